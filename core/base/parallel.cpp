@@ -1,0 +1,91 @@
+#include "core/base/parallel.hpp"
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include <unistd.h>
+
+namespace sonar {
+
+struct Parallel::Pool {
+  std::mutex mutex;
+  std::condition_variable start, finished;
+  std::vector<std::thread> workers;
+  std::uint64_t round = 0;
+  int busy = 0;
+  bool stop = false;
+
+  std::atomic<std::size_t> next{0};
+  std::size_t count = 0;
+  void* body = nullptr;
+  Call call = nullptr;
+
+  void take_items(int worker) {
+    for (std::size_t i = next.fetch_add(1, std::memory_order_relaxed); i < count;
+         i = next.fetch_add(1, std::memory_order_relaxed))
+      call(body, i, worker);
+  }
+
+  void work(int worker, int nice_by) {
+    // On Linux niceness belongs to the thread; a refusal costs only smoothness.
+    if (nice_by != 0 && ::nice(nice_by) == -1) {
+    }
+    std::uint64_t seen = 0;
+    while (true) {
+      {
+        std::unique_lock lock(mutex);
+        start.wait(lock, [&] { return stop || round != seen; });
+        if (stop) return;
+        seen = round;
+      }
+      take_items(worker);
+      {
+        std::lock_guard lock(mutex);
+        if (--busy == 0) finished.notify_one();
+      }
+    }
+  }
+};
+
+Parallel::Parallel(int threads, int nice) : threads_(threads < 1 ? 1 : threads) {
+  if (threads_ == 1) return;
+  pool_ = std::make_unique<Pool>();
+  for (int worker = 1; worker < threads_; ++worker)
+    pool_->workers.emplace_back([pool = pool_.get(), worker, nice] { pool->work(worker, nice); });
+}
+
+Parallel::~Parallel() {
+  if (!pool_) return;
+  {
+    std::lock_guard lock(pool_->mutex);
+    pool_->stop = true;
+  }
+  pool_->start.notify_all();
+  for (auto& t : pool_->workers) t.join();
+}
+
+void Parallel::run(std::size_t count, void* body, Call call) {
+  if (!pool_ || count < 2) {
+    for (std::size_t i = 0; i < count; ++i) call(body, i, 0);
+    return;
+  }
+  Pool& p = *pool_;
+  {
+    std::lock_guard lock(p.mutex);
+    p.count = count;
+    p.body = body;
+    p.call = call;
+    p.next.store(0, std::memory_order_relaxed);
+    p.busy = threads_ - 1;
+    ++p.round;
+  }
+  p.start.notify_all();
+  p.take_items(0);
+  std::unique_lock lock(p.mutex);
+  p.finished.wait(lock, [&] { return p.busy == 0; });
+}
+
+}  // namespace sonar

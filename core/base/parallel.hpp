@@ -1,0 +1,38 @@
+// A fixed pool of compute threads for the loops inside the stages of a ping. The only threads core/ ever has.
+// Items are handed out from an atomic counter; results must not depend on who takes which.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+namespace sonar {
+
+class Parallel {
+ public:
+  /// `threads` counts the calling thread; 1 runs everything in place. `nice` is added to the workers' niceness.
+  explicit Parallel(int threads = 1, int nice = 0);
+  ~Parallel();
+  Parallel(const Parallel&) = delete;
+  Parallel& operator=(const Parallel&) = delete;
+
+  int threads() const { return threads_; }
+
+  /// Calls body(item, worker) once for every item in [0, count) and returns when all are done; worker is in [0, threads()).
+  /// One caller at a time. The body must not throw.
+  template <class Body>
+  void for_each(std::size_t count, Body&& body) {
+    using Plain = std::remove_reference_t<Body>;
+    run(count, const_cast<void*>(static_cast<const void*>(&body)),
+        [](void* b, std::size_t item, int worker) { (*static_cast<Plain*>(b))(item, worker); });
+  }
+
+ private:
+  using Call = void (*)(void* body, std::size_t item, int worker);
+  void run(std::size_t count, void* body, Call call);
+
+  int threads_ = 1;
+  struct Pool;
+  std::unique_ptr<Pool> pool_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,49 @@
+// Counter-based random numbers: every draw is a function of its key and counter, so no order, thread or device can change it.
+// Source: Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3" (Philox4x32-10); known-answer vectors in tests.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "core/base/host_device.hpp"
+
+namespace sonar {
+
+struct Random4 {
+  std::uint32_t v[4];
+};
+struct ComplexNormal {
+  float re, im;
+};
+
+/// Philox4x32 with ten rounds: four 32-bit words from a 128-bit counter and a 64-bit key.
+SONAR_HD constexpr Random4 philox(std::uint32_t c0, std::uint32_t c1, std::uint32_t c2, std::uint32_t c3, std::uint32_t k0,
+                                  std::uint32_t k1) {
+  for (int round = 0; round < 10; ++round) {
+    const std::uint64_t p0 = std::uint64_t{0xD2511F53u} * c0;
+    const std::uint64_t p1 = std::uint64_t{0xCD9E8D57u} * c2;
+    const std::uint32_t n0 = static_cast<std::uint32_t>(p1 >> 32) ^ c1 ^ k0;
+    const std::uint32_t n2 = static_cast<std::uint32_t>(p0 >> 32) ^ c3 ^ k1;
+    c1 = static_cast<std::uint32_t>(p1);
+    c3 = static_cast<std::uint32_t>(p0);
+    c0 = n0;
+    c2 = n2;
+    k0 += 0x9E3779B9u;
+    k1 += 0xBB67AE85u;
+  }
+  return {{c0, c1, c2, c3}};
+}
+
+/// (0, 1): never 0, so that its logarithm is finite.
+SONAR_HD constexpr float uniform_open(std::uint32_t bits) {
+  return (static_cast<float>(bits >> 9) + 0.5f) * (1.0f / 8388608.0f);
+}
+
+/// Circular complex Gaussian with E|z|^2 = 1 (Box-Muller).
+SONAR_HD inline ComplexNormal complex_normal(std::uint32_t a, std::uint32_t b) {
+  const float radius = std::sqrt(-std::log(uniform_open(a)));
+  const float angle = 6.28318530717958647692f * uniform_open(b);
+  return {radius * std::cos(angle), radius * std::sin(angle)};
+}
+
+}  // namespace sonar

@@ -1,0 +1,34 @@
+// The one way functions report failure that comes from outside: a value or a sentence. See docs/architecture.md, "Errors".
+#pragma once
+
+#include <string>
+#include <tl/expected.hpp>
+#include <utility>
+
+namespace sonar {
+
+/// What went wrong, in the sysexits classes the programs exit with.
+enum class ErrorKind : int {
+  usage = 64,         // arguments
+  bad_data = 65,      // a scene, a mesh, a recording
+  missing_file = 66,
+  unavailable = 69,   // a port, an interface, a device
+  bug = 70,           // ours
+  io = 74,
+  config = 78
+};
+
+struct Error {
+  ErrorKind kind = ErrorKind::bug;
+  std::string text;  // one sentence: what, where, why, next step
+};
+
+template <class T>
+using Result = tl::expected<T, Error>;
+
+inline tl::unexpected<Error> failure(ErrorKind kind, std::string text) {
+  return tl::unexpected<Error>(Error{kind, std::move(text)});
+}
+inline int exit_code(ErrorKind kind) { return static_cast<int>(kind); }
+
+}  // namespace sonar

@@ -1,0 +1,48 @@
+// What rays see: the scene's triangles behind a bounding-volume hierarchy (Embree, in embree_scene.cpp and nowhere else).
+// Static geometry is built once at high quality relative to `origin()`; moving bodies are instances, re-placed per ping.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/base/geometry.hpp"
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+
+/// Sixteen rays side by side. Set origin, direction and far; after trace(), `far` is the distance of the first hit.
+struct alignas(64) RayPacket {
+  static constexpr int size = 16;
+  static constexpr std::uint32_t miss = 0xFFFFFFFFu;
+  float origin_x[size], origin_y[size], origin_z[size];        // [m], relative to RayScene::origin()
+  float direction_x[size], direction_y[size], direction_z[size];  // unit length, world axes
+  float far[size];          // in: longest distance of interest [m]; out: distance of the hit
+  std::uint32_t object[size];    // out: index into Scene::objects, or miss
+  std::uint32_t triangle[size];  // out: index into that object's mesh
+  float normal_x[size], normal_y[size], normal_z[size];  // out: geometric normal, world axes, not normalised, either side
+};
+
+class RayScene {
+ public:
+  /// `build_threads` caps the threads Embree uses for building.
+  RayScene(std::shared_ptr<const Scene> scene, int build_threads);
+  ~RayScene();
+  RayScene(const RayScene&) = delete;
+  RayScene& operator=(const RayScene&) = delete;
+
+  const Scene& scene() const;
+  Vec3d origin() const;  // world position that float coordinates are relative to
+  /// Moves the bodies; called by the thread that owns the scene, before tracing. Costs nothing when nothing moved.
+  void place(std::span<const Pose> bodies_in_world);
+  /// First hits of the active lanes (bit i of `active`). Thread-safe between calls of place().
+  void trace(RayPacket& rays, std::uint32_t active, bool coherent) const;
+  static std::string version();  // "Embree 3.13.5"
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace sonar

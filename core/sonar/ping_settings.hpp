@@ -1,0 +1,31 @@
+// What a client may change between two pings, in our terms. The vendor's law (protocol/<vendor>) fills the grid from its own knobs.
+#pragma once
+
+#include <cstdint>
+
+namespace sonar {
+
+struct SampleFormat {
+  int bits = 8;                  // 8, 16 or 32
+  std::uint32_t max_code = 254;  // saturation value
+  float gamma = 1;               // sample = max_code * (v / full scale)^gamma
+  bool row_gains = false;        // a power gain per row, see Ping::row_gain
+};
+
+struct PingSettings {
+  int mode = 0;  // index into SonarModel::modes
+  int beam_count = 512;
+  int range_bin_count = 437;   // rows
+  float range_m = 10;          // as used by the device, full scale
+  float range_bin_m = 0.0229f;  // row spacing, in the device's metres (with its believed sound speed)
+  float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (acoustics.md 2.2)
+  int samples_per_row = 1;     // 1: a row is the sample at its centre; n: the mean power of n samples across it
+  float rate_hz = 10;          // 0 = standby
+  float gain_db = 0;
+  float device_sound_speed_mps = 1500;        // what the device believes
+  float device_absorption_db_per_m = 0;       // one way, what its TVG believes
+  bool triggered = false;      // one ping per request of the client
+  SampleFormat format;
+};
+
+}  // namespace sonar

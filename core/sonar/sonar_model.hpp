@@ -1,0 +1,56 @@
+// What a sonar IS: the constants of a product, frequency mode by frequency mode. Filled by protocol/<vendor>/models.cpp.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace sonar {
+
+/// Aperture shading of the receive array; sets the side lobes. `unit` switches the pattern off (1 everywhere).
+enum class Taper { uniform, taylor30, hamming, hann, unit };
+/// Which data-sheet number the vertical width is (acoustics.md 2.4): of one pattern, or of transmit times receive.
+enum class ElevationWidthIs { one_way, two_way };
+enum class BeamSpacing {
+  uniform_in_sine,   // beam azimuths asin(s), s linear over +-sin(half aperture): Oculus
+  uniform_in_angle,  // BlueView
+};
+
+struct BeamPattern {
+  float azimuth_width_rad = 0;    // -3 dB width of one receive beam at broadside
+  float elevation_width_rad = 0;  // -3 dB width, see elevation_width_is
+  Taper azimuth_taper = Taper::taylor30;
+  Taper elevation_taper = Taper::uniform;  // uniform (product of two equal sincs) or unit
+  ElevationWidthIs elevation_width_is = ElevationWidthIs::two_way;
+};
+
+/// How the receiver turns pressure into samples (acoustics.md 4.8); constants of the product.
+struct ReceiverLaw {
+  float tvg_slope_db = 30;       // X of X log10 r
+  float tvg_minimum_range_m = 0.5f;
+  float tvg_ceiling_db = 80;     // infinity switches it off
+  float full_scale_upa = 1;      // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
+  float noise_figure_db = 10;
+};
+
+struct FrequencyMode {
+  std::string name;  // "HF", "LF"
+  float centre_hz = 0;
+  float horizontal_aperture_rad = 0;
+  float min_range_m = 0.1f;
+  float max_range_m = 0;
+  float source_level_db = 0;  // dB re 1 uPa rms at 1 m
+  BeamSpacing beam_spacing = BeamSpacing::uniform_in_sine;
+  BeamPattern pattern;
+  ReceiverLaw receiver;
+};
+
+struct SonarModel {
+  std::string profile;  // the name in a configuration: "oculus-m1200d"
+  std::string name;     // for people: "Oculus M1200d"
+  std::uint16_t part_number = 0;
+  std::vector<FrequencyMode> modes;
+  float max_rate_hz = 40;
+};
+
+}  // namespace sonar

@@ -1,0 +1,34 @@
+// The water: what it is, how fast sound goes in it and how much it absorbs. Used by the physics and by devices that compute
+// their believed sound speed. Formulae and their sources: acoustics of docs/architecture.md; oracles 27-29 in tests/core.
+// C++17-clean, standard library only.
+#pragma once
+
+namespace sonar {
+
+struct Water {
+  double temperature_c = 12;
+  double salinity_psu = 30;
+  double ph = 8.0;
+  double sound_speed_mps = 0;  // 0 = computed from the rest (see true_sound_speed_mps)
+};
+
+/// Francois & Garrison 1982. Frequency [Hz], depth [m]; one-way, dB/m.
+double absorption_db_per_m(const Water& water, double depth_m, double frequency_hz);
+/// Ainslie & McColm 1998, the cross-check. dB/m.
+double absorption_ainslie_mccolm_db_per_m(const Water& water, double depth_m, double frequency_hz);
+/// Mackenzie 1981. T 2..30 C, S 25..40, depth 0..8000 m.
+double sound_speed_mackenzie_mps(double temperature_c, double salinity_psu, double depth_m);
+/// Chen & Millero / UNESCO 1983. T 0..40 C, S 0..40, gauge pressure 0..1000 bar.
+double sound_speed_unesco_mps(double temperature_c, double salinity_psu, double pressure_bar);
+/// Bilaniuk & Wong, 148 points: fresh water at the surface, 0..100 C.
+double sound_speed_fresh_mps(double temperature_c);
+/// Density from temperature and salinity [kg/m^3] (UNESCO EOS-80 at the surface).
+double density_kg_per_m3(double temperature_c, double salinity_psu);
+/// Absolute pressure [bar] at a depth: 1.013 + 0.0981 depth rho / 1000; depth below 0 counts as 0.
+double absolute_pressure_bar(const Water& water, double depth_m);
+/// The sound speed the world really has: as given, or UNESCO at that depth.
+double true_sound_speed_mps(const Water& water, double depth_m);
+/// Depth of a place in the world: z = 0 is the surface, depth = -z, at least 0.
+inline double depth_from_z(double z_m) { return z_m < 0 ? -z_m : 0; }
+
+}  // namespace sonar

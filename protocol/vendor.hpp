@@ -1,0 +1,125 @@
+// The one interface between the daemon and a vendor's wire. A vendor is a pure translator: no sockets, no clock, no log.
+// The daemon owns time and bytes in flight; a Dialogue is one client's conversation, a Vendor frames pings and beacons.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/sonar/ping.hpp"
+
+namespace sonar::protocol {
+
+using Bytes = std::vector<std::byte>;
+using BytesView = std::span<const std::byte>;
+using Ipv4 = std::array<std::uint8_t, 4>;  // 192.168.1.2 = {192, 168, 1, 2}
+
+/// One named choice of a protocol's unknowns, settable under `options:` of a sonar in the configuration.
+struct Option {
+  std::string_view name;
+  std::vector<std::string_view> allowed;  // first = default; empty = free number
+  std::string_view default_value;
+  std::string_view meaning;
+};
+using OptionValues = std::map<std::string, std::string>;
+
+/// The emulated device as its own packets describe it. Owned by the daemon's Device; read on the I/O thread only.
+struct DeviceState {
+  std::string name;
+  std::uint16_t id = 0;  // serial number, never 0
+  std::shared_ptr<const SonarModel> model;
+  Ipv4 advertise_ip{}, netmask{255, 255, 255, 0};
+  Ipv4 connected_client{};  // 0.0.0.0 when nobody is connected
+  std::array<std::uint8_t, 6> mac{};
+  Time powered_up_at{};
+  Water water;             // at the device, as measured by its sensors
+  double depth_m = 0;
+  OptionValues options;    // complete: defaults filled in by check_options
+  struct StoredAddress {   // what a client wrote; stored, never applied
+    std::uint32_t ip = 0, netmask = 0;
+    bool dhcp = false;
+  } stored_address;
+};
+
+/// The client replaced the device's settings. `request`: its own bytes, echoed in the pings made with them.
+struct ChangeSettings {
+  PingSettings settings;
+  Bytes request;
+  std::string summary;  // for the log: "mode 2, range 20 m, gain 50 %, rate 10 Hz"
+  bool repeated = false;  // byte-identical to this client's previous request: must not restart the ping timer
+};
+struct RequestPing {};  // one ping now (network trigger, BlueView)
+struct StoreAddress {
+  DeviceState::StoredAddress address;
+};
+struct Notice {  // worth one (rate-limited) log line, e.g. junk skipped or a request refused
+  std::string text;
+};
+struct Close {
+  std::string why;
+};
+using Event = std::variant<ChangeSettings, RequestPing, StoreAddress, Notice, Close>;
+struct Reaction {
+  std::vector<Event> events;
+  std::vector<Bytes> replies;  // whole messages, in order
+};
+
+class Dialogue {
+ public:
+  virtual ~Dialogue() = default;
+  /// Any split of the stream, any garbage. Never throws, never grows without bound.
+  virtual Reaction on_bytes(BytesView received, Time now) = 0;
+  /// Keep-alives. Called at or after next_tick().
+  virtual Reaction on_tick(Time now) = 0;
+  virtual Time next_tick() const = 0;
+  /// A ping was put into this client's outbox: keep-alives only fill silence.
+  virtual void on_ping_queued(Time now) = 0;
+};
+
+struct Port {
+  enum class Kind { tcp_listen, udp_broadcast } kind{};
+  std::uint16_t number = 0;
+  std::chrono::milliseconds period{0};  // of beacons
+};
+
+class Vendor {
+ public:
+  virtual ~Vendor() = default;
+  virtual std::string_view name() const = 0;
+  virtual std::span<const std::shared_ptr<const SonarModel>> models() const = 0;
+  virtual std::span<const Port> ports() const = 0;
+  virtual std::span<const Option> options() const = 0;
+  virtual int default_max_clients() const = 0;
+  /// What the device does before any client spoke (its stored configuration). `request` may be empty.
+  virtual ChangeSettings initial_settings(const DeviceState& device) const = 0;
+  virtual bool pings_before_first_request(const DeviceState& device) const = 0;
+  /// Empty when the vendor has no beacon.
+  virtual Bytes beacon(const DeviceState& device, Time now) const = 0;
+  /// The state must outlive the dialogue.
+  virtual std::unique_ptr<Dialogue> converse(const DeviceState& device, Time now) const = 0;
+  /// Once per ping, shared by all sessions. `request`: ChangeSettings::request of the settings the ping was made with.
+  virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device, BytesView request) const = 0;
+};
+
+/// Fills in defaults; refuses unknown names and values with a sentence that names the nearest valid one.
+Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& given);
+
+/// Adding a vendor = one folder + one line in vendors.cpp.
+std::span<const Vendor* const> vendors();
+/// The vendor and model behind a profile name, or a sentence with the nearest names.
+struct Profile {
+  const Vendor* vendor = nullptr;
+  std::shared_ptr<const SonarModel> model;
+};
+Result<Profile> find_profile(std::string_view profile);
+
+}  // namespace sonar::protocol
