@@ -1,0 +1,112 @@
+// Oracles 27 to 29 of the acoustic model: absorption table, continuity of its branches, published sound speeds;
+// and the check values of the density equation. Reference numbers come from the papers, not from our code.
+#include "core/sonar/water.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar {
+namespace {
+
+struct WaterColumn {
+  double temperature_c, salinity_psu;
+};
+constexpr WaterColumn waters[] = {{4, 35}, {10, 35}, {20, 35}, {10, 0}, {20, 0}};
+
+// Francois & Garrison at pH 8 and the surface, dB/km.
+struct AbsorptionRow {
+  double frequency_khz;
+  double db_per_km[5];
+};
+constexpr AbsorptionRow absorption_table[] = {
+    {100, {27.54, 33.63, 38.06, 3.11, 2.20}},        {300, {65.60, 73.14, 101.96, 27.97, 19.81}},
+    {450, {111.5, 109.7, 134.8, 62.94, 44.57}},      {750, {257.1, 222.4, 218.9, 174.8, 123.8}},
+    {900, {357.1, 299.5, 274.2, 251.7, 178.3}},      {1200, {611.5, 495.4, 413.8, 447.6, 316.9}},
+    {2100, {1810.6, 1418.6, 1068.3, 1370.6, 970.6}}, {3000, {3663.6, 2845.2, 2078.7, 2797.2, 1980.9}},
+};
+
+TEST(Water, Oracle27_AbsorptionTable) {
+  for (const AbsorptionRow& row : absorption_table) {
+    for (int column = 0; column < 5; ++column) {
+      const Water water{.temperature_c = waters[column].temperature_c, .salinity_psu = waters[column].salinity_psu, .ph = 8};
+      const double got = 1000 * absorption_db_per_m(water, 0, row.frequency_khz * 1e3);
+      // The two smallest entries are printed to three digits only.
+      const double tolerance = std::max(1e-3 * row.db_per_km[column], 0.0051);
+      EXPECT_NEAR(got, row.db_per_km[column], tolerance) << row.frequency_khz << " kHz, column " << column;
+    }
+  }
+}
+
+TEST(Water, AbsorptionFormulaeAgreeWithEachOther) {
+  const Water sea{.temperature_c = 10, .salinity_psu = 35, .ph = 8};
+  for (double f : {900e3, 1200e3, 2100e3, 3000e3}) {
+    const double ratio = absorption_ainslie_mccolm_db_per_m(sea, 0, f) / absorption_db_per_m(sea, 0, f);
+    EXPECT_GT(ratio, 1.0) << f;
+    EXPECT_LT(ratio, 1.10) << f;
+  }
+  for (double f : {1e3, 10e3, 100e3}) {
+    EXPECT_NEAR(absorption_ainslie_mccolm_db_per_m(sea, 0, f) / absorption_db_per_m(sea, 0, f), 1.0, 0.11) << f;
+  }
+}
+
+TEST(Water, AbsorptionFallsWithDepthAndIsFiniteAtTheEdges) {
+  const Water sea{.temperature_c = 10, .salinity_psu = 35, .ph = 8};
+  EXPECT_LT(absorption_db_per_m(sea, 1000, 100e3), absorption_db_per_m(sea, 0, 100e3));
+  EXPECT_DOUBLE_EQ(absorption_db_per_m(sea, -5, 1e6), absorption_db_per_m(sea, 0, 1e6));
+  const Water fresh{.temperature_c = 10, .salinity_psu = 0, .ph = 8};
+  EXPECT_EQ(absorption_db_per_m(fresh, 0, 0), 0);
+  EXPECT_EQ(absorption_ainslie_mccolm_db_per_m(fresh, 0, 0), 0);
+}
+
+TEST(Water, Oracle28_AbsorptionBranchesMeetAt20Degrees) {
+  for (const double salinity : {0.0, 35.0}) {
+    for (const AbsorptionRow& row : absorption_table) {
+      const Water below{.temperature_c = 20, .salinity_psu = salinity, .ph = 8};
+      const Water above{.temperature_c = std::nextafter(20.0, 21.0), .salinity_psu = salinity, .ph = 8};
+      const double f = row.frequency_khz * 1e3;
+      const double a = absorption_db_per_m(below, 0, f), b = absorption_db_per_m(above, 0, f);
+      EXPECT_NE(a, b);  // two branches, not one
+      EXPECT_NEAR(b / a, 1, 1e-3) << row.frequency_khz << " kHz, S " << salinity;
+    }
+  }
+}
+
+TEST(Water, Oracle29_SoundSpeeds) {
+  EXPECT_NEAR(sound_speed_mackenzie_mps(25, 35, 1000), 1550.744, 0.01);
+  EXPECT_NEAR(sound_speed_mackenzie_mps(10, 35, 0), 1489.803, 0.01);
+  EXPECT_NEAR(sound_speed_unesco_mps(40, 40, 1000), 1731.995, 0.01);
+  EXPECT_NEAR(sound_speed_unesco_mps(20, 0, 0), 1482.34, 0.01);
+  EXPECT_NEAR(sound_speed_fresh_mps(20), 1482.36, 0.01);
+}
+
+TEST(Water, TheTwoSeaFormulaeAgree) {
+  for (double t : {2.0, 10.0, 25.0}) {
+    for (double s : {30.0, 35.0}) {
+      EXPECT_NEAR(sound_speed_mackenzie_mps(t, s, 0), sound_speed_unesco_mps(t, s, 0), 0.5) << t << " C, S " << s;
+    }
+  }
+}
+
+// UNESCO technical papers in marine science 44, table of check values at zero gauge pressure.
+TEST(Water, DensityCheckValues) {
+  EXPECT_NEAR(density_kg_per_m3(5, 0), 999.96675, 1e-4);
+  EXPECT_NEAR(density_kg_per_m3(5, 35), 1027.67547, 1e-4);
+  EXPECT_NEAR(density_kg_per_m3(25, 35), 1023.34306, 1e-4);
+}
+
+TEST(Water, PressureAndTrueSoundSpeed) {
+  Water sea{.temperature_c = 5, .salinity_psu = 35, .ph = 8};
+  EXPECT_DOUBLE_EQ(absolute_pressure_bar(sea, -3), 1.013);
+  EXPECT_NEAR(absolute_pressure_bar(sea, 10), 1.013 + 0.0981 * 10 * 1.02767547, 1e-6);
+  EXPECT_DOUBLE_EQ(true_sound_speed_mps(sea, 0), sound_speed_unesco_mps(5, 35, 0));
+  EXPECT_NEAR(true_sound_speed_mps(sea, 100) - true_sound_speed_mps(sea, 0), 1.63, 0.05);
+  sea.sound_speed_mps = 1234;
+  EXPECT_EQ(true_sound_speed_mps(sea, 100), 1234);
+  EXPECT_EQ(depth_from_z(-7), 7);
+  EXPECT_EQ(depth_from_z(2), 0);
+}
+
+}  // namespace
+}  // namespace sonar
