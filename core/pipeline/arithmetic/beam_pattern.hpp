@@ -1,0 +1,143 @@
+// Directivity of the receive array in azimuth and of transmitter times receiver in elevation, as closed forms.
+// Used by the coupling of columns to beams, by the cells' amplitudes, and by whoever predicts a level.
+// C++17-clean, standard library only: nvcc reads it too.
+#pragma once
+
+#include <cmath>
+
+#include "core/base/geometry.hpp"
+#include "core/base/host_device.hpp"
+#include "core/sonar/sonar_model.hpp"
+
+namespace sonar {
+
+/// Number of terms of the aperture's cosine series that any of our tapers needs.
+inline constexpr int taper_terms = 4;
+
+/// Aperture shading g(p) = 1 + 2 sum_m c[m] cos(2 pi m p), p = place on the aperture / its length; c[0] = 1.
+/// Its far-field amplitude is D(x) = sum_m c[|m|] sinc(x - m), x = aperture / wavelength * sine offset; D(0) = 1.
+struct TaperSeries {
+  double c[taper_terms] = {1, 0, 0, 0};
+};
+
+/// sin(pi x) / (pi x)
+SONAR_HD inline double sinc(double x) {
+  const double a = pi * x;
+  return std::fabs(a) < 1e-4 ? 1 - a * a / 6 : std::sin(a) / a;
+}
+
+/// Taylor 1955 one-parameter line source, nbar = 4, design side lobes -30 dB. The first nbar - 1 zeros move to
+/// z_n = sigma sqrt(A^2 + (n - 1/2)^2), A = acosh(10^(30/20)) / pi, sigma^2 = nbar^2 / (A^2 + (nbar - 1/2)^2).
+SONAR_HD inline TaperSeries taylor30_series() {
+  constexpr int nbar = taper_terms;
+  const double a = std::acosh(std::pow(10.0, 30.0 / 20.0)) / pi;
+  const double sigma2 = nbar * nbar / (a * a + (nbar - 0.5) * (nbar - 0.5));
+  TaperSeries series;
+  for (int m = 1; m < nbar; ++m) {
+    double value = 1;  // ((nbar-1)!)^2 / ((nbar-1+m)! (nbar-1-m)!), factor by factor
+    for (int i = 1; i <= m; ++i) value *= static_cast<double>(nbar - i) / (nbar - 1 + i);
+    for (int n = 1; n < nbar; ++n) value *= 1 - m * m / (sigma2 * (a * a + (n - 0.5) * (n - 0.5)));
+    series.c[m] = value;
+  }
+  return series;
+}
+
+SONAR_HD inline TaperSeries taper_series(Taper taper) {
+  TaperSeries series;
+  if (taper == Taper::taylor30) return taylor30_series();
+  if (taper == Taper::hamming) series.c[1] = 0.23 / 0.54;
+  if (taper == Taper::hann) series.c[1] = 0.5;
+  return series;
+}
+
+/// Signed amplitude D(x) of a series, see TaperSeries.
+SONAR_HD inline double series_amplitude(const TaperSeries& series, double x) {
+  double sum = sinc(x);
+  for (int m = 1; m < taper_terms; ++m) {
+    if (series.c[m] != 0) sum += series.c[m] * (sinc(x - m) + sinc(x + m));
+  }
+  return sum;
+}
+
+/// Signed amplitude at x = aperture / wavelength * sine offset; 1 everywhere for `unit`.
+SONAR_HD inline double beam_amplitude(Taper taper, double x) {
+  return taper == Taper::unit ? 1.0 : series_amplitude(taper_series(taper), x);
+}
+
+/// The x > 0 on the main lobe at which D(x) falls to `level` (0 < level < 1).
+SONAR_HD inline double main_lobe_crossing(const TaperSeries& series, double level) {
+  double low = 0, high = 1;  // every taper here is below 0.7 at x = 1 and falls monotonically until then
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (series_amplitude(series, middle) > level ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+/// -3 dB width in units of wavelength / aperture: uniform 0.886, taylor30 1.125, hamming 1.303, hann 1.441.
+SONAR_HD inline double width_factor(Taper taper) {
+  return taper == Taper::unit ? 1.0 : 2 * main_lobe_crossing(taper_series(taper), std::sqrt(0.5));
+}
+
+/// Aperture in wavelengths that gives the -3 dB width [rad] at broadside (acoustics.md 2.4); the beam spans +-sin(width / 2).
+SONAR_HD inline double aperture_in_wavelengths(Taper taper, double width_rad) {
+  return width_factor(taper) / (2 * std::sin(0.5 * width_rad));
+}
+SONAR_HD inline double lambda_over_aperture(Taper taper, double width_rad) {
+  return 1 / aperture_in_wavelengths(taper, width_rad);
+}
+
+/// Signed receive amplitude W of eq. (9): `du` = difference of the direction sines of source and beam axis.
+SONAR_HD inline double directivity(Taper taper, double aperture_wavelengths, double du) {
+  return beam_amplitude(taper, aperture_wavelengths * du);
+}
+
+/// Integral of D^2 over u = what sum_k W_jk^2 du_k tends to: the width in sine space whose scatterers a beam collects.
+/// The terms of the series are orthonormal, so this is exact. Not defined for `unit`.
+SONAR_HD inline double effective_beam_width_u(Taper taper, double aperture_wavelengths) {
+  const TaperSeries series = taper_series(taper);
+  double sum = 1;
+  for (int m = 1; m < taper_terms; ++m) sum += 2 * series.c[m] * series.c[m];
+  return sum / aperture_wavelengths;
+}
+
+/// Vertical aperture in wavelengths of each of the two equal sincs (transmit, receive). Of the quoted width, half lies on
+/// either side; there the one pattern (one_way) or the product (two_way) is at half power.
+SONAR_HD inline double elevation_aperture_in_wavelengths(const BeamPattern& pattern) {
+  const double level = pattern.elevation_width_is == ElevationWidthIs::one_way ? std::sqrt(0.5) : std::sqrt(std::sqrt(0.5));
+  const double half_width = 0.5 * static_cast<double>(pattern.elevation_width_rad);
+  return main_lobe_crossing(TaperSeries{}, level) / std::sin(half_width);
+}
+
+/// Amplitude Dtx * Erx at angle psi about the array axis [rad] for a known aperture; 0 behind the array.
+SONAR_HD inline double elevation_two_way(double elevation_aperture_wavelengths, double psi_rad) {
+  if (std::fabs(psi_rad) >= 0.5 * pi) return 0;
+  const double d = sinc(elevation_aperture_wavelengths * std::sin(psi_rad));
+  return d * d;
+}
+/// The same from the data sheet's numbers. Solves for the aperture each time: keep the aperture in loops.
+SONAR_HD inline double elevation_two_way(const BeamPattern& pattern, double psi_rad) {
+  if (pattern.elevation_taper == Taper::unit) return std::fabs(psi_rad) < 0.5 * pi ? 1 : 0;
+  return elevation_two_way(elevation_aperture_in_wavelengths(pattern), psi_rad);
+}
+
+/// |psi| at which Dtx * Erx has fallen to `level` (0 < level < 1, amplitude): how far out a fan must reach. pi / 2 for `unit`.
+SONAR_HD inline double elevation_reach_rad(const BeamPattern& pattern, double level) {
+  if (pattern.elevation_taper == Taper::unit) return 0.5 * pi;
+  const double sine = main_lobe_crossing(TaperSeries{}, std::sqrt(level)) / elevation_aperture_in_wavelengths(pattern);
+  return sine < 1 ? std::asin(sine) : 0.5 * pi;
+}
+
+/// A straight array along y measures u = cos(elevation) sin(azimuth); psi is the angle about that axis (acoustics.md 2.4).
+struct ConicalDirection {
+  double u = 0, psi_rad = 0;
+};
+SONAR_HD inline ConicalDirection conical_from_sonar(Vec3d direction_in_sonar) {
+  return {direction_in_sonar.y / length(direction_in_sonar), std::atan2(direction_in_sonar.z, direction_in_sonar.x)};
+}
+SONAR_HD inline Vec3d sonar_from_conical(const ConicalDirection& d) {
+  const double across = std::sqrt(1 - d.u * d.u);
+  return {across * std::cos(d.psi_rad), d.u, across * std::sin(d.psi_rad)};
+}
+
+}  // namespace sonar

@@ -1,0 +1,54 @@
+// What a scatterer sends back: Lambert cross-sections, spreading, absorption, carrier phase (acoustics.md 2.1, eq. 5-6).
+// Used by cells, by the fixed fan and by point targets. C++17-clean, standard library only.
+#pragma once
+
+#include <cmath>
+
+#include "core/base/geometry.hpp"
+#include "core/base/host_device.hpp"
+
+namespace sonar {
+
+/// Cosine of incidence below which a facet's area per solid angle is held: silhouettes must not blow up.
+inline constexpr double cosine_floor = 1e-3;
+/// Range [m] below which nothing echoes: inside the housing, and 1/r^2 has no meaning.
+inline constexpr double nearest_scatterer_m = 1e-2;
+/// Largest Lambert coefficient that conserves energy, 10 log10(1/pi) dB.
+inline constexpr double largest_lambert_db = -4.971498726941338;
+
+/// mu [1/sr] from 10 log10 mu.
+SONAR_HD inline double lambert_coefficient(double lambert_db) { return std::pow(10.0, 0.1 * lambert_db); }
+
+/// Lambert's sigma_b = mu cos^2(incidence) per unit surface area.
+SONAR_HD inline double lambert_per_area(double mu, double cosine) { return mu * cosine * cosine; }
+/// Cross-section [m^2] of a piece of surface of known area (a cell).
+SONAR_HD inline double cell_cross_section_m2(double mu, double cosine, double area_m2) {
+  return lambert_per_area(mu, cosine) * area_m2;
+}
+/// Surface area [m^2] seen in a solid angle at range r.
+SONAR_HD inline double footprint_area_m2(double cosine, double range_m, double solid_angle_sr) {
+  const double c = std::fabs(cosine);
+  return range_m * range_m * solid_angle_sr / (c > cosine_floor ? c : cosine_floor);
+}
+/// Cross-section [m^2] of what a solid angle sees: eq. (5), mu cos r^2 dOmega away from grazing.
+SONAR_HD inline double lambert_cross_section_m2(double mu, double cosine, double range_m, double solid_angle_sr) {
+  return cell_cross_section_m2(mu, cosine, footprint_area_m2(cosine, range_m, solid_angle_sr));
+}
+
+/// Amplitude absorption [Np/m] from dB/m: 1 Np = 8.686 dB.
+SONAR_HD inline double nepers_from_db(double db) { return db * 0.11512925464970228; }
+
+/// Two-way pressure factor 1/r^2 exp(-2 alpha r); alpha one way [Np/m]. 0 nearer than nearest_scatterer_m, and for NaN.
+SONAR_HD inline double two_way_transmission(double range_m, double alpha_np_per_m) {
+  if (!(range_m >= nearest_scatterer_m)) return 0;
+  return std::exp(-2 * alpha_np_per_m * range_m) / (range_m * range_m);
+}
+
+/// Carrier phase of an echo from range r in turns, folded to [0, 1): the echo is multiplied by exp(-i 2 pi turns).
+/// In double: a float range alone costs 1e-3 of the signal at 900 kHz (acoustics.md 5.3).
+SONAR_HD inline double carrier_turns(double centre_hz, double sound_speed_mps, double range_m) {
+  const double turns = 2 * centre_hz * range_m / sound_speed_mps;
+  return turns - std::floor(turns);
+}
+
+}  // namespace sonar
