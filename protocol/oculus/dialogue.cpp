@@ -1,0 +1,150 @@
+#include "protocol/oculus/dialogue.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <optional>
+
+#include "protocol/oculus/framer.hpp"
+#include "protocol/oculus/options.hpp"
+#include "protocol/oculus/replies.hpp"
+#include "protocol/oculus/settings.hpp"
+
+namespace sonar::oculus {
+namespace {
+
+using protocol::ChangeSettings;
+using protocol::DeviceState;
+using protocol::Notice;
+using protocol::Reaction;
+using protocol::RequestPing;
+using protocol::StoreAddress;
+
+constexpr std::size_t notices_per_call = 8;  // a hostile client must not turn its bytes into more of ours
+
+class OculusDialogue final : public protocol::Dialogue {
+ public:
+  OculusDialogue(const DeviceState& device, Time now) : device_(device) {
+    postpone_dummy(now);
+    if (text_option(device.options, option_name::boot_text) == "on") next_tick_ = now, greets_ = true;
+  }
+
+  Reaction on_bytes(protocol::BytesView received, Time now) override {
+    Reaction reaction;
+    notices_ = 0;
+    stored_ = device_.stored_address;
+    const std::uint64_t skipped_before = framer_.skipped_bytes();
+    framer_.append(received);
+    while (const auto message = framer_.next()) on_message(*message, now, reaction);
+    if (const std::uint64_t skipped = framer_.skipped_bytes() - skipped_before; skipped > 0)
+      notice(reaction, "skipped " + std::to_string(skipped) + " bytes that start no Oculus message");
+    return reaction;
+  }
+
+  Reaction on_tick(Time now) override {
+    Reaction reaction;
+    if (now < next_tick_) return reaction;
+    if (greets_) {
+      reaction.replies.push_back(make_log(device_.id, "sonard: emulated " + device_.model->name + "\n"));
+      greets_ = false;
+    } else {
+      reaction.replies.push_back(make_dummy(device_.id));
+    }
+    postpone_dummy(now);
+    return reaction;
+  }
+
+  Time next_tick() const override { return next_tick_; }
+  void on_ping_queued(Time now) override {
+    if (!greets_) postpone_dummy(now);
+  }
+
+ private:
+  void on_message(wire::BytesView message, Time now, Reaction& reaction) {
+    const MessageHeader header = header_of(message);
+    switch (header.type) {
+      case MessageType::fire:
+        return on_fire(message, now, reaction);
+      case MessageType::user_config:
+        return on_user_config(message, now, reaction);
+      case MessageType::dummy:
+        return;
+      default:
+        break;
+    }
+    char text[80];
+    std::snprintf(text, sizeof text, "ignored a message of unexpected type 0x%04X (%zu bytes)",
+                  static_cast<unsigned>(header.type), message.size());
+    notice(reaction, text);
+  }
+
+  void on_fire(wire::BytesView message, Time now, Reaction& reaction) {
+    const auto fire = parse_fire(message);
+    if (!fire) return notice(reaction, "ignored a fire message of " + std::to_string(message.size()) + " bytes, 53 are needed");
+    if (has_non_finite(fire->settings))
+      return notice(reaction, "ignored a fire message whose range, gain, sound speed or salinity is not a finite number");
+    Settled settled = settle(*fire, device_);
+    if (!settled.clamped.empty() && text_option(device_.options, option_name::out_of_range) == "ignore")
+      return notice(reaction, "ignored a fire message: " + settled.clamped.front() + " (option out_of_range: ignore)");
+
+    protocol::Bytes request = make_fire(*fire, 0);
+    const bool standby = settled.settings.rate_hz <= 0;
+    const bool repeated = request == last_request_;
+    last_request_ = request;
+    const bool one_ping = settled.settings.triggered && !standby;
+    reaction.events.emplace_back(ChangeSettings{settled.settings, std::move(request), summary(*fire, settled), repeated});
+    if (one_ping) reaction.events.emplace_back(RequestPing{});
+    if (standby && !repeated) {  // drivers take a dummy as the acknowledgement of standby
+      reaction.replies.push_back(make_dummy(device_.id));
+      postpone_dummy(now);
+    }
+  }
+
+  std::string summary(const FireRequest& fire, const Settled& settled) const {
+    std::string text = describe(fire);
+    for (const std::string& clamped : settled.clamped) text += "; " + clamped;
+    const bool bit = (fire.settings.flags & flag::gain_assist) != 0;
+    if (bit == (text_option(device_.options, option_name::gain_assist_bit) == "set_enables"))
+      text += "; gain assist has no effect";
+    return text;
+  }
+
+  void on_user_config(wire::BytesView message, Time now, Reaction& reaction) {
+    UserConfigMessage config;
+    wire::Reader reader(message);
+    fields(reader, config);
+    if (!reader.ok()) return notice(reaction, "ignored a user configuration: " + reader.failure_text());
+    const bool write = config.ip_address != 0;
+    if (write) {
+      stored_ = {config.ip_address, config.ip_mask, config.dhcp_enable != 0};
+      reaction.events.emplace_back(StoreAddress{stored_});
+    }
+    if (write && text_option(device_.options, option_name::user_config_write) != "reply") return;
+    reaction.replies.push_back(make_user_config(device_.id, stored_, device_));
+    postpone_dummy(now);  // the one client that asks takes whatever 28 bytes come first: leave it quiet
+  }
+
+  void notice(Reaction& reaction, std::string text) {
+    if (notices_++ < notices_per_call) reaction.events.emplace_back(Notice{std::move(text)});
+  }
+
+  void postpone_dummy(Time now) {
+    const double period_ms = std::clamp(number_option(device_.options, option_name::dummy_period_ms), 10.0, 60000.0);
+    next_tick_ = now + nanoseconds_from(period_ms * 1e-3);
+  }
+
+  const DeviceState& device_;
+  Framer framer_{Sender::client};
+  protocol::Bytes last_request_;
+  DeviceState::StoredAddress stored_;  // as of this call: a read may follow its write in the same bytes
+  Time next_tick_{};
+  bool greets_ = false;
+  std::size_t notices_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now) {
+  return std::make_unique<OculusDialogue>(device, now);
+}
+
+}  // namespace sonar::oculus

@@ -1,0 +1,14 @@
+// One client's conversation with an emulated Oculus: bytes and ticks in, events and replies out. No socket, no clock, no log.
+// The daemon's Session feeds it and carries out what it returns.
+#pragma once
+
+#include <memory>
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::oculus {
+
+/// The state must outlive the dialogue.
+std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now);
+
+}  // namespace sonar::oculus

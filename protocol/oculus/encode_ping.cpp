@@ -1,0 +1,162 @@
+#include "protocol/oculus/encode_ping.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "core/base/geometry.hpp"
+#include "protocol/oculus/options.hpp"
+#include "protocol/oculus/settings.hpp"
+
+namespace sonar::oculus {
+namespace {
+
+/// Floats near 65 deg err by 4e-4 of a hundredth; the capture's own law comes no closer than this to a whole number but on it.
+constexpr double truncation_guard_cdeg = 1e-3;
+
+PingResultV1 version_1(const PingHead& head) {
+  const PingResultV2& from = head.fixed;
+  PingResultV1 to;
+  to.header = from.header;
+  to.fire = from.fire;
+  to.ping_id = from.ping_id;
+  to.status = from.status;
+  to.frequency_hz = from.frequency_hz;
+  to.temperature_c = from.temperature_c;
+  to.pressure_bar = from.pressure_bar;
+  to.sound_speed_mps = from.sound_speed_mps;
+  to.ping_start_time = head.ping_start_counter;
+  to.data_size = from.data_size;
+  to.range_resolution_m = from.range_resolution_m;
+  to.row_count = from.row_count;
+  to.beam_count = from.beam_count;
+  to.sizes = from.sizes;
+  return to;
+}
+
+void append_image(wire::Bytes& out, const PingBlocks& blocks, std::size_t rows) {
+  const std::size_t row_bytes = rows == 0 ? 0 : blocks.samples.size() / rows;
+  wire::Writer write(out);
+  for (std::size_t row = 0; row < rows; ++row) {
+    if (!blocks.row_gains.empty()) write("rowGain", blocks.row_gains[row]);
+    const auto samples = blocks.samples.subspan(row * row_bytes, row_bytes);
+    out.insert(out.end(), samples.begin(), samples.end());
+  }
+}
+
+DataSize data_size_from(int bits) {
+  switch (bits) {
+    case 8:
+      return DataSize::bits8;
+    case 16:
+      return DataSize::bits16;
+    case 24:
+      return DataSize::bits24;
+    default:
+      return DataSize::bits32;
+  }
+}
+
+std::uint16_t reply_version(const FireRequest& fire, std::string_view option) {
+  if (option == "0") return 0;
+  if (option == "1") return 1;
+  if (option == "2") return 2;
+  return std::min<std::uint16_t>(fire.version, 2);  // mirror; there is no version above 2
+}
+
+void set_attitude(PingResultV2& fixed, const Quatd& vehicle_in_world) {
+  const RollPitchYaw angles = rpy_from_quat(vehicle_in_world);
+  fixed.heading_deg = deg_from_rad(heading_rad(vehicle_in_world));
+  fixed.pitch_deg = -deg_from_rad(angles.pitch_rad);  // about y to port, positive is bow down; the packet wants bow up
+  fixed.roll_deg = deg_from_rad(angles.roll_rad);
+}
+
+void set_environment(PingResultV2& fixed, const PingRequest& request) {
+  fixed.temperature_c = request.water.temperature_c;
+  fixed.pressure_bar = absolute_pressure_bar(request.water, depth_from_z(request.sonar_in_world.position_m.z));
+  set_attitude(fixed, request.vehicle_in_world.orientation);
+}
+
+/// Seconds of the power-up clock in both versions' forms.
+void set_start_time(PingHead& head, std::chrono::nanoseconds since_power_up, std::string_view unit) {
+  const auto microseconds = std::chrono::floor<std::chrono::microseconds>(since_power_up).count();
+  head.fixed.ping_start_time_s = static_cast<double>(microseconds) * 1e-6;
+  head.ping_start_counter = static_cast<std::uint32_t>(unit == "microseconds" ? microseconds : since_power_up.count());
+}
+
+/// The double the client sent, when that is what was used; settings keep it as a float.
+double sound_speed_used(const FireSettings& asked, const PingSettings& settings) {
+  const bool as_asked = static_cast<float>(asked.sound_speed_mps) == settings.device_sound_speed_mps;
+  return as_asked ? asked.sound_speed_mps : static_cast<double>(settings.device_sound_speed_mps);
+}
+
+}  // namespace
+
+wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks) {
+  PingResultV2& fixed = head.fixed;
+  const bool long_form = fixed.header.version >= 2;
+  const std::size_t fixed_size = long_form ? ping_v2_size : ping_v1_size;
+  const std::size_t offset = std::max<std::size_t>(image_offset, fixed_size + 2 * blocks.bearings_cdeg.size());
+  const std::size_t image_size = blocks.samples.size() + 4 * blocks.row_gains.size();
+  fixed.header.type = MessageType::ping_result;
+  fixed.header.payload_size = static_cast<std::uint32_t>(offset + image_size - header_size);
+  fixed.sizes = {static_cast<std::uint32_t>(offset), static_cast<std::uint32_t>(image_size),
+                 static_cast<std::uint32_t>(offset + image_size)};
+
+  wire::Bytes out;
+  out.reserve(offset + image_size);
+  if (long_form) {
+    wire::append(out, fixed);
+  } else {
+    wire::append(out, version_1(head));
+  }
+  wire::Writer write(out);
+  for (const std::int16_t& bearing : blocks.bearings_cdeg) write("bearing", bearing);
+  out.resize(offset);  // zero filler
+  append_image(out, blocks, fixed.row_count);
+  return out;
+}
+
+std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad) {
+  const double bearing_cdeg = -100 * deg_from_rad(azimuth_rad);
+  return static_cast<std::int16_t>(std::trunc(bearing_cdeg + std::copysign(truncation_guard_cdeg, bearing_cdeg)));
+}
+
+FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, double sound_speed_used_mps) {
+  FireSettings echo = asked;
+  echo.gain_percent = echoed_gain_percent(asked, gain_echo);
+  if (asked.sound_speed_mps == 0) echo.sound_speed_mps = sound_speed_used_mps;
+  return echo;
+}
+
+wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, wire::BytesView request) {
+  const FireRequest fire = parse_fire(request).value_or(stored_fire());
+  const PingSettings& settings = ping.request.settings;
+  PingHead head;
+  PingResultV2& fixed = head.fixed;
+  fixed.header.source = device.id;
+  fixed.header.version = reply_version(fire, text_option(device.options, option_name::reply_version));
+  fixed.sound_speed_mps = sound_speed_used(fire.settings, settings);
+  fixed.fire = echo_of(fire.settings, text_option(device.options, option_name::gain_echo), fixed.sound_speed_mps);
+  fixed.extension = fire.extension;
+  fixed.ping_id = static_cast<std::uint32_t>(ping.request.number);
+  fixed.frequency_hz = ping.mode().centre_hz;
+  set_environment(fixed, ping.request);
+  set_start_time(head, ping.request.fired_at - device.powered_up_at,
+                 text_option(device.options, option_name::ping_start_time_unit));
+  fixed.data_size = data_size_from(settings.format.bits);
+  fixed.range_resolution_m = settings.range_bin_m;
+  fixed.row_count = static_cast<std::uint16_t>(settings.range_bin_count);
+  fixed.beam_count = static_cast<std::uint16_t>(settings.beam_count);
+
+  std::vector<std::int16_t> bearings;
+  for (const float azimuth_rad : ping.beam_azimuth_rad) bearings.push_back(bearing_cdeg_from_azimuth(azimuth_rad));
+  assert(bearings.size() == fixed.beam_count);
+  assert(ping.samples.size() * 8 ==
+         std::size_t{fixed.row_count} * fixed.beam_count * static_cast<unsigned>(settings.format.bits));
+  assert(!settings.format.row_gains || ping.row_gain.size() == fixed.row_count);
+  const std::span<const std::uint32_t> gains = settings.format.row_gains ? ping.row_gain : std::span<const std::uint32_t>{};
+  return encode_ping(std::move(head), {bearings, gains, ping.samples});
+}
+
+}  // namespace sonar::oculus

@@ -1,0 +1,38 @@
+// A ping in the vendor's bytes: echo rules, sizes, bearings. The only place where azimuth (to port) becomes bearing (to
+// starboard). Called by Vendor::frame once per ping; the bare encoder also re-encodes captured pings in the tests.
+#pragma once
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "protocol/oculus/fire.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::oculus {
+
+/// Fixed part of either version. header.version decides what travels: below 2 the extension, the attitude and
+/// ping_start_time_s stay behind and ping_start_counter goes instead.
+struct PingHead {
+  PingResultV2 fixed;
+  std::uint32_t ping_start_counter = 0;
+};
+struct PingBlocks {
+  std::span<const std::int16_t> bearings_cdeg;  // [beams], 0.01 deg, positive to starboard
+  std::span<const std::uint32_t> row_gains;     // [rows], or empty
+  wire::BytesView samples;                      // [rows][beams], little-endian
+};
+
+/// Fills in payload size, image offset, image size and message size; no trailing bytes. row_count and beam_count must be set.
+wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks);
+
+/// 0.01 deg, truncated toward zero as the capture is, guarded so that 29.99999 deg of a float stays 3000.
+std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad);
+
+/// The fire settings as the ping repeats them (spec 5.4). `sound_speed_used` replaces a requested 0.
+FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, double sound_speed_used_mps);
+
+/// Everything: request parsed, echo, environment, image.
+wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, wire::BytesView request);
+
+}  // namespace sonar::oculus

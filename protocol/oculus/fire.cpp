@@ -1,0 +1,67 @@
+#include "protocol/oculus/fire.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "protocol/oculus/framer.hpp"
+#include "protocol/oculus/settings.hpp"
+
+namespace sonar::oculus {
+
+std::optional<FireRequest> parse_fire(wire::BytesView message) {
+  if (message.size() < fire_v1_size) return std::nullopt;
+  FireRequest fire;
+  fire.version = header_of(message).version;
+  wire::Reader reader(message);
+  reader.block("header", header_size);
+  fields(reader, fire.settings);
+  if (fire.version >= 2) {
+    wire::Bytes tail(wire::wire_size<FireExtension>());  // zeros where the client sent less
+    const auto sent = message.subspan(fire_v1_size, std::min(tail.size(), message.size() - fire_v1_size));
+    std::copy(sent.begin(), sent.end(), tail.begin());
+    wire::Reader tail_reader(tail);
+    fields(tail_reader, fire.extension);
+  }
+  return fire;
+}
+
+wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination, bool payload_size_zero) {
+  const std::size_t length = fire.version >= 2 ? fire_v2_size : fire_v1_size;
+  MessageHeader header;
+  header.destination = destination;
+  header.type = MessageType::fire;
+  header.version = fire.version;
+  header.payload_size = payload_size_zero ? 0 : static_cast<std::uint32_t>(length - header_size);
+  if (fire.version >= 2) return wire::bytes_of(FireMessageV2{header, fire.settings, fire.extension});
+  return wire::bytes_of(FireMessageV1{header, fire.settings});
+}
+
+FireRequest stored_fire() {
+  FireRequest fire;  // unknown: what the real device stores; a plain picture of the nearest 10 m
+  fire.settings.mode = 1;
+  fire.settings.flags = flag::range_in_metres | flag::simple_result | flag::beams_512;
+  fire.settings.range = 10;
+  fire.settings.gain_percent = 50;
+  return fire;
+}
+
+std::string describe(const FireRequest& fire) {
+  const FireSettings& s = fire.settings;
+  const bool metres = (s.flags & flag::range_in_metres) != 0;
+  const double rate_hz = table_rate_hz(s.ping_rate);
+  char text[160];
+  std::snprintf(text, sizeof text, "mode %d, range %g %s, gain %g %%, ", s.mode, s.range, metres ? "m" : "%", s.gain_percent);
+  std::string sentence = text;
+  if (rate_hz > 0) {
+    std::snprintf(text, sizeof text, "rate %g Hz", rate_hz);
+    sentence += text;
+  } else {
+    sentence += "standby";
+  }
+  sentence += (s.flags & flag::beams_512) != 0 ? ", 512 beams" : ", 256 beams";
+  sentence += ", flags " + std::to_string(s.flags) + ", version " + std::to_string(fire.version);
+  if ((s.flags & flag::network_trigger) != 0) sentence += ", network trigger";
+  return sentence;
+}
+
+}  // namespace sonar::oculus

@@ -1,0 +1,31 @@
+// The fire message as both sides use it: parsed from a client's bytes, or made by our own client.
+// The device keeps its normalised bytes (53 or 89) beside the settings, so that a ping echoes what it was made with.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "protocol/oculus/messages.hpp"
+
+namespace sonar::oculus {
+
+struct FireRequest {
+  std::uint16_t version = 0;  // msg_version: 0 or 1 short, 2 long
+  FireSettings settings;
+  FireExtension extension;  // zero unless version 2
+};
+
+/// A whole message as framed. Nothing when it is too short to be a fire message; a missing tail of version 2 reads as 0.
+std::optional<FireRequest> parse_fire(wire::BytesView message);
+
+/// Exact bytes: 53 (versions 0, 1) or 89 (version 2 and above), payload size filled in unless `payload_size_zero`,
+/// as several public clients send it.
+wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination = 0, bool payload_size_zero = false);
+
+/// The device's stored configuration before any client spoke. Version 0 fits all clients (spec 3.1).
+FireRequest stored_fire();
+
+/// "mode 2, range 20 m, gain 50 %, rate 10 Hz": for the log.
+std::string describe(const FireRequest& fire);
+
+}  // namespace sonar::oculus

@@ -1,0 +1,41 @@
+// Cuts a byte stream of either direction into whole messages: any split, junk skipped byte by byte, memory bounded.
+// Stands between the socket's bytes and the Dialogue (device side) or the Decoder (driver side).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "protocol/oculus/messages.hpp"
+
+namespace sonar::oculus {
+
+/// Who sends the stream: clients put 0 into payload_size as they like (spec section 2), devices are exact.
+enum class Sender { client, device };
+
+/// Total length of the message this header opens, or nothing when the header is junk for that sender.
+std::optional<std::size_t> message_length(const MessageHeader& header, Sender sender);
+
+class Framer {
+ public:
+  explicit Framer(Sender sender) : sender_(sender) {}
+
+  /// Adds received bytes. Drain with next() before the following append: what then stays is less than one message.
+  void append(wire::BytesView received);
+  /// The next whole message, header included; valid until the next call of append or next.
+  std::optional<wire::BytesView> next();
+
+  /// Junk bytes skipped so far.
+  std::uint64_t skipped_bytes() const { return skipped_; }
+  std::size_t buffered_bytes() const { return buffer_.size() - begin_; }
+
+ private:
+  Sender sender_;
+  wire::Bytes buffer_;
+  std::size_t begin_ = 0;
+  std::uint64_t skipped_ = 0;
+};
+
+/// Header of a message of at least 16 bytes.
+MessageHeader header_of(wire::BytesView message);
+
+}  // namespace sonar::oculus

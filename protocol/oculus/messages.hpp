@@ -1,0 +1,265 @@
+// Every Oculus message, described once: trade names in the structs, the vendor's spelling in fields(), wire order and widths.
+// Little-endian, byte-packed, sent over TCP 52100 both ways and (status) over UDP 52102; see README.md here.
+// Layouts: docs/protocols/oculus.md and the public drivers named there; captured pings confirm header and version-1 result.
+#pragma once
+
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::oculus {
+
+inline constexpr std::uint16_t magic = 0x4F53;  // bytes 53 4F
+inline constexpr std::uint16_t tcp_port = 52100, status_port = 52102;
+inline constexpr std::uint32_t image_offset = 2048;           // capture; past both bearing tables
+inline constexpr std::uint32_t request_payload_limit = 4096;  // a client's larger payload size is junk
+inline constexpr std::size_t reply_limit = 4u << 20;  // a device's longer message is junk: the largest real ping has 1.5 MB
+
+enum class MessageType : std::uint16_t {
+  status = 0x0001,
+  fire = 0x0015,
+  full_ping_result = 0x0022,  // never sent: only answers the non-public full fire message
+  ping_result = 0x0023,
+  user_config = 0x0055,
+  log = 0x0080,
+  dummy = 0x00FF,
+};
+
+/// Ping rates are maxima. Other values occur on the wire (the captured echo has 195) and are kept.
+enum class PingRate : std::uint8_t { hz10 = 0, hz15 = 1, hz40 = 2, hz5 = 3, hz2 = 4, standby = 5 };
+enum class DataSize : std::uint8_t { bits8 = 0, bits16 = 1, bits24 = 2, bits32 = 3 };
+
+namespace flag {
+inline constexpr std::uint8_t range_in_metres = 0x01, samples_16_bit = 0x02, row_gains = 0x04, simple_result = 0x08;
+inline constexpr std::uint8_t gain_assist = 0x10, low_power = 0x20, beams_512 = 0x40, network_trigger = 0x80;
+inline constexpr std::uint32_t extended_32_bit = 0x200;  // "scientific" data (liboculus)
+}  // namespace flag
+
+struct MessageHeader {
+  std::uint16_t oculus_id = magic, source = 0, destination = 0;
+  MessageType type{};
+  std::uint16_t version = 0;
+  std::uint32_t payload_size = 0;  // of clients: unreliable, often 0
+  std::uint16_t part_number = 0;   // 0 but in the status message
+};
+template <class V, wire::Like<MessageHeader> M>
+constexpr void fields(V& visit, M& m) {
+  visit("oculusId", m.oculus_id);
+  visit("srcDeviceId", m.source);
+  visit("dstDeviceId", m.destination);
+  visit("msgId", m.type);
+  visit("msgVersion", m.version);
+  visit("payloadSize", m.payload_size);
+  visit("partNumber", m.part_number);
+}
+
+/// What a client asks for; the same bytes are echoed in every ping.
+struct FireSettings {
+  std::uint8_t mode = 1;  // 1 low frequency, 2 high frequency
+  PingRate ping_rate = PingRate::hz10;
+  std::uint8_t network_speed = 0xFF;  // Mbit/s, 0 or 255 no limit
+  std::uint8_t gamma = 0x7F;          // gamma = value / 255; 0 means 1.0
+  std::uint8_t flags = 0;
+  double range = 0;  // m or per cent of the mode's maximum
+  double gain_percent = 0;
+  double sound_speed_mps = 0;  // 0: the device computes it
+  double salinity_ppt = 0;
+};
+template <class V, wire::Like<FireSettings> M>
+constexpr void fields(V& visit, M& m) {
+  visit("masterMode", m.mode);
+  visit("pingRate", m.ping_rate);
+  visit("networkSpeed", m.network_speed);
+  visit("gammaCorrection", m.gamma);
+  visit("flags", m.flags);
+  visit("range", m.range);
+  visit("gainPercent", m.gain_percent);
+  visit("speedOfSound", m.sound_speed_mps);
+  visit("salinity", m.salinity_ppt);
+}
+
+/// What version 2 adds to the fire message.
+struct FireExtension {
+  std::uint32_t flags = 0;
+  std::array<std::uint32_t, 2> reserved0{};
+  std::uint32_t beacon_locator_frequency = 0;
+  std::array<std::uint32_t, 5> reserved1{};
+};
+template <class V, wire::Like<FireExtension> M>
+constexpr void fields(V& visit, M& m) {
+  visit("extFlags", m.flags);
+  visit("reserved0", m.reserved0);
+  visit("beaconLocatorFrequency", m.beacon_locator_frequency);
+  visit("reserved1", m.reserved1);
+}
+
+struct FireMessageV1 {  // versions 0 and 1
+  MessageHeader header;
+  FireSettings fire;
+};
+template <class V, wire::Like<FireMessageV1> M>
+constexpr void fields(V& visit, M& m) {
+  visit("header", m.header);
+  visit("fire", m.fire);
+}
+
+struct FireMessageV2 {
+  MessageHeader header;
+  FireSettings fire;
+  FireExtension extension;
+};
+template <class V, wire::Like<FireMessageV2> M>
+constexpr void fields(V& visit, M& m) {
+  visit("header", m.header);
+  visit("fire", m.fire);
+  visit("extension", m.extension);
+}
+
+struct StatusMessage {
+  MessageHeader header;
+  std::uint32_t device_id = 0;
+  std::uint16_t device_type = 1;  // imaging sonar
+  std::uint16_t part_number = 0;
+  std::uint32_t status = 3;  // bits 0-2: 3 = main firmware runs
+  std::uint32_t arm0_version = 0, arm0_date = 0, arm1_version = 0, arm1_date = 0, bitfile_version = 0, bitfile_date = 0;
+  std::array<std::uint8_t, 4> ip_address{}, ip_mask{}, connected_ip{};  // octets in reading order
+  std::array<std::uint8_t, 6> mac{};
+  std::array<double, 8> temperature_c{};
+  double pressure_bar = 0;
+};
+template <class V, wire::Like<StatusMessage> M>
+constexpr void fields(V& visit, M& m) {
+  visit("header", m.header);
+  visit("deviceId", m.device_id);
+  visit("deviceType", m.device_type);
+  visit("partNumber", m.part_number);
+  visit("status", m.status);
+  visit("firmwareVersion0", m.arm0_version);
+  visit("firmwareDate0", m.arm0_date);
+  visit("firmwareVersion1", m.arm1_version);
+  visit("firmwareDate1", m.arm1_date);
+  visit("bitfileVersion", m.bitfile_version);
+  visit("bitfileDate", m.bitfile_date);
+  visit("ipAddr", m.ip_address);
+  visit("ipMask", m.ip_mask);
+  visit("connectedIpAddr", m.connected_ip);
+  visit("macAddr", m.mac);
+  visit("temperature", m.temperature_c);
+  visit("pressure", m.pressure_bar);
+}
+
+/// Last fields of a ping result, the same in both versions but for the spare words between beams and offset.
+struct ImageSizes {
+  std::uint32_t image_offset = 0, image_size = 0, message_size = 0;
+};
+template <class V, wire::Like<ImageSizes> M>
+constexpr void fields(V& visit, M& m) {
+  visit("imageOffset", m.image_offset);
+  visit("imageSize", m.image_size);
+  visit("messageSize", m.message_size);
+}
+
+/// Fixed part; bearings (i16 per beam, 0.01 deg, positive to starboard), filler and image follow.
+struct PingResultV1 {
+  MessageHeader header;
+  FireSettings fire;
+  std::uint32_t ping_id = 0, status = 0;
+  double frequency_hz = 0, temperature_c = 0, pressure_bar = 0, sound_speed_mps = 0;
+  std::uint32_t ping_start_time = 0;  // free-running counter, see option ping_start_time_unit
+  DataSize data_size{};
+  double range_resolution_m = 0;
+  std::uint16_t row_count = 0, beam_count = 0;
+  ImageSizes sizes;
+};
+template <class V, wire::Like<PingResultV1> M>
+constexpr void fields(V& visit, M& m) {
+  visit("header", m.header);
+  visit("fire", m.fire);
+  visit("pingId", m.ping_id);
+  visit("status", m.status);
+  visit("frequency", m.frequency_hz);
+  visit("temperature", m.temperature_c);
+  visit("pressure", m.pressure_bar);
+  visit("speedOfSoundUsed", m.sound_speed_mps);
+  visit("pingStartTime", m.ping_start_time);
+  visit("dataSize", m.data_size);
+  visit("rangeResolution", m.range_resolution_m);
+  visit("nRanges", m.row_count);
+  visit("nBeams", m.beam_count);
+  visit("sizes", m.sizes);
+}
+
+struct PingResultV2 {
+  MessageHeader header;
+  FireSettings fire;
+  FireExtension extension;
+  std::uint32_t ping_id = 0, status = 0;
+  double frequency_hz = 0, temperature_c = 0, pressure_bar = 0;
+  double heading_deg = 0, pitch_deg = 0, roll_deg = 0;
+  double sound_speed_mps = 0;
+  double ping_start_time_s = 0;  // since power-up, microsecond resolution
+  DataSize data_size{};
+  double range_resolution_m = 0;
+  std::uint16_t row_count = 0, beam_count = 0;
+  std::array<std::uint32_t, 4> spare{};
+  ImageSizes sizes;
+};
+template <class V, wire::Like<PingResultV2> M>
+constexpr void fields(V& visit, M& m) {
+  visit("header", m.header);
+  visit("fire", m.fire);
+  visit("extension", m.extension);
+  visit("pingId", m.ping_id);
+  visit("status", m.status);
+  visit("frequency", m.frequency_hz);
+  visit("temperature", m.temperature_c);
+  visit("pressure", m.pressure_bar);
+  visit("heading", m.heading_deg);
+  visit("pitch", m.pitch_deg);
+  visit("roll", m.roll_deg);
+  visit("speedOfSoundUsed", m.sound_speed_mps);
+  visit("pingStartTime", m.ping_start_time_s);
+  visit("dataSize", m.data_size);
+  visit("rangeResolution", m.range_resolution_m);
+  visit("nRanges", m.row_count);
+  visit("nBeams", m.beam_count);
+  visit("spare", m.spare);
+  visit("sizes", m.sizes);
+}
+
+/// ip 0 asks for the stored values, anything else writes them. Plain integers: 192.168.1.2 = 0xC0A80102.
+struct UserConfigMessage {
+  MessageHeader header;
+  std::uint32_t ip_address = 0, ip_mask = 0, dhcp_enable = 0;
+};
+template <class V, wire::Like<UserConfigMessage> M>
+constexpr void fields(V& visit, M& m) {
+  visit("header", m.header);
+  visit("ipAddr", m.ip_address);
+  visit("ipMask", m.ip_mask);
+  visit("dhcpEnable", m.dhcp_enable);
+}
+
+/// Keep-alive: a header and nothing else.
+struct DummyMessage {
+  MessageHeader header;
+};
+template <class V, wire::Like<DummyMessage> M>
+constexpr void fields(V& visit, M& m) {
+  visit("header", m.header);
+}
+
+static_assert(wire::wire_size<MessageHeader>() == 16);
+static_assert(wire::wire_size<FireMessageV1>() == 53);
+static_assert(wire::wire_size<FireMessageV2>() == 89);
+static_assert(wire::wire_size<StatusMessage>() == 142);
+static_assert(wire::wire_size<PingResultV1>() == 122);
+static_assert(wire::wire_size<PingResultV2>() == 202);
+static_assert(wire::wire_size<UserConfigMessage>() == 28);
+static_assert(wire::wire_size<DummyMessage>() == 16);
+
+inline constexpr std::size_t header_size = wire::wire_size<MessageHeader>();
+inline constexpr std::size_t fire_v1_size = wire::wire_size<FireMessageV1>(), fire_v2_size = wire::wire_size<FireMessageV2>();
+inline constexpr std::size_t status_size = wire::wire_size<StatusMessage>();
+inline constexpr std::size_t user_config_size = wire::wire_size<UserConfigMessage>();
+inline constexpr std::size_t ping_v1_size = wire::wire_size<PingResultV1>(), ping_v2_size = wire::wire_size<PingResultV2>();
+
+}  // namespace sonar::oculus

@@ -1,0 +1,146 @@
+#include "protocol/oculus/models.hpp"
+
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::oculus {
+namespace {
+
+// Sources of the numbers below. VND: the vendor's public sample viewer as mirrored in driver repositories. ENS:
+// ENSTABretagneRobotics oculus_driver. APL: liboculus, include/liboculus/Constants.h and part number list. BLU: BluEye-Robotics
+// oculus_driver. BAS: bastianschildknecht sonar_driver. CAP: the captured M1200d pings. unknown: no public source; the value is
+// our choice.
+
+/// unknown: fitted. The pressure that reaches full scale at TVG 0 dB and gain 0 dB, so that the demo scene at gain 50, gamma 127
+/// has an 8-bit median of 30 to 60. The one place to tune it.
+namespace fitted_full_scale_upa {
+constexpr float m370s = 4e10f, c550d_low = 4e10f, c550d_high = 3e11f, m750d_low = 4e10f, m750d_high = 3e11f;
+constexpr float m1200d_low = 4e10f, m1200d_high = 3e11f, m3000d_low = 4e10f, m3000d_high = 3e11f;
+}  // namespace fitted_full_scale_upa
+
+constexpr float source_level_db = 200;  // unknown: chosen, acoustics profile table
+constexpr float tvg_slope_db = 30;      // unknown: chosen
+constexpr float tvg_ceiling_db = 80;    // unknown: chosen
+constexpr float noise_figure_db = 10;   // unknown: chosen
+
+struct ModeRow {
+  double centre_hz = 0, aperture_deg = 0, azimuth_width_deg = 0, elevation_width_deg = 0, max_range_m = 0;
+  float full_scale_upa = 0;
+};
+struct FamilyRow {
+  double min_range_m = 0.1;  // BAS
+  ModeRow low, high;         // high.centre_hz 0: one mode only
+};
+struct ProfileRow {
+  std::string_view profile, name;
+  std::uint16_t part_number = 0;
+  const FamilyRow* family = nullptr;
+};
+
+// 370 kHz and 200 m: VND, ENS; aperture and minimum range: BAS; elevation 20: VND; unknown: azimuth width 1.5.
+constexpr FamilyRow m370s{0.2, {370e3, 130, 1.5, 20, 200, fitted_full_scale_upa::m370s}, {}};
+// Frequencies and ranges: VND; unknown: apertures 120 and 70, widths 1.0 and 0.7 x 20.
+constexpr FamilyRow c550d{0.1,
+                          {550e3, 120, 1.0, 20, 100, fitted_full_scale_upa::c550d_low},
+                          {820e3, 70, 0.7, 20, 30, fitted_full_scale_upa::c550d_high}};
+// Frequencies, ranges, widths: APL, VND; aperture 130 low: BAS; unknown: aperture 70 high (BAS has 130, see -hf130).
+constexpr ModeRow m750d_low{750e3, 130, 1.0, 20, 120, fitted_full_scale_upa::m750d_low};
+constexpr FamilyRow m750d{0.1, m750d_low, {1.2e6, 70, 0.6, 20, 40, fitted_full_scale_upa::m750d_high}};
+constexpr FamilyRow m750d_hf130{0.1, m750d_low, {1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m750d_high}};
+// Older hardware: 12 deg elevation in the high mode (APL).
+constexpr FamilyRow m750d_old{0.1, m750d_low, {1.2e6, 70, 0.6, 12, 40, fitted_full_scale_upa::m750d_high}};
+// Low: BAS, APL, VND. High: frequency 140.625 MHz / 67 and aperture 60 from CAP, widths and range APL.
+constexpr ModeRow m1200d_low{1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m1200d_low};
+constexpr FamilyRow m1200d{0.1, m1200d_low, {140.625e6 / 67, 60, 0.4, 12, 10, fitted_full_scale_upa::m1200d_high}};
+// unknown: a single-frequency product by its name; the low mode of the M1200d is assumed.
+constexpr FamilyRow n1200s{0.1, m1200d_low, {}};
+// Frequencies, widths, ranges: APL, VND; unknown: apertures 130 and 40.
+constexpr FamilyRow m3000d{0.1,
+                           {1.2e6, 130, 0.6, 20, 30, fitted_full_scale_upa::m3000d_low},
+                           {3.0e6, 40, 0.4, 20, 5, fitted_full_scale_upa::m3000d_high}};
+
+// Part numbers: older list ENS, BAS; newer list APL, VND, BLU. 1032, 1041 and 1042 are known to every client.
+constexpr ProfileRow profiles[] = {
+    {"oculus-m370s", "Oculus M370s", 1041, &m370s},
+    {"oculus-m750d", "Oculus M750d", 1032, &m750d},
+    {"oculus-m1200d", "Oculus M1200d", 1042, &m1200d},
+    {"oculus-m3000d", "Oculus M3000d", 2203, &m3000d},
+    {"oculus-c550d", "Oculus C550d", 4713, &c550d},
+    {"oculus-m750d-hf130", "Oculus M750d, 130 deg in mode 2", 1032, &m750d_hf130},
+    {"oculus-m750d-hf12", "Oculus M750d, older hardware", 1032, &m750d_old},
+    {"oculus-m373s", "Oculus M373s", 1209, &m370s},
+    {"oculus-m373s-deep", "Oculus M373s deep", 1218, &m370s},
+    {"oculus-m370s-deep", "Oculus M370s deep", 1217, &m370s},
+    {"oculus-m370s-artemis", "Oculus MA370s", 1229, &m370s},
+    {"oculus-md370s", "Oculus MD370s", 1433, &m370s},
+    {"oculus-mf370s", "Oculus MF370s", 1436, &m370s},
+    {"oculus-md370s-burton", "Oculus MD370s Burton", 2294, &m370s},
+    {"oculus-mt370s", "Oculus MT370s", 2418, &m370s},
+    {"oculus-m750d-fusion", "Oculus MF750d", 1134, &m750d},
+    {"oculus-m750d-artemis", "Oculus MA750d", 1135, &m750d},
+    {"oculus-md750d-impulse", "Oculus MD750d Impulse", 1244, &m750d},
+    {"oculus-md750d", "Oculus MD750d", 1434, &m750d},
+    {"oculus-md750d-burton", "Oculus MD750d Burton", 1921, &m750d},
+    {"oculus-mt750d", "Oculus MT750d", 2419, &m750d},
+    {"oculus-m1200d-deep", "Oculus M1200d deep", 1219, &m1200d},
+    {"oculus-m1200d-artemis", "Oculus MA1200d", 1228, &m1200d},
+    {"oculus-md1200d", "Oculus MD1200d", 1435, &m1200d},
+    {"oculus-mf1200d", "Oculus MF1200d", 1437, &m1200d},
+    {"oculus-md1200d-burton", "Oculus MD1200d Burton", 2086, &m1200d},
+    {"oculus-mt1200d", "Oculus MT1200d", 2420, &m1200d},
+    {"oculus-n1200s", "Oculus N1200s", 1220, &n1200s},
+    {"oculus-n1200s-deep", "Oculus N1200s deep", 1221, &n1200s},
+    {"oculus-mf3000d", "Oculus MF3000d", 2466, &m3000d},
+    {"oculus-mt3000d", "Oculus MT3000d", 2599, &m3000d},
+    {"oculus-md3000d-impulse", "Oculus MD3000d Impulse", 2658, &m3000d},
+    {"oculus-md3000d-burton", "Oculus MD3000d Burton", 2659, &m3000d},
+    {"oculus-ma3000d", "Oculus MA3000d", 2924, &m3000d},
+};
+
+float radians(double deg) { return static_cast<float>(rad_from_deg(deg)); }
+
+FrequencyMode mode_from(const ModeRow& row, double min_range_m, const char* name) {
+  FrequencyMode mode;
+  mode.name = name;
+  mode.centre_hz = static_cast<float>(row.centre_hz);
+  mode.horizontal_aperture_rad = radians(row.aperture_deg);
+  mode.min_range_m = static_cast<float>(min_range_m);
+  mode.max_range_m = static_cast<float>(row.max_range_m);
+  mode.source_level_db = source_level_db;
+  mode.beam_spacing = BeamSpacing::uniform_in_sine;  // CAP; the same law for other apertures
+  mode.pattern.azimuth_width_rad = radians(row.azimuth_width_deg);
+  mode.pattern.elevation_width_rad = radians(row.elevation_width_deg);
+  mode.receiver.tvg_slope_db = tvg_slope_db;
+  mode.receiver.tvg_ceiling_db = tvg_ceiling_db;
+  mode.receiver.noise_figure_db = noise_figure_db;
+  mode.receiver.full_scale_upa = row.full_scale_upa;
+  return mode;
+}
+
+std::shared_ptr<const SonarModel> model_from(const ProfileRow& row) {
+  SonarModel model;
+  model.profile = row.profile;
+  model.name = row.name;
+  model.part_number = row.part_number;
+  model.max_rate_hz = 40;  // highest rate code of the fire message
+  const FamilyRow& family = *row.family;
+  model.modes.push_back(mode_from(family.low, family.min_range_m, "LF"));
+  if (family.high.centre_hz > 0) model.modes.push_back(mode_from(family.high, family.min_range_m, "HF"));
+  return std::make_shared<const SonarModel>(std::move(model));
+}
+
+}  // namespace
+
+std::span<const std::shared_ptr<const SonarModel>> models() {
+  static const std::vector<std::shared_ptr<const SonarModel>> built = [] {
+    std::vector<std::shared_ptr<const SonarModel>> all;
+    for (const ProfileRow& row : profiles) all.push_back(model_from(row));
+    return all;
+  }();
+  return built;
+}
+
+}  // namespace sonar::oculus

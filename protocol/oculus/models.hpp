@@ -1,0 +1,15 @@
+// Every Oculus product as a row: profile name, part number, frequency modes. Read by the Vendor; the physics sees SonarModel
+// only.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "core/sonar/sonar_model.hpp"
+
+namespace sonar::oculus {
+
+/// All profiles, the plain product of each family first. Built once, never changed.
+std::span<const std::shared_ptr<const SonarModel>> models();
+
+}  // namespace sonar::oculus

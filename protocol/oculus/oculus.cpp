@@ -1,0 +1,51 @@
+#include "protocol/oculus/oculus.hpp"
+
+#include "protocol/oculus/dialogue.hpp"
+#include "protocol/oculus/encode_ping.hpp"
+#include "protocol/oculus/models.hpp"
+#include "protocol/oculus/options.hpp"
+#include "protocol/oculus/replies.hpp"
+#include "protocol/oculus/settings.hpp"
+
+namespace sonar::oculus {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Status once a second: the public viewer drops a sonar after 2 s without, another driver after 5 s.
+constexpr std::array<protocol::Port, 2> port_table{
+    {{protocol::Port::Kind::tcp_listen, tcp_port, 0ms}, {protocol::Port::Kind::udp_broadcast, status_port, 1000ms}}};
+
+class OculusVendor final : public protocol::Vendor {
+ public:
+  std::string_view name() const override { return "oculus"; }
+  std::span<const std::shared_ptr<const SonarModel>> models() const override { return oculus::models(); }
+  std::span<const protocol::Port> ports() const override { return port_table; }
+  std::span<const protocol::Option> options() const override { return oculus::options(); }
+  int default_max_clients() const override { return 1; }  // the status message has room for one client's address
+
+  protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
+    const FireRequest fire = stored_fire();
+    return {settle(fire, device).settings, make_fire(fire), "stored configuration: " + describe(fire), false};
+  }
+  bool pings_before_first_request(const protocol::DeviceState& device) const override {
+    return text_option(device.options, option_name::before_first_fire) == "pings";
+  }
+  protocol::Bytes beacon(const protocol::DeviceState& device, Time) const override { return make_status(device); }
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::DeviceState& device, Time now) const override {
+    return make_dialogue(device, now);
+  }
+  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device,
+                                               protocol::BytesView request) const override {
+    return std::make_shared<const protocol::Bytes>(encode_ping(ping, device, request));
+  }
+};
+
+}  // namespace
+
+const protocol::Vendor& vendor() {
+  static const OculusVendor only;
+  return only;
+}
+
+}  // namespace sonar::oculus

@@ -1,0 +1,83 @@
+#include "protocol/oculus/options.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+
+namespace sonar::oculus {
+namespace {
+
+const std::array<protocol::Option, 13>& table() {
+  static const std::array<protocol::Option, 13> rows{{
+      {option_name::before_first_fire,
+       {"dummies", "pings"},
+       "dummies",
+       "what a client gets before its first fire message; pings use the stored configuration and version 0"},
+      {option_name::gain_echo,
+       {"auto", "verbatim", "mapped"},
+       "auto",
+       "gain in the echo: auto = 40 + 0.6 g in mode 2 with flag bit 4 clear, mapped = in mode 2 always, verbatim = never"},
+      {option_name::pulse,
+       {"rows", "native"},
+       "rows",
+       "pulse width: rows = 0.9 row spacings, native = 2.5 mm at every range and the mean power of a row"},
+      {option_name::ping_start_time_unit,
+       {"nanoseconds", "microseconds"},
+       "nanoseconds",
+       "unit of the free-running 32-bit counter in version-1 pings"},
+      {option_name::honour_network_speed,
+       {"false", "true"},
+       "false",
+       "true lowers the ping rate to the Mbit/s the client asked for"},
+      {option_name::gain_assist_bit,
+       {"set_enables", "set_disables"},
+       "set_enables",
+       "meaning of flag bit 4 (sources contradict); gain assist itself is accepted without effect"},
+      {option_name::reply_version,
+       {"mirror", "0", "1", "2"},
+       "mirror",
+       "version of ping results: that of the fire message, or always this one"},
+      {option_name::out_of_range,
+       {"clamp", "ignore"},
+       "clamp",
+       "settings outside the model's limits: use the nearest valid ones, or ignore the whole message"},
+      {option_name::user_config_write,
+       {"silent", "reply"},
+       "silent",
+       "answer to a written user configuration: none, or the stored values"},
+      {option_name::status_bit7, {"clear", "set"}, "clear", "bit 7 (\"main\" connection) of the status word"},
+      {option_name::row_rate_hz, {}, "262237.76223776224", "sample rate behind the row law, 37.5 MHz / 143 in the capture"},
+      {option_name::dummy_period_ms, {}, "1000", "silence after which a dummy message is sent"},
+      {option_name::boot_text, {"off", "on"}, "off", "a log message to every client that connects"},
+  }};
+  return rows;
+}
+
+std::string_view default_of(std::string_view name) {
+  for (const protocol::Option& option : table())
+    if (option.name == name) return option.default_value;
+  return {};
+}
+
+bool parse_number(std::string_view text, double& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size() && std::isfinite(value) && value > 0;
+}
+
+}  // namespace
+
+std::span<const protocol::Option> options() { return table(); }
+
+std::string_view text_option(const protocol::OptionValues& values, std::string_view name) {
+  const auto found = values.find(std::string(name));
+  return found == values.end() ? default_of(name) : std::string_view(found->second);
+}
+
+double number_option(const protocol::OptionValues& values, std::string_view name) {
+  double value = 0;
+  if (parse_number(text_option(values, name), value)) return value;
+  parse_number(default_of(name), value);
+  return value;
+}
+
+}  // namespace sonar::oculus

@@ -1,0 +1,28 @@
+// Everything the public sources leave unknown or contradictory about the device, as named options of a sonar's configuration.
+// The first allowed value of each is the default; read through the accessors here by dialogue, frame and beacon.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::oculus {
+
+namespace option_name {
+inline constexpr std::string_view before_first_fire = "before_first_fire", gain_echo = "gain_echo", pulse = "pulse",
+                                  ping_start_time_unit = "ping_start_time_unit", honour_network_speed = "honour_network_speed",
+                                  gain_assist_bit = "gain_assist_bit", reply_version = "reply_version",
+                                  out_of_range = "out_of_range", user_config_write = "user_config_write",
+                                  status_bit7 = "status_bit7", row_rate_hz = "row_rate_hz", dummy_period_ms = "dummy_period_ms",
+                                  boot_text = "boot_text";
+}
+
+std::span<const protocol::Option> options();
+
+/// The configured value, or the default when the map lacks it.
+std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
+/// For free numbers; the default when the text is not a finite number above 0.
+double number_option(const protocol::OptionValues& values, std::string_view name);
+
+}  // namespace sonar::oculus

@@ -1,0 +1,159 @@
+#include "protocol/oculus/settings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "core/sonar/water.hpp"
+#include "protocol/oculus/options.hpp"
+
+namespace sonar::oculus {
+namespace {
+
+constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus issue 13: 0-100 % is 0-96 dB
+constexpr double rest_per_ping_s = 0.002;  // chosen: between the last echo and the next transmission
+constexpr double surface_pressure_bar = 1.013;
+
+/// Clamps, and says so: "range 20 m is outside 0.1..10 m, 10 m is used".
+double clamped(double value, double low, double high, const char* what, const char* unit, std::vector<std::string>& said) {
+  const double used = std::clamp(value, low, high);
+  if (used != value) {
+    char text[160];
+    std::snprintf(text, sizeof text, "%s %g %s is outside %g..%g %s, %g %s is used", what, value, unit, low, high, unit, used,
+                  unit);
+    said.emplace_back(text);
+  }
+  return used;
+}
+
+SampleFormat sample_format(const FireRequest& fire) {
+  SampleFormat format;
+  format.gamma = gamma_from_byte(fire.settings.gamma);
+  format.row_gains = (fire.settings.flags & flag::row_gains) != 0;
+  if (fire.version >= 2 && (fire.extension.flags & flag::extended_32_bit) != 0) {
+    format.bits = 32;
+    format.max_code = std::numeric_limits<std::uint32_t>::max();
+  } else if ((fire.settings.flags & flag::samples_16_bit) != 0) {
+    format.bits = 16;
+    format.max_code = 65535;
+  } else {
+    format.bits = 8;
+    format.max_code = 254;  // capture: 255 never occurs, 254 is saturation
+  }
+  return format;
+}
+
+/// Pulse and range sampling of one row, option `pulse`.
+void set_pulse(PingSettings& settings, double spacing_m, bool native) {
+  settings.pulse_width_m = static_cast<float>(native ? native_pulse_m : 0.9 * spacing_m);
+  if (!native) return;
+  const double sample_m = native_pulse_m / (4 * 0.5887);  // F_s = 2b, b = 0.5887 c / pulse
+  settings.samples_per_row = std::max(1, static_cast<int>(std::ceil(spacing_m / sample_m)));
+}
+
+double highest_rate_hz(const FireSettings& fire, const PingSettings& settings, const protocol::DeviceState& device) {
+  double rate = std::min(table_rate_hz(fire.ping_rate), static_cast<double>(device.model->max_rate_hz));
+  const double echo_time_s = 2.0 * static_cast<double>(settings.range_m) / static_cast<double>(settings.device_sound_speed_mps);
+  rate = std::min(rate, 1.0 / (echo_time_s + rest_per_ping_s));
+  const bool limited = fire.network_speed != 0 && fire.network_speed != 255;
+  if (limited && text_option(device.options, option_name::honour_network_speed) == "true")
+    rate = std::min(rate, fire.network_speed * 1e6 / (8.0 * static_cast<double>(ping_size(settings))));
+  return rate;
+}
+
+}  // namespace
+
+RowLaw row_law(double range_m, double sound_speed_mps, double rate_hz) {
+  RowLaw law{sound_speed_mps / (2 * rate_hz), 1};
+  while (range_m / law.spacing_m > row_limit) law.spacing_m *= 2;
+  law.count = std::max(1, static_cast<int>(std::floor(range_m / law.spacing_m)));
+  return law;
+}
+
+double table_rate_hz(PingRate rate) {
+  switch (rate) {
+    case PingRate::hz15:
+      return 15;
+    case PingRate::hz40:
+      return 40;
+    case PingRate::hz5:
+      return 5;
+    case PingRate::hz2:
+      return 2;
+    case PingRate::standby:
+      return 0;
+    default:
+      return 10;
+  }
+}
+
+float gamma_from_byte(std::uint8_t value) { return value == 0 ? 1.0f : static_cast<float>(value) / 255.0f; }
+
+double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo) {
+  const bool high_frequency = fire.mode == 2;
+  const bool mapped = gain_echo == "mapped" || (gain_echo == "auto" && (fire.flags & flag::gain_assist) == 0);
+  return high_frequency && mapped ? 40 + 0.6 * fire.gain_percent : fire.gain_percent;
+}
+
+bool has_non_finite(const FireSettings& fire) {
+  return !std::isfinite(fire.range) || !std::isfinite(fire.gain_percent) || !std::isfinite(fire.sound_speed_mps) ||
+         !std::isfinite(fire.salinity_ppt);
+}
+
+int mode_index(const SonarModel& model, std::uint8_t wire_mode) { return wire_mode == 2 && model.modes.size() > 1 ? 1 : 0; }
+
+double device_sound_speed_mps(const protocol::DeviceState& device, double salinity_ppt) {
+  const double gauge_bar = absolute_pressure_bar(device.water, device.depth_m) - surface_pressure_bar;
+  return sound_speed_unesco_mps(std::clamp(device.water.temperature_c, 0.0, 40.0), std::clamp(salinity_ppt, 0.0, 40.0),
+                                std::clamp(gauge_bar, 0.0, 1000.0));
+}
+
+Settled settle(const FireRequest& fire, const protocol::DeviceState& device) {
+  Settled out;
+  PingSettings& settings = out.settings;
+  const FireSettings& asked = fire.settings;
+  settings.mode = mode_index(*device.model, asked.mode);
+  if (asked.mode != settings.mode + 1)
+    out.clamped.push_back("mode " + std::to_string(asked.mode) + " is not one of this model's, mode 1 is used");
+  if (static_cast<std::uint8_t>(asked.ping_rate) > static_cast<std::uint8_t>(PingRate::standby))
+    out.clamped.push_back("ping rate code " + std::to_string(static_cast<int>(asked.ping_rate)) + " is unknown, 10 Hz is used");
+  const FrequencyMode& mode = device.model->modes[static_cast<std::size_t>(settings.mode)];
+
+  const double salinity = clamped(asked.salinity_ppt, 0, 40, "salinity", "ppt", out.clamped);
+  const double speed = asked.sound_speed_mps == 0 ? device_sound_speed_mps(device, salinity)
+                                                  : clamped(asked.sound_speed_mps, 1300, 1700, "sound speed", "m/s", out.clamped);
+  settings.device_sound_speed_mps = static_cast<float>(speed);
+  Water believed = device.water;
+  believed.salinity_psu = salinity;
+  settings.device_absorption_db_per_m = static_cast<float>(absorption_db_per_m(believed, device.depth_m, mode.centre_hz));
+
+  const bool metres = (asked.flags & flag::range_in_metres) != 0;
+  const double range = metres ? asked.range : asked.range / 100 * static_cast<double>(mode.max_range_m);
+  settings.range_m = static_cast<float>(clamped(range, mode.min_range_m, mode.max_range_m, "range", "m", out.clamped));
+  const RowLaw rows = row_law(settings.range_m, speed, number_option(device.options, option_name::row_rate_hz));
+  settings.range_bin_count = rows.count;
+  settings.range_bin_m = static_cast<float>(rows.spacing_m);
+  set_pulse(settings, rows.spacing_m, text_option(device.options, option_name::pulse) == "native");
+
+  settings.beam_count = (asked.flags & flag::beams_512) != 0 ? 512 : 256;
+  settings.format = sample_format(fire);
+  settings.tvg = settings.format.bits != 32;
+  FireSettings used = asked;
+  used.gain_percent = clamped(asked.gain_percent, 0, 100, "gain", "%", out.clamped);
+  const bool scientific = settings.format.bits == 32;
+  const double percent =
+      scientific ? used.gain_percent : echoed_gain_percent(used, text_option(device.options, option_name::gain_echo));
+  settings.gain_db = static_cast<float>(db_per_percent * percent);
+  settings.triggered = (asked.flags & flag::network_trigger) != 0;
+  settings.rate_hz = static_cast<float>(highest_rate_hz(asked, settings, device));
+  return out;
+}
+
+std::size_t ping_size(const PingSettings& settings) {
+  const std::size_t row = static_cast<std::size_t>(settings.beam_count) * static_cast<std::size_t>(settings.format.bits / 8) +
+                          (settings.format.row_gains ? 4 : 0);
+  return image_offset + static_cast<std::size_t>(settings.range_bin_count) * row;
+}
+
+}  // namespace sonar::oculus

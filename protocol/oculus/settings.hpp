@@ -1,0 +1,52 @@
+// The laws that turn a fire message into PingSettings: rows, rates, gain, gamma, limits, the device's own sound speed.
+// Pure functions, called by the dialogue; the way back (echo and ping result) is encode_ping.hpp.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/sonar/ping_settings.hpp"
+#include "protocol/oculus/fire.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::oculus {
+
+/// 37.5 MHz / 143, exact in the capture (M1200d mode 2). unknown: other modes; the same is used.
+inline constexpr double row_rate_hz = 37.5e6 / 143.0;
+inline constexpr int row_limit = 720;             // liboculus node README, measured by its authors
+inline constexpr double native_pulse_m = 0.0025;  // acoustics of docs/architecture.md, range resolution of the data sheets
+
+/// Rows of a ping (spec 5.3.1): c / (2 fs) doubled until at most 720 rows cover the range.
+struct RowLaw {
+  double spacing_m = 0;
+  int count = 1;
+};
+RowLaw row_law(double range_m, double sound_speed_mps, double rate_hz = row_rate_hz);
+
+/// 0 = standby; unknown values count as 10 Hz (chosen).
+double table_rate_hz(PingRate rate);
+/// Exponent of the samples: value / 255, and 1 for 0.
+float gamma_from_byte(std::uint8_t value);
+/// The gain as echoed, per cent (spec 5.4): mode 2 without flag bit 4 is mapped to 40 + 0.6 g, see option gain_echo.
+double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo);
+
+/// True when a double of the message is NaN or infinite: the message must be ignored.
+bool has_non_finite(const FireSettings& fire);
+/// Index into the model's modes; unknown modes count as 1.
+int mode_index(const SonarModel& model, std::uint8_t wire_mode);
+
+/// What the device computes for itself when 0 is requested [m/s].
+double device_sound_speed_mps(const protocol::DeviceState& device, double salinity_ppt);
+
+/// Settings in our terms, and a sentence for each value that had to be clamped.
+struct Settled {
+  PingSettings settings;
+  std::vector<std::string> clamped;
+};
+/// The fire message must be finite.
+Settled settle(const FireRequest& fire, const protocol::DeviceState& device);
+
+/// Bytes of a ping result made with these settings.
+std::size_t ping_size(const PingSettings& settings);
+
+}  // namespace sonar::oculus

@@ -1,0 +1,253 @@
+// Messages are described once, by a function fields(visit, message); the visitors here write, read, count and name them.
+// Floor of every vendor folder: no packed structs, no casts of buffers, no byte ever read beyond the span.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+namespace sonar::wire {
+
+using Bytes = std::vector<std::byte>;
+using BytesView = std::span<const std::byte>;
+
+enum class Endian { little, big };
+
+/// One description serves writing (const message) and reading: `template <class V, wire::Like<Header> M> fields(V&, M&)`.
+template <class M, class Message>
+concept Like = std::same_as<std::remove_const_t<M>, Message>;
+
+template <class T>
+concept Scalar = (std::is_arithmetic_v<T> && !std::same_as<T, bool> && sizeof(T) <= 8) || std::is_enum_v<T>;
+
+template <std::size_t size>
+using UnsignedOf =
+    std::conditional_t<size == 1, std::uint8_t,
+                       std::conditional_t<size == 2, std::uint16_t, std::conditional_t<size == 4, std::uint32_t, std::uint64_t>>>;
+
+template <Scalar T>
+constexpr std::uint64_t bits_from(T value) {
+  return std::bit_cast<UnsignedOf<sizeof(T)>>(value);
+}
+template <Scalar T>
+constexpr T from_bits(std::uint64_t bits) {
+  return std::bit_cast<T>(static_cast<UnsignedOf<sizeof(T)>>(bits));
+}
+
+/// Byte `index` (in wire order) of a value of `size` bytes is found `shift_of` bits up.
+constexpr unsigned shift_of(std::size_t index, std::size_t size, Endian endian) {
+  return static_cast<unsigned>(8 * (endian == Endian::little ? index : size - 1 - index));
+}
+
+/// Base of all visitors: arrays and nested messages by recursion, scalars by the derived class.
+template <class Self>
+class Visitor {
+ public:
+  template <class T>
+  constexpr void operator()(std::string_view name, T& value) {
+    visit(name, value);
+  }
+
+ private:
+  template <class T>
+  constexpr void visit(std::string_view name, T& value) {
+    if constexpr (Scalar<std::remove_const_t<T>>) {
+      self().scalar(name, value);
+    } else {
+      self().nested(name, value);
+    }
+  }
+  template <class T, std::size_t n>
+  constexpr void visit(std::string_view name, std::array<T, n>& value) {
+    self().array(name, value);
+  }
+  template <class T, std::size_t n>
+  constexpr void visit(std::string_view name, const std::array<T, n>& value) {
+    self().array(name, value);
+  }
+  constexpr Self& self() { return static_cast<Self&>(*this); }
+
+ protected:
+  template <class A>
+  constexpr void array(std::string_view name, A& values) {
+    for (auto& value : values) visit(name, value);
+  }
+  template <class M>
+  constexpr void nested(std::string_view, M& message) {
+    fields(self(), message);
+  }
+};
+
+/// Appends to a byte vector it does not own.
+class Writer : public Visitor<Writer> {
+ public:
+  explicit Writer(Bytes& out, Endian endian = Endian::little) : out_(out), endian_(endian) {}
+
+ private:
+  friend class Visitor<Writer>;
+  template <Scalar T>
+  void scalar(std::string_view, const T& value) {
+    const std::uint64_t bits = bits_from(value);
+    for (std::size_t i = 0; i < sizeof(T); ++i)
+      out_.push_back(static_cast<std::byte>((bits >> shift_of(i, sizeof(T), endian_)) & 0xFFu));
+  }
+  Bytes& out_;
+  Endian endian_;
+};
+
+/// Consumes a span. The first failure is kept, everything after it leaves its fields untouched.
+class Reader : public Visitor<Reader> {
+ public:
+  struct Failure {
+    std::string_view field;
+    std::size_t offset = 0, needed = 0, left = 0;
+  };
+
+  explicit Reader(BytesView in, Endian endian = Endian::little) : in_(in), endian_(endian) {}
+
+  bool ok() const { return !failed_; }
+  const Failure& failure() const { return failure_; }
+  std::string failure_text() const {
+    return "field '" + std::string(failure_.field) + "' at byte " + std::to_string(failure_.offset) + " needs " +
+           std::to_string(failure_.needed) + " bytes, " + std::to_string(failure_.left) + " are left";
+  }
+  std::size_t position() const { return position_; }
+  std::size_t remaining() const { return in_.size() - position_; }
+
+  /// The next `count` bytes as they are, or an empty view and a failure.
+  BytesView block(std::string_view name, std::size_t count) {
+    if (!has(name, count)) return {};
+    const BytesView taken = in_.subspan(position_, count);
+    position_ += count;
+    return taken;
+  }
+
+ private:
+  friend class Visitor<Reader>;
+  template <Scalar T>
+  void scalar(std::string_view name, T& value) {
+    if (!has(name, sizeof(T))) return;
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < sizeof(T); ++i)
+      bits |= std::to_integer<std::uint64_t>(in_[position_ + i]) << shift_of(i, sizeof(T), endian_);
+    position_ += sizeof(T);
+    value = from_bits<T>(bits);
+  }
+  bool has(std::string_view name, std::size_t count) {
+    if (failed_) return false;
+    if (count <= remaining()) return true;
+    failed_ = true;
+    failure_ = {name, position_, count, remaining()};
+    return false;
+  }
+
+  BytesView in_;
+  Endian endian_;
+  std::size_t position_ = 0;
+  bool failed_ = false;
+  Failure failure_;
+};
+
+/// Counts bytes.
+class Counter : public Visitor<Counter> {
+ public:
+  std::size_t bytes = 0;
+
+ private:
+  friend class Visitor<Counter>;
+  template <Scalar T>
+  constexpr void scalar(std::string_view, const T&) {
+    bytes += sizeof(T);
+  }
+};
+
+/// Lists offset, type and the vendor's name of every field: the tables of the protocol documents.
+class Namer : public Visitor<Namer> {
+ public:
+  struct Row {
+    std::size_t offset = 0, size = 0;
+    std::string type, name;
+  };
+  std::vector<Row> rows;
+
+  std::string markdown() const {
+    std::string text = "| off | type | field |\n|---|---|---|\n";
+    for (const Row& row : rows) text += "| " + std::to_string(row.offset) + " | " + row.type + " | " + row.name + " |\n";
+    return text;
+  }
+
+ private:
+  friend class Visitor<Namer>;
+  template <class T>
+  static std::string type_name() {
+    if constexpr (std::is_enum_v<T>) {
+      return type_name<std::underlying_type_t<T>>();
+    } else {
+      return (std::is_floating_point_v<T> ? "f" : (std::is_signed_v<T> ? "i" : "u")) + std::to_string(8 * sizeof(T));
+    }
+  }
+  void add(std::string type, std::string_view name, std::size_t size) {
+    rows.push_back({offset_, size, std::move(type), prefix_ + std::string(name)});
+    offset_ += size;
+  }
+  template <Scalar T>
+  void scalar(std::string_view name, const T&) {
+    add(type_name<T>(), name, sizeof(T));
+  }
+  template <class A>
+  void array(std::string_view name, A& values) {
+    using Element = typename std::remove_const_t<A>::value_type;
+    if constexpr (Scalar<Element>) {
+      add(type_name<Element>() + " x " + std::to_string(values.size()), name, values.size() * sizeof(Element));
+    } else {
+      Visitor::array(name, values);
+    }
+  }
+  template <class M>
+  void nested(std::string_view name, M& message) {
+    const std::string outer = prefix_;
+    prefix_ += std::string(name) + ".";
+    fields(*this, message);
+    prefix_ = outer;
+  }
+  std::size_t offset_ = 0;
+  std::string prefix_;
+};
+
+/// Bytes a message takes on the wire; a constant.
+template <class M>
+constexpr std::size_t wire_size() {
+  Counter counter;
+  const M message{};
+  fields(counter, message);
+  return counter.bytes;
+}
+
+template <class M>
+void append(Bytes& out, const M& message, Endian endian = Endian::little) {
+  Writer writer(out, endian);
+  fields(writer, message);
+}
+template <class M>
+Bytes bytes_of(const M& message, Endian endian = Endian::little) {
+  Bytes out;
+  out.reserve(wire_size<M>());
+  append(out, message, endian);
+  return out;
+}
+template <class M>
+std::string offset_table() {
+  Namer namer;
+  const M message{};
+  fields(namer, message);
+  return namer.markdown();
+}
+
+}  // namespace sonar::wire
