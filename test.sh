@@ -1,0 +1,23 @@
+#!/usr/bin/env bash
+# Sets up, builds and runs the tests. usage: ./test.sh [--long] [ctest arguments...]
+#   --long   also the tests labelled "long", a minute of each fuzz target and the thread sanitizer on the daemon
+# Tests that read recordings of real devices take their folder from SONARD_CAPTURES and are skipped without it.
+set -u -o pipefail
+cd "$(dirname "$0")" || exit 70
+# shellcheck source=tests/tools/setup.sh
+. tests/tools/setup.sh
+
+long=
+case "${1:-}" in
+  -h | --help) sed -n '2,4s/^# //p' "$0"; exit 0 ;;
+  --long) long=1; shift ;;
+esac
+
+setup_and_build || exit
+if [ -n "$long" ]; then
+  tests/tools/long_checks.sh || exit
+fi
+say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"
+only=(-LE long)
+[ -n "$long" ] && only=()
+ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-2}" --output-on-failure --no-tests=error "${only[@]}" "$@" </dev/null

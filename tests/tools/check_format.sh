@@ -1,0 +1,7 @@
+#!/usr/bin/env bash
+# Says which tracked C++ and CUDA files clang-format 14 would change; ./tests/tools/check_format.sh --fix changes them.
+set -u -o pipefail
+cd "$(dirname "$0")/../.." || exit 70
+mode=(--dry-run -Werror)
+[ "${1:-}" = --fix ] && mode=(-i)
+git ls-files -z '*.hpp' '*.cpp' '*.cu' '*.cuh' | xargs -0 --no-run-if-empty clang-format-14 "${mode[@]}"

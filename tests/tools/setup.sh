@@ -1,0 +1,79 @@
+# Prepares a machine and builds: sourced by run.sh, test.sh and .ci/run, from the repository root. Quick when nothing changed.
+# shellcheck shell=bash
+
+# What the build needs on Debian 12 and Ubuntu; all of it from the main archive.
+build_packages=(
+  g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libpng-dev libexpected-dev
+  libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libeigen3-dev libgtest-dev libgmock-dev
+)
+
+say() { printf '\n== %s\n' "$*"; }
+
+# need_packages NAME...: installs what is missing, with apt, and says so.
+need_packages() {
+  if ! command -v dpkg-query >/dev/null; then
+    echo "not a Debian-like system: expecting the equivalents of these packages: $*"
+    return 0
+  fi
+  local name missing=()
+  for name in "$@"; do
+    [ "$(dpkg-query -W -f='${db:Status-Status}' "$name" 2>/dev/null)" = installed ] || missing+=("$name")
+  done
+  [ ${#missing[@]} -gt 0 ] || return 0
+
+  local as_root=()
+  if [ "$(id -u)" != 0 ]; then
+    command -v sudo >/dev/null || {
+      echo "missing packages, and neither root nor sudo to install them. As root: apt-get install ${missing[*]}" >&2
+      return 69
+    }
+    as_root=(sudo)
+  fi
+  say "installing ${missing[*]}"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 update </dev/null &&
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -y --no-install-recommends -o DPkg::Lock::Timeout=300 \
+      -o Acquire::Retries=3 -o Dpkg::Use-Pty=0 install "${missing[@]}" </dev/null || {
+    echo "apt-get could not install ${missing[*]}: see its message above; with no network, install them by hand" >&2
+    return 69
+  }
+}
+
+# Compilers at once: one a processor, but no more than the memory carries (a large file takes about 1.2 GB).
+build_jobs() {
+  local processors memory_kb by_memory
+  processors=$(nproc 2>/dev/null || echo 2)
+  memory_kb=$(awk '/^MemAvailable:/ {print $2}' /proc/meminfo 2>/dev/null)
+  by_memory=$((${memory_kb:-4000000} / 1200000))
+  [ "$by_memory" -ge 1 ] || by_memory=1
+  echo $((processors < by_memory ? processors : by_memory))
+}
+
+# configure PRESET [cmake arguments...]
+configure() {
+  local log preset=$1
+  shift
+  log=$(mktemp)
+  if cmake --preset "$preset" -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" "$@" >"$log" 2>&1 </dev/null; then
+    grep -E '^-- (sonard|  )|Warning' "$log" || true
+    rm -f "$log"
+  else
+    cat "$log" >&2
+    rm -f "$log"
+    echo "configuring preset $preset failed: see above" >&2
+    return 1
+  fi
+}
+
+# build PRESET [targets...]
+build() {
+  local preset=$1
+  shift
+  cmake --build "build/$preset" --parallel "$(build_jobs)" ${1:+--target "$@"} </dev/null
+}
+
+# setup_and_build [cmake arguments...]: the release build, everything in it.
+setup_and_build() {
+  need_packages "${build_packages[@]}" || return
+  say "building in build/release"
+  configure release -DSONAR_WERROR="${SONAR_WERROR:-OFF}" "$@" && build release
+}
