@@ -1,0 +1,53 @@
+// The compute pool: every item exactly once, worker numbers in range, usable again and again, for any number of threads.
+#include "core/base/parallel.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <vector>
+
+namespace sonar {
+namespace {
+
+class ParallelPool : public testing::TestWithParam<int> {};
+
+TEST_P(ParallelPool, EveryItemOnce) {
+  Parallel pool(GetParam());
+  EXPECT_EQ(pool.threads(), GetParam());
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{10000}}) {
+    std::vector<std::atomic<int>> seen(count);
+    std::atomic<bool> worker_in_range = true;
+    pool.for_each(count, [&](std::size_t item, int worker) {
+      ++seen[item];
+      if (worker < 0 || worker >= pool.threads()) worker_in_range = false;
+    });
+    for (const auto& n : seen) ASSERT_EQ(n, 1);
+    EXPECT_TRUE(worker_in_range);
+  }
+}
+
+TEST_P(ParallelPool, NoWorkerIsInTwoItemsAtOnce) {
+  Parallel pool(GetParam());
+  std::vector<std::atomic<int>> inside(static_cast<std::size_t>(pool.threads()));
+  std::atomic<bool> overlap = false;
+  pool.for_each(2000, [&](std::size_t, int worker) {
+    const auto w = static_cast<std::size_t>(worker);
+    if (inside[w].fetch_add(1) != 0) overlap = true;
+    inside[w].fetch_sub(1);
+  });
+  EXPECT_FALSE(overlap);
+}
+
+TEST_P(ParallelPool, ManySmallRounds) {
+  Parallel pool(GetParam());
+  std::vector<int> sum(64);
+  for (int round = 0; round < 500; ++round) {
+    pool.for_each(sum.size(), [&](std::size_t item, int) { ++sum[item]; });
+  }
+  for (const int n : sum) EXPECT_EQ(n, 500);  // for_each returns only when all items are done and visible
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, ParallelPool, testing::Values(1, 2, 4), testing::PrintToStringParamName());
+
+}  // namespace
+}  // namespace sonar
