@@ -1,6 +1,8 @@
 // The seam between the daemon and whatever computes pings: CPU here, CUDA in cuda/.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <memory>
 #include <span>
 #include <string>
@@ -18,21 +20,27 @@ enum class SimdLevel { automatic, portable, avx2, avx512 };
 struct EngineOptions {
   SimdLevel simd = SimdLevel::automatic;
   std::size_t cell_cache_bytes = 160u << 20;
+  double (*now_s)() = nullptr;  // a clock for PingStatistics; core/ has none of its own
 };
 
-/// Wall time of each stage of the last ping [s], in the order they run.
-struct StageTime {
-  const char* stage = "";
-  double seconds = 0;
+enum class Stage { cull, build_cells, trace, scatter, synthesize, noise, couple, receive, stages };
+inline constexpr std::array<const char*, static_cast<std::size_t>(Stage::stages)> stage_names{
+    "cull", "build cells", "trace", "scatter", "synthesize", "noise", "couple", "receive"};
+
+/// Counts and times of one ping, for the benchmark. Times stay 0 without a clock.
+struct PingStatistics {
+  std::array<double, static_cast<std::size_t>(Stage::stages)> seconds{};  // summed over workers
+  std::size_t rays = 0, tiles = 0, tiles_built = 0, cells = 0, echoes = 0, cell_bytes = 0;
 };
 
 class PingEngine {
  public:
   virtual ~PingEngine() = default;
-  /// Requests must be valid (see validate_request). One caller at a time.
+  /// Requests must be valid (why_invalid in core/pipeline/ping_plan.hpp is empty). One caller at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
-  virtual std::vector<StageTime> last_stage_times() const { return {}; }
+  /// Of the last ping.
+  virtual PingStatistics statistics() const { return {}; }
 };
 
 /// Builds the acceleration structures; the pool must outlive the engine.

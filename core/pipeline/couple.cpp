@@ -1,0 +1,55 @@
+#include "core/pipeline/couple.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/waveform.hpp"
+
+namespace sonar {
+
+void couple(const ColumnSignals& columns, const Coupling& coupling, const simd::Kernels& kernels, int first_sample, int samples, int beams,
+            CoupleScratch& scratch, BeamSignals& out) {
+  const int floats = (2 * samples + 31) / 32 * 32;
+  out.beams = beams;
+  out.first_sample = first_sample;
+  out.samples = samples;
+  out.stride = floats;
+  out.data.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>((beams + 3) / 4 * 4));
+
+  scratch.window.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>(columns.columns));
+  for (int k = 0; k < columns.columns; ++k) {
+    const float* from = columns.first_sample(k) + 2 * first_sample;
+    std::copy(from, from + floats, scratch.window.data() + static_cast<std::ptrdiff_t>(k) * floats);
+  }
+  for (const CouplingPanel& panel : coupling.panels)
+    kernels.couple_panel(scratch.window.data() + static_cast<std::ptrdiff_t>(panel.first_column) * floats, floats,
+                         coupling.weights.data() + panel.weights, panel.count, out.beam(panel.first_beam), floats);
+}
+
+void add_points(std::span<const PointEcho> points, const PingPlan& plan, BeamSignals& out) {
+  if (points.empty()) return;
+  const double per_sample = 2 * half_power_bt * plan.sample_spacing_m / static_cast<double>(plan.settings.pulse_width_m);
+  std::vector<std::complex<double>> sum;
+  for (int j = 0; j < out.beams; ++j) {
+    sum.assign(static_cast<std::size_t>(out.samples), 0.0);
+    for (const PointEcho& point : points) {
+      const double weight = beam_weight(plan.mode, plan.beam_sine[static_cast<std::size_t>(j)], point.sine);
+      const int from = std::max(static_cast<int>(std::floor(point.sample)) - plan.taps / 2 + 1, out.first_sample);
+      const int to = std::min(static_cast<int>(std::floor(point.sample)) + plan.taps / 2 + 1, out.first_sample + out.samples);
+      for (int n = from; n < to; ++n) {
+        const double x = per_sample * (n - point.sample);
+        sum[static_cast<std::size_t>(n - out.first_sample)] += point.amplitude * (weight * std::exp(-x * x));
+      }
+    }
+    float* beam = out.beam(j);
+    for (int n = 0; n < out.samples; ++n) {
+      const std::complex<double> s = sum[static_cast<std::size_t>(n)];
+      beam[2 * n] += static_cast<float>(plan.expected_power ? std::norm(s) : s.real());
+      if (!plan.expected_power) beam[2 * n + 1] += static_cast<float>(s.imag());
+    }
+  }
+}
+
+}  // namespace sonar

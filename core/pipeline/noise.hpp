@@ -1,0 +1,25 @@
+// Receiver noise: white complex Gaussian per column, shaped in range like the pulse, injected before coupling so that
+// neighbouring beams share it as in a real array (acoustics.md 4.6). Drawn from a pre-filtered table at hashed places.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/units.hpp"
+
+namespace sonar {
+
+class NoiseTable {
+ public:
+  /// Draws the table anew when seed or filter changed. E|n|^2 = 1 per sample.
+  void prepare(Seed seed, const std::vector<float>& filter);
+  /// column[2 n], column[2 n + 1] += rms * noise for n in [0, samples). A function of (seed, sonar, ping, column, n) alone.
+  void add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
+
+ private:
+  Seed seed_{};
+  std::vector<float> filter_;
+  std::vector<float> white_, shaped_;  // complex, interleaved
+};
+
+}  // namespace sonar

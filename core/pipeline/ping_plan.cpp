@@ -1,0 +1,292 @@
+#include "core/pipeline/ping_plan.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/receiver.hpp"
+#include "core/pipeline/arithmetic/waveform.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr double widest_column_in_beams = 0.35;  // acoustics.md 2.4
+constexpr double margin_in_beams = 3.0;          // columns beyond the sector, or its edge beams would be dim
+constexpr double flat_margin_in_beams = 1.5;     // of which the transmitter lights this much fully
+constexpr int base_elevations = 48;              // cells.md 4
+constexpr double fan_over_width = 2.3;           // the fan reaches the -20 dB points of the two-way pattern
+constexpr double widest_fan_rad = 1.4;
+constexpr double dropped_energy = 1e-4;          // of the coupling band, -40 dB
+constexpr double pulse_reach_widths = 3.99;      // p falls to 2e-10 at this many -3 dB widths
+constexpr double level_fade = 1.15;              // cell levels cross-fade over 15 % of range
+
+double half_aperture_sine(const FrequencyMode& mode) { return std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2); }
+double beam_width_sine(const FrequencyMode& mode) {
+  return 2 * std::sin(static_cast<double>(mode.pattern.azimuth_width_rad) / 2);
+}
+
+Fan make_fan(const FrequencyMode& mode, const PingSettings& settings) {
+  Fan fan;
+  fan.half_angle_rad = std::min(static_cast<double>(mode.pattern.elevation_width_rad) * fan_over_width / 2, widest_fan_rad);
+  const double tangent = std::tan(fan.half_angle_rad);
+  const double wanted = static_cast<double>(settings.range_m) * 2 * tangent / (0.7 * static_cast<double>(settings.pulse_width_m));
+  fan.bins = 256;
+  while (fan.bins < 2048 && fan.bins < wanted) fan.bins *= 2;
+  fan.first_tangent = static_cast<float>(-tangent);
+  fan.bins_per_tangent = static_cast<float>(fan.bins / (2 * tangent));
+  for (int e = 0; e < base_elevations; ++e)
+    fan.elevation_rad.push_back(static_cast<float>(fan.half_angle_rad * (2.0 * e / (base_elevations - 1) - 1)));
+  return fan;
+}
+
+/// Least squares over the fan through Chebyshev points: the pattern is entire in w = sin^2, so few terms do.
+std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_rad) {
+  constexpr int n = simd::elevation_terms;
+  if (mode.pattern.elevation_taper == Taper::unit) {
+    std::vector<float> one(n, 0.0f);
+    one[0] = 1;
+    return one;
+  }
+  const double aperture = elevation_aperture_in_wavelengths(mode.pattern);
+  const double top = std::pow(std::sin(half_angle_rad), 2);
+  // Newton's divided differences at Chebyshev nodes of [0, top], then expanded to plain powers.
+  std::array<double, n> node{}, coefficient{};
+  for (int i = 0; i < n; ++i) {
+    node[static_cast<std::size_t>(i)] = top * 0.5 * (1 - std::cos(pi * (i + 0.5) / n));
+    coefficient[static_cast<std::size_t>(i)] = elevation_two_way(aperture, std::asin(std::sqrt(node[static_cast<std::size_t>(i)])));
+  }
+  for (int order = 1; order < n; ++order)
+    for (int i = n - 1; i >= order; --i) {
+      const auto k = static_cast<std::size_t>(i);
+      coefficient[k] = (coefficient[k] - coefficient[k - 1]) / (node[k] - node[k - static_cast<std::size_t>(order)]);
+    }
+  std::array<double, n> power{};
+  for (int i = n - 1; i >= 0; --i) {  // power = power * (w - node_i) + coefficient_i
+    for (int k = n - 1; k > 0; --k)
+      power[static_cast<std::size_t>(k)] = power[static_cast<std::size_t>(k - 1)] - node[static_cast<std::size_t>(i)] * power[static_cast<std::size_t>(k)];
+    power[0] = -node[static_cast<std::size_t>(i)] * power[0] + coefficient[static_cast<std::size_t>(i)];
+  }
+  return {power.begin(), power.end()};
+}
+
+void fill_row_gains(PingPlan& plan) {
+  const PingSettings& s = plan.settings;
+  const auto tvg = [&](int row) {
+    return s.tvg ? tvg_db(plan.mode.receiver, (row + 0.5) * static_cast<double>(s.range_bin_m),
+                          static_cast<double>(s.device_absorption_db_per_m))
+                 : 0.0;
+  };
+  const double smallest = tvg(0);
+  for (int row = 0; row < s.range_bin_count; ++row) {
+    double gain_db = static_cast<double>(s.gain_db) + tvg(row);
+    double extra = 1;
+    if (s.format.row_gains) {
+      plan.row_gain.push_back(row_power_gain(tvg(row), smallest));
+      gain_db = static_cast<double>(s.gain_db) + smallest;
+      extra = plan.row_gain.back();
+    }
+    const double factor = full_scale_factor(plan.mode.receiver, gain_db);
+    plan.row_power_factor.push_back(static_cast<float>(factor * factor * extra));
+  }
+}
+
+}  // namespace
+
+double beam_weight(const FrequencyMode& mode, double beam_sine, double sine) {
+  const Taper taper = mode.pattern.azimuth_taper;
+  return directivity(taper, aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad)), sine - beam_sine);
+}
+
+std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count) {
+  std::vector<double> sines;
+  const double half = static_cast<double>(mode.horizontal_aperture_rad) / 2;
+  for (int j = 0; j < beam_count; ++j) {
+    if (mode.beam_spacing == BeamSpacing::uniform_in_sine)
+      sines.push_back(beam_count > 1 ? std::sin(half) * (1 - 2.0 * j / (beam_count - 1)) : 0.0);
+    else
+      sines.push_back(std::sin(half * (1 - (2.0 * j + 1) / beam_count)));
+  }
+  return sines;
+}
+
+Columns make_columns(const FrequencyMode& mode, int beam_count) {
+  const double top = half_aperture_sine(mode), width = beam_width_sine(mode);
+  // Beams lie on column centres where they are uniform in the sine, so that one row of weights serves them all.
+  const double beam_spacing = 2 * top / std::max(beam_count - 1, 1);
+  const double per_beam = std::ceil(beam_spacing / (widest_column_in_beams * width) - 1e-9);
+  Columns c;
+  c.spacing = beam_spacing / std::max(per_beam, 1.0);
+  const int margin = static_cast<int>(std::ceil(margin_in_beams * width / c.spacing));
+  const int inside = static_cast<int>(std::lround(2 * top / c.spacing)) + 1;
+  c.count = inside + 2 * margin;
+  c.first_sine = top + margin * c.spacing;
+  for (int k = 0; k < c.count; ++k) {
+    const double beyond = (std::abs(c.sine(k)) - top) / width;
+    const double fall = std::clamp((beyond - flat_margin_in_beams) / (margin_in_beams - flat_margin_in_beams), 0.0, 1.0);
+    c.transmit.push_back(std::abs(c.sine(k)) < 1 ? static_cast<float>(std::pow(std::cos(pi / 2 * fall), 2)) : 0.0f);
+  }
+  return c;
+}
+
+Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared) {
+  const Taper taper = mode.pattern.azimuth_taper;
+  const double aperture = aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad));
+  const TaperSeries series = taper_series(taper);
+  const auto weight = [&](double du) { return taper == Taper::unit ? 1.0 : series_amplitude(series, aperture * du); };
+  Coupling c;
+  // The smallest band whose dropped energy is below -40 dB.
+  std::vector<double> energy(static_cast<std::size_t>(columns.count));
+  double total = 0;
+  for (int h = 0; h < columns.count; ++h) {
+    const double w = weight(h * columns.spacing);
+    total += energy[static_cast<std::size_t>(h)] = w * w * (h == 0 ? 1 : 2);
+  }
+  double dropped = 0;
+  c.half_band = columns.count - 1;
+  while (c.half_band > 0 && dropped + energy[static_cast<std::size_t>(c.half_band)] < dropped_energy * total)
+    dropped += energy[static_cast<std::size_t>(c.half_band--)];
+  c.weight_energy = total - dropped;
+
+  const int beams = static_cast<int>(beam_sines.size());
+  const auto nearest_column = [&](int beam) {
+    return (columns.first_sine - beam_sines[static_cast<std::size_t>(beam)]) / columns.spacing;
+  };
+  const bool same_for_all = mode.beam_spacing == BeamSpacing::uniform_in_sine && beams > 1;
+  for (int first = 0; first < beams; first += 4) {
+    const int last = std::min(first + 3, beams - 1);
+    const int from = static_cast<int>(std::floor(nearest_column(first) + 0.5)) - c.half_band;
+    const int to = static_cast<int>(std::floor(nearest_column(last) + 0.5)) + c.half_band + 1;
+    const int clipped_from = std::max(from, 0), clipped_to = std::min(to, columns.count);
+    const bool whole = last == first + 3;
+    if (first == 0 || !same_for_all || !whole) {
+      c.panels.push_back({first, clipped_from, clipped_to - clipped_from, c.weights.size()});
+      // The first panel keeps its unclipped weights, because the others share them.
+      const int start = same_for_all && whole ? from : clipped_from, stop = same_for_all && whole ? to : clipped_to;
+      if (start < clipped_from) c.panels.back().weights += 4 * static_cast<std::size_t>(clipped_from - start);
+      for (int k = start; k < stop; ++k)
+        for (int j = first; j < first + 4; ++j) {
+          const double w = j <= last ? weight(columns.sine(k) - beam_sines[static_cast<std::size_t>(j)]) : 0.0;
+          c.weights.push_back(static_cast<float>(squared ? w * w : w));
+        }
+    } else {
+      c.panels.push_back({first, clipped_from, clipped_to - clipped_from, 4 * static_cast<std::size_t>(clipped_from - from)});
+    }
+  }
+  return c;
+}
+
+std::vector<float> make_pulse_rows(double samples_per_width, int taps, int steps, bool squared) {
+  const double per_sample = 2 * half_power_bt / samples_per_width;  // b t of one sample: -3 dB width is 2 * 0.5887 / b
+  const auto value = [&](int step, int tap) {
+    const double x = per_sample * (tap - (taps / 2 - 1) - static_cast<double>(step) / steps);
+    return std::exp(-(squared ? 2 : 1) * x * x);
+  };
+  std::vector<float> rows;
+  for (int step = 0; step < steps; ++step) {
+    for (int tap = 0; tap < taps; ++tap) rows.push_back(static_cast<float>(value(step, tap)));
+    for (int tap = 0; tap < taps; ++tap) rows.push_back(static_cast<float>(value(step + 1, tap) - value(step, tap)));
+  }
+  return rows;
+}
+
+std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m) {
+  const int coarsest = static_cast<int>(std::ceil(-std::log2(pulse_width_m) - 1e-9));
+  constexpr double nearest_m = 0.2;  // nearer than this nobody images; one level serves what is left
+  std::vector<CellLevel> levels;
+  double coarser_begins = 2 * max_range_m;  // where the level above takes over
+  for (int level = coarsest;; ++level) {
+    const double begins = 3 * std::ldexp(1.0, -level) / beam_width_rad;
+    const bool finest = begins < nearest_m || level - coarsest > 10;
+    CellLevel l;
+    l.level = level;
+    l.fade_in_from_m = finest ? 0.0f : static_cast<float>(begins);
+    l.full_from_m = finest ? 0.0f : static_cast<float>(begins * level_fade);
+    l.full_to_m = static_cast<float>(coarser_begins);
+    l.fade_out_to_m = static_cast<float>(coarser_begins * level_fade);
+    if (begins < max_range_m || finest) levels.push_back(l);
+    if (finest) break;
+    if (begins < max_range_m) coarser_begins = begins;
+  }
+  return levels;
+}
+
+std::vector<float> make_noise_filter(double bt) {
+  const int order = static_cast<int>(std::clamp(std::ceil(4.3 / bt), 2.0, 64.0));
+  std::vector<double> r(static_cast<std::size_t>(order) + 1);
+  for (int k = 0; k <= order; ++k) r[static_cast<std::size_t>(k)] = std::exp(-0.5 * bt * bt * k * k);
+  r[0] += 1e-4;  // keeps the factorisation definite on fine grids, where the spectrum falls to nothing
+  // Bauer's method: the rows of the Cholesky factor of the long banded Toeplitz matrix tend to the minimum-phase factor.
+  const int n = 64 * order;
+  std::vector<std::vector<double>> band(static_cast<std::size_t>(n), std::vector<double>(static_cast<std::size_t>(order) + 1));
+  const auto l = [&](int i, int j) -> double& { return band[static_cast<std::size_t>(i)][static_cast<std::size_t>(i - j)]; };
+  for (int i = 0; i < n; ++i)
+    for (int j = std::max(0, i - order); j <= i; ++j) {
+      double sum = r[static_cast<std::size_t>(i - j)];
+      for (int k = std::max(0, i - order); k < j; ++k) sum -= l(i, k) * l(j, k);
+      l(i, j) = i == j ? std::sqrt(sum) : sum / l(j, j);
+    }
+  std::vector<float> h;
+  double energy = 0;
+  for (const double v : band.back()) energy += v * v;
+  for (const double v : band.back()) h.push_back(static_cast<float>(v / std::sqrt(energy)));
+  return h;
+}
+
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
+  PingPlan p;
+  p.mode = mode;
+  p.settings = settings;
+  p.expected_power = switches.expected_power;
+  p.fixed_fan = switches.fixed_fan;
+  p.columns = make_columns(mode, settings.beam_count);
+  p.beam_sine = make_beam_sines(mode, settings.beam_count);
+  for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
+  p.coupling = make_coupling(mode, p.columns, p.beam_sine, p.expected_power);
+  p.fan = make_fan(mode, settings);
+  p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
+
+  p.samples = settings.range_bin_count * settings.samples_per_row;
+  p.sample_spacing_m = static_cast<double>(settings.range_bin_m) / settings.samples_per_row;
+  const double samples_per_width = static_cast<double>(settings.pulse_width_m) / p.sample_spacing_m;
+  p.taps = 8 * std::max(1, static_cast<int>(std::ceil(2 * pulse_reach_widths * samples_per_width / 8 - 0.05)));
+  p.pulse_rows = make_pulse_rows(samples_per_width, p.taps, p.pulse_steps, p.expected_power);
+  const double c_dev = static_cast<double>(settings.device_sound_speed_mps);
+  p.envelope_hz = envelope_parameter_hz(c_dev, static_cast<double>(settings.pulse_width_m));
+  p.levels = make_cell_levels(static_cast<double>(settings.pulse_width_m), static_cast<double>(mode.pattern.azimuth_width_rad),
+                              static_cast<double>(settings.range_m) * 1.1);
+
+  p.noise_filter = make_noise_filter(p.envelope_hz * 2 * p.sample_spacing_m / c_dev);
+  p.column_noise_upa = noise_rms_upa(mode, noise_bandwidth_hz(p.envelope_hz)) / std::sqrt(p.coupling.weight_energy);
+  fill_row_gains(p);
+  return p;
+}
+
+bool serves(const PingPlan& plan, const PingRequest& r) {
+  const PingSettings &a = plan.settings, &b = r.settings;
+  return plan.mode.name == r.model->modes[static_cast<std::size_t>(b.mode)].name && a.mode == b.mode && a.beam_count == b.beam_count &&
+         a.range_bin_count == b.range_bin_count && a.range_m == b.range_m && a.range_bin_m == b.range_bin_m &&
+         a.pulse_width_m == b.pulse_width_m && a.samples_per_row == b.samples_per_row && a.gain_db == b.gain_db && a.tvg == b.tvg &&
+         a.device_sound_speed_mps == b.device_sound_speed_mps && a.device_absorption_db_per_m == b.device_absorption_db_per_m &&
+         a.format.bits == b.format.bits && a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma &&
+         a.format.row_gains == b.format.row_gains && plan.expected_power == r.switches.expected_power &&
+         plan.fixed_fan == r.switches.fixed_fan;
+}
+
+std::string why_invalid(const PingRequest& r) {
+  const PingSettings& s = r.settings;
+  if (!r.model) return "the request names no sonar model";
+  if (s.mode < 0 || s.mode >= static_cast<int>(r.model->modes.size())) return "mode " + std::to_string(s.mode) + " does not exist in " + r.model->name;
+  if (s.beam_count < 1 || s.beam_count > 2048) return "beam_count " + std::to_string(s.beam_count) + " is not in 1..2048";
+  if (s.range_bin_count < 1 || s.range_bin_count > 65535) return "range_bin_count " + std::to_string(s.range_bin_count) + " is not in 1..65535";
+  if (s.samples_per_row < 1 || s.samples_per_row > 64) return "samples_per_row " + std::to_string(s.samples_per_row) + " is not in 1..64";
+  if (!(s.range_bin_m > 0) || !(s.pulse_width_m > 0) || !(s.range_m > 0) || !(s.device_sound_speed_mps > 0))
+    return "range, row spacing, pulse width and sound speed must be positive";
+  if (s.format.bits != 8 && s.format.bits != 16 && s.format.bits != 32) return "samples have 8, 16 or 32 bits";
+  if (!(s.format.gamma > 0)) return "gamma must be positive";
+  if (!is_finite(r.sonar_in_world.position_m) || !is_finite(r.sonar_in_world.orientation)) return "the sonar's pose is not finite";
+  return {};
+}
+
+}  // namespace sonar

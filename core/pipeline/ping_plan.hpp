@@ -1,0 +1,91 @@
+// Everything about a ping that follows from the model and the client's settings alone: columns, sample grid, pulse and coupling
+// tables, noise filter, gains. Made when settings change, used by every stage until they change again.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/pipeline/simd/kernels.hpp"
+#include "core/scene/surface_cells.hpp"
+#include "core/sonar/ping.hpp"
+
+namespace sonar {
+
+/// Columns of constant direction sine u = y / r (cones about the array axis), falling from port to starboard like the beams.
+struct Columns {
+  int count = 0;
+  double first_sine = 0;    // centre of column 0
+  double spacing = 0;       // in u
+  std::vector<float> transmit;  // amplitude of the transmitter per column: flat over the sector, soft beyond
+  double sine(int column) const { return first_sine - column * spacing; }
+};
+
+/// What the rays look at: angles about the array axis, and the tangent axis of the depth map.
+struct Fan {
+  double half_angle_rad = 0;
+  float first_tangent = 0, bins_per_tangent = 0;
+  int bins = 0;
+  std::vector<float> elevation_rad;  // the base fan, falling... rising from below to above
+};
+
+/// Weights of four neighbouring beams over the columns they share.
+struct CouplingPanel {
+  int first_beam = 0;    // the four beams first_beam .. +3; those past the last beam have zero weights
+  int first_column = 0, count = 0;
+  std::size_t weights = 0;  // offset into Coupling::weights, count x 4 values
+};
+struct Coupling {
+  int half_band = 0;     // columns on either side that a beam listens to
+  std::vector<CouplingPanel> panels;
+  std::vector<float> weights;
+  double weight_energy = 1;  // sum_k W_jk^2 of the middle beam
+};
+
+struct PingPlan {
+  FrequencyMode mode;
+  PingSettings settings;
+  bool expected_power = false;
+  int fixed_fan = 0;
+
+  Columns columns;
+  Fan fan;
+  Coupling coupling;
+  std::vector<float> beam_azimuth_rad;
+  std::vector<double> beam_sine;
+
+  // The sample grid: sample n lies at the device range (n + 1/2) sample_spacing_m.
+  int samples = 0;             // rows * samples_per_row
+  double sample_spacing_m = 0;
+  std::vector<float> pulse_rows;  // simd::PulseRows
+  int taps = 8, pulse_steps = 256;
+  double envelope_hz = 0;      // b of p(t) = exp(-b^2 t^2)
+
+  std::vector<CellLevel> levels;       // coarsest first
+  std::vector<float> elevation;        // polynomial of the two-way pattern in sin^2(angle)
+  std::vector<float> noise_filter;     // minimum-phase taps that give white noise the pulse's correlation on this grid
+  double column_noise_upa = 0;         // rms of one column
+  std::vector<float> row_power_factor; // per row: (gain * TVG / full scale)^2
+  std::vector<std::uint32_t> row_gain; // when settings.format.row_gains
+
+  simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
+};
+
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
+/// Whether the plan still serves this request.
+bool serves(const PingPlan& plan, const PingRequest& request);
+
+/// The sentence that says why a request cannot be simulated; empty when it can.
+std::string why_invalid(const PingRequest& request);
+
+// The parts of a plan, callable alone.
+Columns make_columns(const FrequencyMode& mode, int beam_count);
+std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count);
+Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared);
+std::vector<float> make_pulse_rows(double samples_per_half_power_width, int taps, int steps, bool squared);
+std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m);
+/// Taps h with sum_n h_n h_{n+k} = exp(-(b t k)^2 / 2), t = sample time: white noise filtered by h has the pulse's correlation.
+std::vector<float> make_noise_filter(double b_times_sample_time);
+/// Amplitude weight of a beam steered to `beam_sine` for a source at `sine`.
+double beam_weight(const FrequencyMode& mode, double beam_sine, double sine);
+
+}  // namespace sonar

@@ -1,0 +1,65 @@
+#include "core/pipeline/receive.hpp"
+
+#include <cmath>
+#include <cstdint>
+
+namespace sonar {
+namespace {
+
+/// Mean power of each row, beam after beam, turned so that a row's beams lie side by side.
+void detect(const BeamSignals& beams, const PingPlan& plan, int rows, int width, std::vector<float>& power) {
+  const int per_row = plan.settings.samples_per_row;
+  power.resize(static_cast<std::size_t>(rows) * static_cast<std::size_t>(width));
+  constexpr int block = 16;  // beams at a time: their rows stay in the first cache while they are turned
+  for (int from = 0; from < beams.beams; from += block) {
+    const int to = std::min(from + block, beams.beams);
+    for (int row = 0; row < rows; ++row)
+      for (int j = from; j < to; ++j) {
+        const float* s = beams.beam(j) + 2 * row * per_row;
+        float sum = 0;
+        for (int q = 0; q < per_row; ++q) sum += plan.expected_power ? s[2 * q] : s[2 * q] * s[2 * q] + s[2 * q + 1] * s[2 * q + 1];
+        power[static_cast<std::size_t>(row * width + j)] = sum / static_cast<float>(per_row);
+      }
+  }
+}
+
+void put(std::uint32_t code, int bytes, std::byte* at) {
+  for (int b = 0; b < bytes; ++b) at[b] = static_cast<std::byte>(code >> (8 * b) & 0xFFu);
+}
+
+}  // namespace
+
+void shape_ping(const PingPlan& plan, const Switches& switches, Ping& ping) {
+  const PingSettings& s = plan.settings;
+  const auto cells = static_cast<std::size_t>(s.range_bin_count) * static_cast<std::size_t>(s.beam_count);
+  ping.beam_azimuth_rad = plan.beam_azimuth_rad;
+  ping.samples.resize(cells * static_cast<std::size_t>(s.format.bits / 8));
+  ping.row_gain = plan.row_gain;
+  if (switches.keep_pressure) ping.pressure_upa.resize(cells);
+}
+
+void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels& kernels, ReceiveScratch& scratch, Ping& ping) {
+  const PingSettings& s = plan.settings;
+  const int per_row = s.samples_per_row, first_row = beams.first_sample / per_row, rows = beams.samples / per_row;
+  const int width = (s.beam_count + 15) / 16 * 16;
+  const int bytes = s.format.bits / 8;
+  detect(beams, plan, rows, width, scratch.power);
+  scratch.codes.resize(static_cast<std::size_t>(width));
+  const auto max_code = static_cast<float>(s.format.max_code);
+  for (int row = 0; row < rows; ++row) {
+    const float* power = scratch.power.data() + static_cast<std::ptrdiff_t>(row) * width;
+    const std::size_t at = static_cast<std::size_t>(first_row + row) * static_cast<std::size_t>(s.beam_count);
+    if (!ping.pressure_upa.empty())
+      for (int j = 0; j < s.beam_count; ++j) ping.pressure_upa[at + static_cast<std::size_t>(j)] = std::sqrt(power[j]);
+    kernels.quantise(power, plan.row_power_factor[static_cast<std::size_t>(first_row + row)], s.format.gamma / 2, max_code,
+                     scratch.codes.data(), width);
+    std::byte* out = ping.samples.data() + at * static_cast<std::size_t>(bytes);
+    for (int j = 0; j < s.beam_count; ++j) {
+      // 2^32 - 1 is no float: compare before the conversion can overflow.
+      const float code = scratch.codes[static_cast<std::size_t>(j)];
+      put(code >= max_code ? s.format.max_code : static_cast<std::uint32_t>(code), bytes, out + static_cast<std::ptrdiff_t>(j) * bytes);
+    }
+  }
+}
+
+}  // namespace sonar

@@ -1,0 +1,23 @@
+// Last stage: envelope, time-varied gain, range rows, quantised samples (acoustics.md 2.5, 4.8).
+#pragma once
+
+#include <vector>
+
+#include "core/pipeline/couple.hpp"
+#include "core/pipeline/ping_plan.hpp"
+#include "core/sonar/ping.hpp"
+
+namespace sonar {
+
+/// Buffers of receive, one per worker.
+struct ReceiveScratch {
+  std::vector<float> power;  // [rows][beams rounded up]
+  std::vector<float> codes;
+};
+
+/// Sizes the parts of the ping that receive fills.
+void shape_ping(const PingPlan& plan, const Switches& switches, Ping& ping);
+/// Rows of the window that `beams` holds; the window must begin and end on whole rows.
+void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels& kernels, ReceiveScratch& scratch, Ping& ping);
+
+}  // namespace sonar

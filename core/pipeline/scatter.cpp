@@ -1,0 +1,182 @@
+#include "core/pipeline/scatter.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/random.hpp"
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/scattering.hpp"
+#include "core/scene/cell_lattice.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr float depth_tolerance_in_pulses = 1.5f;  // cells.md 2: covers the straight lines between rays
+constexpr std::uint32_t fixed_fan_key = 0x66616eu; // keeps these draws apart from the cells'
+
+double fraction(double turns) { return turns - std::floor(turns); }
+
+float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
+
+TileToSound prepare(const TileInView& t, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan, const PingScalars& s) {
+  TileToSound out;
+  simd::TileSeen& seen = out.seen;
+  const CellTile& tile = *t.tile;
+  const double range = length(t.from_sonar_m);
+  seen.tile = &tile;
+  const Vec3 q = to_float(t.from_sonar_object_m), p = to_float(t.from_sonar_m);
+  seen.from_sonar_object[0] = q.x, seen.from_sonar_object[1] = q.y, seen.from_sonar_object[2] = q.z;
+  seen.from_sonar[0] = p.x, seen.from_sonar[1] = p.y, seen.from_sonar[2] = p.z;
+  const Rotation& turn = cells.sonar_from_object(t.object);
+  for (int i = 0; i < 9; ++i) seen.turn[i] = static_cast<float>(turn.m[i / 3][i % 3]);
+  seen.range_m = static_cast<float>(range);
+  seen.phase_turns = static_cast<float>(fraction(range * s.turns_per_m));
+  const double mu = lambert_coefficient(static_cast<double>(scene.materials[static_cast<std::size_t>(tile.material)].lambert_db));
+  const double constant = s.source_upa * std::sqrt(mu) * std::exp(-2 * s.absorption_np_per_m * range);
+  seen.amplitude = static_cast<float>(constant * static_cast<double>(tile.weight_unit));
+  seen.area_amplitude = static_cast<float>(constant * lattice::cell_size_m(tile.level));
+  seen.fade_in_from_m = t.level->fade_in_from_m;
+  seen.fade_in_per_m = per_metre(t.level->fade_in_from_m, t.level->full_from_m);
+  seen.fade_out_to_m = t.level->fade_out_to_m;
+  seen.fade_out_per_m = per_metre(t.level->full_to_m, t.level->fade_out_to_m);
+
+  const double radius = static_cast<double>(tile.half_edge_m) * 1.7320508;
+  out.first_column = 0, out.last_column = plan.columns.count;
+  if (range > 2 * radius) {
+    // |grad u| <= 1 / r, and r >= range - radius inside the cube.
+    const double sine = t.from_sonar_m.y / range, spread = radius / (range - radius) + 1e-6;
+    const double from = (plan.columns.first_sine - (sine + spread)) / plan.columns.spacing + 0.5;
+    const double to = (plan.columns.first_sine - (sine - spread)) / plan.columns.spacing + 1.5;
+    out.first_column = static_cast<int>(std::clamp(std::floor(from), 0.0, static_cast<double>(plan.columns.count)));
+    out.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(plan.columns.count)));
+  }
+  return out;
+}
+
+}  // namespace
+
+void Echoes::reserve(int capacity) {
+  const auto n = static_cast<std::size_t>(capacity) + 16;
+  sample.resize(n);
+  re.resize(n);
+  im.resize(n);
+  column.resize(n);
+}
+
+void Echoes::add(float at_sample, std::complex<float> amplitude, int in_column) {
+  if (count == capacity()) reserve(std::max(1024, 2 * count));
+  const auto i = static_cast<std::size_t>(count++);
+  sample[i] = at_sample;
+  re[i] = amplitude.real();
+  im[i] = amplitude.imag();
+  column[i] = in_column;
+}
+
+void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan,
+                   const PingScalars& scalars, Parallel& pool, std::vector<TileToSound>& tiles) {
+  tiles.resize(in_view.size());
+  constexpr std::size_t batch = 256;
+  pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
+    const std::size_t end = std::min(in_view.size(), (b + 1) * batch);
+    for (std::size_t i = b * batch; i < end; ++i) tiles[i] = prepare(in_view[i], cells, scene, plan, scalars);
+  });
+}
+
+simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, const DepthMap& seen) {
+  simd::GroupView g{};
+  g.first_edge_sine = static_cast<float>(plan.columns.first_sine + plan.columns.spacing / 2);
+  g.columns_per_sine = static_cast<float>(1 / plan.columns.spacing);
+  g.first_column = seen.first_column;
+  g.last_column = seen.first_column + seen.columns;
+  g.first_tangent = plan.fan.first_tangent;
+  g.bins_per_tangent = plan.fan.bins_per_tangent;
+  g.bins = seen.bins;
+  g.inverse_depth = seen.inverse_x.data();
+  g.depth_tolerance_m = depth_tolerance_in_pulses * plan.settings.pulse_width_m;
+  g.turns_per_m = static_cast<float>(s.turns_per_m);
+  g.decay_per_m = static_cast<float>(2 * s.absorption_np_per_m);
+  g.samples_per_m = static_cast<float>(s.samples_per_m);
+  g.first_sample = static_cast<float>(-plan.taps / 2);
+  g.last_sample = static_cast<float>(plan.samples + plan.taps / 2 - 1);
+  std::copy(plan.elevation.begin(), plan.elevation.end(), g.elevation);
+  g.expected_power = plan.expected_power;
+  return g;
+}
+
+std::size_t scatter(const std::vector<TileToSound>& tiles, std::size_t from, const simd::GroupView& group, const simd::Kernels& kernels,
+                    Echoes& echoes) {
+  for (; from < tiles.size(); ++from) {
+    const TileToSound& t = tiles[from];
+    if (t.first_column >= group.last_column || t.last_column <= group.first_column) continue;
+    if (echoes.count + t.seen.tile->count > echoes.capacity()) {
+      if (echoes.count > 0) break;
+      echoes.reserve(t.seen.tile->count);
+    }
+    echoes.count += kernels.scatter_tile(t.seen, group, echoes.at(echoes.count));
+  }
+  return from;
+}
+
+void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPlan& plan, const PingScalars& s, Seed seed, Echoes& echoes) {
+  const double solid_angle = plan.columns.spacing * 2 * plan.fan.half_angle_rad / plan.fixed_fan;
+  const auto bits = static_cast<std::uint64_t>(seed);
+  const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
+  const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
+  for (const FanHit& hit : hits) {
+    const double r = static_cast<double>(hit.range_m);
+    const double at_sample = s.sample_of(r);
+    if (at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) continue;
+    const Object& object = scene.objects[hit.object];
+    const double mu =
+        lambert_coefficient(static_cast<double>(scene.materials[object.mesh->material[hit.triangle]].lambert_db));
+    const double sigma = lambert_cross_section_m2(mu, static_cast<double>(hit.cosine), r, solid_angle);
+    const double pattern = has_pattern ? elevation_two_way(aperture, static_cast<double>(hit.elevation_rad)) : 1.0;
+    const double amplitude = s.source_upa * std::sqrt(sigma) * two_way_transmission(r, s.absorption_np_per_m) * pattern;
+    if (plan.expected_power) {
+      echoes.add(static_cast<float>(at_sample), {static_cast<float>(amplitude * amplitude), 0}, hit.column);
+      continue;
+    }
+    const Random4 draw = philox(hit.object, static_cast<std::uint32_t>(hit.column), static_cast<std::uint32_t>(hit.ray), fixed_fan_key,
+                                static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32));
+    const ComplexNormal xi = complex_normal(draw.v[0], draw.v[1]);
+    const double phase = -2 * pi * fraction(r * s.turns_per_m);
+    const std::complex<double> a = std::complex<double>(xi.re, xi.im) * std::polar(amplitude, phase);
+    echoes.add(static_cast<float>(at_sample), std::complex<float>(a), hit.column);
+  }
+}
+
+std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pose> bodies_in_world, const PingPlan& plan,
+                                      const PingScalars& s, const Pose& sonar_in_world) {
+  std::vector<PointEcho> points;
+  const Pose world_in_sonar = inverse(sonar_in_world);
+  for (const PointTarget& target : scene.scene().point_targets) {
+    const Vec3d local = target.position_m;
+    const bool rides = target.body >= 0 && static_cast<std::size_t>(target.body) < bodies_in_world.size();
+    const Vec3d in_world = rides ? transform(bodies_in_world[static_cast<std::size_t>(target.body)], local) : local;
+    const Vec3d p = transform(world_in_sonar, in_world);
+    const double r = length(p);
+    const double at_sample = s.sample_of(r);
+    if (r < nearest_scatterer_m || p.x <= 0 || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) continue;
+    const ConicalDirection direction = conical_from_sonar(p);
+    const double column = std::floor((plan.columns.first_sine - direction.u) / plan.columns.spacing + 0.5);
+    if (std::abs(direction.psi_rad) > plan.fan.half_angle_rad || column < 0 || column >= plan.columns.count) continue;
+
+    RayPacket ray;
+    const Vec3d along = (1 / r) * (in_world - sonar_in_world.position_m);
+    ray.origin_x[0] = s.position_in_scene.x, ray.origin_y[0] = s.position_in_scene.y, ray.origin_z[0] = s.position_in_scene.z;
+    const Vec3 d = to_float(along);
+    ray.direction_x[0] = d.x, ray.direction_y[0] = d.y, ray.direction_z[0] = d.z;
+    ray.far[0] = static_cast<float>(r) * 0.9999f;
+    scene.trace(ray, 1u, false);
+    if (ray.object[0] != RayPacket::miss) continue;
+
+    const double transmit = static_cast<double>(plan.columns.transmit[static_cast<std::size_t>(column)]);
+    const double amplitude = s.source_upa * amplitude_from_db(static_cast<double>(target.target_strength_db)) *
+                             two_way_transmission(r, s.absorption_np_per_m) * elevation_two_way(plan.mode.pattern, direction.psi_rad) *
+                             transmit;
+    points.push_back({direction.u, at_sample, std::polar(amplitude, -2 * pi * fraction(r * s.turns_per_m))});
+  }
+  return points;
+}
+
+}  // namespace sonar

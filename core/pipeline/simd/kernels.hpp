@@ -1,0 +1,75 @@
+// The four hot loops of a ping, compiled once per instruction set from kernels.inl and picked at run time.
+// Plain arrays in, plain arrays out: what they compute is explained where they are called (scatter, synthesize, couple, receive).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/pipeline/ping_engine.hpp"
+#include "core/scene/surface_cells.hpp"
+
+namespace sonar::simd {
+
+/// Degree of the even polynomial that stands for the elevation pattern, in w = sin^2(elevation angle).
+inline constexpr int elevation_terms = 9;
+
+/// One tile as one ping sees it.
+struct TileSeen {
+  const CellTile* tile = nullptr;
+  float from_sonar_object[3];  // tile centre minus sonar, object axes [m]
+  float from_sonar[3];         // the same, sonar axes [m]
+  float turn[9];               // object to sonar axes, row-major
+  float range_m;               // of the tile centre
+  float phase_turns;           // carrier phase of the tile centre, in [0, 1)
+  float amplitude;             // everything that is constant over the tile, times weight_unit
+  float area_amplitude;        // the same with the cell size in place of the speckle (expected power)
+  float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
+};
+
+/// What holds for all tiles of one column group.
+struct GroupView {
+  float first_edge_sine, columns_per_sine;  // column = (first_edge_sine - y / r) * columns_per_sine
+  int first_column, last_column;            // half-open
+  float first_tangent, bins_per_tangent;    // depth map axis t = z / x
+  int bins;                                 // values per column of the depth map; the map has bins + 1
+  const float* inverse_depth;               // [last - first][bins + 1], 1 / x of what the rays saw, 0 = nothing
+  float depth_tolerance_m;
+  float turns_per_m;                        // 2 f / c
+  float decay_per_m;                        // 2 alpha [Np/m]
+  float samples_per_m, first_sample, last_sample;  // range window on the sample grid: s = r * samples_per_m - 0.5
+  float elevation[elevation_terms];         // two-way pattern, polynomial in w
+  bool expected_power;
+};
+
+/// Echoes waiting to be summed: structure of arrays, the caller owns the memory.
+struct EchoArrays {
+  float* sample;  // fractional sample index
+  float* re;
+  float* im;
+  std::int32_t* column;  // absolute column
+};
+
+/// Gaussian (or other) pulse on the sample grid: row `f` holds `taps` values and then `taps` differences to the next row.
+struct PulseRows {
+  const float* rows;
+  int taps, steps;
+};
+
+struct Kernels {
+  const char* name;
+  /// Appends the visible cells of a tile; `out` has room for tile.count + 16 more. Returns how many were appended.
+  int (*scatter_tile)(const TileSeen&, const GroupView&, EchoArrays out);
+  /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im).
+  void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column, int lead);
+  /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.
+  void (*couple_panel)(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats);
+  /// codes[i] = min(max_code, round(max_code * (power[i] * gain)^half_gamma)), as float; n is a multiple of 16.
+  void (*quantise)(const float* power, float gain, float half_gamma, float max_code, float* codes, int n);
+};
+
+/// The kernels of a level; `automatic` takes the best this processor has. A level it lacks falls back to the next lower one.
+const Kernels& kernels_for(SimdLevel level);
+
+extern const Kernels portable_kernels, avx2_kernels, avx512_kernels;
+
+}  // namespace sonar::simd

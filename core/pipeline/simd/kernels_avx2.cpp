@@ -1,0 +1,17 @@
+// The hot loops for processors with AVX2 and FMA; see kernels.inl.
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "core/pipeline/simd/kernels.hpp"
+
+namespace sonar::simd {
+namespace avx2 {
+constexpr int lanes = 8;
+#include "core/pipeline/simd/kernels.inl"
+}  // namespace avx2
+
+extern const Kernels avx2_kernels;
+const Kernels avx2_kernels{"avx2", avx2::scatter_tile, avx2::accumulate, avx2::couple_panel, avx2::quantise};
+
+}  // namespace sonar::simd

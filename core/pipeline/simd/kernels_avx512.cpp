@@ -1,0 +1,17 @@
+// The hot loops for processors with AVX-512 F, VL, BW and DQ; see kernels.inl.
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <immintrin.h>
+#include "core/pipeline/simd/kernels.hpp"
+
+namespace sonar::simd {
+namespace avx512 {
+constexpr int lanes = 16;
+#include "core/pipeline/simd/kernels.inl"
+}  // namespace avx512
+
+extern const Kernels avx512_kernels;
+const Kernels avx512_kernels{"avx512", avx512::scatter_tile, avx512::accumulate, avx512::couple_panel, avx512::quantise};
+
+}  // namespace sonar::simd

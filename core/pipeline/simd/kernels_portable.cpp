@@ -1,0 +1,17 @@
+// The hot loops for any x86-64 (or other) processor; see kernels.inl.
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "core/pipeline/simd/kernels.hpp"
+
+namespace sonar::simd {
+namespace portable {
+constexpr int lanes = 4;
+#include "core/pipeline/simd/kernels.inl"
+}  // namespace portable
+
+extern const Kernels portable_kernels;
+const Kernels portable_kernels{"portable", portable::scatter_tile, portable::accumulate, portable::couple_panel, portable::quantise};
+
+}  // namespace sonar::simd

@@ -1,0 +1,48 @@
+// The table of contents of a ping: from a request and the scene to samples, stage by stage. A pure function of its arguments;
+// what it keeps between calls (Workspace, SurfaceCells) only saves work.
+#pragma once
+
+#include <vector>
+
+#include "core/base/parallel.hpp"
+#include "core/pipeline/couple.hpp"
+#include "core/pipeline/noise.hpp"
+#include "core/pipeline/ping_engine.hpp"
+#include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/receive.hpp"
+#include "core/pipeline/scatter.hpp"
+#include "core/pipeline/synthesize.hpp"
+#include "core/pipeline/trace_fan.hpp"
+#include "core/scene/ray_scene.hpp"
+#include "core/scene/surface_cells.hpp"
+
+namespace sonar {
+
+/// Buffers reused from ping to ping.
+struct Workspace {
+  PingPlan plan;
+  bool has_plan = false;
+  NoiseTable noise;
+  std::vector<TileToSound> tiles;
+  std::vector<PointEcho> points;
+  ColumnSignals columns;
+  struct PerWorker {
+    FanScratch fan;
+    DepthMap seen;
+    std::vector<FanHit> hits;
+    Echoes echoes;
+    CoupleScratch couple;
+    BeamSignals beams;
+    ReceiveScratch receive;
+    PingStatistics statistics;
+  };
+  std::vector<PerWorker> workers;
+  PingStatistics statistics;
+  double (*now_s)() = nullptr;
+};
+
+/// `cells` must belong to the scene of `scene` and to the request's seed; bodies must have been placed.
+Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels, Workspace& work,
+              Parallel& pool);
+
+}  // namespace sonar

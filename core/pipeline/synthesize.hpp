@@ -1,0 +1,34 @@
+// Stage three: pulses summed in time, per column, at the sample centres (acoustics.md eq. 8). The pulse is analytic, so it is
+// evaluated only where a row takes its sample; no frequency loop and no transform is needed.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/pipeline/noise.hpp"
+#include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/scatter.hpp"
+
+namespace sonar {
+
+/// Complex signals per column at the sample centres, interleaved; in expected power, re is a power.
+struct ColumnSignals {
+  int columns = 0, samples = 0;
+  int lead = 0;               // samples of room before sample 0, for pulses that begin earlier
+  std::ptrdiff_t stride = 0;  // floats from column to column
+  std::vector<float> data;
+
+  void shape(int column_count, int sample_count, int taps);
+  float* column(int k) { return data.data() + k * stride; }
+  const float* first_sample(int k) const { return data.data() + k * stride + 2 * lead; }
+};
+
+/// Zeroes columns [first, last).
+void clear_columns(ColumnSignals& signals, int first, int last);
+/// Adds the pulses of the echoes, whose columns must lie in [first_column, ...) of `signals`.
+void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernels& kernels, ColumnSignals& signals);
+/// Applies the transmitter's pattern and adds receiver noise to columns [first, last); `noise` null = none.
+void finish_columns(const PingPlan& plan, const NoiseTable* noise, std::uint32_t sonar, std::uint32_t ping, int first, int last,
+                    ColumnSignals& signals);
+
+}  // namespace sonar

@@ -1,0 +1,227 @@
+#include "core/pipeline/trace_fan.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar {
+namespace {
+
+constexpr int edge_depth = 4;     // edges are found to 1/16 of a base interval
+constexpr int deepest = 6;        // a surface that still will not interpolate hides itself
+
+/// Sixteen rays on their way: fills a packet lane by lane and remembers who asked.
+class PacketFiller {
+ public:
+  PacketFiller(const PingScalars& scalars, float far_m) : scalars_(scalars), far_m_(far_m) {}
+
+  int count() const { return count_; }
+  bool full() const { return count_ == RayPacket::size; }
+  void add(double sine, float elevation_rad) {
+    const auto i = static_cast<std::size_t>(count_++);
+    const double across = std::sqrt(std::max(0.0, 1 - sine * sine)), e = static_cast<double>(elevation_rad);
+    const double x = across * std::cos(e), y = sine, z = across * std::sin(e);
+    const auto& m = scalars_.world_from_sonar.m;
+    packet.direction_x[i] = static_cast<float>(m[0][0] * x + m[0][1] * y + m[0][2] * z);
+    packet.direction_y[i] = static_cast<float>(m[1][0] * x + m[1][1] * y + m[1][2] * z);
+    packet.direction_z[i] = static_cast<float>(m[2][0] * x + m[2][1] * y + m[2][2] * z);
+    packet.origin_x[i] = scalars_.position_in_scene.x;
+    packet.origin_y[i] = scalars_.position_in_scene.y;
+    packet.origin_z[i] = scalars_.position_in_scene.z;
+    packet.far[i] = far_m_;
+  }
+  void trace(const RayScene& scene) {
+    scene.trace(packet, count_ == RayPacket::size ? 0xFFFFu : (1u << count_) - 1u, true);
+    traced += static_cast<std::size_t>(count_);
+  }
+  void clear() { count_ = 0; }
+
+  RayPacket packet;
+  std::size_t traced = 0;
+
+ private:
+  const PingScalars& scalars_;
+  float far_m_;
+  int count_ = 0;
+};
+
+class FanTracer {
+ public:
+  FanTracer(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, FanScratch& scratch)
+      : scene_(scene), plan_(plan), filler_(scalars, static_cast<float>(scalars.max_range_m)), first_(first), last_(last), s_(scratch) {
+    tolerance_m_ = plan.settings.pulse_width_m;
+    for (int k = first; k < last; ++k) across_.push_back(static_cast<float>(std::sqrt(std::max(0.0, 1 - std::pow(plan.columns.sine(k), 2)))));
+  }
+
+  std::size_t run(DepthMap& seen) {
+    trace_base();
+    open_intervals();
+    for (int depth = 1; depth <= deepest && !s_.open.empty(); ++depth) halve_intervals();
+    draw(seen);
+    return filler_.traced;
+  }
+
+ private:
+  using Sample = FanScratch::Sample;
+  using Interval = FanScratch::Interval;
+
+  Sample& at(std::int32_t i) { return s_.samples[static_cast<std::size_t>(i)]; }
+  int elevations() const { return static_cast<int>(plan_.fan.elevation_rad.size()); }
+
+  /// Turns lane i of the packet into the sample it was traced for.
+  void take(int lane, float elevation, float column_across, Sample& sample) const {
+    const auto i = static_cast<std::size_t>(lane);
+    sample.elevation_rad = elevation;
+    sample.tangent = std::tan(elevation);
+    sample.object = filler_.packet.object[i];
+    sample.range_m = sample.object == RayPacket::miss ? 0 : filler_.packet.far[i];
+    sample.inverse_x = sample.object == RayPacket::miss ? 0 : 1.0f / std::max(sample.range_m * column_across * std::cos(elevation), 1e-4f);
+  }
+
+  /// Elevation by elevation, sixteen neighbouring columns a packet: neighbours in a packet lie a fraction of a degree apart.
+  void trace_base() {
+    const int n = elevations();
+    s_.samples.resize(static_cast<std::size_t>(last_ - first_) * static_cast<std::size_t>(n));
+    for (int e = 0; e < n; ++e) {
+      const float elevation = plan_.fan.elevation_rad[static_cast<std::size_t>(e)];
+      for (int from = first_; from < last_; from += RayPacket::size) {
+        const int to = std::min(from + RayPacket::size, last_);
+        filler_.clear();
+        for (int k = from; k < to; ++k) filler_.add(plan_.columns.sine(k), elevation);
+        filler_.trace(scene_);
+        for (int k = from; k < to; ++k) {
+          const std::int32_t index = (k - first_) * n + e;
+          take(k - from, elevation, across_[static_cast<std::size_t>(k - first_)], at(index));
+          at(index).next = e + 1 < n ? index + 1 : -1;
+          at(index).edge_above = false;
+        }
+      }
+    }
+  }
+
+  /// Whether an interval needs a look at its middle; what is left undecided becomes an edge.
+  void consider(std::int32_t below, std::int32_t above, std::int32_t column, int depth, std::vector<Interval>& list) {
+    Sample &a = at(below), &b = at(above);
+    if (a.object != b.object) {
+      a.edge_above = true;
+      if (depth < edge_depth) list.push_back({below, above, column, depth});
+    } else if (a.object != RayPacket::miss && std::abs(a.range_m - b.range_m) > tolerance_m_) {
+      if (depth < deepest)
+        list.push_back({below, above, column, depth});
+      else
+        a.edge_above = true;
+    }
+  }
+
+  void open_intervals() {
+    s_.open.clear();
+    const int n = elevations();
+    for (int e = 0; e + 1 < n; ++e)
+      for (int k = 0; k < last_ - first_; ++k) consider(k * n + e, k * n + e + 1, k, 0, s_.open);
+  }
+
+  void halve_intervals() {
+    s_.halves.clear();
+    for (std::size_t from = 0; from < s_.open.size(); from += RayPacket::size) {
+      const std::size_t to = std::min(from + RayPacket::size, s_.open.size());
+      filler_.clear();
+      for (std::size_t i = from; i < to; ++i) filler_.add(plan_.columns.sine(first_ + s_.open[i].column), middle_of(s_.open[i]));
+      filler_.trace(scene_);
+      for (std::size_t i = from; i < to; ++i) insert(s_.open[i], static_cast<int>(i - from));
+    }
+    std::swap(s_.open, s_.halves);
+  }
+
+  float middle_of(const Interval& v) { return 0.5f * (at(v.below).elevation_rad + at(v.above).elevation_rad); }
+
+  void insert(const Interval& v, int lane) {
+    const float across = across_[static_cast<std::size_t>(v.column)];
+    const float elevation = middle_of(v);
+    const auto middle = static_cast<std::int32_t>(s_.samples.size());
+    s_.samples.emplace_back();
+    take(lane, elevation, across, at(middle));
+    at(middle).next = v.above;
+    at(middle).edge_above = false;
+    at(v.below).next = middle;
+    at(v.below).edge_above = false;
+    if (lies_between(at(v.below), at(middle), at(v.above), across)) return;
+    consider(v.below, middle, v.column, v.depth + 1, s_.halves);
+    consider(middle, v.above, v.column, v.depth + 1, s_.halves);
+  }
+
+  /// On a plane 1 / x is linear in the tangent; a middle that agrees to a pulse width needs no further look.
+  bool lies_between(const Sample& a, const Sample& m, const Sample& b, float across) const {
+    if (a.object != b.object || m.object != a.object) return false;
+    const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
+    const float expected_x = 1.0f / (a.inverse_x + part * (b.inverse_x - a.inverse_x));
+    const float expected_range = expected_x / (across * std::cos(m.elevation_rad));
+    return std::abs(expected_range - m.range_m) <= tolerance_m_;
+  }
+
+  /// Linear between hits of one surface, the farther value across edges.
+  void draw(DepthMap& seen) {
+    const Fan& fan = plan_.fan;
+    const int n = elevations();
+    seen.first_column = first_;
+    seen.columns = last_ - first_;
+    seen.bins = fan.bins;
+    seen.inverse_x.resize(static_cast<std::size_t>(seen.columns) * static_cast<std::size_t>(fan.bins + 1));
+    for (int k = 0; k < seen.columns; ++k) {
+      float* map = seen.inverse_x.data() + static_cast<std::ptrdiff_t>(k) * (fan.bins + 1);
+      int bin = 0;
+      for (std::int32_t i = k * n; at(i).next >= 0; i = at(i).next) {
+        const Sample &a = at(i), &b = at(at(i).next);
+        const float top = (b.tangent - fan.first_tangent) * fan.bins_per_tangent;
+        const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
+        const float farther = std::min(a.inverse_x, b.inverse_x);
+        const float per_tangent = (b.inverse_x - a.inverse_x) / (b.tangent - a.tangent);
+        for (; bin <= end; ++bin) {
+          const float tangent = fan.first_tangent + static_cast<float>(bin) / fan.bins_per_tangent;
+          map[bin] = a.edge_above ? farther : std::max(0.0f, a.inverse_x + per_tangent * (tangent - a.tangent));
+        }
+      }
+    }
+  }
+
+  const RayScene& scene_;
+  const PingPlan& plan_;
+  PacketFiller filler_;
+  int first_, last_;
+  FanScratch& s_;
+  float tolerance_m_ = 0;
+  std::vector<float> across_;
+};
+
+}  // namespace
+
+std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, FanScratch& scratch,
+                      DepthMap& seen) {
+  return FanTracer(scene, plan, scalars, first, last, scratch).run(seen);
+}
+
+void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, int rays,
+                     std::vector<FanHit>& hits) {
+  PacketFiller filler(scalars, static_cast<float>(scalars.max_range_m));
+  const double step = 2 * plan.fan.half_angle_rad / rays;
+  for (int column = first; column < last; ++column) {
+    if (std::abs(plan.columns.sine(column)) >= 1) continue;
+    for (int from = 0; from < rays; from += RayPacket::size) {
+      const int to = std::min(from + RayPacket::size, rays);
+      const auto elevation = [&](int ray) { return static_cast<float>((ray + 0.5) * step - plan.fan.half_angle_rad); };
+      filler.clear();
+      for (int ray = from; ray < to; ++ray) filler.add(plan.columns.sine(column), elevation(ray));
+      filler.trace(scene);
+      for (int ray = from; ray < to; ++ray) {
+        const auto i = static_cast<std::size_t>(ray - from);
+        const RayPacket& p = filler.packet;
+        if (p.object[i] == RayPacket::miss) continue;
+        const Vec3 normal{p.normal_x[i], p.normal_y[i], p.normal_z[i]};
+        const Vec3 along{p.direction_x[i], p.direction_y[i], p.direction_z[i]};
+        const float size = length(normal);
+        if (!(size > 0)) continue;
+        hits.push_back({column, ray, p.far[i], elevation(ray), std::abs(dot(normal, along)) / size, p.object[i], p.triangle[i]});
+      }
+    }
+  }
+}
+
+}  // namespace sonar

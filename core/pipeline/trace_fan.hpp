@@ -1,0 +1,51 @@
+// Stage one: a sparse fan of rays from the aperture finds what is visible. The result is a depth map per column; scatterers
+// come from the surfaces (scatter.hpp), so rays decide shadows only.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/ping_scalars.hpp"
+#include "core/scene/ray_scene.hpp"
+
+namespace sonar {
+
+/// What the rays saw, column by column: 1 / x (x = forward coordinate in the sonar's frame) against the tangent z / x.
+struct DepthMap {
+  int first_column = 0, columns = 0, bins = 0;
+  std::vector<float> inverse_x;  // [columns][bins + 1], 0 = nothing was hit
+};
+
+/// Buffers of trace_fan that live from ping to ping; one per worker.
+struct FanScratch {
+  struct Sample {
+    float elevation_rad, tangent, inverse_x, range_m;
+    std::uint32_t object;
+    std::int32_t next;   // the sample above in the same column, -1 = last
+    bool edge_above;     // the interval up to `next` hides an edge: do not interpolate
+  };
+  struct Interval {
+    std::int32_t below, above;
+    std::int32_t column;
+    int depth;
+  };
+  std::vector<Sample> samples;
+  std::vector<Interval> open, halves;
+};
+
+/// Traces columns [first, last). Returns the number of rays.
+std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, FanScratch& scratch,
+                      DepthMap& seen);
+
+/// One hit of the fixed fan (paper-style sampling: a ray is a scatterer).
+struct FanHit {
+  int column = 0, ray = 0;
+  float range_m = 0, elevation_rad = 0, cosine = 0;
+  std::uint32_t object = 0, triangle = 0;
+};
+/// `rays` uniform elevations for every column of [first, last); appends to `hits`.
+void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, int rays,
+                     std::vector<FanHit>& hits);
+
+}  // namespace sonar

@@ -1,0 +1,117 @@
+// The geometry under the surface cells: triangles seen along the dominant axis of their normals, the half-open test that gives
+// every lattice point exactly one owner, and the cubes that tiles live in.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "core/base/geometry.hpp"
+#include "core/scene/scene.hpp"
+
+namespace sonar::lattice {
+
+/// A triangle in permuted coordinates: u, v span the lattice plane, w is along the dominant axis of the normal.
+struct Facet {
+  double u[3], v[3], w[3];
+  double nu, nv, nw;  // unit normal
+};
+
+inline double component(Vec3 p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
+constexpr int u_axis(int axis) { return (axis + 1) % 3; }
+constexpr int v_axis(int axis) { return (axis + 2) % 3; }
+
+inline Vec3d normal_of(const Mesh& mesh, std::uint32_t triangle) {
+  const auto& t = mesh.triangles[triangle];
+  const Vec3d a = to_double(mesh.vertices[t[0]]), b = to_double(mesh.vertices[t[1]]), c = to_double(mesh.vertices[t[2]]);
+  const Vec3d n = cross(b - a, c - a);
+  const double len = length(n);
+  return len > 0 ? (1.0 / len) * n : Vec3d{};
+}
+
+inline int dominant_axis(Vec3d n) {
+  const double x = std::abs(n.x), y = std::abs(n.y), z = std::abs(n.z);
+  return z >= x && z >= y ? 2 : (y >= x ? 1 : 0);
+}
+
+inline Facet facet_of(const Mesh& mesh, std::uint32_t triangle, int axis) {
+  Facet f{};
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 p = mesh.vertices[mesh.triangles[triangle][static_cast<std::size_t>(i)]];
+    f.u[i] = component(p, u_axis(axis));
+    f.v[i] = component(p, v_axis(axis));
+    f.w[i] = component(p, axis);
+  }
+  const Vec3d n = normal_of(mesh, triangle);
+  const double xyz[3] = {n.x, n.y, n.z};
+  f.nu = xyz[u_axis(axis)];
+  f.nv = xyz[v_axis(axis)];
+  f.nw = xyz[axis];
+  return f;
+}
+
+/// Twice the signed area of (p, q, x), computed from the same operands in the same order whichever way the edge runs, so that
+/// two triangles that share an edge get exactly opposite values.
+inline double edge(double pu, double pv, double qu, double qv, double xu, double xv) {
+  const bool forward = pu < qu || (pu == qu && pv < qv);
+  if (forward) return (qu - pu) * (xv - pv) - (qv - pv) * (xu - pu);
+  return -((pu - qu) * (xv - qv) - (pv - qv) * (xu - qu));
+}
+
+/// Half-open: a point on a shared edge belongs to exactly one of the two triangles (top-left rule).
+inline bool owns(const Facet& f, double xu, double xv) {
+  const double turn = f.nw > 0 ? 1.0 : -1.0;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3;
+    const double e = turn * edge(f.u[i], f.v[i], f.u[j], f.v[j], xu, xv);
+    if (e < 0) return false;
+    if (e == 0) {
+      const double du = turn * (f.u[j] - f.u[i]), dv = turn * (f.v[j] - f.v[i]);
+      if (!(dv < 0 || (dv == 0 && du > 0))) return false;
+    }
+  }
+  return true;
+}
+
+/// Height of the facet's plane over a lattice point.
+inline double height(const Facet& f, double xu, double xv) {
+  return f.w[0] - (f.nu * (xu - f.u[0]) + f.nv * (xv - f.v[0])) / f.nw;
+}
+
+/// Whether a facet may own points inside the cube; may say yes too often, never no.
+inline bool may_touch(const Facet& f, double cu, double cv, double cw, double half) {
+  const double slack = half * 1e-6 + 1e-9;
+  const double h = half + slack;
+  const double centre[3] = {cu, cv, cw};
+  const double* corner[3] = {f.u, f.v, f.w};
+  for (int a = 0; a < 3; ++a) {
+    const double lo = std::fmin(corner[a][0], std::fmin(corner[a][1], corner[a][2]));
+    const double hi = std::fmax(corner[a][0], std::fmax(corner[a][1], corner[a][2]));
+    if (lo > centre[a] + h || hi < centre[a] - h) return false;
+  }
+  const double off = f.nu * (cu - f.u[0]) + f.nv * (cv - f.v[0]) + f.nw * (cw - f.w[0]);
+  if (std::abs(off) > h * (std::abs(f.nu) + std::abs(f.nv) + std::abs(f.nw))) return false;
+  const double turn = f.nw > 0 ? 1.0 : -1.0;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3;
+    const double du = turn * (f.u[j] - f.u[i]), dv = turn * (f.v[j] - f.v[i]);
+    const double inside_most = du * (cv - f.v[i]) - dv * (cu - f.u[i]) + h * (std::abs(du) + std::abs(dv));
+    if (inside_most < 0) return false;
+  }
+  return true;
+}
+
+/// Edge of the cube (and of the tile) whose cells have the size 2^-level.
+inline double tile_edge_m(int level) { return std::ldexp(16.0, -level); }
+inline double cell_size_m(int level) { return std::ldexp(1.0, -level); }
+
+/// Permuted coordinates back to object coordinates.
+inline Vec3d from_permuted(double u, double v, double w, int axis) {
+  double xyz[3];
+  xyz[u_axis(axis)] = u;
+  xyz[v_axis(axis)] = v;
+  xyz[axis] = w;
+  return {xyz[0], xyz[1], xyz[2]};
+}
+
+}  // namespace sonar::lattice

@@ -1,0 +1,97 @@
+// Scatterers as a property of the surfaces: a lattice of cells in object coordinates, made on demand from the mesh triangles and
+// kept between pings (docs/architecture.md, "Surface cells"; Choi 2025 eq. 2 for the statistics of one scatterer).
+// `scatter` asks for the tiles in view of a ping; the cells' speckle is theirs, whatever ray or ping looks at them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+#include "core/base/parallel.hpp"
+#include "core/base/units.hpp"
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+
+/// Up to 16 x 16 cells (more where sheets overlap) in a cube of the lattice, in one allocation of int16 columns.
+/// Positions are relative to the cube's centre. Padding cells have zero weight.
+struct CellTile {
+  int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
+  Vec3d centre_m;           // object coordinates
+  float half_edge_m = 0;    // of the cube
+  float position_unit_m = 0;
+  float weight_unit = 0;    // xi * sqrt(cell area) [m] per count
+  int count = 0;            // padded to a multiple of CellTile::block
+  int stride = 0;           // int16 values per column
+  std::unique_ptr<std::int16_t[]> data;
+  std::uint64_t last_used = 0;
+
+  static constexpr int block = 16;
+  static constexpr float normal_unit = 1.0f / 32767.0f;
+  enum Column { x, y, z, normal_x, normal_y, normal_z, weight_re, weight_im, columns };
+  const std::int16_t* column(Column c) const { return data.get() + static_cast<std::ptrdiff_t>(c) * stride; }
+  std::size_t bytes() const { return static_cast<std::size_t>(stride) * columns * sizeof(std::int16_t); }
+};
+
+/// Ranges in which the cells of one level (size 2^-level m) are used; neighbours cross-fade (weights add to one in power).
+struct CellLevel {
+  int level = 0;
+  float fade_in_from_m = 0, full_from_m = 0, full_to_m = 0, fade_out_to_m = 0;
+};
+
+/// What a ping looks at: outer bounds only, in the sonar's frame.
+struct CellView {
+  Pose sonar_in_world;
+  std::span<const Pose> bodies_in_world;
+  float max_range_m = 0;
+  float max_sine = 1;          // |y / r| of the outermost column
+  float max_elevation_rad = 1; // half angle of the fan about the array axis
+  std::vector<CellLevel> levels;  // coarsest first
+};
+
+/// A tile in view and where the sonar is, seen from it.
+struct TileInView {
+  const CellTile* tile = nullptr;
+  const CellLevel* level = nullptr;
+  Vec3d from_sonar_object_m;  // tile centre minus sonar, object axes
+  Vec3d from_sonar_m;         // the same in the sonar's axes
+  int object = 0;
+};
+
+class SurfaceCells {
+ public:
+  SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes);
+  ~SurfaceCells();
+  SurfaceCells(const SurfaceCells&) = delete;
+  SurfaceCells& operator=(const SurfaceCells&) = delete;
+
+  Seed seed() const { return seed_; }
+  /// Tiles that may lie in the view, missing ones built first, in an order that does not depend on the pool.
+  /// Valid until the next call. `view` must outlive the result.
+  const std::vector<TileInView>& in_view(const CellView& view, Parallel& pool);
+  /// Rotation from object to sonar axes of the last view, per object.
+  const Rotation& sonar_from_object(int object) const { return rotations_[static_cast<std::size_t>(object)]; }
+  std::size_t cached_bytes() const { return cached_bytes_; }
+  std::size_t built_last_time() const { return built_; }
+
+ private:
+  class Sheet;
+  struct Node;
+  void visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& sonar_from_object);
+  void keep_within_budget();
+
+  std::shared_ptr<const Scene> scene_;
+  Seed seed_{};
+  std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
+  std::uint64_t now_ = 0;
+  std::vector<std::unique_ptr<Sheet>> sheets_;
+  std::vector<Rotation> rotations_;
+  std::vector<TileInView> in_view_;
+  std::vector<Node*> wanted_;   // the nodes of in_view_
+  std::vector<Node*> built_nodes_;
+};
+
+}  // namespace sonar
