@@ -1,0 +1,56 @@
+// The control protocol's messages as plain structs, and their translation from and to protobuf. Nothing else in the house sees
+// protobuf. Both directions are here: the daemon decodes requests, tools and tests encode them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "protocol/control/pose_sample.hpp"
+
+namespace sonar::control {
+
+using Bytes = std::vector<std::byte>;
+using BytesView = std::span<const std::byte>;
+
+inline constexpr std::uint32_t protocol_version = 1;
+inline constexpr std::size_t largest_datagram = 1200;
+
+struct Hello {
+  std::uint32_t protocol_version = control::protocol_version;
+  std::string name;
+};
+struct Unsupported {  // a request this version does not know
+};
+struct Request {
+  std::uint64_t id = 0;
+  std::variant<Unsupported, Hello, PoseSample> op;
+};
+enum class StatusCode { ok, refused, unsupported };
+struct Response {
+  std::uint64_t id = 0;
+  StatusCode code = StatusCode::ok;
+  std::string text;
+  bool hello = false;  // carries our Hello
+};
+
+/// One datagram: a PoseUpdate. Refused with one sentence when malformed (see checked()).
+Result<PoseSample> decode_pose_datagram(BytesView datagram);
+struct RefusedRequest {  // a Response can still name it
+  std::uint64_t id = 0;
+  std::string why;
+};
+/// One message of the stream, without its length. A message that is not protobuf has id 0.
+tl::expected<Request, RefusedRequest> decode_request(BytesView message);
+Bytes encode_response(const Response& response);
+
+/// For senders. The sample's pose is sent as ENU_FLU, or turned into NED_FRD when `sent_in` says so.
+Bytes encode_pose_datagram(const PoseSample& sample);
+Bytes encode_request(const Request& request);
+Result<Response> decode_response(BytesView message);
+
+}  // namespace sonar::control

@@ -1,0 +1,47 @@
+#include "protocol/control/delimited.hpp"
+
+namespace sonar::control {
+namespace {
+constexpr std::size_t longest_length_field = 5;  // a varint of 32 bits
+}
+
+Result<std::optional<std::vector<std::byte>>> DelimitedParser::next() {
+  std::uint64_t length = 0;
+  std::size_t used = 0;
+  while (true) {
+    if (used == longest_length_field)
+      return failure(ErrorKind::bad_data, "control stream: the length in front of a message has more than 5 bytes");
+    if (start_ + used == buffer_.size()) return std::optional<std::vector<std::byte>>{};
+    const auto byte = std::to_integer<std::uint64_t>(buffer_[start_ + used]);
+    length |= (byte & 0x7f) << (7 * used);
+    ++used;
+    if ((byte & 0x80) == 0) break;
+  }
+  if (length > largest_message)
+    return failure(ErrorKind::bad_data,
+                   "control stream: a message of " + std::to_string(length) + " bytes exceeds the limit of 1 MiB");
+  if (buffer_.size() - start_ - used < length) return std::optional<std::vector<std::byte>>{};
+  const auto first = buffer_.begin() + static_cast<std::ptrdiff_t>(start_ + used);
+  std::vector<std::byte> message(first, first + static_cast<std::ptrdiff_t>(length));
+  start_ += used + static_cast<std::size_t>(length);
+  if (start_ == buffer_.size() || start_ > (64u << 10)) {  // give the front back now and then, not byte by byte
+    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(start_));
+    start_ = 0;
+  }
+  return std::optional(std::move(message));
+}
+
+std::vector<std::byte> delimited(std::span<const std::byte> message) {
+  std::vector<std::byte> out;
+  out.reserve(message.size() + longest_length_field);
+  std::uint64_t rest = message.size();
+  do {
+    const auto low = static_cast<std::uint8_t>(rest & 0x7f);
+    rest >>= 7;
+    out.push_back(static_cast<std::byte>(rest != 0 ? low | 0x80u : low));
+  } while (rest != 0);
+  out.insert(out.end(), message.begin(), message.end());
+  return out;
+}
+
+}  // namespace sonar::control

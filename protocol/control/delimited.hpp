@@ -1,0 +1,31 @@
+// Framing of the control stream: a varint length, then that many bytes. Incremental and without I/O: any split of the stream.
+// Source: protobuf encoding guide, "varint"; the cap is ours (interfaces.md 3d).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/result.hpp"
+
+namespace sonar::control {
+
+class DelimitedParser {
+ public:
+  static constexpr std::size_t largest_message = 1u << 20;
+
+  void feed(std::span<const std::byte> received) { buffer_.insert(buffer_.end(), received.begin(), received.end()); }
+  /// The next whole message; nullopt = more bytes are needed; an error is final: the stream has no meaning after it.
+  Result<std::optional<std::vector<std::byte>>> next();
+
+ private:
+  std::vector<std::byte> buffer_;  // never longer than one message and one read
+  std::size_t start_ = 0;          // of the next message
+};
+
+/// Length and message, ready to be sent.
+std::vector<std::byte> delimited(std::span<const std::byte> message);
+
+}  // namespace sonar::control

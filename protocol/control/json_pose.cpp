@@ -1,0 +1,160 @@
+#include "protocol/control/json_pose.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace sonar::control {
+namespace {
+
+using nlohmann::json;
+constexpr int deepest_nesting = 8;
+constexpr double latest_timestamp_s = 9e9;  // fits int64 nanoseconds
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
+
+/// Looks at nesting only: brackets outside strings. The parser recurses, so depth is bounded before it runs.
+bool too_deep(std::string_view text) {
+  int depth = 0;
+  bool in_string = false, escaped = false;
+  for (const char c : text) {
+    if (in_string) {
+      if (escaped)
+        escaped = false;
+      else if (c == '\\')
+        escaped = true;
+      else if (c == '"')
+        in_string = false;
+      continue;
+    }
+    if (c == '"') in_string = true;
+    if ((c == '{' || c == '[') && ++depth > deepest_nesting) return true;
+    if (c == '}' || c == ']') --depth;
+  }
+  return false;
+}
+
+template <std::size_t N>
+Result<std::optional<std::array<double, N>>> numbers(const json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end()) return std::optional<std::array<double, N>>{};
+  const std::string wanted = std::string(key) + " must be a list of " + std::to_string(N) + " numbers";
+  if (!found->is_array() || found->size() != N) return refused(wanted);
+  std::array<double, N> values{};
+  for (std::size_t i = 0; i < N; ++i) {
+    if (!(*found)[i].is_number()) return refused(wanted);
+    values[i] = (*found)[i].get<double>();
+  }
+  return std::optional(values);
+}
+
+Result<std::string> text_of(const json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end()) return std::string();
+  if (!found->is_string()) return refused(std::string(key) + " must be a string");
+  return found->get<std::string>();
+}
+
+Result<Stamp> stamp_of(const json& object) {
+  const auto found = object.find("timestamp");
+  if (found == object.end()) return Stamp{};
+  if (!found->is_number()) return refused("timestamp must be a number of seconds");
+  const double s = found->get<double>();
+  if (!(std::abs(s) <= latest_timestamp_s)) return refused("timestamp must be a number of seconds below 9e9");
+  return Stamp{ClockDomain::sim, static_cast<std::int64_t>(std::llround(s * 1e9))};
+}
+
+Result<Frame> frame_of(const json& object) {
+  const auto name = text_of(object, "frame");
+  if (!name) return tl::unexpected(name.error());
+  if (name->empty() || *name == "NED_FRD") return Frame::ned_frd;
+  if (*name == "ENU_FLU") return Frame::enu_flu;
+  return refused("frame must be \"NED_FRD\" or \"ENU_FLU\"");
+}
+
+/// Attitude angles or quaternion, body to world, in the frame of the message.
+Result<std::array<double, 4>> orientation_of(const json& object, std::string& fields) {
+  const auto quaternion = numbers<4>(object, "quaternion");
+  if (!quaternion) return tl::unexpected(quaternion.error());
+  const auto attitude = numbers<3>(object, "attitude");
+  if (!attitude) return tl::unexpected(attitude.error());
+  if (*quaternion) {
+    fields += " quaternion";
+    return **quaternion;
+  }
+  if (!*attitude) return refused("attitude [roll, pitch, yaw] or quaternion [w, x, y, z] is missing");
+  for (const double angle : **attitude)
+    if (!std::isfinite(angle)) return refused("attitude has a NaN or infinite component");
+  fields += " attitude";
+  const Quatd q = quat_from_rpy({(**attitude)[0], (**attitude)[1], (**attitude)[2]});
+  return std::array<double, 4>{q.w, q.x, q.y, q.z};
+}
+
+Result<PoseSample> sample_from(const json& object) {
+  PoseSample sample;
+  RawPose raw;
+  const auto vehicle = text_of(object, "vehicle");
+  if (!vehicle) return tl::unexpected(vehicle.error());
+  const auto stamp = stamp_of(object);
+  if (!stamp) return tl::unexpected(stamp.error());
+  const auto frame = frame_of(object);
+  if (!frame) return tl::unexpected(frame.error());
+  const auto position = numbers<3>(object, "position");
+  if (!position) return tl::unexpected(position.error());
+  if (!*position) return refused("position is missing");
+  sample.name = *vehicle;
+  sample.stamp = *stamp;
+  sample.fields = stamp->domain == ClockDomain::sim ? "timestamp position" : "position";
+  raw.frame = *frame;
+  raw.position_m = **position;
+  const auto orientation = orientation_of(object, sample.fields);
+  if (!orientation) return tl::unexpected(orientation.error());
+  raw.orientation_wxyz = *orientation;
+  const auto velocity = numbers<3>(object, "velocity");
+  if (!velocity) return tl::unexpected(velocity.error());
+  auto checked_sample = checked(std::move(sample), raw);
+  if (!checked_sample || !*velocity) return checked_sample;
+  const auto& v = **velocity;
+  for (const double component : v)
+    if (!(std::abs(component) <= 1e4)) return refused("velocity is NaN, infinite or above 1e4 m/s");
+  const Vec3d sent{v[0], v[1], v[2]};
+  const Vec3d in_world = *frame == Frame::ned_frd ? enu_from_ned(sent) : sent;
+  checked_sample->velocity_mps = rotate(conjugate(checked_sample->pose.orientation), in_world);
+  checked_sample->fields += " velocity";
+  return checked_sample;
+}
+
+}  // namespace
+
+Result<PoseSample> parse_json_pose(std::string_view line) {
+  if (line.size() > longest_line) return refused("line is longer than 4096 bytes");
+  if (too_deep(line)) return refused("JSON is nested deeper than 8 levels");
+  const json object = json::parse(line.begin(), line.end(), nullptr, false);
+  if (object.is_discarded()) return refused("line is not JSON");
+  if (!object.is_object()) return refused("line is not a JSON object");
+  return sample_from(object);
+}
+
+void LineParser::feed(std::span<const std::byte> received) {
+  for (const std::byte b : received) buffer_.push_back(static_cast<char>(b));
+}
+
+std::optional<LineParser::Line> LineParser::next() {
+  while (true) {
+    const std::size_t end = buffer_.find('\n');
+    if (end == std::string::npos) {
+      if (swallowing_) buffer_.clear();
+      if (buffer_.size() <= longest_line) return std::nullopt;
+      buffer_.clear();
+      swallowing_ = true;
+      return Line{{}, true};
+    }
+    std::string text = buffer_.substr(0, end);
+    buffer_.erase(0, end + 1);
+    if (std::exchange(swallowing_, false)) continue;  // the tail of a line already reported
+    if (text.size() > longest_line) return Line{{}, true};
+    if (!text.empty() && text.back() == '\r') text.pop_back();
+    if (text.find_first_not_of(" \t") != std::string::npos) return Line{std::move(text), false};
+  }
+}
+
+}  // namespace sonar::control

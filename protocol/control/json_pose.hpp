@@ -1,0 +1,41 @@
+// Poses as JSON lines: the keys of ArduPilot's JSON simulator reply, so that a physics back-end sends us a copy of what it
+// already has. Source: ArduPilot libraries/SITL/examples/JSON/readme.md (timestamp, position, attitude, quaternion, velocity).
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "protocol/control/pose_sample.hpp"
+
+namespace sonar::control {
+
+inline constexpr std::size_t longest_line = 4096;
+
+/// One line, without or with its newline. Unknown keys are ignored (ArduPilot sends an imu block); never throws.
+///   timestamp   s, the sender's clock; absent = arrival
+///   position    [n, e, d] m, required
+///   attitude    [roll, pitch, yaw] rad, or quaternion [w, x, y, z]; one of the two is required
+///   velocity    [n, e, d] m/s, world axes
+///   frame       "NED_FRD" (default, as ArduPilot) or "ENU_FLU": then position, velocity and attitude are ENU and FLU
+///   vehicle     name, may be absent when there is one vehicle
+Result<PoseSample> parse_json_pose(std::string_view line);
+
+/// Cuts a byte stream into lines. A line beyond the limit is swallowed to its end and reported once.
+class LineParser {
+ public:
+  struct Line {
+    std::string text;
+    bool too_long = false;
+  };
+  void feed(std::span<const std::byte> received);
+  std::optional<Line> next();
+
+ private:
+  std::string buffer_;
+  bool swallowing_ = false;
+};
+
+}  // namespace sonar::control

@@ -1,0 +1,57 @@
+// A pose as a sender gave it, checked and turned into the house's frames: world ENU, body FLU, SI units, int64 nanoseconds.
+// protocol/control makes these from protobuf and JSON; daemon/world.hpp keeps them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/base/geometry.hpp"
+#include "core/base/result.hpp"
+
+namespace sonar::control {
+
+/// Whose clock a stamp was read from (interfaces.md 3c).
+enum class ClockDomain {
+  wall,     // UNIX time of a computer whose clock agrees with ours
+  sim,      // the sender's own, any origin
+  arrival,  // no stamp: the moment of receipt counts
+};
+struct Stamp {
+  ClockDomain domain = ClockDomain::arrival;
+  std::int64_t ns = 0;
+};
+/// Axes a sender speaks in. World and body change together.
+enum class Frame { ned_frd, enu_flu };
+std::string_view name_of(Frame frame);  // "NED/FRD"
+
+struct PoseSample {
+  enum class Of { vehicle, object };
+  Of of = Of::vehicle;
+  std::string name;       // of the vehicle or object; empty = the only one there is
+  std::uint64_t seq = 0;  // 0 = the sender does not count
+  Stamp stamp;
+  Pose pose;                                    // body (FLU) in world (ENU)
+  std::optional<Vec3d> velocity_mps;            // body axes, FLU
+  std::optional<Vec3d> angular_velocity_radps;  // body axes, FLU
+  std::uint32_t reset_counter = 0;              // a change means: do not interpolate across
+  bool hidden = false;                          // objects only: out of the scene for now
+  Frame sent_in = Frame::enu_flu;               // for the log
+  std::string fields;                           // for the log: what the message contained
+};
+
+/// The numbers of a message before anybody believed them. Velocities are in body axes of `frame`.
+struct RawPose {
+  std::optional<Frame> frame;
+  std::array<double, 3> position_m{};
+  std::array<double, 4> orientation_wxyz{};
+  std::optional<std::array<double, 3>> velocity_mps;
+  std::optional<std::array<double, 3>> angular_velocity_radps;
+};
+/// Fills pose and velocities of `sample` from `raw`, or refuses with one sentence: no frame, NaN or infinity, absurd size, or a
+/// quaternion whose norm is off by more than 1e-3 (a smaller drift is renormalised).
+Result<PoseSample> checked(PoseSample sample, const RawPose& raw);
+
+}  // namespace sonar::control
