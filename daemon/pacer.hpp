@@ -1,0 +1,46 @@
+// When the next ping of one sonar is due: a grid computed from its start (never a sum of sleeps), or one ping per trigger.
+// Pure arithmetic on times passed in; the Device asks it and sets the timer.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/base/units.hpp"
+#include "core/sonar/ping_settings.hpp"
+
+namespace sonar {
+
+/// Time between two pings that these settings allow: the rate asked for, and never less than the two-way travel of sound to the
+/// range plus 2 ms (oculus.md 5.5). Zero in standby.
+std::chrono::nanoseconds ping_period(const PingSettings& settings);
+
+class Pacer {
+ public:
+  /// New settings. The grid goes on when period and trigger mode stay the same; otherwise it restarts at `now`, but not before
+  /// the sound of the last ping has come back.
+  void configure(const PingSettings& settings, Time now);
+  /// No pings until the next configure().
+  void stop();
+  /// A trigger from the client; one is kept while the previous ping is still under way, more are counted as skipped.
+  void trigger(Time now);
+  /// When fire() wants to be called next; none in standby, when stopped or waiting for a trigger.
+  std::optional<Time> next_tick() const;
+  /// At or after next_tick(): true = ping now, stamped with last_tick(). `busy`: the previous ping is still being computed; its
+  /// ticks are skipped and counted, never queued (a trigger waits instead). After a late call the grid goes on in phase.
+  bool fire(Time now, bool busy);
+
+  Time last_tick() const { return last_tick_; }
+  std::chrono::nanoseconds period() const { return period_; }
+  std::uint64_t skipped_ticks() const { return skipped_; }
+
+ private:
+  bool running_ = false, triggered_ = false, trigger_waits_ = false, has_fired_ = false;
+  std::chrono::nanoseconds period_{0};
+  Time start_{};            // of the grid
+  std::int64_t index_ = 0;  // of the next tick on it
+  Time trigger_at_{};
+  Time last_tick_{};
+  std::uint64_t skipped_ = 0;
+};
+
+}  // namespace sonar

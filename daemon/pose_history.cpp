@@ -1,0 +1,69 @@
+#include "daemon/pose_history.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar {
+namespace {
+// Two samples nearer than this say nothing about speed: their stamps are mostly jitter.
+constexpr std::chrono::nanoseconds shortest_difference = std::chrono::milliseconds(1);
+}  // namespace
+
+Quatd quat_from_rotation(Vec3d r) {
+  const double angle = length(r);
+  if (angle < 1e-12) return normalized(Quatd{1, r.x / 2, r.y / 2, r.z / 2});
+  const double s = std::sin(angle / 2) / angle;
+  return {std::cos(angle / 2), r.x * s, r.y * s, r.z * s};
+}
+
+Vec3d rotation_between(Quatd a, Quatd b) {
+  Quatd d = conjugate(a) * b;
+  if (d.w < 0) d = {-d.w, -d.x, -d.y, -d.z};
+  const double sine = std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
+  if (sine < 1e-12) return {2 * d.x, 2 * d.y, 2 * d.z};
+  const double factor = 2 * std::atan2(sine, d.w) / sine;
+  return {factor * d.x, factor * d.y, factor * d.z};
+}
+
+Quatd slerp(Quatd a, Quatd b, double u) { return normalized(a * quat_from_rotation(u * rotation_between(a, b))); }
+
+void PoseHistory::put(const Sample& sample) {
+  if (!samples_.empty() && samples_.back().at == sample.at) {
+    samples_.back() = sample;
+    return;
+  }
+  samples_.push_back(sample);
+  while (samples_.size() > most_samples || (samples_.size() > 2 && sample.at - samples_.front().at > length))
+    samples_.pop_front();
+}
+
+Pose PoseHistory::beyond_newest(std::chrono::nanoseconds ahead) const {
+  const Sample& last = samples_.back();
+  const double ahead_s = seconds(ahead);
+  Vec3d velocity_in_world, turn_in_body;
+  if (samples_.size() > 1) {
+    const Sample& before = samples_[samples_.size() - 2];
+    const auto gap = last.at - before.at;
+    if (gap >= shortest_difference) {
+      const double per_s = 1 / seconds(gap);
+      velocity_in_world = per_s * (last.pose.position_m - before.pose.position_m);
+      turn_in_body = per_s * rotation_between(before.pose.orientation, last.pose.orientation);
+    }
+  }
+  if (last.velocity_mps) velocity_in_world = rotate(last.pose.orientation, *last.velocity_mps);
+  if (last.angular_velocity_radps) turn_in_body = *last.angular_velocity_radps;
+  return {last.pose.position_m + ahead_s * velocity_in_world,
+          normalized(last.pose.orientation * quat_from_rotation(ahead_s * turn_in_body))};
+}
+
+Pose PoseHistory::at(Time t, std::chrono::nanoseconds extrapolate_max) const {
+  const auto after = std::lower_bound(samples_.begin(), samples_.end(), t, [](const Sample& s, Time x) { return s.at < x; });
+  if (after == samples_.end()) return beyond_newest(std::min<std::chrono::nanoseconds>(t - samples_.back().at, extrapolate_max));
+  if (after->at == t || after == samples_.begin()) return after->pose;
+  const Sample& a = *(after - 1);
+  const Sample& b = *after;
+  const double u = seconds(t - a.at) / seconds(b.at - a.at);
+  return {a.pose.position_m + u * (b.pose.position_m - a.pose.position_m), slerp(a.pose.orientation, b.pose.orientation, u)};
+}
+
+}  // namespace sonar

@@ -1,0 +1,47 @@
+// The last two seconds of one body's poses, and the pose at any moment from them: between samples, a little beyond them, or held.
+// Used by daemon/world.cpp, one per vehicle and moving object; times are the sender's.
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "core/base/geometry.hpp"
+#include "core/base/units.hpp"
+
+namespace sonar {
+
+class PoseHistory {
+ public:
+  struct Sample {
+    Time at{};
+    Pose pose;                                    // body in world
+    std::optional<Vec3d> velocity_mps;            // body axes
+    std::optional<Vec3d> angular_velocity_radps;  // body axes
+  };
+  static constexpr std::chrono::nanoseconds length = std::chrono::seconds(2);
+  static constexpr std::size_t most_samples = 2048;  // two seconds at the rate limit of 1 kHz
+
+  void clear() { samples_.clear(); }
+  bool empty() const { return samples_.empty(); }
+  std::size_t size() const { return samples_.size(); }
+  const Sample& newest() const { return samples_.back(); }
+
+  /// `sample.at` must not lie before newest().at; an equal time replaces.
+  void put(const Sample& sample);
+  /// Interpolated (lerp, slerp) between samples; before the first one held; after the last one carried on by its velocity, or
+  /// by the difference of the last two samples, for at most `extrapolate_max`, then held there. Not on an empty history.
+  Pose at(Time t, std::chrono::nanoseconds extrapolate_max) const;
+
+ private:
+  Pose beyond_newest(std::chrono::nanoseconds ahead) const;
+  std::deque<Sample> samples_;
+};
+
+/// Shortest way from a (u = 0) to b (u = 1) at constant turn rate.
+Quatd slerp(Quatd a, Quatd b, double u);
+/// The rotation vector [rad] that turns a into b, in a's own axes; shortest way.
+Vec3d rotation_between(Quatd a, Quatd b);
+/// Rotation by a vector [rad].
+Quatd quat_from_rotation(Vec3d rotation_rad);
+
+}  // namespace sonar

@@ -1,0 +1,165 @@
+#include "daemon/world.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar {
+namespace {
+
+using control::ClockDomain;
+using control::PoseSample;
+
+constexpr double hidden_height_m = 1e4;  // far beyond any sonar's range, near enough for exact placement
+constexpr double smallest_orbit_m = 4;
+constexpr double orbit_speed_mps = 0.5;
+constexpr std::chrono::nanoseconds future_allowed = std::chrono::seconds(1);
+
+std::string joined_names(const std::vector<std::string>& names) {
+  std::string all;
+  for (const std::string& n : names) all += (all.empty() ? "" : ", ") + n;
+  return all.empty() ? "none" : all;
+}
+
+}  // namespace
+
+World::World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start)
+    : rules_(rules), start_(start) {
+  const auto add = [](std::vector<Track>& tracks, std::vector<BodyStart>& bodies) {
+    for (BodyStart& b : bodies) {
+      Track t;
+      t.source = b.orbits ? "demo orbit" : "initial pose";
+      t.body = std::move(b);
+      tracks.push_back(std::move(t));
+    }
+  };
+  add(vehicles_, vehicles);
+  add(objects_, objects);
+}
+
+World::Track* World::find(const PoseSample& sample, std::string& refusal) {
+  const bool vehicle = sample.of == PoseSample::Of::vehicle;
+  std::vector<Track>& tracks = vehicle ? vehicles_ : objects_;
+  if (sample.name.empty() && tracks.size() == 1) return &tracks.front();
+  std::vector<std::string> names;
+  for (Track& t : tracks) {
+    if (!sample.name.empty() && t.body.name == sample.name) return &t;
+    names.push_back(t.body.name);
+  }
+  const std::string kind = vehicle ? "vehicle" : "moving object";
+  refusal = sample.name.empty()
+                ? "the message names no " + kind + " and there is not exactly one; known: " + joined_names(names)
+                : "no " + kind + " is called \"" + sample.name.substr(0, 64) + "\"; known: " + joined_names(names);
+  return nullptr;
+}
+
+bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time now) const {
+  return !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain &&
+         now - track.last_arrival <= rules_.stale_after;
+}
+
+PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time now) {
+  PoseOutcome out;
+  Track* const found = find(sample, out.refusal);
+  if (found == nullptr) {
+    ++counters_.refused;
+    out.verdict = PoseVerdict::unknown_name;
+    return out;
+  }
+  Track& track = *found;
+  const bool shared_clock = sample.stamp.domain == ClockDomain::wall && !rules_.stepped;
+  const Time at = sample.stamp.domain == ClockDomain::arrival ? now : Time(Ns(sample.stamp.ns));
+  if (shared_clock && (at > now + future_allowed || at < now - rules_.stale_after - future_allowed)) {
+    ++counters_.refused;
+    out.verdict = PoseVerdict::bad_time;
+    out.refusal = "WALL time stamp is " + std::to_string(seconds(at - now)) +
+                  " s from this computer's clock: synchronise the clocks, or send SIM or ARRIVAL time";
+    return out;
+  }
+
+  const bool same_history = continues(track, sample, sender, now);
+  const bool reset = same_history && sample.reset_counter != track.reset_counter;
+  if (same_history && !reset) {
+    const bool seq_is_old = sample.seq != 0 && track.seq != 0 && sample.seq <= track.seq;
+    if (seq_is_old || at < track.history.newest().at) {
+      ++counters_.late;
+      out.verdict = PoseVerdict::late;
+      out.refusal = "pose came out of order";
+      return out;
+    }
+    if (at == track.history.newest().at) ++counters_.replaced;
+    if (length(sample.pose.position_m - track.history.newest().pose.position_m) > rules_.max_jump_m) {
+      ++counters_.jumps;
+      out.notice = "pose of " + track.body.name + " jumped further than max_jump_m: history cleared";
+      track.history.clear();
+    }
+  } else {
+    ++(reset ? counters_.resets : counters_.histories);
+    track.history.clear();
+  }
+
+  // The sender's clock is mapped by the least delay seen; a jump of more than we would extrapolate is a new relation.
+  const bool own_clock = !shared_clock && sample.stamp.domain != ClockDomain::arrival;
+  const Ns offset = own_clock ? now - at : Ns(0);
+  const bool keep =
+      own_clock && same_history && !reset && offset >= track.offset && offset - track.offset <= rules_.extrapolate_max;
+  if (!keep) track.offset = offset;
+
+  if (track.source != sender.source) {
+    out.notice = "pose source of " + track.body.name + " changed: " + track.source + " -> " + sender.source +
+                 (sample.fields.empty() ? "" : "; fields: " + sample.fields) + " (" +
+                 std::string(control::name_of(sample.sent_in)) + ")";
+  } else if (track.stale_reported) {
+    out.notice = "poses of " + track.body.name + " are back";
+  }
+  track.source = sender.source;
+  track.sender_id = sender.id;
+  track.seq = sample.seq;
+  track.reset_counter = sample.reset_counter;
+  track.domain = sample.stamp.domain;
+  track.last_arrival = now;
+  track.hidden = sample.hidden;
+  track.stale_reported = false;
+  track.history.put({at, sample.pose, sample.velocity_mps, sample.angular_velocity_radps});
+  ++counters_.accepted;
+  return out;
+}
+
+bool World::is_stale(const Track& track, Time now) const {
+  return !track.history.empty() && now - track.last_arrival > rules_.stale_after;
+}
+
+std::vector<std::string> World::newly_stale(Time now) {
+  std::vector<std::string> sentences;
+  for (Track& t : vehicles_) {  // objects may rest where they were put; a vehicle without news is a broken link
+    if (t.stale_reported || !is_stale(t, now)) continue;
+    t.stale_reported = true;
+    ++counters_.stale;
+    sentences.push_back("no pose for " + t.body.name + " from " + t.source + " for " +
+                        std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(now - t.last_arrival).count()) +
+                        " ms");
+  }
+  return sentences;
+}
+
+Pose World::pose_at(const Track& track, Time t) const {
+  if (track.hidden) return {{0, 0, hidden_height_m}, {}};
+  if (!track.history.empty()) return track.history.at(t - track.offset, rules_.extrapolate_max);
+  return track.body.orbits ? orbit(track.body.initial_pose, t) : track.body.initial_pose;
+}
+
+Pose World::orbit(const Pose& initial, Time t) const {
+  const Vec3d p = initial.position_m;
+  const double radius_m = std::max(smallest_orbit_m, std::hypot(p.x, p.y));
+  const double angle = std::atan2(p.y, p.x) + orbit_speed_mps / radius_m * seconds(t - start_);
+  const RollPitchYaw inward{0, 0, angle + pi};  // the sonar looks across the middle of the world
+  return {{radius_m * std::cos(angle), radius_m * std::sin(angle), p.z}, quat_from_rpy(inward)};
+}
+
+std::vector<Pose> World::objects_at(Time t) const {
+  std::vector<Pose> poses;
+  poses.reserve(objects_.size());
+  for (const Track& o : objects_) poses.push_back(pose_at(o, t));
+  return poses;
+}
+
+}  // namespace sonar

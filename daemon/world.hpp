@@ -1,0 +1,97 @@
+// Where everything is: the poses of vehicles and moving objects, taken from senders by the sequence and time rules of
+// docs/configuration.md, and answered for any moment. Pure: time is passed in; the daemon's I/O thread owns the only one.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "daemon/pose_history.hpp"
+#include "protocol/control/pose_sample.hpp"
+
+namespace sonar {
+
+struct PoseRules {
+  std::chrono::nanoseconds extrapolate_max = std::chrono::milliseconds(200);
+  std::chrono::nanoseconds stale_after = std::chrono::seconds(1);
+  double max_jump_m = 50;
+  bool stepped = false;  // simulated time: WALL stamps are then read as the sender's own
+};
+
+/// A vehicle, or a moving object of the scene.
+struct BodyStart {
+  std::string name;
+  Pose initial_pose;    // in world
+  bool orbits = false;  // circles the world's z axis until the first accepted pose
+};
+
+/// Who sent a pose. A different `id` starts a new history; a different `source` is worth a log line.
+struct Sender {
+  std::string id;      // "json udp 127.0.0.1:40123"
+  std::string source;  // "json 127.0.0.1"
+};
+
+enum class PoseVerdict { accepted, late, unknown_name, bad_time };
+
+struct PoseOutcome {
+  PoseVerdict verdict = PoseVerdict::accepted;
+  std::string refusal;  // one sentence when not accepted
+  std::string notice;   // worth a log line: the source changed, poses came back
+};
+
+struct PoseCounters {
+  std::uint64_t accepted = 0;
+  std::uint64_t refused = 0;    // malformed, unknown name, impossible time
+  std::uint64_t late = 0;       // out of order or repeated
+  std::uint64_t replaced = 0;   // equal stamps
+  std::uint64_t jumps = 0;      // beyond max_jump
+  std::uint64_t resets = 0;     // reset counter changed
+  std::uint64_t histories = 0;  // begun: first pose, other sender, or after silence
+  std::uint64_t stale = 0;      // times a body's poses stopped coming
+};
+
+class World {
+ public:
+  World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start);
+
+  PoseOutcome accept(const control::PoseSample& sample, const Sender& sender, Time now);
+  void count_refused() { ++counters_.refused; }
+
+  Pose vehicle_at(std::size_t vehicle, Time t) const { return pose_at(vehicles_[vehicle], t); }
+  std::vector<Pose> objects_at(Time t) const;
+  /// True when poses came once and then stopped for longer than the rules allow.
+  bool is_stale(std::size_t vehicle, Time now) const { return is_stale(vehicles_[vehicle], now); }
+  /// One sentence for each body whose poses stopped since the last call.
+  std::vector<std::string> newly_stale(Time now);
+  std::string_view source_of(std::size_t vehicle) const { return vehicles_[vehicle].source; }
+  const PoseCounters& counters() const { return counters_; }
+
+ private:
+  struct Track {
+    BodyStart body;
+    PoseHistory history;
+    std::string sender_id, source;
+    std::uint64_t seq = 0;
+    std::uint32_t reset_counter = 0;
+    control::ClockDomain domain{};
+    Time last_arrival{};
+    std::chrono::nanoseconds offset{0};  // our time = sender's time + offset
+    bool hidden = false, stale_reported = false;
+  };
+  using Ns = std::chrono::nanoseconds;
+
+  Track* find(const control::PoseSample& sample, std::string& refusal);
+  bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time now) const;
+  bool is_stale(const Track& track, Time now) const;
+  Pose pose_at(const Track& track, Time t) const;
+  Pose orbit(const Pose& initial, Time t) const;
+
+  PoseRules rules_;
+  std::vector<Track> vehicles_, objects_;
+  Time start_;
+  PoseCounters counters_;
+};
+
+}  // namespace sonar

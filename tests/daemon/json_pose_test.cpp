@@ -1,0 +1,110 @@
+// JSON lines: ArduPilot's keys, refusals in sentences, lines at every split.
+#include "protocol/control/json_pose.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace sonar::control {
+namespace {
+
+using testing::HasSubstr;
+
+std::string why(std::string_view line) {
+  const auto s = parse_json_pose(line);
+  return s ? std::string("accepted") : s.error().text;
+}
+
+TEST(JsonPose, ReadsArduPilotsKeys) {
+  const auto s = parse_json_pose(
+      R"({"timestamp":1.5,"imu":{"gyro":[0,0,0],"accel_body":[0,0,-9.8]},"position":[1,2,3],"attitude":[0,0.1,1.5707963267948966],"velocity":[0,2,0]})");
+  ASSERT_TRUE(s) << s.error().text;
+  EXPECT_EQ(s->stamp.domain, ClockDomain::sim);
+  EXPECT_EQ(s->stamp.ns, 1500000000);
+  EXPECT_EQ(s->pose.position_m.x, 2);
+  EXPECT_EQ(s->pose.position_m.y, 1);
+  EXPECT_EQ(s->pose.position_m.z, -3);
+  EXPECT_NEAR(deg_from_rad(heading_rad(s->pose.orientation)), 90, 1e-9);
+  const Vec3d ahead = rotate(s->pose.orientation, {1, 0, 0});
+  EXPECT_NEAR(ahead.z, std::sin(0.1), 1e-12) << "positive pitch is bow up";
+  ASSERT_TRUE(s->velocity_mps);
+  EXPECT_NEAR(s->velocity_mps->x, 2 * std::cos(0.1), 1e-12) << "2 m/s east, heading east: ahead in body axes";
+  EXPECT_EQ(s->fields, "timestamp position attitude velocity");
+  EXPECT_EQ(s->sent_in, Frame::ned_frd);
+}
+
+TEST(JsonPose, ReadsQuaternionFrameAndVehicle) {
+  const auto s = parse_json_pose(R"({"position":[1,2,-3],"quaternion":[1,0,0,0],"frame":"ENU_FLU","vehicle":"rov"})");
+  ASSERT_TRUE(s) << s.error().text;
+  EXPECT_EQ(s->pose.position_m.x, 1);
+  EXPECT_EQ(s->pose.position_m.z, -3);
+  EXPECT_EQ(s->name, "rov");
+  EXPECT_EQ(s->stamp.domain, ClockDomain::arrival);
+  EXPECT_NEAR(rotate(s->pose.orientation, {1, 0, 0}).x, 1, 1e-12);
+}
+
+TEST(JsonPose, RefusesWithASentence) {
+  EXPECT_EQ(why("nonsense"), "line is not JSON");
+  EXPECT_EQ(why(""), "line is not JSON");
+  EXPECT_EQ(why("[1,2,3]"), "line is not a JSON object");
+  EXPECT_EQ(why(R"({"attitude":[0,0,0]})"), "position is missing");
+  EXPECT_THAT(why(R"({"position":[0,0,0]})"), HasSubstr("attitude [roll, pitch, yaw] or quaternion"));
+  EXPECT_EQ(why(R"({"position":[0,0],"attitude":[0,0,0]})"), "position must be a list of 3 numbers");
+  EXPECT_EQ(why(R"({"position":[0,0,"x"],"attitude":[0,0,0]})"), "position must be a list of 3 numbers");
+  EXPECT_EQ(why(R"({"position":[0,0,null],"attitude":[0,0,0]})"), "position must be a list of 3 numbers");
+  EXPECT_EQ(why(R"({"position":[0,0,NaN],"attitude":[0,0,0]})"), "line is not JSON");
+  EXPECT_EQ(why(R"({"position":[0,0,1e999],"attitude":[0,0,0]})"), "line is not JSON");
+  EXPECT_THAT(why(R"({"position":[0,0,1e200],"attitude":[0,0,0]})"), HasSubstr("1e8 m"));
+  EXPECT_THAT(why(R"({"position":[0,0,0],"quaternion":[1,1,0,0]})"), HasSubstr("normalise"));
+  EXPECT_EQ(why(R"({"position":[0,0,0],"quaternion":[1,0,0]})"), "quaternion must be a list of 4 numbers");
+  EXPECT_THAT(why(R"({"position":[0,0,0],"attitude":[0,0,0],"frame":"NWU"})"), HasSubstr("NED_FRD"));
+  EXPECT_EQ(why(R"({"position":[0,0,0],"attitude":[0,0,0],"vehicle":3})"), "vehicle must be a string");
+  EXPECT_THAT(why(R"({"position":[0,0,0],"attitude":[0,0,0],"timestamp":"now"})"), HasSubstr("seconds"));
+  EXPECT_THAT(why(R"({"position":[0,0,0],"attitude":[0,0,0],"timestamp":1e12})"), HasSubstr("9e9"));
+  EXPECT_THAT(why(R"({"position":[0,0,0],"attitude":[0,0,0],"velocity":[1e9,0,0]})"), HasSubstr("velocity"));
+  EXPECT_THAT(why(std::string(2000, '[')), HasSubstr("deeper"));
+  EXPECT_THAT(why(std::string(5000, ' ')), HasSubstr("4096"));
+  EXPECT_EQ(why("{\"position\":[0,0,0],\"attitude\":[0,0,0],\"vehicle\":\"\xff\xfe\"}"), "line is not JSON") << "invalid UTF-8";
+}
+
+TEST(JsonPose, EveryTruncationIsRefusedQuietly) {
+  const std::string line = R"({"timestamp":1.0,"position":[0,0,3],"attitude":[0,0.1,0.5],"velocity":[0,0,0]})";
+  for (std::size_t n = 0; n < line.size(); ++n) ASSERT_NE(why(line.substr(0, n)), "accepted") << n;
+  EXPECT_EQ(why(line), "accepted");
+}
+
+std::span<const std::byte> bytes(const std::string& s) { return std::as_bytes(std::span(s.data(), s.size())); }
+
+TEST(LineParser, EverySplitGivesTheSameLines) {
+  const std::string stream = "one\ntwo\r\n\n  \nthree\n";
+  for (std::size_t cut = 0; cut <= stream.size(); ++cut) {
+    LineParser parser;
+    std::vector<std::string> lines;
+    for (const auto& part : {stream.substr(0, cut), stream.substr(cut)}) {
+      parser.feed(bytes(part));
+      while (auto line = parser.next()) lines.push_back(line->text);
+    }
+    ASSERT_EQ(lines, (std::vector<std::string>{"one", "two", "three"})) << "cut at " << cut;
+  }
+}
+
+TEST(LineParser, ALineBeyondTheLimitIsReportedOnceAndSwallowed) {
+  LineParser parser;
+  int too_long = 0;
+  std::vector<std::string> lines;
+  const auto drain = [&] {
+    while (auto line = parser.next()) line->too_long ? void(++too_long) : lines.push_back(line->text);
+  };
+  for (int i = 0; i < 100; ++i) {
+    parser.feed(bytes(std::string(1000, 'x')));
+    drain();
+  }
+  parser.feed(bytes("tail\ngood\n"));
+  drain();
+  EXPECT_EQ(too_long, 1);
+  EXPECT_EQ(lines, (std::vector<std::string>{"good"}));
+}
+
+}  // namespace
+}  // namespace sonar::control

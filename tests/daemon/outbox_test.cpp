@@ -1,0 +1,92 @@
+// The outbox rule of docs/architecture.md: message being written + depth waiting pings, whole messages, drops counted.
+#include "daemon/outbox.hpp"
+
+#include <gtest/gtest.h>
+
+namespace sonar {
+namespace {
+
+void push(Outbox& box, int tag, std::size_t size = 100) {
+  box.push_ping(std::make_shared<const Outbox::Bytes>(size, static_cast<std::byte>(tag)), static_cast<std::uint32_t>(tag));
+}
+Outbox::Bytes reply(int tag, std::size_t size = 16) { return Outbox::Bytes(size, static_cast<std::byte>(tag)); }
+int tag_of(const Outbox::Message& m) { return m ? std::to_integer<int>(m.bytes->front()) : -1; }
+
+TEST(Outbox, ReplacesTheOldestWaitingPingAndNeverTheOneBeingWritten) {
+  Outbox box({1, WhenFull::replace_oldest});
+  push(box, 1);
+  const auto first = box.take();
+  EXPECT_EQ(tag_of(first), 1);
+  for (int i = 2; i <= 5; ++i) push(box, i);
+  EXPECT_EQ(box.pings_dropped(), 3u);
+  EXPECT_FALSE(box.take()) << "one message at a time";
+  box.written();
+  EXPECT_EQ(tag_of(box.take()), 5);
+  box.written();
+  EXPECT_TRUE(box.idle());
+  EXPECT_EQ(box.pings_written(), 2u);
+}
+
+TEST(Outbox, DropsTheNewestWhenToldTo) {
+  Outbox box({2, WhenFull::drop_newest});
+  for (int i = 1; i <= 5; ++i) push(box, i);
+  EXPECT_EQ(box.pings_dropped(), 3u);
+  EXPECT_EQ(tag_of(box.take()), 1);
+  box.written();
+  EXPECT_EQ(tag_of(box.take()), 2);
+}
+
+TEST(Outbox, RepliesGoInOrderAndBeforeWaitingPings) {
+  Outbox box({1, WhenFull::replace_oldest});
+  push(box, 1);
+  EXPECT_EQ(tag_of(box.take()), 1);
+  push(box, 2);
+  ASSERT_TRUE(box.push_reply(reply(10)));
+  ASSERT_TRUE(box.push_reply(reply(11)));
+  box.written();
+  const auto first_reply = box.take();
+  EXPECT_EQ(tag_of(first_reply), 10);
+  EXPECT_EQ(first_reply.ping, 0u);
+  box.written();
+  EXPECT_EQ(tag_of(box.take()), 11);
+  box.written();
+  EXPECT_EQ(tag_of(box.take()), 2);
+  box.written();
+  EXPECT_EQ(box.pings_written(), 2u) << "replies are not pings";
+}
+
+TEST(Outbox, RepliesAreBoundedByCountAndBytes) {
+  Outbox many({});
+  for (std::size_t i = 0; i < Outbox::most_replies; ++i) ASSERT_TRUE(many.push_reply(reply(1)));
+  EXPECT_FALSE(many.push_reply(reply(1)));
+  Outbox large({});
+  EXPECT_TRUE(large.push_reply(reply(1, Outbox::most_reply_bytes)));
+  EXPECT_FALSE(large.push_reply(reply(1, 1)));
+}
+
+TEST(Outbox, WaitingPingsStayBelowEightMebibytes) {
+  Outbox box({3, WhenFull::replace_oldest});
+  push(box, 1, 5u << 20);
+  push(box, 2, 5u << 20);
+  EXPECT_EQ(box.pings_dropped(), 1u);
+  EXPECT_EQ(tag_of(box.take()), 2);
+  EXPECT_FALSE(box.take());
+}
+
+TEST(Outbox, DropWaitingKeepsTheMessageBeingWritten) {
+  Outbox box({2, WhenFull::replace_oldest});
+  for (int i = 1; i <= 3; ++i) {
+    push(box, i);
+    if (i == 1) {
+      EXPECT_EQ(tag_of(box.take()), 1);
+    }
+  }
+  box.drop_waiting();
+  EXPECT_FALSE(box.idle());
+  box.written();
+  EXPECT_TRUE(box.idle());
+  EXPECT_EQ(box.pings_dropped(), 2u);
+}
+
+}  // namespace
+}  // namespace sonar

@@ -1,0 +1,40 @@
+// FIPS 180-4 examples (NIST "SHA-256 example values") and splitting.
+#include "daemon/sha256.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <string_view>
+
+namespace sonar {
+namespace {
+
+std::string hash_of(std::string_view text) {
+  Sha256 sha;
+  sha.add(std::as_bytes(std::span(text.data(), text.size())));
+  return sha.hex();
+}
+
+TEST(Sha256, KnownAnswers) {
+  EXPECT_EQ(hash_of(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(hash_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(hash_of("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
+            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+  EXPECT_EQ(hash_of(std::string(1000000, 'a')), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+TEST(Sha256, AnySplitGivesTheSameDigest) {
+  std::string text;
+  for (int i = 0; i < 300; ++i) text += static_cast<char>(i * 7);
+  const std::string whole = hash_of(text);
+  for (std::size_t cut = 0; cut <= text.size(); ++cut) {
+    Sha256 sha;
+    sha.add(std::as_bytes(std::span(text.data(), cut)));
+    sha.add(std::as_bytes(std::span(text.data() + cut, text.size() - cut)));
+    ASSERT_EQ(sha.hex(), whole) << "cut at " << cut;
+    ASSERT_EQ(sha.size(), text.size());
+  }
+}
+
+}  // namespace
+}  // namespace sonar

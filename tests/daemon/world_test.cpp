@@ -1,0 +1,209 @@
+// Who is believed, when, and what the daemon answers for a moment: the rules of docs/configuration.md, "poses".
+#include "daemon/world.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace sonar {
+namespace {
+
+using control::ClockDomain;
+using control::PoseSample;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+const Time t0 = Time(std::chrono::hours(400000));
+const Sender udp{"protobuf udp 127.0.0.1:4000", "protobuf 127.0.0.1"};
+const Sender json{"json udp 127.0.0.1:5000", "json 127.0.0.1"};
+
+PoseSample at_x(double x, std::uint64_t seq = 0) {
+  PoseSample s;
+  s.seq = seq;
+  s.pose.position_m = {x, 0, -3};
+  return s;
+}
+PoseSample stamped(double x, ClockDomain domain, std::chrono::nanoseconds t, std::uint64_t seq = 0) {
+  PoseSample s = at_x(x, seq);
+  s.stamp = {domain, t.count()};
+  return s;
+}
+World one_rov(PoseRules rules = {}, bool orbits = false) { return World(rules, {{"rov", {{0, 0, -3}, {}}, orbits}}, {}, t0); }
+
+TEST(World, RestsAtTheInitialPoseUntilTheFirstPose) {
+  World w = one_rov();
+  EXPECT_EQ(w.vehicle_at(0, t0 + seconds(100)).position_m.z, -3);
+  EXPECT_FALSE(w.is_stale(0, t0 + seconds(100)));
+  EXPECT_EQ(w.source_of(0), "initial pose");
+}
+
+TEST(World, OrbitsTheOriginLookingInwardUntilTheFirstPose) {
+  World w(PoseRules{}, {{"rov", {{0, -8, -2}, {}}, true}}, {}, t0);
+  const Pose start = w.vehicle_at(0, t0);
+  EXPECT_NEAR(start.position_m.y, -8, 1e-9);
+  for (const int s : {0, 10, 50}) {
+    const Pose p = w.vehicle_at(0, t0 + seconds(s));
+    EXPECT_NEAR(std::hypot(p.position_m.x, p.position_m.y), 8, 1e-9);
+    EXPECT_EQ(p.position_m.z, -2);
+    const Vec3d ahead = rotate(p.orientation, {1, 0, 0});
+    EXPECT_NEAR(ahead.x * p.position_m.x + ahead.y * p.position_m.y, -8, 1e-9) << "looks at the z axis";
+  }
+  EXPECT_GT(length(w.vehicle_at(0, t0 + seconds(2)).position_m - start.position_m), 0.5);
+  const auto outcome = w.accept(at_x(1), json, t0);
+  EXPECT_THAT(outcome.notice, HasSubstr("demo orbit -> json 127.0.0.1"));
+  EXPECT_EQ(w.vehicle_at(0, t0 + seconds(9)).position_m.x, 1);
+}
+
+TEST(World, TheNoticeNamesFieldsAndFrame) {
+  World w = one_rov();
+  PoseSample s = at_x(1);
+  s.fields = "timestamp position attitude velocity";
+  s.sent_in = control::Frame::ned_frd;
+  EXPECT_EQ(w.accept(s, json, t0).notice,
+            "pose source of rov changed: initial pose -> json 127.0.0.1; fields: timestamp position attitude velocity (NED/FRD)");
+  EXPECT_EQ(w.accept(s, json, t0 + milliseconds(10)).notice, "");
+}
+
+TEST(World, ArrivalTimeInterpolates) {
+  World w = one_rov();
+  w.accept(at_x(0), udp, t0);
+  w.accept(at_x(1), udp, t0 + milliseconds(100));
+  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(50)).position_m.x, 0.5, 1e-12);
+  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(150)).position_m.x, 1.5, 1e-12);
+}
+
+TEST(World, OldSequenceNumbersAreLate) {
+  World w = one_rov();
+  w.accept(at_x(0, 10), udp, t0);
+  w.accept(at_x(1, 12), udp, t0 + milliseconds(10));
+  EXPECT_EQ(w.accept(at_x(9, 11), udp, t0 + milliseconds(20)).verdict, PoseVerdict::late);
+  EXPECT_EQ(w.accept(at_x(9, 12), udp, t0 + milliseconds(30)).verdict, PoseVerdict::late);
+  EXPECT_EQ(w.counters().late, 2u);
+  EXPECT_EQ(w.accept(at_x(2, 13), udp, t0 + milliseconds(40)).verdict, PoseVerdict::accepted);
+  EXPECT_EQ(w.counters().accepted, 3u);
+}
+
+TEST(World, ARestartedSenderIsBelievedFromANewPortOrAfterSilence) {
+  World w = one_rov();
+  w.accept(at_x(0, 1000), udp, t0);
+  EXPECT_EQ(w.accept(at_x(1, 1), udp, t0 + milliseconds(900)).verdict, PoseVerdict::late);
+  EXPECT_EQ(w.accept(at_x(1, 1), {"protobuf udp 127.0.0.1:4001", "protobuf 127.0.0.1"}, t0 + milliseconds(950)).verdict,
+            PoseVerdict::accepted);
+  EXPECT_EQ(w.accept(at_x(2, 1), {"protobuf udp 127.0.0.1:4001", "protobuf 127.0.0.1"}, t0 + milliseconds(2000)).verdict,
+            PoseVerdict::accepted);
+  EXPECT_EQ(w.counters().histories, 3u);
+}
+
+TEST(World, ANewSenderDoesNotInterpolateWithTheOldOne) {
+  World w = one_rov();
+  w.accept(at_x(0), udp, t0);
+  w.accept(at_x(10), json, t0 + milliseconds(100));
+  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(50)).position_m.x, 10);
+  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(200)).position_m.x, 10) << "no speed from two different senders";
+}
+
+TEST(World, SenderClockIsMappedByTheLeastDelay) {
+  World w = one_rov();
+  w.accept(stamped(0, ClockDomain::sim, milliseconds(5000)), json, t0 + milliseconds(40));   // 40 ms under way
+  w.accept(stamped(1, ClockDomain::sim, milliseconds(5100)), json, t0 + milliseconds(110));  // 10 ms under way
+  w.accept(stamped(2, ClockDomain::sim, milliseconds(5200)), json, t0 + milliseconds(250));  // 50 ms under way
+  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(160)).position_m.x, 1.5, 1e-9) << "sender time 5150 is our 160";
+}
+
+TEST(World, ASlowSimulatorIsFollowedInSteps) {
+  World w = one_rov();
+  for (int i = 0; i <= 100; ++i)  // half real time
+    w.accept(stamped(0.01 * i, ClockDomain::sim, milliseconds(50 * i)), json, t0 + milliseconds(100 * i));
+  const double x = w.vehicle_at(0, t0 + milliseconds(10000)).position_m.x;
+  EXPECT_NEAR(x, 1.0, 0.05) << "never more than the extrapolation limit away from the newest pose";
+}
+
+TEST(World, EqualStampsReplaceAndOlderOnesAreLate) {
+  World w = one_rov();
+  w.accept(stamped(1, ClockDomain::sim, seconds(1)), json, t0);
+  w.accept(stamped(2, ClockDomain::sim, seconds(1)), json, t0 + milliseconds(10));
+  EXPECT_EQ(w.counters().replaced, 1u);
+  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(10)).position_m.x, 2);
+  EXPECT_EQ(w.accept(stamped(3, ClockDomain::sim, milliseconds(999)), json, t0 + milliseconds(20)).verdict, PoseVerdict::late);
+}
+
+TEST(World, WallStampsMustAgreeWithOurClock) {
+  World w = one_rov();
+  const auto now = t0.time_since_epoch();
+  EXPECT_EQ(w.accept(stamped(1, ClockDomain::wall, now - milliseconds(50)), udp, t0).verdict, PoseVerdict::accepted);
+  const auto future = w.accept(stamped(1, ClockDomain::wall, now + seconds(10)), udp, t0);
+  EXPECT_EQ(future.verdict, PoseVerdict::bad_time);
+  EXPECT_THAT(future.refusal, HasSubstr("synchronise the clocks"));
+  EXPECT_EQ(w.accept(stamped(1, ClockDomain::wall, now - seconds(10)), udp, t0).verdict, PoseVerdict::bad_time);
+  EXPECT_EQ(w.counters().refused, 2u);
+}
+
+TEST(World, InSteppedTimeWallStampsAreTheSendersOwnClock) {
+  PoseRules rules;
+  rules.stepped = true;
+  World w = one_rov(rules);
+  EXPECT_EQ(w.accept(stamped(1, ClockDomain::wall, std::chrono::hours(480000)), udp, Time{}).verdict, PoseVerdict::accepted);
+  EXPECT_EQ(w.vehicle_at(0, Time{}).position_m.x, 1);
+}
+
+TEST(World, AChangedResetCounterOrAJumpClearsTheHistory) {
+  World w = one_rov();
+  w.accept(at_x(0, 1), udp, t0);
+  w.accept(at_x(1, 2), udp, t0 + milliseconds(100));
+  PoseSample reset = at_x(5, 1);  // the counter may start again with a reset
+  reset.reset_counter = 1;
+  EXPECT_EQ(w.accept(reset, udp, t0 + milliseconds(200)).verdict, PoseVerdict::accepted);
+  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(150)).position_m.x, 5);
+  EXPECT_EQ(w.counters().resets, 1u);
+  PoseSample far = at_x(60, 2);
+  far.reset_counter = 1;
+  EXPECT_THAT(w.accept(far, udp, t0 + milliseconds(300)).notice, HasSubstr("max_jump_m"));
+  EXPECT_EQ(w.counters().jumps, 1u);
+  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(400)).position_m.x, 60) << "no extrapolation across the jump";
+}
+
+TEST(World, PosesGoStaleOnceAndComeBack) {
+  World w = one_rov();
+  w.accept(at_x(4, 1), udp, t0);
+  EXPECT_TRUE(w.newly_stale(t0 + milliseconds(1000)).empty());
+  EXPECT_FALSE(w.is_stale(0, t0 + milliseconds(1000)));
+  EXPECT_TRUE(w.is_stale(0, t0 + milliseconds(1001)));
+  EXPECT_EQ(w.newly_stale(t0 + milliseconds(1500)).size(), 1u);
+  EXPECT_TRUE(w.newly_stale(t0 + milliseconds(1600)).empty()) << "said once";
+  EXPECT_EQ(w.vehicle_at(0, t0 + seconds(60)).position_m.x, 4) << "held";
+  EXPECT_THAT(w.accept(at_x(4, 2), udp, t0 + seconds(2)).notice, HasSubstr("are back"));
+  EXPECT_EQ(w.counters().stale, 1u);
+}
+
+TEST(World, NamesAreOptionalOnlyWhenThereIsNoChoice) {
+  World two(PoseRules{}, {{"a", {}, false}, {"b", {}, false}}, {{"crate", {}, false}}, t0);
+  PoseSample s = at_x(1);
+  EXPECT_THAT(two.accept(s, udp, t0).refusal, HasSubstr("known: a, b"));
+  s.name = "c";
+  EXPECT_EQ(two.accept(s, udp, t0).verdict, PoseVerdict::unknown_name);
+  EXPECT_EQ(two.counters().refused, 2u);
+  s.name = "b";
+  EXPECT_EQ(two.accept(s, udp, t0).verdict, PoseVerdict::accepted);
+  EXPECT_EQ(two.vehicle_at(1, t0).position_m.x, 1);
+  s.of = PoseSample::Of::object;
+  EXPECT_EQ(two.accept(s, udp, t0).verdict, PoseVerdict::unknown_name);
+}
+
+TEST(World, ObjectsMoveAndHide) {
+  World w(PoseRules{}, {{"rov", {}, false}}, {{"crate", {{1, 2, -5}, {}}, false}, {"diver", {{3, 4, -5}, {}}, false}}, t0);
+  EXPECT_EQ(w.objects_at(t0)[0].position_m.y, 2);
+  PoseSample s = at_x(9);
+  s.of = PoseSample::Of::object;
+  s.name = "crate";
+  w.accept(s, udp, t0);
+  EXPECT_EQ(w.objects_at(t0)[0].position_m.x, 9);
+  EXPECT_EQ(w.objects_at(t0)[1].position_m.x, 3);
+  s.hidden = true;
+  w.accept(s, udp, t0 + milliseconds(1));
+  EXPECT_GT(w.objects_at(t0)[0].position_m.z, 1000) << "far out of every sonar's range";
+}
+
+}  // namespace
+}  // namespace sonar
