@@ -40,24 +40,18 @@ SONAR_HD constexpr Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y
 SONAR_HD constexpr Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 SONAR_HD constexpr Vec3 operator*(float s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
 SONAR_HD constexpr float dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-SONAR_HD constexpr Vec3 cross(Vec3 a, Vec3 b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+SONAR_HD constexpr Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 SONAR_HD inline float length(Vec3 a) { return std::sqrt(dot(a, a)); }
 
 SONAR_HD constexpr Vec3d operator+(Vec3d a, Vec3d b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 SONAR_HD constexpr Vec3d operator-(Vec3d a, Vec3d b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 SONAR_HD constexpr Vec3d operator*(double s, Vec3d a) { return {s * a.x, s * a.y, s * a.z}; }
 SONAR_HD constexpr double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-SONAR_HD constexpr Vec3d cross(Vec3d a, Vec3d b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+SONAR_HD constexpr Vec3d cross(Vec3d a, Vec3d b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 SONAR_HD inline double length(Vec3d a) { return std::sqrt(dot(a, a)); }
 
 SONAR_HD constexpr Vec3d to_double(Vec3 a) { return {a.x, a.y, a.z}; }
-SONAR_HD constexpr Vec3 to_float(Vec3d a) {
-  return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
-}
+SONAR_HD constexpr Vec3 to_float(Vec3d a) { return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)}; }
 
 SONAR_HD constexpr Quatd operator*(Quatd a, Quatd b) {
   return {a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
@@ -103,8 +97,7 @@ SONAR_HD inline Quatd quat_from_rpy(const RollPitchYaw& a) {
   const double cr = std::cos(a.roll_rad / 2), sr = std::sin(a.roll_rad / 2);
   const double cp = std::cos(a.pitch_rad / 2), sp = std::sin(a.pitch_rad / 2);
   const double cy = std::cos(a.yaw_rad / 2), sy = std::sin(a.yaw_rad / 2);
-  return {cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
-          cr * cp * sy - sr * sp * cy};
+  return {cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy};
 }
 SONAR_HD inline RollPitchYaw rpy_from_quat(Quatd q) {
   const double s = 2 * (q.w * q.y - q.z * q.x);
@@ -139,8 +132,6 @@ SONAR_HD inline double heading_rad(Quatd body_in_world) {
 }
 
 inline bool is_finite(Vec3d v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-inline bool is_finite(Quatd q) {
-  return std::isfinite(q.w) && std::isfinite(q.x) && std::isfinite(q.y) && std::isfinite(q.z);
-}
+inline bool is_finite(Quatd q) { return std::isfinite(q.w) && std::isfinite(q.x) && std::isfinite(q.y) && std::isfinite(q.z); }
 
 }  // namespace sonar

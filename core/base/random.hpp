@@ -35,9 +35,7 @@ SONAR_HD constexpr Random4 philox(std::uint32_t c0, std::uint32_t c1, std::uint3
 }
 
 /// (0, 1): never 0, so that its logarithm is finite.
-SONAR_HD constexpr float uniform_open(std::uint32_t bits) {
-  return (static_cast<float>(bits >> 9) + 0.5f) * (1.0f / 8388608.0f);
-}
+SONAR_HD constexpr float uniform_open(std::uint32_t bits) { return (static_cast<float>(bits >> 9) + 0.5f) * (1.0f / 8388608.0f); }
 
 /// Circular complex Gaussian with E|z|^2 = 1 (Box-Muller).
 SONAR_HD inline ComplexNormal complex_normal(std::uint32_t a, std::uint32_t b) {

@@ -9,11 +9,11 @@ namespace sonar {
 
 /// What went wrong, in the sysexits classes the programs exit with.
 enum class ErrorKind : int {
-  usage = 64,         // arguments
-  bad_data = 65,      // a scene, a mesh, a recording
+  usage = 64,     // arguments
+  bad_data = 65,  // a scene, a mesh, a recording
   missing_file = 66,
-  unavailable = 69,   // a port, an interface, a device
-  bug = 70,           // ours
+  unavailable = 69,  // a port, an interface, a device
+  bug = 70,          // ours
   io = 74,
   config = 78
 };

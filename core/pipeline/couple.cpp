@@ -9,8 +9,8 @@
 
 namespace sonar {
 
-void couple(const ColumnSignals& columns, const Coupling& coupling, const simd::Kernels& kernels, int first_sample, int samples, int beams,
-            CoupleScratch& scratch, BeamSignals& out) {
+void couple(const ColumnSignals& columns, const Coupling& coupling, const simd::Kernels& kernels, int first_sample, int samples,
+            int beams, CoupleScratch& scratch, BeamSignals& out) {
   const int floats = (2 * samples + 31) / 32 * 32;
   out.beams = beams;
   out.first_sample = first_sample;

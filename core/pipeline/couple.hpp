@@ -25,8 +25,8 @@ struct CoupleScratch {
   std::vector<float> window;  // the columns' samples side by side
 };
 
-void couple(const ColumnSignals& columns, const Coupling& coupling, const simd::Kernels& kernels, int first_sample, int samples, int beams,
-            CoupleScratch& scratch, BeamSignals& out);
+void couple(const ColumnSignals& columns, const Coupling& coupling, const simd::Kernels& kernels, int first_sample, int samples,
+            int beams, CoupleScratch& scratch, BeamSignals& out);
 
 /// Point echoes at their exact direction, on top. In expected power they are summed coherently among themselves.
 void add_points(std::span<const PointEcho> points, const PingPlan& plan, BeamSignals& out);

@@ -8,7 +8,11 @@ namespace {
 class CpuEngine final : public PingEngine {
  public:
   CpuEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options)
-      : rays_(scene, pool.threads()), scene_(std::move(scene)), pool_(pool), options_(options), kernels_(simd::kernels_for(options.simd)) {
+      : rays_(scene, pool.threads()),
+        scene_(std::move(scene)),
+        pool_(pool),
+        options_(options),
+        kernels_(simd::kernels_for(options.simd)) {
     work_.now_s = options.now_s;
   }
 
@@ -25,8 +29,8 @@ class CpuEngine final : public PingEngine {
   }
 
   std::string description() const override {
-    return std::string("cpu, ") + kernels_.name + ", " + std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread, " : " threads, ") +
-           RayScene::version();
+    return std::string("cpu, ") + kernels_.name + ", " + std::to_string(pool_.threads()) +
+           (pool_.threads() == 1 ? " thread, " : " threads, ") + RayScene::version();
   }
 
   PingStatistics statistics() const override { return work_.statistics; }

@@ -44,6 +44,7 @@ class PingEngine {
 };
 
 /// Builds the acceleration structures; the pool must outlive the engine.
-std::unique_ptr<PingEngine> make_cpu_engine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options = {});
+std::unique_ptr<PingEngine> make_cpu_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
+                                            const EngineOptions& options = {});
 
 }  // namespace sonar

@@ -18,9 +18,9 @@ constexpr double flat_margin_in_beams = 1.5;     // of which the transmitter lig
 constexpr int base_elevations = 48;              // cells.md 4
 constexpr double fan_over_width = 2.3;           // the fan reaches the -20 dB points of the two-way pattern
 constexpr double widest_fan_rad = 1.4;
-constexpr double dropped_energy = 1e-4;          // of the coupling band, -40 dB
-constexpr double pulse_reach_widths = 3.99;      // p falls to 2e-10 at this many -3 dB widths
-constexpr double level_fade = 1.15;              // cell levels cross-fade over 15 % of range
+constexpr double dropped_energy = 1e-4;      // of the coupling band, -40 dB
+constexpr double pulse_reach_widths = 3.99;  // p falls to 2e-10 at this many -3 dB widths
+constexpr double level_fade = 1.15;          // cell levels cross-fade over 15 % of range
 
 double half_aperture_sine(const FrequencyMode& mode) { return std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2); }
 double beam_width_sine(const FrequencyMode& mode) {
@@ -55,7 +55,8 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
   std::array<double, n> node{}, coefficient{};
   for (int i = 0; i < n; ++i) {
     node[static_cast<std::size_t>(i)] = top * 0.5 * (1 - std::cos(pi * (i + 0.5) / n));
-    coefficient[static_cast<std::size_t>(i)] = elevation_two_way(aperture, std::asin(std::sqrt(node[static_cast<std::size_t>(i)])));
+    coefficient[static_cast<std::size_t>(i)] =
+        elevation_two_way(aperture, std::asin(std::sqrt(node[static_cast<std::size_t>(i)])));
   }
   for (int order = 1; order < n; ++order)
     for (int i = n - 1; i >= order; --i) {
@@ -65,7 +66,8 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
   std::array<double, n> power{};
   for (int i = n - 1; i >= 0; --i) {  // power = power * (w - node_i) + coefficient_i
     for (int k = n - 1; k > 0; --k)
-      power[static_cast<std::size_t>(k)] = power[static_cast<std::size_t>(k - 1)] - node[static_cast<std::size_t>(i)] * power[static_cast<std::size_t>(k)];
+      power[static_cast<std::size_t>(k)] =
+          power[static_cast<std::size_t>(k - 1)] - node[static_cast<std::size_t>(i)] * power[static_cast<std::size_t>(k)];
     power[0] = -node[static_cast<std::size_t>(i)] * power[0] + coefficient[static_cast<std::size_t>(i)];
   }
   return {power.begin(), power.end()};
@@ -96,7 +98,8 @@ void fill_row_gains(PingPlan& plan) {
 
 double beam_weight(const FrequencyMode& mode, double beam_sine, double sine) {
   const Taper taper = mode.pattern.azimuth_taper;
-  return directivity(taper, aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad)), sine - beam_sine);
+  return directivity(taper, aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad)),
+                     sine - beam_sine);
 }
 
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count) {
@@ -265,27 +268,31 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
 
 bool serves(const PingPlan& plan, const PingRequest& r) {
   const PingSettings &a = plan.settings, &b = r.settings;
-  return plan.mode.name == r.model->modes[static_cast<std::size_t>(b.mode)].name && a.mode == b.mode && a.beam_count == b.beam_count &&
-         a.range_bin_count == b.range_bin_count && a.range_m == b.range_m && a.range_bin_m == b.range_bin_m &&
-         a.pulse_width_m == b.pulse_width_m && a.samples_per_row == b.samples_per_row && a.gain_db == b.gain_db && a.tvg == b.tvg &&
-         a.device_sound_speed_mps == b.device_sound_speed_mps && a.device_absorption_db_per_m == b.device_absorption_db_per_m &&
-         a.format.bits == b.format.bits && a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma &&
-         a.format.row_gains == b.format.row_gains && plan.expected_power == r.switches.expected_power &&
-         plan.fixed_fan == r.switches.fixed_fan;
+  return plan.mode.name == r.model->modes[static_cast<std::size_t>(b.mode)].name && a.mode == b.mode &&
+         a.beam_count == b.beam_count && a.range_bin_count == b.range_bin_count && a.range_m == b.range_m &&
+         a.range_bin_m == b.range_bin_m && a.pulse_width_m == b.pulse_width_m && a.samples_per_row == b.samples_per_row &&
+         a.gain_db == b.gain_db && a.tvg == b.tvg && a.device_sound_speed_mps == b.device_sound_speed_mps &&
+         a.device_absorption_db_per_m == b.device_absorption_db_per_m && a.format.bits == b.format.bits &&
+         a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma && a.format.row_gains == b.format.row_gains &&
+         plan.expected_power == r.switches.expected_power && plan.fixed_fan == r.switches.fixed_fan;
 }
 
 std::string why_invalid(const PingRequest& r) {
   const PingSettings& s = r.settings;
   if (!r.model) return "the request names no sonar model";
-  if (s.mode < 0 || s.mode >= static_cast<int>(r.model->modes.size())) return "mode " + std::to_string(s.mode) + " does not exist in " + r.model->name;
+  if (s.mode < 0 || s.mode >= static_cast<int>(r.model->modes.size()))
+    return "mode " + std::to_string(s.mode) + " does not exist in " + r.model->name;
   if (s.beam_count < 1 || s.beam_count > 2048) return "beam_count " + std::to_string(s.beam_count) + " is not in 1..2048";
-  if (s.range_bin_count < 1 || s.range_bin_count > 65535) return "range_bin_count " + std::to_string(s.range_bin_count) + " is not in 1..65535";
-  if (s.samples_per_row < 1 || s.samples_per_row > 64) return "samples_per_row " + std::to_string(s.samples_per_row) + " is not in 1..64";
+  if (s.range_bin_count < 1 || s.range_bin_count > 65535)
+    return "range_bin_count " + std::to_string(s.range_bin_count) + " is not in 1..65535";
+  if (s.samples_per_row < 1 || s.samples_per_row > 64)
+    return "samples_per_row " + std::to_string(s.samples_per_row) + " is not in 1..64";
   if (!(s.range_bin_m > 0) || !(s.pulse_width_m > 0) || !(s.range_m > 0) || !(s.device_sound_speed_mps > 0))
     return "range, row spacing, pulse width and sound speed must be positive";
   if (s.format.bits != 8 && s.format.bits != 16 && s.format.bits != 32) return "samples have 8, 16 or 32 bits";
   if (!(s.format.gamma > 0)) return "gamma must be positive";
-  if (!is_finite(r.sonar_in_world.position_m) || !is_finite(r.sonar_in_world.orientation)) return "the sonar's pose is not finite";
+  if (!is_finite(r.sonar_in_world.position_m) || !is_finite(r.sonar_in_world.orientation))
+    return "the sonar's pose is not finite";
   return {};
 }
 

@@ -14,8 +14,8 @@ namespace sonar {
 /// Columns of constant direction sine u = y / r (cones about the array axis), falling from port to starboard like the beams.
 struct Columns {
   int count = 0;
-  double first_sine = 0;    // centre of column 0
-  double spacing = 0;       // in u
+  double first_sine = 0;        // centre of column 0
+  double spacing = 0;           // in u
   std::vector<float> transmit;  // amplitude of the transmitter per column: flat over the sector, soft beyond
   double sine(int column) const { return first_sine - column * spacing; }
 };
@@ -30,12 +30,12 @@ struct Fan {
 
 /// Weights of four neighbouring beams over the columns they share.
 struct CouplingPanel {
-  int first_beam = 0;    // the four beams first_beam .. +3; those past the last beam have zero weights
+  int first_beam = 0;  // the four beams first_beam .. +3; those past the last beam have zero weights
   int first_column = 0, count = 0;
   std::size_t weights = 0;  // offset into Coupling::weights, count x 4 values
 };
 struct Coupling {
-  int half_band = 0;     // columns on either side that a beam listens to
+  int half_band = 0;  // columns on either side that a beam listens to
   std::vector<CouplingPanel> panels;
   std::vector<float> weights;
   double weight_energy = 1;  // sum_k W_jk^2 of the middle beam
@@ -54,18 +54,18 @@ struct PingPlan {
   std::vector<double> beam_sine;
 
   // The sample grid: sample n lies at the device range (n + 1/2) sample_spacing_m.
-  int samples = 0;             // rows * samples_per_row
+  int samples = 0;  // rows * samples_per_row
   double sample_spacing_m = 0;
   std::vector<float> pulse_rows;  // simd::PulseRows
   int taps = 8, pulse_steps = 256;
-  double envelope_hz = 0;      // b of p(t) = exp(-b^2 t^2)
+  double envelope_hz = 0;  // b of p(t) = exp(-b^2 t^2)
 
-  std::vector<CellLevel> levels;       // coarsest first
-  std::vector<float> elevation;        // polynomial of the two-way pattern in sin^2(angle)
-  std::vector<float> noise_filter;     // minimum-phase taps that give white noise the pulse's correlation on this grid
-  double column_noise_upa = 0;         // rms of one column
-  std::vector<float> row_power_factor; // per row: (gain * TVG / full scale)^2
-  std::vector<std::uint32_t> row_gain; // when settings.format.row_gains
+  std::vector<CellLevel> levels;        // coarsest first
+  std::vector<float> elevation;         // polynomial of the two-way pattern in sin^2(angle)
+  std::vector<float> noise_filter;      // minimum-phase taps that give white noise the pulse's correlation on this grid
+  double column_noise_upa = 0;          // rms of one column
+  std::vector<float> row_power_factor;  // per row: (gain * TVG / full scale)^2
+  std::vector<std::uint32_t> row_gain;  // when settings.format.row_gains
 
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
 };

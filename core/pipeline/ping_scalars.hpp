@@ -15,7 +15,7 @@ struct PingScalars {
   double samples_per_m = 0;        // fractional sample of a true range r: r * samples_per_m - 1/2
   double turns_per_m = 0;          // carrier turns per metre of one-way range, 2 f / c
   Rotation world_from_sonar;
-  Vec3 position_in_scene;          // relative to RayScene::origin() [m]
+  Vec3 position_in_scene;  // relative to RayScene::origin() [m]
 
   double sample_of(double range_m) const { return range_m * samples_per_m - 0.5; }
 };

@@ -17,7 +17,8 @@ void detect(const BeamSignals& beams, const PingPlan& plan, int rows, int width,
       for (int j = from; j < to; ++j) {
         const float* s = beams.beam(j) + 2 * row * per_row;
         float sum = 0;
-        for (int q = 0; q < per_row; ++q) sum += plan.expected_power ? s[2 * q] : s[2 * q] * s[2 * q] + s[2 * q + 1] * s[2 * q + 1];
+        for (int q = 0; q < per_row; ++q)
+          sum += plan.expected_power ? s[2 * q] : s[2 * q] * s[2 * q] + s[2 * q + 1] * s[2 * q + 1];
         power[static_cast<std::size_t>(row * width + j)] = sum / static_cast<float>(per_row);
       }
   }
@@ -57,7 +58,8 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
     for (int j = 0; j < s.beam_count; ++j) {
       // 2^32 - 1 is no float: compare before the conversion can overflow.
       const float code = scratch.codes[static_cast<std::size_t>(j)];
-      put(code >= max_code ? s.format.max_code : static_cast<std::uint32_t>(code), bytes, out + static_cast<std::ptrdiff_t>(j) * bytes);
+      put(code >= max_code ? s.format.max_code : static_cast<std::uint32_t>(code), bytes,
+          out + static_cast<std::ptrdiff_t>(j) * bytes);
     }
   }
 }

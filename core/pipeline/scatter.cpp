@@ -11,14 +11,15 @@
 namespace sonar {
 namespace {
 
-constexpr float depth_tolerance_in_pulses = 1.5f;  // cells.md 2: covers the straight lines between rays
-constexpr std::uint32_t fixed_fan_key = 0x66616eu; // keeps these draws apart from the cells'
+constexpr float depth_tolerance_in_pulses = 1.5f;   // cells.md 2: covers the straight lines between rays
+constexpr std::uint32_t fixed_fan_key = 0x66616eu;  // keeps these draws apart from the cells'
 
 double fraction(double turns) { return turns - std::floor(turns); }
 
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
-TileToSound prepare(const TileInView& t, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan, const PingScalars& s) {
+TileToSound prepare(const TileInView& t, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan,
+                    const PingScalars& s) {
   TileToSound out;
   simd::TileSeen& seen = out.seen;
   const CellTile& tile = *t.tile;
@@ -103,8 +104,8 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   return g;
 }
 
-std::size_t scatter(const std::vector<TileToSound>& tiles, std::size_t from, const simd::GroupView& group, const simd::Kernels& kernels,
-                    Echoes& echoes) {
+std::size_t scatter(const std::vector<TileToSound>& tiles, std::size_t from, const simd::GroupView& group,
+                    const simd::Kernels& kernels, Echoes& echoes) {
   for (; from < tiles.size(); ++from) {
     const TileToSound& t = tiles[from];
     if (t.first_column >= group.last_column || t.last_column <= group.first_column) continue;
@@ -117,7 +118,8 @@ std::size_t scatter(const std::vector<TileToSound>& tiles, std::size_t from, con
   return from;
 }
 
-void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPlan& plan, const PingScalars& s, Seed seed, Echoes& echoes) {
+void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPlan& plan, const PingScalars& s, Seed seed,
+                  Echoes& echoes) {
   const double solid_angle = plan.columns.spacing * 2 * plan.fan.half_angle_rad / plan.fixed_fan;
   const auto bits = static_cast<std::uint64_t>(seed);
   const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
@@ -127,8 +129,7 @@ void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPl
     const double at_sample = s.sample_of(r);
     if (at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) continue;
     const Object& object = scene.objects[hit.object];
-    const double mu =
-        lambert_coefficient(static_cast<double>(scene.materials[object.mesh->material[hit.triangle]].lambert_db));
+    const double mu = lambert_coefficient(static_cast<double>(scene.materials[object.mesh->material[hit.triangle]].lambert_db));
     const double sigma = lambert_cross_section_m2(mu, static_cast<double>(hit.cosine), r, solid_angle);
     const double pattern = has_pattern ? elevation_two_way(aperture, static_cast<double>(hit.elevation_rad)) : 1.0;
     const double amplitude = s.source_upa * std::sqrt(sigma) * two_way_transmission(r, s.absorption_np_per_m) * pattern;
@@ -136,8 +137,8 @@ void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPl
       echoes.add(static_cast<float>(at_sample), {static_cast<float>(amplitude * amplitude), 0}, hit.column);
       continue;
     }
-    const Random4 draw = philox(hit.object, static_cast<std::uint32_t>(hit.column), static_cast<std::uint32_t>(hit.ray), fixed_fan_key,
-                                static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32));
+    const Random4 draw = philox(hit.object, static_cast<std::uint32_t>(hit.column), static_cast<std::uint32_t>(hit.ray),
+                                fixed_fan_key, static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32));
     const ComplexNormal xi = complex_normal(draw.v[0], draw.v[1]);
     const double phase = -2 * pi * fraction(r * s.turns_per_m);
     const std::complex<double> a = std::complex<double>(xi.re, xi.im) * std::polar(amplitude, phase);
@@ -156,7 +157,8 @@ std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pos
     const Vec3d p = transform(world_in_sonar, in_world);
     const double r = length(p);
     const double at_sample = s.sample_of(r);
-    if (r < nearest_scatterer_m || p.x <= 0 || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) continue;
+    if (r < nearest_scatterer_m || p.x <= 0 || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1)
+      continue;
     const ConicalDirection direction = conical_from_sonar(p);
     const double column = std::floor((plan.columns.first_sine - direction.u) / plan.columns.spacing + 0.5);
     if (std::abs(direction.psi_rad) > plan.fan.half_angle_rad || column < 0 || column >= plan.columns.count) continue;
@@ -172,8 +174,8 @@ std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pos
 
     const double transmit = static_cast<double>(plan.columns.transmit[static_cast<std::size_t>(column)]);
     const double amplitude = s.source_upa * amplitude_from_db(static_cast<double>(target.target_strength_db)) *
-                             two_way_transmission(r, s.absorption_np_per_m) * elevation_two_way(plan.mode.pattern, direction.psi_rad) *
-                             transmit;
+                             two_way_transmission(r, s.absorption_np_per_m) *
+                             elevation_two_way(plan.mode.pattern, direction.psi_rad) * transmit;
     points.push_back({direction.u, at_sample, std::polar(amplitude, -2 * pi * fraction(r * s.turns_per_m))});
   }
   return points;

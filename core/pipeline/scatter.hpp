@@ -41,8 +41,8 @@ void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& c
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen);
 
 /// Appends the echoes of tiles [from, ...) that reach the group until the tiles or the room run out; returns the next tile.
-std::size_t scatter(const std::vector<TileToSound>& tiles, std::size_t from, const simd::GroupView& group, const simd::Kernels& kernels,
-                    Echoes& echoes);
+std::size_t scatter(const std::vector<TileToSound>& tiles, std::size_t from, const simd::GroupView& group,
+                    const simd::Kernels& kernels, Echoes& echoes);
 
 /// One echo a hit (paper-style): sigma = mu cos r^2 dOmega, speckle keyed by (seed, object, column, ray).
 void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPlan& plan, const PingScalars& scalars, Seed seed,
@@ -50,9 +50,9 @@ void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPl
 
 /// An echo without a surface: coupled to the beams at its exact direction, never snapped to a column.
 struct PointEcho {
-  double sine = 0;                   // y / r
+  double sine = 0;  // y / r
   double sample = 0;
-  std::complex<double> amplitude;    // [uPa]
+  std::complex<double> amplitude;  // [uPa]
 };
 /// Point targets in the fan that no surface hides.
 std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pose> bodies_in_world, const PingPlan& plan,

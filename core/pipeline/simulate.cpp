@@ -5,14 +5,15 @@
 namespace sonar {
 namespace {
 
-constexpr int group_columns = 48;      // columns one worker carries from rays to sums: their signals stay in the second cache
-constexpr int window_samples = 64;     // samples one worker carries from coupling to codes
+constexpr int group_columns = 48;   // columns one worker carries from rays to sums: their signals stay in the second cache
+constexpr int window_samples = 64;  // samples one worker carries from coupling to codes
 constexpr int echo_room = 16384;
 
 /// Adds the time since it was made, or last told, to a stage.
 class Stopwatch {
  public:
-  Stopwatch(double (*now_s)(), PingStatistics& statistics) : now_s_(now_s), statistics_(statistics), since_(now_s ? now_s() : 0) {}
+  Stopwatch(double (*now_s)(), PingStatistics& statistics)
+      : now_s_(now_s), statistics_(statistics), since_(now_s ? now_s() : 0) {}
   void lap(Stage stage) {
     if (!now_s_) return;
     const double now = now_s_();
@@ -27,7 +28,8 @@ class Stopwatch {
 };
 
 std::span<const Pose> bodies_of(const PingRequest& request, const Scene& scene) {
-  return request.bodies_in_world.empty() ? std::span<const Pose>(scene.bodies_in_world) : std::span<const Pose>(request.bodies_in_world);
+  return request.bodies_in_world.empty() ? std::span<const Pose>(scene.bodies_in_world)
+                                         : std::span<const Pose>(request.bodies_in_world);
 }
 
 void find_tiles(SurfaceCells& cells, const Scene& scene, const PingRequest& request, const PingScalars& scalars, Workspace& w,
@@ -51,8 +53,8 @@ void find_tiles(SurfaceCells& cells, const Scene& scene, const PingRequest& requ
   for (const TileInView& t : in_view) w.statistics.cells += static_cast<std::size_t>(t.tile->count);
 }
 
-void sound_fixed_fan(const RayScene& scene, const PingRequest& request, const PingScalars& scalars, const simd::Kernels& kernels, int first,
-                     int last, Workspace& w, Workspace::PerWorker& mine, Stopwatch& watch) {
+void sound_fixed_fan(const RayScene& scene, const PingRequest& request, const PingScalars& scalars, const simd::Kernels& kernels,
+                     int first, int last, Workspace& w, Workspace::PerWorker& mine, Stopwatch& watch) {
   mine.hits.clear();
   trace_fixed_fan(scene, w.plan, scalars, first, last, w.plan.fixed_fan, mine.hits);
   mine.statistics.rays += static_cast<std::size_t>(last - first) * static_cast<std::size_t>(w.plan.fixed_fan);
@@ -64,8 +66,8 @@ void sound_fixed_fan(const RayScene& scene, const PingRequest& request, const Pi
   watch.lap(Stage::synthesize);
 }
 
-void sound_cells(const RayScene& scene, const PingScalars& scalars, const simd::Kernels& kernels, int first, int last, Workspace& w,
-                 Workspace::PerWorker& mine, Stopwatch& watch) {
+void sound_cells(const RayScene& scene, const PingScalars& scalars, const simd::Kernels& kernels, int first, int last,
+                 Workspace& w, Workspace::PerWorker& mine, Stopwatch& watch) {
   mine.statistics.rays += trace_fan(scene, w.plan, scalars, first, last, mine.fan, mine.seen);
   watch.lap(Stage::trace);
   const simd::GroupView group = make_group_view(w.plan, scalars, mine.seen);
@@ -79,8 +81,8 @@ void sound_cells(const RayScene& scene, const PingScalars& scalars, const simd::
 }
 
 /// From rays to the signals of columns [first, last): one worker's share.
-void sound_group(const RayScene& scene, const PingRequest& request, const PingScalars& scalars, const simd::Kernels& kernels, int first,
-                 int last, Workspace& w, Workspace::PerWorker& mine) {
+void sound_group(const RayScene& scene, const PingRequest& request, const PingScalars& scalars, const simd::Kernels& kernels,
+                 int first, int last, Workspace& w, Workspace::PerWorker& mine) {
   Stopwatch watch(w.now_s, mine.statistics);
   clear_columns(w.columns, first, last);
   if (!request.blank) {
@@ -89,18 +91,17 @@ void sound_group(const RayScene& scene, const PingRequest& request, const PingSc
     else
       sound_cells(scene, scalars, kernels, first, last, w, mine, watch);
   }
-  finish_columns(w.plan, request.switches.noise ? &w.noise : nullptr, request.sonar_id, static_cast<std::uint32_t>(request.number), first,
-                 last, w.columns);
+  finish_columns(w.plan, request.switches.noise ? &w.noise : nullptr, request.sonar_id,
+                 static_cast<std::uint32_t>(request.number), first, last, w.columns);
   watch.lap(Stage::noise);
 }
 
 /// From columns to samples of rows [first_row, last_row): one worker's share.
-void image_rows(const simd::Kernels& kernels, int first_row, int last_row, Workspace& w, Workspace::PerWorker& mine,
-                Ping& ping) {
+void image_rows(const simd::Kernels& kernels, int first_row, int last_row, Workspace& w, Workspace::PerWorker& mine, Ping& ping) {
   Stopwatch watch(w.now_s, mine.statistics);
   const int per_row = w.plan.settings.samples_per_row;
-  couple(w.columns, w.plan.coupling, kernels, first_row * per_row, (last_row - first_row) * per_row, w.plan.settings.beam_count, mine.couple,
-         mine.beams);
+  couple(w.columns, w.plan.coupling, kernels, first_row * per_row, (last_row - first_row) * per_row, w.plan.settings.beam_count,
+         mine.couple, mine.beams);
   add_points(w.points, w.plan, mine.beams);
   watch.lap(Stage::couple);
   receive(mine.beams, w.plan, kernels, mine.receive, ping);

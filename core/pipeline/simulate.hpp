@@ -42,7 +42,7 @@ struct Workspace {
 };
 
 /// `cells` must belong to the scene of `scene` and to the request's seed; bodies must have been placed.
-Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels, Workspace& work,
-              Parallel& pool);
+Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
+              Workspace& work, Parallel& pool);
 
 }  // namespace sonar

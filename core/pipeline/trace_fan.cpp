@@ -6,8 +6,8 @@
 namespace sonar {
 namespace {
 
-constexpr int edge_depth = 4;     // edges are found to 1/16 of a base interval
-constexpr int deepest = 6;        // a surface that still will not interpolate hides itself
+constexpr int edge_depth = 4;  // edges are found to 1/16 of a base interval
+constexpr int deepest = 6;     // a surface that still will not interpolate hides itself
 
 /// Sixteen rays on their way: fills a packet lane by lane and remembers who asked.
 class PacketFiller {
@@ -47,9 +47,15 @@ class PacketFiller {
 class FanTracer {
  public:
   FanTracer(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, FanScratch& scratch)
-      : scene_(scene), plan_(plan), filler_(scalars, static_cast<float>(scalars.max_range_m)), first_(first), last_(last), s_(scratch) {
+      : scene_(scene),
+        plan_(plan),
+        filler_(scalars, static_cast<float>(scalars.max_range_m)),
+        first_(first),
+        last_(last),
+        s_(scratch) {
     tolerance_m_ = plan.settings.pulse_width_m;
-    for (int k = first; k < last; ++k) across_.push_back(static_cast<float>(std::sqrt(std::max(0.0, 1 - std::pow(plan.columns.sine(k), 2)))));
+    for (int k = first; k < last; ++k)
+      across_.push_back(static_cast<float>(std::sqrt(std::max(0.0, 1 - std::pow(plan.columns.sine(k), 2)))));
   }
 
   std::size_t run(DepthMap& seen) {
@@ -74,7 +80,8 @@ class FanTracer {
     sample.tangent = std::tan(elevation);
     sample.object = filler_.packet.object[i];
     sample.range_m = sample.object == RayPacket::miss ? 0 : filler_.packet.far[i];
-    sample.inverse_x = sample.object == RayPacket::miss ? 0 : 1.0f / std::max(sample.range_m * column_across * std::cos(elevation), 1e-4f);
+    sample.inverse_x =
+        sample.object == RayPacket::miss ? 0 : 1.0f / std::max(sample.range_m * column_across * std::cos(elevation), 1e-4f);
   }
 
   /// Elevation by elevation, sixteen neighbouring columns a packet: neighbours in a packet lie a fraction of a degree apart.
@@ -193,8 +200,8 @@ class FanTracer {
 
 }  // namespace
 
-std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, FanScratch& scratch,
-                      DepthMap& seen) {
+std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
+                      FanScratch& scratch, DepthMap& seen) {
   return FanTracer(scene, plan, scalars, first, last, scratch).run(seen);
 }
 

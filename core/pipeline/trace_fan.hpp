@@ -22,8 +22,8 @@ struct FanScratch {
   struct Sample {
     float elevation_rad, tangent, inverse_x, range_m;
     std::uint32_t object;
-    std::int32_t next;   // the sample above in the same column, -1 = last
-    bool edge_above;     // the interval up to `next` hides an edge: do not interpolate
+    std::int32_t next;  // the sample above in the same column, -1 = last
+    bool edge_above;    // the interval up to `next` hides an edge: do not interpolate
   };
   struct Interval {
     std::int32_t below, above;
@@ -35,8 +35,8 @@ struct FanScratch {
 };
 
 /// Traces columns [first, last). Returns the number of rays.
-std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, FanScratch& scratch,
-                      DepthMap& seen);
+std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
+                      FanScratch& scratch, DepthMap& seen);
 
 /// One hit of the fixed fan (paper-style sampling: a ray is a scatterer).
 struct FanHit {

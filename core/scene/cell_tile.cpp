@@ -37,9 +37,9 @@ std::array<LatticePoint, side * side> draw_points(const TileAddress& a, std::uin
       const Random4 draw =
           philox(sheet, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(a.level),
                  static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32) ^ texture_seed);
-      points[static_cast<std::size_t>(row * side + col)] = {
-          (i + static_cast<double>(uniform_open(draw.v[0]))) * s, (j + static_cast<double>(uniform_open(draw.v[1]))) * s,
-          draw.v[2], draw.v[3]};
+      points[static_cast<std::size_t>(row * side + col)] = {(i + static_cast<double>(uniform_open(draw.v[0]))) * s,
+                                                            (j + static_cast<double>(uniform_open(draw.v[1]))) * s, draw.v[2],
+                                                            draw.v[3]};
     }
   return points;
 }
@@ -88,7 +88,9 @@ void pack(const std::vector<Cell>& cells, CellTile& tile) {
   tile.count = (n + CellTile::block - 1) / CellTile::block * CellTile::block;
   tile.stride = tile.count;
   tile.data = std::make_unique<std::int16_t[]>(static_cast<std::size_t>(tile.stride) * CellTile::columns);
-  const auto put = [&](CellTile::Column c, int i, std::int16_t v) { tile.data[static_cast<std::size_t>(c * tile.stride + i)] = v; };
+  const auto put = [&](CellTile::Column c, int i, std::int16_t v) {
+    tile.data[static_cast<std::size_t>(c * tile.stride + i)] = v;
+  };
   for (int i = 0; i < tile.count; ++i) {
     const Cell& c = cells[static_cast<std::size_t>(std::min(i, n - 1))];  // padding repeats the last place, with zero weight
     put(CellTile::x, i, counts(c.from_centre.x / tile.position_unit_m));

@@ -19,7 +19,7 @@ struct TileAddress {
 };
 
 /// `data` stays null when no cell lies in the cube. Cost: about 0.1 us a cell.
-CellTile build_tile(const TileAddress& address, const Mesh& mesh, std::span<const std::uint32_t> triangles, std::uint32_t texture_seed,
-                    Seed seed);
+CellTile build_tile(const TileAddress& address, const Mesh& mesh, std::span<const std::uint32_t> triangles,
+                    std::uint32_t texture_seed, Seed seed);
 
 }  // namespace sonar

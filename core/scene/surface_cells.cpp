@@ -144,8 +144,7 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
 
 SurfaceCells::~SurfaceCells() = default;
 
-void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object,
-                         const Rotation& turn) {
+void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& turn) {
   const Cube cube = cube_of(node.address);
   const Vec3d centre = lattice::from_permuted(cube.u, cube.v, cube.w, sheet.axis);
   const double radius = cube.half * 1.7320508075688772 * 1.0001;

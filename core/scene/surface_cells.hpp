@@ -20,12 +20,12 @@ namespace sonar {
 /// Positions are relative to the cube's centre. Padding cells have zero weight.
 struct CellTile {
   int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
-  Vec3d centre_m;           // object coordinates
-  float half_edge_m = 0;    // of the cube
+  Vec3d centre_m;                                     // object coordinates
+  float half_edge_m = 0;                              // of the cube
   float position_unit_m = 0;
-  float weight_unit = 0;    // xi * sqrt(cell area) [m] per count
-  int count = 0;            // padded to a multiple of CellTile::block
-  int stride = 0;           // int16 values per column
+  float weight_unit = 0;  // xi * sqrt(cell area) [m] per count
+  int count = 0;          // padded to a multiple of CellTile::block
+  int stride = 0;         // int16 values per column
   std::unique_ptr<std::int16_t[]> data;
   std::uint64_t last_used = 0;
 
@@ -47,8 +47,8 @@ struct CellView {
   Pose sonar_in_world;
   std::span<const Pose> bodies_in_world;
   float max_range_m = 0;
-  float max_sine = 1;          // |y / r| of the outermost column
-  float max_elevation_rad = 1; // half angle of the fan about the array axis
+  float max_sine = 1;             // |y / r| of the outermost column
+  float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first
 };
 
@@ -90,7 +90,7 @@ class SurfaceCells {
   std::vector<std::unique_ptr<Sheet>> sheets_;
   std::vector<Rotation> rotations_;
   std::vector<TileInView> in_view_;
-  std::vector<Node*> wanted_;   // the nodes of in_view_
+  std::vector<Node*> wanted_;  // the nodes of in_view_
   std::vector<Node*> built_nodes_;
 };
 

@@ -1,4 +1,5 @@
-// One ping: everything it depends on (PingRequest) and what came back (Ping). A ping is a pure function of its request and the scene.
+// One ping: everything it depends on (PingRequest) and what came back (Ping). A ping is a pure function of its request and the
+// scene.
 #pragma once
 
 #include <cstddef>
@@ -18,8 +19,8 @@ namespace sonar {
 struct Switches {
   bool expected_power = false;  // |sum a|^2 replaced by sum |a|^2: deterministic radiometry
   bool noise = true;
-  int fixed_fan = 0;            // n > 0: n uniform rays a column, one scatterer a ray, no cells
-  bool keep_pressure = false;   // fill Ping::pressure_upa
+  int fixed_fan = 0;           // n > 0: n uniform rays a column, one scatterer a ray, no cells
+  bool keep_pressure = false;  // fill Ping::pressure_upa
 };
 
 struct PingRequest {
@@ -34,7 +35,7 @@ struct PingRequest {
   std::uint64_t settings_id = 0;  // which client request these settings came from: the echo belongs to the ping
   std::uint32_t sonar_id = 0;     // keys the receiver noise
   Seed seed{};
-  bool blank = false;             // no scene, noise only (on_stale: blank)
+  bool blank = false;  // no scene, noise only (on_stale: blank)
   Switches switches;
 };
 

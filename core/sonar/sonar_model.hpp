@@ -26,10 +26,10 @@ struct BeamPattern {
 
 /// How the receiver turns pressure into samples (acoustics.md 4.8); constants of the product.
 struct ReceiverLaw {
-  float tvg_slope_db = 30;       // X of X log10 r
+  float tvg_slope_db = 30;  // X of X log10 r
   float tvg_minimum_range_m = 0.5f;
-  float tvg_ceiling_db = 80;     // infinity switches it off
-  float full_scale_upa = 1;      // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
+  float tvg_ceiling_db = 80;  // infinity switches it off
+  float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
 };
 

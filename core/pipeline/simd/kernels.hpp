@@ -34,10 +34,10 @@ struct GroupView {
   int bins;                                 // values per column of the depth map; the map has bins + 1
   const float* inverse_depth;               // [last - first][bins + 1], 1 / x of what the rays saw, 0 = nothing
   float depth_tolerance_m;
-  float turns_per_m;                        // 2 f / c
-  float decay_per_m;                        // 2 alpha [Np/m]
+  float turns_per_m;                               // 2 f / c
+  float decay_per_m;                               // 2 alpha [Np/m]
   float samples_per_m, first_sample, last_sample;  // range window on the sample grid: s = r * samples_per_m - 0.5
-  float elevation[elevation_terms];         // two-way pattern, polynomial in w
+  float elevation[elevation_terms];                // two-way pattern, polynomial in w
   bool expected_power;
 };
 
@@ -60,7 +60,8 @@ struct Kernels {
   /// Appends the visible cells of a tile; `out` has room for tile.count + 16 more. Returns how many were appended.
   int (*scatter_tile)(const TileSeen&, const GroupView&, EchoArrays out);
   /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im).
-  void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column, int lead);
+  void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column,
+                     int lead);
   /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.
   void (*couple_panel)(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats);
   /// codes[i] = min(max_code, round(max_code * (power[i] * gain)^half_gamma)), as float; n is a multiple of 16.

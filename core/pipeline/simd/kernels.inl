@@ -50,7 +50,8 @@ inline float exp2_of(float x) {
 inline constexpr int chunk = 256;
 
 struct Chunk {  // one stretch of a tile on its way through the loops below
-  alignas(64) float range[chunk], offset[chunk], cosine[chunk], sine2[chunk], tangent[chunk], nearness[chunk], column[chunk], sample[chunk];
+  alignas(64) float range[chunk], offset[chunk], cosine[chunk], sine2[chunk], tangent[chunk], nearness[chunk], column[chunk],
+      sample[chunk];
   alignas(64) float re[chunk], im[chunk];
   alignas(64) std::int32_t keep[chunk], beam_column[chunk];
 };
@@ -74,15 +75,16 @@ inline void place_cells(const TileSeen& s, const GroupView& g, int from, int n, 
   const float bins = static_cast<float>(g.bins);
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) {
-    const float dx = unit * static_cast<float>(tx[i]), dy = unit * static_cast<float>(ty[i]), dz = unit * static_cast<float>(tz[i]);
+    const float dx = unit * static_cast<float>(tx[i]), dy = unit * static_cast<float>(ty[i]),
+                dz = unit * static_cast<float>(tz[i]);
     const float e = dx * (2 * qx0 + dx) + dy * (2 * qy0 + dy) + dz * (2 * qz0 + dz);
     const float r = std::sqrt(larger(r0_squared + e, 1e-6f));
     const float inverse_r = 1.0f / r;
     const float x = px0 + m00 * dx + m01 * dy + m02 * dz;
     const float y = py0 + m10 * dx + m11 * dy + m12 * dz;
     const float z = pz0 + m20 * dx + m21 * dy + m22 * dz;
-    const float along = static_cast<float>(nx[i]) * (qx0 + dx) + static_cast<float>(ny[i]) * (qy0 + dy) +
-                        static_cast<float>(nz[i]) * (qz0 + dz);
+    const float along =
+        static_cast<float>(nx[i]) * (qx0 + dx) + static_cast<float>(ny[i]) * (qy0 + dy) + static_cast<float>(nz[i]) * (qz0 + dz);
     const float column = (g.first_edge_sine - y * inverse_r) * g.columns_per_sine;
     const float inverse_x = 1.0f / larger(x, 1e-6f);
     const float bin = (z * inverse_x - g.first_tangent) * g.bins_per_tangent;
@@ -208,8 +210,8 @@ int scatter_tile(const TileSeen& s, const GroupView& g, EchoArrays out) {
 }
 
 template <int taps>
-void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride, int first_column,
-                     int lead) {
+void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
+                     int first_column, int lead) {
   const float steps = static_cast<float>(pulse.steps);
   const int reach = (taps > 0 ? taps : pulse.taps) / 2 - 1;
   const int n_taps = taps > 0 ? taps : pulse.taps;
@@ -231,8 +233,8 @@ void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, flo
 
 #if defined(__AVX512F__)
 template <>
-void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride, int first_column,
-                        int lead) {
+void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
+                        int first_column, int lead) {
   const float steps = static_cast<float>(pulse.steps);
   const __m512i twice = _mm512_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7);
   for (int i = 0; i < count; ++i) {

@@ -1,8 +1,8 @@
 // The hot loops for processors with AVX-512 F, VL, BW and DQ; see kernels.inl.
+#include <immintrin.h>
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <immintrin.h>
 #include "core/pipeline/simd/kernels.hpp"
 
 namespace sonar::simd {

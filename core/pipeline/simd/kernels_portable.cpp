@@ -12,6 +12,7 @@ constexpr int lanes = 4;
 }  // namespace portable
 
 extern const Kernels portable_kernels;
-const Kernels portable_kernels{"portable", portable::scatter_tile, portable::accumulate, portable::couple_panel, portable::quantise};
+const Kernels portable_kernels{"portable", portable::scatter_tile, portable::accumulate, portable::couple_panel,
+                               portable::quantise};
 
 }  // namespace sonar::simd

@@ -1,0 +1,245 @@
+#include "core/scene/surface_cells.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+#include <cstring>
+#include <map>
+
+#include "core/base/random.hpp"
+#include "core/scene/cell_lattice.hpp"
+
+namespace sonar {
+namespace {
+
+using HeightAt = double (*)(double, double);
+
+/// A grid of `n` x `n` squares over [0, size]^2, each split along a diagonal that alternates.
+std::shared_ptr<Mesh> terrain(int n, double size, HeightAt height) {
+  auto mesh = std::make_shared<Mesh>();
+  for (int j = 0; j <= n; ++j)
+    for (int i = 0; i <= n; ++i) {
+      const double x = size * i / n, y = size * j / n;
+      mesh->vertices.push_back(to_float(Vec3d{x, y, height(x, y)}));
+    }
+  const auto at = [n](int i, int j) { return static_cast<std::uint32_t>(j * (n + 1) + i); };
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const std::uint32_t a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
+      if ((i + j) % 2) {
+        mesh->triangles.push_back({a, b, c});
+        mesh->triangles.push_back({a, c, d});
+      } else {
+        mesh->triangles.push_back({a, b, d});
+        mesh->triangles.push_back({b, c, d});
+      }
+    }
+  mesh->material.assign(mesh->triangles.size(), 0);
+  return mesh;
+}
+
+std::shared_ptr<Mesh> sphere(double radius, int rings) {
+  auto mesh = std::make_shared<Mesh>();
+  for (int r = 0; r <= rings; ++r)
+    for (int s = 0; s < 2 * rings; ++s) {
+      const double theta = pi * r / rings, phi = pi * s / rings;
+      mesh->vertices.push_back(
+          to_float(radius * Vec3d{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)}));
+    }
+  const auto at = [rings](int r, int s) { return static_cast<std::uint32_t>(r * 2 * rings + s % (2 * rings)); };
+  for (int r = 0; r < rings; ++r)
+    for (int s = 0; s < 2 * rings; ++s) {
+      if (r > 0) mesh->triangles.push_back({at(r, s), at(r + 1, s), at(r, s + 1)});
+      if (r + 1 < rings) mesh->triangles.push_back({at(r, s + 1), at(r + 1, s), at(r + 1, s + 1)});
+    }
+  mesh->material.assign(mesh->triangles.size(), 0);
+  return mesh;
+}
+
+std::shared_ptr<const Scene> scene_of(std::shared_ptr<const Mesh> mesh) {
+  auto scene = std::make_shared<Scene>();
+  scene->materials.push_back({"sand", -27, 0, 0, 0});
+  Object object;
+  object.name = "it";
+  object.mesh = std::move(mesh);
+  scene->objects.push_back(object);
+  return scene;
+}
+
+/// Everything in front of a sonar that looks along +x from far behind, at one level.
+CellView whole_scene(int level, Vec3d from = {-200, 0, 0}) {
+  CellView view;
+  view.sonar_in_world.position_m = from;
+  view.max_range_m = 1000;
+  view.max_sine = 1;
+  view.max_elevation_rad = 1.4f;
+  view.levels = {{level, 0, 0, 1e6f, 1e6f}};
+  return view;
+}
+
+bool real(const CellTile& t, int i) { return t.column(CellTile::weight_re)[i] != 0 || t.column(CellTile::weight_im)[i] != 0; }
+
+Vec3d place(const CellTile& t, int i) {
+  const double unit = static_cast<double>(t.position_unit_m);
+  return t.centre_m + Vec3d{unit * t.column(CellTile::x)[i], unit * t.column(CellTile::y)[i], unit * t.column(CellTile::z)[i]};
+}
+
+double gentle(double x, double y) { return 0.11 * std::sin(2.3 * x + 0.4) * std::cos(1.7 * y) + 0.05 * std::sin(9 * x + 5 * y); }
+
+TEST(SurfaceCells, EveryLatticePointOfATerrainHasExactlyOneOwner) {
+  SurfaceCells cells(scene_of(terrain(37, 4.0, gentle)), Seed{3}, 1u << 30);
+  Parallel pool(1);
+  const int level = 5;
+  std::map<std::pair<long, long>, int> owners;
+  for (const TileInView& t : cells.in_view(whole_scene(level), pool)) {
+    ASSERT_EQ(t.tile->axis, 2);
+    for (int i = 0; i < t.tile->count; ++i) {
+      if (!real(*t.tile, i)) continue;
+      const Vec3d p = place(*t.tile, i);
+      // A point's rounding may carry it over its cell's border by micrometres: count the owners of neighbours together below.
+      ++owners[{std::lround(std::floor(p.x * 32)), std::lround(std::floor(p.y * 32))}];
+    }
+  }
+  int total = 0, wrong = 0;
+  for (const auto& [where, n] : owners) {
+    total += n;
+    wrong += n != 1;
+  }
+  EXPECT_EQ(total, 128 * 128);
+  EXPECT_LE(wrong, 20);  // rounding of stored places only
+}
+
+TEST(SurfaceCells, CellsLieOnTheirTriangles) {
+  SurfaceCells cells(scene_of(terrain(37, 4.0, gentle)), Seed{3}, 1u << 30);
+  Parallel pool(1);
+  const auto mesh = terrain(37, 4.0, gentle);
+  double worst = 0;
+  for (const TileInView& t : cells.in_view(whole_scene(6), pool))
+    for (int i = 0; i < t.tile->count; i += 7) {
+      if (!real(*t.tile, i)) continue;
+      const Vec3d p = place(*t.tile, i);
+      double nearest = 1;
+      for (std::uint32_t f = 0; f < mesh->triangles.size(); ++f) {
+        const lattice::Facet facet = lattice::facet_of(*mesh, f, 2);
+        if (lattice::owns(facet, p.x, p.y)) nearest = std::min(nearest, std::abs(lattice::height(facet, p.x, p.y) - p.z));
+      }
+      worst = std::max(worst, nearest);
+    }
+  EXPECT_LT(worst, 2e-5);
+}
+
+TEST(SurfaceCells, AreasAddUpToTheSurface) {
+  const double radius = 0.7;
+  SurfaceCells cells(scene_of(sphere(radius, 40)), Seed{1}, 1u << 30);
+  Parallel pool(1);
+  const int level = 6;
+  double area = 0;
+  for (const TileInView& t : cells.in_view(whole_scene(level), pool))
+    for (int i = 0; i < t.tile->count; ++i) {
+      if (!real(*t.tile, i)) continue;
+      const auto axis = static_cast<CellTile::Column>(CellTile::normal_x + t.tile->axis);
+      area += std::pow(lattice::cell_size_m(level), 2) /
+              std::abs(t.tile->column(axis)[i] * static_cast<double>(CellTile::normal_unit));
+    }
+  EXPECT_NEAR(area / (4 * pi * radius * radius), 1.0, 0.01);
+}
+
+TEST(SurfaceCells, SpeckleIsCircularGaussianWithTheCellsArea) {
+  SurfaceCells cells(scene_of(terrain(2, 8.0, [](double, double) { return 0.0; })), Seed{9}, 1u << 30);
+  Parallel pool(1);
+  const int level = 5;
+  double n = 0, power = 0, fourth = 0;
+  std::complex<double> mean = 0, pseudo = 0;
+  for (const TileInView& t : cells.in_view(whole_scene(level), pool))
+    for (int i = 0; i < t.tile->count; ++i) {
+      if (!real(*t.tile, i)) continue;
+      const std::complex<double> w(t.tile->column(CellTile::weight_re)[i], t.tile->column(CellTile::weight_im)[i]);
+      const std::complex<double> xi = w * static_cast<double>(t.tile->weight_unit) / lattice::cell_size_m(level);
+      n += 1;
+      power += std::norm(xi);
+      fourth += std::norm(xi) * std::norm(xi);
+      mean += xi;
+      pseudo += xi * xi;
+    }
+  ASSERT_EQ(n, 256 * 256);
+  EXPECT_NEAR(power / n, 1.0, 0.02);
+  EXPECT_NEAR(fourth / n, 2.0, 0.08);
+  EXPECT_LT(std::abs(mean) / n, 0.015);
+  EXPECT_LT(std::abs(pseudo) / n, 0.02);
+}
+
+std::vector<std::int16_t> bytes_of(const std::vector<TileInView>& tiles) {
+  std::vector<std::int16_t> all;
+  for (const TileInView& t : tiles)
+    all.insert(all.end(), t.tile->data.get(), t.tile->data.get() + t.tile->stride * CellTile::columns);
+  return all;
+}
+
+TEST(SurfaceCells, SameBytesForAnyPoolAndAfterBeingForgotten) {
+  const auto scene = scene_of(terrain(20, 4.0, gentle));
+  Parallel one(1), three(3);
+  SurfaceCells a(scene, Seed{5}, 1u << 30), b(scene, Seed{5}, 1u << 30), small(scene, Seed{5}, 1u << 16);
+  const auto first = bytes_of(a.in_view(whole_scene(6), one));
+  ASSERT_FALSE(first.empty());
+  EXPECT_EQ(first, bytes_of(b.in_view(whole_scene(6), three)));
+
+  CellView near = whole_scene(6, {-1, 0, 1});
+  near.max_range_m = 1.5f;
+  EXPECT_EQ(first, bytes_of(small.in_view(whole_scene(6), one)));
+  small.in_view(near, one);
+  EXPECT_LE(small.cached_bytes(), std::size_t{1} << 19);
+  EXPECT_EQ(first, bytes_of(small.in_view(whole_scene(6), one)));
+  EXPECT_GT(small.built_last_time(), 0u);
+  b.in_view(whole_scene(6), one);
+  EXPECT_EQ(b.built_last_time(), 0u);
+}
+
+TEST(SurfaceCells, SeedAndTextureSeedChangeTheSpeckle) {
+  const auto scene = scene_of(terrain(8, 2.0, gentle));
+  auto other = std::make_shared<Scene>(*scene);
+  other->materials[0].texture_seed = 1;
+  Parallel pool(1);
+  SurfaceCells a(scene, Seed{5}, 1u << 30), b(scene, Seed{6}, 1u << 30), c(other, Seed{5}, 1u << 30);
+  const auto first = bytes_of(a.in_view(whole_scene(6), pool));
+  EXPECT_NE(first, bytes_of(b.in_view(whole_scene(6), pool)));
+  EXPECT_NE(first, bytes_of(c.in_view(whole_scene(6), pool)));
+}
+
+TEST(SurfaceCells, CullsWhatLiesBehindBesideOrBeyond) {
+  SurfaceCells cells(scene_of(terrain(20, 4.0, gentle)), Seed{5}, 1u << 30);
+  Parallel pool(1);
+  CellView view = whole_scene(6, {-1, 2, 0.5});
+  view.max_elevation_rad = 0.5f;
+  const std::size_t all = cells.in_view(view, pool).size();
+  ASSERT_GT(all, 0u);
+  CellView narrow = view;
+  narrow.max_sine = 0.1f;
+  EXPECT_LT(cells.in_view(narrow, pool).size(), all / 2);
+  CellView short_sighted = view;
+  short_sighted.max_range_m = 2;
+  EXPECT_LT(cells.in_view(short_sighted, pool).size(), all / 2);
+  CellView away = view;
+  away.sonar_in_world.orientation = quat_from_rpy({0, 0, pi});
+  EXPECT_EQ(cells.in_view(away, pool).size(), 0u);
+}
+
+TEST(CellLattice, SharedEdgesHaveOneOwner) {
+  // Points exactly on the shared edge, both windings.
+  for (int flip = 0; flip < 2; ++flip) {
+    Mesh mesh;
+    mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    if (flip) mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
+    mesh.material = {0, 0};
+    for (int k = 1; k < 8; ++k) {
+      const double on = k / 8.0;
+      const int owners =
+          lattice::owns(lattice::facet_of(mesh, 0, 2), on, on) + lattice::owns(lattice::facet_of(mesh, 1, 2), on, on);
+      EXPECT_EQ(owners, 1) << "at " << on;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace sonar
