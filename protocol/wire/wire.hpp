@@ -115,7 +115,7 @@ class Reader : public Visitor<Reader> {
   bool ok() const { return !failed_; }
   const Failure& failure() const { return failure_; }
   std::string failure_text() const {
-    return "field '" + std::string(failure_.field) + "' at byte " + std::to_string(failure_.offset) + " needs " +
+    return std::string("field '").append(failure_.field) + "' at byte " + std::to_string(failure_.offset) + " needs " +
            std::to_string(failure_.needed) + " bytes, " + std::to_string(failure_.left) + " are left";
   }
   std::size_t position() const { return position_; }
@@ -179,7 +179,10 @@ class Namer : public Visitor<Namer> {
 
   std::string markdown() const {
     std::string text = "| off | type | field |\n|---|---|---|\n";
-    for (const Row& row : rows) text += "| " + std::to_string(row.offset) + " | " + row.type + " | " + row.name + " |\n";
+    for (const Row& row : rows) {
+      text.append("| ").append(std::to_string(row.offset)).append(" | ").append(row.type);
+      text.append(" | ").append(row.name).append(" |\n");
+    }
     return text;
   }
 
@@ -190,7 +193,8 @@ class Namer : public Visitor<Namer> {
     if constexpr (std::is_enum_v<T>) {
       return type_name<std::underlying_type_t<T>>();
     } else {
-      return (std::is_floating_point_v<T> ? "f" : (std::is_signed_v<T> ? "i" : "u")) + std::to_string(8 * sizeof(T));
+      return std::string(std::is_floating_point_v<T> ? "f" : (std::is_signed_v<T> ? "i" : "u"))
+          .append(std::to_string(8 * sizeof(T)));
     }
   }
   void add(std::string type, std::string_view name, std::size_t size) {

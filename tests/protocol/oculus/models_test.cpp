@@ -1,0 +1,68 @@
+// The product table against the figures of docs/protocols/oculus.md, section 5.3 and 4.1, typed again.
+#include <set>
+
+#include "protocol/oculus/models.hpp"
+#include "tests/protocol/oculus/oculus_testing.hpp"
+
+namespace sonar::oculus::testing {
+namespace {
+
+struct Expected {
+  const char* profile;
+  int part_number;
+  std::size_t mode;
+  double centre_hz, max_range_m, aperture_deg, azimuth_deg, elevation_deg, min_range_m;
+};
+
+TEST(Models, FamiliesAsInTheTable) {
+  const Expected table[] = {
+      {"oculus-m370s", 1041, 0, 370e3, 200, 130, 1.5, 20, 0.2},    {"oculus-c550d", 4713, 0, 550e3, 100, 120, 1.0, 20, 0.1},
+      {"oculus-c550d", 4713, 1, 820e3, 30, 70, 0.7, 20, 0.1},      {"oculus-m750d", 1032, 0, 750e3, 120, 130, 1.0, 20, 0.1},
+      {"oculus-m750d", 1032, 1, 1.2e6, 40, 70, 0.6, 20, 0.1},      {"oculus-m750d-hf130", 1032, 1, 1.2e6, 40, 130, 0.6, 20, 0.1},
+      {"oculus-m750d-hf12", 1032, 1, 1.2e6, 40, 70, 0.6, 12, 0.1}, {"oculus-m1200d", 1042, 0, 1.2e6, 40, 130, 0.6, 20, 0.1},
+      {"oculus-m1200d", 1042, 1, 2098880.6, 10, 60, 0.4, 12, 0.1}, {"oculus-m3000d", 2203, 0, 1.2e6, 30, 130, 0.6, 20, 0.1},
+      {"oculus-m3000d", 2203, 1, 3.0e6, 5, 40, 0.4, 20, 0.1},
+  };
+  for (const Expected& row : table) {
+    const auto profile = protocol::find_profile(row.profile);
+    ASSERT_TRUE(profile.has_value()) << row.profile;
+    ASSERT_GT(profile->model->modes.size(), row.mode) << row.profile;
+    const FrequencyMode& mode = profile->model->modes[row.mode];
+    EXPECT_EQ(profile->model->part_number, row.part_number) << row.profile;
+    EXPECT_NEAR(mode.centre_hz, row.centre_hz, 0.2) << row.profile;
+    EXPECT_FLOAT_EQ(mode.max_range_m, static_cast<float>(row.max_range_m)) << row.profile;
+    EXPECT_NEAR(deg_from_rad(mode.horizontal_aperture_rad), row.aperture_deg, 1e-4) << row.profile;
+    EXPECT_NEAR(deg_from_rad(mode.pattern.azimuth_width_rad), row.azimuth_deg, 1e-5) << row.profile;
+    EXPECT_NEAR(deg_from_rad(mode.pattern.elevation_width_rad), row.elevation_deg, 1e-5) << row.profile;
+    EXPECT_FLOAT_EQ(mode.min_range_m, static_cast<float>(row.min_range_m)) << row.profile;
+    EXPECT_EQ(mode.source_level_db, 200) << row.profile;
+    EXPECT_EQ(mode.receiver.noise_figure_db, 10) << row.profile;
+  }
+}
+
+TEST(Models, SingleFrequencyProductsHaveOneMode) {
+  EXPECT_EQ(protocol::find_profile("oculus-m370s")->model->modes.size(), 1u);
+  EXPECT_EQ(protocol::find_profile("oculus-m1200d")->model->modes.size(), 2u);
+}
+
+TEST(Models, EveryPublicPartNumberHasAProfile) {
+  std::set<int> have;
+  for (const auto& model : models()) have.insert(model->part_number);
+  for (const int number : {1032, 1041, 1042, 1134, 1135, 1209, 1217, 1218, 1219, 1220, 1221, 1228, 1229, 1244, 1433, 1434,
+                           1435, 1436, 1437, 2466, 2924, 1921, 2086, 2294, 2203, 2599, 2658, 2659, 2418, 2419, 2420, 4713})
+    EXPECT_TRUE(have.contains(number)) << number;
+}
+
+TEST(Models, AllAreUsable) {
+  for (const auto& model : models()) {
+    EXPECT_FALSE(model->modes.empty()) << model->profile;
+    for (const FrequencyMode& mode : model->modes) {
+      EXPECT_GT(mode.centre_hz, 0) << model->profile;
+      EXPECT_GT(mode.receiver.full_scale_upa, 1) << model->profile;
+      EXPECT_LT(mode.min_range_m, mode.max_range_m) << model->profile;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace sonar::oculus::testing

@@ -1,0 +1,107 @@
+// The list of vendors: profiles by name, options checked, mistakes answered with the nearest valid name.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <set>
+
+#include "protocol/blueview/models.hpp"
+#include "protocol/vendor.hpp"
+
+namespace {
+
+using namespace sonar;
+using testing::HasSubstr;
+
+const protocol::Vendor& oculus() { return *protocol::vendors().front(); }
+
+TEST(Profiles, AreFoundByName) {
+  const auto profile = protocol::find_profile("oculus-m1200d");
+  ASSERT_TRUE(profile.has_value());
+  EXPECT_EQ(profile->vendor->name(), "oculus");
+  EXPECT_EQ(profile->model->part_number, 1042);
+}
+
+TEST(Profiles, MistakesNameTheNearest) {
+  const auto profile = protocol::find_profile("oculus-m1200");
+  ASSERT_FALSE(profile.has_value());
+  EXPECT_EQ(profile.error().kind, ErrorKind::config);
+  EXPECT_THAT(profile.error().text, HasSubstr("unknown profile 'oculus-m1200', the nearest are oculus-m1200d, "));
+}
+
+TEST(Profiles, NamesAreUnique) {
+  std::set<std::string> names;
+  for (const protocol::Vendor* vendor : protocol::vendors())
+    for (const auto& model : vendor->models()) EXPECT_TRUE(names.insert(model->profile).second) << model->profile;
+}
+
+TEST(Options, DefaultsAreFilledIn) {
+  const auto options = protocol::check_options(oculus(), {{"gain_echo", "verbatim"}});
+  ASSERT_TRUE(options.has_value());
+  EXPECT_EQ(options->at("gain_echo"), "verbatim");
+  EXPECT_EQ(options->at("before_first_fire"), "dummies");
+  EXPECT_EQ(options->size(), oculus().options().size());
+}
+
+TEST(Options, DefaultIsTheFirstAllowedValue) {
+  for (const protocol::Option& option : oculus().options()) {
+    EXPECT_FALSE(option.meaning.empty()) << option.name;
+    if (!option.allowed.empty()) {
+      EXPECT_EQ(option.allowed.front(), option.default_value) << option.name;
+    }
+  }
+}
+
+TEST(Options, DefaultsPassTheirOwnCheck) {
+  const auto defaults = protocol::check_options(oculus(), {});
+  ASSERT_TRUE(defaults.has_value());
+  EXPECT_TRUE(protocol::check_options(oculus(), *defaults).has_value());
+}
+
+TEST(Options, EveryAllowedValuePasses) {
+  for (const protocol::Option& option : oculus().options())
+    for (const std::string_view value : option.allowed)
+      EXPECT_TRUE(protocol::check_options(oculus(), {{std::string(option.name), std::string(value)}}).has_value()) << option.name;
+}
+
+TEST(Options, UnknownNameIsRefused) {
+  const auto options = protocol::check_options(oculus(), {{"gain_ecko", "auto"}});
+  ASSERT_FALSE(options.has_value());
+  EXPECT_EQ(options.error().text, "unknown option 'gain_ecko' of oculus, the nearest is 'gain_echo'");
+}
+
+TEST(Options, UnknownValueIsRefused) {
+  const auto options = protocol::check_options(oculus(), {{"before_first_fire", "ping"}});
+  ASSERT_FALSE(options.has_value());
+  EXPECT_EQ(options.error().text, "option before_first_fire cannot be 'ping', the nearest is 'pings' (valid: dummies, pings)");
+}
+
+TEST(Options, NumbersMustBeNumbers) {
+  EXPECT_TRUE(protocol::check_options(oculus(), {{"dummy_period_ms", "250"}}).has_value());
+  for (const char* bad : {"", "fast", "-1", "0", "nan", "inf", "1e999", "250ms"}) {
+    const auto options = protocol::check_options(oculus(), {{"dummy_period_ms", bad}});
+    ASSERT_FALSE(options.has_value()) << bad;
+    EXPECT_THAT(options.error().text, HasSubstr("dummy_period_ms must be a number above 0, not '"));
+  }
+}
+
+// Performance table, case P1.
+TEST(BlueView, PresetIsTheBenchmarksCase) {
+  const auto& model = *blueview::models().front();
+  const FrequencyMode& mode = model.modes.front();
+  EXPECT_EQ(model.profile, "blueview-p900-90");
+  EXPECT_FLOAT_EQ(mode.centre_hz, 900e3f);
+  EXPECT_FLOAT_EQ(mode.horizontal_aperture_rad, std::numbers::pi_v<float> / 2);
+  EXPECT_EQ(mode.beam_spacing, BeamSpacing::uniform_in_angle);
+  EXPECT_EQ(mode.source_level_db, 210);
+  EXPECT_EQ(mode.max_range_m, 100);
+  EXPECT_EQ(model.max_rate_hz, 15);
+  const PingSettings preset = blueview::p900_90_preset();
+  EXPECT_EQ(preset.beam_count, 512);
+  EXPECT_EQ(preset.range_bin_count, 394);
+  EXPECT_FLOAT_EQ(preset.range_bin_m, 0.0254f);
+  EXPECT_FLOAT_EQ(preset.pulse_width_m, 0.0254f);
+  EXPECT_NEAR(preset.range_m, 10, 0.0254);
+}
+
+}  // namespace

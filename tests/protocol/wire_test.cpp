@@ -1,0 +1,117 @@
+// The visitors alone, on a message made up for the purpose.
+#include "protocol/wire/wire.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+namespace {
+
+using sonar::wire::Bytes;
+using sonar::wire::BytesView;
+
+enum class Colour : std::uint16_t { red = 0x0102 };
+struct Inner {
+  std::int16_t left = 0;
+  std::array<std::uint8_t, 3> octets{};
+};
+struct Outer {
+  Colour colour{};
+  std::array<Inner, 2> pair{};
+  double level = 0;
+  float share = 0;
+};
+template <class V, sonar::wire::Like<Inner> M>
+constexpr void fields(V& visit, M& m) {
+  visit("left", m.left);
+  visit("octets", m.octets);
+}
+template <class V, sonar::wire::Like<Outer> M>
+constexpr void fields(V& visit, M& m) {
+  visit("colour", m.colour);
+  visit("pair", m.pair);
+  visit("level", m.level);
+  visit("share", m.share);
+}
+static_assert(sonar::wire::wire_size<Outer>() == 2 + 2 * 5 + 8 + 4);
+
+Bytes bytes(std::initializer_list<int> values) {
+  Bytes out;
+  for (const int value : values) out.push_back(static_cast<std::byte>(value));
+  return out;
+}
+
+Outer sample() {
+  Outer outer;
+  outer.colour = Colour::red;
+  outer.pair = {Inner{-2, {1, 2, 3}}, Inner{300, {4, 5, 6}}};
+  outer.level = 50;     // 40 49 00 .. 00
+  outer.share = -1.5f;  // BF C0 00 00
+  return outer;
+}
+const Bytes little =
+    bytes({0x02, 0x01, 0xFE, 0xFF, 1, 2, 3, 0x2C, 0x01, 4, 5, 6, 0, 0, 0, 0, 0, 0, 0x49, 0x40, 0, 0, 0xC0, 0xBF});
+const Bytes big = bytes({0x01, 0x02, 0xFF, 0xFE, 1, 2, 3, 0x01, 0x2C, 4, 5, 6, 0x40, 0x49, 0, 0, 0, 0, 0, 0, 0xBF, 0xC0, 0, 0});
+
+TEST(Wire, WritesBothByteOrders) {
+  EXPECT_EQ(sonar::wire::bytes_of(sample()), little);
+  EXPECT_EQ(sonar::wire::bytes_of(sample(), sonar::wire::Endian::big), big);
+}
+
+TEST(Wire, ReadsBothByteOrders) {
+  for (const auto endian : {sonar::wire::Endian::little, sonar::wire::Endian::big}) {
+    Outer outer;
+    sonar::wire::Reader reader(endian == sonar::wire::Endian::little ? little : big, endian);
+    fields(reader, outer);
+    EXPECT_TRUE(reader.ok());
+    EXPECT_EQ(reader.remaining(), 0u);
+    EXPECT_EQ(outer.colour, Colour::red);
+    EXPECT_EQ(outer.pair[0].left, -2);
+    EXPECT_EQ(outer.pair[1].octets[2], 6);
+    EXPECT_EQ(outer.level, 50.0);
+    EXPECT_EQ(outer.share, -1.5f);
+  }
+}
+
+// Every length in a buffer of exactly that size: a sanitizer sees any byte read past it.
+TEST(Wire, KeepsTheFirstFailureAndReadsNothingMore) {
+  for (std::size_t length = 0; length < little.size(); ++length) {
+    const std::unique_ptr<std::byte[]> exact(new std::byte[length]);
+    std::copy_n(little.begin(), length, exact.get());
+    Outer outer = sample();
+    outer.share = 7;
+    sonar::wire::Reader reader(BytesView(exact.get(), length));
+    fields(reader, outer);
+    EXPECT_FALSE(reader.ok()) << length;
+    EXPECT_EQ(outer.share, 7) << "a field behind the end was touched at length " << length;
+    EXPECT_LE(reader.failure().offset, length);
+    EXPECT_GT(reader.failure().needed, reader.failure().left);
+  }
+}
+
+TEST(Wire, SaysWhatWasMissing) {
+  Outer outer;
+  sonar::wire::Reader reader(BytesView(little).first(15));
+  fields(reader, outer);
+  EXPECT_EQ(reader.failure_text(), "field 'level' at byte 12 needs 8 bytes, 3 are left");
+  EXPECT_TRUE(reader.block("tail", 1).empty()) << "a failed reader gives no more bytes";
+}
+
+TEST(Wire, HandsOutBlocks) {
+  sonar::wire::Reader reader(little);
+  EXPECT_EQ(reader.block("head", 4).size(), 4u);
+  EXPECT_EQ(reader.position(), 4u);
+  EXPECT_TRUE(reader.block("too much", 100).empty());
+  EXPECT_FALSE(reader.ok());
+}
+
+TEST(Wire, PrintsTheOffsetTable) {
+  EXPECT_EQ(sonar::wire::offset_table<Outer>(),
+            "| off | type | field |\n|---|---|---|\n"
+            "| 0 | u16 | colour |\n"
+            "| 2 | i16 | pair.left |\n| 4 | u8 x 3 | pair.octets |\n"
+            "| 7 | i16 | pair.left |\n| 9 | u8 x 3 | pair.octets |\n"
+            "| 12 | f64 | level |\n| 20 | f32 | share |\n");
+}
+
+}  // namespace
