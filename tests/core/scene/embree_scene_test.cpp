@@ -1,0 +1,161 @@
+// The fast ray caster against the plain one: soups, moving bodies, far places, and scenes with nothing in them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/scene/ray_scene.hpp"
+#include "scene_testing.hpp"
+
+namespace sonar {
+namespace {
+
+using testing::brute_force;
+using testing::Draw;
+using testing::Hit;
+using testing::set_ray;
+using testing::soup;
+
+// Casts `packets` packets from around the origin and judges every lane.
+void compare(const Scene& scene, const RayScene& rays, std::span<const Pose> bodies, Draw& draw, int packets, double far_m,
+             bool coherent, double tolerance_m) {
+  int hits = 0;
+  for (int n = 0; n < packets; ++n) {
+    RayPacket packet;
+    Vec3d from[16], along[16];
+    for (int i = 0; i < 16; ++i) {
+      const Vec3 rounded = to_float(draw.point(6));  // both sides get the float place
+      from[i] = rays.origin() + to_double(rounded);
+      const Vec3d d = draw.point(1);
+      along[i] = to_double(to_float((1 / length(d)) * d));
+      set_ray(packet, i, to_double(rounded), along[i], far_m);
+    }
+    const std::uint32_t active = n % 3 == 0 ? 0x5A5Au : 0xFFFFu;
+    rays.trace(packet, active, coherent);
+    for (int i = 0; i < 16; ++i) {
+      if (!((active >> i) & 1)) {
+        EXPECT_EQ(packet.object[i], RayPacket::miss);
+        EXPECT_EQ(packet.far[i], static_cast<float>(far_m));
+        continue;
+      }
+      const Hit truth = brute_force(scene, bodies, from[i], along[i], far_m);
+      ASSERT_EQ(packet.object[i], truth.object) << "packet " << n << " lane " << i << " at " << truth.distance_m;
+      if (truth.object == RayPacket::miss) {
+        EXPECT_EQ(packet.far[i], static_cast<float>(far_m));
+        continue;
+      }
+      ++hits;
+      EXPECT_EQ(packet.triangle[i], truth.triangle);
+      EXPECT_NEAR(packet.far[i], truth.distance_m, tolerance_m);
+      const Vec3d normal{packet.normal_x[i], packet.normal_y[i], packet.normal_z[i]};
+      const double cosine = dot(normal, truth.normal) / (length(normal) * length(truth.normal));
+      EXPECT_NEAR(std::abs(cosine), 1, 1e-5);
+    }
+  }
+  EXPECT_GT(hits, packets);
+}
+
+std::shared_ptr<Scene> three_soups(Draw& draw, Vec3d centre) {
+  auto scene = std::make_shared<Scene>();
+  scene->materials.emplace_back();
+  for (int i = 0; i < 3; ++i) {
+    scene->objects.push_back(
+        Object{.name = "soup", .mesh = soup(draw, 150, 5, 1), .in_world = {centre + draw.point(2), draw.turn()}});
+  }
+  return scene;
+}
+
+TEST(RayScene, AgreesWithBruteForceOnStaticScenes) {
+  Draw draw(1);
+  const auto scene = three_soups(draw, {});
+  const RayScene rays(scene, 2);
+  compare(*scene, rays, {}, draw, 60, 30, true, 1e-4);
+  compare(*scene, rays, {}, draw, 60, 30, false, 1e-4);
+}
+
+TEST(RayScene, FarIsTheLongestDistanceOfInterest) {
+  Draw draw(2);
+  const auto scene = three_soups(draw, {});
+  const RayScene rays(scene, 1);
+  compare(*scene, rays, {}, draw, 60, 2.5, true, 1e-4);
+}
+
+TEST(RayScene, StaysExactTwoKilometresAway) {
+  Draw draw(3);
+  const Vec3d far_place{2000, -2000, -500};
+  const auto scene = three_soups(draw, far_place);
+  const RayScene rays(scene, 1);
+  EXPECT_LT(length(rays.origin() - far_place), 5);
+  compare(*scene, rays, {}, draw, 60, 30, true, 1e-4);
+}
+
+TEST(RayScene, InvisibleObjectsAreNotThere) {
+  Draw draw(4);
+  auto scene = three_soups(draw, {});
+  scene->objects[1].visible = false;
+  const RayScene rays(scene, 1);
+  compare(*scene, rays, {}, draw, 60, 30, true, 1e-4);
+}
+
+// Two bodies, one of two objects, beside a static one, all of it far from the world's zero.
+class MovingScene : public ::testing::Test {
+ protected:
+  MovingScene() {
+    scene_ = three_soups(draw_, far_);
+    for (int b = 0; b < 2; ++b) {
+      scene_->body_names.push_back("body");
+      scene_->bodies_in_world.push_back({far_ + draw_.point(2), draw_.turn()});
+    }
+    scene_->objects[1].body = 1;
+    scene_->objects[2].body = 0;
+    scene_->objects.push_back(Object{.name = "also", .mesh = soup(draw_, 60, 3, 1), .in_world = {far_, draw_.turn()}, .body = 1});
+  }
+  Draw draw_{5};
+  Vec3d far_{1500, 1200, -30};
+  std::shared_ptr<Scene> scene_;
+};
+
+TEST_F(MovingScene, StartsWhereTheSceneFilePutIt) {
+  const RayScene rays(scene_, 2);
+  compare(*scene_, rays, scene_->bodies_in_world, draw_, 60, 30, true, 2e-4);
+}
+
+TEST_F(MovingScene, FollowsItsPosesAndComesBack) {
+  RayScene rays(scene_, 2);
+  for (int step = 0; step < 4; ++step) {
+    std::vector<Pose> bodies;
+    for (int b = 0; b < 2; ++b) bodies.push_back({far_ + draw_.point(3), draw_.turn()});
+    rays.place(bodies);
+    compare(*scene_, rays, bodies, draw_, 30, 30, step % 2 == 0, 2e-4);
+    rays.place(bodies);  // nothing moved
+    compare(*scene_, rays, bodies, draw_, 10, 30, true, 2e-4);
+  }
+  rays.place({});
+  compare(*scene_, rays, scene_->bodies_in_world, draw_, 30, 30, true, 2e-4);
+}
+
+TEST_F(MovingScene, AWorldOfBodiesAloneWorks) {
+  scene_->objects.erase(scene_->objects.begin());
+  const RayScene rays(scene_, 1);
+  compare(*scene_, rays, scene_->bodies_in_world, draw_, 60, 30, true, 2e-4);
+}
+
+TEST(RayScene, AnEmptySceneMissesEverywhere) {
+  for (const int bodies : {0, 1}) {
+    auto scene = std::make_shared<Scene>();
+    scene->bodies_in_world.resize(static_cast<std::size_t>(bodies));
+    RayScene rays(scene, 1);
+    rays.place(std::vector<Pose>(static_cast<std::size_t>(bodies), Pose{{1, 2, 3}, {}}));
+    RayPacket packet;
+    for (int i = 0; i < 16; ++i) set_ray(packet, i, {}, {1, 0, 0}, 50);
+    rays.trace(packet, 0xFFFF, true);
+    for (int i = 0; i < 16; ++i) {
+      EXPECT_EQ(packet.object[i], RayPacket::miss);
+      EXPECT_EQ(packet.far[i], 50);
+    }
+  }
+}
+
+TEST(RayScene, NamesItsLibrary) { EXPECT_EQ(RayScene::version().rfind("Embree ", 0), 0u); }
+
+}  // namespace
+}  // namespace sonar
