@@ -52,9 +52,7 @@ void Outbox::written() {
   writing_ = false;
 }
 
-void Outbox::drop_waiting() {
-  replies_.clear();
-  reply_bytes_ = 0;
+void Outbox::drop_waiting_pings() {
   pings_dropped_ += pings_.size();
   pings_.clear();
   ping_bytes_ = 0;

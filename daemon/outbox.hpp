@@ -40,8 +40,8 @@ class Outbox {
   Message take();
   /// The message last taken has been written to its end.
   void written();
-  /// Leaves only the message being written.
-  void drop_waiting();
+  /// Leaves the message being written and the replies, which are small.
+  void drop_waiting_pings();
 
   bool idle() const { return !writing_ && replies_.empty() && pings_.empty(); }
   std::uint64_t pings_written() const { return pings_written_; }

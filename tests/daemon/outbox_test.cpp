@@ -73,7 +73,7 @@ TEST(Outbox, WaitingPingsStayBelowEightMebibytes) {
   EXPECT_FALSE(box.take());
 }
 
-TEST(Outbox, DropWaitingKeepsTheMessageBeingWritten) {
+TEST(Outbox, DropWaitingPingsKeepsTheMessageBeingWrittenAndReplies) {
   Outbox box({2, WhenFull::replace_oldest});
   for (int i = 1; i <= 3; ++i) {
     push(box, i);
@@ -81,8 +81,11 @@ TEST(Outbox, DropWaitingKeepsTheMessageBeingWritten) {
       EXPECT_EQ(tag_of(box.take()), 1);
     }
   }
-  box.drop_waiting();
+  ASSERT_TRUE(box.push_reply(reply(9)));
+  box.drop_waiting_pings();
   EXPECT_FALSE(box.idle());
+  box.written();
+  EXPECT_EQ(tag_of(box.take()), 9);
   box.written();
   EXPECT_TRUE(box.idle());
   EXPECT_EQ(box.pings_dropped(), 2u);

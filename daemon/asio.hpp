@@ -1,0 +1,19 @@
+// Boost.Asio as the daemon uses it: included here and nowhere else, so that <utility> comes first (Boost 1.74's awaitable.hpp
+// needs std::exchange and does not include it) and every await spells its error code the same way.
+#pragma once
+
+#include <utility>
+
+#include <boost/asio.hpp>
+
+namespace sonar {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using asio::ip::udp;
+using boost::system::error_code;
+
+/// co_await socket.async_...(..., into(ec)): no exceptions in coroutines.
+inline auto into(error_code& ec) { return asio::redirect_error(asio::use_awaitable, ec); }
+
+}  // namespace sonar

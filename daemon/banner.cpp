@@ -1,0 +1,110 @@
+#include "daemon/banner.hpp"
+
+#include <cstdarg>
+#include <cstdio>
+#include <fstream>
+
+#include "cuda/cuda_status.hpp"
+
+namespace sonar {
+namespace {
+
+[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
+  char line[512];
+  va_list arguments;
+  va_start(arguments, pattern);
+  std::vsnprintf(line, sizeof line, pattern, arguments);
+  va_end(arguments);
+  return line;
+}
+
+std::string frequency_text(double hz) { return hz >= 1e6 ? format("%.3g MHz", hz / 1e6) : format("%.3g kHz", hz / 1e3); }
+std::string address_text(const Endpoint& e) { return text_of(e); }
+
+std::string sonar_lines(const Device& device) {
+  const PingSettings s = device.initial_settings();
+  const SonarModel& model = *device.state().model;
+  const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
+  std::string text =
+      "sonar     " + device.config().name + "  " + model.name + "  " + frequency_text(static_cast<double>(mode.centre_hz)) +
+      format("  %d beams  %g m  %g Hz\n", s.beam_count, static_cast<double>(s.range_m), static_cast<double>(s.rate_hz));
+  const tcp::endpoint data = device.data_endpoint();
+  text += format("  data    tcp %s:%d", data.address().to_string().c_str(), data.port());
+  for (const udp::endpoint& to : device.status_destinations())
+    text += format("      status udp -> %s:%d (1 Hz)", to.address().to_string().c_str(), to.port());
+  if (device.state().advertise_ip != device.config().bind_ip)
+    text += "      advertised as " + text_of(device.state().advertise_ip);
+  return text + "\n";
+}
+
+std::string pose_line(const App& app) {
+  const Endpoint protobuf = app.poses().protobuf(), json = app.poses().json();
+  std::string text = "pose      udp and tcp ";
+  text += protobuf.port != 0 ? address_text(protobuf) + " (protobuf)" : "protobuf off";
+  text += json.port != 0 ? "  " + address_text(json) + " (json)" : "  json off";
+  text += "  | source: " + std::string(app.world().source_of(0)) + "\n";
+  return text;
+}
+
+/// Largest resident memory so far [MB]; 0 where the system does not tell.
+double peak_memory_mb() {
+  std::ifstream status("/proc/self/status");
+  std::string word;
+  while (status >> word) {
+    double kb = 0;
+    if (word == "VmHWM:" && status >> kb) return kb / 1024;
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::string banner(const App& app, const BannerFacts& facts) {
+  std::string text = "sonard " SONARD_VERSION "  (" + app.engine().description() + ", CUDA: " + cuda_status() + ")\n";
+  text += "config    " + facts.config_line + "\n";
+  text += "scene     " + app.scene().name +
+          format("   %zu triangles, %zu materials, %zu moving, built in %.0f ms\n", app.scene().triangle_count(),
+                 app.scene().materials.size(), app.scene().body_names.size(), facts.scene_ms);
+  for (const Device& d : app.devices()) text += sonar_lines(d);
+  text += pose_line(app);
+  text += "seed      " + std::to_string(app.config().seed) + "   reproducible";
+  if (app.config().clock == ClockMode::stepped) text += ", stepped clock";
+  return text + "\n";
+}
+
+std::string ready_line(const App& app, double seconds) {
+  return format("ready in %.2f s. Connect your driver to %s.   Ctrl-C stops.\n", seconds,
+                text_of(app.config().sonars.front().advertise_ip).c_str());
+}
+
+std::string summary(const App& app) {
+  std::string text;
+  for (const Device& d : app.devices()) {
+    const DeviceFigures f = d.figures();
+    text +=
+        "sonar " + d.config().name +
+        format("  %llu pings, %llu served, %llu dropped, %llu late ticks, %llu clients", static_cast<unsigned long long>(f.pings),
+               static_cast<unsigned long long>(f.served), static_cast<unsigned long long>(f.dropped),
+               static_cast<unsigned long long>(f.skipped_ticks), static_cast<unsigned long long>(f.clients));
+    if (f.pings > 0) text += format(", %.1f ms a ping", 1e3 * f.simulation_s / static_cast<double>(f.pings));
+    text += "\n";
+  }
+  const PoseCounters& p = app.world().counters();
+  if (p.accepted + p.refused + p.late > 0)
+    text += format("poses  %llu accepted, %llu refused, %llu late, %llu replaced\n", static_cast<unsigned long long>(p.accepted),
+                   static_cast<unsigned long long>(p.refused), static_cast<unsigned long long>(p.late),
+                   static_cast<unsigned long long>(p.replaced));
+  return text + format("resident memory %.0f MB at most\n", peak_memory_mb());
+}
+
+std::string digest_lines(const App& app) {
+  std::string text;
+  for (const Device& d : app.devices())
+    for (const StreamDigest& s : d.digests())
+      text += "sha256 " + s.sha256 +
+              format("  %s client %llu  %llu bytes\n", d.config().name.c_str(), static_cast<unsigned long long>(s.client),
+                     static_cast<unsigned long long>(s.bytes));
+  return text;
+}
+
+}  // namespace sonar

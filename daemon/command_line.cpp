@@ -1,0 +1,66 @@
+#include "daemon/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include "core/base/result.hpp"
+
+namespace sonar {
+namespace {
+
+void add_run_options(CLI::App& app, RunCommand& run) {
+  app.add_option("config", run.config, "configuration file; without one sonard looks in the usual places, then runs the demo");
+  app.add_flag("--demo", run.demo, "run the built-in demo, whatever files there are");
+  app.add_option("--clock", run.clock, "realtime, or stepped: a tick when every client has taken the last ping")
+      ->check(CLI::IsMember({"realtime", "stepped"}))
+      ->envname("SONARD_CLOCK");
+  app.add_option("--threads", run.threads, "compute threads, 0 = all cores")
+      ->check(CLI::Range(0, 256))
+      ->envname("SONARD_THREADS");
+  app.add_option("--seed", run.seed, "seed of speckle and noise")->envname("SONARD_SEED");
+  app.add_option("--simd", run.simd, "instruction set of the hot loops")
+      ->check(CLI::IsMember({"auto", "portable", "avx2", "avx512"}))
+      ->envname("SONARD_SIMD");
+  app.add_option("--bind", run.bind, "address of the first sonar instead of its bind_ip and advertise_ip")
+      ->envname("SONARD_BIND");
+  app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings");
+  app.add_flag("--digest", run.digest, "print the SHA-256 of every client's byte stream at the end");
+  app.add_option("--log-format", run.log_format, "text or json")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->envname("SONARD_LOG_FORMAT");
+  app.add_option("--log-level", run.log_level, "debug, info, warning or error")
+      ->check(CLI::IsMember({"debug", "info", "warning", "error"}))
+      ->envname("SONARD_LOG_LEVEL");
+}
+
+}  // namespace
+
+Command parse_command_line(int argc, char** argv) {
+  // The benchmark has its own arguments; they are handed over untouched.
+  if (argc > 1 && std::string_view(argv[1]) == "bench") return BenchCommand{{argv + 1, argv + argc}};
+
+  CLI::App app{"sonard: emulates imaging sonars on the network, from a 3D scene"};
+  app.set_version_flag("--version", std::string("sonard " SONARD_VERSION));
+  RunCommand run;
+  CheckCommand check;
+  // `sonard CONFIG` is `sonard run CONFIG`: the word may be left out.
+  const bool bare = argc < 2 || (std::string_view(argv[1]) != "run" && std::string_view(argv[1]) != "check");
+  if (bare) {
+    add_run_options(app, run);
+    app.footer("Commands: run [CONFIG] (the default), check CONFIG, bench; each has --help.");
+  } else {
+    app.require_subcommand(1);
+    add_run_options(*app.add_subcommand("run", "serve the sonars of a configuration"), run);
+    app.add_subcommand("check", "validate a configuration and its scene, then exit")
+        ->add_option("config", check.config, "configuration file")
+        ->required();
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return Leave{app.exit(e) == 0 ? 0 : exit_code(ErrorKind::usage)};
+  }
+  if (!bare && app.got_subcommand("check")) return check;
+  return run;
+}
+
+}  // namespace sonar

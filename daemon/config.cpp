@@ -1,0 +1,322 @@
+#include "daemon/config.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <set>
+
+#include "core/text/decimal.hpp"
+#include "core/text/strict_yaml.hpp"
+
+namespace sonar {
+namespace {
+
+using text::Map;
+using text::Node;
+using text::Range;
+
+constexpr Range finite_place{.min = -1e7, .max = 1e7};
+constexpr double hot_c = 30;  // a widely used driver sends the sonar to standby above this (oculus.md section 4)
+
+Ipv4 read_ip(const Node& node, Ipv4 fallback = {}) {
+  if (!node.present()) return fallback;
+  const auto ip = parse_ipv4(node.text(64));
+  if (!ip) node.fail(ip.error().text);
+  return ip.value_or(fallback);
+}
+
+/// "127.0.0.1:14770"; the port may be left out when `default_port` is given.
+Endpoint read_endpoint(const Node& node, bool port_needed) {
+  const std::string text = node.text(64);
+  const std::size_t colon = text.find(':');
+  Endpoint endpoint;
+  const auto ip = parse_ipv4(std::string_view(text).substr(0, colon));
+  const auto port = colon == std::string::npos ? std::optional<std::int64_t>(0) : text::parse_integer(text.substr(colon + 1));
+  if (!ip || (port_needed && colon == std::string::npos))
+    node.fail("is not an address; write it as " +
+              std::string(port_needed ? "127.0.0.1:14770" : "127.255.255.255 or 192.168.1.7:52102"));
+  else if (!port || *port < 0 || *port > 65535)
+    node.fail("port must be a number from 0 to 65535");
+  else
+    endpoint = {*ip, static_cast<std::uint16_t>(*port)};
+  return endpoint;
+}
+
+AddressRange read_range(const Node& node) {
+  const std::string text = node.text(64);
+  const std::size_t slash = text.find('/');
+  const auto ip = parse_ipv4(std::string_view(text).substr(0, slash));
+  const auto bits = slash == std::string::npos ? std::optional<std::int64_t>(32) : text::parse_integer(text.substr(slash + 1));
+  if (!ip || !bits || *bits < 0 || *bits > 32) {
+    node.fail("is not an address range; write it as 192.168.1.0/24");
+    return {};
+  }
+  return {*ip, static_cast<int>(*bits)};
+}
+
+Pose pose_from(const std::array<double, 3>& xyz_m, const std::array<double, 3>& rpy_deg) {
+  return {{xyz_m[0], xyz_m[1], xyz_m[2]},
+          quat_from_rpy({rad_from_deg(rpy_deg[0]), rad_from_deg(rpy_deg[1]), rad_from_deg(rpy_deg[2])})};
+}
+
+Pose read_world_pose(const Node& node) {
+  if (!node.present()) return {};
+  Map map = node.map();
+  const bool ned = map.required("frame").choice<bool>({{"ENU_FLU", false}, {"NED_FRD", true}});
+  const auto xyz_m = map.required("xyz_m").numbers<3>(finite_place);
+  const auto rpy_deg = map.optional("rpy_deg").numbers_or<3>({0, 0, 0}, Range::between(-360, 360));
+  const Pose pose = pose_from(xyz_m, rpy_deg);
+  return ned ? enu_flu_from_ned_frd(pose) : pose;
+}
+
+Pose read_mount(const Node& node) {
+  if (!node.present()) return {};
+  Map map = node.map();
+  const bool frd = map.required("frame").choice<bool>({{"FLU", false}, {"FRD", true}});
+  const auto xyz_m = map.optional("xyz_m").numbers_or<3>({0, 0, 0}, Range::between(-1000, 1000));
+  const auto rpy_deg = map.optional("rpy_deg").numbers_or<3>({0, 0, 0}, Range::between(-360, 360));
+  const Pose pose = pose_from(xyz_m, rpy_deg);
+  return frd ? flu_from_frd(pose) : pose;
+}
+
+/// Beside the configuration, then in the directories of shipped scenes.
+std::filesystem::path find_scene(const Node& node, const std::filesystem::path& directory) {
+  const std::filesystem::path given = node.text();
+  const std::filesystem::path shipped[] = {SONARD_SCENES_SOURCE, SONARD_SCENES_INSTALLED};
+  std::vector<std::filesystem::path> places = {directory / given};
+  for (const auto& scenes : shipped) {
+    places.push_back(scenes / given);
+    places.push_back(scenes.parent_path() / given);
+  }
+  std::error_code ec;
+  for (const auto& place : places)
+    if (std::filesystem::is_regular_file(place, ec)) return place.lexically_normal();
+  node.fail("no such file; looked in " + (directory.empty() ? std::string(".") : directory.string()) + ", " +
+            shipped[0].string() + " and " + shipped[1].string());
+  return given;
+}
+
+void read_world(Map map, Config& config, const std::filesystem::path& directory) {
+  config.scene = find_scene(map.required("scene"), directory);
+  config.seed = map.optional("seed").unsigned_integer_or(1);
+  if (Node origin = map.optional("origin")) {  // kept for geodetic poses; checked so that it is right when they come
+    Map place = origin.map();
+    place.required("lat").number(Range::between(-90, 90));
+    place.required("lon").number(Range::between(-180, 180));
+    place.optional("alt").number_or(0, Range::between(-12000, 10000));
+  }
+  if (Node node = map.optional("water")) {
+    Map water = node.map();
+    const Node temperature = water.optional("temperature_c");
+    config.water.temperature_c = temperature.number_or(config.water.temperature_c, Range::between(-2, 40));
+    config.water.salinity_psu = water.optional("salinity_psu").number_or(config.water.salinity_psu, Range::between(0, 42));
+    config.water.ph = water.optional("ph").number_or(config.water.ph, Range::between(6, 9));
+    config.water.sound_speed_mps = water.optional("sound_speed_mps").number_or(0, Range::between(0, 2000));
+    if (config.water.sound_speed_mps != 0 && config.water.sound_speed_mps < 1000)
+      water.optional("sound_speed_mps").fail("must be 0 (computed from the rest) or from 1000 to 2000");
+    if (!water.optional("allow_hot").boolean_or(false) && config.water.temperature_c >= hot_c)
+      temperature.fail("30 C or more sends a real driver to standby; add allow_hot: true if that is what you want");
+  }
+}
+
+void read_vehicles(const Node& node, Config& config) {
+  std::set<std::string> names;
+  for (const Node& item : node.items(1, 64)) {
+    Map map = item.map();
+    VehicleConfig vehicle;
+    const Node name = map.required("name");
+    vehicle.name = name.text(64);
+    if (!names.insert(vehicle.name).second) name.fail("\"" + vehicle.name + "\" is used twice");
+    vehicle.initial_pose = read_world_pose(map.optional("initial_pose"));
+    vehicle.orbits = map.optional("trajectory").choice_or<bool>(false, {{"none", false}, {"orbit", true}});
+    config.vehicles.push_back(std::move(vehicle));
+  }
+}
+
+std::size_t read_vehicle_of(Map& map, const Config& config) {
+  const Node node = map.optional("vehicle");
+  if (!node.present()) {
+    if (config.vehicles.size() > 1) map.required("vehicle");
+    return 0;
+  }
+  std::vector<std::string_view> names;
+  for (const VehicleConfig& v : config.vehicles) names.push_back(v.name);
+  return node.choice_index(std::move(names));
+}
+
+protocol::OptionValues read_options(const Node& node, const protocol::Vendor& vendor) {
+  protocol::OptionValues given;
+  if (node.present())
+    for (auto& [key, value] : node.map().entries()) given[key] = value.text(64);
+  auto complete = check_options(vendor, given);
+  if (!complete) node.fail(complete.error().text);
+  return complete.value_or(protocol::OptionValues{});
+}
+
+void read_addresses(Map& map, SonarConfig& sonar) {
+  sonar.bind_ip = read_ip(map.required("bind_ip"));
+  const bool any = sonar.bind_ip == Ipv4{};
+  const Node advertise = any ? map.required("advertise_ip") : map.optional("advertise_ip");
+  sonar.advertise_ip = read_ip(advertise, sonar.bind_ip);
+  sonar.netmask = read_ip(map.optional("netmask"), is_loopback(sonar.advertise_ip) ? Ipv4{255, 0, 0, 0} : Ipv4{255, 255, 255, 0});
+  for (const Node& to : map.optional("status_to").items(0, 16)) sonar.status_to.push_back(read_endpoint(to, false));
+  if (sonar.status_to.empty()) {
+    Endpoint broadcast;
+    for (std::size_t i = 0; i < 4; ++i)
+      broadcast.ip[i] = static_cast<std::uint8_t>(sonar.advertise_ip[i] | (~sonar.netmask[i] & 0xff));
+    sonar.status_to.push_back(broadcast);
+  }
+}
+
+SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
+  SonarConfig sonar;
+  const Node name = map.required("name");
+  sonar.name = name.text(64);
+  const Node profile_node = map.required("profile");
+  const auto profile = protocol::find_profile(profile_node.text(64));
+  if (!profile) profile_node.fail(profile.error().text);
+  sonar.vehicle = read_vehicle_of(map, config);
+  sonar.mount = read_mount(map.optional("mount"));
+  read_addresses(map, sonar);
+  sonar.device_id = static_cast<std::uint16_t>(map.optional("device_id").integer_or(7001 + static_cast<int>(index), 1, 65535));
+  if (Node node = map.optional("clients")) {
+    Map clients = node.map();
+    sonar.max_clients =
+        static_cast<int>(clients.optional("max").integer_or(profile ? profile->vendor->default_max_clients() : 1, 1, 16));
+    sonar.when_full = clients.optional("when_full")
+                          .choice_or(WhenClientsFull::close_new, {{"close_new", WhenClientsFull::close_new},
+                                                                  {"take_over", WhenClientsFull::take_over},
+                                                                  {"queue", WhenClientsFull::queue}});
+  } else if (profile) {
+    sonar.max_clients = profile->vendor->default_max_clients();
+  }
+  if (Node node = map.optional("outbox")) {
+    Map outbox = node.map();
+    sonar.outbox.depth = static_cast<int>(outbox.optional("depth").integer_or(1, 1, Outbox::deepest));
+    sonar.outbox.when_full = outbox.optional("full").choice_or(
+        WhenFull::replace_oldest, {{"replace_oldest", WhenFull::replace_oldest}, {"drop_newest", WhenFull::drop_newest}});
+  }
+  const Node options = map.optional("options");
+  if (profile) {
+    sonar.profile = *profile;
+    sonar.options = read_options(options, *profile->vendor);
+  } else if (options.present()) {
+    options.map().entries();
+  }
+  for (const SonarConfig& other : config.sonars) {
+    if (other.name == sonar.name) name.fail("\"" + sonar.name + "\" is used twice");
+    if (other.bind_ip == sonar.bind_ip)
+      map.required("bind_ip").fail(text_of(sonar.bind_ip) + " is already used by sonar \"" + other.name +
+                                   "\"; each sonar needs its own address");
+    if (other.device_id == sonar.device_id)
+      map.optional("device_id").fail(std::to_string(sonar.device_id) + " is already used by sonar \"" + other.name + "\"");
+  }
+  return sonar;
+}
+
+PoseListener read_listener(const Node& node, std::uint16_t default_port, bool has_ranges) {
+  PoseListener listener{true, {{127, 0, 0, 1}, default_port}};
+  if (!node.present()) return listener;
+  if (node.text(64) == "off") return {false, {}};
+  listener.at = read_endpoint(node, true);
+  if (!is_loopback(listener.at.ip) && !has_ranges)
+    node.fail("poses from other computers need poses.allow_from, e.g. allow_from: [192.168.1.0/24]");
+  return listener;
+}
+
+void read_poses(const Node& node, PoseConfig& poses) {
+  poses.protobuf.at = {{127, 0, 0, 1}, 14770};
+  poses.json.at = {{127, 0, 0, 1}, 14771};
+  if (!node.present()) return;
+  Map map = node.map();
+  for (const Node& range : map.optional("allow_from").items(0, 64)) poses.allow_from.push_back(read_range(range));
+  poses.protobuf = read_listener(map.optional("protobuf"), 14770, !poses.allow_from.empty());
+  poses.json = read_listener(map.optional("json"), 14771, !poses.allow_from.empty());
+  const bool same = poses.protobuf.enabled && poses.json.enabled && poses.json.at.port != 0 &&
+                    poses.protobuf.at.ip == poses.json.at.ip && poses.protobuf.at.port == poses.json.at.port;
+  if (same) map.optional("json").fail("the same address as poses.protobuf; give each its own port");
+  poses.extrapolate_max_s = map.optional("extrapolate_max_s").number_or(poses.extrapolate_max_s, Range::between(0, 10));
+  poses.stale_after_s = map.optional("stale_after_s").number_or(poses.stale_after_s, Range::between(0.01, 3600));
+  poses.max_jump_m = map.optional("max_jump_m").number_or(poses.max_jump_m, Range::between(0.001, 1e7));
+  poses.on_stale = map.optional("on_stale")
+                       .choice_or(OnStale::hold, {{"hold", OnStale::hold}, {"blank", OnStale::blank}, {"stop", OnStale::stop}});
+}
+
+void read_engine(const Node& node, EngineConfig& engine) {
+  if (!node.present()) return;
+  Map map = node.map();
+  engine.threads = static_cast<int>(map.optional("threads").integer_or(0, 0, 256));
+  map.optional("quality").choice_or<int>(0, {{"default", 0}});
+  engine.simd = map.optional("simd").choice_or(SimdLevel::automatic, {{"auto", SimdLevel::automatic},
+                                                                      {"portable", SimdLevel::portable},
+                                                                      {"avx2", SimdLevel::avx2},
+                                                                      {"avx512", SimdLevel::avx512}});
+  engine.switches.expected_power = map.optional("expected_power").boolean_or(false);
+  engine.switches.noise = map.optional("noise").choice_or<bool>(true, {{"on", true}, {"off", false}});
+  engine.switches.fixed_fan = static_cast<int>(map.optional("fixed_fan").integer_or(0, 0, 100000));
+}
+
+void read_log(const Node& node, LogOptions& log) {
+  if (!node.present()) return;
+  Map map = node.map();
+  log.level = map.optional("level").choice_or(
+      LogLevel::info,
+      {{"debug", LogLevel::debug}, {"info", LogLevel::info}, {"warning", LogLevel::warning}, {"error", LogLevel::error}});
+  log.json = map.optional("format").choice_or<bool>(false, {{"text", false}, {"json", true}});
+}
+
+Result<Config> read(const text::Document& document, const std::string& name, const std::filesystem::path& directory) {
+  Config config;
+  config.source = name;
+  Map root = document.root();
+  read_world(root.required("world").map(), config, directory);
+  read_vehicles(root.required("vehicles"), config);
+  std::size_t index = 0;
+  for (const Node& item : root.required("sonars").items(1, 64)) config.sonars.push_back(read_sonar(item.map(), config, index++));
+  read_poses(root.optional("poses"), config.poses);
+  read_engine(root.optional("engine"), config.engine);
+  config.clock =
+      root.optional("clock").choice_or(ClockMode::realtime, {{"realtime", ClockMode::realtime}, {"stepped", ClockMode::stepped}});
+  read_log(root.optional("log"), config.log);
+  if (auto error = document.finish()) return tl::make_unexpected(*error);
+  return config;
+}
+
+constexpr std::string_view demo_yaml = R"(world:
+  scene: demo.yaml
+  seed: 1
+vehicles:
+  - name: rov
+    initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}
+    trajectory: orbit
+sonars:
+  - name: front
+    profile: oculus-m1200d
+    mount: {frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}
+    bind_ip: 127.0.0.2
+)";
+
+}  // namespace
+
+Result<Config> load_config(const std::filesystem::path& file) {
+  const auto document = text::parse_yaml_file(file, {.error_kind = ErrorKind::config});
+  if (!document) return tl::make_unexpected(document.error());
+  return read(*document, file.string(), file.parent_path());
+}
+
+Result<Config> parse_config(std::string_view yaml, const std::string& name, const std::filesystem::path& directory) {
+  const auto document = text::parse_yaml(yaml, name, {.error_kind = ErrorKind::config});
+  if (!document) return tl::make_unexpected(document.error());
+  return read(*document, name, directory);
+}
+
+Result<Config> demo_config() { return parse_config(demo_yaml, "demo", {}); }
+
+std::vector<std::filesystem::path> config_search_path() {
+  std::vector<std::filesystem::path> places = {"./sonard.yaml"};
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
+    places.push_back(std::filesystem::path(home) / ".config/sonard/sonard.yaml");
+  places.push_back("/etc/sonard/sonard.yaml");
+  return places;
+}
+
+}  // namespace sonar

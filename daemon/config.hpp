@@ -1,0 +1,102 @@
+// The configuration file as one struct tree with defaults, read and validated once at start; docs/configuration.md is its manual.
+// Nothing else in the daemon reads settings from anywhere.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+#include "core/base/result.hpp"
+#include "core/pipeline/ping_engine.hpp"
+#include "core/sonar/water.hpp"
+#include "daemon/log.hpp"
+#include "daemon/outbox.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+using protocol::Ipv4;
+
+struct Endpoint {
+  Ipv4 ip{};
+  std::uint16_t port = 0;
+};
+struct AddressRange {  // 10.0.0.0/8
+  Ipv4 ip{};
+  int prefix_bits = 32;
+  bool contains(Ipv4 address) const;
+};
+std::string text_of(Ipv4 ip);
+std::string text_of(Endpoint endpoint);
+bool is_loopback(Ipv4 ip);
+
+enum class WhenClientsFull { close_new, take_over, queue };
+enum class OnStale { hold, blank, stop };
+enum class ClockMode { realtime, stepped };
+
+struct VehicleConfig {
+  std::string name;
+  Pose initial_pose;  // in world
+  bool orbits = false;
+};
+struct SonarConfig {
+  std::string name;
+  protocol::Profile profile;
+  std::size_t vehicle = 0;  // index into Config::vehicles
+  Pose mount;               // sonar in vehicle, FLU
+  Ipv4 bind_ip{}, advertise_ip{}, netmask{};
+  std::vector<Endpoint> status_to;  // port 0 = the vendor's own
+  std::uint16_t device_id = 0;
+  int max_clients = 1;
+  WhenClientsFull when_full = WhenClientsFull::close_new;
+  OutboxRules outbox;
+  protocol::OptionValues options;  // complete
+};
+struct PoseListener {
+  bool enabled = true;
+  Endpoint at;
+};
+struct PoseConfig {
+  PoseListener protobuf, json;
+  std::vector<AddressRange> allow_from;  // empty = anybody who reaches the listener (loopback only)
+  double extrapolate_max_s = 0.2;
+  double stale_after_s = 1.0;
+  OnStale on_stale = OnStale::hold;
+  double max_jump_m = 50;
+};
+struct EngineConfig {
+  int threads = 0;  // 0 = all cores
+  SimdLevel simd = SimdLevel::automatic;
+  Switches switches;
+};
+
+struct Config {
+  std::string source;           // the file, or what stands in for it
+  std::filesystem::path scene;  // as found
+  std::uint64_t seed = 1;
+  Water water;
+  std::vector<VehicleConfig> vehicles;
+  std::vector<SonarConfig> sonars;
+  PoseConfig poses;
+  EngineConfig engine;
+  ClockMode clock = ClockMode::realtime;
+  LogOptions log;
+};
+
+/// Errors: file:line:col: key.path: what, and the nearest valid name.
+Result<Config> load_config(const std::filesystem::path& file);
+/// `directory` is where relative scene paths start; `name` stands in errors for the file.
+Result<Config> parse_config(std::string_view yaml, const std::string& name, const std::filesystem::path& directory);
+/// What runs when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene.
+Result<Config> demo_config();
+
+/// ./sonard.yaml, ~/.config/sonard/sonard.yaml, /etc/sonard/sonard.yaml, in this order.
+std::vector<std::filesystem::path> config_search_path();
+
+/// For addresses given on the command line.
+Result<Ipv4> parse_ipv4(std::string_view text);
+
+}  // namespace sonar

@@ -1,0 +1,374 @@
+#include "daemon/device.hpp"
+
+#include <algorithm>
+#include <cassert>
+
+#include "daemon/listen.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr auto accept_pause = std::chrono::milliseconds(100);  // after running out of file descriptors
+
+protocol::DeviceState describe(const SonarConfig& config, const Water& water, Time now) {
+  protocol::DeviceState s;
+  s.name = config.name;
+  s.id = config.device_id;
+  s.model = config.profile.model;
+  s.advertise_ip = config.advertise_ip;
+  s.netmask = config.netmask;
+  // Locally administered, so that it can belong to no real device.
+  s.mac = {0x02,
+           0x53,
+           0x4f,
+           0x00,
+           static_cast<std::uint8_t>(config.device_id >> 8),
+           static_cast<std::uint8_t>(config.device_id & 0xff)};
+  s.powered_up_at = now;
+  s.water = water;
+  s.options = config.options;
+  return s;
+}
+
+}  // namespace
+
+Device::Device(DeviceContext& context, const SonarConfig& config, std::uint32_t index)
+    : context_(context),
+      config_(config),
+      vendor_(*config.profile.vendor),
+      index_(index),
+      state_(describe(config, context.config.water, context.clock.now())),
+      acceptor_(context.io),
+      beacon_(context.io),
+      beacon_timer_(context.io),
+      ping_timer_(context.io) {
+  update_state(context.clock.now());
+  use_initial_settings();
+}
+
+Device::~Device() = default;
+
+Result<void> Device::open() {
+  for (const protocol::Port& port : vendor_.ports()) {
+    if (port.kind == protocol::Port::Kind::tcp_listen) {
+      if (auto r = listen_tcp(acceptor_, {config_.bind_ip, port.number}); !r) return r;
+    } else {
+      beacon_period_ = port.period;
+      for (const Endpoint& to : config_.status_to)
+        status_to_.emplace_back(address_of(to.ip), to.port == 0 ? port.number : to.port);
+      // An ephemeral port, but never by chance the one that drivers listen on.
+      for (int attempt = 0; attempt < 8; ++attempt) {
+        if (beacon_.is_open()) beacon_.close();
+        if (auto r = bind_udp(beacon_, {config_.bind_ip, 0}, true); !r) return r;
+        if (beacon_.local_endpoint().port() != port.number) break;
+      }
+    }
+  }
+  return {};
+}
+
+tcp::endpoint Device::data_endpoint() const {
+  error_code ec;
+  return acceptor_.local_endpoint(ec);
+}
+
+void Device::start() {
+  asio::co_spawn(
+      context_.io, [this] { return accept(); }, asio::detached);
+  if (beacon_period_.count() > 0)
+    asio::co_spawn(
+        context_.io, [this] { return announce(); }, asio::detached);
+}
+
+void Device::stop() {
+  if (std::exchange(stopping_, true)) return;
+  error_code ec;
+  acceptor_.close(ec);
+  beacon_timer_.cancel();
+  ping_timer_.cancel();
+  pacer_.stop();
+  beacon_.close(ec);
+  for (tcp::socket& waiting : queue_) waiting.close(ec);
+  queue_.clear();
+  const auto sessions = sessions_;  // finish() may end one at once and change the list
+  for (const SessionPointer& s : sessions) s->finish("sonard stops");
+}
+
+bool Device::gone() const { return sessions_.empty() && leaving_.empty() && turning_away_ == 0 && !busy_; }
+
+// ---- clients
+
+asio::awaitable<void> Device::accept() {
+  while (!stopping_) {
+    error_code ec;
+    tcp::socket socket = co_await acceptor_.async_accept(into(ec));
+    if (stopping_) co_return;
+    if (ec) {
+      asio::steady_timer pause(context_.io, accept_pause);
+      co_await pause.async_wait(into(ec));
+      continue;
+    }
+    admit(std::move(socket));
+  }
+}
+
+void Device::admit(tcp::socket socket) {
+  constexpr std::size_t longest_queue = 16;
+  if (sessions_.size() < static_cast<std::size_t>(config_.max_clients)) return welcome(std::move(socket));
+  if (config_.when_full == WhenClientsFull::take_over) {
+    const SessionPointer oldest = sessions_.front();
+    sessions_.pop_front();
+    leaving_.push_back(oldest);
+    oldest->finish("another client took over");
+    if (sessions_.empty()) use_initial_settings();
+    return welcome(std::move(socket));
+  }
+  if (config_.when_full == WhenClientsFull::queue && queue_.size() < longest_queue) {
+    context_.log.info("client waits for a place", {{"sonar", config_.name}, {"waiting", queue_.size() + 1}});
+    queue_.push_back(std::move(socket));
+    return;
+  }
+  ++figures_.refused_clients;
+  context_.log.info("client turned away: " + std::to_string(config_.max_clients) + " already connected",
+                    {{"sonar", config_.name}});
+  asio::co_spawn(
+      context_.io, [this, s = std::move(socket)]() mutable { return turn_away(std::move(s)); }, asio::detached);
+}
+
+/// FIN and no byte. What the client has sent meanwhile is read away, or the kernel would answer it with RST.
+asio::awaitable<void> Device::turn_away(tcp::socket socket) {
+  constexpr int most_at_once = 16;
+  if (turning_away_ >= most_at_once || stopping_) co_return;
+  ++turning_away_;
+  error_code ec;
+  socket.shutdown(tcp::socket::shutdown_send, ec);
+  asio::steady_timer deadline(context_.io, std::chrono::seconds(1));
+  deadline.async_wait([&socket](const error_code& e) {
+    if (!e) socket.cancel();
+  });
+  std::array<std::byte, 1024> dustbin;
+  for (int reads = 0; !ec && reads < 64; ++reads) co_await socket.async_read_some(asio::buffer(dustbin), into(ec));
+  deadline.cancel();
+  // The handler above must be done with `socket` before this frame goes.
+  co_await asio::post(context_.io, asio::use_awaitable);
+  --turning_away_;
+  context_.on_change();
+}
+
+void Device::welcome(tcp::socket socket) {
+  const Time now = context_.clock.now();
+  Session::Setup setup{config_.outbox, context_.digest, ++figures_.clients};
+  update_state(now);
+  auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket), vendor_.converse(state_, now), setup);
+  context_.log.info("client connected", {{"sonar", config_.name}, {"client", session->client()}});
+  sessions_.push_back(session);
+  session->start();
+  on_membership();
+}
+
+void Device::on_membership() {
+  state_.connected_client = sessions_.empty() ? protocol::Ipv4{} : sessions_.front()->client_ip();
+  const Time now = context_.clock.now();
+  if (sessions_.empty()) use_initial_settings();
+  if (wants_pings())
+    pacer_.configure(settings_, now);
+  else
+    pacer_.stop();
+  arm();
+  context_.on_change();
+}
+
+void Device::on_over(Session& session, const std::string& why) {
+  context_.log.info("client gone: " + why, {{"sonar", config_.name},
+                                            {"client", session.client()},
+                                            {"pings", session.outbox().pings_written()},
+                                            {"dropped", session.outbox().pings_dropped()}});
+  figures_.dropped += session.outbox().pings_dropped();
+  if (context_.digest) digests_.push_back({session.number(), session.digest().size(), session.digest().hex()});
+  const auto is_it = [&session](const SessionPointer& s) { return s.get() == &session; };
+  leaving_.remove_if(is_it);
+  if (sessions_.remove_if(is_it) == 0) return context_.on_change();
+  if (!stopping_ && !queue_.empty()) {
+    tcp::socket next = std::move(queue_.front());
+    queue_.pop_front();
+    if (sessions_.empty()) use_initial_settings();
+    welcome(std::move(next));
+  } else {
+    on_membership();
+  }
+}
+
+// ---- settings
+
+/// As if no client had ever spoken: the next one finds the device as it comes.
+void Device::use_initial_settings() {
+  asked_ = false;
+  protocol::ChangeSettings initial = vendor_.initial_settings(state_);
+  settings_ = initial.settings;
+  requests_[++settings_id_] = std::move(initial.request);
+}
+
+bool Device::wants_pings() const {
+  return !stopping_ && !sessions_.empty() && (asked_ || vendor_.pings_before_first_request(state_));
+}
+
+void Device::change_settings(Session& from, const protocol::ChangeSettings& change) {
+  // Repeats arrive at ping rate from some drivers; only what the device does not already do is news.
+  if (!asked_ || requests_[settings_id_] != change.request) {
+    settings_ = change.settings;
+    requests_[++settings_id_] = change.request;
+    if (!busy_) requests_.erase(requests_.begin(), requests_.find(settings_id_));
+    std::uint64_t unsaid = 0;
+    if (from.log_limiter().allows(LogLimiter::Clock::now(), unsaid))
+      context_.log.info("settings: " + change.summary, {{"sonar", config_.name}, {"client", from.client()}});
+  }
+  asked_ = true;
+  if (wants_pings()) pacer_.configure(settings_, context_.clock.now());
+}
+
+void Device::on_event(Session& from, const protocol::Event& event) {
+  if (stopping_) return;
+  if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
+    change_settings(from, *change);
+  } else if (std::holds_alternative<protocol::RequestPing>(event)) {
+    pacer_.trigger(context_.clock.now());
+  } else if (const auto* store = std::get_if<protocol::StoreAddress>(&event)) {
+    state_.stored_address = store->address;
+  } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
+    std::uint64_t unsaid = 0;
+    if (from.log_limiter().allows(LogLimiter::Clock::now(), unsaid))
+      context_.log.warning(notice->text, {{"sonar", config_.name}, {"client", from.client()}, {"unsaid", unsaid}});
+    return;
+  }
+  arm();
+  context_.on_change();
+}
+
+// ---- pings
+
+std::optional<Time> Device::next_tick() const {
+  const auto next = pacer_.next_tick();
+  const bool waits_for_pose =
+      next && context_.config.poses.on_stale == OnStale::stop && context_.world.is_stale(config_.vehicle, *next);
+  return waits_for_pose ? std::nullopt : next;
+}
+
+bool Device::settled() const {
+  return !busy_ && std::all_of(sessions_.begin(), sessions_.end(), [](const SessionPointer& s) { return s->idle(); });
+}
+
+void Device::arm() {
+  if (context_.clock.stepped()) return;
+  const auto next = pacer_.next_tick();
+  if (!next) {
+    ping_timer_.cancel();
+    return;
+  }
+  ping_timer_.expires_at(context_.clock.timer_at(*next));
+  ping_timer_.async_wait([this](const error_code& ec) {
+    if (!ec && !stopping_) on_timer();
+  });
+}
+
+void Device::on_timer() {
+  step(context_.clock.now());
+  arm();
+}
+
+void Device::step(Time now) {
+  if (pacer_.fire(now, busy_)) ping(pacer_.last_tick());
+}
+
+void Device::tick_sessions(Time now) {
+  const auto sessions = sessions_;
+  for (const SessionPointer& s : sessions) s->tick(now);
+}
+
+void Device::update_state(Time now) {
+  const Pose sonar = compose(context_.world.vehicle_at(config_.vehicle, now), config_.mount);
+  state_.depth_m = depth_from_z(sonar.position_m.z);
+}
+
+void Device::ping(Time at) {
+  const bool stale = context_.world.is_stale(config_.vehicle, at);
+  const OnStale on_stale = context_.config.poses.on_stale;
+  if (stale && on_stale == OnStale::stop) return;
+  update_state(at);
+  PingRequest request;
+  request.model = state_.model;
+  request.number = PingNumber(++ping_number_);
+  request.fired_at = at;
+  request.vehicle_in_world = context_.world.vehicle_at(config_.vehicle, at);
+  request.sonar_in_world = compose(request.vehicle_in_world, config_.mount);
+  request.bodies_in_world = context_.world.objects_at(at);
+  request.water = context_.config.water;
+  request.settings = settings_;
+  request.settings_id = settings_id_;
+  request.sonar_id = index_;
+  request.seed = Seed(context_.config.seed);
+  request.blank = stale && on_stale == OnStale::blank;
+  request.switches = context_.config.engine.switches;
+  busy_ = true;
+  context_.simulator.submit(std::move(request), [this](Simulator::Outcome outcome) { on_ping(std::move(outcome)); });
+}
+
+void Device::on_ping(Simulator::Outcome outcome) {
+  busy_ = false;
+  ++figures_.pings;
+  figures_.simulation_s += outcome.seconds;
+  if (!outcome.ping) {
+    context_.on_failure("sonar " + config_.name + ": the ping engine failed: " + outcome.failure);
+  } else if (!stopping_ && !sessions_.empty()) {
+    const PingRequest& request = outcome.ping->request;
+    const auto bytes = vendor_.frame(*outcome.ping, state_, requests_[request.settings_id]);
+    const auto number = static_cast<std::uint32_t>(request.number);
+    const Time now = context_.clock.now();
+    for (const SessionPointer& s : sessions_) s->push_ping(bytes, number, now);
+    requests_.erase(requests_.begin(), requests_.find(std::min(settings_id_, request.settings_id)));
+    if (figures_.pings == 1) context_.log.debug("first ping simulated", {{"sonar", config_.name}, {"ms", outcome.seconds * 1e3}});
+  }
+  context_.on_change();
+}
+
+void Device::on_written(Session&, std::uint32_t number) {
+  if (number > last_served_) {
+    last_served_ = number;
+    ++figures_.served;
+  }
+  context_.on_change();
+}
+
+DeviceFigures Device::figures() const {
+  DeviceFigures f = figures_;
+  f.skipped_ticks = pacer_.skipped_ticks();
+  for (const SessionPointer& s : sessions_) f.dropped += s->outbox().pings_dropped();
+  return f;
+}
+
+std::vector<StreamDigest> Device::digests() const {
+  auto all = digests_;
+  std::sort(all.begin(), all.end(), [](const StreamDigest& a, const StreamDigest& b) { return a.client < b.client; });
+  return all;
+}
+
+// ---- beacon
+
+asio::awaitable<void> Device::announce() {
+  while (!stopping_) {
+    update_state(context_.clock.now());
+    const protocol::Bytes status = vendor_.beacon(state_, context_.clock.now());
+    for (const udp::endpoint& to : status_to_) {
+      error_code ec;
+      if (status.empty() || stopping_) break;
+      co_await beacon_.async_send_to(asio::buffer(status), to, into(ec));
+      if (stopping_) co_return;
+      if (ec && !std::exchange(beacon_failed_, true))
+        context_.log.warning("cannot send status: " + ec.message(), {{"sonar", config_.name}, {"to", to.address().to_string()}});
+    }
+    error_code ec;
+    beacon_timer_.expires_after(beacon_period_);
+    co_await beacon_timer_.async_wait(into(ec));
+  }
+}
+
+}  // namespace sonar

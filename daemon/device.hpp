@@ -1,0 +1,129 @@
+// One emulated sonar: its listener, its clients, its settings and its rhythm, and the beacon that announces it.
+// Owned by App; asks the World where it is and the Simulator for pings. I/O thread only.
+#pragma once
+
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/asio.hpp"
+#include "daemon/clock.hpp"
+#include "daemon/config.hpp"
+#include "daemon/log.hpp"
+#include "daemon/pacer.hpp"
+#include "daemon/session.hpp"
+#include "daemon/simulator.hpp"
+#include "daemon/world.hpp"
+
+namespace sonar {
+
+/// What all devices share; outlives them.
+struct DeviceContext {
+  asio::io_context& io;
+  Clock& clock;
+  World& world;
+  Simulator& simulator;
+  Log& log;
+  const Config& config;
+  bool digest = false;
+  std::function<void()> on_change;                         // something stepped time or the end may have waited for
+  std::function<void(const std::string& why)> on_failure;  // the engine failed: the daemon cannot go on
+};
+
+struct DeviceFigures {
+  std::uint64_t pings = 0;    // simulated
+  std::uint64_t served = 0;   // written whole to at least one client
+  std::uint64_t dropped = 0;  // whole pings a client was too slow for
+  std::uint64_t skipped_ticks = 0;
+  std::uint64_t clients = 0, refused_clients = 0;
+  double simulation_s = 0;  // wall time of all pings
+};
+struct StreamDigest {
+  std::uint64_t client = 0, bytes = 0;
+  std::string sha256;
+};
+
+class Device final : public SessionParent {
+ public:
+  Device(DeviceContext& context, const SonarConfig& config, std::uint32_t index);
+  ~Device() override;
+
+  /// Binds the TCP listener, then the socket of the beacon. Errors name the address and the next step.
+  Result<void> open();
+  void start();
+  /// Stop accepting, stop pinging, let every client have its current message whole and a FIN.
+  void stop();
+
+  // Stepped time: App asks and tells.
+  std::optional<Time> next_tick() const;
+  bool settled() const;  // no ping under way, every client has taken what it was sent
+  void step(Time now);
+  void tick_sessions(Time now);
+
+  bool gone() const;  // after stop(): nothing is left
+  const SonarConfig& config() const { return config_; }
+  DeviceFigures figures() const;
+  std::vector<StreamDigest> digests() const;
+  tcp::endpoint data_endpoint() const;
+  std::vector<udp::endpoint> status_destinations() const { return status_to_; }
+  const protocol::DeviceState& state() const { return state_; }
+  PingSettings initial_settings() const { return vendor_.initial_settings(state_).settings; }
+
+  void on_event(Session& from, const protocol::Event& event) override;
+  void on_written(Session& by, std::uint32_t ping) override;
+  void on_over(Session& session, const std::string& why) override;
+
+ private:
+  using SessionPointer = std::shared_ptr<Session>;
+
+  asio::awaitable<void> accept();
+  asio::awaitable<void> turn_away(tcp::socket socket);
+  asio::awaitable<void> announce();
+  void admit(tcp::socket socket);
+  void welcome(tcp::socket socket);
+  void on_membership();
+  void use_initial_settings();
+  void change_settings(Session& from, const protocol::ChangeSettings& change);
+  void arm();
+  void on_timer();
+  bool wants_pings() const;
+  void ping(Time at);
+  void on_ping(Simulator::Outcome outcome);
+  void update_state(Time now);
+
+  DeviceContext& context_;
+  const SonarConfig& config_;
+  const protocol::Vendor& vendor_;
+  std::uint32_t index_;
+  protocol::DeviceState state_;
+
+  tcp::acceptor acceptor_;
+  udp::socket beacon_;
+  asio::steady_timer beacon_timer_, ping_timer_;
+  std::chrono::milliseconds beacon_period_{0};
+  std::vector<udp::endpoint> status_to_;
+
+  std::list<SessionPointer> sessions_;  // oldest first
+  std::list<SessionPointer> leaving_;   // no longer counted as clients, still taking their last message
+  std::list<tcp::socket> queue_;        // connected, waiting for a place
+  int turning_away_ = 0;
+
+  Pacer pacer_;
+  PingSettings settings_;
+  std::uint64_t settings_id_ = 0;
+  std::map<std::uint64_t, protocol::Bytes> requests_;  // settings_id -> the client's own bytes, echoed in its pings
+  bool asked_ = false;                                 // a client that is still connected has sent settings
+  std::uint32_t ping_number_ = 0;
+  bool busy_ = false, stopping_ = false, beacon_failed_ = false;
+
+  DeviceFigures figures_;
+  std::uint32_t last_served_ = 0;
+  std::vector<StreamDigest> digests_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,16 @@
+// Opening listeners with errors that say what, where, why and what to do next (interfaces.md 5b).
+#pragma once
+
+#include "core/base/result.hpp"
+#include "daemon/asio.hpp"
+#include "daemon/config.hpp"
+
+namespace sonar {
+
+Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at);
+/// `broadcast`: may send to broadcast addresses.
+Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast);
+
+asio::ip::address_v4 address_of(Ipv4 ip);
+
+}  // namespace sonar

@@ -1,0 +1,102 @@
+#include "daemon/log.hpp"
+
+#include <spdlog/logger.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+
+#include <algorithm>
+
+namespace sonar {
+namespace {
+
+std::string json_string(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    const auto u = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (u < 0x20) {
+      constexpr std::string_view digits = "0123456789abcdef";
+      out += "\\u00";
+      out += digits[u >> 4];
+      out += digits[u & 15];
+    } else {
+      out += c;
+    }
+  }
+  out += '"';
+  return out;
+}
+
+/// Text from outside must not forge lines: control characters become '?', values with spaces are quoted.
+std::string plain(std::string_view text, bool quote_spaces) {
+  std::string out(text);
+  std::replace_if(
+      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  const bool quote = quote_spaces && (out.empty() || out.find_first_of(" \"=") != std::string::npos);
+  return quote ? json_string(out) : out;
+}
+
+std::string text_line(std::string_view phrase, const std::vector<LogField>& fields) {
+  std::string line = plain(phrase, false);
+  for (const LogField& f : fields) line.append("  ").append(f.key).append("=").append(plain(f.value, true));
+  return line;
+}
+std::string json_members(std::string_view phrase, const std::vector<LogField>& fields) {
+  std::string line = "\"message\":";
+  line.append(json_string(phrase));
+  for (const LogField& f : fields) line.append(",").append(json_string(f.key)).append(":").append(json_string(f.value));
+  return line;
+}
+
+spdlog::level::level_enum spdlog_level(LogLevel level) {
+  switch (level) {
+    case LogLevel::debug:
+      return spdlog::level::debug;
+    case LogLevel::info:
+      return spdlog::level::info;
+    case LogLevel::warning:
+      return spdlog::level::warn;
+    default:
+      return spdlog::level::err;
+  }
+}
+
+}  // namespace
+
+struct Log::Sink {
+  spdlog::logger logger{"sonard", std::make_shared<spdlog::sinks::stderr_color_sink_st>()};
+};
+
+Log::Log(LogOptions options) : options_(std::move(options)) {
+  if (options_.sink) return;
+  sink_ = std::make_unique<Sink>();
+  sink_->logger.set_level(spdlog::level::debug);  // filtered below, by our own level
+  sink_->logger.set_pattern(options_.json ? R"({"time":"%Y-%m-%dT%H:%M:%S.%f%z","level":"%l",%v})"
+                                          : "%Y-%m-%d %H:%M:%S.%e %^%l%$  %v");
+}
+Log::~Log() = default;
+
+void Log::write(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields) {
+  if (level < options_.level) return;
+  if (options_.sink) {
+    options_.sink(level, text_line(phrase, fields));
+    return;
+  }
+  sink_->logger.log(spdlog_level(level),
+                    spdlog::string_view_t(options_.json ? json_members(phrase, fields) : text_line(phrase, fields)));
+}
+
+bool LogLimiter::allows(Clock::time_point now, std::uint64_t& unsaid) {
+  if (last_ != Clock::time_point{}) tokens_ = std::min(5.0, tokens_ + std::chrono::duration<double>(now - last_).count());
+  last_ = now;
+  if (tokens_ < 1) {
+    ++swallowed_;
+    return false;
+  }
+  tokens_ -= 1;
+  unsaid = std::exchange(swallowed_, 0);
+  return true;
+}
+
+}  // namespace sonar

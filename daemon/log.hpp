@@ -1,0 +1,58 @@
+// One line per event: a short phrase, then key=value. The only way the daemon speaks after its banner; spdlog is behind it.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+namespace sonar {
+
+enum class LogLevel { debug, info, warning, error };
+
+struct LogOptions {
+  LogLevel level = LogLevel::info;
+  bool json = false;
+  std::function<void(LogLevel, const std::string&)> sink;  // instead of stderr: tests
+};
+
+struct LogField {
+  std::string key, value;
+  LogField(std::string_view k, std::string_view v) : key(k), value(v) {}
+  template <class T, class = std::enable_if_t<std::is_arithmetic_v<T>>>
+  LogField(std::string_view k, T v) : key(k), value(std::to_string(v)) {}
+};
+
+class Log {
+ public:
+  explicit Log(LogOptions options = {});
+  ~Log();
+  void debug(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::debug, phrase, fields); }
+  void info(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::info, phrase, fields); }
+  void warning(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::warning, phrase, fields); }
+  void error(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::error, phrase, fields); }
+
+ private:
+  void write(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields);
+  LogOptions options_;
+  struct Sink;
+  std::unique_ptr<Sink> sink_;
+};
+
+/// For what an outsider can provoke: five lines at once, then one a second.
+class LogLimiter {
+ public:
+  using Clock = std::chrono::steady_clock;
+  /// True: say it. `unsaid` receives how many were swallowed since the last line.
+  bool allows(Clock::time_point now, std::uint64_t& unsaid);
+
+ private:
+  double tokens_ = 5;
+  Clock::time_point last_{};
+  std::uint64_t swallowed_ = 0;
+};
+
+}  // namespace sonar

@@ -1,0 +1,131 @@
+// sonard: reads the configuration, loads the scene, builds the engine and runs the App. The only place that knows all of them.
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <thread>
+
+#include "core/scene/load_scene.hpp"
+#include "daemon/app.hpp"
+#include "daemon/banner.hpp"
+#include "daemon/bench.hpp"
+#include "daemon/command_line.hpp"
+
+namespace sonar {
+namespace {
+
+using Steady = std::chrono::steady_clock;
+constexpr int compute_niceness = 10;
+
+double seconds_since(Steady::time_point begin) { return std::chrono::duration<double>(Steady::now() - begin).count(); }
+
+int complain(const Error& error) {
+  std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
+  return exit_code(error.kind);
+}
+
+struct Found {
+  Config config;
+  std::string how;  // for the banner
+};
+Result<Found> find_config(const RunCommand& command) {
+  const auto found = [](Result<Config> config, std::string how) -> Result<Found> {
+    if (!config) return tl::make_unexpected(config.error());
+    return Found{*std::move(config), std::move(how)};
+  };
+  if (command.demo) return found(demo_config(), "built-in demo");
+  if (!command.config.empty()) return found(load_config(command.config), command.config);
+  std::string looked;
+  for (const auto& place : config_search_path()) {
+    std::error_code ec;
+    if (std::filesystem::exists(place, ec)) return found(load_config(place), place.string());
+    looked += (looked.empty() ? "" : ", ") + place.string();
+  }
+  return found(demo_config(), "none found (looked in " + looked + ") -> demo");
+}
+
+Result<void> override_config(Config& config, const RunCommand& command) {
+  if (!command.clock.empty()) config.clock = command.clock == "stepped" ? ClockMode::stepped : ClockMode::realtime;
+  if (command.threads) config.engine.threads = *command.threads;
+  if (command.seed) config.seed = *command.seed;
+  if (command.simd == "auto") config.engine.simd = SimdLevel::automatic;
+  if (command.simd == "portable") config.engine.simd = SimdLevel::portable;
+  if (command.simd == "avx2") config.engine.simd = SimdLevel::avx2;
+  if (command.simd == "avx512") config.engine.simd = SimdLevel::avx512;
+  if (!command.log_format.empty()) config.log.json = command.log_format == "json";
+  if (command.log_level == "debug") config.log.level = LogLevel::debug;
+  if (command.log_level == "info") config.log.level = LogLevel::info;
+  if (command.log_level == "warning") config.log.level = LogLevel::warning;
+  if (command.log_level == "error") config.log.level = LogLevel::error;
+  if (!command.bind.empty()) {
+    const auto ip = parse_ipv4(command.bind);
+    if (!ip) return failure(ErrorKind::usage, "--bind: " + ip.error().text);
+    config.sonars.front().bind_ip = config.sonars.front().advertise_ip = *ip;
+  }
+  return {};
+}
+
+int compute_threads(const EngineConfig& engine) {
+  if (engine.threads > 0) return engine.threads;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+int run(const RunCommand& command, Steady::time_point begin) {
+  auto found = find_config(command);
+  if (!found) return complain(found.error());
+  Config config = std::move(found->config);
+  if (const auto r = override_config(config, command); !r) return complain(r.error());
+  const auto scene_begin = Steady::now();
+  const auto scene = load_scene(config.scene);
+  if (!scene) return complain(scene.error());
+
+  Log log(config.log);
+  Parallel pool(compute_threads(config.engine), compute_niceness);  // outlives the engine inside App
+  const EngineOptions engine_options{config.engine.simd};
+  const auto make_engine = [&](std::shared_ptr<const Scene> s) { return make_cpu_engine(std::move(s), pool, engine_options); };
+  App app(std::move(config), *scene, make_engine, {command.exit_after_pings, command.digest, true}, log);
+  const double scene_ms = 1e3 * seconds_since(scene_begin);
+  if (const auto r = app.open(); !r) return complain(r.error());
+  std::fputs(banner(app, {found->how, scene_ms}).c_str(), stderr);
+  std::fputs(ready_line(app, seconds_since(begin)).c_str(), stderr);
+
+  const int code = app.run();
+  std::fputs(summary(app).c_str(), stderr);
+  std::fputs(digest_lines(app).c_str(), stdout);
+  return code;
+}
+
+int check(const CheckCommand& command) {
+  const auto config = load_config(command.config);
+  if (!config) return complain(config.error());
+  const auto scene = load_scene(config->scene);
+  if (!scene) return complain(scene.error());
+  std::printf("%s: ok, %zu sonar(s); scene %s: ok, %zu triangles\n", command.config.c_str(), config->sonars.size(),
+              config->scene.string().c_str(), (*scene)->triangle_count());
+  return 0;
+}
+
+int bench(const BenchCommand& command) {
+  std::vector<char*> arguments;
+  std::vector<std::string> words = command.arguments;
+  for (std::string& w : words) arguments.push_back(w.data());
+  arguments.push_back(nullptr);
+  return run_bench(static_cast<int>(words.size()), arguments.data());
+}
+
+}  // namespace
+}  // namespace sonar
+
+int main(int argc, char** argv) {
+  const auto begin = std::chrono::steady_clock::now();
+  try {
+    const sonar::Command command = sonar::parse_command_line(argc, argv);
+    if (const auto* leave = std::get_if<sonar::Leave>(&command)) return leave->exit_code;
+    if (const auto* check = std::get_if<sonar::CheckCommand>(&command)) return sonar::check(*check);
+    if (const auto* bench = std::get_if<sonar::BenchCommand>(&command)) return sonar::bench(*bench);
+    return sonar::run(std::get<sonar::RunCommand>(command), begin);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "sonard: %s (this is a bug, please report it)\n", e.what());
+    return sonar::exit_code(sonar::ErrorKind::bug);
+  }
+}

@@ -1,0 +1,188 @@
+#include "daemon/session.hpp"
+
+#include <netinet/tcp.h>
+
+#include <algorithm>
+
+namespace sonar {
+namespace {
+
+// Bytes the kernel may hold that are not yet on the wire. More would only make a slow client's picture older.
+constexpr int unsent_limit_bytes = 256 * 1024;
+constexpr auto idle_watch = std::chrono::seconds(1);
+
+void prepare(tcp::socket& socket) {
+  error_code ec;  // a refused option costs smoothness, not correctness
+  socket.set_option(tcp::no_delay(true), ec);
+  socket.set_option(asio::socket_base::keep_alive(true), ec);
+  using UnsentLimit = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
+  socket.set_option(UnsentLimit(unsent_limit_bytes), ec);
+}
+
+}  // namespace
+
+Session::Session(SessionParent& parent, const Clock& clock, tcp::socket socket, std::unique_ptr<protocol::Dialogue> dialogue,
+                 const Setup& setup)
+    : parent_(parent),
+      clock_(clock),
+      socket_(std::move(socket)),
+      dialogue_(std::move(dialogue)),
+      setup_(setup),
+      outbox_(setup.outbox),
+      wake_writer_(socket_.get_executor(), Steady::time_point::max()),
+      wake_watch_(socket_.get_executor()) {
+  error_code ec;
+  peer_ = socket_.remote_endpoint(ec);
+  client_ = peer_.address().to_string() + ":" + std::to_string(peer_.port());
+  prepare(socket_);
+}
+
+protocol::Ipv4 Session::client_ip() const {
+  return peer_.address().is_v4() ? peer_.address().to_v4().to_bytes() : protocol::Ipv4{};
+}
+
+void Session::start() {
+  const auto executor = socket_.get_executor();
+  const auto self = shared_from_this();
+  asio::co_spawn(
+      executor, [self]() -> asio::awaitable<void> { return self->read(); }, asio::detached);
+  asio::co_spawn(
+      executor, [self]() -> asio::awaitable<void> { return self->write(); }, asio::detached);
+  asio::co_spawn(
+      executor, [self]() -> asio::awaitable<void> { return self->watch(); }, asio::detached);
+}
+
+asio::awaitable<void> Session::read() {
+  const auto self = shared_from_this();
+  while (!over_) {
+    error_code ec;
+    const std::size_t n = co_await socket_.async_read_some(asio::buffer(received_), into(ec));
+    if (over_) co_return;
+    if (ec) {
+      over(finishing_ ? why_ : ec == asio::error::eof ? "closed by the client" : ec.message());
+      co_return;
+    }
+    if (!finishing_) handle(dialogue_->on_bytes(std::span(received_).first(n), clock_.now()));
+  }
+}
+
+void Session::handle(protocol::Reaction reaction) {
+  std::string close_why;
+  for (const protocol::Event& event : reaction.events) {
+    if (const auto* close = std::get_if<protocol::Close>(&event))
+      close_why = close->why;
+    else
+      parent_.on_event(*this, event);
+    if (over_) return;
+  }
+  for (protocol::Bytes& reply : reaction.replies)
+    if (!outbox_.push_reply(std::move(reply))) return reset("asks faster than it reads the answers");
+  if (!close_why.empty()) return finish(close_why);
+  wake_writer_.cancel();
+  wake_watch_.cancel();
+}
+
+asio::awaitable<bool> Session::write_whole(std::shared_ptr<const protocol::Bytes> bytes) {
+  std::size_t done = 0;
+  while (done < bytes->size()) {
+    error_code ec;
+    const std::size_t n = co_await socket_.async_write_some(asio::buffer(bytes->data() + done, bytes->size() - done), into(ec));
+    if (over_) co_return false;
+    if (ec) {
+      over(ec.message());
+      co_return false;
+    }
+    if (setup_.digest) digest_.add(std::span(*bytes).subspan(done, n));
+    done += n;
+    progress_at_ = Steady::now();
+  }
+  co_return true;
+}
+
+asio::awaitable<void> Session::write() {
+  const auto self = shared_from_this();
+  while (!over_) {
+    const Outbox::Message message = outbox_.take();
+    error_code ec;
+    if (message) {
+      writing_ = true;
+      progress_at_ = Steady::now();
+      if (!co_await write_whole(message.bytes)) co_return;
+      writing_ = false;
+      outbox_.written();
+      parent_.on_written(*this, message.ping);
+    } else if (finishing_) {
+      socket_.shutdown(tcp::socket::shutdown_send, ec);
+      said_goodbye_ = true;  // the reader waits for the client's own goodbye, the watch for the deadline
+      co_return;
+    } else {
+      co_await wake_writer_.async_wait(into(ec));
+    }
+  }
+}
+
+Session::Steady::time_point Session::watch_until() const {
+  auto until = Steady::now() + idle_watch;
+  if (finishing_) until = std::min(until, finish_by_);
+  if (!finishing_ && !clock_.stepped()) until = std::min(until, clock_.timer_at(dialogue_->next_tick()));
+  return until;
+}
+
+asio::awaitable<void> Session::watch() {
+  const auto self = shared_from_this();
+  while (!over_) {
+    wake_watch_.expires_at(watch_until());
+    error_code ec;
+    co_await wake_watch_.async_wait(into(ec));
+    if (over_) co_return;
+    const auto now = Steady::now();
+    if (finishing_ && now >= finish_by_) {
+      if (!said_goodbye_) reset("did not take its last message in time");
+      over(why_);
+    } else if (writing_ && now - progress_at_ > stall_limit) {
+      reset("took no byte for 10 s");
+    } else if (!finishing_ && !clock_.stepped()) {
+      tick(clock_.now());
+    }
+  }
+}
+
+void Session::tick(Time now) {
+  if (over_ || finishing_ || now < dialogue_->next_tick()) return;
+  handle(dialogue_->on_tick(now));
+}
+
+void Session::push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, std::uint32_t number, Time now) {
+  if (over_ || finishing_) return;
+  outbox_.push_ping(bytes, number);
+  dialogue_->on_ping_queued(now);
+  wake_writer_.cancel();
+}
+
+void Session::finish(std::string why) {
+  if (over_ || finishing_) return;
+  finishing_ = true;
+  why_ = std::move(why);
+  finish_by_ = Steady::now() + finish_limit;
+  outbox_.drop_waiting_pings();
+  wake_writer_.cancel();
+  wake_watch_.cancel();
+}
+
+void Session::reset(std::string why) {
+  if (over_) return;
+  error_code ec;
+  socket_.set_option(asio::socket_base::linger(true, 0), ec);
+  over(std::move(why));
+}
+
+void Session::over(std::string why) {
+  if (std::exchange(over_, true)) return;
+  error_code ec;
+  socket_.close(ec);
+  wake_writer_.cancel();
+  wake_watch_.cancel();
+  parent_.on_over(*this, why);
+}
+
+}  // namespace sonar

@@ -1,0 +1,94 @@
+// One connected client: its socket, its conversation and its outbox. Two coroutines read and write, a timer keeps watch.
+// Owned by its Device's list and by its own coroutines; it tells the Device once when it is over.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "daemon/asio.hpp"
+#include "daemon/clock.hpp"
+#include "daemon/log.hpp"
+#include "daemon/outbox.hpp"
+#include "daemon/sha256.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+class Session;
+
+/// What a session needs from its parent, which outlives it.
+class SessionParent {
+ public:
+  virtual ~SessionParent() = default;
+  /// Settings, triggers and stored addresses; replies, notices and Close are the session's own business.
+  virtual void on_event(Session& from, const protocol::Event& event) = 0;
+  /// A message has been handed to the kernel whole; `ping` is its number or 0.
+  virtual void on_written(Session& by, std::uint32_t ping) = 0;
+  virtual void on_over(Session& session, const std::string& why) = 0;
+};
+
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  struct Setup {
+    OutboxRules outbox;
+    bool digest = false;
+    std::uint64_t number = 0;  // of the client, counted per sonar from 1
+  };
+  /// Longest time a client may take no byte of a message being written; then it is reset.
+  static constexpr std::chrono::seconds stall_limit{10};
+  /// Longest time a client may take for its last message after finish(); then it is reset.
+  static constexpr std::chrono::milliseconds finish_limit{1500};
+
+  Session(SessionParent& parent, const Clock& clock, tcp::socket socket, std::unique_ptr<protocol::Dialogue> dialogue,
+          const Setup& setup);
+
+  void start();
+  void push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, std::uint32_t number, Time now);
+  /// Stepped time: the keep-alives that are due at `now`.
+  void tick(Time now);
+  /// No more messages after the one being written; then FIN. Reset if the client does not take it in time.
+  void finish(std::string why);
+  /// At once, without goodbye.
+  void reset(std::string why);
+
+  bool idle() const { return outbox_.idle(); }
+  const Outbox& outbox() const { return outbox_; }
+  const Sha256& digest() const { return digest_; }
+  std::uint64_t number() const { return setup_.number; }
+  protocol::Ipv4 client_ip() const;
+  std::string client() const { return client_; }  // "127.0.0.1:40123"
+  LogLimiter& log_limiter() { return log_limiter_; }
+
+ private:
+  using Steady = std::chrono::steady_clock;
+
+  asio::awaitable<void> read();
+  asio::awaitable<void> write();
+  asio::awaitable<void> watch();
+  asio::awaitable<bool> write_whole(std::shared_ptr<const protocol::Bytes> bytes);
+  void handle(protocol::Reaction reaction);
+  Steady::time_point watch_until() const;
+  void over(std::string why);
+
+  SessionParent& parent_;
+  const Clock& clock_;
+  tcp::socket socket_;
+  tcp::endpoint peer_;
+  std::string client_;
+  std::unique_ptr<protocol::Dialogue> dialogue_;
+  Setup setup_;
+  Outbox outbox_;
+  Sha256 digest_;
+  LogLimiter log_limiter_;
+  asio::steady_timer wake_writer_, wake_watch_;
+  std::array<std::byte, 8192> received_{};
+  Steady::time_point progress_at_{};  // a byte went out, while writing
+  Steady::time_point finish_by_{};
+  bool writing_ = false, finishing_ = false, said_goodbye_ = false, over_ = false;
+  std::string why_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,36 @@
+#include "daemon/simulator.hpp"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <exception>
+
+namespace sonar {
+
+Simulator::Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, int nice_by)
+    : io_(io), engine_(std::move(engine)) {
+  asio::post(thread_, [nice_by] {
+    // Niceness belongs to the thread on Linux; a refusal costs only smoothness.
+    if (nice_by != 0 && ::nice(nice_by) == -1) return;
+  });
+}
+
+Simulator::~Simulator() { thread_.join(); }
+
+void Simulator::submit(PingRequest request, Done done) {
+  auto work = asio::make_work_guard(io_);
+  asio::post(thread_, [this, work = std::move(work), request = std::move(request), done = std::move(done)]() mutable {
+    Outcome outcome;
+    const auto begin = std::chrono::steady_clock::now();
+    try {
+      auto pings = engine_->run({&request, 1});
+      outcome.ping = std::make_shared<const Ping>(std::move(pings.at(0)));
+    } catch (const std::exception& e) {
+      outcome.failure = e.what();
+    }
+    outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    asio::post(io_, [outcome = std::move(outcome), done = std::move(done)]() mutable { done(std::move(outcome)); });
+  });
+}
+
+}  // namespace sonar

@@ -1,0 +1,40 @@
+// The simulation thread: one thread that owns the ping engine and computes one request after the other.
+// Requests go over by value, finished pings come back on the I/O thread; nothing else is shared.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/pipeline/ping_engine.hpp"
+#include "daemon/asio.hpp"
+
+namespace sonar {
+
+class Simulator {
+ public:
+  struct Outcome {
+    std::shared_ptr<const Ping> ping;  // null on failure
+    std::string failure;
+    double seconds = 0;  // of wall time it took
+  };
+  using Done = std::function<void(Outcome)>;
+
+  /// `nice_by` is added to the thread's niceness, as for the workers of the engine's pool.
+  Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, int nice_by);
+  /// Waits for the ping under way.
+  ~Simulator();
+  Simulator(const Simulator&) = delete;
+  Simulator& operator=(const Simulator&) = delete;
+
+  /// I/O thread. `done` is called there; the I/O thread stays alive until it was.
+  void submit(PingRequest request, Done done);
+  const PingEngine& engine() const { return *engine_; }
+
+ private:
+  asio::io_context& io_;
+  std::unique_ptr<PingEngine> engine_;
+  asio::thread_pool thread_{1};
+};
+
+}  // namespace sonar
