@@ -1,0 +1,36 @@
+// Small worlds made in code for the oracles: flat and rough beds, walls, boxes, spheres, points.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "core/scene/scene.hpp"
+
+namespace sonar::test {
+
+/// Height field z(x, y) over a rectangle, two triangles a square of about `step_m`.
+Mesh height_field(double x0, double x1, double y0, double y1, double step_m, const std::function<double(double, double)>& z);
+/// Wall in the plane x = 0, facing -x and +x alike.
+Mesh wall(double half_width_m, double half_height_m);
+/// Axis-aligned box about the origin.
+Mesh box(Vec3d half_size_m);
+/// Sphere about the origin: an octahedron halved `halvings` times, vertices on the sphere (8 * 4^halvings triangles).
+Mesh sphere(double radius_m, int halvings);
+
+/// Relief made of `waves` plane waves of random direction, wavelength 0.3 to 3 m and slope; rms height given. Same for ever.
+std::function<double(double, double)> rough_relief(double rms_height_m, int waves);
+
+/// Builds scenes piece by piece; every object gets its own material.
+class SceneMaker {
+ public:
+  SceneMaker& add(Mesh mesh, double lambert_db, Vec3d position_m = {}, Quatd orientation = {});
+  SceneMaker& add_body(Mesh mesh, double lambert_db, Pose in_world);  // the next moving body
+  SceneMaker& add_point(Vec3d position_m, double target_strength_db);
+  std::shared_ptr<const Scene> make() const { return std::make_shared<const Scene>(scene_); }
+
+ private:
+  std::uint16_t add_material(double lambert_db);
+  Scene scene_;
+};
+
+}  // namespace sonar::test
