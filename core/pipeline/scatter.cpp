@@ -104,16 +104,24 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   return g;
 }
 
-std::size_t scatter(const std::vector<TileToSound>& tiles, std::size_t from, const simd::GroupView& group,
-                    const simd::Kernels& kernels, Echoes& echoes) {
-  for (; from < tiles.size(); ++from) {
-    const TileToSound& t = tiles[from];
-    if (t.first_column >= group.last_column || t.last_column <= group.first_column) continue;
-    if (echoes.count + t.seen.tile->count > echoes.capacity()) {
+void sort_tiles(const std::vector<TileToSound>& tiles, int group_columns, int groups,
+                std::vector<std::vector<std::uint32_t>>& by_group) {
+  by_group.resize(static_cast<std::size_t>(groups));
+  for (auto& wanted : by_group) wanted.clear();
+  for (std::size_t i = 0; i < tiles.size(); ++i)
+    for (int g = tiles[i].first_column / group_columns; g * group_columns < tiles[i].last_column && g < groups; ++g)
+      by_group[static_cast<std::size_t>(g)].push_back(static_cast<std::uint32_t>(i));
+}
+
+std::size_t scatter(const std::vector<TileToSound>& tiles, std::span<const std::uint32_t> wanted, std::size_t from,
+                    const simd::GroupView& group, const simd::Kernels& kernels, Echoes& echoes) {
+  for (; from < wanted.size(); ++from) {
+    const simd::TileSeen& seen = tiles[wanted[from]].seen;
+    if (echoes.count + seen.tile->count > echoes.capacity()) {
       if (echoes.count > 0) break;
-      echoes.reserve(t.seen.tile->count);
+      echoes.reserve(seen.tile->count);
     }
-    echoes.count += kernels.scatter_tile(t.seen, group, echoes.at(echoes.count));
+    echoes.count += kernels.scatter_tile(seen, group, echoes.at(echoes.count));
   }
   return from;
 }

@@ -9,6 +9,8 @@ constexpr int group_columns = 48;   // columns one worker carries from rays to s
 constexpr int window_samples = 64;  // samples one worker carries from coupling to codes
 constexpr int echo_room = 16384;
 
+int groups_of(const PingPlan& plan) { return (plan.columns.count + group_columns - 1) / group_columns; }
+
 /// Adds the time since it was made, or last told, to a stage.
 class Stopwatch {
  public:
@@ -46,6 +48,7 @@ void find_tiles(SurfaceCells& cells, const Scene& scene, const PingRequest& requ
   const auto& in_view = cells.in_view(view, pool);
   watch.lap(cells.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
   prepare_tiles(in_view, cells, scene, plan, scalars, pool, w.tiles);
+  sort_tiles(w.tiles, group_columns, groups_of(plan), w.tiles_by_group);
   watch.lap(Stage::cull);
   w.statistics.tiles = in_view.size();
   w.statistics.tiles_built = cells.built_last_time();
@@ -71,8 +74,9 @@ void sound_cells(const RayScene& scene, const PingScalars& scalars, const simd::
   mine.statistics.rays += trace_fan(scene, w.plan, scalars, first, last, mine.fan, mine.seen);
   watch.lap(Stage::trace);
   const simd::GroupView group = make_group_view(w.plan, scalars, mine.seen);
-  for (std::size_t tile = 0; tile < w.tiles.size();) {
-    tile = scatter(w.tiles, tile, group, kernels, mine.echoes);
+  const auto& wanted = w.tiles_by_group[static_cast<std::size_t>(first / group_columns)];
+  for (std::size_t next = 0; next < wanted.size();) {
+    next = scatter(w.tiles, wanted, next, group, kernels, mine.echoes);
     mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
     watch.lap(Stage::scatter);
     synthesize(mine.echoes, w.plan.pulse(), kernels, w.columns);
@@ -145,7 +149,7 @@ Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& req
   }
 
   const int columns = w.plan.columns.count;
-  pool.for_each(static_cast<std::size_t>((columns + group_columns - 1) / group_columns), [&](std::size_t g, int worker) {
+  pool.for_each(static_cast<std::size_t>(groups_of(w.plan)), [&](std::size_t g, int worker) {
     const int first = static_cast<int>(g) * group_columns;
     sound_group(scene, request, scalars, kernels, first, std::min(first + group_columns, columns), w,
                 w.workers[static_cast<std::size_t>(worker)]);

@@ -24,6 +24,7 @@ struct Workspace {
   bool has_plan = false;
   NoiseTable noise;
   std::vector<TileToSound> tiles;
+  std::vector<std::vector<std::uint32_t>> tiles_by_group;
   std::vector<PointEcho> points;
   ColumnSignals columns;
   struct PerWorker {

@@ -1,6 +1,7 @@
 #include "core/pipeline/trace_fan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace sonar {
@@ -9,24 +10,41 @@ namespace {
 constexpr int edge_depth = 4;  // edges are found to 1/16 of a base interval
 constexpr int deepest = 6;     // a surface that still will not interpolate hides itself
 
-/// Sixteen rays on their way: fills a packet lane by lane and remembers who asked.
+/// An elevation about the array axis, with what is derived from it once.
+struct Elevation {
+  float angle_rad, cosine, sine;
+};
+Elevation elevation_at(float angle_rad) { return {angle_rad, std::cos(angle_rad), std::sin(angle_rad)}; }
+
+/// A column's direction sine u, and sqrt(1 - u^2).
+struct ColumnSine {
+  float along, across;
+};
+std::vector<ColumnSine> column_sines(const Columns& columns, int first, int last) {
+  std::vector<ColumnSine> sines;
+  for (int k = first; k < last; ++k) {
+    const double u = columns.sine(k);
+    sines.push_back({static_cast<float>(u), static_cast<float>(std::sqrt(std::max(0.0, 1 - u * u)))});
+  }
+  return sines;
+}
+
+/// Sixteen rays on their way: fills a packet lane by lane. Rays decide shadows only, so float directions do.
 class PacketFiller {
  public:
-  PacketFiller(const PingScalars& scalars, float far_m) : scalars_(scalars), far_m_(far_m) {}
+  PacketFiller(const PingScalars& scalars, float far_m) : origin_(scalars.position_in_scene), far_m_(far_m) {
+    for (int i = 0; i < 9; ++i) m_[i] = static_cast<float>(scalars.world_from_sonar.m[i / 3][i % 3]);
+  }
 
-  int count() const { return count_; }
-  bool full() const { return count_ == RayPacket::size; }
-  void add(double sine, float elevation_rad) {
+  void add(ColumnSine column, Elevation e) {
     const auto i = static_cast<std::size_t>(count_++);
-    const double across = std::sqrt(std::max(0.0, 1 - sine * sine)), e = static_cast<double>(elevation_rad);
-    const double x = across * std::cos(e), y = sine, z = across * std::sin(e);
-    const auto& m = scalars_.world_from_sonar.m;
-    packet.direction_x[i] = static_cast<float>(m[0][0] * x + m[0][1] * y + m[0][2] * z);
-    packet.direction_y[i] = static_cast<float>(m[1][0] * x + m[1][1] * y + m[1][2] * z);
-    packet.direction_z[i] = static_cast<float>(m[2][0] * x + m[2][1] * y + m[2][2] * z);
-    packet.origin_x[i] = scalars_.position_in_scene.x;
-    packet.origin_y[i] = scalars_.position_in_scene.y;
-    packet.origin_z[i] = scalars_.position_in_scene.z;
+    const float x = column.across * e.cosine, y = column.along, z = column.across * e.sine;
+    packet.direction_x[i] = m_[0] * x + m_[1] * y + m_[2] * z;
+    packet.direction_y[i] = m_[3] * x + m_[4] * y + m_[5] * z;
+    packet.direction_z[i] = m_[6] * x + m_[7] * y + m_[8] * z;
+    packet.origin_x[i] = origin_.x;
+    packet.origin_y[i] = origin_.y;
+    packet.origin_z[i] = origin_.z;
     packet.far[i] = far_m_;
   }
   void trace(const RayScene& scene) {
@@ -39,8 +57,9 @@ class PacketFiller {
   std::size_t traced = 0;
 
  private:
-  const PingScalars& scalars_;
+  Vec3 origin_;
   float far_m_;
+  float m_[9];
   int count_ = 0;
 };
 
@@ -54,8 +73,8 @@ class FanTracer {
         last_(last),
         s_(scratch) {
     tolerance_m_ = plan.settings.pulse_width_m;
-    for (int k = first; k < last; ++k)
-      across_.push_back(static_cast<float>(std::sqrt(std::max(0.0, 1 - std::pow(plan.columns.sine(k), 2)))));
+    columns_ = column_sines(plan.columns, first, last);
+    for (const float angle : plan.fan.elevation_rad) base_.push_back(elevation_at(angle));
   }
 
   std::size_t run(DepthMap& seen) {
@@ -70,18 +89,20 @@ class FanTracer {
   using Sample = FanScratch::Sample;
   using Interval = FanScratch::Interval;
 
+  ColumnSine column(int k) const { return columns_[static_cast<std::size_t>(k)]; }
   Sample& at(std::int32_t i) { return s_.samples[static_cast<std::size_t>(i)]; }
-  int elevations() const { return static_cast<int>(plan_.fan.elevation_rad.size()); }
+  int elevations() const { return static_cast<int>(base_.size()); }
 
-  /// Turns lane i of the packet into the sample it was traced for.
-  void take(int lane, float elevation, float column_across, Sample& sample) const {
+  /// Turns a lane of the packet into the sample it was traced for.
+  void take(int lane, Elevation e, ColumnSine column, Sample& sample) const {
     const auto i = static_cast<std::size_t>(lane);
-    sample.elevation_rad = elevation;
-    sample.tangent = std::tan(elevation);
+    const bool hit = filler_.packet.object[i] != RayPacket::miss;
+    sample.elevation_rad = e.angle_rad;
+    sample.forward = column.across * e.cosine;
+    sample.tangent = e.sine / e.cosine;
     sample.object = filler_.packet.object[i];
-    sample.range_m = sample.object == RayPacket::miss ? 0 : filler_.packet.far[i];
-    sample.inverse_x =
-        sample.object == RayPacket::miss ? 0 : 1.0f / std::max(sample.range_m * column_across * std::cos(elevation), 1e-4f);
+    sample.range_m = hit ? filler_.packet.far[i] : 0;
+    sample.inverse_x = hit ? 1.0f / std::max(sample.range_m * sample.forward, 1e-4f) : 0;
   }
 
   /// Elevation by elevation, sixteen neighbouring columns a packet: neighbours in a packet lie a fraction of a degree apart.
@@ -89,15 +110,15 @@ class FanTracer {
     const int n = elevations();
     s_.samples.resize(static_cast<std::size_t>(last_ - first_) * static_cast<std::size_t>(n));
     for (int e = 0; e < n; ++e) {
-      const float elevation = plan_.fan.elevation_rad[static_cast<std::size_t>(e)];
+      const Elevation elevation = base_[static_cast<std::size_t>(e)];
       for (int from = first_; from < last_; from += RayPacket::size) {
         const int to = std::min(from + RayPacket::size, last_);
         filler_.clear();
-        for (int k = from; k < to; ++k) filler_.add(plan_.columns.sine(k), elevation);
+        for (int k = from; k < to; ++k) filler_.add(column(k - first_), elevation);
         filler_.trace(scene_);
         for (int k = from; k < to; ++k) {
           const std::int32_t index = (k - first_) * n + e;
-          take(k - from, elevation, across_[static_cast<std::size_t>(k - first_)], at(index));
+          take(k - from, elevation, column(k - first_), at(index));
           at(index).next = e + 1 < n ? index + 1 : -1;
           at(index).edge_above = false;
         }
@@ -128,40 +149,40 @@ class FanTracer {
 
   void halve_intervals() {
     s_.halves.clear();
+    std::array<Elevation, RayPacket::size> middle;
     for (std::size_t from = 0; from < s_.open.size(); from += RayPacket::size) {
-      const std::size_t to = std::min(from + RayPacket::size, s_.open.size());
+      const std::size_t n = std::min<std::size_t>(RayPacket::size, s_.open.size() - from);
       filler_.clear();
-      for (std::size_t i = from; i < to; ++i) filler_.add(plan_.columns.sine(first_ + s_.open[i].column), middle_of(s_.open[i]));
+      for (std::size_t i = 0; i < n; ++i) {
+        const Interval& v = s_.open[from + i];
+        middle[i] = elevation_at(0.5f * (at(v.below).elevation_rad + at(v.above).elevation_rad));
+        filler_.add(column(v.column), middle[i]);
+      }
       filler_.trace(scene_);
-      for (std::size_t i = from; i < to; ++i) insert(s_.open[i], static_cast<int>(i - from));
+      for (std::size_t i = 0; i < n; ++i) insert(s_.open[from + i], middle[i], static_cast<int>(i));
     }
     std::swap(s_.open, s_.halves);
   }
 
-  float middle_of(const Interval& v) { return 0.5f * (at(v.below).elevation_rad + at(v.above).elevation_rad); }
-
-  void insert(const Interval& v, int lane) {
-    const float across = across_[static_cast<std::size_t>(v.column)];
-    const float elevation = middle_of(v);
+  void insert(const Interval& v, Elevation elevation, int lane) {
     const auto middle = static_cast<std::int32_t>(s_.samples.size());
     s_.samples.emplace_back();
-    take(lane, elevation, across, at(middle));
+    take(lane, elevation, column(v.column), at(middle));
     at(middle).next = v.above;
     at(middle).edge_above = false;
     at(v.below).next = middle;
     at(v.below).edge_above = false;
-    if (lies_between(at(v.below), at(middle), at(v.above), across)) return;
+    if (lies_between(at(v.below), at(middle), at(v.above))) return;
     consider(v.below, middle, v.column, v.depth + 1, s_.halves);
     consider(middle, v.above, v.column, v.depth + 1, s_.halves);
   }
 
   /// On a plane 1 / x is linear in the tangent; a middle that agrees to a pulse width needs no further look.
-  bool lies_between(const Sample& a, const Sample& m, const Sample& b, float across) const {
+  bool lies_between(const Sample& a, const Sample& m, const Sample& b) const {
     if (a.object != b.object || m.object != a.object) return false;
     const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
     const float expected_x = 1.0f / (a.inverse_x + part * (b.inverse_x - a.inverse_x));
-    const float expected_range = expected_x / (across * std::cos(m.elevation_rad));
-    return std::abs(expected_range - m.range_m) <= tolerance_m_;
+    return std::abs(expected_x / m.forward - m.range_m) <= tolerance_m_;
   }
 
   /// Linear between hits of one surface, the farther value across edges.
@@ -195,7 +216,8 @@ class FanTracer {
   int first_, last_;
   FanScratch& s_;
   float tolerance_m_ = 0;
-  std::vector<float> across_;
+  std::vector<ColumnSine> columns_;
+  std::vector<Elevation> base_;
 };
 
 }  // namespace
@@ -209,13 +231,15 @@ void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScal
                      std::vector<FanHit>& hits) {
   PacketFiller filler(scalars, static_cast<float>(scalars.max_range_m));
   const double step = 2 * plan.fan.half_angle_rad / rays;
+  const std::vector<ColumnSine> sines = column_sines(plan.columns, first, last);
   for (int column = first; column < last; ++column) {
-    if (std::abs(plan.columns.sine(column)) >= 1) continue;
+    const ColumnSine sine = sines[static_cast<std::size_t>(column - first)];
+    if (!(sine.across > 0)) continue;
     for (int from = 0; from < rays; from += RayPacket::size) {
       const int to = std::min(from + RayPacket::size, rays);
       const auto elevation = [&](int ray) { return static_cast<float>((ray + 0.5) * step - plan.fan.half_angle_rad); };
       filler.clear();
-      for (int ray = from; ray < to; ++ray) filler.add(plan.columns.sine(column), elevation(ray));
+      for (int ray = from; ray < to; ++ray) filler.add(sine, elevation_at(elevation(ray)));
       filler.trace(scene);
       for (int ray = from; ray < to; ++ray) {
         const auto i = static_cast<std::size_t>(ray - from);

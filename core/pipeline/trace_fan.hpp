@@ -20,7 +20,7 @@ struct DepthMap {
 /// Buffers of trace_fan that live from ping to ping; one per worker.
 struct FanScratch {
   struct Sample {
-    float elevation_rad, tangent, inverse_x, range_m;
+    float elevation_rad, tangent, forward, inverse_x, range_m;  // forward: x of the unit direction
     std::uint32_t object;
     std::int32_t next;  // the sample above in the same column, -1 = last
     bool edge_above;    // the interval up to `next` hides an edge: do not interpolate

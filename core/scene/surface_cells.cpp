@@ -154,8 +154,7 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
                 m[2][0] * q.x + m[2][1] * q.y + m[2][2] * q.z};
   const double range = length(p);
   if (range - radius > view.max_range_m) return;
-  const double ch = std::cos(view.max_elevation_rad), sh = std::sin(view.max_elevation_rad);
-  if (std::abs(p.z) * ch - p.x * sh > radius) return;
+  if (std::abs(p.z) * fan_cosine_ - p.x * fan_sine_ > radius) return;
   if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
 
   const double nearest = range - radius, farthest = range + radius;
@@ -179,6 +178,8 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
 const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
   assert(!view.levels.empty());
   ++now_;
+  fan_cosine_ = std::cos(static_cast<double>(view.max_elevation_rad));
+  fan_sine_ = std::sin(static_cast<double>(view.max_elevation_rad));
   in_view_.clear();
   wanted_.clear();
   rotations_.resize(scene_->objects.size());

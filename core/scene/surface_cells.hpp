@@ -87,6 +87,7 @@ class SurfaceCells {
   Seed seed_{};
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0;
+  double fan_cosine_ = 1, fan_sine_ = 0;  // of the last view's half angle
   std::vector<std::unique_ptr<Sheet>> sheets_;
   std::vector<Rotation> rotations_;
   std::vector<TileInView> in_view_;

@@ -1,5 +1,6 @@
 // Bodies of the hot loops, included once per instruction set inside a namespace of its own. Written as plain loops over short
 // arrays that the compiler turns into vector code; `lanes` is the width it should think in.
+// Loops that must become vector code stand in functions of their own: inlined into each other, compilers lose the thread.
 // The order of every sum is fixed, so a result depends on the instruction set but never on threads.
 
 inline float larger(float a, float b) { return a > b ? a : b; }
@@ -50,14 +51,15 @@ inline float exp2_of(float x) {
 inline constexpr int chunk = 256;
 
 struct Chunk {  // one stretch of a tile on its way through the loops below
-  alignas(64) float range[chunk], offset[chunk], cosine[chunk], sine2[chunk], tangent[chunk], nearness[chunk], column[chunk],
-      sample[chunk];
-  alignas(64) float re[chunk], im[chunk];
-  alignas(64) std::int32_t keep[chunk], beam_column[chunk];
+  alignas(64) float range[chunk + 16], offset[chunk + 16], cosine[chunk + 16], sine2[chunk + 16], column[chunk + 16],
+      sample[chunk + 16];
+  alignas(64) float tangent[chunk], nearness[chunk];
+  alignas(64) float weight_re[chunk + 16], weight_im[chunk + 16];
+  alignas(64) std::int32_t keep[chunk], index[chunk + 16];
 };
 
 /// Where the cells are: range, column, elevation, cosine of incidence; and which lie in the group's window.
-inline void place_cells(const TileSeen& s, const GroupView& g, int from, int n, Chunk& c) {
+__attribute__((noinline)) void place_cells(const TileSeen& s, const GroupView& g, int from, int n, Chunk& c) {
   const CellTile& t = *s.tile;
   const std::int16_t* __restrict tx = t.column(CellTile::x) + from;
   const std::int16_t* __restrict ty = t.column(CellTile::y) + from;
@@ -104,7 +106,7 @@ inline void place_cells(const TileSeen& s, const GroupView& g, int from, int n, 
 }
 
 /// The depth map decides what is seen: a cell no farther than what the rays saw along its direction.
-inline int look_up(const GroupView& g, int n, Chunk& c) {
+__attribute__((noinline)) int look_up(const GroupView& g, int n, Chunk& c) {
   const float* __restrict map = g.inverse_depth;
   const int row = g.bins + 1, first = g.first_column;
   int kept = 0;
@@ -116,7 +118,6 @@ inline int look_up(const GroupView& g, int n, Chunk& c) {
     const float a = map[at], b = map[at + 1];
     const float seen = a + (c.tangent[i] - static_cast<float>(bin)) * (b - a);
     const std::int32_t visible = c.keep[i] & static_cast<std::int32_t>(c.nearness[i] >= seen);
-    c.beam_column[i] = column;
     c.keep[i] = visible;
     kept += visible;
   }
@@ -128,67 +129,108 @@ inline float cross_fade(const TileSeen& s, float r) {
   return larger(smaller(smaller(in, out), 1.0f), 0.0f);
 }
 
-/// Amplitude and carrier of every cell, times its speckle.
-inline void sound_cells(const TileSeen& s, const GroupView& g, int from, int n, Chunk& c) {
+/// Moves the visible cells to the front, so that only they are sounded. Returns how many there are.
+inline int gather_visible(const TileSeen& s, int from, int n, Chunk& c) {
   const std::int16_t* __restrict wr = s.tile->column(CellTile::weight_re) + from;
   const std::int16_t* __restrict wi = s.tile->column(CellTile::weight_im) + from;
-#pragma GCC ivdep
-  for (int i = 0; i < n; ++i) {
-    const float r = c.range[i], w = c.sine2[i];
-    float pattern = g.elevation[elevation_terms - 1];
-    for (int k = elevation_terms - 2; k >= 0; --k) pattern = pattern * w + g.elevation[k];
-    const float d = -g.decay_per_m * c.offset[i];
-    const float loss = 1.0f + d * (1.0f + d * (0.5f + d * (1.0f / 6.0f + d * (1.0f / 24.0f))));
-    const float amplitude = s.amplitude * std::sqrt(cross_fade(s, r)) * c.cosine[i] * pattern * loss / (r * r);
-    const float turns = -(s.phase_turns + g.turns_per_m * c.offset[i]);
-    const float cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
-    const float a = static_cast<float>(wr[i]), b = static_cast<float>(wi[i]);
-    c.re[i] = a * cs - b * sn;
-    c.im[i] = a * sn + b * cs;
-  }
-}
-
-/// The same in expected power: |xi|^2 is 1, so only the cell's area counts and no carrier is needed.
-inline void power_of_cells(const TileSeen& s, const GroupView& g, int from, int n, Chunk& c) {
-  const CellTile& t = *s.tile;
-  const std::int16_t* __restrict wr = t.column(CellTile::weight_re) + from;
-  const std::int16_t* __restrict wi = t.column(CellTile::weight_im) + from;
-  const std::int16_t* __restrict na = t.column(static_cast<CellTile::Column>(CellTile::normal_x + t.axis)) + from;
-  for (int i = 0; i < n; ++i) {
-    const float r = c.range[i], w = c.sine2[i];
-    float pattern = g.elevation[elevation_terms - 1];
-    for (int k = elevation_terms - 2; k >= 0; --k) pattern = pattern * w + g.elevation[k];
-    const float loss = std::exp(-g.decay_per_m * c.offset[i]);
-    const float amplitude = s.area_amplitude * c.cosine[i] * pattern * loss / (r * r);
-    const float slope = std::fabs(static_cast<float>(na[i])) * CellTile::normal_unit;
-    const bool real_cell = (wr[i] != 0) | (wi[i] != 0);
-    c.re[i] = real_cell ? amplitude * amplitude * cross_fade(s, r) / slope : 0.0f;
-    c.im[i] = 0;
-  }
-}
-
-inline int append_kept(const Chunk& c, int n, EchoArrays out) {
   int m = 0;
 #if defined(__AVX512F__)
-  for (int i = 0; i < n; i += 16) {
-    const __mmask16 keep = _mm512_test_epi32_mask(_mm512_load_si512(c.keep + i), _mm512_load_si512(c.keep + i));
+  const auto pack = [&](float* at, int i, __mmask16 keep) {
     // Compress in registers and store whole vectors: compressing stores are slow on some processors.
-    _mm512_storeu_ps(out.sample + m, _mm512_maskz_compress_ps(keep, _mm512_load_ps(c.sample + i)));
-    _mm512_storeu_ps(out.re + m, _mm512_maskz_compress_ps(keep, _mm512_load_ps(c.re + i)));
-    _mm512_storeu_ps(out.im + m, _mm512_maskz_compress_ps(keep, _mm512_load_ps(c.im + i)));
-    _mm512_storeu_si512(out.column + m, _mm512_maskz_compress_epi32(keep, _mm512_load_si512(c.beam_column + i)));
+    _mm512_storeu_ps(at + m, _mm512_maskz_compress_ps(keep, _mm512_load_ps(at + i)));
+  };
+  const auto weights = [](const std::int16_t* w) {
+    return _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(w))));
+  };
+  for (int i = 0; i < n; i += 16) {
+    const __m512i flags = _mm512_load_si512(c.keep + i);
+    const __mmask16 keep = _mm512_test_epi32_mask(flags, flags);
+    if (keep == 0) continue;
+    pack(c.range, i, keep);
+    pack(c.offset, i, keep);
+    pack(c.cosine, i, keep);
+    pack(c.sine2, i, keep);
+    pack(c.column, i, keep);
+    pack(c.sample, i, keep);
+    _mm512_storeu_ps(c.weight_re + m, _mm512_maskz_compress_ps(keep, weights(wr + i)));
+    _mm512_storeu_ps(c.weight_im + m, _mm512_maskz_compress_ps(keep, weights(wi + i)));
     m += __builtin_popcount(keep);
   }
 #else
   for (int i = 0; i < n; ++i) {
-    out.sample[m] = c.sample[i];
-    out.re[m] = c.re[i];
-    out.im[m] = c.im[i];
-    out.column[m] = c.beam_column[i];
+    c.index[m] = i;
     m += c.keep[i];
+  }
+  for (int k = 0; k < m; ++k) {
+    const int i = c.index[k];  // never below k: moving forward in place is safe
+    c.range[k] = c.range[i];
+    c.offset[k] = c.offset[i];
+    c.cosine[k] = c.cosine[i];
+    c.sine2[k] = c.sine2[i];
+    c.column[k] = c.column[i];
+    c.sample[k] = c.sample[i];
+    c.weight_re[k] = static_cast<float>(wr[i]);
+    c.weight_im[k] = static_cast<float>(wi[i]);
   }
 #endif
   return m;
+}
+
+/// Two-way elevation pattern, polynomial in sin^2. Written out: a loop here would keep its callers from becoming vector code.
+inline float elevation_pattern(const float (&e)[elevation_terms], float w) {
+  static_assert(elevation_terms == 9);
+  return e[0] + w * (e[1] + w * (e[2] + w * (e[3] + w * (e[4] + w * (e[5] + w * (e[6] + w * (e[7] + w * e[8])))))));
+}
+
+/// Amplitude and carrier of every visible cell, times its speckle.
+__attribute__((noinline)) void sound_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
+  float* __restrict out_re = out.re;
+  float* __restrict out_im = out.im;
+  float* __restrict out_sample = out.sample;
+  std::int32_t* __restrict out_column = out.column;
+#pragma GCC ivdep
+  for (int i = 0; i < n; ++i) {
+    const float r = c.range[i];
+    const float d = -g.decay_per_m * c.offset[i];
+    const float loss = 1.0f + d * (1.0f + d * (0.5f + d * (1.0f / 6.0f + d * (1.0f / 24.0f))));
+    const float amplitude =
+        s.amplitude * std::sqrt(cross_fade(s, r)) * c.cosine[i] * elevation_pattern(g.elevation, c.sine2[i]) * loss / (r * r);
+    const float turns = -(s.phase_turns + g.turns_per_m * c.offset[i]);
+    const float cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
+    const float a = c.weight_re[i], b = c.weight_im[i];
+    out_re[i] = a * cs - b * sn;
+    out_im[i] = a * sn + b * cs;
+    out_sample[i] = c.sample[i];
+    out_column[i] = static_cast<std::int32_t>(c.column[i]);
+  }
+}
+
+/// The same in expected power: |xi|^2 is 1, so only the cell's area counts and no carrier is needed.
+/// weight_re holds what inverse_slopes put there.
+inline void power_of_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
+  for (int i = 0; i < n; ++i) {
+    const float r = c.range[i];
+    const float amplitude =
+        s.area_amplitude * c.cosine[i] * elevation_pattern(g.elevation, c.sine2[i]) * std::exp(-g.decay_per_m * c.offset[i]) / (r * r);
+    out.re[i] = amplitude * amplitude * cross_fade(s, r) * c.weight_re[i];
+    out.im[i] = 0;
+    out.sample[i] = c.sample[i];
+    out.column[i] = static_cast<std::int32_t>(c.column[i]);
+  }
+}
+
+/// Cells of a slope cover more surface than their lattice square: 1 / |normal along the dominant axis|; 0 for padding.
+inline void inverse_slopes(const TileSeen& s, int from, int n, Chunk& c) {
+  const CellTile& t = *s.tile;
+  const std::int16_t* along = t.column(static_cast<CellTile::Column>(CellTile::normal_x + t.axis)) + from;
+  const std::int16_t* wr = t.column(CellTile::weight_re) + from;
+  const std::int16_t* wi = t.column(CellTile::weight_im) + from;
+  int m = 0;
+  for (int i = 0; i < n; ++i) {
+    if (!c.keep[i]) continue;
+    const bool real_cell = (wr[i] != 0) | (wi[i] != 0);
+    c.weight_re[m++] = real_cell ? 1.0f / (std::fabs(static_cast<float>(along[i])) * CellTile::normal_unit) : 0.0f;
+  }
 }
 
 int scatter_tile(const TileSeen& s, const GroupView& g, EchoArrays out) {
@@ -198,11 +240,13 @@ int scatter_tile(const TileSeen& s, const GroupView& g, EchoArrays out) {
     const int n = s.tile->count - from < chunk ? s.tile->count - from : chunk;
     place_cells(s, g, from, n, c);
     if (look_up(g, n, c) == 0) continue;
-    if (g.expected_power)
-      power_of_cells(s, g, from, n, c);
-    else
-      sound_cells(s, g, from, n, c);
-    const int m = append_kept(c, n, out);
+    const int m = gather_visible(s, from, n, c);
+    if (g.expected_power) {
+      inverse_slopes(s, from, n, c);
+      power_of_cells(s, g, m, c, out);
+    } else {
+      sound_cells(s, g, m, c, out);
+    }
     out = {out.sample + m, out.re + m, out.im + m, out.column + m};
     appended += m;
   }
