@@ -1,0 +1,36 @@
+// Colours for sample values: each map is a few anchor colours with straight lines between them.
+// Used by draw_fan; the names are what users type.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/result.hpp"
+
+namespace sonar::clients {
+
+struct Rgb {
+  std::uint8_t r = 0, g = 0, b = 0;
+};
+
+struct ColourMap {
+  struct Anchor {
+    float at = 0;  // 0..1, rising from 0 to 1
+    float r = 0, g = 0, b = 0;
+  };
+  std::string_view name;
+  std::vector<Anchor> anchors;
+
+  /// Values outside 0..1 take the end colours; NaN takes the first.
+  Rgb colour(float value) const;
+};
+
+std::span<const ColourMap> colour_maps();
+std::string colour_map_names();  // "gray, copper, ..."
+/// Or a sentence with the names there are.
+Result<ColourMap> find_colour_map(std::string_view name);
+
+}  // namespace sonar::clients

@@ -1,0 +1,143 @@
+#include "clients/fan_image/draw_fan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::clients {
+namespace {
+
+constexpr Rgb background{13, 17, 23}, ring_colour{150, 160, 170}, text_colour{190, 198, 206};
+
+/// Pixels and metres: the apex is at (apex_x, apex_y), y grows downwards.
+struct Layout {
+  int width = 0, height = 0;
+  double apex_x = 0, apex_y = 0, metres_per_pixel = 1;
+};
+
+Layout lay_out(const PolarImage& image, const FanStyle& style) {
+  const double half_aperture = std::max(std::abs(image.azimuth_rad.front()), std::abs(image.azimuth_rad.back()));
+  const double margin = style.rings ? 28 : 4;
+  Layout layout;
+  layout.width = style.width_px;
+  layout.metres_per_pixel = 2 * image.range_m() * std::sin(half_aperture) / (style.width_px - 2 * margin);
+  // A very narrow fan would be very tall.
+  layout.metres_per_pixel = std::max(layout.metres_per_pixel, image.range_m() / (4.0 * style.width_px));
+  layout.apex_x = style.width_px / 2.0;
+  layout.apex_y = margin + image.range_m() / layout.metres_per_pixel;
+  layout.height = static_cast<int>(std::ceil(layout.apex_y + margin));
+  return layout;
+}
+
+/// Place in the beam table, fractional; beam k spans [k - 0.5, k + 0.5]. Nothing outside the fan.
+std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azimuth) {
+  const auto next = std::lower_bound(azimuth_rad.begin(), azimuth_rad.end(), azimuth, std::greater<>());
+  const auto right = std::clamp<std::ptrdiff_t>(next - azimuth_rad.begin(), 1, std::ssize(azimuth_rad) - 1);
+  const double a = azimuth_rad[static_cast<std::size_t>(right - 1)], b = azimuth_rad[static_cast<std::size_t>(right)];
+  const double beam = static_cast<double>(right - 1) + (a - azimuth) / (a - b);
+  if (beam < -0.5 || beam > static_cast<double>(azimuth_rad.size()) - 0.5) return std::nullopt;
+  return beam;
+}
+
+/// Cells [first, last] that a box of `width` around `centre` touches, cell i being [i, i + 1); weights by overlap.
+struct Span {
+  double low = 0, high = 0;
+  std::size_t first = 0, last = 0;
+  double weight(std::size_t i) const {
+    return std::min(high, static_cast<double>(i) + 1) - std::max(low, static_cast<double>(i));
+  }
+};
+Span span_around(double centre, double width, std::size_t cells) {
+  const double limit = static_cast<double>(cells);
+  Span span;
+  span.low = std::clamp(centre - width / 2, 0.0, limit - 1e-6);
+  span.high = std::clamp(centre + width / 2, span.low + 1e-6, limit);
+  span.first = static_cast<std::size_t>(span.low);
+  span.last = std::min(cells - 1, static_cast<std::size_t>(span.high));
+  return span;
+}
+
+/// Mean sample over the pixel's footprint; a footprint smaller than a cell becomes one cell wide, which interpolates linearly.
+std::optional<float> footprint_mean(const PolarImage& image, double x_m, double y_m, double pixel_m) {
+  const double range = std::hypot(x_m, y_m);
+  if (range >= image.range_m()) return std::nullopt;
+  const std::optional<double> beam = beam_at(image.azimuth_rad, std::atan2(-x_m, y_m));
+  if (!beam) return std::nullopt;
+  const double beam_spacing = (image.azimuth_rad.front() - image.azimuth_rad.back()) / static_cast<double>(image.beams - 1);
+  const double beams_wide = pixel_m / std::max(range, pixel_m) / beam_spacing;
+  const Span rows = span_around(range / image.row_spacing_m, std::max(1.0, pixel_m / image.row_spacing_m), image.rows);
+  const Span beams = span_around(*beam + 0.5, std::max(1.0, beams_wide), image.beams);
+  double sum = 0, weights = 0;
+  for (std::size_t row = rows.first; row <= rows.last; ++row) {
+    for (std::size_t b = beams.first; b <= beams.last; ++b) {
+      const double weight = std::max(0.0, rows.weight(row)) * std::max(0.0, beams.weight(b));
+      sum += weight * static_cast<double>(image.at(row, b));
+      weights += weight;
+    }
+  }
+  return static_cast<float>(sum / weights);
+}
+
+void draw_rings(Raster& raster, const PolarImage& image, const Layout& layout) {
+  const double spacing = ring_spacing_m(image.range_m());
+  const int scale = std::max(1, layout.width / 450);
+  for (int ring = 1; ring * spacing <= image.range_m() * 1.0001; ++ring) {
+    const double radius = ring * spacing / layout.metres_per_pixel;
+    const double from = image.azimuth_rad.back(), to = image.azimuth_rad.front();
+    const int steps = static_cast<int>(radius * (to - from) * 2) + 2;
+    for (int i = 0; i <= steps; ++i) {
+      const double azimuth = from + (to - from) * i / steps;
+      blend(raster, static_cast<int>(layout.apex_x - radius * std::sin(azimuth)),
+            static_cast<int>(layout.apex_y - radius * std::cos(azimuth)), ring_colour, 0.12f);
+    }
+    char label[32];
+    std::snprintf(label, sizeof label, "%g m", ring * spacing);
+    const int x = static_cast<int>(layout.apex_x - radius * std::sin(from)) + 3 * scale;
+    const int y = static_cast<int>(layout.apex_y - radius * std::cos(from)) - scale;
+    draw_text(raster, std::min(x, layout.width - text_width(label, scale) - 1), y, label, text_colour, scale);
+  }
+}
+
+Result<void> check(const PolarImage& image, const FanStyle& style) {
+  if (style.width_px < 64 || style.width_px > 8000)
+    return failure(ErrorKind::usage, "a picture " + std::to_string(style.width_px) + " pixels wide: choose 64 to 8000");
+  if (image.rows < 1 || image.beams < 2 || !(image.row_spacing_m > 0) || !std::isfinite(image.row_spacing_m))
+    return failure(ErrorKind::bad_data, "the ping has no picture: " + std::to_string(image.rows) + " rows of " +
+                                            std::to_string(image.beams) + " beams, nothing to draw");
+  for (std::size_t i = 1; i < image.beams; ++i)
+    if (image.azimuth_rad[i] >= image.azimuth_rad[i - 1])
+      return failure(ErrorKind::bad_data, "the bearing table does not run from port to starboard at beam " + std::to_string(i));
+  if (image.azimuth_rad.front() > pi / 2 || image.azimuth_rad.back() < -pi / 2)
+    return failure(ErrorKind::bad_data, "the bearing table covers more than half a circle");
+  return {};
+}
+
+}  // namespace
+
+double ring_spacing_m(double range_m) {
+  const double decade = std::pow(10.0, std::floor(std::log10(range_m)));
+  for (const double step : {0.1, 0.2, 0.5, 1.0})
+    if (range_m / (step * decade) <= 10) return step * decade;
+  return 2 * decade;
+}
+
+Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style) {
+  if (Result<void> sound = check(image, style); !sound) return tl::unexpected(sound.error());
+  const Layout layout = lay_out(image, style);
+  Raster raster(layout.width, layout.height);
+  for (int y = 0; y < layout.height; ++y) {
+    for (int x = 0; x < layout.width; ++x) {
+      const double x_m = (x + 0.5 - layout.apex_x) * layout.metres_per_pixel;
+      const double y_m = (layout.apex_y - y - 0.5) * layout.metres_per_pixel;
+      const std::optional<float> mean = footprint_mean(image, x_m, y_m, layout.metres_per_pixel);
+      raster.at(x, y) = mean ? style.colours.colour(*mean / image.full_scale) : background;
+    }
+  }
+  if (style.rings) draw_rings(raster, image, layout);
+  return raster;
+}
+
+}  // namespace sonar::clients

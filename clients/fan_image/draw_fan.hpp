@@ -1,0 +1,27 @@
+// Turns a ping's rows and beams into the fan an operator knows: sonar at the bottom, range upwards, port on the left.
+// Uses the beams' own directions, and averages over each pixel's footprint, so that nothing flickers or is skipped.
+#pragma once
+
+#include <string>
+
+#include "clients/fan_image/colour_map.hpp"
+#include "clients/fan_image/polar_image.hpp"
+#include "clients/fan_image/raster.hpp"
+#include "core/base/result.hpp"
+
+namespace sonar::clients {
+
+struct FanStyle {
+  int width_px = 1000;  // 64..8000
+  ColourMap colours;
+  bool rings = true;  // range rings with their metres
+};
+
+/// Refuses an image without rows or beams, with a bearing table that does not run from port to starboard, or a fan wider than
+/// half a circle.
+Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
+
+/// Distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.
+double ring_spacing_m(double range_m);
+
+}  // namespace sonar::clients

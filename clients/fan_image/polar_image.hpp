@@ -1,0 +1,21 @@
+// A ping as a picture before it is a fan: samples by range row and beam, with where each beam looks.
+// Made from any vendor's decoded ping; drawn by draw_fan, measured by image_statistics.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace sonar::clients {
+
+struct PolarImage {
+  std::size_t rows = 0, beams = 0;
+  double row_spacing_m = 0;         // row i covers [i, i + 1) * row_spacing_m
+  std::vector<double> azimuth_rad;  // [beams], positive to port, strictly falling
+  std::vector<float> samples;       // [rows][beams], codes as sent
+  float full_scale = 255;           // the code drawn brightest
+
+  float at(std::size_t row, std::size_t beam) const { return samples[row * beams + beam]; }
+  double range_m() const { return static_cast<double>(rows) * row_spacing_m; }
+};
+
+}  // namespace sonar::clients

@@ -1,0 +1,71 @@
+#include "clients/fan_image/raster.hpp"
+
+#include <png.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <system_error>
+
+namespace sonar::clients {
+namespace {
+
+/// Five rows of three dots, top row in the highest bits.
+std::uint16_t glyph(char c) {
+  static constexpr std::array<std::uint16_t, 10> digits{
+      0b111'101'101'101'111, 0b010'110'010'010'111, 0b111'001'111'100'111, 0b111'001'111'001'111, 0b101'101'111'001'001,
+      0b111'100'111'001'111, 0b111'100'111'101'111, 0b111'001'001'010'010, 0b111'101'111'101'111, 0b111'101'111'001'111};
+  if (c >= '0' && c <= '9') return digits[static_cast<std::size_t>(c - '0')];
+  if (c == '.') return 0b000'000'000'000'010;
+  if (c == '-') return 0b000'000'111'000'000;
+  if (c == 'm') return 0b000'000'111'111'101;
+  return 0;
+}
+
+std::uint8_t mix(std::uint8_t under, std::uint8_t over, float opacity) {
+  return static_cast<std::uint8_t>(std::lround(static_cast<float>(under) * (1 - opacity) + static_cast<float>(over) * opacity));
+}
+
+}  // namespace
+
+void blend(Raster& raster, int x, int y, Rgb colour, float opacity) {
+  if (x < 0 || y < 0 || x >= raster.width || y >= raster.height) return;
+  Rgb& p = raster.at(x, y);
+  p = {mix(p.r, colour.r, opacity), mix(p.g, colour.g, opacity), mix(p.b, colour.b, opacity)};
+}
+
+int text_width(std::string_view text, int scale) { return static_cast<int>(text.size()) * 4 * scale - scale; }
+
+void draw_text(Raster& raster, int left, int top, std::string_view text, Rgb colour, int scale) {
+  for (const char c : text) {
+    const std::uint16_t dots = glyph(c);
+    for (int dot = 0; dot < 15; ++dot) {
+      if ((dots >> (14 - dot) & 1) == 0) continue;
+      for (int i = 0; i < scale * scale; ++i)
+        blend(raster, left + dot % 3 * scale + i % scale, top + dot / 3 * scale + i / scale, colour, 1);
+    }
+    left += 4 * scale;
+  }
+}
+
+Result<void> write_png(const Raster& raster, const std::filesystem::path& file) {
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(raster.pixels.size() * 3);
+  for (const Rgb& p : raster.pixels) rgb.insert(rgb.end(), {p.r, p.g, p.b});
+
+  std::error_code error;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
+  const std::filesystem::path unfinished = file.string() + ".tmp";
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(raster.width);
+  image.height = static_cast<png_uint_32>(raster.height);
+  image.format = PNG_FORMAT_RGB;
+  if (png_image_write_to_file(&image, unfinished.c_str(), 0, rgb.data(), 0, nullptr) == 0)
+    return failure(ErrorKind::io, "cannot write " + file.string() + ": " + image.message + "; is the folder there and writable?");
+  std::filesystem::rename(unfinished, file, error);
+  if (error) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + error.message());
+  return {};
+}
+
+}  // namespace sonar::clients

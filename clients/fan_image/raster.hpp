@@ -1,0 +1,37 @@
+// A picture in memory: RGB pixels, row 0 at the top, and the little drawing a fan image needs on top of its samples.
+// Filled by draw_fan, written by write_png.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "clients/fan_image/colour_map.hpp"
+#include "core/base/result.hpp"
+
+namespace sonar::clients {
+
+struct Raster {
+  int width = 0, height = 0;
+  std::vector<Rgb> pixels;  // [height][width]
+
+  Raster(int width_px, int height_px)
+      : width(width_px), height(height_px), pixels(static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px)) {}
+  Rgb& at(int x, int y) {
+    return pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+  }
+  const Rgb& at(int x, int y) const { return const_cast<Raster*>(this)->at(x, y); }
+};
+
+/// Mixes `colour` over a pixel; places outside the picture are ignored.
+void blend(Raster& raster, int x, int y, Rgb colour, float opacity);
+
+/// Digits, '.', '-', ' ' and 'm' in a 3 x 5 face, `scale` pixels a dot; other characters leave a gap.
+void draw_text(Raster& raster, int left, int top, std::string_view text, Rgb colour, int scale);
+int text_width(std::string_view text, int scale);
+
+/// Written beside its final name and renamed, so that a reader never sees half a picture.
+Result<void> write_png(const Raster& raster, const std::filesystem::path& file);
+
+}  // namespace sonar::clients

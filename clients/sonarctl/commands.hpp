@@ -1,0 +1,81 @@
+// What sonarctl can do, one function each; main.cpp fills the options from the command line. Results go to standard output,
+// complaints come back as one sentence with the exit code's class.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/fan_image/draw_fan.hpp"
+#include "clients/sonarctl/net.hpp"
+#include "core/base/geometry.hpp"
+#include "core/base/result.hpp"
+#include "protocol/control/pose_sample.hpp"
+#include "protocol/oculus/fire.hpp"
+
+namespace sonar::clients {
+
+/// Where pings come from: a device or a recording.
+struct SourceOptions {
+  Endpoint device{"127.0.0.2", 52100};
+  bool discover = false;                     // take the device from its status broadcast
+  std::filesystem::path recording;           // instead of a device
+  std::optional<oculus::FireRequest> asked;  // settings to send
+  double connect_patience_s = 2;
+  double silence_limit_s = 10;  // no byte for so long is an error
+};
+
+struct ListenOptions {
+  SourceOptions source;
+  double seconds = 0;       // 0 = no limit
+  std::uint64_t pings = 0;  // 0 = no limit
+  bool json = false, quiet = false;
+  bool triggered = false;        // send the settings again after every ping: one ping a request
+  double started_at_unix_s = 0;  // also report the time from then to the first ping
+  std::filesystem::path png;     // draw the last ping
+  std::filesystem::path record;  // raw bytes
+  FanStyle style;
+};
+Result<void> listen(const ListenOptions& options);
+
+struct ViewOptions {
+  SourceOptions source;
+  std::filesystem::path png;
+  std::size_t ping = 0;  // which of a recording's, from 0
+  FanStyle style;
+};
+Result<void> view(const ViewOptions& options);
+
+struct StatsOptions {
+  SourceOptions source;
+  std::size_t ping = 0;
+  std::string window;                // rows and beams of the speckle figures; empty = all
+  std::string shadow, surroundings;  // two windows to compare
+  bool json = false;
+};
+Result<void> stats(const StatsOptions& options);
+
+struct PoseOptions {
+  enum class Path { once, circle, line } path = Path::once;
+  std::string to;                                  // HOST:PORT; empty = 127.0.0.1 and the protocol's port
+  bool json = false;                               // JSON lines instead of protobuf
+  bool confirm = false;                            // over the TCP control stream, each pose answered by the daemon
+  control::Frame frame = control::Frame::enu_flu;  // of the positions and angles below, and of what is sent
+  std::string vehicle, object;                     // at most one; empty = the only vehicle there is. Objects go over TCP
+  double rate_hz = 20, seconds = 0;                // 0 = one turn, or one line
+  std::vector<double> position_m{0, 0, 0}, rpy_deg{0, 0, 0};  // once
+  std::vector<double> centre_m{0, 0, 0};                      // circle
+  double radius_m = 5, period_s = 60;
+  bool look_inwards = true;
+  std::vector<double> from_m{0, 0, 0}, to_m{10, 0, 0};  // line
+  double speed_mps = 0.5;
+  double pitch_deg = 0;  // circle and line, bow up positive
+};
+Result<void> send_poses(const PoseOptions& options);
+
+/// Interrupted by Ctrl-C: commands end as if their time were over.
+extern volatile int interrupted;
+
+}  // namespace sonar::clients

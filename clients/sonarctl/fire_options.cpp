@@ -1,0 +1,62 @@
+#include "clients/sonarctl/fire_options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+namespace sonar::clients {
+namespace {
+
+const std::map<std::string, oculus::PingRate>& rates() {
+  using oculus::PingRate;
+  static const std::map<std::string, PingRate> by_name{{"2", PingRate::hz2},   {"5", PingRate::hz5},
+                                                       {"10", PingRate::hz10}, {"15", PingRate::hz15},
+                                                       {"40", PingRate::hz40}, {"standby", PingRate::standby}};
+  return by_name;
+}
+
+}  // namespace
+
+void FireArguments::add_to(CLI::App& app) {
+  const auto group = [](CLI::Option* option) { return option->group("Settings of the sonar")->capture_default_str(); };
+  group(app.add_option("--mode", mode, "1 low frequency, wide; 2 high frequency, narrow"))->check(CLI::Range(1, 2));
+  CLI::Option* metres = group(app.add_option("--range", range_m, "metres"))->check(CLI::Range(0.0, 1000.0));
+  group(app.add_option("--range-percent", range_percent, "of the mode's maximum, instead of metres"))
+      ->check(CLI::Range(0.0, 100.0))
+      ->excludes(metres);
+  group(app.add_option("--gain", gain_percent, "per cent"))->check(CLI::Range(0.0, 100.0));
+  group(app.add_option("--rate", rate, "pings a second at most"))->check(CLI::IsMember({"2", "5", "10", "15", "40", "standby"}));
+  group(app.add_option("--beams", beams, ""))->check(CLI::IsMember({256, 512}));
+  group(app.add_option("--bits", bits, "a sample; 32 needs --version 2"))->check(CLI::IsMember({8, 16, 32}));
+  group(app.add_option("--gamma", gamma, "as the wire has it: gamma = value / 255"))->check(CLI::Range(0, 255));
+  group(app.add_option("--speed-of-sound", sound_speed_mps, "m/s; 0 = the sonar computes it"))->check(CLI::Range(0.0, 2000.0));
+  group(app.add_option("--salinity", salinity_ppt, "ppt"))->check(CLI::Range(0.0, 50.0));
+  group(app.add_option("--version", version, "of the messages"))->check(CLI::Range(0, 2));
+  app.add_flag("--gains", row_gains, "a gain in front of every row")->group("Settings of the sonar");
+  app.add_flag("--gain-assist", gain_assist, "flag bit 4")->group("Settings of the sonar");
+  app.add_flag("--trigger", trigger, "one ping for each request (network trigger)")->group("Settings of the sonar");
+}
+
+oculus::FireRequest FireArguments::request() const {
+  namespace flag = oculus::flag;
+  oculus::FireRequest fire;
+  fire.version = static_cast<std::uint16_t>(bits == 32 ? 2 : version);
+  oculus::FireSettings& s = fire.settings;
+  s.mode = static_cast<std::uint8_t>(mode);
+  s.ping_rate = rates().at(rate);
+  s.gamma = static_cast<std::uint8_t>(gamma);
+  s.flags = flag::simple_result;
+  if (range_percent <= 0) s.flags |= flag::range_in_metres;
+  if (beams == 512) s.flags |= flag::beams_512;
+  if (bits > 8) s.flags |= flag::samples_16_bit;
+  if (row_gains) s.flags |= flag::row_gains;
+  if (gain_assist) s.flags |= flag::gain_assist;
+  if (trigger) s.flags |= flag::network_trigger;
+  if (bits == 32) fire.extension.flags = flag::extended_32_bit;
+  s.range = range_percent > 0 ? range_percent : range_m;
+  s.gain_percent = gain_percent;
+  s.sound_speed_mps = sound_speed_mps;
+  s.salinity_ppt = salinity_ppt;
+  return fire;
+}
+
+}  // namespace sonar::clients

@@ -1,0 +1,35 @@
+// Figures that say whether samples look like a sonar's: speckle correlations, shadow depth, the noise floor over range.
+// Computed on the codes as sent; `sonarctl stats` prints them, tests judge them.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "clients/fan_image/polar_image.hpp"
+#include "core/base/result.hpp"
+
+namespace sonar::clients {
+
+/// Half-open: rows [row_begin, row_end), beams [beam_begin, beam_end).
+struct Window {
+  std::size_t row_begin = 0, row_end = 0, beam_begin = 0, beam_end = 0;
+};
+Window whole(const PolarImage& image);
+/// "400:650" or "400:650,100:200" (rows, beams); a missing end is the image's. Refused when empty or outside.
+Result<Window> parse_window(const std::string& text, const PolarImage& image);
+
+double mean(const PolarImage& image, const Window& window);
+/// Pearson correlation of each sample with the one `rows` and `beams` further on, over the window. 0 when nothing varies.
+double correlation(const PolarImage& image, const Window& window, std::size_t rows, std::size_t beams);
+/// Share of the window's samples at or above a code.
+double share_at_least(const PolarImage& image, const Window& window, float code);
+/// Codes below which the given shares (0..1) of the window lie.
+std::vector<double> percentiles(const PolarImage& image, const Window& window, const std::vector<double>& shares);
+/// Mean of each block of `rows` rows, all beams; the last block may be shorter.
+std::vector<double> block_means(const PolarImage& image, std::size_t rows);
+/// First row whose median over the beams rises above `factor` times the median of all rows before it and above `code`:
+/// where the near field ends. image.rows when it never does. The first eight rows (transmit leak) are passed over.
+std::size_t first_echo_row(const PolarImage& image, double factor = 3, double code = 10);
+
+}  // namespace sonar::clients

@@ -1,0 +1,137 @@
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+
+#include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/picture.hpp"
+#include "clients/sonarctl/ping_log.hpp"
+#include "clients/sonarctl/source.hpp"
+
+namespace sonar::clients {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Time left before the run or the silence is over, whichever comes first; short enough to notice Ctrl-C.
+std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_s, double silent_s) {
+  double left_s = options.source.silence_limit_s - silent_s;
+  if (options.seconds > 0) left_s = std::min(left_s, options.seconds - elapsed_s);
+  return milliseconds_from(std::clamp(left_s, 0.0, 0.5));
+}
+
+class Listener {
+ public:
+  Listener(const ListenOptions& options, PingStream stream)
+      : options_(options), stream_(std::move(stream)), log_(options.source.asked) {}
+
+  /// Until the wished time or number of pings is over; a sentence when the device stops before.
+  Result<void> run() {
+    while (!finished()) {
+      const PingStream::Item item = stream_.next(patience(options_, seconds_since(start_), seconds_since(last_message_)));
+      if (item.what == Wait::closed) return failure(ErrorKind::io, closed_text(item.error));
+      if (item.what == Wait::data) {
+        last_message_ = Clock::now();
+        if (Result<void> taken = take(*item.message); !taken) return taken;
+      } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
+        return failure(ErrorKind::io, "not a byte from the device for " + std::to_string(options_.source.silence_limit_s) +
+                                          " s: drivers give up after 10 s; is the daemon stopped or stuck?");
+      }
+    }
+    return {};
+  }
+
+  PingSummary summary() const { return log_.summary(stream_.junk_bytes()); }
+  const std::optional<oculus::DecodedPing>& last_ping() const { return last_ping_; }
+  std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }
+
+ private:
+  bool finished() const {
+    const bool enough = options_.pings > 0 && log_.counts().pings >= options_.pings;
+    const bool over = options_.seconds > 0 && seconds_since(start_) >= options_.seconds;
+    return enough || over || interrupted != 0;
+  }
+
+  std::string closed_text(const std::string& error) const {
+    if (!error.empty()) return "the connection broke: " + error;
+    return "the device closed the connection after " + std::to_string(log_.counts().pings) +
+           " pings: it stopped, or another client holds it (clients.max)";
+  }
+
+  Result<void> take(const oculus::Received& message) {
+    if (const auto* ping = std::get_if<oculus::DecodedPing>(&message)) return take_ping(*ping);
+    if (std::holds_alternative<oculus::DummyMessage>(message)) log_.add_dummy();
+    if (const auto* other = std::get_if<oculus::OtherMessage>(&message); other != nullptr && !options_.json)
+      std::printf("other message, type 0x%04x, %zu bytes: %s\n", static_cast<unsigned>(other->header.type), other->size,
+                  other->why.c_str());
+    if (const auto* text = std::get_if<oculus::LogText>(&message); text != nullptr && !options_.json)
+      std::printf("device says: %s\n", text->text.c_str());
+    return {};
+  }
+
+  Result<void> take_ping(const oculus::DecodedPing& ping) {
+    const double at_s = seconds_since(start_);
+    if (!last_ping_) first_ping_after_s_ = first_ping_time();
+    const PingReport report = log_.add(ping, at_s);
+    last_ping_ = ping;
+    if (options_.json && !options_.quiet) std::puts(json_from(ping, report, at_s).c_str());
+    if (!options_.json && (!options_.quiet || !report.errors.empty())) std::puts(line_from(ping, report).c_str());
+    // As strict drivers do: ask again until the echo says that the settings took.
+    const bool unsatisfied = !report.echo_mismatches.empty() && !log_.counts().echo_satisfied_at;
+    return unsatisfied || options_.triggered ? stream_.ask_again() : Result<void>{};
+  }
+
+  double first_ping_time() const {
+    if (options_.started_at_unix_s <= 0) return seconds_since(start_);
+    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count() -
+           options_.started_at_unix_s;
+  }
+
+  const ListenOptions& options_;
+  PingStream stream_;
+  PingLog log_;
+  Clock::time_point start_ = Clock::now(), last_message_ = start_;
+  std::optional<oculus::DecodedPing> last_ping_;
+  std::optional<double> first_ping_after_s_;
+};
+
+Result<void> report(const ListenOptions& options, const Listener& listener) {
+  const PingSummary summary = listener.summary();
+  const bool asked = options.source.asked.has_value();
+  std::puts(options.json ? json_from(summary, asked).c_str() : text_from(summary, asked).c_str());
+  if (listener.first_ping_after_s() && !options.json)
+    std::printf("first ping after %.3f s%s\n", *listener.first_ping_after_s(),
+                options.started_at_unix_s > 0 ? " from the daemon's start" : "");
+  if (!options.png.empty() && listener.last_ping()) {
+    const Result<PolarImage> image = picture_of(*listener.last_ping());
+    if (!image) return tl::unexpected(image.error());
+    const Result<Raster> fan = draw_fan(*image, options.style);
+    if (!fan) return tl::unexpected(fan.error());
+    if (Result<void> written = write_png(*fan, options.png); !written) return written;
+    if (!options.json) std::printf("picture %s, %d x %d pixels\n", options.png.c_str(), fan->width, fan->height);
+  }
+  const std::vector<std::string> found = complaints(summary, asked);
+  if (found.empty()) return {};
+  std::string text;
+  for (const std::string& complaint : found) text += (text.empty() ? "" : "; ") + complaint;
+  return failure(ErrorKind::bad_data, text);
+}
+
+}  // namespace
+
+Result<void> listen(const ListenOptions& options) {
+  const Result<Endpoint> device = find_device(options.source, !options.json);
+  if (!device) return tl::unexpected(device.error());
+  auto stream = PingStream::open(*device, options.source.asked, milliseconds_from(options.source.connect_patience_s));
+  if (!stream) return tl::unexpected(stream.error());
+  if (!options.record.empty())
+    if (Result<void> recording = stream->record_to(options.record); !recording) return recording;
+  if (!options.json) std::printf("connected to %s\n", text_from(*device).c_str());
+  Listener listener(options, std::move(*stream));
+  const Result<void> ran = listener.run();
+  const Result<void> reported = report(options, listener);
+  return ran ? reported : ran;
+}
+
+}  // namespace sonar::clients

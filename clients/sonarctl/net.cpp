@@ -1,0 +1,141 @@
+#include "clients/sonarctl/net.hpp"
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <memory>
+#include <thread>
+
+namespace sonar::clients {
+namespace {
+
+using AddressList = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
+
+Result<AddressList> resolve(const Endpoint& endpoint, int type) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = type;
+  addrinfo* found = nullptr;
+  const int rc = ::getaddrinfo(endpoint.host.c_str(), std::to_string(endpoint.port).c_str(), &hints, &found);
+  if (rc != 0)
+    return failure(ErrorKind::usage, "no address for \"" + endpoint.host + "\": " + ::gai_strerror(rc) +
+                                         "; give an IPv4 address such as 127.0.0.2");
+  return AddressList(found, &::freeaddrinfo);
+}
+
+Result<Socket> open_socket(int type) {
+  Socket socket(::socket(AF_INET, type | SOCK_CLOEXEC, 0));
+  if (socket.fd() < 0) return failure(ErrorKind::io, std::string("cannot open a socket: ") + std::strerror(errno));
+  return socket;
+}
+
+/// 0, or the errno of one attempt that takes at most `patience`.
+int try_connect(const Socket& socket, const addrinfo& address, std::chrono::milliseconds patience) {
+  const int flags = ::fcntl(socket.fd(), F_GETFL);
+  ::fcntl(socket.fd(), F_SETFL, flags | O_NONBLOCK);
+  int error = ::connect(socket.fd(), address.ai_addr, address.ai_addrlen) == 0 ? 0 : errno;
+  if (error == EINPROGRESS) {
+    pollfd ready{socket.fd(), POLLOUT, 0};
+    socklen_t size = sizeof error;
+    if (::poll(&ready, 1, static_cast<int>(patience.count())) != 1) return ETIMEDOUT;
+    ::getsockopt(socket.fd(), SOL_SOCKET, SO_ERROR, &error, &size);
+  }
+  ::fcntl(socket.fd(), F_SETFL, flags);
+  return error;
+}
+
+}  // namespace
+
+Socket::~Socket() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+std::string text_from(const Endpoint& endpoint) { return endpoint.host + ":" + std::to_string(endpoint.port); }
+
+Result<Endpoint> parse_endpoint(const std::string& text, const Endpoint& fallback) {
+  Endpoint endpoint = fallback;
+  const std::size_t colon = text.rfind(':');
+  if (colon != 0 && !text.empty()) endpoint.host = text.substr(0, colon);
+  if (colon == std::string::npos) return endpoint;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + colon + 1, end, endpoint.port);
+  if (error != std::errc{} || stop != end || endpoint.port == 0)
+    return failure(ErrorKind::usage, "\"" + text + "\" is no address: write HOST:PORT with a port from 1 to 65535");
+  return endpoint;
+}
+
+Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patience) {
+  using namespace std::chrono_literals;
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  auto addresses = resolve(to, SOCK_STREAM);
+  if (!addresses) return tl::unexpected(addresses.error());
+  for (;;) {
+    auto socket = open_socket(SOCK_STREAM);
+    if (!socket) return socket;
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    const int error = try_connect(*socket, **addresses, std::max(left, 100ms));
+    if (error == 0) {
+      const int yes = 1;
+      ::setsockopt(socket->fd(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+      return socket;
+    }
+    if (std::chrono::steady_clock::now() + 10ms >= deadline)
+      return failure(ErrorKind::unavailable, "cannot connect to tcp " + text_from(to) + ": " + std::strerror(error) +
+                                                 ". Is sonard running there? Its banner names the address of each sonar");
+    std::this_thread::sleep_for(5ms);
+  }
+}
+
+Result<Socket> connect_udp(const Endpoint& to) {
+  auto addresses = resolve(to, SOCK_DGRAM);
+  if (!addresses) return tl::unexpected(addresses.error());
+  auto socket = open_socket(SOCK_DGRAM);
+  if (socket && ::connect(socket->fd(), (*addresses)->ai_addr, (*addresses)->ai_addrlen) != 0)
+    return failure(ErrorKind::unavailable, "cannot send to udp " + text_from(to) + ": " + std::strerror(errno));
+  return socket;
+}
+
+Result<Socket> listen_udp(std::uint16_t port) {
+  auto socket = open_socket(SOCK_DGRAM);
+  if (!socket) return socket;
+  const int yes = 1;
+  ::setsockopt(socket->fd(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  auto any = resolve({"0.0.0.0", port}, SOCK_DGRAM);
+  if (!any) return tl::unexpected(any.error());
+  if (::bind(socket->fd(), (*any)->ai_addr, (*any)->ai_addrlen) != 0)
+    return failure(ErrorKind::unavailable,
+                   "cannot listen on udp " + std::to_string(port) + ": " + std::strerror(errno) +
+                       ". A driver that shares no ports may hold it: stop it, or give the address instead");
+  return socket;
+}
+
+Read read_some(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience) {
+  pollfd ready{socket.fd(), POLLIN, 0};
+  const int polled = ::poll(&ready, 1, static_cast<int>(std::max<std::int64_t>(0, patience.count())));
+  if (polled == 0) return {Wait::timed_out, 0, {}};
+  if (polled < 0) return errno == EINTR ? Read{Wait::interrupted, 0, {}} : Read{Wait::closed, 0, std::strerror(errno)};
+  const ssize_t size = ::recv(socket.fd(), into.data(), into.size(), 0);
+  if (size > 0) return {Wait::data, static_cast<std::size_t>(size), {}};
+  if (size < 0 && errno == EINTR) return {Wait::interrupted, 0, {}};
+  return {Wait::closed, 0, size < 0 ? std::strerror(errno) : ""};
+}
+
+Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t size = ::send(socket.fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (size < 0 && errno == EINTR) continue;
+    if (size < 0) return failure(ErrorKind::io, std::string("cannot send: ") + std::strerror(errno));
+    bytes = bytes.subspan(static_cast<std::size_t>(size));
+  }
+  return {};
+}
+
+}  // namespace sonar::clients

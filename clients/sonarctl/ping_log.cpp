@@ -1,0 +1,130 @@
+#include "clients/sonarctl/ping_log.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace sonar::clients {
+namespace {
+
+template <class... Values>
+std::string formatted(const char* format, Values... values) {
+  char text[400];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+unsigned long long wide(std::uint64_t value) { return value; }
+
+std::string echo_text(const PingSummary& summary) {
+  if (!summary.echo_satisfied_at) return "never";
+  return "ping " + std::to_string(*summary.echo_satisfied_at) +
+         (summary.echo_lost > 0 ? ", then lost in " + std::to_string(summary.echo_lost) : "");
+}
+
+}  // namespace
+
+PingReport PingLog::add(const oculus::DecodedPing& ping, Seconds at) {
+  PingReport report;
+  report.errors = ping.violations;
+  for (std::string& error : sequence_.add(ping)) report.errors.push_back(std::move(error));
+  arrivals_.push_back(at);
+  ++summary_.pings;
+  summary_.bytes += ping.message.size();
+  summary_.identity_errors += report.errors.size();
+  summary_.missing_ids = sequence_.skipped_ids();
+  if (asked_) {
+    report.echo_mismatches = oculus::echo_violations(*asked_, ping);
+    if (report.echo_mismatches.empty() && !summary_.echo_satisfied_at) summary_.echo_satisfied_at = summary_.pings;
+    if (!report.echo_mismatches.empty() && summary_.echo_satisfied_at) ++summary_.echo_lost;
+  }
+  return report;
+}
+
+PingSummary PingLog::summary(std::uint64_t junk_bytes) const {
+  PingSummary summary = summary_;
+  summary.junk_bytes = junk_bytes;
+  std::vector<double> intervals_ms;
+  for (std::size_t i = 1; i < arrivals_.size(); ++i) intervals_ms.push_back(1000 * (arrivals_[i] - arrivals_[i - 1]));
+  if (intervals_ms.empty()) return summary;
+  const double total_s = arrivals_.back() - arrivals_.front();
+  if (total_s > 0) summary.rate_hz = static_cast<double>(intervals_ms.size()) / total_s;
+  summary.interval_p50_ms = percentile(intervals_ms, 0.50);
+  summary.interval_p99_ms = percentile(intervals_ms, 0.99);
+  summary.interval_max_ms = *std::max_element(intervals_ms.begin(), intervals_ms.end());
+  return summary;
+}
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  const auto last = static_cast<double>(values.size() - 1);
+  const auto place = static_cast<std::ptrdiff_t>(std::lround(std::clamp(share, 0.0, 1.0) * last));
+  std::nth_element(values.begin(), values.begin() + place, values.end());
+  return values[static_cast<std::size_t>(place)];
+}
+
+std::vector<std::string> complaints(const PingSummary& summary, bool asked) {
+  std::vector<std::string> found;
+  if (summary.pings == 0) found.push_back("no ping arrived");
+  if (summary.identity_errors > 0)
+    found.push_back(std::to_string(summary.identity_errors) + " broken identities: drivers would drop these pings");
+  if (summary.junk_bytes > 0) found.push_back(std::to_string(summary.junk_bytes) + " bytes between messages that belong to none");
+  if (asked && summary.pings > 0 && !summary.echo_satisfied_at)
+    found.push_back("the echoed settings never became what was asked for");
+  if (summary.echo_lost > 0)
+    found.push_back("the echo was lost again in " + std::to_string(summary.echo_lost) + " pings: is another client connected?");
+  return found;
+}
+
+std::string line_from(const oculus::DecodedPing& ping, const PingReport& report) {
+  const oculus::PingResultV2& f = ping.head.fixed;
+  std::string line = formatted("ping %u  %u x %u  %zu bit  %.2f m  %.4f MHz  %zu bytes", f.ping_id, unsigned{f.row_count},
+                               unsigned{f.beam_count}, 8 * ping.bytes_per_sample(), f.row_count * f.range_resolution_m,
+                               f.frequency_hz / 1e6, ping.message.size());
+  for (const std::string& error : report.errors) line += "\n  error: " + error;
+  for (const std::string& mismatch : report.echo_mismatches) line += "\n  echo: " + mismatch;
+  return line;
+}
+
+std::string text_from(const PingSummary& s, bool asked) {
+  std::string text = formatted("pings %llu, missing ids %llu, identity errors %llu, junk bytes %llu, dummies %llu\n",
+                               wide(s.pings), wide(s.missing_ids), wide(s.identity_errors), wide(s.junk_bytes), wide(s.dummies));
+  text += formatted("rate %.2f Hz, interval p50 %.1f ms, p99 %.1f ms, longest %.1f ms, %.2f MB/s", s.rate_hz, s.interval_p50_ms,
+                    s.interval_p99_ms, s.interval_max_ms,
+                    s.pings > 0 ? s.rate_hz * static_cast<double>(s.bytes) / static_cast<double>(s.pings) / 1e6 : 0.0);
+  if (asked) text += "\nsettings echoed as asked: " + echo_text(s);
+  return text;
+}
+
+std::string json_from(const oculus::DecodedPing& ping, const PingReport& report, Seconds at) {
+  const oculus::PingResultV2& f = ping.head.fixed;
+  const nlohmann::json out{{"ping", f.ping_id},
+                           {"at_s", at},
+                           {"rows", f.row_count},
+                           {"beams", f.beam_count},
+                           {"bits", 8 * ping.bytes_per_sample()},
+                           {"row_m", f.range_resolution_m},
+                           {"frequency_hz", f.frequency_hz},
+                           {"bytes", ping.message.size()},
+                           {"errors", report.errors},
+                           {"echo_mismatches", report.echo_mismatches}};
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string json_from(const PingSummary& s, bool asked) {
+  nlohmann::json out{{"pings", s.pings},
+                     {"missing_ids", s.missing_ids},
+                     {"identity_errors", s.identity_errors},
+                     {"junk_bytes", s.junk_bytes},
+                     {"dummies", s.dummies},
+                     {"bytes", s.bytes},
+                     {"rate_hz", s.rate_hz},
+                     {"interval_p50_ms", s.interval_p50_ms},
+                     {"interval_p99_ms", s.interval_p99_ms},
+                     {"interval_max_ms", s.interval_max_ms}};
+  if (asked) out["echo_satisfied_at"] = s.echo_satisfied_at ? nlohmann::json(*s.echo_satisfied_at) : nlohmann::json(nullptr);
+  return nlohmann::json{{"summary", out}}.dump();
+}
+
+}  // namespace sonar::clients

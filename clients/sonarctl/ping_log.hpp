@@ -1,0 +1,59 @@
+// What a driver's user wants to know of a stream of pings: how many, how steady, how sound, and whether the settings took.
+// Pure bookkeeping: listen feeds it, prints its lines and exits by its verdict.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/oculus/decode.hpp"
+
+namespace sonar::clients {
+
+/// Seconds on a monotonic clock, from any origin.
+using Seconds = double;
+
+struct PingReport {
+  std::vector<std::string> errors;           // identities and sequence; a sentence each
+  std::vector<std::string> echo_mismatches;  // settings that are not yet what was asked for
+};
+
+struct PingSummary {
+  std::uint64_t pings = 0, bytes = 0, missing_ids = 0, identity_errors = 0, dummies = 0, junk_bytes = 0;
+  std::optional<std::uint64_t> echo_satisfied_at;  // number of the ping, from 1; nothing = never, or nothing was asked
+  std::uint64_t echo_lost = 0;                     // pings after that one whose echo differed
+  double rate_hz = 0;
+  double interval_p50_ms = 0, interval_p99_ms = 0, interval_max_ms = 0;
+};
+
+class PingLog {
+ public:
+  /// `asked`: the fire message sent, if any.
+  explicit PingLog(std::optional<oculus::FireRequest> asked) : asked_(std::move(asked)) {}
+
+  PingReport add(const oculus::DecodedPing& ping, Seconds at);
+  void add_dummy() { ++summary_.dummies; }
+  const PingSummary& counts() const { return summary_; }  // so far, without rate and intervals
+  PingSummary summary(std::uint64_t junk_bytes) const;
+
+ private:
+  std::optional<oculus::FireRequest> asked_;
+  oculus::PingSequence sequence_;
+  PingSummary summary_;
+  std::vector<Seconds> arrivals_;
+};
+
+/// Value below which `share` (0..1) of the values lie; 0 for none. Takes its own copy to sort.
+double percentile(std::vector<double> values, double share);
+
+/// Sentences that say why the stream is not what a driver needs; empty = all is well.
+std::vector<std::string> complaints(const PingSummary& summary, bool asked);
+
+std::string line_from(const oculus::DecodedPing& ping, const PingReport& report);  // one line a ping
+std::string text_from(const PingSummary& summary, bool asked);
+std::string json_from(const oculus::DecodedPing& ping, const PingReport& report, Seconds at);
+std::string json_from(const PingSummary& summary, bool asked);
+
+}  // namespace sonar::clients

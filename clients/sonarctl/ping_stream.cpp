@@ -1,0 +1,87 @@
+#include "clients/sonarctl/ping_stream.hpp"
+
+#include <array>
+#include <cstdio>
+#include <iterator>
+
+namespace sonar::clients {
+
+Result<PingStream> PingStream::open(const Endpoint& device, std::optional<oculus::FireRequest> asked,
+                                    std::chrono::milliseconds patience) {
+  auto socket = connect_tcp(device, patience);
+  if (!socket) return tl::unexpected(socket.error());
+  PingStream stream(std::move(*socket), std::move(asked));
+  if (stream.asked_)
+    if (Result<void> sent = stream.ask_again(); !sent) return tl::unexpected(sent.error());
+  return stream;
+}
+
+Result<void> PingStream::ask_again() { return write_all(socket_, oculus::make_fire(*asked_)); }
+
+Result<void> PingStream::record_to(const std::filesystem::path& file) {
+  record_.open(file, std::ios::binary | std::ios::trunc);
+  if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
+  return {};
+}
+
+PingStream::Item PingStream::next(std::chrono::milliseconds patience) {
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  for (;;) {
+    if (auto message = decoder_.next()) return {Wait::data, std::move(message), {}};
+    std::array<std::byte, 65536> chunk;
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    const Read read = read_some(socket_, chunk, left);
+    if (read.what != Wait::data) return {read.what, std::nullopt, read.error};
+    const auto received = std::span<const std::byte>(chunk).first(read.size);
+    if (record_.is_open()) {
+      for (const std::byte b : received) record_.put(static_cast<char>(b));
+      if (!record_) return {Wait::closed, std::nullopt, "the recording cannot be written any further: is the disk full?"};
+    }
+    decoder_.append(received);
+  }
+}
+
+Result<std::vector<oculus::DecodedPing>> read_recording(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": no such file, or no permission");
+  oculus::Decoder decoder;
+  std::vector<oculus::DecodedPing> pings;
+  std::vector<char> chunk(1 << 16);
+  while (in.read(chunk.data(), static_cast<std::streamsize>(chunk.size())), in.gcount() > 0) {
+    wire::Bytes bytes;
+    for (std::streamsize i = 0; i < in.gcount(); ++i) bytes.push_back(static_cast<std::byte>(chunk[static_cast<std::size_t>(i)]));
+    decoder.append(bytes);
+    while (auto message = decoder.next())
+      if (auto* ping = std::get_if<oculus::DecodedPing>(&*message)) pings.push_back(std::move(*ping));
+  }
+  if (pings.empty())
+    return failure(ErrorKind::bad_data, file.string() + " holds no Oculus ping: it must be the raw bytes of the TCP stream");
+  return pings;
+}
+
+Result<Discovered> discover(std::chrono::milliseconds patience) {
+  auto socket = listen_udp(oculus::status_port);
+  if (!socket) return tl::unexpected(socket.error());
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  for (;;) {
+    std::array<std::byte, 2048> datagram;
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    const Read read = read_some(*socket, datagram, left);
+    if (read.what != Wait::data)
+      return failure(ErrorKind::unavailable, "no status datagram on udp " + std::to_string(oculus::status_port) +
+                                                 ": is a sonar running, and does its status_to reach this machine?");
+    const auto status = oculus::decode_status(std::span<const std::byte>(datagram).first(read.size));
+    if (!status) continue;  // somebody else's datagram
+    const auto& ip = status->ip_address;
+    char host[16];
+    std::snprintf(host, sizeof host, "%u.%u.%u.%u", unsigned{ip[0]}, unsigned{ip[1]}, unsigned{ip[2]}, unsigned{ip[3]});
+    Discovered found;
+    found.status = *status;
+    found.device.host = host;
+    found.device.port = oculus::tcp_port;
+    found.complaints = oculus::status_violations(*status, read.size);
+    return found;
+  }
+}
+
+}  // namespace sonar::clients

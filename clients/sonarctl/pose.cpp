@@ -1,0 +1,186 @@
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/trajectory.hpp"
+#include "protocol/control/control.hpp"
+#include "protocol/control/delimited.hpp"
+
+namespace sonar::clients {
+namespace {
+
+using control::Frame;
+using control::PoseSample;
+using Send = std::function<Result<void>(const PoseSample&)>;
+
+constexpr std::uint16_t protobuf_port = 14770, json_port = 14771;
+
+Vec3d vector_from(const std::vector<double>& xyz) { return {xyz[0], xyz[1], xyz[2]}; }
+
+Vec3d world_from(const std::vector<double>& xyz, Frame frame) {
+  const Vec3d v = vector_from(xyz);
+  return frame == Frame::ned_frd ? enu_from_ned(v) : v;
+}
+
+Moment standing_still(const PoseOptions& options) {
+  const Vec3d rpy = vector_from(options.rpy_deg);
+  const Quatd given = quat_from_rpy({rad_from_deg(rpy.x), rad_from_deg(rpy.y), rad_from_deg(rpy.z)});
+  const Quatd in_enu = options.frame == Frame::ned_frd ? enu_flu_from_ned_frd(given) : given;
+  return {{world_from(options.position_m, options.frame), in_enu}, {}};
+}
+
+Circle circle_of(const PoseOptions& o) {
+  return {world_from(o.centre_m, o.frame), o.radius_m, o.period_s, rad_from_deg(o.pitch_deg), o.look_inwards};
+}
+Line line_of(const PoseOptions& o) {
+  return {world_from(o.from_m, o.frame), world_from(o.to_m, o.frame), o.speed_mps, rad_from_deg(o.pitch_deg)};
+}
+
+Moment moment_at(const PoseOptions& options, double time_s) {
+  switch (options.path) {
+    case PoseOptions::Path::circle:
+      return on_circle(circle_of(options), time_s);
+    case PoseOptions::Path::line:
+      return on_line(line_of(options), time_s);
+    case PoseOptions::Path::once:
+      break;
+  }
+  return standing_still(options);
+}
+
+double duration_s(const PoseOptions& options) {
+  if (options.seconds > 0 || options.path == PoseOptions::Path::once) return options.seconds;
+  return options.path == PoseOptions::Path::circle ? std::abs(options.period_s) : line_of(options).duration_s();
+}
+
+PoseSample sample_of(const PoseOptions& options, const Moment& moment, std::uint64_t seq) {
+  PoseSample sample;
+  sample.of = options.object.empty() ? PoseSample::Of::vehicle : PoseSample::Of::object;
+  sample.name = options.object.empty() ? options.vehicle : options.object;
+  sample.seq = seq;
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  sample.stamp = {control::ClockDomain::wall, std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
+  sample.pose = moment.body_in_world;
+  sample.velocity_mps = rotate(conjugate(sample.pose.orientation), moment.velocity_mps);
+  sample.sent_in = options.frame;
+  return sample;
+}
+
+/// ArduPilot's keys; its frame is the default and not repeated.
+std::string json_line(const PoseSample& sample) {
+  const bool ned = sample.sent_in == Frame::ned_frd;
+  const Pose pose = ned ? enu_flu_from_ned_frd(sample.pose) : sample.pose;  // the conversion is its own inverse
+  const Vec3d velocity_enu = rotate(sample.pose.orientation, sample.velocity_mps.value_or(Vec3d{}));
+  const Vec3d v = ned ? enu_from_ned(velocity_enu) : velocity_enu;
+  nlohmann::json line{{"timestamp", static_cast<double>(sample.stamp.ns) * 1e-9},
+                      {"position", {pose.position_m.x, pose.position_m.y, pose.position_m.z}},
+                      {"quaternion", {pose.orientation.w, pose.orientation.x, pose.orientation.y, pose.orientation.z}},
+                      {"velocity", {v.x, v.y, v.z}}};
+  if (!ned) line["frame"] = "ENU_FLU";
+  if (!sample.name.empty()) line["vehicle"] = sample.name;
+  return line.dump() + "\n";
+}
+
+std::vector<std::byte> bytes_of(const std::string& text) {
+  std::vector<std::byte> bytes;
+  for (const char c : text) bytes.push_back(static_cast<std::byte>(c));
+  return bytes;
+}
+
+/// On a connected UDP socket a missing listener shows as a refusal after the first datagram.
+Result<void> send_datagram(const Socket& socket, const Endpoint& to, const std::vector<std::byte>& datagram) {
+  const tl::unexpected<Error> nobody =
+      failure(ErrorKind::unavailable, "nobody listens on udp " + text_from(to) + ": is sonard running with poses there? (--to)");
+  if (!write_all(socket, datagram)) return nobody;
+  std::array<std::byte, 16> nothing;
+  if (read_some(socket, nothing, std::chrono::milliseconds(5)).what == Wait::closed) return nobody;
+  return {};
+}
+
+/// One conversation on the control stream: a Hello, then a request and its answer at a time.
+class ControlClient {
+ public:
+  explicit ControlClient(Socket socket) : socket_(std::move(socket)) {}
+
+  Result<void> request(control::Request request) {
+    request.id = ++last_id_;
+    const auto message = control::encode_request(request);
+    if (Result<void> sent = write_all(socket_, control::delimited(message)); !sent) return sent;
+    const Result<control::Response> answer = response();
+    if (!answer) return tl::unexpected(answer.error());
+    if (answer->code != control::StatusCode::ok) return failure(ErrorKind::bad_data, "sonard refused the pose: " + answer->text);
+    return {};
+  }
+
+ private:
+  Result<control::Response> response() {
+    for (;;) {
+      auto message = parser_.next();
+      if (!message) return tl::unexpected(message.error());
+      if (*message) return control::decode_response(**message);
+      std::array<std::byte, 4096> chunk;
+      const Read read = read_some(socket_, chunk, std::chrono::seconds(5));
+      if (read.what != Wait::data) return failure(ErrorKind::io, "sonard did not answer on the control stream " + read.error);
+      parser_.feed(std::span<const std::byte>(chunk).first(read.size));
+    }
+  }
+
+  Socket socket_;
+  control::DelimitedParser parser_;
+  std::uint64_t last_id_ = 0;
+};
+
+Result<Send> confirmed_sender(const Endpoint& to) {
+  auto socket = connect_tcp(to, std::chrono::seconds(2));
+  if (!socket) return tl::unexpected(socket.error());
+  auto client = std::make_shared<ControlClient>(std::move(*socket));
+  if (Result<void> met = client->request({0, control::Hello{control::protocol_version, "sonarctl"}}); !met)
+    return tl::unexpected(met.error());
+  return Send([client](const PoseSample& sample) { return client->request({0, sample}); });
+}
+
+Result<Send> datagram_sender(const Endpoint& to, bool json) {
+  auto socket = connect_udp(to);
+  if (!socket) return tl::unexpected(socket.error());
+  auto shared = std::make_shared<Socket>(std::move(*socket));
+  return Send([shared, to, json](const PoseSample& sample) {
+    return send_datagram(*shared, to, json ? bytes_of(json_line(sample)) : control::encode_pose_datagram(sample));
+  });
+}
+
+Result<void> check(const PoseOptions& options) {
+  if (!options.vehicle.empty() && !options.object.empty())
+    return failure(ErrorKind::usage, "give either --vehicle or --object, not both");
+  if (options.json && (options.confirm || !options.object.empty()))
+    return failure(ErrorKind::usage, "--json is for datagrams about a vehicle; leave out --json to move objects or to --confirm");
+  return {};
+}
+
+}  // namespace
+
+Result<void> send_poses(const PoseOptions& options) {
+  if (Result<void> sound = check(options); !sound) return sound;
+  const Result<Endpoint> to = parse_endpoint(options.to, {"127.0.0.1", options.json ? json_port : protobuf_port});
+  if (!to) return tl::unexpected(to.error());
+  const bool stream = options.confirm || !options.object.empty();
+  const Result<Send> send = stream ? confirmed_sender(*to) : datagram_sender(*to, options.json);
+  if (!send) return tl::unexpected(send.error());
+
+  const auto start = std::chrono::steady_clock::now();
+  std::uint64_t sent = 0;
+  for (double time_s = 0; interrupted == 0; time_s = static_cast<double>(sent) / options.rate_hz) {
+    std::this_thread::sleep_until(start +
+                                  std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(time_s)));
+    if (Result<void> done = (*send)(sample_of(options, moment_at(options, time_s), ++sent)); !done) return done;
+    if (time_s >= duration_s(options)) break;
+  }
+  std::printf("%llu poses sent to %s %s as %s\n", static_cast<unsigned long long>(sent), stream ? "tcp" : "udp",
+              text_from(*to).c_str(), std::string(control::name_of(options.frame)).c_str());
+  return {};
+}
+
+}  // namespace sonar::clients

@@ -1,0 +1,62 @@
+#include "clients/sonarctl/source.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace sonar::clients {
+
+volatile int interrupted = 0;
+
+namespace {
+
+/// Pings that may still be under way with older settings when ours arrive.
+constexpr int stale_pings = 4;
+
+Result<oculus::DecodedPing> fetch_recorded(const SourceOptions& source, std::size_t number) {
+  auto pings = read_recording(source.recording);
+  if (!pings) return tl::unexpected(pings.error());
+  if (number < pings->size()) return std::move((*pings)[number]);
+  return failure(ErrorKind::usage, source.recording.string() + " holds pings 0 to " + std::to_string(pings->size() - 1) +
+                                       ", not " + std::to_string(number));
+}
+
+Result<oculus::DecodedPing> fetch_live(const SourceOptions& source) {
+  const Result<Endpoint> device = find_device(source, false);
+  if (!device) return tl::unexpected(device.error());
+  auto stream = PingStream::open(*device, source.asked, milliseconds_from(source.connect_patience_s));
+  if (!stream) return tl::unexpected(stream.error());
+  const auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
+  for (int stale = 0; interrupted == 0;) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
+    PingStream::Item item = stream->next(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(500)));
+    if (item.what == Wait::closed)
+      return failure(ErrorKind::io,
+                     "the device closed the connection before a ping came: another client may hold it (clients.max)");
+    if (item.what != Wait::data && left.count() <= 0)
+      return failure(ErrorKind::io,
+                     "no ping came within " + std::to_string(source.silence_limit_s) + " s: is the sonar in standby?");
+    auto* ping = item.what == Wait::data ? std::get_if<oculus::DecodedPing>(&*item.message) : nullptr;
+    if (ping == nullptr) continue;
+    if (!source.asked || oculus::echo_violations(*source.asked, *ping).empty() || ++stale > stale_pings) return std::move(*ping);
+  }
+  return failure(ErrorKind::io, "interrupted before a ping came");
+}
+
+}  // namespace
+
+std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::milliseconds(static_cast<std::int64_t>(s * 1000)); }
+
+Result<Endpoint> find_device(const SourceOptions& source, bool say) {
+  if (!source.discover) return source.device;
+  auto found = discover(std::chrono::seconds(5));
+  if (!found) return tl::unexpected(found.error());
+  if (say) std::printf("status from device %u at %s\n", found->status.device_id, text_from(found->device).c_str());
+  if (!found->complaints.empty()) return failure(ErrorKind::bad_data, "the status datagram: " + found->complaints.front());
+  return found->device;
+}
+
+Result<oculus::DecodedPing> fetch_ping(const SourceOptions& source, std::size_t number) {
+  return source.recording.empty() ? fetch_live(source) : fetch_recorded(source, number);
+}
+
+}  // namespace sonar::clients

@@ -1,0 +1,125 @@
+// The fan: what is to port must be left, what is far must be up, and nothing may be lost between samples and pixels.
+#include "clients/fan_image/draw_fan.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::clients {
+namespace {
+
+PolarImage black_fan(std::size_t rows, std::size_t beams, double half_aperture_deg) {
+  PolarImage image;
+  image.rows = rows;
+  image.beams = beams;
+  image.row_spacing_m = 10.0 / static_cast<double>(rows);
+  for (std::size_t i = 0; i < beams; ++i)
+    image.azimuth_rad.push_back(
+        rad_from_deg(half_aperture_deg * (1 - 2 * static_cast<double>(i) / static_cast<double>(beams - 1))));
+  image.samples.assign(rows * beams, 0);
+  return image;
+}
+
+FanStyle plain_gray(int width = 400) { return {width, *find_colour_map("gray"), false}; }
+
+struct Centroid {
+  double x = 0, y = 0, brightness = 0;
+};
+/// Of what is brighter than the background.
+Centroid brightest_place(const Raster& raster) {
+  Centroid c;
+  for (int y = 0; y < raster.height; ++y) {
+    for (int x = 0; x < raster.width; ++x) {
+      const double value = raster.at(x, y).r > 40 ? raster.at(x, y).r : 0;
+      c.x += value * x, c.y += value * y, c.brightness += value;
+    }
+  }
+  c.x /= c.brightness, c.y /= c.brightness;
+  return c;
+}
+
+TEST(Fan, PutsPortLeftStarboardRightAndFarUp) {
+  PolarImage port = black_fan(100, 64, 60), starboard = port, near = port;
+  for (std::size_t row = 79; row < 82; ++row) {
+    port.samples[row * 64 + 5] = 255;
+    starboard.samples[row * 64 + 58] = 255;
+  }
+  for (std::size_t row = 29; row < 32; ++row) near.samples[row * 64 + 31] = 255;
+  const Centroid p = brightest_place(*draw_fan(port, plain_gray()));
+  const Centroid s = brightest_place(*draw_fan(starboard, plain_gray()));
+  const Centroid n = brightest_place(*draw_fan(near, plain_gray()));
+  EXPECT_LT(p.x, 100);
+  EXPECT_GT(s.x, 300);
+  EXPECT_NEAR(p.x + s.x, 399, 1) << "beams 5 and 58 mirror each other";
+  EXPECT_GT(n.y, p.y) << "nearer is lower";
+}
+
+TEST(Fan, PlacesASampleWhereItsRangeAndBearingSay) {
+  PolarImage image = black_fan(200, 121, 60);  // a beam each degree
+  const std::size_t beam = 60 - 30;            // 30 degrees to port
+  image.samples[100 * 121 + beam] = 255;       // range 5.025 m
+  const Raster fan = *draw_fan(image, plain_gray(800));
+  const Centroid c = brightest_place(fan);
+  const double pixel_m = 2 * 10 * std::sin(rad_from_deg(60)) / (800 - 8);
+  EXPECT_NEAR((400 - c.x - 0.5) * pixel_m, 5.025 * std::sin(rad_from_deg(30)), 2 * pixel_m);
+  EXPECT_NEAR((4 + 10 / pixel_m - c.y - 0.5) * pixel_m, 5.025 * std::cos(rad_from_deg(30)), 2 * pixel_m);
+}
+
+TEST(Fan, KeepsTheMeanWhenPixelsAreCoarserThanSamples) {
+  PolarImage image = black_fan(1000, 512, 60);
+  for (std::size_t i = 0; i < image.samples.size(); ++i) image.samples[i] = i % 2 == 0 ? 200.0f : 100.0f;
+  const Raster fan = *draw_fan(image, plain_gray(128));
+  const Rgb middle = fan.at(64, fan.height / 2);
+  EXPECT_NEAR(middle.r, 150, 8) << "an alternating pattern must blend, not alias";
+}
+
+TEST(Fan, RefusesWhatCannotBeDrawn) {
+  PolarImage none;
+  EXPECT_THAT(draw_fan(none, plain_gray()).error().text, testing::HasSubstr("no picture"));
+  PolarImage twisted = black_fan(10, 16, 60);
+  std::swap(twisted.azimuth_rad[3], twisted.azimuth_rad[4]);
+  EXPECT_THAT(draw_fan(twisted, plain_gray()).error().text, testing::HasSubstr("bearing table"));
+  EXPECT_THAT(draw_fan(black_fan(10, 16, 120), plain_gray()).error().text, testing::HasSubstr("half a circle"));
+  EXPECT_EQ(draw_fan(black_fan(10, 16, 60), plain_gray(10)).error().kind, ErrorKind::usage);
+}
+
+TEST(Fan, ChoosesRoundRings) {
+  EXPECT_DOUBLE_EQ(ring_spacing_m(10), 1);
+  EXPECT_DOUBLE_EQ(ring_spacing_m(30), 5);
+  EXPECT_DOUBLE_EQ(ring_spacing_m(2), 0.2);
+  EXPECT_DOUBLE_EQ(ring_spacing_m(120), 20);
+}
+
+TEST(ColourMap, RunsFromItsFirstToItsLastAnchorAndNeverBeyond) {
+  for (const ColourMap& map : colour_maps()) {
+    const Rgb first = map.colour(0), last = map.colour(1);
+    EXPECT_EQ(map.colour(-5).g, first.g) << map.name;
+    EXPECT_EQ(map.colour(std::nanf("")).g, first.g) << map.name;
+    EXPECT_EQ(map.colour(7).g, last.g) << map.name;
+    EXPECT_GT(last.r + last.g + last.b, first.r + first.g + first.b) << map.name << " must brighten";
+    for (const ColourMap::Anchor& anchor : map.anchors)
+      EXPECT_NEAR(map.colour(anchor.at).r, anchor.r * 255, 0.51) << map.name << " at " << anchor.at;
+  }
+  EXPECT_THAT(find_colour_map("grey").error().text, testing::HasSubstr("gray, copper"));
+}
+
+TEST(Png, IsWrittenWholeOrRefusedWithASentence) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / "fan_image_test";
+  const auto file = folder / "deep" / "fan.png";
+  ASSERT_TRUE(write_png(*draw_fan(black_fan(10, 16, 60), plain_gray(64)), file));
+  std::ifstream in(file, std::ios::binary);
+  std::string start(8, ' ');
+  in.read(start.data(), 8);
+  EXPECT_EQ(start, "\x89PNG\r\n\x1a\n");
+  EXPECT_FALSE(std::filesystem::exists(file.string() + ".tmp"));
+  EXPECT_EQ(write_png(Raster(4, 4), "/dev/null/fan.png").error().kind, ErrorKind::io);
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace sonar::clients

@@ -1,0 +1,246 @@
+// The commands against a device and a pose listener of a few lines, on loopback and free ports.
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <atomic>
+#include <thread>
+
+#include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/ping_stream.hpp"
+#include "protocol/control/control.hpp"
+#include "protocol/control/json_pose.hpp"
+#include "protocol/oculus/encode_ping.hpp"
+
+namespace sonar::clients {
+namespace {
+
+using testing::HasSubstr;
+
+/// Bound to a free port of our own loopback address.
+Socket bound(int type, std::uint16_t& port) {
+  Socket socket(::socket(AF_INET, type | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  ::inet_pton(AF_INET, "127.83.1.9", &address.sin_addr);
+  // The casts are the sockets interface's own.
+  EXPECT_EQ(::bind(socket.fd(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  socklen_t size = sizeof address;
+  ::getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&address), &size);
+  port = ntohs(address.sin_port);
+  return socket;
+}
+
+wire::Bytes ping_bytes(std::uint32_t id, const oculus::FireSettings& echo) {
+  oculus::PingHead head;
+  head.fixed.header.source = 7001;
+  head.fixed.header.type = oculus::MessageType::ping_result;
+  head.fixed.fire = echo;
+  head.fixed.ping_id = id;
+  head.fixed.frequency_hz = 2.1e6;
+  head.fixed.sound_speed_mps = 1500;
+  head.fixed.range_resolution_m = 0.1;
+  head.fixed.row_count = 20;
+  head.fixed.beam_count = 16;
+  std::array<std::int16_t, 16> bearings{};
+  for (std::size_t i = 0; i < bearings.size(); ++i) bearings[i] = static_cast<std::int16_t>(200 * static_cast<int>(i) - 1500);
+  const std::array<std::byte, 320> samples{};
+  return oculus::encode_ping(head, {bearings, {}, samples});
+}
+
+/// Accepts one client, waits for its fire message and sends what `answer` makes of it, then whatever `stay` says.
+class FakeDevice {
+ public:
+  using Answer = std::function<wire::Bytes(std::uint32_t number, const oculus::FireSettings& asked)>;
+  explicit FakeDevice(std::uint32_t pings, Answer answer) : listener_(bound(SOCK_STREAM, port_)) {
+    ::listen(listener_.fd(), 1);
+    thread_ = std::thread([this, pings, answer = std::move(answer)] { serve(pings, answer); });
+  }
+  ~FakeDevice() {
+    ::shutdown(listener_.fd(), SHUT_RDWR);
+    thread_.join();
+  }
+  Endpoint endpoint() const { return {"127.83.1.9", port_}; }
+
+ private:
+  void serve(std::uint32_t pings, const Answer& answer) {
+    const Socket client(::accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC));
+    if (client.fd() < 0) return;
+    std::array<std::byte, 512> received;
+    const Read read = read_some(client, received, std::chrono::seconds(10));
+    const auto fire = oculus::parse_fire(std::span<const std::byte>(received).first(read.size));
+    if (!fire) return;
+    for (std::uint32_t i = 0; i < pings; ++i)
+      if (!write_all(client, answer(i, fire->settings))) return;
+    while (read_some(client, received, std::chrono::seconds(10)).what == Wait::data) continue;  // until the client leaves
+  }
+
+  std::uint16_t port_ = 0;
+  Socket listener_;
+  std::thread thread_;
+};
+
+oculus::FireRequest asked() {
+  oculus::FireRequest fire;
+  fire.settings.mode = 2;
+  fire.settings.flags = oculus::flag::range_in_metres | oculus::flag::simple_result | oculus::flag::gain_assist;
+  fire.settings.range = 2;
+  fire.settings.gain_percent = 50;
+  fire.settings.sound_speed_mps = 1500;
+  return fire;
+}
+
+ListenOptions quiet(const Endpoint& device, std::uint64_t pings) {
+  ListenOptions options;
+  options.source.device = device;
+  options.source.asked = asked();
+  options.pings = pings;
+  options.seconds = 20;
+  options.quiet = true;
+  options.style = {200, *find_colour_map("gray"), true};
+  return options;
+}
+
+TEST(Listen, IsSatisfiedByASoundDeviceAndDrawsIt) {
+  FakeDevice device(5, [](std::uint32_t i, const oculus::FireSettings& echo) { return ping_bytes(i + 1, echo); });
+  ListenOptions options = quiet(device.endpoint(), 5);
+  options.png = std::filesystem::path(testing::TempDir()) / "listen_test.png";
+  options.record = std::filesystem::path(testing::TempDir()) / "listen_test.raw";
+  const Result<void> done = listen(options);
+  EXPECT_TRUE(done) << done.error().text;
+  EXPECT_TRUE(std::filesystem::remove(options.png));
+  const auto recorded = read_recording(options.record);
+  ASSERT_TRUE(recorded) << recorded.error().text;
+  EXPECT_EQ(recorded->size(), 5u);
+  std::filesystem::remove(options.record);
+}
+
+TEST(Listen, AcceptsAnEchoThatTakesOnePing) {
+  FakeDevice device(4, [](std::uint32_t i, oculus::FireSettings echo) {
+    if (i == 0) echo.range = 7;
+    return ping_bytes(i + 1, echo);
+  });
+  const Result<void> done = listen(quiet(device.endpoint(), 4));
+  EXPECT_TRUE(done) << done.error().text;
+}
+
+TEST(Listen, RefusesBrokenSizesJunkAndWrongEchoes) {
+  FakeDevice broken(1, [](std::uint32_t, const oculus::FireSettings& echo) {
+    wire::Bytes bytes = ping_bytes(1, echo);
+    bytes[114] ^= std::byte{1};  // image_size
+    return bytes;
+  });
+  EXPECT_THAT(listen(quiet(broken.endpoint(), 1)).error().text, HasSubstr("broken identities"));
+  FakeDevice junk(2, [](std::uint32_t i, const oculus::FireSettings& echo) {
+    wire::Bytes bytes = ping_bytes(i + 1, echo);
+    bytes.insert(bytes.begin(), 3, std::byte{0});
+    return bytes;
+  });
+  EXPECT_THAT(listen(quiet(junk.endpoint(), 2)).error().text, HasSubstr("6 bytes between messages"));
+  FakeDevice deaf(3, [](std::uint32_t i, oculus::FireSettings echo) {
+    echo.mode = 1;
+    return ping_bytes(i + 1, echo);
+  });
+  const Result<void> done = listen(quiet(deaf.endpoint(), 3));
+  EXPECT_EQ(done.error().kind, ErrorKind::bad_data);
+  EXPECT_THAT(done.error().text, HasSubstr("never became"));
+}
+
+TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
+  FakeDevice silent(0, [](std::uint32_t, const oculus::FireSettings&) { return wire::Bytes{}; });
+  ListenOptions options = quiet(silent.endpoint(), 1);
+  options.source.silence_limit_s = 0.3;
+  EXPECT_THAT(listen(options).error().text, HasSubstr("not a byte"));
+
+  std::uint16_t free_port = 0;
+  { const Socket briefly = bound(SOCK_STREAM, free_port); }
+  options.source.device.port = free_port;
+  options.source.connect_patience_s = 0.1;
+  const Result<void> absent = listen(options);
+  EXPECT_EQ(absent.error().kind, ErrorKind::unavailable);
+  EXPECT_THAT(absent.error().text, HasSubstr("Is sonard running there?"));
+}
+
+TEST(Endpoints, TakeWhatIsMissingFromTheDefault) {
+  const Endpoint fallback{"127.0.0.2", 52100};
+  EXPECT_EQ(text_from(*parse_endpoint("", fallback)), "127.0.0.2:52100");
+  EXPECT_EQ(text_from(*parse_endpoint("10.0.0.7", fallback)), "10.0.0.7:52100");
+  EXPECT_EQ(text_from(*parse_endpoint("10.0.0.7:99", fallback)), "10.0.0.7:99");
+  EXPECT_EQ(text_from(*parse_endpoint(":99", fallback)), "127.0.0.2:99");
+  for (const char* bad : {"host:", "host:0", "host:65536", "host:12x"}) EXPECT_FALSE(parse_endpoint(bad, fallback)) << bad;
+}
+
+/// Runs `send_poses` and hands over the first datagram it sent.
+wire::Bytes first_datagram(PoseOptions options) {
+  std::uint16_t port = 0;
+  const Socket listener = bound(SOCK_DGRAM, port);
+  options.to = "127.83.1.9:" + std::to_string(port);
+  const Result<void> sent = send_poses(options);
+  EXPECT_TRUE(sent) << sent.error().text;
+  wire::Bytes datagram(2000);
+  datagram.resize(read_some(listener, datagram, std::chrono::seconds(10)).size);
+  return datagram;
+}
+
+void expect_at(const control::PoseSample& sample, Vec3d position, Vec3d ahead) {
+  const Pose& pose = sample.pose;
+  EXPECT_NEAR(length(pose.position_m - position), 0, 1e-9);
+  EXPECT_NEAR(length(rotate(pose.orientation, Vec3d{1, 0, 0}) - ahead), 0, 1e-6);
+}
+
+TEST(Pose, ArrivesAsProtobufInTheFrameItWasGivenIn) {
+  PoseOptions options;
+  options.position_m = {1, 2, -3};
+  options.rpy_deg = {0, 0, 90};  // east-north-up: facing north
+  const auto enu = control::decode_pose_datagram(first_datagram(options));
+  ASSERT_TRUE(enu) << enu.error().text;
+  EXPECT_EQ(enu->sent_in, control::Frame::enu_flu);
+  expect_at(*enu, {1, 2, -3}, {0, 1, 0});
+
+  options.frame = control::Frame::ned_frd;  // north 1, east 2, up 3, facing east
+  const auto ned = control::decode_pose_datagram(first_datagram(options));
+  ASSERT_TRUE(ned) << ned.error().text;
+  EXPECT_EQ(ned->sent_in, control::Frame::ned_frd);
+  expect_at(*ned, {2, 1, 3}, {1, 0, 0});
+}
+
+TEST(Pose, ArrivesAsAJsonLineInEitherFrame) {
+  for (const control::Frame frame : {control::Frame::enu_flu, control::Frame::ned_frd}) {
+    PoseOptions options;
+    options.json = true;
+    options.frame = frame;
+    options.path = PoseOptions::Path::line;
+    options.from_m = {0, 0, -4};
+    options.to_m = {0, 0.01, -4};
+    const wire::Bytes datagram = first_datagram(options);
+    std::string line;
+    for (const std::byte b : datagram) line.push_back(static_cast<char>(b));
+    const auto sample = control::parse_json_pose(line);
+    ASSERT_TRUE(sample) << sample.error().text;
+    EXPECT_EQ(sample->sent_in, frame);
+    ASSERT_TRUE(sample->velocity_mps);
+    EXPECT_NEAR(sample->velocity_mps->x, 0.5, 1e-9) << "ahead, in body axes";
+    if (frame == control::Frame::enu_flu) {
+      expect_at(*sample, {0, 0, -4}, {0, 1, 0});
+    } else {
+      expect_at(*sample, {0, 0, 4}, {1, 0, 0});
+    }
+  }
+}
+
+TEST(Pose, SaysWhenNobodyListensOrTheWishIsContradictory) {
+  std::uint16_t free_port = 0;
+  { const Socket briefly = bound(SOCK_DGRAM, free_port); }
+  PoseOptions options;
+  options.to = "127.83.1.9:" + std::to_string(free_port);
+  EXPECT_THAT(send_poses(options).error().text, HasSubstr("nobody listens"));
+  options.vehicle = "rov";
+  options.object = "diver";
+  EXPECT_EQ(send_poses(options).error().kind, ErrorKind::usage);
+}
+
+}  // namespace
+}  // namespace sonar::clients
