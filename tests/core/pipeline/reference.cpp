@@ -95,17 +95,22 @@ std::vector<std::vector<double>> expected_power(std::span<const Scatterer> scatt
   return s;
 }
 
+double seabed_psi_rad(double height_m, double tilt_rad, double range_m, double sine) {
+  const double ahead = std::sqrt(range_m * range_m * (1 - sine * sine) - height_m * height_m);
+  return tilt_rad - std::atan2(height_m, ahead);
+}
+
 double seabed_level_db(const FrequencyMode& mode, const Medium& medium, double envelope_hz, double lambert_db, double height_m,
-                       double tilt_rad, double range_m) {
+                       double tilt_rad, double range_m, double sine) {
   const Taper taper = mode.pattern.azimuth_taper;
   const double theta =
       effective_beam_width_u(taper, aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad)));
-  const double grazing = std::asin(height_m / range_m);
   const double length_m = 0.5 * medium.sound_speed_mps * energy_width_s(envelope_hz);
-  const double strength_db = lambert_db + 20 * std::log10(std::sin(grazing));
+  const double strength_db = lambert_db + 20 * std::log10(height_m / range_m);
+  const double oblique = range_m / std::sqrt(range_m * range_m * (1 - sine * sine) - height_m * height_m);
   return 20 * std::log10(medium.source_upa * two_way_transmission(range_m, medium.absorption_np_per_m)) + strength_db +
-         10 * std::log10(theta * range_m * length_m / std::cos(grazing)) +
-         20 * std::log10(elevation_two_way(mode.pattern, tilt_rad - grazing));
+         10 * std::log10(theta * range_m * length_m * oblique) +
+         20 * std::log10(elevation_two_way(mode.pattern, seabed_psi_rad(height_m, tilt_rad, range_m, sine)));
 }
 
 // sigma = mu cos(a) r^2 du dpsi with cos(a) = sqrt(1 - u^2) cos(psi) = d / r: power mu cos^3(a) / d^2, integrated over the beam.

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
@@ -63,20 +65,20 @@ TEST(Reference, SeabedClosedFormAgainstPoints) {
   FrequencyMode mode = p900();
   const Medium medium{1500, 0, 1};
   const double height = 2, lambert_db = -27, mu = lambert_coefficient(lambert_db), step = 0.004, tilt = 0.25;
-  for (const double r : {4.0, 7.0}) {
+  for (const auto& [r, sine] : {std::pair{4.0, 0.0}, std::pair{7.0, 0.0}, std::pair{7.0, 0.5}}) {
     const Grid grid = grid_of(0.0254, r, 1);
-    const double ahead = std::sqrt(r * r - height * height);
+    const double across = r * sine, ahead = std::sqrt(r * r - across * across - height * height);
     std::vector<Scatterer> points;
-    for (double x = ahead - 0.25; x < ahead + 0.15; x += step) {
-      for (double y = -0.6; y <= 0.6; y += step) {
+    for (double x = ahead - 0.25; x < ahead + 0.25; x += step) {
+      for (double y = across - 0.6; y <= across + 0.6; y += step) {
         const double range = std::sqrt(x * x + y * y + height * height);
         const Vec3d in_sonar{x * std::cos(tilt) + height * std::sin(tilt), y, x * std::sin(tilt) - height * std::cos(tilt)};
         points.push_back(scatterer_at(mode, medium, in_sonar, cell_cross_section_m2(mu, height / range, step * step), 1));
       }
     }
-    const double sine = 0;
     const double got = expected_power(points, std::span(&sine, 1), mode.pattern, grid)[0][0];
-    EXPECT_NEAR(10 * std::log10(got), seabed_level_db(mode, medium, grid.envelope_hz, lambert_db, height, tilt, r), 0.05) << r;
+    EXPECT_NEAR(10 * std::log10(got), seabed_level_db(mode, medium, grid.envelope_hz, lambert_db, height, tilt, r, sine), 0.05)
+        << r << " " << sine;
   }
 }
 

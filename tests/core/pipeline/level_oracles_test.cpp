@@ -1,0 +1,275 @@
+// Oracles on levels of surfaces, in expected power: absolute, against range, against sampling, behind a box.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/scattering.hpp"
+#include "core/pipeline/arithmetic/waveform.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+
+namespace sonar::test {
+namespace {
+
+double db(double power_ratio) { return 10 * std::log10(power_ratio); }
+
+std::shared_ptr<const Scene> flat_bed(double lambert_db) {
+  return SceneMaker().add(height_field(-2, 40, -40, 40, 2, [](double, double) { return 0.0; }), lambert_db).make();
+}
+
+/// integral of E|s|^2 dt of a beam, over rows [from, to).
+double beam_energy(const Sounding& s, int beam, int from, int to) {
+  double sum = 0;
+  for (int row = from; row < to; ++row) sum += s.power(row, beam);
+  return sum * 2 * static_cast<double>(s.request.settings.range_bin_m) / 1500;
+}
+
+/// Mean over the beams within `azimuth_deg` of ahead.
+template <class Value>
+double mean_over_beams(const Sounding& s, double azimuth_deg, Value&& value) {
+  double sum = 0;
+  int n = 0;
+  for (int j = 0; j < s.beams(); ++j) {
+    if (std::abs(std::asin(s.beam_sine(j))) > rad_from_deg(azimuth_deg)) continue;
+    sum += value(j);
+    ++n;
+  }
+  return sum / n;
+}
+
+TEST(LevelOracles, Oracle05_WallEnergyFallsAs20LogR) {
+  const FrequencyMode mode = silent(p900());
+  const double half_fan = 2.3 * rad_from_deg(10);  // beyond, the pattern has nothing left to add: under 0.05 dB
+  std::vector<double> level;
+  for (const double d : {1.0, 2.0, 4.0, 8.0}) {
+    Sounding s(SceneMaker().add(wall(30, 30), -20, {d, 0, 0}).make(), mode, native_rows(1.3 * d + 0.3, 0.0254));
+    s.request.switches.expected_power = true;
+    s.ping();
+    const double energy = mean_over_beams(s, 3, [&](int j) { return beam_energy(s, j, 0, s.rows()); });
+    level.push_back(db(energy));
+    const double expected = reference::wall_energy(mode, s.medium(), s.envelope_hz(), lambert_coefficient(-20), d, half_fan);
+    EXPECT_NEAR(db(energy / expected), 0, 0.2) << d;
+  }
+  for (std::size_t i = 1; i < level.size(); ++i) {
+    EXPECT_NEAR((level[i] - level[0]) / (static_cast<double>(i) * std::log10(2.0)), -20, 0.2) << i;
+  }
+}
+
+struct BedCase {
+  FrequencyMode mode;
+  PingSettings settings;
+  double tilt_rad;
+};
+
+// Blocks of rows and a few beams are averaged: in one sample the cells' own jitter shows (about half a dB), and it is not the
+// level.
+TEST(LevelOracles, Oracle08_AbsoluteSeabedLevel) {
+  const double height = 2, lambert_db = -27;
+  for (const BedCase& c : {BedCase{p900(), native_rows(10, 0.0254), 0.25}, BedCase{p900(), native_rows(10, 0.0254), 0.0},
+                           BedCase{oculus_low(), native_rows(20, 0.0254), 0.2},
+                           BedCase{oculus_high(), native_rows(10, 0.0125), 0.25}, BedCase{p900(), default_rows(10, 400), 0.25}}) {
+    Sounding s(flat_bed(lambert_db), without_elevation_pattern(c.mode), c.settings);
+    s.request.switches.expected_power = true;
+    s.ping_from({0, 0, height}, {0, c.tilt_rad, 0});
+    const double half_fan = 2.3 * static_cast<double>(c.mode.pattern.elevation_width_rad) / 2;
+    constexpr int block = 20;
+    int blocks = 0;
+    for (int row = 0; row + block <= s.rows(); row += block) {
+      const double near_psi = reference::seabed_psi_rad(height, c.tilt_rad, s.range_of_row(row) - 2 * 0.0254, 0.06);
+      const double far_psi = reference::seabed_psi_rad(height, c.tilt_rad, s.range_of_row(row + block) + 2 * 0.0254, 0);
+      if (!(near_psi > -half_fan && far_psi < half_fan)) continue;
+      const double ratio = mean_over_beams(s, 3, [&](int j) {
+        double sum = 0;
+        for (int n = row; n < row + block; ++n) {
+          const double expected = reference::seabed_level_db(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height,
+                                                             c.tilt_rad, s.range_of_row(n), s.beam_sine(j));
+          sum += s.power(n, j) / power_from_db(expected);
+        }
+        return sum / block;
+      });
+      EXPECT_NEAR(db(ratio), 0, 0.3) << c.mode.name << " tilt " << c.tilt_rad << " r " << s.range_of_row(row);
+      ++blocks;
+    }
+    EXPECT_GT(blocks, 8) << c.mode.name;
+  }
+}
+
+/// What sum sigma_i / r_i^4 comes to, from the beams of a whole ping: the sum of E|s|^2 over rows and beams counts every echo
+/// theta_eff tau_eff times.
+double echo_per_m2(const Sounding& s) {
+  double sum = 0;
+  for (int j = 0; j < s.beams(); ++j) sum += beam_energy(s, j, 0, s.rows());
+  const Taper taper = s.mode().pattern.azimuth_taper;
+  const double theta =
+      effective_beam_width_u(taper, aperture_in_wavelengths(taper, static_cast<double>(s.mode().pattern.azimuth_width_rad)));
+  const double du = s.beam_sine(0) - s.beam_sine(1);  // uniform in the sine
+  const double source = s.medium().source_upa;
+  return sum * du / (theta * energy_width_s(s.envelope_hz()) * source * source);
+}
+
+TEST(LevelOracles, Oracle09_LambertSphere) {
+  FrequencyMode mode = without_elevation_pattern(silent(p900()));
+  mode.beam_spacing = BeamSpacing::uniform_in_sine;
+  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(40));
+  const double a = 0.2, mu = lambert_coefficient(-15);
+  for (const double d : {2.0, 3.0}) {
+    PingSettings settings = native_rows(d + 0.5, 0.01);
+    settings.beam_count = d > 2 ? 1024 : 512;
+    for (const int fan : {1200, 0}) {  // 1200 rays over 46 degrees: 300 across the nearer sphere; then cells
+      Sounding s(SceneMaker().add(sphere(a, 6), -15, {d, 0, 0}).make(), mode, settings);
+      s.request.switches.expected_power = true;
+      s.request.switches.fixed_fan = fan;
+      s.ping();
+      EXPECT_NEAR(db(echo_per_m2(s) / reference::sphere_echo_per_m2(mu, a, d)), 0, 0.05) << d << " m, fan " << fan;
+    }
+  }
+}
+
+/// Mean power of a ping between two ranges, beams within 30 degrees.
+double mean_power(const Sounding& s, double from_m, double to_m) {
+  const int from = static_cast<int>(s.row_of_range(from_m)), to = static_cast<int>(s.row_of_range(to_m));
+  return mean_over_beams(s, 30, [&](int j) { return beam_energy(s, j, from, to); });
+}
+
+TEST(LevelOracles, Oracle21_EnergyDoesNotDependOnRays) {
+  struct Case {
+    std::shared_ptr<const Scene> scene;
+    double height, tilt, from_m, to_m;
+  };
+  for (const Case& c :
+       {Case{SceneMaker().add(wall(30, 30), -20, {5, 0, 0}).make(), 0, 0, 4, 8}, Case{flat_bed(-20), 2, 0.25, 3.6, 10}}) {
+    std::vector<double> energy;
+    for (const int fan : {0, 100, 300, 1000}) {
+      Sounding s(c.scene, p900(), native_rows(10.5, 0.0254));
+      s.request.switches.expected_power = true;
+      s.request.switches.fixed_fan = fan;
+      s.ping_from({0, 0, c.height}, {0, c.tilt, 0});
+      energy.push_back(mean_power(s, c.from_m, c.to_m));
+    }
+    for (std::size_t i = 1; i < energy.size(); ++i) EXPECT_NEAR(db(energy[i] / energy[0]), 0, 0.2) << i;
+  }
+}
+
+TEST(LevelOracles, Oracle22_EnergyDoesNotDependOnBeams) {
+  for (const FrequencyMode& mode : {p900(), oculus_low()}) {
+    std::vector<double> energy;
+    for (const int beams : {256, 512, 1024}) {
+      PingSettings settings = native_rows(10, 0.0254);
+      settings.beam_count = beams;
+      Sounding s(flat_bed(-20), mode, settings);
+      s.request.switches.expected_power = true;
+      s.ping_from({0, 0, 2}, {0, 0.25, 0});
+      energy.push_back(mean_power(s, 3.5, 9.5));
+    }
+    EXPECT_NEAR(db(energy[1] / energy[0]), 0, 0.2);
+    EXPECT_NEAR(db(energy[2] / energy[0]), 0, 0.2);
+  }
+}
+
+// Every sample of every beam within 40 degrees, pattern on: no holes, no stripes.
+TEST(LevelOracles, Oracle32_FlatBedIsFilled) {
+  const double height = 2, lambert_db = -27, tilt = 0.25;
+  for (const PingSettings& settings : {native_rows(10, 0.0254), default_rows(10, 354)}) {
+    Sounding s(flat_bed(lambert_db), p900(), settings);
+    s.request.switches.expected_power = true;
+    s.ping_from({0, 0, height}, {0, tilt, 0});
+    const double dr = static_cast<double>(settings.pulse_width_m);
+    int good = 0, all = 0;
+    double worst = 0;
+    for (int j = 0; j < s.beams(); ++j) {
+      const double u = s.beam_sine(j);
+      if (std::abs(u) > std::sin(rad_from_deg(40))) continue;
+      const auto pattern = [&](double r) {
+        return elevation_two_way(s.mode().pattern, reference::seabed_psi_rad(height, tilt, r, u));
+      };
+      for (int row = 0; row < s.rows(); ++row) {
+        const double r = s.range_of_row(row);
+        if (!(r - 2 * dr > height / std::sqrt(1 - u * u)) || !(pattern(r) > 0.1) || !(pattern(r - 2 * dr) > 0.1)) continue;
+        const double off = db(s.power(row, j)) -
+                           reference::seabed_level_db(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, tilt, r, u);
+        good += std::abs(off) <= 1;
+        worst = std::max(worst, std::abs(off));
+        ++all;
+      }
+    }
+    EXPECT_GT(all, 50000);
+    EXPECT_GE(good, 0.99 * all) << "worst " << worst << " dB, rows of " << settings.range_bin_m;
+  }
+}
+
+// The shadow may hold what the rest of the bed leaks into it through side lobes and pulse, and 1 dB more.
+TEST(LevelOracles, Oracle33_ShadowBehindABox) {
+  const double height = 2, lambert_db = -20;
+  const Vec3d half{0.3, 0.7, 0.6}, place{4, 0, 0.6};
+  SceneMaker maker;
+  maker.add(height_field(-2, 40, -40, 40, 2, [](double, double) { return 0.0; }), lambert_db).add(box(half), -20, place);
+  Sounding s(maker.make(), p900(), native_rows(10, 0.0254));
+  s.request.switches.expected_power = true;
+  s.ping_from({0, 0, height}, {0, 0.25, 0});
+
+  // The bed as points of equal area, without what the box hides (seen from the sonar, by the slab test).
+  const auto hidden = [&](Vec3d p) {
+    const Vec3d from{0, 0, height}, step = p - from;
+    double enter = 0, leave = 1;
+    const double o[3] = {from.x, from.y, from.z}, d[3] = {step.x, step.y, step.z}, c[3] = {place.x, place.y, place.z},
+                 h[3] = {half.x, half.y, half.z};
+    for (int i = 0; i < 3; ++i) {
+      const double a = (c[i] - h[i] - o[i]) / d[i], b = (c[i] + h[i] - o[i]) / d[i];
+      enter = std::max(enter, std::min(a, b)), leave = std::min(leave, std::max(a, b));
+    }
+    return enter < leave;
+  };
+  const double step = 0.011, mu = lambert_coefficient(lambert_db);
+  const Quatd world_from_sonar = s.request.sonar_in_world.orientation;
+  std::vector<reference::Scatterer> points;
+  for (double x = 3; x < 8; x += step) {
+    for (double y = -3.5; y < 3.5; y += step) {
+      if (hidden({x, y, 0})) continue;
+      const Vec3d in_sonar = rotate(conjugate(world_from_sonar), Vec3d{x, y, -height});
+      const double sigma = cell_cross_section_m2(mu, height / length(in_sonar), step * step);
+      points.push_back(reference::scatterer_at(s.mode(), s.medium(), in_sonar, sigma, 1));
+    }
+  }
+  // Rows wholly behind the box, before its shadow ends: the box's top edge throws it to x = 4.3 * 2 / 0.8 m.
+  const int from = static_cast<int>(s.row_of_range(5.3)), to = static_cast<int>(s.row_of_range(7.0));
+  reference::Grid grid{1500, s.envelope_hz(), s.range_of_row(from), static_cast<double>(s.request.settings.range_bin_m),
+                       to - from};
+  std::vector<int> beams;
+  std::vector<double> sines;
+  for (const double azimuth_deg : {-4.0, 0.0, 3.0})
+    beams.push_back(s.beam_at(rad_from_deg(azimuth_deg))), sines.push_back(s.beam_sine(beams.back()));
+  const auto predicted = reference::expected_power(points, sines, s.mode().pattern, grid);
+  for (std::size_t b = 0; b < beams.size(); ++b) {
+    double got = 0, expected = 0, open = 0;
+    for (int n = from; n < to; ++n) {
+      got += s.power(n, beams[b]);
+      expected += predicted[b][static_cast<std::size_t>(n - from)];
+      open += s.power(n, s.beam_at(rad_from_deg(25)));
+    }
+    EXPECT_LT(db(got / expected), 1) << b;
+    EXPECT_GT(db(got / expected), -3) << b;  // the leak itself is there: the prediction is not beside the point
+    EXPECT_LT(db(got / open), -20) << b;
+  }
+}
+
+TEST(LevelOracles, Oracle45_ModesDifferByAbsorptionAndBeamAlone) {
+  FrequencyMode low = oculus_low(), high = oculus_high();
+  const double d = 1.5;
+  const auto level = [&](const FrequencyMode& mode, double& alpha_db) {
+    Sounding s(SceneMaker().add(wall(20, 20), -20, {d, 0, 0}).make(), mode, native_rows(2.2, 0.0125));
+    s.request.switches.expected_power = true;
+    s.ping();
+    alpha_db = 8.685889638 * s.medium().absorption_np_per_m;
+    return db(mean_over_beams(s, 3, [&](int j) { return beam_energy(s, j, 0, s.rows()); }));
+  };
+  double alpha_low = 0, alpha_high = 0;
+  const double difference = level(high, alpha_high) - level(low, alpha_low);
+  const double solid_angle = db(0.4 * 12 / (0.6 * 20));
+  EXPECT_GT(alpha_high, 2 * alpha_low);
+  EXPECT_NEAR(difference, solid_angle - 2 * (alpha_high - alpha_low) * d, 0.3);
+}
+
+}  // namespace
+}  // namespace sonar::test
