@@ -1,0 +1,36 @@
+// What `sonard bench` can run: a model, its settings, and how the sonar moves over which scene.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/sonar/ping.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+struct BenchCase {
+  std::string name;           // "P3d"
+  std::string description;    // for the table
+  protocol::Profile profile;  // vendor is null where no protocol frames this model yet
+  PingSettings settings;
+  bool near_bottom = false;  // short ranges want the bed closer
+};
+
+/// All of them, in the order of performance.md.
+std::vector<BenchCase> bench_cases();
+
+/// Scenes the cases run over, and where a sonar flies in them.
+struct BenchScene {
+  std::string name;  // scenes/NAME.yaml
+  double bed_z_m = 0;
+  Vec3d start_m;
+};
+std::span<const BenchScene> bench_scenes();
+
+/// At most 1 m/s and 20 deg/s, as the goals assume.
+Pose bench_pose(const BenchCase& c, const BenchScene& scene, double time_s);
+
+}  // namespace sonar
