@@ -44,7 +44,7 @@ PingSettings p900_90_preset() {
   settings.range_bin_count = preset_rows;
   settings.range_bin_m = static_cast<float>(row_m);
   settings.range_m = static_cast<float>(preset_rows * row_m);
-  settings.pulse_width_m = static_cast<float>(row_m);  // acoustics profile table: 25.4 mm
+  settings.pulse_width_m = static_cast<float>(row_m);  // DS: equal to the row
   settings.rate_hz = 15;
   settings.gain_db = 48;
   settings.format.bits = 16;  // unknown: BlueView images carry 16-bit samples

@@ -29,7 +29,7 @@ wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks);
 /// 0.01 deg, truncated toward zero as the capture is, guarded so that 29.99999 deg of a float stays 3000.
 std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad);
 
-/// The fire settings as the ping repeats them (spec 5.4). `sound_speed_used` replaces a requested 0.
+/// The fire settings as the ping repeats them (docs/protocols/oculus.md, 5.5). `sound_speed_used` replaces a requested 0.
 FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, double sound_speed_used_mps);
 
 /// Everything: request parsed, echo, environment, image.

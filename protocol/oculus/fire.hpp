@@ -22,7 +22,7 @@ std::optional<FireRequest> parse_fire(wire::BytesView message);
 /// as several public clients send it.
 wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination = 0, bool payload_size_zero = false);
 
-/// The device's stored configuration before any client spoke. Version 0 fits all clients (spec 3.1).
+/// The device's stored configuration before any client spoke. Version 0 fits all clients (docs/protocols/oculus.md, 5.1).
 FireRequest stored_fire();
 
 /// "mode 2, range 20 m, gain 50 %, rate 10 Hz": for the log.

@@ -9,7 +9,7 @@
 
 namespace sonar::oculus {
 
-/// Who sends the stream: clients put 0 into payload_size as they like (spec section 2), devices are exact.
+/// Who sends the stream: clients put 0 into payload_size as they like (docs/protocols/oculus.md, 2), devices are exact.
 enum class Sender { client, device };
 
 /// Total length of the message this header opens, or nothing when the header is junk for that sender.

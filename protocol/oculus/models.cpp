@@ -21,7 +21,7 @@ constexpr float m370s = 4e10f, c550d_low = 4e10f, c550d_high = 3e11f, m750d_low 
 constexpr float m1200d_low = 4e10f, m1200d_high = 3e11f, m3000d_low = 4e10f, m3000d_high = 3e11f;
 }  // namespace fitted_full_scale_upa
 
-constexpr float source_level_db = 200;  // unknown: chosen, acoustics profile table
+constexpr float source_level_db = 200;  // unknown: chosen; fits of published experiments vary by 50 dB
 constexpr float tvg_slope_db = 30;      // unknown: chosen
 constexpr float tvg_ceiling_db = 80;    // unknown: chosen
 constexpr float noise_figure_db = 10;   // unknown: chosen

@@ -80,4 +80,15 @@ double number_option(const protocol::OptionValues& values, std::string_view name
   return value;
 }
 
+std::string options_table() {
+  std::string text = "| option | values, default first | meaning |\n|---|---|---|\n";
+  for (const protocol::Option& option : table()) {
+    text.append("| `").append(option.name).append("` | ");
+    if (option.allowed.empty()) text.append(option.default_value).append(", any number above 0");
+    for (const std::string_view& value : option.allowed) text.append(&value == option.allowed.data() ? "" : ", ").append(value);
+    text.append(" | ").append(option.meaning).append(" |\n");
+  }
+  return text;
+}
+
 }  // namespace sonar::oculus

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "protocol/vendor.hpp"
@@ -24,5 +25,8 @@ std::span<const protocol::Option> options();
 std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
 /// For free numbers; the default when the text is not a finite number above 0.
 double number_option(const protocol::OptionValues& values, std::string_view name);
+
+/// The table of README.md.
+std::string options_table();
 
 }  // namespace sonar::oculus

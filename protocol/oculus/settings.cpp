@@ -130,8 +130,9 @@ Settled settle(const FireRequest& fire, const protocol::DeviceState& device) {
 
   const bool metres = (asked.flags & flag::range_in_metres) != 0;
   const double range = metres ? asked.range : asked.range / 100 * static_cast<double>(mode.max_range_m);
-  settings.range_m = static_cast<float>(clamped(range, mode.min_range_m, mode.max_range_m, "range", "m", out.clamped));
-  const RowLaw rows = row_law(settings.range_m, speed, number_option(device.options, option_name::row_rate_hz));
+  const double used_range = clamped(range, mode.min_range_m, mode.max_range_m, "range", "m", out.clamped);
+  settings.range_m = static_cast<float>(used_range);
+  const RowLaw rows = row_law(used_range, speed, std::clamp(number_option(device.options, option_name::row_rate_hz), 1e4, 1e7));
   settings.range_bin_count = rows.count;
   settings.range_bin_m = static_cast<float>(rows.spacing_m);
   set_pulse(settings, rows.spacing_m, text_option(device.options, option_name::pulse) == "native");

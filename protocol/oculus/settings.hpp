@@ -14,9 +14,9 @@ namespace sonar::oculus {
 /// 37.5 MHz / 143, exact in the capture (M1200d mode 2). unknown: other modes; the same is used.
 inline constexpr double row_rate_hz = 37.5e6 / 143.0;
 inline constexpr int row_limit = 720;             // liboculus node README, measured by its authors
-inline constexpr double native_pulse_m = 0.0025;  // acoustics of docs/architecture.md, range resolution of the data sheets
+inline constexpr double native_pulse_m = 0.0025;  // the finest range resolution the data sheets quote
 
-/// Rows of a ping (spec 5.3.1): c / (2 fs) doubled until at most 720 rows cover the range.
+/// Rows of a ping (docs/protocols/oculus.md, 5.4): c / (2 fs) doubled until at most 720 rows cover the range.
 struct RowLaw {
   double spacing_m = 0;
   int count = 1;
@@ -27,7 +27,8 @@ RowLaw row_law(double range_m, double sound_speed_mps, double rate_hz = row_rate
 double table_rate_hz(PingRate rate);
 /// Exponent of the samples: value / 255, and 1 for 0.
 float gamma_from_byte(std::uint8_t value);
-/// The gain as echoed, per cent (spec 5.4): mode 2 without flag bit 4 is mapped to 40 + 0.6 g, see option gain_echo.
+/// The gain as echoed, per cent (docs/protocols/oculus.md, 5.5): mode 2 without flag bit 4 is mapped to 40 + 0.6 g, see option
+/// gain_echo.
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo);
 
 /// True when a double of the message is NaN or infinite: the message must be ignored.

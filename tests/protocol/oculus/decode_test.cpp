@@ -24,7 +24,7 @@ std::vector<std::string> violations_after(std::size_t offset, const char* bytes,
   return decoded ? decoded->violations : std::vector<std::string>{"unreadable"};
 }
 
-// Offsets of version 1 and 2 typed from the tables of the protocol document.
+// Offsets of version 1 and 2 typed from the published layouts.
 TEST(Identities, EveryBrokenOneHasItsSentence) {
   ASSERT_THAT(violations_after(0, "53 4F"), IsEmpty());
   ASSERT_THAT(violations_after(0, "53 4F", 2), IsEmpty());

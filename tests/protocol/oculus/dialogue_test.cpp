@@ -24,7 +24,7 @@ struct Conversation {
   Reaction say(BytesView bytes, double when_s = 0) { return dialogue->on_bytes(Exact(bytes).view(), at(when_s)); }
 };
 
-// Defaults of the public clients, spec section 3: what each sends, and what it must mean.
+// Defaults of the public clients (docs/protocols/oculus.md names them): what each sends, and what it must mean.
 struct Client {
   const char* name;
   int version;

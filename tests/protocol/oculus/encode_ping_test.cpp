@@ -1,6 +1,4 @@
 // Pings framed by the vendor: sizes, echo, version, environment, formats, bearings.
-#include <cstring>
-
 #include "protocol/oculus/models.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 

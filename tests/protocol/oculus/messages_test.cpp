@@ -1,4 +1,4 @@
-// Every message against bytes typed from the tables of docs/protocols/oculus.md, field by field, in both directions.
+// Every message against bytes typed field by field from the published layouts, in both directions.
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
 namespace sonar::oculus::testing {
@@ -115,7 +115,7 @@ TEST(Messages, ShortOrForeignStatusIsRefused) {
   EXPECT_FALSE(decode_status(foreign).has_value());
 }
 
-// One ping of 2 beams and 3 rows with row gains, as the tables of section 5 lay it out.
+// One ping of 2 beams and 3 rows with row gains, as the published layout has it.
 const Bytes echo_bytes =
     hex("02 C3 19 7F 1D "  // mode 2, the captured rate 195, flags with gains
         "00 00 00 00 00 00 04 40  00 00 00 00 00 00 49 40  00 00 00 00 00 4A 97 40  00 00 00 00 00 00 00 00 ");

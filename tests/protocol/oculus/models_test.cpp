@@ -1,4 +1,4 @@
-// The product table against the figures of docs/protocols/oculus.md, section 5.3 and 4.1, typed again.
+// The product table against the figures of public drivers, typed again.
 #include <set>
 
 #include "protocol/oculus/models.hpp"

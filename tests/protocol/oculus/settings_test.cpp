@@ -230,6 +230,14 @@ TEST(Settle, RowRateIsAnOption) {
   EXPECT_EQ(fast.range_bin_count, settings_of(request, device()).range_bin_count / 2);
 }
 
+TEST(Settle, AbsurdRowRatesStayUsable) {
+  for (const char* rate : {"1e-300", "1e300"}) {
+    const PingSettings s = settings_of(fire(0, 2, PingRate::hz10, 0x49, 2, 50), device("oculus-m1200d", {{"row_rate_hz", rate}}));
+    EXPECT_TRUE(s.range_bin_m > 0 && s.range_bin_m < 1) << rate;
+    EXPECT_TRUE(s.range_bin_count >= 1 && s.range_bin_count <= 720) << rate;
+  }
+}
+
 TEST(Settle, NetworkTrigger) { EXPECT_TRUE(settings_of(fire(0, 1, PingRate::hz10, 0xC9, 5, 50), device()).triggered); }
 
 }  // namespace
