@@ -1,0 +1,12 @@
+// What this build and this machine can do with CUDA, in a few words for the banner.
+// Stands apart from cuda_engine.hpp so that the daemon's texts need not know engines.
+#pragma once
+
+#include <string>
+
+namespace sonar {
+
+/// "not built", "no device", "no device (<the driver's reason>)" or "NVIDIA H200, 139.8 GiB, compute 9.0".
+std::string cuda_status();
+
+}  // namespace sonar

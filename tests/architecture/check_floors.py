@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""Holds the floors of docs/architecture.md: who may include whom, and what must not appear where.
+
+usage: check_floors.py ROOT      prints one line a violation, exits 1 when there is any
+"""
+import pathlib
+import re
+import subprocess
+import sys
+
+# Folder -> prefixes of our own files it may include. The longest matching folder counts.
+FLOORS = {
+    "core/base": ["core/base/"],
+    "core/text": ["core/base/", "core/text/"],
+    "core/sonar": ["core/base/", "core/sonar/"],
+    "core/scene": ["core/base/", "core/text/", "core/sonar/", "core/scene/"],
+    "core/pipeline": ["core/base/", "core/sonar/", "core/scene/", "core/pipeline/"],
+    "core/pipeline/arithmetic": ["core/base/", "core/sonar/", "core/pipeline/arithmetic/"],
+    "cuda": ["core/base/", "core/sonar/", "core/pipeline/ping_engine.hpp", "core/pipeline/arithmetic/",
+             "core/scene/flat_scene.hpp", "cuda/"],
+    "protocol": ["core/base/", "core/sonar/", "protocol/"],
+    "protocol/wire": ["core/base/", "protocol/wire/"],
+    "protocol/control": ["core/base/", "protocol/control/"],
+    "protocol/oculus": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
+    "protocol/blueview": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
+    "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
+    "clients": ["core/base/", "core/sonar/", "protocol/", "clients/"],
+    "tests": [""],
+}
+# Header of a dependency -> the only files that may include it (tests may include anything).
+DEPENDENCIES = {
+    r"embree[34]?/": ["core/scene/embree_scene.cpp"],
+    r"fftw": [],  # not linked yet; its one file will stand here
+    r"yaml-cpp/": ["core/text/"],
+    r"assimp/": ["core/scene/load_mesh.cpp"],
+    r"png\.h|pngconf\.h": ["core/scene/", "clients/fan_image/raster.cpp"],
+    r"boost/": ["daemon/"],
+    r"boost/asio\.hpp": ["daemon/asio.hpp"],
+    r"spdlog/|fmt/": ["daemon/", "clients/"],
+    r"google/protobuf|.*\.pb\.h": ["protocol/control/control.cpp"],
+    r"nlohmann/": ["protocol/control/", "daemon/", "clients/"],
+    r"CLI/": ["daemon/", "clients/"],
+    r"cuda|nv[a-z]+\.h": ["cuda/"],
+    r"tbb/|oneapi/": [],
+    r"Eigen/": [],
+}
+# Name, files it is looked for in, files excepted, what must not appear, why.
+FORBIDDEN = [
+    ("cast", r"protocol/", None, r"\breinterpret_cast\b", "bytes are read and written through protocol/wire"),
+    ("packing", r"protocol/", None, r"#\s*pragma\s+pack|__attribute__\s*\(\(\s*packed", "bytes go through protocol/wire"),
+    ("clock", r"core/|protocol/", None, r"\b(system|steady|high_resolution)_clock\b|\b(clock_)?gettime(ofday)?\s*\(|\btime\s*\(\s*(nullptr|NULL|0)\s*\)",
+     "time comes in as an argument; only daemon/ and clients/ read clocks"),
+    ("log", r"core/|protocol/", None, r"\bstd::(cout|cerr|clog)\b|\b(f|v|vf)?printf\s*\(|\bf?puts\s*\(|\bperror\s*\(",
+     "only daemon/ and clients/ print or log"),
+    ("thread", r"core/|protocol/|cuda/|clients/", r"core/base/parallel\.", r"\bstd::(j?thread|async)\b|\bpthread_create\b",
+     "compute threads live in core/base/parallel.* only"),
+    ("socket", r"core/|protocol/", None, r"#\s*include\s*<(sys/socket|netinet/|arpa/|poll|netdb)", "only daemon/ and clients/ touch sockets"),
+    ("mutex", r"daemon/|protocol/", None, r"\bstd::(mutex|shared_mutex|recursive_mutex|condition_variable)\b",
+     "work crosses threads by value and asio::post"),
+    ("global random", r"core/", None, r"\bstd::(mt19937|random_device|default_random_engine)|\bs?rand\s*\(", "random numbers are counter-based, core/base/random.hpp"),
+    ("mark", r"", None, r"\b(TO" + r"DO|FIX" + r"ME|X" + r"XX)\b", "finish it, or write an issue"),
+    ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
+]
+CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc"}
+TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ""}
+LONGEST_FILE = 400  # lines; tests may be longer
+
+
+def tracked_files(root):
+    """What git would commit; every file outside build folders where there is no git."""
+    listing = subprocess.run(["git", "-C", str(root), "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+                             capture_output=True, check=False)
+    if listing.returncode == 0:
+        names = [n for n in listing.stdout.decode().split("\0") if n]
+    else:
+        names = [p.relative_to(root).as_posix() for p in root.rglob("*")]
+        names = [n for n in names if not n.startswith(("build/", "out/", ".git/"))]
+    return sorted(n for n in names if (root / n).is_file())
+
+
+def without_comments(text):
+    """Comments become blanks of the same number of lines; strings stay."""
+    pattern = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.S)
+    return pattern.sub(lambda m: m.group() if m.group().startswith('"') else re.sub(r"[^\n]", " ", m.group()), text)
+
+
+def floor_of(name):
+    folders = [f for f in FLOORS if name.startswith(f + "/")]
+    return max(folders, key=len) if folders else None
+
+
+def include_violations(name, code):
+    floor = floor_of(name)
+    for number, line in enumerate(code.splitlines(), 1):
+        match = re.match(r'\s*#\s*include\s*(["<])([^">]+)[">]', line)
+        if not match:
+            continue
+        quoted, header = match.group(1) == '"', match.group(2)
+        if not name.startswith("tests/"):
+            for pattern, allowed in DEPENDENCIES.items():
+                if re.match(pattern, header) and not header.startswith("cuda/") and not any(name.startswith(a) for a in allowed):
+                    yield number, f"includes <{header}>; only {', '.join(allowed) or 'nobody'} may"
+        if quoted and not header.endswith(".pb.h"):
+            if "/" not in header:
+                yield number, f'includes "{header}": include paths start at the root'
+            elif floor is not None and not any(header.startswith(p) for p in FLOORS[floor]):
+                yield number, f'{floor} must not include "{header}" (floors of docs/architecture.md)'
+
+
+def line_of(text, position):
+    return text.count("\n", 0, position) + 1
+
+
+def violations(root):
+    for name in tracked_files(root):
+        path = root / name
+        if path.suffix not in TEXT:
+            continue
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue  # a binary without an extension
+        is_code = path.suffix in CODE
+        code = without_comments(text) if is_code else text
+        if is_code:
+            for number, what in include_violations(name, code):
+                yield f"{name}:{number}: {what}"
+            if path.suffix in {".hpp", ".cuh", ".h"} and not re.search(r"^#pragma once$", text, re.M):
+                yield f"{name}:1: header without #pragma once"
+            if not name.startswith("tests/") and text.count("\n") > LONGEST_FILE:
+                yield f"{name}:{LONGEST_FILE}: longer than {LONGEST_FILE} lines: split it"
+        for rule, where, excepted, pattern, why in FORBIDDEN:
+            if not re.match(where, name) or (where and not is_code) or (excepted and re.match(excepted, name)):
+                continue
+            searched = code if where else text  # house rules hold in comments too
+            for match in re.finditer(pattern, searched):
+                yield f"{name}:{line_of(searched, match.start())}: {rule}: \"{match.group().strip()}\"; {why}"
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    root = pathlib.Path(sys.argv[1]).resolve()
+    found = list(violations(root))
+    print("\n".join(found) if found else "floors hold")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""Plants one violation of each rule in a made-up tree and expects check_floors to find exactly that one."""
+import pathlib
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+sys.dont_write_bytecode = True
+import check_floors  # noqa: E402
+
+SLASH = "/"  # keeps this file free of what it plants
+
+
+def found_in(files):
+    """Violations of a tree that holds these files, {name: text}."""
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        for name, text in files.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(text, encoding="utf-8")
+        return list(check_floors.violations(root))
+
+
+class Planted(unittest.TestCase):
+    def expect(self, name, text, place, words):
+        if name.endswith(".hpp"):
+            text += "#pragma once\n"
+        found = found_in({name: text})
+        self.assertEqual(len(found), 1, found)
+        self.assertTrue(found[0].startswith(f"{name}:{place}: "), found)
+        self.assertIn(words, found[0])
+
+    def test_upward_and_sideways_includes(self):
+        for name, header in [
+                ("core/base/a.hpp", "core/sonar/ping.hpp"), ("core/sonar/a.hpp", "core/scene/scene.hpp"),
+                ("core/scene/a.cpp", "core/pipeline/simulate.hpp"), ("core/pipeline/a.cpp", "protocol/vendor.hpp"),
+                ("core/pipeline/a.cpp", "core/text/strict_yaml.hpp"), ("core/pipeline/arithmetic/a.hpp", "core/scene/scene.hpp"),
+                ("protocol/oculus/a.cpp", "core/scene/scene.hpp"), ("protocol/oculus/a.cpp", "core/pipeline/ping_engine.hpp"),
+                ("protocol/oculus/a.cpp", "protocol/blueview/models.hpp"), ("protocol/control/a.cpp", "daemon/world.hpp"),
+                ("clients/sonarctl/a.cpp", "daemon/config.hpp"), ("clients/sonarctl/a.cpp", "core/pipeline/simulate.hpp"),
+                ("cuda/a.cu", "core/scene/ray_scene.hpp"), ("daemon/a.cpp", "clients/sonarctl/net.hpp")]:
+            with self.subTest(name=name, header=header):
+                self.expect(name, f'\n#include "{header}"\n', 2, "must not include")
+
+    def test_include_paths_start_at_the_root(self):
+        self.expect("core/base/a.cpp", '#include "units.hpp"\n', 1, "start at the root")
+
+    def test_dependencies_enter_through_one_file(self):
+        for name, header in [
+                ("core/scene/scene.cpp", "embree3/rtcore.h"), ("core/pipeline/a.cpp", "embree4/rtcore.h"),
+                ("core/pipeline/a.cpp", "fftw3.h"), ("daemon/config.cpp", "yaml-cpp/yaml.h"),
+                ("core/scene/scene.cpp", "assimp/scene.h"), ("protocol/oculus/a.cpp", "spdlog/spdlog.h"),
+                ("daemon/a.cpp", "google/protobuf/message.h"), ("daemon/session.cpp", "boost/asio.hpp"),
+                ("core/base/a.cpp", "boost/container/small_vector.hpp"), ("core/base/parallel.cpp", "tbb/parallel_for.h"),
+                ("core/pipeline/a.cpp", "cuda_runtime.h"), ("core/base/a.hpp", "Eigen/Dense")]:
+            with self.subTest(name=name, header=header):
+                self.expect(name, f"#include <{header}>\n", 1, "may")
+
+    def test_forbidden_words(self):
+        for name, line, rule in [
+                ("protocol/wire/a.hpp", "auto p = reinterpret_cast<Header*>(bytes);", "cast"),
+                ("protocol/oculus/a.hpp", "#pragma pack(push, 1)", "packing"),
+                ("protocol/oculus/a.hpp", "struct __attribute__((packed)) A {};", "packing"),
+                ("core/pipeline/a.cpp", "auto t = std::chrono::steady_clock::now();", "clock"),
+                ("protocol/oculus/a.cpp", "auto t = time(nullptr);", "clock"),
+                ("core/scene/a.cpp", 'std::cerr << "loaded";', "log"),
+                ("core/scene/a.cpp", 'printf("loaded");', "log"),
+                ("core/pipeline/a.cpp", "std::thread worker(f);", "thread"),
+                ("cuda/a.cpp", "std::async(f);", "thread"),
+                ("protocol/oculus/a.cpp", "#include <sys/socket.h>", "socket"),
+                ("daemon/a.cpp", "std::mutex guard;", "mutex"),
+                ("core/scene/a.cpp", "std::mt19937 engine;", "global random"),
+                ("daemon/a.cpp", "int x;  // TO" + "DO later", "mark"),
+                ("docs/a.md", "run it in " + SLASH + "ho" + "me/me/sonard", "machine path"),
+                ("tests/daemon/a.cpp", 'open("' + SLASH + "t" + 'mp/x");', "machine path")]:
+            with self.subTest(name=name, line=line):
+                self.expect(name, line + "\n", 1, rule)
+
+    def test_headers_and_sizes(self):
+        found = found_in({"core/base/a.hpp": "int x;\n"})
+        self.assertEqual(found, ["core/base/a.hpp:1: header without #pragma once"])
+        self.expect("core/base/a.cpp", "int x;\n" * 401, 400, "split it")
+
+
+class Innocent(unittest.TestCase):
+    def test_what_is_allowed_is_not_reported(self):
+        self.assertEqual(found_in({
+            "core/base/parallel.cpp": "#include <thread>\nstd::thread worker(f);\n",
+            "core/scene/embree_scene.cpp": '#include <embree3/rtcore.h>\n#include "core/scene/ray_scene.hpp"\n',
+            "core/scene/load_mesh.cpp": "#include <assimp/scene.h>\n",
+            "core/text/strict_yaml.cpp": "#include <yaml-cpp/parser.h>\n",
+            "protocol/control/control.cpp": '#include "control.pb.h"\n',
+            "protocol/oculus/a.cpp": "// reinterpret_cast is not for us\nchar t[9]; int n = std::snprintf(t, 9, \"%d\", 1);\n",
+            "protocol/vendors.cpp": '#include "protocol/oculus/oculus.hpp"\n',
+            "daemon/asio.hpp": "#pragma once\n#include <utility>\n#include <boost/asio.hpp>\n",
+            "daemon/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
+            "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/oculus/decode.hpp"\n',
+            "tests/core/a.cpp": '#include <Eigen/Dense>\n#include "daemon/world.hpp"\nstd::thread t; // steady_clock\n',
+            "docs/a.md": "see https://example.org/work/home and scenes/demo.yaml, /etc/sonard/sonard.yaml\n",
+        }), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
