@@ -22,7 +22,8 @@ class CpuEngine final : public PingEngine {
     for (const PingRequest& request : requests) {
       if (!cells_ || cells_->seed() != request.seed)
         cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes);
-      if (!request.bodies_in_world.empty()) rays_.place(request.bodies_in_world);
+      if (!scene_->bodies_in_world.empty())
+        rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
       pings.push_back(simulate(rays_, *cells_, request, kernels_, work_, pool_));
     }
     return pings;

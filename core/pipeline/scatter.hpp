@@ -41,7 +41,8 @@ void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& c
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen);
 
 /// For each group of `group_columns` columns, the tiles that reach into it, in order.
-void sort_tiles(const std::vector<TileToSound>& tiles, int group_columns, int groups, std::vector<std::vector<std::uint32_t>>& by_group);
+void sort_tiles(const std::vector<TileToSound>& tiles, int group_columns, int groups,
+                std::vector<std::vector<std::uint32_t>>& by_group);
 
 /// Appends the echoes of tiles[wanted[from, ...)] until they or the room run out; returns the next place in `wanted`.
 std::size_t scatter(const std::vector<TileToSound>& tiles, std::span<const std::uint32_t> wanted, std::size_t from,

@@ -8,8 +8,7 @@ namespace {
 constexpr int group_columns = 48;   // columns one worker carries from rays to sums: their signals stay in the second cache
 constexpr int window_samples = 64;  // samples one worker carries from coupling to codes
 constexpr int echo_room = 16384;
-
-int groups_of(const PingPlan& plan) { return (plan.columns.count + group_columns - 1) / group_columns; }
+constexpr std::size_t most_prepared = 8;  // sets of settings kept ready
 
 /// Adds the time since it was made, or last told, to a stage.
 class Stopwatch {
@@ -29,142 +28,184 @@ class Stopwatch {
   double since_;
 };
 
-std::span<const Pose> bodies_of(const PingRequest& request, const Scene& scene) {
-  return request.bodies_in_world.empty() ? std::span<const Pose>(scene.bodies_in_world)
-                                         : std::span<const Pose>(request.bodies_in_world);
+PreparedSettings& prepared_for(const PingRequest& request, Workspace& w) {
+  ++w.pings;
+  auto it = std::find_if(w.prepared.begin(), w.prepared.end(),
+                         [&](const auto& p) { return p->model == request.model && serves(p->plan, request); });
+  if (it == w.prepared.end()) {
+    if (w.prepared.size() >= most_prepared)
+      w.prepared.erase(std::min_element(w.prepared.begin(), w.prepared.end(),
+                                        [](const auto& a, const auto& b) { return a->last_used < b->last_used; }));
+    auto made = std::make_unique<PreparedSettings>();
+    made->model = request.model;
+    made->plan =
+        make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings, request.switches);
+    it = w.prepared.insert(w.prepared.end(), std::move(made));
+  }
+  PreparedSettings& p = **it;
+  p.last_used = w.pings;
+  if (request.switches.noise && !p.plan.expected_power) p.noise.prepare(request.seed, p.plan.noise_filter);
+  return p;
 }
 
-void find_tiles(SurfaceCells& cells, const Scene& scene, const PingRequest& request, const PingScalars& scalars, Workspace& w,
-                Parallel& pool) {
-  Stopwatch watch(w.now_s, w.statistics);
-  const PingPlan& plan = w.plan;
+/// The stages of one ping and what they hand on.
+class PingUnderWay {
+ public:
+  PingUnderWay(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
+               Workspace& work, Parallel& pool)
+      : scene_(scene),
+        cells_(cells),
+        request_(request),
+        kernels_(kernels),
+        w_(work),
+        pool_(pool),
+        prepared_(prepared_for(request, work)),
+        plan_(prepared_.plan),
+        scalars_(make_scalars(plan_, request, scene.origin())),
+        bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world) {
+    w_.columns.shape(plan_.columns.count, plan_.samples, plan_.taps);
+    w_.workers.resize(static_cast<std::size_t>(pool.threads()));
+    w_.statistics = {};
+    for (Workspace::PerWorker& worker : w_.workers) {
+      worker.statistics = {};
+      if (worker.echoes.column.empty()) worker.echoes.reserve(echo_room);
+    }
+  }
+
+  void find_echo_sources();
+  void sound_columns();
+  Ping image();
+
+ private:
+  bool ray_is_scatterer() const { return plan_.fixed_fan > 0; }
+  int groups() const { return (plan_.columns.count + group_columns - 1) / group_columns; }
+  void sound_group(int first, int last, Workspace::PerWorker& mine);
+  void scatter_hits_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch);
+  void scatter_cells_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch);
+  void image_rows(int first, int last, Workspace::PerWorker& mine, Ping& ping);
+
+  const RayScene& scene_;
+  SurfaceCells& cells_;
+  const PingRequest& request_;
+  const simd::Kernels& kernels_;
+  Workspace& w_;
+  Parallel& pool_;
+  PreparedSettings& prepared_;
+  const PingPlan& plan_;
+  PingScalars scalars_;
+  std::span<const Pose> bodies_;
+  std::vector<PointEcho> points_;
+};
+
+/// Surface cells that may be in view, sorted by the columns they reach; analytic points that are.
+void PingUnderWay::find_echo_sources() {
+  if (request_.blank) return;
+  points_ = scatter_points(scene_, bodies_, plan_, scalars_, request_.sonar_in_world);
+  if (ray_is_scatterer()) return;
+  Stopwatch watch(w_.now_s, w_.statistics);
   CellView view;
-  view.sonar_in_world = request.sonar_in_world;
-  view.bodies_in_world = bodies_of(request, scene);
-  view.max_range_m = static_cast<float>(scalars.max_range_m);
-  view.max_sine = static_cast<float>(std::min(1.0, plan.columns.first_sine + plan.columns.spacing));
-  view.max_elevation_rad = static_cast<float>(plan.fan.half_angle_rad);
-  view.levels = plan.levels;
-  const auto& in_view = cells.in_view(view, pool);
-  watch.lap(cells.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
-  prepare_tiles(in_view, cells, scene, plan, scalars, pool, w.tiles);
-  sort_tiles(w.tiles, group_columns, groups_of(plan), w.tiles_by_group);
+  view.sonar_in_world = request_.sonar_in_world;
+  view.bodies_in_world = bodies_;
+  view.max_range_m = static_cast<float>(scalars_.max_range_m);
+  view.max_sine = static_cast<float>(std::min(1.0, plan_.columns.first_sine + plan_.columns.spacing));
+  view.max_elevation_rad = static_cast<float>(plan_.fan.half_angle_rad);
+  view.levels = plan_.levels;
+  const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
+  watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
+  prepare_tiles(in_view, cells_, scene_.scene(), plan_, scalars_, pool_, w_.tiles);
+  sort_tiles(w_.tiles, group_columns, groups(), w_.tiles_by_group);
   watch.lap(Stage::cull);
-  w.statistics.tiles = in_view.size();
-  w.statistics.tiles_built = cells.built_last_time();
-  w.statistics.cell_bytes = cells.cached_bytes();
-  for (const TileInView& t : in_view) w.statistics.cells += static_cast<std::size_t>(t.tile->count);
+  w_.statistics.tiles = in_view.size();
+  w_.statistics.tiles_built = cells_.built_last_time();
+  w_.statistics.cell_bytes = cells_.cached_bytes();
+  for (const TileInView& t : in_view) w_.statistics.cells += static_cast<std::size_t>(t.tile->count);
 }
 
-void sound_fixed_fan(const RayScene& scene, const PingRequest& request, const PingScalars& scalars, const simd::Kernels& kernels,
-                     int first, int last, Workspace& w, Workspace::PerWorker& mine, Stopwatch& watch) {
+/// Rays, echoes, pulses and noise, a group of columns at a time.
+void PingUnderWay::sound_columns() {
+  pool_.for_each(static_cast<std::size_t>(groups()), [&](std::size_t g, int worker) {
+    const int first = static_cast<int>(g) * group_columns;
+    sound_group(first, std::min(first + group_columns, plan_.columns.count), w_.workers[static_cast<std::size_t>(worker)]);
+  });
+}
+
+void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) {
+  Stopwatch watch(w_.now_s, mine.statistics);
+  clear_columns(w_.columns, first, last);
+  if (!request_.blank) {
+    if (ray_is_scatterer())
+      scatter_hits_of(first, last, mine, watch);
+    else
+      scatter_cells_of(first, last, mine, watch);
+  }
+  finish_columns(plan_, request_.switches.noise ? &prepared_.noise : nullptr, request_.sonar_id,
+                 static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
+  watch.lap(Stage::noise);
+}
+
+void PingUnderWay::scatter_hits_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch) {
   mine.hits.clear();
-  trace_fixed_fan(scene, w.plan, scalars, first, last, w.plan.fixed_fan, mine.hits);
-  mine.statistics.rays += static_cast<std::size_t>(last - first) * static_cast<std::size_t>(w.plan.fixed_fan);
+  trace_fixed_fan(scene_, plan_, scalars_, first, last, plan_.fixed_fan, mine.hits);
+  mine.statistics.rays += static_cast<std::size_t>(last - first) * static_cast<std::size_t>(plan_.fixed_fan);
   watch.lap(Stage::trace);
-  scatter_hits(mine.hits, scene.scene(), w.plan, scalars, request.seed, mine.echoes);
+  scatter_hits(mine.hits, scene_.scene(), plan_, scalars_, request_.seed, mine.echoes);
   mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
   watch.lap(Stage::scatter);
-  synthesize(mine.echoes, w.plan.pulse(), kernels, w.columns);
+  synthesize(mine.echoes, plan_.pulse(), kernels_, w_.columns);
   watch.lap(Stage::synthesize);
 }
 
-void sound_cells(const RayScene& scene, const PingScalars& scalars, const simd::Kernels& kernels, int first, int last,
-                 Workspace& w, Workspace::PerWorker& mine, Stopwatch& watch) {
-  mine.statistics.rays += trace_fan(scene, w.plan, scalars, first, last, mine.fan, mine.seen);
+void PingUnderWay::scatter_cells_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch) {
+  mine.statistics.rays += trace_fan(scene_, plan_, scalars_, first, last, mine.fan, mine.seen);
   watch.lap(Stage::trace);
-  const simd::GroupView group = make_group_view(w.plan, scalars, mine.seen);
-  const auto& wanted = w.tiles_by_group[static_cast<std::size_t>(first / group_columns)];
+  const simd::GroupView group = make_group_view(plan_, scalars_, mine.seen);
+  const auto& wanted = w_.tiles_by_group[static_cast<std::size_t>(first / group_columns)];
   for (std::size_t next = 0; next < wanted.size();) {
-    next = scatter(w.tiles, wanted, next, group, kernels, mine.echoes);
+    next = scatter(w_.tiles, wanted, next, group, kernels_, mine.echoes);
     mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
     watch.lap(Stage::scatter);
-    synthesize(mine.echoes, w.plan.pulse(), kernels, w.columns);
+    synthesize(mine.echoes, plan_.pulse(), kernels_, w_.columns);
     watch.lap(Stage::synthesize);
   }
 }
 
-/// From rays to the signals of columns [first, last): one worker's share.
-void sound_group(const RayScene& scene, const PingRequest& request, const PingScalars& scalars, const simd::Kernels& kernels,
-                 int first, int last, Workspace& w, Workspace::PerWorker& mine) {
-  Stopwatch watch(w.now_s, mine.statistics);
-  clear_columns(w.columns, first, last);
-  if (!request.blank) {
-    if (w.plan.fixed_fan > 0)
-      sound_fixed_fan(scene, request, scalars, kernels, first, last, w, mine, watch);
-    else
-      sound_cells(scene, scalars, kernels, first, last, w, mine, watch);
+/// Beams, envelope, gain and codes, a window of rows at a time.
+Ping PingUnderWay::image() {
+  Ping ping;
+  ping.request = request_;
+  shape_ping(plan_, request_.switches, ping);
+  const int rows = plan_.settings.range_bin_count, rows_at_once = std::max(1, window_samples / plan_.settings.samples_per_row);
+  pool_.for_each(static_cast<std::size_t>((rows + rows_at_once - 1) / rows_at_once), [&](std::size_t window, int worker) {
+    const int first = static_cast<int>(window) * rows_at_once;
+    image_rows(first, std::min(first + rows_at_once, rows), w_.workers[static_cast<std::size_t>(worker)], ping);
+  });
+  for (const Workspace::PerWorker& worker : w_.workers) {
+    for (std::size_t s = 0; s < w_.statistics.seconds.size(); ++s) w_.statistics.seconds[s] += worker.statistics.seconds[s];
+    w_.statistics.rays += worker.statistics.rays;
+    w_.statistics.echoes += worker.statistics.echoes;
   }
-  finish_columns(w.plan, request.switches.noise ? &w.noise : nullptr, request.sonar_id,
-                 static_cast<std::uint32_t>(request.number), first, last, w.columns);
-  watch.lap(Stage::noise);
+  return ping;
 }
 
-/// From columns to samples of rows [first_row, last_row): one worker's share.
-void image_rows(const simd::Kernels& kernels, int first_row, int last_row, Workspace& w, Workspace::PerWorker& mine, Ping& ping) {
-  Stopwatch watch(w.now_s, mine.statistics);
-  const int per_row = w.plan.settings.samples_per_row;
-  couple(w.columns, w.plan.coupling, kernels, first_row * per_row, (last_row - first_row) * per_row, w.plan.settings.beam_count,
-         mine.couple, mine.beams);
-  add_points(w.points, w.plan, mine.beams);
+void PingUnderWay::image_rows(int first, int last, Workspace::PerWorker& mine, Ping& ping) {
+  Stopwatch watch(w_.now_s, mine.statistics);
+  const int per_row = plan_.settings.samples_per_row;
+  couple(w_.columns, plan_.coupling, kernels_, first * per_row, (last - first) * per_row, plan_.settings.beam_count, mine.couple,
+         mine.beams);
+  add_points(points_, plan_, mine.beams);
   watch.lap(Stage::couple);
-  receive(mine.beams, w.plan, kernels, mine.receive, ping);
+  receive(mine.beams, plan_, kernels_, mine.receive, ping);
   watch.lap(Stage::receive);
-}
-
-void gather_statistics(Workspace& w) {
-  for (const Workspace::PerWorker& worker : w.workers) {
-    for (std::size_t s = 0; s < w.statistics.seconds.size(); ++s) w.statistics.seconds[s] += worker.statistics.seconds[s];
-    w.statistics.rays += worker.statistics.rays;
-    w.statistics.echoes += worker.statistics.echoes;
-  }
-}
-
-void prepare(const PingRequest& request, Workspace& w, int threads) {
-  if (!w.has_plan || !serves(w.plan, request)) {
-    w.plan = make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings, request.switches);
-    w.has_plan = true;
-    w.columns.shape(w.plan.columns.count, w.plan.samples, w.plan.taps);
-  }
-  if (request.switches.noise && !w.plan.expected_power) w.noise.prepare(request.seed, w.plan.noise_filter);
-  w.workers.resize(static_cast<std::size_t>(threads));
-  w.statistics = {};
-  for (Workspace::PerWorker& worker : w.workers) {
-    worker.statistics = {};
-    if (worker.echoes.column.empty()) worker.echoes.reserve(echo_room);
-  }
 }
 
 }  // namespace
 
-Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels, Workspace& w,
-              Parallel& pool) {
-  prepare(request, w, pool.threads());
-  const PingScalars scalars = make_scalars(w.plan, request, scene.origin());
-  w.tiles.clear();
-  w.points.clear();
-  if (!request.blank) {
-    if (w.plan.fixed_fan == 0) find_tiles(cells, scene.scene(), request, scalars, w, pool);
-    w.points = scatter_points(scene, bodies_of(request, scene.scene()), w.plan, scalars, request.sonar_in_world);
-  }
-
-  const int columns = w.plan.columns.count;
-  pool.for_each(static_cast<std::size_t>(groups_of(w.plan)), [&](std::size_t g, int worker) {
-    const int first = static_cast<int>(g) * group_columns;
-    sound_group(scene, request, scalars, kernels, first, std::min(first + group_columns, columns), w,
-                w.workers[static_cast<std::size_t>(worker)]);
-  });
-
-  Ping ping;
-  ping.request = request;
-  shape_ping(w.plan, request.switches, ping);
-  const int rows = w.plan.settings.range_bin_count, rows_at_once = std::max(1, window_samples / w.plan.settings.samples_per_row);
-  pool.for_each(static_cast<std::size_t>((rows + rows_at_once - 1) / rows_at_once), [&](std::size_t t, int worker) {
-    const int first = static_cast<int>(t) * rows_at_once;
-    image_rows(kernels, first, std::min(first + rows_at_once, rows), w, w.workers[static_cast<std::size_t>(worker)], ping);
-  });
-  gather_statistics(w);
-  return ping;
+Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
+              Workspace& work, Parallel& pool) {
+  PingUnderWay ping(scene, cells, request, kernels, work, pool);
+  ping.find_echo_sources();  // scatterers live on the surfaces; speckle is theirs
+  ping.sound_columns();      // trace_fan: what is visible; scatter: echoes; synthesize: pulses; receiver noise
+  return ping.image();       // couple: columns to beams; receive: envelope, TVG, samples
 }
 
 }  // namespace sonar

@@ -2,6 +2,8 @@
 // what it keeps between calls (Workspace, SurfaceCells) only saves work.
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/base/parallel.hpp"
@@ -18,14 +20,20 @@
 
 namespace sonar {
 
+/// What one model with one set of settings needs from ping to ping.
+struct PreparedSettings {
+  std::shared_ptr<const SonarModel> model;
+  PingPlan plan;
+  NoiseTable noise;
+  std::uint64_t last_used = 0;
+};
+
 /// Buffers reused from ping to ping.
 struct Workspace {
-  PingPlan plan;
-  bool has_plan = false;
-  NoiseTable noise;
+  std::vector<std::unique_ptr<PreparedSettings>> prepared;  // several sonars may take turns
+  std::uint64_t pings = 0;
   std::vector<TileToSound> tiles;
   std::vector<std::vector<std::uint32_t>> tiles_by_group;
-  std::vector<PointEcho> points;
   ColumnSignals columns;
   struct PerWorker {
     FanScratch fan;
