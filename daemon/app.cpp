@@ -41,6 +41,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                log_,
                config_,
                options_.digest,
+               options_.stall_limit,
                [this] { on_change(); },
                [this](const std::string& why) {
                  log_.error(why);

@@ -25,9 +25,10 @@ namespace sonar {
 using EngineFactory = std::function<std::unique_ptr<PingEngine>(std::shared_ptr<const Scene>)>;
 
 struct AppOptions {
-  std::uint64_t exit_after_pings = 0;  // served, over all sonars; 0 = never
-  bool digest = false;                 // SHA-256 of every client's stream
-  bool handle_signals = false;         // SIGINT and SIGTERM stop gracefully, a second one at once
+  std::uint64_t exit_after_pings = 0;            // served, over all sonars; 0 = never
+  bool digest = false;                           // SHA-256 of every client's stream
+  std::chrono::milliseconds stall_limit{10000};  // a client that takes no byte for so long is reset
+  bool handle_signals = false;                   // SIGINT and SIGTERM stop gracefully, a second one at once
 };
 
 class App {

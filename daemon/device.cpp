@@ -157,7 +157,7 @@ asio::awaitable<void> Device::turn_away(tcp::socket socket) {
 
 void Device::welcome(tcp::socket socket) {
   const Time now = context_.clock.now();
-  Session::Setup setup{config_.outbox, context_.digest, ++figures_.clients};
+  Session::Setup setup{config_.outbox, context_.digest, ++figures_.clients, context_.stall_limit};
   update_state(now);
   auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket), vendor_.converse(state_, now), setup);
   context_.log.info("client connected", {{"sonar", config_.name}, {"client", session->client()}});

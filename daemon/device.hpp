@@ -31,6 +31,7 @@ struct DeviceContext {
   Log& log;
   const Config& config;
   bool digest = false;
+  std::chrono::milliseconds stall_limit{10000};
   std::function<void()> on_change;                         // something stepped time or the end may have waited for
   std::function<void(const std::string& why)> on_failure;  // the engine failed: the daemon cannot go on
 };

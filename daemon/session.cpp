@@ -139,8 +139,8 @@ asio::awaitable<void> Session::watch() {
     if (finishing_ && now >= finish_by_) {
       if (!said_goodbye_) reset("did not take its last message in time");
       over(why_);
-    } else if (writing_ && now - progress_at_ > stall_limit) {
-      reset("took no byte for 10 s");
+    } else if (writing_ && now - progress_at_ > setup_.stall_limit) {
+      reset("took no byte for " + std::to_string(setup_.stall_limit.count()) + " ms");
     } else if (!finishing_ && !clock_.stepped()) {
       tick(clock_.now());
     }

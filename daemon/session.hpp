@@ -35,10 +35,9 @@ class Session : public std::enable_shared_from_this<Session> {
   struct Setup {
     OutboxRules outbox;
     bool digest = false;
-    std::uint64_t number = 0;  // of the client, counted per sonar from 1
+    std::uint64_t number = 0;                      // of the client, counted per sonar from 1
+    std::chrono::milliseconds stall_limit{10000};  // a client that takes no byte for so long is reset
   };
-  /// Longest time a client may take no byte of a message being written; then it is reset.
-  static constexpr std::chrono::seconds stall_limit{10};
   /// Longest time a client may take for its last message after finish(); then it is reset.
   static constexpr std::chrono::milliseconds finish_limit{1500};
 

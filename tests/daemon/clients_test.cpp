@@ -1,0 +1,223 @@
+// Several clients, slow ones, dead ones, and the end of the daemon: nobody disturbs anybody, nothing is cut.
+#include <gmock/gmock.h>
+
+#include <list>
+
+#include "tests/daemon/loopback.hpp"
+
+namespace sonar::testing_daemon {
+namespace {
+
+using oculus::PingRate;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// Large pings: 512 beams, 32 bit, about 1.4 MB, so that kernel buffers fill within a second.
+oculus::FireRequest large_fire(PingRate rate) {
+  auto fire = fire_at(rate, 4);
+  fire.version = 2;
+  fire.settings.flags |= oculus::flag::beams_512 | oculus::flag::row_gains;
+  fire.extension.flags = oculus::flag::extended_32_bit;
+  return fire;
+}
+
+TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 2}\n    outbox: {depth: 3}\n";
+  Daemon daemon(setup);
+  Client healthy(daemon.address());
+  Client slow(daemon.address(), 52100, 16384);
+  healthy.fire(large_fire(PingRate::hz10));
+  oculus::PingSequence healthy_ids;
+  std::uint32_t last = 0;
+  for (int i = 0; i < 25; ++i) {
+    const auto ping = healthy.next_ping();
+    ASSERT_TRUE(ping);
+    EXPECT_THAT(ping->violations, IsEmpty());
+    EXPECT_THAT(healthy_ids.add(*ping), IsEmpty());
+    last = ping->head.fixed.ping_id;
+  }
+  EXPECT_EQ(healthy_ids.skipped_ids(), 0u) << "a stalled neighbour costs nothing";
+  // The slow one wakes up: old pings from the kernel's buffers, a gap, then the newest. Nothing cut, nothing mixed.
+  oculus::PingSequence slow_ids;
+  for (std::uint32_t id = 0; id < last;) {
+    const auto ping = slow.next_ping();
+    ASSERT_TRUE(ping);
+    EXPECT_THAT(ping->violations, IsEmpty());
+    EXPECT_THAT(slow_ids.add(*ping), IsEmpty());
+    EXPECT_EQ(ping->sample(1, 1) & 0xffu, FakeEngine::sample(ping->head.fixed.ping_id, 1, 1));
+    id = ping->head.fixed.ping_id;
+  }
+  EXPECT_GT(slow_ids.skipped_ids(), 0u);
+  EXPECT_EQ(slow.decoder.skipped_bytes(), 0u);
+  daemon.stop();
+  EXPECT_GE(daemon.figures().dropped, slow_ids.skipped_ids());
+}
+
+TEST(Clients, OneThatTakesNothingIsReset) {
+  DaemonSetup setup;
+  setup.options.stall_limit = milliseconds(300);
+  Daemon daemon(setup);
+  Client stalled(daemon.address(), 52100, 16384);
+  stalled.fire(large_fire(PingRate::hz40));
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("took no byte for 300 ms") != std::string::npos; }));
+  Client next(daemon.address());
+  next.fire(fire_at(PingRate::hz10));
+  EXPECT_TRUE(next.next_ping()) << "its place is free again";
+  EXPECT_FALSE(stalled.read_to_end());
+  EXPECT_TRUE(stalled.was_reset);
+}
+
+TEST(Clients, DeadOnesFreeTheirPlace) {
+  Daemon daemon;
+  for (int i = 0; i < 10; ++i) {
+    Client client(daemon.address());
+    client.fire(fire_at(PingRate::hz40));
+    ASSERT_TRUE(client.next_ping()) << "client " << i;
+    i % 2 == 0 ? client.reset() : client.close();
+    ASSERT_TRUE(eventually([&, wanted = i + 1] {
+      const std::string log = daemon.log_text();
+      int gone = 0;
+      for (std::size_t at = log.find("client gone"); at != std::string::npos; at = log.find("client gone", at + 1)) ++gone;
+      return gone == wanted;
+    }));
+  }
+}
+
+TEST(Clients, PingIdsGoOnAcrossClientsAndSettingsDoNot) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    options: {dummy_period_ms: 30}\n";
+  Daemon daemon(setup);
+  std::uint32_t last = 0;
+  {
+    Client first(daemon.address());
+    first.fire(fire_at(PingRate::hz40));
+    for (int i = 0; i < 3; ++i) last = first.next_ping()->head.fixed.ping_id;
+  }
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("client gone") != std::string::npos; }));
+  Client second(daemon.address());
+  const auto message = second.next();
+  ASSERT_TRUE(message);
+  EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*message)) << "no pings before its own fire";
+  second.fire(fire_at(PingRate::hz10));
+  EXPECT_GT(second.next_ping()->head.fixed.ping_id, last);
+}
+
+TEST(Admission, CloseNewSendsTheSecondAFinAndNoByte) {
+  Daemon daemon;
+  Client first(daemon.address());
+  first.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(first.next_ping());
+  Client second(daemon.address());
+  second.fire(fire_at(PingRate::standby));  // bytes on their way must not turn the FIN into a reset
+  EXPECT_TRUE(second.read_to_end());
+  EXPECT_EQ(second.bytes_read, 0u);
+  oculus::PingSequence ids;
+  for (int i = 0; i < 5; ++i) EXPECT_THAT(ids.add(*first.next_ping()), IsEmpty());
+  EXPECT_EQ(ids.skipped_ids(), 0u) << "the first is undisturbed";
+  daemon.stop();
+  EXPECT_EQ(daemon.figures().refused_clients, 1u);
+}
+
+TEST(Admission, TakeOverEndsTheOldOneAtAMessageBoundary) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 1, when_full: take_over}\n";
+  Daemon daemon(setup);
+  Client old(daemon.address());
+  old.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(old.next_ping());
+  Client heir(daemon.address());
+  heir.fire(fire_at(PingRate::hz10));
+  EXPECT_TRUE(heir.next_ping());
+  EXPECT_TRUE(old.read_to_end());
+  EXPECT_EQ(old.decoder.buffered_bytes(), 0u);
+}
+
+TEST(Admission, QueueServesTheNextWhenAPlaceIsFree) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 1, when_full: queue}\n";
+  Daemon daemon(setup);
+  auto first = std::make_unique<Client>(daemon.address());
+  first->fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(first->next_ping());
+  Client second(daemon.address());
+  second.fire(fire_at(PingRate::hz10));
+  EXPECT_FALSE(second.next(milliseconds(200)));
+  EXPECT_FALSE(second.ended);
+  first.reset();
+  EXPECT_TRUE(second.next_ping()) << "and its fire message was kept";
+}
+
+TEST(Admission, TheLastFireWinsAmongSeveral) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 3}\n";
+  Daemon daemon(setup);
+  Client a(daemon.address()), b(daemon.address());
+  a.fire(fire_at(PingRate::hz40, 2));
+  ASSERT_TRUE(a.next_ping());
+  ASSERT_TRUE(b.next_ping()) << "pings go to all";
+  b.fire(fire_at(PingRate::hz40, 3));
+  ASSERT_TRUE(eventually([&] { return a.next_ping()->head.fixed.fire.range == 3; }));
+  a.fire(fire_at(PingRate::hz40, 2));  // byte-identical to a's last, but no longer what the device does
+  EXPECT_TRUE(eventually([&] { return b.next_ping()->head.fixed.fire.range == 2; }));
+}
+
+TEST(Clients, AReconnectStormLeavesNothingBehind) {
+  Daemon daemon;
+  for (int i = 0; i < 100; ++i) {
+    Client client(daemon.address());
+    if (i % 3 == 0) client.fire(fire_at(PingRate::hz40));
+    if (i % 2 == 0) client.reset();
+  }
+  const auto served = [&] {
+    Client client(daemon.address());
+    client.fire(fire_at(PingRate::hz40));
+    return client.next_ping(milliseconds(500)).has_value();
+  };
+  EXPECT_TRUE(eventually(served));
+}
+
+TEST(GracefulStop, ReadingClientsGetAWholeLastMessageAndStalledOnesAReset) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 2}\n";
+  Daemon daemon(setup);
+  Client healthy(daemon.address());
+  Client stalled(daemon.address(), 52100, 16384);
+  healthy.fire(large_fire(PingRate::hz15));
+  for (int i = 0; i < 12; ++i) ASSERT_TRUE(healthy.next_ping());
+  bool whole = false;
+  std::thread reader([&] { whole = healthy.read_to_end(); });
+  const auto begin = Steady::now();
+  EXPECT_EQ(daemon.stop(), 0);
+  const auto took = Steady::now() - begin;
+  reader.join();
+  EXPECT_TRUE(whole) << "FIN";
+  EXPECT_EQ(healthy.decoder.buffered_bytes(), 0u) << "no message was cut";
+  EXPECT_GE(took, milliseconds(1400)) << "the stalled one had its time";
+  EXPECT_LT(took, milliseconds(8000)) << "the promise is 2 s; this allows for a busy machine";
+  EXPECT_THAT(daemon.log_text(), HasSubstr("did not take its last message in time"));
+}
+
+TEST(GracefulStop, WithoutClientsItIsImmediate) {
+  Daemon daemon;
+  const auto begin = Steady::now();
+  EXPECT_EQ(daemon.stop(), 0);
+  EXPECT_LT(Steady::now() - begin, milliseconds(5000));
+}
+
+TEST(GracefulStop, ClientsThatCloseOnFinDoNotHoldItUp) {
+  Daemon daemon;
+  auto client = std::make_unique<Client>(daemon.address());
+  client->fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(client->next_ping());
+  std::thread reader([&] {
+    EXPECT_TRUE(client->read_to_end());
+    client.reset();
+  });
+  EXPECT_EQ(daemon.stop(), 0);
+  reader.join();
+  EXPECT_THAT(daemon.log_text(), HasSubstr("client gone: sonard stops"));
+}
+
+}  // namespace
+}  // namespace sonar::testing_daemon

@@ -1,0 +1,205 @@
+// The configuration file: every key, every default, every refusal with file, line, column and key.
+#include "daemon/config.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+namespace sonar {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+std::string directory() {
+  static const std::string made = [] {
+    const std::string d = ::testing::TempDir();
+    std::ofstream(d + "/scene.yaml") << "name: test\n";
+    return d;
+  }();
+  return made;
+}
+Result<Config> parse(const std::string& yaml) { return parse_config(yaml, "sonard.yaml", directory()); }
+std::string why(const std::string& yaml) {
+  const auto config = parse(yaml);
+  return config ? "accepted" : config.error().text;
+}
+
+const std::string world = "world: {scene: scene.yaml}\n";
+const std::string vehicles = "vehicles: [{name: rov}]\n";
+const std::string sonar = "sonars:\n  - name: front\n    profile: oculus-m1200d\n    bind_ip: 127.0.0.2\n";
+
+TEST(Config, DefaultsAreTheManuals) {
+  const auto c = parse(world + vehicles + sonar);
+  ASSERT_TRUE(c) << c.error().text;
+  EXPECT_EQ(c->seed, 1u);
+  const SonarConfig& s = c->sonars.at(0);
+  EXPECT_EQ(text_of(s.advertise_ip), "127.0.0.2");
+  EXPECT_EQ(text_of(s.status_to.at(0).ip), "127.255.255.255");
+  EXPECT_EQ(s.status_to.at(0).port, 0);
+  EXPECT_EQ(s.device_id, 7001);
+  EXPECT_EQ(s.max_clients, 1);
+  EXPECT_EQ(s.when_full, WhenClientsFull::close_new);
+  EXPECT_EQ(s.outbox.depth, 1);
+  EXPECT_EQ(s.options.at("before_first_fire"), "dummies");
+  EXPECT_EQ(text_of(c->poses.protobuf.at), "127.0.0.1:14770");
+  EXPECT_EQ(text_of(c->poses.json.at), "127.0.0.1:14771");
+  EXPECT_EQ(c->poses.extrapolate_max_s, 0.2);
+  EXPECT_EQ(c->poses.stale_after_s, 1.0);
+  EXPECT_EQ(c->poses.max_jump_m, 50);
+  EXPECT_EQ(c->poses.on_stale, OnStale::hold);
+  EXPECT_EQ(c->clock, ClockMode::realtime);
+  EXPECT_TRUE(c->engine.switches.noise);
+}
+
+TEST(Config, EveryKeyIsRead) {
+  const auto c = parse(R"(
+world:
+  scene: scene.yaml
+  seed: 18446744073709551615
+  origin: {lat: 47.60, lon: -122.33, alt: 0}
+  water: {temperature_c: 12.5, salinity_psu: 31, ph: 7.9, sound_speed_mps: 1490}
+vehicles:
+  - name: rov
+    initial_pose: {frame: NED_FRD, xyz_m: [1, 2, 3], rpy_deg: [0, 0, 90]}
+    trajectory: orbit
+  - name: buoy
+sonars:
+  - name: front
+    profile: oculus-m750d
+    vehicle: buoy
+    mount: {frame: FRD, xyz_m: [0.3, 0.2, 0.1], rpy_deg: [0, -15, 0]}
+    bind_ip: 192.168.2.42
+    advertise_ip: 192.168.2.43
+    netmask: 255.255.0.0
+    status_to: [192.168.255.255, '10.1.2.3:52103']
+    device_id: 9
+    clients: {max: 3, when_full: take_over}
+    outbox: {depth: 2, full: drop_newest}
+    options: {before_first_fire: pings, dummy_period_ms: 500}
+poses:
+  protobuf: off
+  json: 0.0.0.0:15000
+  allow_from: [192.168.2.0/24, 10.0.0.1]
+  extrapolate_max_s: 0.5
+  stale_after_s: 2
+  on_stale: stop
+  max_jump_m: 5
+engine: {threads: 3, quality: default, simd: portable, expected_power: true, noise: off, fixed_fan: 16}
+clock: stepped
+log: {level: debug, format: json}
+)");
+  ASSERT_TRUE(c) << c.error().text;
+  EXPECT_EQ(c->seed, 18446744073709551615u);
+  EXPECT_EQ(c->water.salinity_psu, 31);
+  EXPECT_EQ(c->water.sound_speed_mps, 1490);
+  const Pose rov = c->vehicles.at(0).initial_pose;
+  EXPECT_EQ(rov.position_m.x, 2);
+  EXPECT_EQ(rov.position_m.y, 1);
+  EXPECT_EQ(rov.position_m.z, -3);
+  EXPECT_NEAR(deg_from_rad(heading_rad(rov.orientation)), 90, 1e-9);
+  EXPECT_TRUE(c->vehicles.at(0).orbits);
+  const SonarConfig& s = c->sonars.at(0);
+  EXPECT_EQ(s.vehicle, 1u);
+  EXPECT_EQ(s.mount.position_m.y, -0.2);
+  EXPECT_EQ(s.mount.position_m.z, -0.1);
+  EXPECT_NEAR(rotate(s.mount.orientation, {1, 0, 0}).z, -std::sin(rad_from_deg(15)), 1e-12) << "pitched down";
+  EXPECT_EQ(text_of(s.advertise_ip), "192.168.2.43");
+  EXPECT_EQ(text_of(s.status_to.at(1)), "10.1.2.3:52103");
+  EXPECT_EQ(s.device_id, 9);
+  EXPECT_EQ(s.max_clients, 3);
+  EXPECT_EQ(s.when_full, WhenClientsFull::take_over);
+  EXPECT_EQ(s.outbox.depth, 2);
+  EXPECT_EQ(s.outbox.when_full, WhenFull::drop_newest);
+  EXPECT_EQ(s.options.at("dummy_period_ms"), "500");
+  EXPECT_FALSE(c->poses.protobuf.enabled);
+  EXPECT_EQ(c->poses.json.at.port, 15000);
+  EXPECT_TRUE(c->poses.allow_from.at(0).contains({192, 168, 2, 200}));
+  EXPECT_FALSE(c->poses.allow_from.at(0).contains({192, 168, 3, 200}));
+  EXPECT_FALSE(c->poses.allow_from.at(1).contains({10, 0, 0, 2}));
+  EXPECT_EQ(c->poses.on_stale, OnStale::stop);
+  EXPECT_EQ(c->engine.threads, 3);
+  EXPECT_EQ(c->engine.simd, SimdLevel::portable);
+  EXPECT_FALSE(c->engine.switches.noise);
+  EXPECT_EQ(c->engine.switches.fixed_fan, 16);
+  EXPECT_EQ(c->clock, ClockMode::stepped);
+  EXPECT_TRUE(c->log.json);
+}
+
+TEST(Config, UnknownKeysNameTheNearest) {
+  EXPECT_THAT(why(world + vehicles + sonar + "    bind_pi: 127.0.0.3\n"),
+              StartsWith("sonard.yaml:7:5: sonars[0].bind_pi: unknown key; did you mean \"bind_ip\"?"));
+  EXPECT_THAT(why(world + vehicles + sonar + "pose: {}\n"), HasSubstr("did you mean \"poses\"?"));
+  EXPECT_THAT(why(world + vehicles + sonar + "    options: {gain_ehco: auto}\n"), HasSubstr("gain_echo"));
+  EXPECT_THAT(why(world + vehicles + sonar + "    options: {gain_echo: maybe}\n"), HasSubstr("sonars[0].options"));
+  EXPECT_THAT(why(world + vehicles + sonar + "    clients: {when_full: close}\n"), HasSubstr("close_new"));
+}
+
+TEST(Config, EveryRefusalSaysWhatAndWhere) {
+  const auto with = [&](const std::string& more) { return why(world + vehicles + sonar + more); };
+  EXPECT_THAT(why("world: {scene: nowhere.yaml}\n" + vehicles + sonar),
+              HasSubstr("sonard.yaml:1:16: world.scene: no such file; looked in"));
+  EXPECT_THAT(why(vehicles + sonar), HasSubstr("world"));
+  EXPECT_THAT(why(world + sonar), HasSubstr("vehicles"));
+  EXPECT_THAT(why(world + vehicles), HasSubstr("sonars"));
+  EXPECT_THAT(why(world + vehicles + "sonars: [{name: a, profile: oculus-m12, bind_ip: 127.0.0.2}]\n"),
+              HasSubstr("oculus-m1200d"));
+  EXPECT_THAT(why(world + vehicles + "sonars: [{name: a, profile: oculus-m1200d, bind_ip: 127.0.0.256}]\n"),
+              HasSubstr("sonars[0].bind_ip: \"127.0.0.256\" is not an IPv4 address"));
+  EXPECT_THAT(why(world + vehicles + "sonars: [{name: a, profile: oculus-m1200d, bind_ip: 0.0.0.0}]\n"),
+              HasSubstr("advertise_ip"));
+  EXPECT_THAT(why(world + "vehicles: [{name: a}, {name: a}]\n" + sonar), HasSubstr("vehicles[1].name: \"a\" is used twice"));
+  EXPECT_THAT(why(world + "vehicles: [{name: a}, {name: b}]\n" + sonar), HasSubstr("vehicle"));
+  EXPECT_THAT(with("    vehicle: rvo\n"), HasSubstr("rov"));
+  EXPECT_THAT(with("  - {name: front, profile: oculus-m1200d, bind_ip: 127.0.0.3}\n"), HasSubstr("\"front\" is used twice"));
+  EXPECT_THAT(with("  - {name: rear, profile: oculus-m1200d, bind_ip: 127.0.0.2}\n"),
+              HasSubstr("each sonar needs its own address"));
+  EXPECT_THAT(with("  - {name: rear, profile: oculus-m1200d, bind_ip: 127.0.0.3, device_id: 7001}\n"),
+              HasSubstr("already used by sonar"));
+  EXPECT_THAT(with("    device_id: 0\n"), HasSubstr("sonars[0].device_id"));
+  EXPECT_THAT(with("    clients: {max: 17}\n"), HasSubstr("sonars[0].clients.max"));
+  EXPECT_THAT(with("    outbox: {depth: 4}\n"), HasSubstr("sonars[0].outbox.depth"));
+  EXPECT_THAT(with("    mount: {xyz_m: [0, 0, 0]}\n"), HasSubstr("frame"));
+  EXPECT_THAT(with("    mount: {frame: FRD, xyz_m: [0, 0]}\n"), HasSubstr("xyz_m"));
+  EXPECT_THAT(with("    status_to: [nowhere]\n"), HasSubstr("sonars[0].status_to[0]: is not an address"));
+  EXPECT_THAT(with("    status_to: ['127.0.0.1:99999']\n"), HasSubstr("port must be a number"));
+  EXPECT_THAT(with("poses: {json: 127.0.0.1}\n"), HasSubstr("poses.json: is not an address; write it as 127.0.0.1:14770"));
+  EXPECT_THAT(with("poses: {json: 192.168.1.2:14771}\n"), HasSubstr("need poses.allow_from"));
+  EXPECT_THAT(with("poses: {allow_from: [10.0.0.0/33]}\n"), HasSubstr("poses.allow_from[0]: is not an address range"));
+  EXPECT_THAT(with("poses: {json: 127.0.0.1:14770}\n"), HasSubstr("poses.json: the same address as poses.protobuf"));
+  EXPECT_THAT(with("poses: {stale_after_s: 0}\n"), HasSubstr("poses.stale_after_s"));
+  EXPECT_THAT(with("engine: {quality: best}\n"), HasSubstr("engine.quality"));
+  EXPECT_THAT(with("clock: follow\n"), HasSubstr("clock"));
+  EXPECT_THAT(with("log: {level: loud}\n"), HasSubstr("log.level"));
+  const std::string hot = "world: {scene: scene.yaml, water: {temperature_c: 30}}\n";
+  EXPECT_THAT(why(hot + vehicles + sonar), HasSubstr("world.water.temperature_c: 30 C or more"));
+  EXPECT_EQ(why("world: {scene: scene.yaml, water: {temperature_c: 30, allow_hot: true}}\n" + vehicles + sonar), "accepted");
+  EXPECT_THAT(why("world: {scene: scene.yaml, water: {sound_speed_mps: 340}}\n" + vehicles + sonar),
+              HasSubstr("sound_speed_mps"));
+  EXPECT_THAT(why(world + "vehicles: [{name: a, trajectory: path.csv}]\n" + sonar), HasSubstr("vehicles[0].trajectory"));
+}
+
+TEST(Config, ErrorsOfConfigurationsExitWith78AndMissingFilesWith66) {
+  EXPECT_EQ(exit_code(parse("world: 3\n").error().kind), 78);
+  EXPECT_EQ(exit_code(load_config(directory() + "/none.yaml").error().kind), 66);
+}
+
+TEST(Config, AddressesAreReadStrictly) {
+  EXPECT_TRUE(parse_ipv4("1.2.3.4"));
+  for (const char* wrong : {"", "1.2.3", "1.2.3.4.5", "1.2.3.4 ", "a.b.c.d", "1.2.3.-4", "01.2.3.4x"})
+    EXPECT_FALSE(parse_ipv4(wrong)) << wrong;
+}
+
+TEST(Config, TheShippedExampleIsValid) {
+  const auto c = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/sonard.yaml");
+  ASSERT_TRUE(c) << c.error().text;
+  EXPECT_EQ(c->sonars.at(0).profile.model->profile, "oculus-m1200d");
+  const auto demo = demo_config();
+  ASSERT_TRUE(demo) << demo.error().text;
+  EXPECT_EQ(text_of(demo->sonars.at(0).bind_ip), "127.0.0.2");
+}
+
+}  // namespace
+}  // namespace sonar

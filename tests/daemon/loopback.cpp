@@ -1,0 +1,230 @@
+#include "tests/daemon/loopback.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <fstream>
+
+namespace sonar::testing_daemon {
+namespace {
+
+sockaddr_in endpoint(const std::string& address, std::uint16_t port) {
+  sockaddr_in a{};
+  a.sin_family = AF_INET;
+  a.sin_port = htons(port);
+  inet_pton(AF_INET, address.c_str(), &a.sin_addr);
+  return a;
+}
+const sockaddr* plain(const sockaddr_in& a) { return static_cast<const sockaddr*>(static_cast<const void*>(&a)); }
+
+std::shared_ptr<const Scene> small_scene(bool moving_object) {
+  auto scene = std::make_shared<Scene>();
+  scene->name = "test";
+  if (moving_object) {
+    scene->body_names = {"crate"};
+    scene->bodies_in_world = {Pose{{5, 0, -3}, {}}};
+  }
+  return scene;
+}
+
+std::string yaml(const DaemonSetup& s) {
+  const std::string poses =
+      s.more.find("poses:") == std::string::npos ? "poses: {protobuf: '" + s.address + ":0', json: '" + s.address + ":0'}\n" : "";
+  const std::string status =
+      s.sonar_lines.find("status_to") == std::string::npos ? "    status_to: ['" + s.address + ":9']\n" : "";
+  return "world: {scene: scene.yaml}\n"
+         "vehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}\n"
+         "sonars:\n  - name: front\n    profile: oculus-m1200d\n    bind_ip: " +
+         s.address + "\n" + status + s.sonar_lines + poses + s.more;
+}
+
+}  // namespace
+
+std::string own_address() {
+  static std::atomic<unsigned> count{0};
+  const auto process = static_cast<unsigned>(getpid());
+  const unsigned n = ++count;
+  return "127." + std::to_string(64 + process / 250 % 128) + "." + std::to_string(1 + process % 250) + "." +
+         std::to_string(1 + n % 250);
+}
+
+std::uint8_t FakeEngine::sample(std::uint32_t ping, std::size_t row, std::size_t beam) {
+  return static_cast<std::uint8_t>((ping * 31 + row * 7 + beam) % 255);
+}
+
+std::vector<Ping> FakeEngine::run(std::span<const PingRequest> requests) {
+  std::vector<Ping> pings;
+  for (const PingRequest& request : requests) {
+    {
+      std::lock_guard lock(record_->mutex);
+      record_->requests.push_back(request);
+    }
+    if (takes_.count() > 0) std::this_thread::sleep_for(takes_);
+    const auto number = static_cast<std::uint32_t>(request.number);
+    if (number == fails_at_) throw std::runtime_error("out of coffee");
+    Ping ping;
+    ping.request = request;
+    const auto rows = static_cast<std::size_t>(request.settings.range_bin_count);
+    const auto beams = static_cast<std::size_t>(request.settings.beam_count);
+    const double edge = 0.5 * static_cast<double>(ping.mode().horizontal_aperture_rad);
+    for (std::size_t b = 0; b < beams; ++b)
+      ping.beam_azimuth_rad.push_back(
+          static_cast<float>(edge - 2 * edge * static_cast<double>(b) / static_cast<double>(beams - 1)));
+    const auto width = static_cast<std::size_t>(request.settings.format.bits / 8);
+    ping.samples.resize(rows * beams * width);
+    for (std::size_t r = 0; r < rows; ++r)
+      for (std::size_t b = 0; b < beams; ++b)
+        ping.samples[(r * beams + b) * width] = static_cast<std::byte>(sample(number, r, b));
+    if (request.settings.format.row_gains) ping.row_gain.assign(rows, 1);
+    pings.push_back(std::move(ping));
+  }
+  return pings;
+}
+
+Daemon::Daemon(DaemonSetup setup) : address_(setup.address) {
+  const std::string directory = ::testing::TempDir();
+  std::ofstream(directory + "/scene.yaml") << "name: test\n";
+  auto config = parse_config(yaml(setup), "test.yaml", directory);
+  if (!config) throw std::runtime_error(config.error().text);
+  LogOptions log;
+  log.sink = [this](LogLevel, const std::string& line) {
+    std::lock_guard lock(log_mutex_);
+    log_text_ += line + "\n";
+  };
+  log_ = std::make_unique<Log>(log);
+  const auto make_engine = [&](const std::shared_ptr<const Scene>&) -> std::unique_ptr<PingEngine> {
+    return std::make_unique<FakeEngine>(record_, setup.engine_takes, setup.engine_fails_at);
+  };
+  app_ = std::make_unique<App>(*std::move(config), small_scene(setup.moving_object), make_engine, setup.options, *log_);
+  if (const auto opened = app_->open(); !opened) throw std::runtime_error(opened.error().text);
+  thread_ = std::thread([this] { code_ = app_->run(); });
+}
+
+Daemon::~Daemon() { stop(); }
+
+int Daemon::stop() {
+  app_->request_stop();
+  return wait();
+}
+
+int Daemon::wait() {
+  if (thread_.joinable()) thread_.join();
+  return code_.value_or(-1);
+}
+
+std::string Daemon::log_text() {
+  std::lock_guard lock(log_mutex_);
+  return log_text_;
+}
+
+Client::Client(const std::string& address, std::uint16_t port, int receive_buffer) {
+  fd_ = socket(AF_INET, SOCK_STREAM, 0);
+  if (receive_buffer > 0) setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
+  const sockaddr_in to = endpoint(address, port);
+  if (connect(fd_, plain(to), sizeof to) != 0) ADD_FAILURE() << "cannot connect to " << address << ":" << port;
+}
+Client::~Client() { close(); }
+
+void Client::close() {
+  if (fd_ >= 0) ::close(fd_);
+  fd_ = -1;
+}
+void Client::reset() {
+  const linger now{1, 0};
+  setsockopt(fd_, SOL_SOCKET, SO_LINGER, &now, sizeof now);
+  close();
+}
+
+void Client::send(const std::vector<std::byte>& bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const auto n = ::send(fd_, bytes.data() + done, bytes.size() - done, MSG_NOSIGNAL);
+    if (n <= 0) return;
+    done += static_cast<std::size_t>(n);
+  }
+}
+void Client::send(const std::string& text) { send(bytes_of(text)); }
+
+bool Client::read_some(milliseconds timeout, std::vector<std::byte>* raw) {
+  pollfd p{fd_, POLLIN, 0};
+  if (ended || fd_ < 0 || poll(&p, 1, static_cast<int>(timeout.count())) <= 0) return false;
+  std::vector<std::byte> buffer(1 << 18);
+  const auto n = recv(fd_, buffer.data(), buffer.size(), 0);
+  if (n <= 0) {
+    ended = true;
+    was_reset = n < 0;
+    return false;
+  }
+  buffer.resize(static_cast<std::size_t>(n));
+  bytes_read += buffer.size();
+  digest.add(buffer);
+  if (raw != nullptr)
+    raw->insert(raw->end(), buffer.begin(), buffer.end());
+  else
+    decoder.append(buffer);
+  return true;
+}
+
+std::optional<oculus::Received> Client::next(milliseconds timeout) {
+  const auto deadline = Steady::now() + timeout;
+  while (true) {
+    if (auto message = decoder.next()) return message;
+    const auto left = std::chrono::duration_cast<milliseconds>(deadline - Steady::now());
+    if (left.count() <= 0 || !read_some(left)) return std::nullopt;
+  }
+}
+
+std::optional<oculus::DecodedPing> Client::next_ping(milliseconds timeout) {
+  const auto deadline = Steady::now() + timeout;
+  while (true) {
+    const auto left = std::chrono::duration_cast<milliseconds>(deadline - Steady::now());
+    auto message = next(std::max(left, milliseconds(0)));
+    if (!message) return std::nullopt;
+    if (auto* ping = std::get_if<oculus::DecodedPing>(&*message)) return std::move(*ping);
+  }
+}
+
+bool Client::read_to_end(milliseconds timeout) {
+  const auto deadline = Steady::now() + timeout;
+  while (!ended && Steady::now() < deadline) next(milliseconds(100));
+  return ended && !was_reset;
+}
+
+std::vector<std::byte> Client::read_raw(std::size_t at_least, milliseconds timeout) {
+  std::vector<std::byte> raw;
+  const auto deadline = Steady::now() + timeout;
+  while (raw.size() < at_least && Steady::now() < deadline)
+    if (!read_some(milliseconds(100), &raw) && ended) break;
+  return raw;
+}
+
+oculus::FireRequest fire_at(oculus::PingRate rate, double range_m) {
+  oculus::FireRequest f;
+  f.settings.mode = 2;
+  f.settings.ping_rate = rate;
+  f.settings.flags = oculus::flag::range_in_metres | oculus::flag::simple_result;
+  f.settings.range = range_m;
+  f.settings.gain_percent = 50;
+  return f;
+}
+
+void send_udp(const std::string& address, std::uint16_t port, const std::vector<std::byte>& bytes) {
+  const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+  const sockaddr_in to = endpoint(address, port);
+  sendto(fd, bytes.data(), bytes.size(), 0, plain(to), sizeof to);
+  ::close(fd);
+}
+
+std::vector<std::byte> bytes_of(const std::string& text) {
+  const auto view = std::as_bytes(std::span(text.data(), text.size()));
+  return {view.begin(), view.end()};
+}
+
+}  // namespace sonar::testing_daemon

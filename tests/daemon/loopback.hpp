@@ -1,0 +1,135 @@
+// What the daemon's loopback tests share: a daemon with a fake engine in a thread, and a driver-side client with deadlines.
+// Every test has its own 127.x.y.z address, so that tests can run side by side.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/app.hpp"
+#include "protocol/oculus/decode.hpp"
+
+namespace sonar::testing_daemon {
+
+using Steady = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+constexpr milliseconds patience{20000};  // for anything that must happen
+
+/// 127.64..127.191, from the process number and a counter.
+std::string own_address();
+
+/// Pings without physics: sample = a pattern of ping number, row and beam. Remembers what it was asked.
+class FakeEngine final : public PingEngine {
+ public:
+  struct Record {
+    std::mutex mutex;
+    std::vector<PingRequest> requests;
+    std::vector<PingRequest> all() {
+      std::lock_guard lock(mutex);
+      return requests;
+    }
+  };
+  FakeEngine(std::shared_ptr<Record> record, milliseconds takes, std::uint32_t fails_at = 0)
+      : record_(std::move(record)), takes_(takes), fails_at_(fails_at) {}
+  std::vector<Ping> run(std::span<const PingRequest> requests) override;
+  std::string description() const override { return "fake"; }
+  static std::uint8_t sample(std::uint32_t ping, std::size_t row, std::size_t beam);
+
+ private:
+  std::shared_ptr<Record> record_;
+  milliseconds takes_;
+  std::uint32_t fails_at_;
+};
+
+struct DaemonSetup {
+  std::string address = own_address();
+  std::string sonar_lines;  // more keys of the sonar, "    key: value\n"
+  std::string more;         // more sections
+  AppOptions options;
+  milliseconds engine_takes{0};
+  std::uint32_t engine_fails_at = 0;
+  bool moving_object = false;
+};
+
+class Daemon {
+ public:
+  explicit Daemon(DaemonSetup setup = {});
+  ~Daemon();
+  /// Stops it, if it does not end by itself, and returns run()'s result.
+  int stop();
+  /// Waits for it to end by itself.
+  int wait();
+  App& app() { return *app_; }
+  const std::string& address() const { return address_; }
+  std::vector<PingRequest> requests() { return record_->all(); }
+  std::string log_text();
+  /// Only after stop() or wait().
+  DeviceFigures figures() const { return app_->devices().front().figures(); }
+
+ private:
+  std::string address_;
+  std::shared_ptr<FakeEngine::Record> record_ = std::make_shared<FakeEngine::Record>();
+  std::mutex log_mutex_;
+  std::string log_text_;
+  std::unique_ptr<Log> log_;
+  std::unique_ptr<App> app_;
+  std::thread thread_;
+  std::optional<int> code_;
+};
+
+/// A plain TCP client that decodes what it reads. Everything has a deadline.
+class Client {
+ public:
+  /// `receive_buffer`: a small one makes a client stall sooner.
+  explicit Client(const std::string& address, std::uint16_t port = 52100, int receive_buffer = 0);
+  ~Client();
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  void send(const std::vector<std::byte>& bytes);
+  void send(const std::string& text);
+  void fire(const oculus::FireRequest& fire) { send(oculus::make_fire(fire)); }
+  /// The next message, or nothing at the deadline or the end of the stream.
+  std::optional<oculus::Received> next(milliseconds timeout = patience);
+  /// Skips everything but pings.
+  std::optional<oculus::DecodedPing> next_ping(milliseconds timeout = patience);
+  /// Reads to the end of the stream; true = FIN, false = reset or deadline.
+  bool read_to_end(milliseconds timeout = patience);
+  std::vector<std::byte> read_raw(std::size_t at_least, milliseconds timeout = patience);
+  void reset();  // RST
+  void close();
+
+  std::uint64_t bytes_read = 0;
+  bool ended = false, was_reset = false;
+  oculus::Decoder decoder;
+  Sha256 digest;
+
+ private:
+  bool read_some(milliseconds timeout, std::vector<std::byte>* raw = nullptr);
+  int fd_ = -1;
+};
+
+/// Defaults of a driver: mode 2, 10 Hz, metres, 8 bit, 256 beams, 2 m.
+oculus::FireRequest fire_at(oculus::PingRate rate, double range_m = 2);
+
+void send_udp(const std::string& address, std::uint16_t port, const std::vector<std::byte>& bytes);
+std::vector<std::byte> bytes_of(const std::string& text);
+
+/// Polls until `done` or the deadline.
+template <class Done>
+bool eventually(Done&& done, milliseconds timeout = patience) {
+  const auto deadline = Steady::now() + timeout;
+  while (!done()) {
+    if (Steady::now() > deadline) return false;
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  return true;
+}
+
+}  // namespace sonar::testing_daemon
