@@ -287,10 +287,12 @@ std::string why_invalid(const PingRequest& r) {
     return "range_bin_count " + std::to_string(s.range_bin_count) + " is not in 1..65535";
   if (s.samples_per_row < 1 || s.samples_per_row > 64)
     return "samples_per_row " + std::to_string(s.samples_per_row) + " is not in 1..64";
-  if (!(s.range_bin_m > 0) || !(s.pulse_width_m > 0) || !(s.range_m > 0) || !(s.device_sound_speed_mps > 0))
-    return "range, row spacing, pulse width and sound speed must be positive";
+  const auto positive = [](float x) { return x > 0 && std::isfinite(x); };
+  if (!positive(s.range_bin_m) || !positive(s.pulse_width_m) || !positive(s.range_m) || !positive(s.device_sound_speed_mps))
+    return "range, row spacing, pulse width and sound speed must be positive and finite";
+  if (!std::isfinite(s.gain_db) || !std::isfinite(s.device_absorption_db_per_m)) return "gain and absorption must be finite";
   if (s.format.bits != 8 && s.format.bits != 16 && s.format.bits != 32) return "samples have 8, 16 or 32 bits";
-  if (!(s.format.gamma > 0)) return "gamma must be positive";
+  if (!positive(s.format.gamma)) return "gamma must be positive and finite";
   if (!is_finite(r.sonar_in_world.position_m) || !is_finite(r.sonar_in_world.orientation))
     return "the sonar's pose is not finite";
   return {};
