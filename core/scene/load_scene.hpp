@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <string_view>
 
 #include "core/base/result.hpp"
@@ -12,5 +13,8 @@ namespace sonar {
 
 /// Errors: file:line:col: key.path: what, and the nearest valid name.
 Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& file);
+/// The same from text; `name` starts the errors, paths in the scene are relative to `folder`.
+Result<std::shared_ptr<const Scene>> parse_scene(std::string_view text, const std::string& name,
+                                                 const std::filesystem::path& folder);
 
 }  // namespace sonar

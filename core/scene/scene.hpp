@@ -57,6 +57,7 @@ struct Scene {
   std::vector<std::string> body_names;       // moving bodies, in the order of PingRequest::bodies_in_world
   std::vector<Pose> bodies_in_world;         // where the scene file put them
   SeaSurface sea_surface;                    // its mesh, if present, is one of the objects
+  std::vector<std::string> notes;            // what the loader did that its user should know, one sentence each
 
   std::size_t triangle_count() const {
     std::size_t n = 0;

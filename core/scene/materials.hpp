@@ -1,0 +1,38 @@
+// Names of materials while a scene is read: the scene's own first, then the library every scene may use. Internal to the loader.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "core/text/strict_yaml.hpp"
+
+namespace sonar {
+
+extern const char* const material_library_yaml;  // scenes/materials.yaml
+
+class MaterialTable {
+ public:
+  /// Starts with the library.
+  explicit MaterialTable(Scene& scene);
+  /// Reads `materials: {name: {...}}`; later names win over the library's.
+  void read(text::Map materials);
+  /// Index into Scene::materials, where the material is put at its first use.
+  std::optional<std::uint16_t> find(std::string_view name);
+  /// As find(); an unknown name is an error at the node.
+  std::uint16_t named(const text::Node& node);
+  std::uint16_t add(Material material);
+
+ private:
+  Material* definition(std::string_view name);
+  void read_one(const std::string& name, text::Map keys);
+  std::vector<std::string_view> names() const;
+
+  Scene& scene_;
+  std::vector<Material> definitions_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,29 @@
+// Solids and sheets as triangle meshes, fine enough that the chords stay within a millimetre of the true surface.
+// Object frame: axis of revolution along z, centred on the origin; outward normals, closed (sheets excepted), material 0.
+#pragma once
+
+#include <cstdint>
+
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+
+/// Segments round a circle of this radius [m] so that no chord is farther than a millimetre from it; 16..512.
+int segments_for(double radius_m);
+
+/// A rectangle in the x-y plane, normals up, in patches of at most `patch_m`.
+Mesh make_plane(double length_x_m, double length_y_m, double patch_m = 1);
+Mesh make_box(Vec3d size_m, double patch_m = 1);
+Mesh make_sphere(double radius_m, int segments);
+enum class Caps { both, bottom, none };
+Mesh make_cylinder(double radius_m, double length_m, int segments, Caps caps = Caps::both);
+/// `length_m` is that of the straight part, between the two half spheres.
+Mesh make_capsule(double radius_m, double length_m, int segments);
+/// Base down at -length/2. A top radius above zero makes it a frustum.
+Mesh make_cone(double base_radius_m, double top_radius_m, double length_m, int segments);
+/// Ring of `radius_m` (to the middle of the tube) in the x-y plane. Radius above tube radius.
+Mesh make_torus(double radius_m, double tube_radius_m, int segments);
+/// A boulder: an ellipsoid with the given semi-axes and bumps of `bumpiness` (0..0.5) of its size, drawn from `seed`.
+Mesh make_rock(Vec3d semi_axes_m, double bumpiness, std::uint32_t seed, int segments);
+
+}  // namespace sonar

@@ -1,0 +1,63 @@
+// Ground as a height over a rectangular grid: read from files (PNG, ESRI ASCII) or made from a seed.
+// All become meshes about their own middle, so that far coordinates stay in the double precision of a pose.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+
+inline constexpr std::size_t max_mesh_triangles = 20'000'000;
+
+/// Heights over the product of two rising coordinate lists; NaN = no ground there.
+struct HeightGrid {
+  std::vector<double> x_m, y_m;  // rising, at least two each
+  std::vector<float> z_m;        // [y][x]
+};
+
+/// A mesh about its own middle, and where that middle lies in the coordinates it was described in.
+struct CentredMesh {
+  Mesh mesh;
+  Vec3d centre_m;
+  std::size_t left_out = 0;  // triangles without area
+};
+
+/// Fails when no four neighbouring heights exist, or when it would exceed max_mesh_triangles.
+Result<CentredMesh> mesh_from_grid(const HeightGrid& grid);
+
+/// Grey PNG of 8 or 16 bits over size_x by size_y metres about the origin; first row of the image = largest y.
+/// Black is low_m, white is high_m.
+Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double size_x_m, double size_y_m, double low_m,
+                                    double high_m);
+/// ESRI ASCII grid (.asc) in its own coordinates; heights are multiplied by z_scale (-1 for depths).
+Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, double z_scale);
+
+struct Ripples {
+  double wavelength_m = 0;   // 0 = none
+  double height_m = 0;       // crest to trough
+  double direction_rad = 0;  // the way the crests follow each other, from x towards y
+  double bend = 0.35;        // how far the crest lines wander, in wavelengths
+};
+/// Made ground. Waves and bumps that the grid cannot carry fade out where it is coarse.
+struct SeabedShape {
+  double size_x_m = 40, size_y_m = 40;
+  double fine_x_m = 40, fine_y_m = 40;  // inside, the grid has its spacing; outside it widens, up to 1 m
+  double spacing_x_m = 0.2, spacing_y_m = 0.2;
+  std::uint32_t seed = 1;
+  double relief_m = 0.1;    // amplitude of the longest octave
+  double wavelength_m = 4;  // of the longest octave
+  int octaves = 5;
+  double persistence = 0.5;  // amplitude ratio of one octave to the one before
+  Ripples ripples;
+  std::array<double, 2> slope{0, 0};  // rise per metre along x and y
+};
+/// Grid points the shape asks for; the caller bounds it before making anything.
+std::size_t seabed_triangles(const SeabedShape& shape);
+HeightGrid make_seabed(const SeabedShape& shape);
+
+}  // namespace sonar
