@@ -42,7 +42,7 @@ std::vector<BenchCase> bench_cases() {
 }
 
 std::span<const BenchScene> bench_scenes() {
-  static const std::array<BenchScene, 2> scenes{{{"local-search", 0, {0, 0, 0}}, {"demo", 0, {0, 0, 0}}}};
+  static const std::array<BenchScene, 2> scenes{{{"local-search", -10, {0, 0, 0}}, {"demo", -5, {-6.5, 0.5, 0}}}};
   return scenes;
 }
 

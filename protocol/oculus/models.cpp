@@ -17,8 +17,8 @@ namespace {
 /// unknown: fitted. The pressure that reaches full scale at TVG 0 dB and gain 0 dB, so that the demo scene at gain 50, gamma 127
 /// has an 8-bit median of 30 to 60. The one place to tune it.
 namespace fitted_full_scale_upa {
-constexpr float m370s = 4e10f, c550d_low = 4e10f, c550d_high = 3e11f, m750d_low = 4e10f, m750d_high = 3e11f;
-constexpr float m1200d_low = 4e10f, m1200d_high = 3e11f, m3000d_low = 4e10f, m3000d_high = 3e11f;
+constexpr float m370s = 7e9f, c550d_low = 7e9f, c550d_high = 7e9f, m750d_low = 7e9f, m750d_high = 7e9f;
+constexpr float m1200d_low = 7e9f, m1200d_high = 2.6e10f, m3000d_low = 7e9f, m3000d_high = 2.6e10f;
 }  // namespace fitted_full_scale_upa
 
 constexpr float source_level_db = 200;  // unknown: chosen; fits of published experiments vary by 50 dB
