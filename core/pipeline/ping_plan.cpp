@@ -96,12 +96,6 @@ void fill_row_gains(PingPlan& plan) {
 
 }  // namespace
 
-double beam_weight(const FrequencyMode& mode, double beam_sine, double sine) {
-  const Taper taper = mode.pattern.azimuth_taper;
-  return directivity(taper, aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad)),
-                     sine - beam_sine);
-}
-
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count) {
   std::vector<double> sines;
   const double half = static_cast<double>(mode.horizontal_aperture_rad) / 2;
@@ -134,10 +128,7 @@ Columns make_columns(const FrequencyMode& mode, int beam_count) {
 }
 
 Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared) {
-  const Taper taper = mode.pattern.azimuth_taper;
-  const double aperture = aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad));
-  const TaperSeries series = taper_series(taper);
-  const auto weight = [&](double du) { return taper == Taper::unit ? 1.0 : series_amplitude(series, aperture * du); };
+  const ReceivePattern weight = receive_pattern(mode.pattern);
   Coupling c;
   // The smallest band whose dropped energy is below -40 dB.
   std::vector<double> energy(static_cast<std::size_t>(columns.count));

@@ -85,7 +85,5 @@ std::vector<float> make_pulse_rows(double samples_per_half_power_width, int taps
 std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m);
 /// Taps h with sum_n h_n h_{n+k} = exp(-(b t k)^2 / 2), t = sample time: white noise filtered by h has the pulse's correlation.
 std::vector<float> make_noise_filter(double b_times_sample_time);
-/// Amplitude weight of a beam steered to `beam_sine` for a source at `sine`.
-double beam_weight(const FrequencyMode& mode, double beam_sine, double sine);
 
 }  // namespace sonar

@@ -92,6 +92,18 @@ SONAR_HD inline double directivity(Taper taper, double aperture_wavelengths, dou
   return beam_amplitude(taper, aperture_wavelengths * du);
 }
 
+/// directivity() with its constants worked out once, for loops.
+struct ReceivePattern {
+  bool unit = false;
+  TaperSeries series;
+  double aperture_wavelengths = 0;
+  SONAR_HD double operator()(double du) const { return unit ? 1.0 : series_amplitude(series, aperture_wavelengths * du); }
+};
+SONAR_HD inline ReceivePattern receive_pattern(const BeamPattern& pattern) {
+  return {pattern.azimuth_taper == Taper::unit, taper_series(pattern.azimuth_taper),
+          aperture_in_wavelengths(pattern.azimuth_taper, static_cast<double>(pattern.azimuth_width_rad))};
+}
+
 /// Integral of D^2 over u = what sum_k W_jk^2 du_k tends to: the width in sine space whose scatterers a beam collects.
 /// The terms of the series are orthonormal, so this is exact. Not defined for `unit`.
 SONAR_HD inline double effective_beam_width_u(Taper taper, double aperture_wavelengths) {

@@ -74,18 +74,17 @@ TEST(LevelOracles, Oracle08_AbsoluteSeabedLevel) {
     s.request.switches.expected_power = true;
     s.ping_from({0, 0, height}, {0, c.tilt_rad, 0});
     const double half_fan = 2.3 * static_cast<double>(c.mode.pattern.elevation_width_rad) / 2;
+    const reference::SeabedLevel bed(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, c.tilt_rad);
     constexpr int block = 20;
     int blocks = 0;
     for (int row = 0; row + block <= s.rows(); row += block) {
-      const double near_psi = reference::seabed_psi_rad(height, c.tilt_rad, s.range_of_row(row) - 2 * 0.0254, 0.06);
-      const double far_psi = reference::seabed_psi_rad(height, c.tilt_rad, s.range_of_row(row + block) + 2 * 0.0254, 0);
+      const double near_psi = bed.psi_rad(s.range_of_row(row) - 2 * 0.0254, 0.06);
+      const double far_psi = bed.psi_rad(s.range_of_row(row + block) + 2 * 0.0254);
       if (!(near_psi > -half_fan && far_psi < half_fan)) continue;
       const double ratio = mean_over_beams(s, 3, [&](int j) {
         double sum = 0;
         for (int n = row; n < row + block; ++n) {
-          const double expected = reference::seabed_level_db(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height,
-                                                             c.tilt_rad, s.range_of_row(n), s.beam_sine(j));
-          sum += s.power(n, j) / power_from_db(expected);
+          sum += s.power(n, j) / power_from_db(bed.db(s.range_of_row(n), s.beam_sine(j)));
         }
         return sum / block;
       });
@@ -175,20 +174,18 @@ TEST(LevelOracles, Oracle32_FlatBedIsFilled) {
     Sounding s(flat_bed(lambert_db), p900(), settings);
     s.request.switches.expected_power = true;
     s.ping_from({0, 0, height}, {0, tilt, 0});
+    const reference::SeabedLevel bed(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, tilt);
     const double dr = static_cast<double>(settings.pulse_width_m);
     int good = 0, all = 0;
     double worst = 0;
     for (int j = 0; j < s.beams(); ++j) {
       const double u = s.beam_sine(j);
       if (std::abs(u) > std::sin(rad_from_deg(40))) continue;
-      const auto pattern = [&](double r) {
-        return elevation_two_way(s.mode().pattern, reference::seabed_psi_rad(height, tilt, r, u));
-      };
       for (int row = 0; row < s.rows(); ++row) {
         const double r = s.range_of_row(row);
-        if (!(r - 2 * dr > height / std::sqrt(1 - u * u)) || !(pattern(r) > 0.1) || !(pattern(r - 2 * dr) > 0.1)) continue;
-        const double off = db(s.power(row, j)) -
-                           reference::seabed_level_db(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, tilt, r, u);
+        if (!(r - 2 * dr > height / std::sqrt(1 - u * u)) || !(bed.pattern(r, u) > 0.1) || !(bed.pattern(r - 2 * dr, u) > 0.1))
+          continue;
+        const double off = db(s.power(row, j)) - bed.db(r, u);
         good += std::abs(off) <= 1;
         worst = std::max(worst, std::abs(off));
         ++all;

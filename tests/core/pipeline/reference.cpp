@@ -9,17 +9,6 @@
 namespace sonar::reference {
 namespace {
 
-class ReceivePattern {
- public:
-  explicit ReceivePattern(const BeamPattern& p)
-      : taper_(p.azimuth_taper), aperture_(aperture_in_wavelengths(taper_, static_cast<double>(p.azimuth_width_rad))) {}
-  double operator()(double du) const { return directivity(taper_, aperture_, du); }
-
- private:
-  Taper taper_;
-  double aperture_;
-};
-
 constexpr double pulse_reach_bt = 7;  // p < 1e-21 beyond
 
 template <class Sum>
@@ -71,7 +60,7 @@ std::vector<Complex> signal_in_frequency(std::span<const Scatterer> scatterers, 
 
 std::vector<std::vector<Complex>> beams(std::span<const Scatterer> scatterers, std::span<const double> beam_sines,
                                         const BeamPattern& pattern, const Grid& grid) {
-  const ReceivePattern weight(pattern);
+  const ReceivePattern weight = receive_pattern(pattern);
   std::vector<std::vector<Complex>> s(beam_sines.size(), std::vector<Complex>(static_cast<std::size_t>(grid.samples)));
   for (std::size_t j = 0; j < beam_sines.size(); ++j) {
     for (const Scatterer& i : scatterers) {
@@ -84,7 +73,7 @@ std::vector<std::vector<Complex>> beams(std::span<const Scatterer> scatterers, s
 
 std::vector<std::vector<double>> expected_power(std::span<const Scatterer> scatterers, std::span<const double> beam_sines,
                                                 const BeamPattern& pattern, const Grid& grid) {
-  const ReceivePattern weight(pattern);
+  const ReceivePattern weight = receive_pattern(pattern);
   std::vector<std::vector<double>> s(beam_sines.size(), std::vector<double>(static_cast<std::size_t>(grid.samples)));
   for (std::size_t j = 0; j < beam_sines.size(); ++j) {
     for (const Scatterer& i : scatterers) {
@@ -95,28 +84,41 @@ std::vector<std::vector<double>> expected_power(std::span<const Scatterer> scatt
   return s;
 }
 
-double seabed_psi_rad(double height_m, double tilt_rad, double range_m, double sine) {
-  const double ahead = std::sqrt(range_m * range_m * (1 - sine * sine) - height_m * height_m);
-  return tilt_rad - std::atan2(height_m, ahead);
-}
-
-double seabed_level_db(const FrequencyMode& mode, const Medium& medium, double envelope_hz, double lambert_db, double height_m,
-                       double tilt_rad, double range_m, double sine) {
+SeabedLevel::SeabedLevel(const FrequencyMode& mode, const Medium& medium, double envelope_hz, double lambert_db, double height_m,
+                         double tilt_rad)
+    : medium_(medium),
+      height_m_(height_m),
+      tilt_rad_(tilt_rad),
+      lambert_db_(lambert_db),
+      has_pattern_(mode.pattern.elevation_taper != Taper::unit),
+      elevation_aperture_(elevation_aperture_in_wavelengths(mode.pattern)) {
   const Taper taper = mode.pattern.azimuth_taper;
   const double theta =
       effective_beam_width_u(taper, aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad)));
-  const double length_m = 0.5 * medium.sound_speed_mps * energy_width_s(envelope_hz);
-  const double strength_db = lambert_db + 20 * std::log10(height_m / range_m);
-  const double oblique = range_m / std::sqrt(range_m * range_m * (1 - sine * sine) - height_m * height_m);
-  return 20 * std::log10(medium.source_upa * two_way_transmission(range_m, medium.absorption_np_per_m)) + strength_db +
-         10 * std::log10(theta * range_m * length_m * oblique) +
-         20 * std::log10(elevation_two_way(mode.pattern, seabed_psi_rad(height_m, tilt_rad, range_m, sine)));
+  area_per_m2_ = theta * 0.5 * medium.sound_speed_mps * energy_width_s(envelope_hz);
+}
+
+double SeabedLevel::psi_rad(double range_m, double sine) const {
+  const double ahead = std::sqrt(range_m * range_m * (1 - sine * sine) - height_m_ * height_m_);
+  return tilt_rad_ - std::atan2(height_m_, ahead);
+}
+
+double SeabedLevel::pattern(double range_m, double sine) const {
+  return has_pattern_ ? elevation_two_way(elevation_aperture_, psi_rad(range_m, sine)) : 1;
+}
+
+double SeabedLevel::db(double range_m, double sine) const {
+  const double strength_db = lambert_db_ + 20 * std::log10(height_m_ / range_m);
+  const double oblique = range_m / std::sqrt(range_m * range_m * (1 - sine * sine) - height_m_ * height_m_);
+  return 20 * std::log10(medium_.source_upa * two_way_transmission(range_m, medium_.absorption_np_per_m) *
+                         pattern(range_m, sine)) +
+         strength_db + 10 * std::log10(area_per_m2_ * range_m * oblique);
 }
 
 // sigma = mu cos(a) r^2 du dpsi with cos(a) = sqrt(1 - u^2) cos(psi) = d / r: power mu cos^3(a) / d^2, integrated over the beam.
 double wall_energy(const FrequencyMode& mode, const Medium& medium, double envelope_hz, double mu, double distance_m,
                    double half_fan_rad) {
-  const ReceivePattern weight(mode.pattern);
+  const ReceivePattern weight = receive_pattern(mode.pattern);
   double over_psi = 0, over_u = 0;
   const double dpsi = 1e-4, du = 1e-4;
   for (double psi = -half_fan_rad + dpsi / 2; psi < half_fan_rad; psi += dpsi) {

@@ -57,10 +57,21 @@ std::vector<std::vector<double>> expected_power(std::span<const Scatterer> scatt
 /// SL - 40 log r - 2 alpha r + S_b + 10 log10(theta_eff r (c / 2) tau_eff F), sin g = h / r, F = 1 / cos g at azimuth 0 and
 /// r / sqrt(r^2 (1 - u^2) - h^2) in a beam of sine u; plus the two-way elevation pattern there (tilt: sonar's nose down,
 /// positive).
-double seabed_level_db(const FrequencyMode& mode, const Medium& medium, double envelope_hz, double lambert_db, double height_m,
-                       double tilt_rad, double range_m, double sine = 0);
-/// The angle about the array axis at which that beam sees the bottom at that range.
-double seabed_psi_rad(double height_m, double tilt_rad, double range_m, double sine = 0);
+class SeabedLevel {
+ public:
+  SeabedLevel(const FrequencyMode& mode, const Medium& medium, double envelope_hz, double lambert_db, double height_m,
+              double tilt_rad);
+  double db(double range_m, double sine = 0) const;
+  /// The angle about the array axis at which that beam sees the bottom at that range, and the two-way pattern there.
+  double psi_rad(double range_m, double sine = 0) const;
+  double pattern(double range_m, double sine = 0) const;
+
+ private:
+  Medium medium_;
+  double height_m_, tilt_rad_, lambert_db_, area_per_m2_;
+  bool has_pattern_;
+  double elevation_aperture_;
+};
 
 /// Oracle 5, absolute: integral of E|s|^2 dt over an infinite wall straight ahead at `distance_m`, alpha = 0, beam at azimuth 0,
 /// elevations up to `half_fan_rad`. [uPa^2 s]

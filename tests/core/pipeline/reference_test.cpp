@@ -77,7 +77,7 @@ TEST(Reference, SeabedClosedFormAgainstPoints) {
       }
     }
     const double got = expected_power(points, std::span(&sine, 1), mode.pattern, grid)[0][0];
-    EXPECT_NEAR(10 * std::log10(got), seabed_level_db(mode, medium, grid.envelope_hz, lambert_db, height, tilt, r, sine), 0.05)
+    EXPECT_NEAR(10 * std::log10(got), SeabedLevel(mode, medium, grid.envelope_hz, lambert_db, height, tilt).db(r, sine), 0.05)
         << r << " " << sine;
   }
 }

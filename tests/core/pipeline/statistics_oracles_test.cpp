@@ -110,6 +110,7 @@ std::vector<double> independent_intensities(const FrequencyMode& mode, const Pin
   for (int seed = 1; seed <= seeds; ++seed) {
     s.request.seed = Seed{static_cast<std::uint64_t>(seed)};
     s.ping_from({0, 0, height}, {0, tilt, 0});
+    const reference::SeabedLevel bed(mode, s.medium(), s.envelope_hz(), -15, height, tilt);
     double last_sine = 2;
     for (int j = 0; j < s.beams(); ++j) {
       const double u = s.beam_sine(j);
@@ -120,10 +121,8 @@ std::vector<double> independent_intensities(const FrequencyMode& mode, const Pin
       for (int row = 0; row < s.rows(); row += step) {
         const double r = s.range_of_row(row), pulse = static_cast<double>(settings.pulse_width_m);
         if (!(r - 2 * pulse > height / std::sqrt(1 - u * u))) continue;
-        const double psi = reference::seabed_psi_rad(height, tilt, r - 2 * pulse, u);
-        if (!(elevation_two_way(mode.pattern, psi) > 0.2)) continue;
-        all.push_back(s.power(row, j) /
-                      power_from_db(reference::seabed_level_db(mode, s.medium(), s.envelope_hz(), -15, height, tilt, r, u)));
+        if (!(bed.pattern(r - 2 * pulse, u) > 0.2)) continue;
+        all.push_back(s.power(row, j) / power_from_db(bed.db(r, u)));
       }
     }
   }
