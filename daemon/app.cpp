@@ -55,17 +55,17 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
 }
 
 Result<void> App::open() {
+  if (options_.handle_signals) {  // before anybody can read that we are ready
+    signals_.add(SIGINT);
+    signals_.add(SIGTERM);
+  }
   for (Device& d : devices_)
     if (auto r = d.open(); !r) return r;
   return pose_server_.open();
 }
 
 int App::run() {
-  if (options_.handle_signals) {
-    signals_.add(SIGINT);
-    signals_.add(SIGTERM);
-    wait_for_signal();
-  }
+  if (options_.handle_signals) wait_for_signal();
   pose_server_.start();
   for (Device& d : devices_) d.start();
   asio::co_spawn(

@@ -80,10 +80,15 @@ int run(const RunCommand& command, Steady::time_point begin) {
   if (!scene) return complain(scene.error());
 
   Log log(config.log);
+  for (const std::string& note : (*scene)->notes) log.info(note);
   Parallel pool(compute_threads(config.engine), compute_niceness);  // outlives the engine inside App
   const EngineOptions engine_options{config.engine.simd};
   const auto make_engine = [&](std::shared_ptr<const Scene> s) { return make_cpu_engine(std::move(s), pool, engine_options); };
-  App app(std::move(config), *scene, make_engine, {command.exit_after_pings, command.digest, true}, log);
+  AppOptions options;
+  options.exit_after_pings = command.exit_after_pings;
+  options.digest = command.digest;
+  options.handle_signals = true;
+  App app(std::move(config), *scene, make_engine, options, log);
   const double scene_ms = 1e3 * seconds_since(scene_begin);
   if (const auto r = app.open(); !r) return complain(r.error());
   std::fputs(banner(app, {found->how, scene_ms}).c_str(), stderr);

@@ -37,7 +37,10 @@ Result<void> PoseServer::open() {
     if (!wanted.enabled) return {};
     listeners_.push_back(Listener{encoding, udp::socket(io_), tcp::acceptor(io_)});
     const auto at = open(listeners_.back(), wanted.at);
-    if (!at) return tl::make_unexpected(at.error());
+    if (!at) {
+      const std::string key = encoding == Encoding::json ? "poses.json" : "poses.protobuf";
+      return failure(at.error().kind, at.error().text + "; " + key + " in the configuration takes another address, or off");
+    }
     out = *at;
     return {};
   };
