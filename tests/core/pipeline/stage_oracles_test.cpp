@@ -142,6 +142,28 @@ TEST(StageOracles, Oracle19_CouplingAgainstDenseSum) {
   }
 }
 
+// Whatever the processor: the same picture to the rounding of a float.
+TEST(StageOracles, KernelSetsAgreeOnAPing) {
+  SceneMaker maker;
+  maker.add(height_field(-2, 14, -10, 10, 0.1, rough_relief(0.03, 40)), -20).add(sphere(0.4, 3), -10, {5, 1, 0.4});
+  const auto scene = maker.make();
+  for (const bool expected_power : {false, true}) {
+    std::vector<float> first;
+    for (const SimdLevel level : {SimdLevel::portable, SimdLevel::avx2, SimdLevel::avx512}) {
+      Sounding s(scene, oculus_high(), default_rows(10, 720), {.threads = 2, .engine = {.simd = level}});
+      s.request.switches.expected_power = expected_power;
+      const std::vector<float> now = s.ping_from({0, 0, 2}, {0, 0.25, 0}).pressure_upa;
+      if (first.empty()) first = now;
+      double error = 0, power = 0;
+      for (std::size_t i = 0; i < now.size(); ++i) {
+        error += std::pow(static_cast<double>(now[i]) - static_cast<double>(first[i]), 2);
+        power += std::pow(static_cast<double>(first[i]), 2);
+      }
+      EXPECT_LE(std::sqrt(error / power), 1e-3) << s.engine().description();
+    }
+  }
+}
+
 // End to end: points at random places, against the double sum with each at its own exact sine.
 TEST(StageOracles, PointsThroughTheEngineAgainstDirectSum) {
   for (const FrequencyMode& mode : {p900(), oculus_high()}) {

@@ -192,6 +192,63 @@ TEST(StatisticsOracles, Oracle34_StillSceneStillPing) {
   EXPECT_GT(*std::max_element(first.begin(), first.end()), 0);
 }
 
+TEST(StatisticsOracles, Oracle26_CoherenceOfBeamsOnABed) {
+  Sounding s(flat_bed(), p900(), native_rows(10, 0.0254));
+  const ReceivePattern pattern = receive_pattern(p900().pattern);
+  for (const int apart : {1, 3, 5, 8}) {
+    std::vector<double> a, b;
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      s.request.seed = Seed{seed};
+      s.ping_from({0, 0, 2}, {0, 0.25, 0});
+      const reference::SeabedLevel bed(s.mode(), s.medium(), s.envelope_hz(), -15, 2, 0.25);
+      for (int row = static_cast<int>(s.row_of_range(4)); row < s.row_of_range(9.5); row += 4) {
+        for (int j = 128; j < 384 - apart; ++j) {
+          const double r = s.range_of_row(row);
+          a.push_back(s.power(row, j) / power_from_db(bed.db(r, s.beam_sine(j))));
+          b.push_back(s.power(row, j + apart) / power_from_db(bed.db(r, s.beam_sine(j + apart))));
+        }
+      }
+    }
+    // Spacing in the sine shrinks off axis: the expectation is averaged over the same beams.
+    double expected = 0;
+    for (int j = 128; j < 384 - apart; ++j) {
+      double product = 0, square = 0;
+      for (double u = -0.1; u < 0.1; u += 5e-4) {
+        const double far = pattern(u + s.beam_sine(j) - s.beam_sine(j + apart));
+        product += pattern(u) * far, square += pattern(u) * pattern(u);
+      }
+      expected += std::pow(product / square, 2) / (256 - apart);
+    }
+    EXPECT_NEAR(coherence(a, b), std::sqrt(expected), 0.1) << apart;
+  }
+}
+
+// van Cittert-Zernike: an untapered array of length L that moves sideways by x keeps 1 - 2 x / L of its coherence.
+TEST(StatisticsOracles, Oracle35_LateralShiftDecorrelates) {
+  FrequencyMode mode = p900();
+  mode.pattern.azimuth_taper = Taper::uniform;
+  const double aperture_m = aperture_in_wavelengths(Taper::uniform, rad_from_deg(1)) * 1500 / 900e3;
+  Sounding s(flat_bed(), mode, native_rows(10, 0.0254));
+  for (const double part : {0.1, 0.25, 0.5}) {
+    std::vector<double> a, b;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      s.request.seed = Seed{seed};
+      const std::vector<float> before = s.ping_from({0, 0, 2}, {0, 0.25, 0}).pressure_upa;
+      s.ping_from({0, part * aperture_m, 2}, {0, 0.25, 0});
+      const reference::SeabedLevel bed(mode, s.medium(), s.envelope_hz(), -15, 2, 0.25);
+      for (int row = static_cast<int>(s.row_of_range(4.5)); row < s.row_of_range(9.5); row += 2) {
+        for (int j = 0; j < s.beams(); j += 2) {
+          if (std::abs(std::asin(s.beam_sine(j))) > rad_from_deg(8)) continue;
+          const double expected = power_from_db(bed.db(s.range_of_row(row), s.beam_sine(j)));
+          const auto p = static_cast<double>(before[static_cast<std::size_t>(row * s.beams() + j)]);
+          a.push_back(p * p / expected), b.push_back(s.power(row, j) / expected);
+        }
+      }
+    }
+    EXPECT_NEAR(coherence(a, b), 1 - 2 * part, 0.12) << part;
+  }
+}
+
 /// Correlation of intensities in a patch between two pings, the second read `shift` rows nearer and `beams` beams further on.
 double patch_correlation(const Sounding& s, const std::vector<float>& before, const std::vector<float>& after, double from_m,
                          double to_m, double azimuth_deg, int row_shift, int beam_shift) {
