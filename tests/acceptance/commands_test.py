@@ -1,0 +1,77 @@
+"""What the programs say when asked wrongly: one sentence with what, where and what to do, and the exit code of its class."""
+import pathlib
+import tempfile
+import unittest
+
+from running_sonard import BUILD, ROOT, SONARCTL, SONARD, free_address, run
+
+
+def check(text):
+    with tempfile.TemporaryDirectory() as folder:
+        config = pathlib.Path(folder) / "test.yaml"
+        config.write_text(text, encoding="utf-8")
+        return run(SONARD, "check", config)
+
+
+GOOD = f"""\
+world: {{scene: {ROOT}/scenes/demo.yaml}}
+vehicles: [{{name: rov}}]
+sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
+"""
+
+
+class Help(unittest.TestCase):
+    def test_every_command_explains_itself(self):
+        for command in [(SONARD,), (SONARD, "run"), (SONARD, "check"), (SONARCTL,), (SONARCTL, "listen"), (SONARCTL, "view"),
+                        (SONARCTL, "stats"), (SONARCTL, "pose"), (SONARCTL, "pose", "circle")]:
+            with self.subTest(command=command):
+                result = run(*command, "--help")
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertIn("Usage", result.stdout)
+        for command in ["listen", "view", "stats", "pose"]:
+            self.assertIn("examples:", run(SONARCTL, command, "--help").stdout)
+
+    def test_version(self):
+        self.assertRegex(run(SONARD, "--version").stdout, r"^sonard \d+\.\d+\.\d+")
+
+
+class Mistakes(unittest.TestCase):
+    def expect(self, result, code, *words):
+        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+        for word in words:
+            self.assertIn(word, result.stderr)
+
+    def test_usage_is_64(self):
+        self.expect(run(SONARD, "--no-such-option"), 64, "--no-such-option")
+        self.expect(run(SONARCTL), 64)
+        self.expect(run(SONARCTL, "listen", "--rate", "7"), 64, "--rate")
+        self.expect(run(SONARCTL, "view", "--png", "x.png", "--from-raw", "y", "--colour-map", "pink"), 64, "gray, copper")
+        self.expect(run(SONARCTL, "listen", "127.0.0.1:port"), 64, "127.0.0.1:port", "HOST:PORT")
+
+    def test_a_good_configuration_is_0(self):
+        self.expect(check(GOOD), 0)
+
+    def test_a_mistyped_key_is_78_and_the_nearest_one_is_named(self):
+        self.expect(check(GOOD.replace("bind_ip", "bind_op")), 78, "test.yaml:3:", "bind_op", 'did you mean "bind_ip"')
+
+    def test_an_unknown_profile_and_a_missing_scene_say_so(self):
+        self.expect(check(GOOD.replace("m1200d", "m1200")), 78, "oculus-m1200d")
+        self.expect(check(GOOD.replace("demo.yaml", "demi.yaml")), 78, "test.yaml:1:", "world.scene", "no such file")
+
+    def test_a_broken_scene_is_65_with_its_place(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene = pathlib.Path(folder) / "scene.yaml"
+            scene.write_text("objects:\n  - {name: a, sphere: {radius_m: -1}}\n", encoding="utf-8")
+            self.expect(check(GOOD.replace(f"{ROOT}/scenes/demo.yaml", str(scene))), 65, "scene.yaml:")
+
+    def test_missing_files_are_66_and_absent_devices_69(self):
+        self.expect(run(SONARD, "run", BUILD / "none.yaml"), 66, "none.yaml")
+        self.expect(run(SONARCTL, "view", "--png", "x.png", "--from-raw", BUILD / "none.raw"), 66, "none.raw")
+        self.expect(run(SONARCTL, "listen", free_address(), "--wait", "0.1"), 69, "Is sonard running there?")
+
+    def test_an_address_of_another_machine_is_69_with_the_way_out(self):
+        self.expect(run(SONARD, "run", "--demo", "--bind", "192.0.2.7"), 69, "192.0.2.7", "--bind")
+
+
+if __name__ == "__main__":
+    unittest.main()
