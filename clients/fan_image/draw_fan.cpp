@@ -83,7 +83,7 @@ std::optional<float> footprint_mean(const PolarImage& image, double x_m, double 
 
 void draw_rings(Raster& raster, const PolarImage& image, const Layout& layout) {
   const double spacing = ring_spacing_m(image.range_m());
-  const int scale = std::max(1, layout.width / 450);
+  const int scale = std::max(1, layout.width / 400);
   for (int ring = 1; ring * spacing <= image.range_m() * 1.0001; ++ring) {
     const double radius = ring * spacing / layout.metres_per_pixel;
     const double from = image.azimuth_rad.back(), to = image.azimuth_rad.front();

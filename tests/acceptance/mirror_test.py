@@ -98,6 +98,17 @@ class Mirror(unittest.TestCase):
         self.assertAlmostEqual(found[0], 5.92, delta=0.12, msg="a metre ahead, C is a metre nearer")
 
 
+    def test_the_control_stream_answers(self):
+        to = f"{self.daemon.address}:14770"
+        result = self.daemon.ctl_to(to, "pose", "line", "--from", "0,0,0", "--to-point", "0.1,0,0", "--confirm")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("poses sent to tcp", result.stdout)
+        for wrong in (("--vehicle", "rob"), ("--object", "diver")):
+            result = self.daemon.ctl_to(to, "pose", "once", "--confirm", *wrong)
+            self.assertEqual(result.returncode, 65, result.stdout)
+            self.assertIn(wrong[1], result.stderr)
+
+
 class Rolled(unittest.TestCase):
     def test_a_starboard_list_lifts_port_targets_out_of_the_fan(self):
         """Rolled 90 degrees, left and right become up and down: A and C leave the 12 degree fan, the picture loses its L."""
