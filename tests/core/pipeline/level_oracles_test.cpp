@@ -167,6 +167,39 @@ TEST(LevelOracles, Oracle22_EnergyDoesNotDependOnBeams) {
   }
 }
 
+// The transmitter lights the sector evenly and a beam's skirt beyond it; farther out it is dark.
+TEST(LevelOracles, EdgeBeamsAreNotDimAndNothingComesFromBeyond) {
+  const double height = 2, lambert_db = -27, tilt = 0.25;
+  for (const FrequencyMode& mode : {p900(), oculus_high()}) {
+    Sounding s(flat_bed(lambert_db), without_elevation_pattern(mode), native_rows(8, 0.0254));
+    s.request.switches.expected_power = true;
+    s.ping_from({0, 0, height}, {0, tilt, 0});
+    const reference::SeabedLevel bed(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, tilt);
+    for (const int first : {0, s.beams() - 4}) {
+      double ratio = 0;
+      int n = 0;
+      for (int row = static_cast<int>(s.row_of_range(6)); row < s.rows() - 4; ++row) {
+        for (int j = first; j < first + 4; ++j, ++n)
+          ratio += s.power(row, j) / power_from_db(bed.db(s.range_of_row(row), s.beam_sine(j)));
+      }
+      EXPECT_NEAR(db(ratio / n), 0, 0.3) << mode.name << " from beam " << first;
+    }
+
+    const double edge = std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2);
+    const double width = 2 * std::sin(static_cast<double>(mode.pattern.azimuth_width_rad) / 2);
+    const auto peak_of_point_at = [&](double sine) {
+      Sounding p(SceneMaker().add_point(5.0 * Vec3d{std::sqrt(1 - sine * sine), sine, 0}, 0).make(), mode,
+                 native_rows(6, 0.0254));
+      p.ping();
+      const int row = static_cast<int>(std::lround(p.row_of_range(5)));
+      return p.pressure(row, p.loudest_beam(row));
+    };
+    const double inside = peak_of_point_at(edge - 4 * width);
+    EXPECT_LT(peak_of_point_at(edge + 2.5 * width), 0.1 * inside);
+    EXPECT_EQ(peak_of_point_at(edge + 3.6 * width), 0);
+  }
+}
+
 // Every sample of every beam within 40 degrees, pattern on: no holes, no stripes.
 TEST(LevelOracles, Oracle32_FlatBedIsFilled) {
   const double height = 2, lambert_db = -27, tilt = 0.25;
