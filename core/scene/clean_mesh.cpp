@@ -36,13 +36,11 @@ bool has_area(Vec3 a, Vec3 b, Vec3 c) {
 
 }  // namespace
 
-Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material) {
+Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material, std::size_t most) {
   const auto bad = [](std::string what) { return failure(ErrorKind::bad_data, std::move(what)); };
   const std::size_t count = corners.size() / 3;
   if (count == 0) return bad("has no triangles; export faces, not only points or lines");
-  if (count > max_mesh_triangles) {
-    return bad("has " + std::to_string(count) + " triangles, at most 20 million are read; simplify it");
-  }
+  if (count > most) return bad("has more than " + std::to_string(most) + " triangles; simplify it");
   constexpr double huge = std::numeric_limits<double>::infinity();
   Vec3d low{huge, huge, huge}, high{-huge, -huge, -huge};
   for (const Vec3d& p : corners) {

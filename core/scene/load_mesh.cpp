@@ -2,12 +2,13 @@
 #include "core/scene/load_mesh.hpp"
 
 #include <assimp/config.h>
-#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
-#include <cstring>
+#include <fstream>
+
+#include "core/scene/polygon.hpp"
 
 namespace sonar {
 namespace {
@@ -27,6 +28,16 @@ std::string first_line(std::string s) {
   return s.substr(0, std::min<std::size_t>(s.find('\n'), 200));
 }
 
+// Assimp 5.2 never comes back from a PLY header that does not end.
+bool has_ply_header(const std::filesystem::path& file) {
+  std::string head(64 << 10, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  const std::size_t end = head.find("end_header");
+  return head.starts_with("ply") && end != std::string::npos && head.find('\n', end) != std::string::npos;
+}
+
 struct Corners {
   std::vector<Vec3d> at;
   std::vector<std::uint16_t> material;
@@ -40,15 +51,18 @@ void gather(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>
     const aiMesh& mesh = *scene.mMeshes[node.mMeshes[m]];
     for (unsigned f = 0; f < mesh.mNumFaces && out.at.size() <= 3 * max_mesh_triangles; ++f) {
       const aiFace& face = mesh.mFaces[f];
-      if (face.mNumIndices != 3) continue;
-      for (unsigned k = 0; k < 3; ++k) {
-        const unsigned index = face.mIndices[k];
-        if (index >= mesh.mNumVertices) return;
-        const aiVector3t<double> v =
-            here * aiVector3t<double>(mesh.mVertices[index].x, mesh.mVertices[index].y, mesh.mVertices[index].z);
-        out.at.push_back({v.x, v.y, v.z});
+      if (face.mNumIndices < 3) continue;  // points and lines
+      std::vector<Vec3d> polygon;
+      for (unsigned k = 0; k < face.mNumIndices; ++k) {
+        if (face.mIndices[k] >= mesh.mNumVertices) return;
+        const aiVector3D& p = mesh.mVertices[face.mIndices[k]];
+        const aiVector3t<double> v = here * aiVector3t<double>(p.x, p.y, p.z);
+        polygon.push_back({v.x, v.y, v.z});
       }
-      out.material.push_back(static_cast<std::uint16_t>(std::min(mesh.mMaterialIndex, 65535u)));
+      for (const auto& triangle : triangulate(polygon)) {
+        for (const std::uint32_t k : triangle) out.at.push_back(polygon[k]);
+        out.material.push_back(static_cast<std::uint16_t>(std::min(mesh.mMaterialIndex, 65535u)));
+      }
     }
   }
   for (unsigned c = 0; c < node.mNumChildren; ++c) gather(scene, *node.mChildren[c], here, depth + 1, out);
@@ -70,13 +84,13 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
   if (std::find(known.begin(), known.end(), extension) == known.end()) {
     return bad("unknown mesh format; use OBJ, STL, PLY, glTF, GLB or DAE");
   }
+  if (extension == ".ply" && !has_ply_header(request.file)) return bad("cannot be read: not a PLY file with a whole header");
 
   Assimp::Importer importer;
   const bool dae = extension == ".dae";
   const bool y_up_by_default = extension == ".gltf" || extension == ".glb" || dae;  // Assimp turns a tagged DAE to y up
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());
-  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  const aiScene* scene = importer.ReadFile(request.file.string(), aiProcess_Triangulate | aiProcess_SortByPType);
+  const aiScene* scene = importer.ReadFile(request.file.string(), 0);  // its post-processing asserts on odd files
   if (!scene || !scene->mRootNode) return bad("cannot be read: " + first_line(importer.GetErrorString()));
 
   Corners corners;

@@ -29,6 +29,7 @@ Result<LoadedMesh> load_mesh(const MeshFile& request);
 
 /// Shared checks of all meshes: finite, within 1e7 m; drops triangles without area and merges equal vertices, recentres.
 /// `positions` are triangle corners, three a triangle. Errors lack the file name.
-Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material);
+Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material,
+                               std::size_t most = max_mesh_triangles);
 
 }  // namespace sonar

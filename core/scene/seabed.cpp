@@ -14,17 +14,26 @@ struct Axis {
   std::vector<double> at_m, spacing_m;
 };
 
+int fine_steps(double fine_half_m, double spacing_m) {
+  return static_cast<int>(std::clamp(std::ceil(fine_half_m / spacing_m - 1e-9), 1.0, 1e9));
+}
+// Calls each(distance) for the rows outside the fine part, from `from_m` to `half_m`.
+template <class Each>
+void widen(double from_m, double half_m, double spacing_m, Each&& each) {
+  double step = spacing_m;
+  while (from_m < half_m - 1e-9) {
+    step = std::max(spacing_m, std::min(step * widening, widest_m));
+    from_m = from_m + 1.5 * step > half_m ? half_m : from_m + step;
+    each(from_m);
+  }
+}
+
 Axis make_axis(double size_m, double fine_m, double spacing_m) {
   const double half = size_m / 2, fine_half = std::min(fine_m / 2, half);
-  const int n = std::max(1, static_cast<int>(std::ceil(fine_half / spacing_m - 1e-9)));
+  const int n = fine_steps(fine_half, spacing_m);
   std::vector<double> outwards;  // distances from the middle, beyond zero
   for (int i = 1; i <= n; ++i) outwards.push_back(fine_half * i / n);
-  double step = spacing_m;
-  while (outwards.back() < half - 1e-9) {
-    step = std::max(spacing_m, std::min(step * widening, widest_m));
-    const double next = outwards.back() + step;
-    outwards.push_back(next + 0.5 * step > half ? half : next);
-  }
+  widen(fine_half, half, spacing_m, [&](double at) { outwards.push_back(at); });
   Axis axis;
   for (std::size_t i = outwards.size(); i-- > 0;) axis.at_m.push_back(-outwards[i]);
   axis.at_m.push_back(0);
@@ -48,15 +57,14 @@ double ripple_profile(double cycles) {
 }  // namespace
 
 std::size_t seabed_triangles(const SeabedShape& s) {
-  // Outside the fine part a row is never closer than the spacing, and the steps reach 1 m within 0.08 of a metre's rows.
-  const auto points = [](double size, double fine, double spacing) {
-    const double outside = std::max(0.0, size - fine);
-    const double steps =
-        spacing >= widest_m ? outside / spacing : outside / widest_m + 2 * std::log(widest_m / spacing) / std::log(widening);
-    return std::min(fine, size) / spacing + std::min(steps, outside / spacing) + 4;
+  const auto cells = [](double size, double fine, double spacing) {
+    const double half = size / 2, fine_half = std::min(fine / 2, half);
+    double n = fine_steps(fine_half, spacing);
+    widen(fine_half, half, spacing, [&](double) { ++n; });
+    return 2 * n;
   };
-  const double cells = points(s.size_x_m, s.fine_x_m, s.spacing_x_m) * points(s.size_y_m, s.fine_y_m, s.spacing_y_m);
-  return static_cast<std::size_t>(std::min(2 * cells, 1e15));
+  const double count = 2 * cells(s.size_x_m, s.fine_x_m, s.spacing_x_m) * cells(s.size_y_m, s.fine_y_m, s.spacing_y_m);
+  return static_cast<std::size_t>(std::min(count, 1e15));
 }
 
 HeightGrid make_seabed(const SeabedShape& s) {

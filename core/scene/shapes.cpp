@@ -128,10 +128,11 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   if (type == "seabed") {
     const SeabedShape shape = read_seabed(keys);
     const Node size = keys.optional("size_m");
+    if (shape.size_x_m <= 0 || shape.size_y_m <= 0 || shape.spacing_x_m <= 0 || shape.spacing_y_m <= 0)
+      return {};  // said already
     if (seabed_triangles(shape) > max_mesh_triangles) {
       return size.fail("makes more than 20 million triangles; raise spacing_m or set fine_size_m"), Shape{};
     }
-    if (shape.size_x_m <= 0 || shape.size_y_m <= 0 || shape.spacing_x_m <= 0 || shape.spacing_y_m <= 0) return {};
     return from_grid(make_seabed(shape), material, size, false);
   }
   const Node file = keys.required("file");

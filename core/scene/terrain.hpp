@@ -53,10 +53,10 @@ struct SeabedShape {
   double wavelength_m = 4;  // of the longest octave
   int octaves = 5;
   double persistence = 0.5;  // amplitude ratio of one octave to the one before
-  Ripples ripples;
+  Ripples ripples = {};
   std::array<double, 2> slope{0, 0};  // rise per metre along x and y
 };
-/// Grid points the shape asks for; the caller bounds it before making anything.
+/// Triangles the shape will have; the caller bounds it before making anything.
 std::size_t seabed_triangles(const SeabedShape& shape);
 HeightGrid make_seabed(const SeabedShape& shape);
 

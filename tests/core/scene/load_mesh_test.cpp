@@ -1,0 +1,207 @@
+// Mesh files: every format, axes and scale, far offsets, and the many ways a file can be wrong.
+#include "core/scene/load_mesh.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+
+#include "mesh_checks.hpp"
+#include "temporary_files.hpp"
+
+namespace sonar {
+namespace {
+
+using testing::expect_sound;
+using ::testing::HasSubstr;
+using testing::TemporaryFiles;
+
+// A wedge 2 long in x, 1 wide in y, 3 high in z.
+const std::string obj = "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 3\nusemtl steel\nf 1 3 2\nf 1 2 4\nusemtl wood\nf 1 4 3\nf 2 3 4\n";
+const std::string ply =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0\n2 0 0\n0 1 0\n0 0 3\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+const std::string stl =
+    "solid wedge\n"
+    "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 2 0 0\nendloop\nendfacet\n"
+    "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 2 0 0\nvertex 0 0 3\nendloop\nendfacet\n"
+    "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 3\nvertex 0 1 0\nendloop\nendfacet\n"
+    "facet normal 0 0 0\nouter loop\nvertex 2 0 0\nvertex 0 1 0\nvertex 0 0 3\nendloop\nendfacet\n"
+    "endsolid wedge\n";
+
+std::string collada(const std::string& axis) {
+  return "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+         "<asset><unit meter=\"1\"/><up_axis>" +
+         axis +
+         "</up_axis></asset><library_geometries><geometry id=\"g\"><mesh>"
+         "<source id=\"p\"><float_array id=\"a\" count=\"12\">0 0 0 2 0 0 0 1 0 0 0 3</float_array><technique_common>"
+         "<accessor source=\"#a\" count=\"4\" stride=\"3\"><param name=\"X\" type=\"float\"/><param name=\"Y\" type=\"float\"/>"
+         "<param name=\"Z\" type=\"float\"/></accessor></technique_common></source><vertices id=\"v\"><input "
+         "semantic=\"POSITION\" "
+         "source=\"#p\"/></vertices><triangles count=\"4\"><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>"
+         "<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries><library_visual_scenes>"
+         "<visual_scene id=\"s\"><node><instance_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes>"
+         "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
+}
+
+// A GLB with the wedge's vertices and triangles, as the glTF 2.0 container asks.
+std::string glb() {
+  const float vertices[12] = {0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 3};
+  const std::uint16_t indices[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  std::string json =
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"buffers":[{"byteLength":72}],)"
+      R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":24}],)"
+      R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[2,1,3]},)"
+      R"({"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}]})";
+  while (json.size() % 4) json += ' ';
+  std::string out;
+  const auto word = [&](std::size_t v) {
+    for (int k = 0; k < 4; ++k) out += static_cast<char>((v >> (8 * k)) & 0xFF);
+  };
+  out += "glTF";
+  word(2), word(12 + 8 + json.size() + 8 + 72);
+  word(json.size());
+  out += "JSON" + json;
+  word(72);
+  out.append("BIN\0", 4);
+  std::string data(72, '\0');
+  std::memcpy(data.data(), vertices, 48);
+  std::memcpy(data.data() + 48, indices, 24);
+  return out + data;
+}
+
+struct Extent {
+  Vec3d low, high;
+};
+Extent extent(const CentredMesh& m) {
+  Extent e{{1e30, 1e30, 1e30}, {-1e30, -1e30, -1e30}};
+  for (const Vec3& v : m.mesh.vertices) {
+    const Vec3d p = to_double(v) + m.centre_m;
+    e.low = {std::min(e.low.x, p.x), std::min(e.low.y, p.y), std::min(e.low.z, p.z)};
+    e.high = {std::max(e.high.x, p.x), std::max(e.high.y, p.y), std::max(e.high.z, p.z)};
+  }
+  return e;
+}
+void expect_extent(const LoadedMesh& m, Vec3d low, Vec3d high) {
+  expect_sound(m.centred.mesh);
+  EXPECT_EQ(m.centred.mesh.triangles.size(), 4u);
+  EXPECT_EQ(m.centred.mesh.vertices.size(), 4u);
+  const Extent e = extent(m.centred);
+  EXPECT_LT(length(e.low - low), 1e-5) << e.low.x << " " << e.low.y << " " << e.low.z;
+  EXPECT_LT(length(e.high - high), 1e-5) << e.high.x << " " << e.high.y << " " << e.high.z;
+}
+
+class LoadMesh : public ::testing::Test {
+ protected:
+  LoadedMesh good(const std::string& name, const std::string& bytes, MeshFile request = {}) {
+    request.file = files_.write(name, bytes);
+    auto mesh = load_mesh(request);
+    if (!mesh) throw std::runtime_error(mesh.error().text);
+    return std::move(*mesh);
+  }
+  std::string refusal(const std::string& name, const std::string& bytes, MeshFile request = {}) {
+    request.file = files_.write(name, bytes);
+    auto mesh = load_mesh(request);
+    return mesh ? "accepted" : mesh.error().text;
+  }
+  TemporaryFiles files_;
+};
+
+TEST_F(LoadMesh, ZUpFormats) {
+  expect_extent(good("a.obj", obj), {0, 0, 0}, {2, 1, 3});
+  expect_extent(good("a.stl", stl), {0, 0, 0}, {2, 1, 3});
+  expect_extent(good("a.ply", ply), {0, 0, 0}, {2, 1, 3});
+  expect_extent(good("A.OBJ", obj), {0, 0, 0}, {2, 1, 3});
+}
+
+TEST_F(LoadMesh, YUpFormatsAreTurned) {
+  expect_extent(good("a.glb", glb()), {0, -3, 0}, {2, 0, 1});
+  expect_extent(good("y.dae", collada("Y_UP")), {0, -3, 0}, {2, 0, 1});
+  expect_extent(good("z.dae", collada("Z_UP")), {0, 0, 0}, {2, 1, 3});
+}
+
+TEST_F(LoadMesh, UpAndScaleAsAsked) {
+  MeshFile y_up;
+  y_up.up = UpAxis::y;
+  expect_extent(good("a.obj", obj, y_up), {0, -3, 0}, {2, 0, 1});
+  expect_extent(good("z.dae", collada("Z_UP"), y_up), {0, -3, 0}, {2, 0, 1});
+  MeshFile z_up;
+  z_up.up = UpAxis::z;
+  z_up.scale = 0.001;
+  expect_extent(good("a.glb", glb(), z_up), {0, 0, 0}, {0.002, 0.001, 0.003});
+  expect_extent(good("y.dae", collada("Y_UP"), z_up), {0, 0, 0}, {0.002, 0.001, 0.003});
+}
+
+TEST_F(LoadMesh, MaterialsKeepTheirNamesAndTriangles) {
+  const LoadedMesh mesh = good("a.obj", obj);
+  std::map<std::string, int> count;
+  for (const std::uint16_t m : mesh.centred.mesh.material) ++count[mesh.material_names[m]];
+  EXPECT_EQ(count["steel"] + count["wood"] + count["DefaultMaterial"], 4);
+}
+
+TEST_F(LoadMesh, VolumesKeepTheirSign) {
+  EXPECT_NEAR(testing::volume(good("a.obj", obj).centred.mesh), 1, 1e-6);
+  EXPECT_NEAR(testing::volume(good("a.glb", glb()).centred.mesh), 1, 1e-6);
+}
+
+TEST_F(LoadMesh, FarOffsetsMoveIntoTheCentre) {
+  const LoadedMesh mesh = good("far.obj", "v 500000 0 0\nv 500002 0 0\nv 500000 1 0\nf 1 2 3\n");
+  EXPECT_DOUBLE_EQ(mesh.centred.centre_m.x, 500001);
+  for (const Vec3& v : mesh.centred.mesh.vertices) EXPECT_LE(std::abs(v.x), 1);
+}
+
+TEST_F(LoadMesh, TrianglesWithoutAreaAreLeftOutAndCounted) {
+  const LoadedMesh mesh = good("d.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\nf 1 1 2\n");
+  EXPECT_EQ(mesh.centred.mesh.triangles.size(), 1u);
+  EXPECT_GE(mesh.centred.left_out, 1u);
+}
+
+TEST_F(LoadMesh, WrongFilesAreRefusedWithOneSentence) {
+  EXPECT_THAT(refusal("n.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n"), HasSubstr("n.obj: has vertices that are not finite"));
+  EXPECT_THAT(refusal("h.obj", "v 0 0 0\nv 2e7 0 0\nv 0 1 0\nf 1 2 3\n"),
+              HasSubstr("h.obj: reaches beyond 1e7 m; set \"scale\""));
+  EXPECT_THAT(refusal("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
+              HasSubstr("flat.obj: has only triangles without area"));
+  EXPECT_THAT(refusal("x.xyz", "1 2 3"), HasSubstr("x.xyz: unknown mesh format; use OBJ"));
+  for (const char* name : {"e.obj", "e.stl", "e.ply", "e.glb", "e.gltf", "e.dae"}) {
+    EXPECT_THAT(refusal(name, ""), HasSubstr(std::string(name) + ": ")) << name;
+    EXPECT_THAT(refusal(name, "this is not a mesh"), HasSubstr(std::string(name) + ": ")) << name;
+  }
+  EXPECT_NE(refusal("points.obj", "v 0 0 0\nv 1 0 0\n"), "accepted");
+  MeshFile missing;
+  missing.file = files_.path("none.obj");
+  const auto error = load_mesh(missing);
+  ASSERT_FALSE(error);
+  EXPECT_EQ(error.error().kind, ErrorKind::missing_file);
+  EXPECT_THAT(error.error().text, HasSubstr("no mesh file at "));
+}
+
+TEST_F(LoadMesh, TruncatedFilesNeverCrash) {
+  const std::pair<const char*, std::string> all[] = {
+      {"t.obj", obj}, {"t.stl", stl}, {"t.ply", ply}, {"t.glb", glb()}, {"t.dae", collada("Z_UP")}};
+  for (const auto& [name, bytes] : all) {
+    for (std::size_t n = 0; n < bytes.size(); n += 7) {
+      MeshFile request;
+      request.file = files_.write(name, bytes.substr(0, n));
+      const auto mesh = load_mesh(request);
+      if (mesh) {
+        expect_sound(mesh->centred.mesh);
+      } else {
+        EXPECT_THAT(mesh.error().text, HasSubstr(name));
+      }
+    }
+  }
+}
+
+TEST(CleanMesh, Limits) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(clean_mesh({}, {}).error().text, HasSubstr("has no triangles"));
+  EXPECT_THAT(clean_mesh({{0, 0, 0}, {1, 0, nan}, {0, 1, 0}}, {}).error().text, HasSubstr("not finite"));
+  EXPECT_THAT(clean_mesh(std::vector<Vec3d>(30), {}, 9).error().text, HasSubstr("has more than 9 triangles; simplify it"));
+}
+
+}  // namespace
+}  // namespace sonar

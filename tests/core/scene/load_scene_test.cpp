@@ -1,0 +1,248 @@
+// The scene format: what it means, what it refuses and with which sentence, and that no mutation of it can crash the loader.
+#include "core/scene/load_scene.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "mesh_checks.hpp"
+#include "scene_testing.hpp"
+#include "temporary_files.hpp"
+
+namespace sonar {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using testing::TemporaryFiles;
+
+std::string refusal(const std::string& text, const std::filesystem::path& folder = ".") {
+  const auto scene = parse_scene(text, "s.yaml", folder);
+  return scene ? "accepted" : scene.error().text;
+}
+std::shared_ptr<const Scene> parsed(const std::string& text, const std::filesystem::path& folder = ".") {
+  auto scene = parse_scene(text, "s.yaml", folder);
+  if (!scene) throw std::runtime_error(scene.error().text);
+  return *scene;
+}
+std::string object(const std::string& keys) { return "objects:\n  - {" + keys + "}\n"; }
+
+TEST(LoadScene, EveryPrimitiveLoads) {
+  const auto scene = parsed(R"(
+name: all
+objects:
+  - {type: plane, material: sand, size_m: [4, 4]}
+  - {type: box, material: rock, size_m: [1, 2, 3]}
+  - {type: sphere, material: steel, radius_m: 0.5}
+  - {type: cylinder, material: steel, radius_m: 0.5, length_m: 2, segments: 24, caps: bottom}
+  - {type: capsule, material: steel, radius_m: 0.5, length_m: 2}
+  - {type: cone, material: rubber, radius_m: 0.5, length_m: 1, top_radius_m: 0.1}
+  - {type: torus, material: rubber, radius_m: 0.5, tube_radius_m: 0.1}
+  - {type: rock, material: rock, size_m: [1, 1, 0.6], seed: 4}
+  - {type: seabed, material: mud, size_m: [10, 10], spacing_m: 0.5, ripples: {wavelength_m: 2, height_m: 0.1}}
+  - {type: point, target_strength_db: -20, pose: {xyz_m: [1, 2, 3]}}
+sea_surface: {size_m: [50, 60], lambert_db: -35}
+)");
+  EXPECT_EQ(scene->name, "all");
+  ASSERT_EQ(scene->objects.size(), 10u);
+  EXPECT_EQ(scene->objects[1].name, "box 2");
+  for (const Object& o : scene->objects) {
+    testing::expect_sound(*o.mesh);
+    for (const std::uint16_t m : o.mesh->material) ASSERT_LT(m, scene->materials.size());
+  }
+  ASSERT_EQ(scene->point_targets.size(), 1u);
+  EXPECT_EQ(scene->point_targets[0].target_strength_db, -20);
+  EXPECT_EQ(scene->point_targets[0].position_m.z, 3);
+  EXPECT_TRUE(scene->sea_surface.present);
+  EXPECT_EQ(scene->sea_surface.lambert_db, -35);
+  EXPECT_EQ(scene->objects.back().name, "sea surface");
+  EXPECT_EQ(scene->materials[scene->objects.back().mesh->material[0]].reflection, -1);
+}
+
+TEST(LoadScene, MaterialsComeFromTheLibraryAndTheScene) {
+  const auto scene = parsed(R"(
+materials:
+  sand: {lambert_db: -20, roughness_m: 0.002, reflection: 0.4, texture_seed: 9}
+  silt: {like: sand, lambert_db: -29}
+objects:
+  - {type: sphere, radius_m: 1, material: silt}
+  - {type: sphere, radius_m: 1, material: concrete}
+  - {type: sphere, radius_m: 2, material: silt}
+)");
+  ASSERT_EQ(scene->materials.size(), 2u);  // only what is used
+  EXPECT_EQ(scene->materials[0].name, "silt");
+  EXPECT_FLOAT_EQ(scene->materials[0].lambert_db, -29);
+  EXPECT_FLOAT_EQ(scene->materials[0].roughness_m, 0.002f);
+  EXPECT_EQ(scene->materials[0].texture_seed, 9u);
+  EXPECT_EQ(scene->materials[1].name, "concrete");
+  EXPECT_EQ(scene->objects[2].mesh->material[0], 0);
+}
+
+TEST(LoadScene, TheLibraryHasTheNamesWePromise) {
+  for (const char* name :
+       {"mud", "sand", "gravel", "rock", "concrete", "steel", "aluminium", "wood", "rubber", "plastic", "glass", "ice"}) {
+    EXPECT_EQ(refusal(object(std::string("type: sphere, radius_m: 1, material: ") + name)), "accepted") << name;
+  }
+}
+
+TEST(LoadScene, InstancesShareOneMesh) {
+  const auto scene =
+      parsed(object("name: pile, type: cylinder, radius_m: 1, length_m: 1, material: wood, "
+                    "instances: [{xyz_m: [1, 0, 0]}, {xyz_m: [2, 0, 0], rpy_deg: [0, 0, 90]}]"));
+  ASSERT_EQ(scene->objects.size(), 2u);
+  EXPECT_EQ(scene->objects[0].mesh, scene->objects[1].mesh);
+  EXPECT_EQ(scene->objects[1].name, "pile[1]");
+  EXPECT_NEAR(rpy_from_quat(scene->objects[1].in_world.orientation).yaw_rad, pi / 2, 1e-12);
+}
+
+TEST(LoadScene, MovingBodiesKeepTheirOrderAndCarryOthers) {
+  const auto scene = parsed(R"(
+objects:
+  - {name: ground, type: plane, size_m: [9, 9], material: sand}
+  - {name: diver, type: capsule, radius_m: 0.2, length_m: 1, material: rubber, moving: true, pose: {xyz_m: [5, 0, -2], rpy_deg: [0, 0, 90]}}
+  - {name: echo, type: point, target_strength_db: -10, moving: true, pose: {xyz_m: [7, 7, 7]}}
+  - {name: tank, type: cylinder, radius_m: 0.1, length_m: 0.6, material: steel, attached_to: diver, pose: {xyz_m: [1, 0, 0]}}
+  - {name: lamp, type: point, target_strength_db: -30, attached_to: diver, pose: {xyz_m: [0, 0, 0.5]}}
+)");
+  EXPECT_EQ(scene->body_names, (std::vector<std::string>{"diver", "echo"}));
+  ASSERT_EQ(scene->bodies_in_world.size(), 2u);
+  EXPECT_EQ(scene->bodies_in_world[1].position_m.x, 7);
+  EXPECT_EQ(scene->objects[0].body, -1);
+  EXPECT_EQ(scene->objects[1].body, 0);
+  EXPECT_EQ(scene->objects[2].body, 0);
+  EXPECT_NEAR(length(scene->objects[1].in_world.position_m - Vec3d{5, 0, -2}), 0, 1e-12);
+  EXPECT_NEAR(length(scene->objects[2].in_world.position_m - Vec3d{5, 1, -2}), 0, 1e-12);  // turned with the diver
+  EXPECT_EQ(scene->point_targets[0].body, 1);
+  EXPECT_EQ(length(scene->point_targets[0].position_m), 0);
+  EXPECT_EQ(scene->point_targets[1].body, 0);
+  EXPECT_EQ(scene->point_targets[1].position_m.z, 0.5);
+}
+
+TEST(LoadScene, MeshFilesMaterialsByNameAndSharing) {
+  TemporaryFiles files;
+  files.write("m.mtl", "newmtl hull\nnewmtl deck\n");
+  files.write("m.obj",
+              "mtllib m.mtl\nv 0 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 3\nusemtl hull\nf 1 3 2\nf 1 2 4\nusemtl deck\nf 1 4 3\nf 2 3 4\n");
+  const auto scene = parsed(R"(
+objects:
+  - {type: mesh, file: m.obj, materials: {hull: steel, deck: wood}, pose: {xyz_m: [100, 0, 0]}}
+  - {type: mesh, file: m.obj, materials: {hull: steel}, material: wood}
+  - {type: mesh, file: m.obj, material: ice}
+)",
+                            files.folder());
+  EXPECT_EQ(scene->objects[0].mesh, scene->objects[1].mesh);
+  EXPECT_NE(scene->objects[0].mesh, scene->objects[2].mesh);
+  std::map<std::string, int> count;
+  for (const std::uint16_t m : scene->objects[0].mesh->material) ++count[scene->materials[m].name];
+  EXPECT_EQ(count["steel"], 2);
+  EXPECT_EQ(count["wood"], 2);
+  EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 101, 1e-9);  // the file's zero stays at the pose
+  EXPECT_THAT(refusal(object("type: mesh, file: m.obj"), files.folder()),
+              StartsWith("s.yaml:2:5: objects[0].material: needed, because the mesh's material \""));
+  EXPECT_THAT(refusal(object("type: mesh, file: m.obj, material: ice, materials: {hul: steel}"), files.folder()),
+              HasSubstr("objects[0].materials.hul: the mesh has no material of this name; did you mean \"hull\"?"));
+  EXPECT_THAT(refusal(object("type: mesh, file: none.obj, material: ice"), files.folder()),
+              StartsWith("s.yaml:2:24: objects[0].file: no mesh file at "));
+}
+
+TEST(LoadScene, HeightmapsStandInTheirOwnCoordinates) {
+  TemporaryFiles files;
+  files.write("g.asc", "ncols 3\nnrows 2\nxllcorner 1000\nyllcorner 2000\ncellsize 2\n1 2 3\n4 5 6\n");
+  const auto scene = parsed(R"(
+objects:
+  - {type: heightmap, file: g.asc, material: sand, pose: {xyz_m: [0, 0, -20]}}
+  - {type: heightmap, file: g.asc, material: sand, centred: true, pose: {xyz_m: [0, 0, -20]}}
+)",
+                            files.folder());
+  EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 1003, 1e-9);
+  EXPECT_NEAR(scene->objects[0].in_world.position_m.z, -16.5, 1e-9);
+  EXPECT_NEAR(scene->objects[1].in_world.position_m.x, 0, 1e-9);
+  EXPECT_THAT(refusal(object("type: heightmap, file: g.txt, material: sand"), files.folder()),
+              HasSubstr("unknown height format"));
+}
+
+TEST(LoadScene, MaterialLibrariesOfOnesOwn) {
+  TemporaryFiles files;
+  files.write("lib.yaml", "kelp: {lambert_db: -40}\n");
+  const std::string text = "material_library: lib.yaml\n" + object("type: sphere, radius_m: 1, material: kelp");
+  EXPECT_EQ(parsed(text, files.folder())->materials[0].name, "kelp");
+  files.write("lib.yaml", "kelp: {lambert: -40}\n");
+  EXPECT_THAT(refusal(text, files.folder()), HasSubstr("lib.yaml:1:8: kelp.lambert: unknown key; did you mean \"lambert_db\"?"));
+}
+
+TEST(LoadScene, ErrorsNameTheirPlaceAndTheNearestName) {
+  EXPECT_EQ(refusal("name: x\n"), "s.yaml:1:1: objects: required key is missing");
+  EXPECT_EQ(refusal("objcts: []\n"), "s.yaml:1:1: objcts: unknown key; did you mean \"objects\"?");
+  EXPECT_EQ(refusal(object("type: sphre, material: sand")),
+            "s.yaml:2:12: objects[0].type: unknown value \"sphre\"; did you mean \"sphere\"?");
+  EXPECT_EQ(refusal(object("type: sphere, material: snad, radius_m: 1")),
+            "s.yaml:2:30: objects[0].material: unknown material \"snad\"; did you mean \"sand\"?");
+  EXPECT_EQ(refusal(object("type: sphere, material: sand, radius: 1")),
+            "s.yaml:2:36: objects[0].radius: unknown key; did you mean \"radius_m\"?");
+  EXPECT_EQ(refusal(object("type: sphere, material: sand, radius_m: -1")),
+            "s.yaml:2:46: objects[0].radius_m: must be between 0.0001 and 100000, found -1");
+  EXPECT_EQ(refusal(object("type: sphere, radius_m: 1")), "s.yaml:2:5: objects[0].material: required key is missing");
+  EXPECT_EQ(refusal(object("typ: sphere, radius_m: 1")), "s.yaml:2:6: objects[0].typ: unknown key; did you mean \"type\"?");
+  EXPECT_THAT(refusal(object("type: box, material: sand, size_m: [1, 1]")), HasSubstr("size_m: must be a list of 3 numbers"));
+  EXPECT_THAT(refusal(object("type: torus, material: sand, radius_m: 1, tube_radius_m: 1")),
+              HasSubstr("must be smaller than radius_m"));
+  EXPECT_THAT(refusal(object("type: point, target_strength_db: 0, moving: true, attached_to: x")), HasSubstr("not both"));
+  EXPECT_THAT(refusal(object("type: point, target_strength_db: 0, attached_to: x")),
+              HasSubstr("no moving object \"x\" above this one"));
+  EXPECT_THAT(refusal(object("type: sphere, radius_m: 1, material: sand, pose: {}, instances: [{}]")),
+              HasSubstr("give pose or instances"));
+  EXPECT_THAT(refusal(object("type: sphere, radius_m: 1, material: sand, moving: true, instances: [{}]")),
+              HasSubstr("has one pose"));
+  EXPECT_THAT(
+      refusal("objects:\n  - {name: a, type: point, target_strength_db: 0}\n  - {name: a, type: point, target_strength_db: 0}\n"),
+      HasSubstr("s.yaml:3:12: objects[1].name: name used twice"));
+  EXPECT_THAT(refusal("materials: {a: {like: snd}}\nobjects: []"),
+              HasSubstr("materials.a.like: unknown material \"snd\"; did you mean \"sand\"?"));
+  EXPECT_THAT(refusal("materials: {a: {lambert_db: -4}}\nobjects: []"), HasSubstr("must be between -80 and -4.97, found -4"));
+  EXPECT_THAT(refusal(object("type: seabed, material: sand, size_m: [90000, 90000], spacing_m: 0.01, fine_size_m: [9000, 9000]")),
+              HasSubstr("makes more than 20 million triangles"));
+  const auto error = parse_scene("objects: 1", "s.yaml", ".");
+  EXPECT_EQ(error.error().kind, ErrorKind::bad_data);
+  EXPECT_EQ(load_scene("no/scene.yaml").error().kind, ErrorKind::missing_file);
+}
+
+TEST(LoadScene, TheTriangleCapCountsInstances) {
+  std::string text = "objects:\n  - {type: torus, material: sand, radius_m: 90, tube_radius_m: 80, segments: 2048, instances: [";
+  for (int i = 0; i < 20; ++i) text += i ? ", {}" : "{}";
+  EXPECT_THAT(refusal(text + "]}\n"), HasSubstr("the scene has more than 20 million triangles here"));
+}
+
+TEST(LoadScene, AnEmptyListIsAnEmptyScene) { EXPECT_EQ(parsed("objects: []")->objects.size(), 0u); }
+
+TEST(LoadScene, MutationsEndInASceneOrASentence) {
+  const std::string good = R"(name: m
+materials: {a: {like: sand, lambert_db: -20}}
+objects:
+  - {name: b, type: box, material: a, size_m: [1, 2, 3], patch_m: 1, pose: {xyz_m: [1, 2, 3], rpy_deg: [1, 2, 3]}}
+  - {type: sphere, radius_m: 0.3, material: steel, moving: true}
+  - {type: cone, radius_m: 0.3, length_m: 1, segments: 12, material: steel, instances: [{xyz_m: [1, 1, 1]}]}
+  - {type: seabed, material: mud, size_m: [4, 4], spacing_m: 1, octaves: 2, ripples: {wavelength_m: 2, height_m: 0.1}}
+  - {type: point, target_strength_db: -3}
+sea_surface: {size_m: [9, 9]}
+)";
+  ASSERT_EQ(refusal(good), "accepted");
+  constexpr std::string_view alphabet = "0123456789-.eE[]{}:, \nabm_~'\"";
+  const auto check = [](const std::string& text) {
+    const auto scene = parse_scene(text, "s.yaml", ".");
+    if (!scene) {
+      EXPECT_THAT(scene.error().text, StartsWith("s.yaml:"));
+      return;
+    }
+    for (const Object& o : (*scene)->objects) testing::expect_sound(*o.mesh);
+  };
+  for (std::size_t n = 0; n < good.size(); n += 5) check(good.substr(0, n));
+  for (std::uint32_t i = 0; i < 1200; ++i) {
+    const Random4 r = philox(i, 0, 0, 0, 5, 6);
+    std::string bad = good;
+    bad[r.v[0] % bad.size()] = alphabet[r.v[1] % alphabet.size()];
+    if (r.v[2] & 1) bad.erase(r.v[2] % bad.size(), 1);
+    check(bad);
+  }
+}
+
+}  // namespace
+}  // namespace sonar

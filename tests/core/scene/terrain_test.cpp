@@ -1,0 +1,198 @@
+// Ground: made from a seed, read from ESRI grids and PNG images; far coordinates, holes, and files that are wrong.
+#include "core/scene/terrain.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "core/scene/noise.hpp"
+#include "mesh_checks.hpp"
+#include "temporary_files.hpp"
+
+namespace sonar {
+namespace {
+
+using testing::expect_sound;
+using ::testing::HasSubstr;
+using testing::TemporaryFiles;
+
+TEST(Noise, IsSmoothBoundedAndDrawnFromItsSeed) {
+  double sum = 0, most = 0, step = 0;
+  const GradientField field(50, 50, 2, 9, 1), again(80, 30, 2, 9, 1), other(50, 50, 2, 10, 1);
+  int differs = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const double x = -45 + 0.0225 * i, y = 20 * std::sin(i);
+    const double v = field(x, y);
+    EXPECT_NEAR(v, again(x, y), 1e-9);  // whatever the rectangle
+    differs += std::abs(v - other(x, y)) > 1e-3;
+    sum += v * v;
+    most = std::max(most, std::abs(v));
+    step = std::max(step, std::abs(field(x + 1e-4, y) - v));
+    EXPECT_LE(std::abs(value_noise({x, y, 0.3 * x}, 3, 0)), 1);
+  }
+  EXPECT_GT(differs, 3500);
+  EXPECT_LE(most, 1.01);
+  EXPECT_NEAR(std::sqrt(sum / 4000), 0.35, 0.1);
+  EXPECT_LT(step, 1e-3);
+}
+
+TEST(Seabed, HasTheSizeSpacingAndReliefAskedFor) {
+  SeabedShape shape{.size_x_m = 30, .size_y_m = 20, .fine_x_m = 30, .fine_y_m = 20, .spacing_x_m = 0.25, .spacing_y_m = 0.5};
+  shape.relief_m = 0.2;
+  const HeightGrid grid = make_seabed(shape);
+  EXPECT_EQ(grid.x_m.size(), 121u);
+  EXPECT_EQ(grid.y_m.size(), 41u);
+  EXPECT_DOUBLE_EQ(grid.x_m.front(), -15);
+  EXPECT_DOUBLE_EQ(grid.x_m.back(), 15);
+  const auto [low, high] = std::minmax_element(grid.z_m.begin(), grid.z_m.end());
+  EXPECT_GT(*high - *low, 0.2f);
+  EXPECT_LT(*high - *low, 0.8f);
+  EXPECT_EQ(make_seabed(shape).z_m, grid.z_m);
+  shape.seed = 2;
+  EXPECT_NE(make_seabed(shape).z_m, grid.z_m);
+  auto mesh = mesh_from_grid(grid);
+  ASSERT_TRUE(mesh);
+  expect_sound(mesh->mesh);
+  EXPECT_EQ(mesh->mesh.triangles.size(), 2u * 120 * 40);
+}
+
+TEST(Seabed, RipplesHaveTheirWavelengthAndHeight) {
+  SeabedShape shape{.size_x_m = 20, .size_y_m = 4, .fine_x_m = 20, .fine_y_m = 4, .spacing_x_m = 0.02, .spacing_y_m = 1};
+  shape.relief_m = 0;
+  shape.ripples = {.wavelength_m = 0.5, .height_m = 0.06, .direction_rad = 0, .bend = 0};
+  const HeightGrid grid = make_seabed(shape);
+  const std::size_t n = grid.x_m.size();
+  int crossings = 0;
+  float low = 1, high = -1;
+  for (std::size_t i = 0; i + 1 < n; ++i) {
+    crossings += (grid.z_m[2 * n + i] < 0) != (grid.z_m[2 * n + i + 1] < 0);
+    low = std::min(low, grid.z_m[i]), high = std::max(high, grid.z_m[i]);
+  }
+  EXPECT_NEAR(crossings, 2 * 20 / 0.5, 2);
+  EXPECT_GT(high - low, 0.035f);
+  EXPECT_LT(high - low, 0.0605f);
+}
+
+TEST(Seabed, WidensOutsideItsFinePartAndKeepsItsEstimate) {
+  const SeabedShape shape{.size_x_m = 60, .size_y_m = 60, .fine_x_m = 10, .fine_y_m = 10, .spacing_x_m = 0.1, .spacing_y_m = 0.1};
+  const HeightGrid grid = make_seabed(shape);
+  EXPECT_DOUBLE_EQ(grid.x_m.back(), 30);
+  double widest = 0;
+  for (std::size_t i = 1; i < grid.x_m.size(); ++i) {
+    const double step = grid.x_m[i] - grid.x_m[i - 1];
+    EXPECT_GT(step, 0.05);
+    widest = std::max(widest, step);
+  }
+  EXPECT_GT(widest, 0.9);
+  EXPECT_LT(widest, 1.6);
+  EXPECT_EQ(seabed_triangles(shape), 2 * (grid.x_m.size() - 1) * (grid.y_m.size() - 1));
+}
+
+const char* const small_grid =
+    "ncols 3\nnrows 3\nxllcorner 500000\nyllcorner 5200000.5\ncellsize 2\nNODATA_value -9999\n"
+    "1 2 3\n4 5 6\n7 8 -9999\n";
+
+TEST(EsriGrid, KeepsFarCoordinatesInTheCentre) {
+  TemporaryFiles files;
+  const auto grid = read_esri_heights(files.write("g.asc", small_grid), 1);
+  ASSERT_TRUE(grid) << grid.error().text;
+  auto mesh = mesh_from_grid(*grid);
+  ASSERT_TRUE(mesh);
+  expect_sound(mesh->mesh);
+  EXPECT_DOUBLE_EQ(mesh->centre_m.x, 500003);
+  EXPECT_DOUBLE_EQ(mesh->centre_m.y, 5200003.5);
+  EXPECT_EQ(mesh->mesh.vertices.size(), 8u);
+  EXPECT_EQ(mesh->mesh.triangles.size(), 6u);  // the corner without data costs its quad
+  // First row of the file is north: the height at the north-west is 1.
+  EXPECT_FLOAT_EQ(grid->z_m[6], 1);
+  EXPECT_TRUE(std::isnan(grid->z_m[2]));
+  EXPECT_FLOAT_EQ(read_esri_heights(files.write("g.asc", small_grid), -1)->z_m[6], -1);
+}
+
+TEST(EsriGrid, WrongFilesAreRefusedWithTheirLine) {
+  TemporaryFiles files;
+  const auto refusal = [&](const std::string& text) {
+    const auto grid = read_esri_heights(files.write("bad.asc", text), 1);
+    return grid ? std::string("accepted") : grid.error().text;
+  };
+  EXPECT_THAT(refusal(""), HasSubstr("ncols is missing in the header"));
+  EXPECT_THAT(refusal("ncols 3\nnrows x\n"), HasSubstr("line 2: nrows needs a number"));
+  EXPECT_THAT(refusal("hello 3\n"), HasSubstr("\"hello\" is not a header word"));
+  EXPECT_THAT(refusal("ncols 1\nnrows 2\ncellsize 1\n1 2"), HasSubstr("whole numbers from 2"));
+  EXPECT_THAT(refusal("ncols 1e9\nnrows 1e9\ncellsize 1\n"), HasSubstr("at most 10 million"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 0\n1 2 3 4"), HasSubstr("cellsize must be"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2 3"), HasSubstr("ends after 3 of 4 heights"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2 3 4 5"), HasSubstr("more heights than"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 nan"), HasSubstr("line 5: \"nan\" is not a height"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 1e9"), HasSubstr("beyond 1e7 m"));
+  const auto missing = read_esri_heights("no/grid.asc", 1);
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().kind, ErrorKind::missing_file);
+  const auto empty = read_esri_heights(files.write("e.asc", "ncols 2\nnrows 2\ncellsize 1\nNODATA_value 0\n0 0 0 0"), 1);
+  ASSERT_TRUE(empty);
+  EXPECT_THAT(mesh_from_grid(*empty).error().text, HasSubstr("no cell of the grid has a height"));
+  for (std::size_t n = 0; n < std::string(small_grid).size(); ++n) refusal(std::string(small_grid).substr(0, n));
+}
+
+// A grey image written with libpng's simple interface.
+std::filesystem::path write_png(const TemporaryFiles& files, unsigned width, unsigned height, unsigned format,
+                                const void* pixels) {
+  const auto file = files.path("h.png");
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = width;
+  image.height = height;
+  image.format = format;
+  EXPECT_TRUE(png_image_write_to_file(&image, file.c_str(), 0, pixels, 0, nullptr));
+  return file;
+}
+
+TEST(PngHeights, SixteenBitsKeepTheirSteps) {
+  TemporaryFiles files;
+  const std::uint16_t pixels[6] = {0, 1, 65535, 256, 512, 32768};
+  const auto grid = read_png_heights(write_png(files, 3, 2, PNG_FORMAT_LINEAR_Y, pixels), 20, 10, -6.5535, 0);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_DOUBLE_EQ(grid->x_m.front(), -10);
+  EXPECT_DOUBLE_EQ(grid->y_m.back(), 5);
+  EXPECT_NEAR(grid->z_m[3], -6.5535, 1e-6);  // first row of the image is the last row of the grid
+  EXPECT_NEAR(grid->z_m[4], -6.5534, 1e-6);
+  EXPECT_NEAR(grid->z_m[5], 0, 1e-6);
+  EXPECT_NEAR(grid->z_m[0], -6.5535 + 0.0256, 1e-6);
+}
+
+TEST(PngHeights, WrongFilesAreRefused) {
+  TemporaryFiles files;
+  const std::uint8_t colour[12] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+  const auto refusal = [&](const std::filesystem::path& file) {
+    const auto grid = read_png_heights(file, 1, 1, 0, 1);
+    return grid ? std::string("accepted") : grid.error().text;
+  };
+  EXPECT_THAT(refusal(write_png(files, 2, 2, PNG_FORMAT_RGB, colour)), HasSubstr("not a grey image"));
+  EXPECT_THAT(refusal(write_png(files, 1, 2, PNG_FORMAT_GRAY, colour)), HasSubstr("smaller than 2 x 2"));
+  EXPECT_THAT(refusal(files.write("no.png", "not a picture")), HasSubstr("not usable as heights"));
+  EXPECT_THAT(refusal("no/such.png"), HasSubstr("cannot be opened"));
+  const auto good = write_png(files, 3, 2, PNG_FORMAT_GRAY, colour);
+  EXPECT_EQ(refusal(good), "accepted");
+  const std::string bytes = files.read(good);
+  for (std::size_t n = 0; n + 12 < bytes.size(); ++n) {  // without its last chunk alone, the picture is whole
+    EXPECT_THAT(refusal(files.write("cut.png", bytes.substr(0, n))), HasSubstr("not usable as heights")) << n;
+  }
+  for (std::size_t n = 0; n < bytes.size(); ++n) {
+    std::string bent = bytes;
+    bent[n] = static_cast<char>(bent[n] ^ 0x55);
+    refusal(files.write("bent.png", bent));
+  }
+}
+
+TEST(HeightGrid, TooManyTrianglesAreRefused) {
+  HeightGrid grid;
+  grid.x_m.resize(5000);
+  grid.y_m.resize(5000);
+  EXPECT_THAT(mesh_from_grid(grid).error().text, HasSubstr("more than 20 million triangles"));
+}
+
+}  // namespace
+}  // namespace sonar
