@@ -211,6 +211,17 @@ TEST(LoadScene, TheTriangleCapCountsInstances) {
   EXPECT_THAT(refusal(text + "]}\n"), HasSubstr("the scene has more than 20 million triangles here"));
 }
 
+TEST(LoadScene, TheExampleOfTheDocumentationLoads) {
+  const std::string page = TemporaryFiles::read(std::filesystem::path(SONARD_SOURCE_DIR) / "docs" / "scenes.md");
+  const std::size_t from = page.find("```yaml\n") + 8, to = page.find("```", from);
+  ASSERT_LT(to, page.size());
+  TemporaryFiles files;
+  files.write("ours.yaml", "weed: {lambert_db: -35}\n");
+  const auto scene = parsed(page.substr(from, to - from), files.folder());
+  EXPECT_EQ(scene->body_names, std::vector<std::string>{"diver"});
+  EXPECT_EQ(scene->objects.size(), 6u);
+}
+
 TEST(LoadScene, AnEmptyListIsAnEmptyScene) { EXPECT_EQ(parsed("objects: []")->objects.size(), 0u); }
 
 TEST(LoadScene, MutationsEndInASceneOrASentence) {

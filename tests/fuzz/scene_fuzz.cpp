@@ -1,0 +1,16 @@
+// Scene files by fuzzing: whatever the text, the answer is a scene or a sentence that starts with the file's name.
+// Short texts, with no files beside them.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+#include "core/scene/load_scene.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size > 4096) return 0;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  const auto scene = sonar::parse_scene(text, "s.yaml", "no-such-folder");
+  if (!scene && !scene.error().text.starts_with("s.yaml:")) std::abort();
+  return 0;
+}
