@@ -174,6 +174,35 @@ TEST(Control, ARefusedRequestKeepsItsId) {
   EXPECT_EQ(decode_request(text("\xff\xff")).error().id, 0u);
 }
 
+TEST(Control, TruncationsAndFlippedBytesAreReadOrRefusedNeverFatal) {
+  PoseSample s;
+  s.name = "rov";
+  s.seq = 3;
+  s.stamp = {ClockDomain::sim, 123456789};
+  s.velocity_mps = Vec3d{1, 2, 3};
+  for (const Bytes& whole : {encode_pose_datagram(s), encode_request({5, s}), encode_request({6, Hello{}})}) {
+    const auto try_both = [](const Bytes& bytes) {
+      const auto pose = decode_pose_datagram(bytes);
+      if (pose) {
+        EXPECT_TRUE(is_finite(pose->pose.position_m));
+        EXPECT_NEAR(norm_squared(pose->pose.orientation), 1, 1e-9);
+      }
+      const auto request = decode_request(bytes);
+      if (!request) {
+        EXPECT_FALSE(request.error().why.empty());
+      }
+    };
+    for (std::size_t n = 0; n < whole.size(); ++n) try_both(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)));
+    for (std::size_t at = 0; at < whole.size(); ++at) {
+      for (int bit = 0; bit < 8; ++bit) {
+        Bytes flipped = whole;
+        flipped[at] ^= static_cast<std::byte>(1 << bit);
+        try_both(flipped);
+      }
+    }
+  }
+}
+
 TEST(Delimited, EverySplitGivesTheSameMessages) {
   Bytes stream;
   const std::vector<std::size_t> sizes = {0, 1, 127, 128, 300};

@@ -1,0 +1,113 @@
+// A Device's clients: who is let in, who waits, who is turned away, and what changes when one comes or goes.
+#include <array>
+
+#include "daemon/device.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr auto accept_pause = std::chrono::milliseconds(100);  // after running out of file descriptors
+constexpr std::size_t longest_queue = 16;
+constexpr int most_turned_away_at_once = 16;
+
+}  // namespace
+
+asio::awaitable<void> Device::accept() {
+  while (!stopping_) {
+    error_code ec;
+    tcp::socket socket = co_await acceptor_.async_accept(into(ec));
+    if (stopping_) co_return;
+    if (ec) {
+      asio::steady_timer pause(context_.io, accept_pause);
+      co_await pause.async_wait(into(ec));
+      continue;
+    }
+    admit(std::move(socket));
+  }
+}
+
+void Device::admit(tcp::socket socket) {
+  if (sessions_.size() < static_cast<std::size_t>(config_.max_clients)) return welcome(std::move(socket));
+  if (config_.when_full == WhenClientsFull::take_over) {
+    const SessionPointer oldest = sessions_.front();
+    sessions_.pop_front();
+    leaving_.push_back(oldest);
+    oldest->finish("another client took over");
+    if (sessions_.empty()) use_initial_settings();
+    return welcome(std::move(socket));
+  }
+  if (config_.when_full == WhenClientsFull::queue && queue_.size() < longest_queue) {
+    context_.log.info("client waits for a place", {{"sonar", config_.name}, {"waiting", queue_.size() + 1}});
+    queue_.push_back(std::move(socket));
+    return;
+  }
+  ++figures_.refused_clients;
+  context_.log.info("client turned away: " + std::to_string(config_.max_clients) + " already connected",
+                    {{"sonar", config_.name}});
+  asio::co_spawn(
+      context_.io, [this, s = std::move(socket)]() mutable { return turn_away(std::move(s)); }, asio::detached);
+}
+
+/// FIN and no byte. What the client has sent meanwhile is read away, or the kernel would answer it with RST.
+asio::awaitable<void> Device::turn_away(tcp::socket socket) {
+  if (turning_away_ >= most_turned_away_at_once || stopping_) co_return;
+  ++turning_away_;
+  error_code ec;
+  socket.shutdown(tcp::socket::shutdown_send, ec);
+  asio::steady_timer deadline(context_.io, std::chrono::seconds(1));
+  deadline.async_wait([&socket](const error_code& e) {
+    if (!e) socket.cancel();
+  });
+  std::array<std::byte, 1024> dustbin;
+  for (int reads = 0; !ec && reads < 64; ++reads) co_await socket.async_read_some(asio::buffer(dustbin), into(ec));
+  deadline.cancel();
+  // The handler above must be done with `socket` before this frame goes.
+  co_await asio::post(context_.io, asio::use_awaitable);
+  --turning_away_;
+  context_.on_change();
+}
+
+void Device::welcome(tcp::socket socket) {
+  const Time now = context_.clock.now();
+  Session::Setup setup{config_.outbox, context_.digest, ++figures_.clients, context_.stall_limit};
+  update_state(now);
+  auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket), vendor_.converse(state_, now), setup);
+  context_.log.info("client connected", {{"sonar", config_.name}, {"client", session->client()}});
+  sessions_.push_back(session);
+  session->start();
+  on_membership();
+}
+
+void Device::on_membership() {
+  state_.connected_client = sessions_.empty() ? protocol::Ipv4{} : sessions_.front()->client_ip();
+  const Time now = context_.clock.now();
+  if (sessions_.empty()) use_initial_settings();
+  if (wants_pings())
+    pacer_.configure(settings_, now);
+  else
+    pacer_.stop();
+  arm();
+  context_.on_change();
+}
+
+void Device::on_over(Session& session, const std::string& why) {
+  context_.log.info("client gone: " + why, {{"sonar", config_.name},
+                                            {"client", session.client()},
+                                            {"pings", session.outbox().pings_written()},
+                                            {"dropped", session.outbox().pings_dropped()}});
+  figures_.dropped += session.outbox().pings_dropped();
+  if (context_.digest) digests_.push_back({session.number(), session.digest().size(), session.digest().hex()});
+  const auto is_it = [&session](const SessionPointer& s) { return s.get() == &session; };
+  leaving_.remove_if(is_it);
+  if (sessions_.remove_if(is_it) == 0) return context_.on_change();
+  if (!stopping_ && !queue_.empty()) {
+    tcp::socket next = std::move(queue_.front());
+    queue_.pop_front();
+    if (sessions_.empty()) use_initial_settings();
+    welcome(std::move(next));
+  } else {
+    on_membership();
+  }
+}
+
+}  // namespace sonar
