@@ -19,6 +19,9 @@ struct SurfaceCells::Node {
   bool divided = false;
   bool built = false;
   CellTile tile;
+  std::uint64_t last_visited = 0;
+
+  std::size_t own_bytes() const { return sizeof(Node) + triangles.capacity() * sizeof(std::uint32_t) + tile.bytes(); }
 };
 
 /// The triangles of one object that share material, dominant axis and side of the normal: one lattice.
@@ -31,7 +34,10 @@ class SurfaceCells::Sheet {
   std::vector<std::unique_ptr<Node>> roots;
 
   void plant(const std::vector<std::uint32_t>& triangles);
-  void divide(Node& node) const;
+  /// Returns the bytes that the new cubes take.
+  std::size_t divide(Node& node) const;
+  /// Forgets all cubes below `node` that were last visited before `then`; returns the bytes that frees.
+  static std::size_t forget_below(Node& node, std::uint64_t then);
 };
 
 namespace {
@@ -94,7 +100,7 @@ void SurfaceCells::Sheet::plant(const std::vector<std::uint32_t>& triangles) {
   for (auto& [where, node] : planted) roots.push_back(std::move(node));
 }
 
-void SurfaceCells::Sheet::divide(Node& node) const {
+std::size_t SurfaceCells::Sheet::divide(Node& node) const {
   node.divided = true;
   std::array<TileAddress, 8> inside;
   for (int c = 0; c < 8; ++c) {
@@ -115,6 +121,28 @@ void SurfaceCells::Sheet::divide(Node& node) const {
       node.children[c]->triangles.push_back(t);
     }
   }
+  std::size_t bytes = 0;
+  for (const auto& child : node.children)
+    if (child) bytes += child->own_bytes();
+  return bytes;
+}
+
+std::size_t SurfaceCells::Sheet::forget_below(Node& node, std::uint64_t then) {
+  std::size_t freed = 0;
+  bool stale = node.divided;
+  for (const auto& child : node.children) {
+    if (!child) continue;
+    freed += forget_below(*child, then);
+    stale = stale && child->last_visited < then;
+  }
+  if (!stale) return freed;  // cubes come and go eight at a time, so that `divided` stays true or false
+  for (auto& child : node.children) {
+    if (!child) continue;
+    freed += child->own_bytes();
+    child.reset();
+  }
+  node.divided = false;
+  return freed;
 }
 
 SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes)
@@ -157,6 +185,7 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
   if (std::abs(p.z) * fan_cosine_ - p.x * fan_sine_ > radius) return;
   if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
 
+  node.last_visited = now_;
   const double nearest = range - radius, farthest = range + radius;
   bool finer = node.address.level < view.levels.front().level;
   for (const CellLevel& level : view.levels) {
@@ -170,7 +199,7 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
     }
   }
   if (!finer) return;
-  if (!node.divided) sheet.divide(node);
+  if (!node.divided) cached_bytes_ += sheet.divide(node);
   for (auto& child : node.children)
     if (child) visit(sheet, *child, view, sonar_in_object, turn);
 }
@@ -208,29 +237,26 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
     node.built = true;
   });
   built_ = missing.size();
-  for (Node* node : missing) {
-    cached_bytes_ += node->tile.bytes();
-    built_nodes_.push_back(node);
-  }
-  for (Node* node : wanted_) node->tile.last_used = now_;
+  for (const Node* node : missing) cached_bytes_ += node->tile.bytes();
   keep_within_budget();
 
   std::erase_if(in_view_, [](const TileInView& t) { return t.tile->count == 0; });
   return in_view_;
 }
 
-/// Forgets the tiles that were not looked at for longest; they come back identical when wanted again.
+/// Forgets what was not looked at for longest; it comes back identical when wanted again.
 void SurfaceCells::keep_within_budget() {
-  if (cached_bytes_ <= cache_bytes_) return;
-  std::sort(built_nodes_.begin(), built_nodes_.end(),
-            [](const Node* a, const Node* b) { return a->tile.last_used > b->tile.last_used; });
-  while (!built_nodes_.empty() && cached_bytes_ > cache_bytes_ / 4 * 3) {
-    Node* oldest = built_nodes_.back();
-    if (oldest->tile.last_used == now_) break;
-    cached_bytes_ -= oldest->tile.bytes();
-    oldest->tile = CellTile{};
-    oldest->built = false;
-    built_nodes_.pop_back();
+  for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {
+    if (age >= now_) continue;
+    for (auto& sheet : sheets_)
+      for (auto& root : sheet->roots) {
+        cached_bytes_ -= Sheet::forget_below(*root, now_ - age + 1);
+        if (root->built && root->last_visited <= now_ - age) {
+          cached_bytes_ -= root->tile.bytes();
+          root->tile = CellTile{};
+          root->built = false;
+        }
+      }
   }
 }
 

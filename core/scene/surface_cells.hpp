@@ -27,7 +27,6 @@ struct CellTile {
   int count = 0;          // padded to a multiple of CellTile::block
   int stride = 0;         // int16 values per column
   std::unique_ptr<std::int16_t[]> data;
-  std::uint64_t last_used = 0;
 
   static constexpr int block = 16;
   static constexpr float normal_unit = 1.0f / 32767.0f;
@@ -74,6 +73,7 @@ class SurfaceCells {
   const std::vector<TileInView>& in_view(const CellView& view, Parallel& pool);
   /// Rotation from object to sonar axes of the last view, per object.
   const Rotation& sonar_from_object(int object) const { return rotations_[static_cast<std::size_t>(object)]; }
+  /// Of the tiles and of the tree that leads to them.
   std::size_t cached_bytes() const { return cached_bytes_; }
   std::size_t built_last_time() const { return built_; }
 
@@ -92,7 +92,6 @@ class SurfaceCells {
   std::vector<Rotation> rotations_;
   std::vector<TileInView> in_view_;
   std::vector<Node*> wanted_;  // the nodes of in_view_
-  std::vector<Node*> built_nodes_;
 };
 
 }  // namespace sonar

@@ -195,6 +195,26 @@ TEST(SurfaceCells, SameBytesForAnyPoolAndAfterBeingForgotten) {
   EXPECT_EQ(b.built_last_time(), 0u);
 }
 
+TEST(SurfaceCells, ALongJourneyStaysWithinItsBudget) {
+  const std::size_t budget = 4u << 20;
+  SurfaceCells cells(scene_of(terrain(200, 100.0, gentle)), Seed{5}, budget),
+      fresh(scene_of(terrain(200, 100.0, gentle)), Seed{5}, 1u << 30);
+  Parallel pool(1);
+  CellView view = whole_scene(5, {0, 50, 1});
+  view.max_range_m = 4;
+  std::size_t most = 0, everything = 0;
+  for (int step = 0; step < 95; ++step) {
+    view.sonar_in_world.position_m.x = step;
+    cells.in_view(view, pool);
+    fresh.in_view(view, pool);
+    most = std::max(most, cells.cached_bytes());
+    everything = fresh.cached_bytes();
+  }
+  EXPECT_LE(most, budget);
+  EXPECT_GT(everything, 2 * budget);
+  EXPECT_EQ(bytes_of(cells.in_view(view, pool)), bytes_of(fresh.in_view(view, pool)));
+}
+
 TEST(SurfaceCells, SeedAndTextureSeedChangeTheSpeckle) {
   const auto scene = scene_of(terrain(8, 2.0, gentle));
   auto other = std::make_shared<Scene>(*scene);
