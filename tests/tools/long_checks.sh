@@ -8,13 +8,14 @@ cd "$(dirname "$0")/../.." || exit 70
 
 need_packages "${build_packages[@]}" clang-14 libclang-rt-14-dev || exit
 
-# built_tests FOLDER: the GoogleTest programs a build folder holds under tests/, fuzz targets excluded.
-built_tests() { find "build/$1/tests" -path '*/fuzz' -prune -o -type f -name '*_test*' -perm -u+x -print | sort; }
+# What runs in more than one thread: the daemon over loopback, and the pool.
+threaded_tests=(daemon_loopback_test base_test)
 
-say "thread sanitizer: the daemon and the compute threads"
+say "thread sanitizer: ${threaded_tests[*]}"
 configure tsan || exit
-build tsan tsan_tests || exit
-for program in $(built_tests tsan); do
+build tsan "${threaded_tests[@]}" || exit
+for test in "${threaded_tests[@]}"; do
+  program=$(find build/tsan/tests -name "$test" -type f)
   echo "-- $program"
   TSAN_OPTIONS="halt_on_error=1 suppressions=$PWD/tests/tools/tsan.supp" "$program" --gtest_brief=1 || exit 1
 done
@@ -22,9 +23,13 @@ done
 say "fuzz targets, ${SONARD_FUZZ_SECONDS:-60} s each"
 configure fuzz || exit
 build fuzz fuzz_targets || exit
-for program in $(find build/fuzz/tests/fuzz -type f -name 'fuzz_*' -perm -u+x | sort); do
-  echo "-- $program"
-  corpus=$(mktemp -d)
-  "$program" -max_total_time="${SONARD_FUZZ_SECONDS:-60}" -rss_limit_mb=2048 -print_final_stats=0 -verbosity=0 "$corpus" || exit 1
-  rm -rf "$corpus"
+for program in build/fuzz/tests/fuzz/*_fuzz; do
+  name=$(basename "$program")
+  echo "-- $name"
+  found=$(mktemp -d)
+  seeds=tests/fuzz/corpus/${name%_fuzz}
+  [ -d "$seeds" ] || seeds=
+  # shellcheck disable=SC2086 # no seeds, no argument
+  "$program" -max_total_time="${SONARD_FUZZ_SECONDS:-60}" -rss_limit_mb=2048 -verbosity=0 -print_final_stats=1 "$found" $seeds || exit 1
+  rm -rf "$found"
 done

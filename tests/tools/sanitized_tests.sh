@@ -6,13 +6,13 @@ cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
 . tests/tools/setup.sh
 
-# Folders of tests/ whose programs run here; tests/core is left to the release build but for its parsers.
-wanted='^tests/(protocol|daemon|clients)/|^tests/core/(text|scene)'
+# Paths under tests/ that run here; what only computes is left to the release build.
+wanted='^tests/(protocol|daemon|clients)/|^tests/core/text/|/core_load_scene_test|/core_shapes_test'
 
 need_packages "${build_packages[@]}" && configure asan || exit
 targets=("$@")
 if [ ${#targets[@]} -eq 0 ]; then
-  mapfile -t targets < <(ninja -C build/asan -t targets all | sed -n 's/: CXX_EXECUTABLE_LINKER.*//p' | grep -E "$wanted")
+  mapfile -t targets < <(ninja -C build/asan -t targets all | sed -n 's/: CXX_EXECUTABLE_LINKER.*//p' | grep -E "$wanted" | grep '_test$')
 fi
 [ ${#targets[@]} -gt 0 ] || { echo "no test program matches $wanted" >&2; exit 1; }
 build asan "${targets[@]}" || exit
