@@ -38,7 +38,7 @@ wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination, bool p
 
 FireRequest stored_fire() {
   FireRequest fire;  // unknown: what the real device stores; a plain picture of the nearest 10 m
-  fire.settings.mode = 1;
+  fire.settings.mode = 2;
   fire.settings.flags = flag::range_in_metres | flag::simple_result | flag::beams_512;
   fire.settings.range = 10;
   fire.settings.gain_percent = 50;
