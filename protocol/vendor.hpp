@@ -41,10 +41,10 @@ struct DeviceState {
   Ipv4 connected_client{};  // 0.0.0.0 when nobody is connected
   std::array<std::uint8_t, 6> mac{};
   Time powered_up_at{};
-  Water water;             // at the device, as measured by its sensors
+  Water water;  // at the device, as measured by its sensors
   double depth_m = 0;
-  OptionValues options;    // complete: defaults filled in by check_options
-  struct StoredAddress {   // what a client wrote; stored, never applied
+  OptionValues options;   // complete: defaults filled in by check_options
+  struct StoredAddress {  // what a client wrote; stored, never applied
     std::uint32_t ip = 0, netmask = 0;
     bool dhcp = false;
   } stored_address;
@@ -54,7 +54,7 @@ struct DeviceState {
 struct ChangeSettings {
   PingSettings settings;
   Bytes request;
-  std::string summary;  // for the log: "mode 2, range 20 m, gain 50 %, rate 10 Hz"
+  std::string summary;    // for the log: "mode 2, range 20 m, gain 50 %, rate 10 Hz"
   bool repeated = false;  // byte-identical to this client's previous request: must not restart the ping timer
 };
 struct RequestPing {};  // one ping now (network trigger, BlueView)

@@ -16,11 +16,11 @@ namespace sonar {
 struct alignas(64) RayPacket {
   static constexpr int size = 16;
   static constexpr std::uint32_t miss = 0xFFFFFFFFu;
-  float origin_x[size], origin_y[size], origin_z[size];        // [m], relative to RayScene::origin()
+  float origin_x[size], origin_y[size], origin_z[size];           // [m], relative to RayScene::origin()
   float direction_x[size], direction_y[size], direction_z[size];  // unit length, world axes
-  float far[size];          // in: longest distance of interest [m]; out: distance of the hit
-  std::uint32_t object[size];    // out: index into Scene::objects, or miss
-  std::uint32_t triangle[size];  // out: index into that object's mesh
+  float far[size];                                       // in: longest distance of interest [m]; out: distance of the hit
+  std::uint32_t object[size];                            // out: index into Scene::objects, or miss
+  std::uint32_t triangle[size];                          // out: index into that object's mesh
   float normal_x[size], normal_y[size], normal_z[size];  // out: geometric normal, world axes, not normalised, either side
 };
 

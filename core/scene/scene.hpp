@@ -14,32 +14,32 @@ namespace sonar {
 
 struct Material {
   std::string name;
-  float lambert_db = -27;      // 10 log10 mu, Mackenzie coefficient; at most -4.97 (energy conservation)
-  float roughness_m = 1e-3f;   // rms
-  float reflection = 0.5f;     // pressure reflection coefficient at normal incidence, water-referenced, -1..1
+  float lambert_db = -27;     // 10 log10 mu, Mackenzie coefficient; at most -4.97 (energy conservation)
+  float roughness_m = 1e-3f;  // rms
+  float reflection = 0.5f;    // pressure reflection coefficient at normal incidence, water-referenced, -1..1
   std::uint32_t texture_seed = 0;
 };
 
 /// Triangles in object coordinates, two-sided, geometric normals. Shared by objects that use the same file.
 struct Mesh {
-  std::vector<Vec3> vertices;                              // [m]
-  std::vector<std::array<std::uint32_t, 3>> triangles;     // indices into vertices, never degenerate
-  std::vector<std::uint16_t> material;                     // per triangle, index into Scene::materials
+  std::vector<Vec3> vertices;                           // [m]
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // indices into vertices, never degenerate
+  std::vector<std::uint16_t> material;                  // per triangle, index into Scene::materials
 };
 
 /// A mesh placed in the world. `id` is its place in Scene::objects and keys its speckle.
 struct Object {
   std::string name;
   std::shared_ptr<const Mesh> mesh;
-  Pose in_world;     // static objects: for ever; moving ones: initially
-  int body = -1;     // index into PingRequest::bodies_in_world, -1 = static
+  Pose in_world;  // static objects: for ever; moving ones: initially
+  int body = -1;  // index into PingRequest::bodies_in_world, -1 = static
   bool visible = true;
 };
 
 /// An analytic echo without a surface.
 struct PointTarget {
   std::string name;
-  Vec3d position_m;           // in the world, or in its body when body >= 0
+  Vec3d position_m;  // in the world, or in its body when body >= 0
   float target_strength_db = 0;
   int body = -1;
 };
@@ -54,10 +54,10 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Object> objects;
   std::vector<PointTarget> point_targets;
-  std::vector<std::string> body_names;       // moving bodies, in the order of PingRequest::bodies_in_world
-  std::vector<Pose> bodies_in_world;         // where the scene file put them
-  SeaSurface sea_surface;                    // its mesh, if present, is one of the objects
-  std::vector<std::string> notes;            // what the loader did that its user should know, one sentence each
+  std::vector<std::string> body_names;  // moving bodies, in the order of PingRequest::bodies_in_world
+  std::vector<Pose> bodies_in_world;    // where the scene file put them
+  SeaSurface sea_surface;               // its mesh, if present, is one of the objects
+  std::vector<std::string> notes;       // what the loader did that its user should know, one sentence each
 
   std::size_t triangle_count() const {
     std::size_t n = 0;

@@ -1,4 +1,5 @@
-// What a client may change between two pings, in our terms. The vendor's law (protocol/<vendor>) fills the grid from its own knobs.
+// What a client may change between two pings, in our terms. The vendor's law (protocol/<vendor>) fills the grid from its own
+// knobs.
 #pragma once
 
 #include <cstdint>
@@ -15,17 +16,17 @@ struct SampleFormat {
 struct PingSettings {
   int mode = 0;  // index into SonarModel::modes
   int beam_count = 512;
-  int range_bin_count = 437;   // rows
-  float range_m = 10;          // as used by the device, full scale
-  float range_bin_m = 0.0229f;  // row spacing, in the device's metres (with its believed sound speed)
+  int range_bin_count = 437;      // rows
+  float range_m = 10;             // as used by the device, full scale
+  float range_bin_m = 0.0229f;    // row spacing, in the device's metres (with its believed sound speed)
   float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (acoustics.md 2.2)
-  int samples_per_row = 1;     // 1: a row is the sample at its centre; n: the mean power of n samples across it
-  float rate_hz = 10;          // 0 = standby
+  int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples across it
+  float rate_hz = 10;             // 0 = standby
   float gain_db = 0;
-  bool tvg = true;             // false: no time-varied gain, G0 only (Oculus 32-bit "scientific" data)
-  float device_sound_speed_mps = 1500;        // what the device believes
-  float device_absorption_db_per_m = 0;       // one way, what its TVG believes
-  bool triggered = false;      // one ping per request of the client
+  bool tvg = true;                       // false: no time-varied gain, G0 only (Oculus 32-bit "scientific" data)
+  float device_sound_speed_mps = 1500;   // what the device believes
+  float device_absorption_db_per_m = 0;  // one way, what its TVG believes
+  bool triggered = false;                // one ping per request of the client
   SampleFormat format;
 };
 
