@@ -252,7 +252,11 @@ TEST(StrictYaml, ErrorsCarryTheKindAskedFor) {
   EXPECT_EQ(bad.error().kind, ErrorKind::bad_data);
   auto d = parse_yaml("a: 1", "s.yaml", {.error_kind = ErrorKind::bad_data});
   ASSERT_TRUE(d);
-  EXPECT_EQ(d->finish()->kind, ErrorKind::bad_data);
+  d->root();
+  const auto error = d->finish();
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->text, "s.yaml:1:1: a: unknown key");
+  EXPECT_EQ(error->kind, ErrorKind::bad_data);
 }
 
 TEST(Decimal, TheWholeTextOrNothing) {
