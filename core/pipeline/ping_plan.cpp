@@ -16,7 +16,8 @@ constexpr double widest_column_in_beams = 0.35;  // acoustics.md 2.4
 constexpr double margin_in_beams = 3.0;          // columns beyond the sector, or its edge beams would be dim
 constexpr double flat_margin_in_beams = 1.5;     // of which the transmitter lights this much fully
 constexpr int base_elevations = 48;              // cells.md 4
-constexpr double fan_over_width = 2.3;           // the fan reaches the -20 dB points of the two-way pattern
+constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
+constexpr double unit_fan_over_width = 2.3;      // where there is no pattern to end it
 constexpr double widest_fan_rad = 1.4;
 constexpr double dropped_energy = 1e-4;      // of the coupling band, -40 dB
 constexpr double pulse_reach_widths = 3.99;  // p falls to 2e-10 at this many -3 dB widths
@@ -29,15 +30,21 @@ double beam_width_sine(const FrequencyMode& mode) {
 
 Fan make_fan(const FrequencyMode& mode, const PingSettings& settings) {
   Fan fan;
-  fan.half_angle_rad = std::min(static_cast<double>(mode.pattern.elevation_width_rad) * fan_over_width / 2, widest_fan_rad);
+  const bool has_pattern = mode.pattern.elevation_taper != Taper::unit;
+  const double reach = has_pattern ? elevation_reach_rad(mode.pattern, fan_edge_amplitude)
+                                   : static_cast<double>(mode.pattern.elevation_width_rad) * unit_fan_over_width / 2;
+  fan.half_angle_rad = std::min(reach, widest_fan_rad);
   const double tangent = std::tan(fan.half_angle_rad);
   const double wanted = static_cast<double>(settings.range_m) * 2 * tangent / (0.7 * static_cast<double>(settings.pulse_width_m));
   fan.bins = 256;
   while (fan.bins < 2048 && fan.bins < wanted) fan.bins *= 2;
   fan.first_tangent = static_cast<float>(-tangent);
   fan.bins_per_tangent = static_cast<float>(fan.bins / (2 * tangent));
-  for (int e = 0; e < base_elevations; ++e)
-    fan.elevation_rad.push_back(static_cast<float>(fan.half_angle_rad * (2.0 * e / (base_elevations - 1) - 1)));
+  for (int e = 0; e < base_elevations; ++e) {
+    // Nudged off round angles: a ray that lies exactly on the edge between two triangles can slip through.
+    const double nudge = e == 0 || e == base_elevations - 1 ? 0 : 0.0137;
+    fan.elevation_rad.push_back(static_cast<float>(fan.half_angle_rad * (2 * (e + nudge) / (base_elevations - 1) - 1)));
+  }
   return fan;
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/scene/ray_scene.hpp"
-#include "scene_testing.hpp"
+#include "tests/core/scene/scene_testing.hpp"
 
 namespace sonar {
 namespace {

@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "mesh_checks.hpp"
-#include "scene_testing.hpp"
-#include "temporary_files.hpp"
+#include "tests/core/scene/mesh_checks.hpp"
+#include "tests/core/scene/scene_testing.hpp"
+#include "tests/core/scene/temporary_files.hpp"
 
 namespace sonar {
 namespace {

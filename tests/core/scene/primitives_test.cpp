@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "mesh_checks.hpp"
+#include "tests/core/scene/mesh_checks.hpp"
 
 namespace sonar {
 namespace {

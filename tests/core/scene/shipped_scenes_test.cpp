@@ -8,7 +8,7 @@
 
 #include "core/scene/load_scene.hpp"
 #include "core/scene/ray_scene.hpp"
-#include "scene_testing.hpp"
+#include "tests/core/scene/scene_testing.hpp"
 
 namespace sonar {
 namespace {

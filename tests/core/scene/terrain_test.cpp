@@ -9,8 +9,8 @@
 #include <fstream>
 
 #include "core/scene/noise.hpp"
-#include "mesh_checks.hpp"
-#include "temporary_files.hpp"
+#include "tests/core/scene/mesh_checks.hpp"
+#include "tests/core/scene/temporary_files.hpp"
 
 namespace sonar {
 namespace {
