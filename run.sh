@@ -12,13 +12,13 @@ case "${1:-}" in
     exit 0
     ;;
   --check)
-    setup_and_build || exit
+    setup_and_build sonard sonarctl || exit
     say "checking the demo"
     exec tests/tools/check_demo.sh build/release
     ;;
 esac
 
-setup_and_build || exit
+setup_and_build sonard sonarctl || exit
 say "starting sonard"
 [ $# -gt 0 ] || set -- --demo
 exec build/release/daemon/sonard "$@"

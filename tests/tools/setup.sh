@@ -71,9 +71,9 @@ build() {
   cmake --build "build/$preset" --parallel "$(build_jobs)" ${1:+--target "$@"} </dev/null
 }
 
-# setup_and_build [cmake arguments...]: the release build, everything in it.
+# setup_and_build [targets...]: the release build; without targets everything in it, tests too.
 setup_and_build() {
   need_packages "${build_packages[@]}" || return
   say "building in build/release"
-  configure release -DSONAR_WERROR="${SONAR_WERROR:-OFF}" "$@" && build release
+  configure release -DSONAR_WERROR="${SONAR_WERROR:-OFF}" && build release "$@"
 }
