@@ -1,4 +1,4 @@
-// What sonard says when it is ready and when it ends: a few lines on stderr, in plain words (interfaces.md 5c).
+// What sonard says when it is ready and when it ends: a few lines on stderr, in plain words.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // `sonard bench`: times whole pings, from pose to framed bytes, case by case and stage by stage, as a table and as JSON.
-// The cases are those of docs/benchmarks.md; figures depend on the machine, so the processor is printed with them.
+// The cases are those of bench_cases.hpp; figures depend on the machine, so the processor is printed with them.
 #pragma once
 
 namespace sonar {

@@ -1,4 +1,4 @@
-// Opening listeners with errors that say what, where, why and what to do next (interfaces.md 5b).
+// Opening listeners with errors that say what, where, why and what to do next (docs/architecture.md, "Errors").
 #pragma once
 
 #include "core/base/result.hpp"

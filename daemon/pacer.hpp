@@ -11,7 +11,7 @@
 namespace sonar {
 
 /// Time between two pings that these settings allow: the rate asked for, and never less than the two-way travel of sound to the
-/// range plus 2 ms (oculus.md 5.5). Zero in standby.
+/// range plus 2 ms (docs/protocols/oculus.md, section 5.6). Zero in standby.
 std::chrono::nanoseconds ping_period(const PingSettings& settings);
 
 class Pacer {

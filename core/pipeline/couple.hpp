@@ -1,5 +1,5 @@
-// Stage four: the receive pattern across columns makes beams (acoustics.md eq. 9): s_j[n] = sum_k W_jk g_k[n], W signed and not
-// normalised further. Works on a window of samples, so that what it reads and writes stays in cache.
+// Stage four: the receive pattern across columns makes beams (docs/acoustics.md, section 6): s_j[n] = sum_k W_jk g_k[n],
+// W signed and not normalised further. Works on a window of samples, so that what it reads and writes stays in cache.
 #pragma once
 
 #include <span>

@@ -1,5 +1,6 @@
 // Receiver noise: white complex Gaussian per column, shaped in range like the pulse, injected before coupling so that
-// neighbouring beams share it as in a real array (acoustics.md 4.6). Drawn from a pre-filtered table at hashed places.
+// neighbouring beams share it as in a real array (docs/acoustics.md, section 5). Drawn from a pre-filtered table at hashed
+// places.
 #pragma once
 
 #include <cstdint>

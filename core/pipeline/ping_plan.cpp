@@ -12,10 +12,10 @@
 namespace sonar {
 namespace {
 
-constexpr double widest_column_in_beams = 0.35;  // acoustics.md 2.4
+constexpr double widest_column_in_beams = 0.35;  // docs/acoustics.md, section 2
 constexpr double margin_in_beams = 3.0;          // columns beyond the sector, or its edge beams would be dim
 constexpr double flat_margin_in_beams = 1.5;     // of which the transmitter lights this much fully
-constexpr int base_elevations = 48;              // cells.md 4
+constexpr int base_elevations = 48;              // docs/acoustics.md, section 2
 constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
 constexpr double unit_fan_over_width = 2.3;      // where there is no pattern to end it
 constexpr double widest_fan_rad = 1.4;

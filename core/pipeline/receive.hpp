@@ -1,4 +1,4 @@
-// Last stage: envelope, time-varied gain, range rows, quantised samples (acoustics.md 2.5, 4.8).
+// Last stage: envelope, time-varied gain, range rows, quantised samples (docs/acoustics.md, section 7).
 #pragma once
 
 #include <vector>

@@ -11,7 +11,7 @@
 namespace sonar {
 namespace {
 
-constexpr float depth_tolerance_in_pulses = 1.5f;   // cells.md 2: covers the straight lines between rays
+constexpr float depth_tolerance_in_pulses = 1.5f;   // docs/acoustics.md, section 3: covers the straight lines between rays
 constexpr std::uint32_t fixed_fan_key = 0x66616eu;  // keeps these draws apart from the cells'
 
 double fraction(double turns) { return turns - std::floor(turns); }

@@ -1,5 +1,5 @@
-// Stage three: pulses summed in time, per column, at the sample centres (acoustics.md eq. 8). The pulse is analytic, so it is
-// evaluated only where a row takes its sample; no frequency loop and no transform is needed.
+// Stage three: pulses summed in time, per column, at the sample centres (docs/acoustics.md, section 4). The pulse is analytic, so
+// it is evaluated only where a row takes its sample; no frequency loop and no transform is needed.
 #pragma once
 
 #include <cstddef>

@@ -15,7 +15,7 @@
 
 namespace sonar {
 
-/// Parts of the model that can be switched (acoustics.md section 8). The defaults are the canonical model.
+/// Parts of the model that can be switched (docs/acoustics.md, section 8). The defaults are the canonical model.
 struct Switches {
   bool expected_power = false;  // |sum a|^2 replaced by sum |a|^2: deterministic radiometry
   bool noise = true;

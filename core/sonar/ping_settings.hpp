@@ -19,7 +19,7 @@ struct PingSettings {
   int range_bin_count = 437;      // rows
   float range_m = 10;             // as used by the device, full scale
   float range_bin_m = 0.0229f;    // row spacing, in the device's metres (with its believed sound speed)
-  float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (acoustics.md 2.2)
+  float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (docs/acoustics.md, section 4)
   int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples across it
   float rate_hz = 10;             // 0 = standby
   float gain_db = 0;

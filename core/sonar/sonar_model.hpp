@@ -9,7 +9,7 @@ namespace sonar {
 
 /// Aperture shading of the receive array; sets the side lobes. `unit` switches the pattern off (1 everywhere).
 enum class Taper { uniform, taylor30, hamming, hann, unit };
-/// Which data-sheet number the vertical width is (acoustics.md 2.4): of one pattern, or of transmit times receive.
+/// Which data-sheet number the vertical width is (docs/acoustics.md, section 6): of one pattern, or of transmit times receive.
 enum class ElevationWidthIs { one_way, two_way };
 enum class BeamSpacing {
   uniform_in_sine,   // beam azimuths asin(s), s linear over +-sin(half aperture): Oculus
@@ -24,7 +24,7 @@ struct BeamPattern {
   ElevationWidthIs elevation_width_is = ElevationWidthIs::two_way;
 };
 
-/// How the receiver turns pressure into samples (acoustics.md 4.8); constants of the product.
+/// How the receiver turns pressure into samples (docs/acoustics.md, section 7); constants of the product.
 struct ReceiverLaw {
   float tvg_slope_db = 30;  // X of X log10 r
   float tvg_minimum_range_m = 0.5f;

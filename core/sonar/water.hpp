@@ -1,5 +1,5 @@
 // The water: what it is, how fast sound goes in it and how much it absorbs. Used by the physics and by devices that compute
-// their believed sound speed. Formulae and their sources: acoustics of docs/architecture.md; oracles 27-29 in tests/core.
+// their believed sound speed. Formulae and their sources: at the functions; oracles 27-29: tests/core/sonar.
 // C++17-clean, standard library only.
 #pragma once
 

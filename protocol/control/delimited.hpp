@@ -1,5 +1,5 @@
 // Framing of the control stream: a varint length, then that many bytes. Incremental and without I/O: any split of the stream.
-// Source: protobuf encoding guide, "varint"; the cap is ours (interfaces.md 3d).
+// Source: protobuf encoding guide, "varint"; the cap is ours (control.proto).
 #pragma once
 
 #include <cstddef>

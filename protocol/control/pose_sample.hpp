@@ -13,7 +13,7 @@
 
 namespace sonar::control {
 
-/// Whose clock a stamp was read from (interfaces.md 3c).
+/// Whose clock a stamp was read from (docs/configuration.md, "Sending poses").
 enum class ClockDomain {
   wall,     // UNIX time of a computer whose clock agrees with ours
   sim,      // the sender's own, any origin

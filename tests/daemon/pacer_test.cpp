@@ -19,7 +19,7 @@ const Time t0 = Time(std::chrono::hours(1000));
 
 TEST(Pacer, PeriodIsTheRateOrTheTravelTimePlusTwoMilliseconds) {
   EXPECT_EQ(ping_period(settings(10)), milliseconds(100));
-  EXPECT_EQ(ping_period(settings(40, 120)), milliseconds(162));  // 2 * 120 / 1500 + 2 ms, as oculus.md 5.5 says
+  EXPECT_EQ(ping_period(settings(40, 120)), milliseconds(162));  // 2 * 120 / 1500 + 2 ms: docs/protocols/oculus.md, section 5.6
   EXPECT_EQ(ping_period(settings(0)).count(), 0);
   EXPECT_EQ(ping_period(settings(-1)).count(), 0);
 }

@@ -79,7 +79,7 @@ SONAR_HD inline double width_factor(Taper taper) {
   return taper == Taper::unit ? 1.0 : 2 * main_lobe_crossing(taper_series(taper), std::sqrt(0.5));
 }
 
-/// Aperture in wavelengths that gives the -3 dB width [rad] at broadside (acoustics.md 2.4); the beam spans +-sin(width / 2).
+/// Aperture in wavelengths for a -3 dB width [rad] at broadside: the beam spans +-sin(width / 2) (docs/acoustics.md, section 6).
 SONAR_HD inline double aperture_in_wavelengths(Taper taper, double width_rad) {
   return width_factor(taper) / (2 * std::sin(0.5 * width_rad));
 }
@@ -140,7 +140,7 @@ SONAR_HD inline double elevation_reach_rad(const BeamPattern& pattern, double le
   return sine < 1 ? std::asin(sine) : 0.5 * pi;
 }
 
-/// A straight array along y measures u = cos(elevation) sin(azimuth); psi is the angle about that axis (acoustics.md 2.4).
+/// An array along y measures u = cos(elevation) sin(azimuth); psi is the angle about that axis (docs/acoustics.md, section 1).
 struct ConicalDirection {
   double u = 0, psi_rad = 0;
 };

@@ -1,4 +1,4 @@
-// From beam pressure to samples: thermal noise level, time-varied gain, row gains, quantisation (acoustics.md 2.5, 4.6, 4.8).
+// From beam pressure to samples: thermal noise level, time-varied gain, row gains, quantisation (docs/acoustics.md, section 7).
 // The last stage of a ping uses it, and vendors that state a gain per row. C++17-clean, standard library only.
 #pragma once
 

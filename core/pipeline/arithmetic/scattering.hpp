@@ -1,4 +1,4 @@
-// What a scatterer sends back: Lambert cross-sections, spreading, absorption, carrier phase (acoustics.md 2.1, eq. 5-6).
+// What a scatterer sends back: Lambert cross-sections, spreading, absorption, carrier phase (docs/acoustics.md, section 3).
 // Used by cells, by the fixed fan and by point targets. C++17-clean, standard library only.
 #pragma once
 
@@ -45,7 +45,7 @@ SONAR_HD inline double two_way_transmission(double range_m, double alpha_np_per_
 }
 
 /// Carrier phase of an echo from range r in turns, folded to [0, 1): the echo is multiplied by exp(-i 2 pi turns).
-/// In double: a float range alone costs 1e-3 of the signal at 900 kHz (acoustics.md 5.3).
+/// In double: a float range alone costs 1e-3 of the signal at 900 kHz (docs/acoustics.md, section 1).
 SONAR_HD inline double carrier_turns(double centre_hz, double sound_speed_mps, double range_m) {
   const double turns = 2 * centre_hz * range_m / sound_speed_mps;
   return turns - std::floor(turns);

@@ -1,5 +1,5 @@
 // The Gaussian pulse p(t) = exp(-b^2 t^2) after the receiver's filter, and the widths that follow from it.
-// Used by synthesis, by the shaped noise and by level predictions (acoustics.md 2.2). C++17-clean, standard library only.
+// Used by synthesis, shaped noise and level predictions (docs/acoustics.md, section 4). C++17-clean, standard library only.
 #pragma once
 
 #include <cmath>

@@ -179,7 +179,7 @@ TEST(StrictYaml, TextsHaveLimits) {
   EXPECT_EQ(read("a: abcdef", [](Map m) { m.required("a").text(5); }), "f.yaml:1:4: a: has 6 bytes, at most 5 are allowed");
 }
 
-// interfaces.md section 5 shows this sentence.
+// docs/scenes.md promises this form of sentence.
 TEST(StrictYaml, UnknownKeyNamesTheNearest) {
   const std::string text = "sonars:\n  - name: front\n    rang: 10\n";
   const auto reader = [](Map m) {
