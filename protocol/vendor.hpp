@@ -54,7 +54,7 @@ struct DeviceState {
 struct ChangeSettings {
   PingSettings settings;
   Bytes request;
-  std::string summary;    // for the log: "mode 2, range 20 m, gain 50 %, rate 10 Hz"
+  std::string summary;    // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
   bool repeated = false;  // byte-identical to this client's previous request: must not restart the ping timer
 };
 struct RequestPing {};  // one ping now (network trigger, BlueView)

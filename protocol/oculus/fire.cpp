@@ -50,7 +50,8 @@ std::string describe(const FireRequest& fire) {
   const bool metres = (s.flags & flag::range_in_metres) != 0;
   const double rate_hz = table_rate_hz(s.ping_rate);
   char text[160];
-  std::snprintf(text, sizeof text, "mode %d, range %g %s, gain %g %%, ", s.mode, s.range, metres ? "m" : "%", s.gain_percent);
+  std::snprintf(text, sizeof text, "mode %d, range %g %s, gain %g %%, gamma %d, ", s.mode, s.range, metres ? "m" : "%",
+                s.gain_percent, s.gamma);
   std::string sentence = text;
   if (rate_hz > 0) {
     std::snprintf(text, sizeof text, "rate %g Hz", rate_hz);
@@ -58,7 +59,14 @@ std::string describe(const FireRequest& fire) {
   } else {
     sentence += "standby";
   }
+  if (s.sound_speed_mps == 0) {
+    sentence += ", own sound speed";
+  } else {
+    std::snprintf(text, sizeof text, ", sound speed %g m/s", s.sound_speed_mps);
+    sentence += text;
+  }
   sentence += (s.flags & flag::beams_512) != 0 ? ", 512 beams" : ", 256 beams";
+  sentence += ", " + std::to_string(sample_format(fire).bits) + " bits";
   sentence += ", flags " + std::to_string(s.flags) + ", version " + std::to_string(fire.version);
   if ((s.flags & flag::network_trigger) != 0) sentence += ", network trigger";
   return sentence;

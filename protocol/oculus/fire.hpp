@@ -25,7 +25,7 @@ wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination = 0, bo
 /// The device's stored configuration before any client spoke. Version 0 fits all clients (docs/protocols/oculus.md, 5.1).
 FireRequest stored_fire();
 
-/// "mode 2, range 20 m, gain 50 %, rate 10 Hz": for the log.
+/// "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, own sound speed, 512 beams, 8 bits, ...": for the log.
 std::string describe(const FireRequest& fire);
 
 }  // namespace sonar::oculus

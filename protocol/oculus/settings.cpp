@@ -27,23 +27,6 @@ double clamped(double value, double low, double high, const char* what, const ch
   return used;
 }
 
-SampleFormat sample_format(const FireRequest& fire) {
-  SampleFormat format;
-  format.gamma = gamma_from_byte(fire.settings.gamma);
-  format.row_gains = (fire.settings.flags & flag::row_gains) != 0;
-  if (fire.version >= 2 && (fire.extension.flags & flag::extended_32_bit) != 0) {
-    format.bits = 32;
-    format.max_code = std::numeric_limits<std::uint32_t>::max();
-  } else if ((fire.settings.flags & flag::samples_16_bit) != 0) {
-    format.bits = 16;
-    format.max_code = 65535;
-  } else {
-    format.bits = 8;
-    format.max_code = 254;  // capture: 255 never occurs, 254 is saturation
-  }
-  return format;
-}
-
 /// Pulse and range sampling of one row, option `pulse`.
 void set_pulse(PingSettings& settings, double spacing_m, bool native) {
   settings.pulse_width_m = static_cast<float>(native ? native_pulse_m : 0.9 * spacing_m);
@@ -89,6 +72,23 @@ double table_rate_hz(PingRate rate) {
 }
 
 float gamma_from_byte(std::uint8_t value) { return value == 0 ? 1.0f : static_cast<float>(value) / 255.0f; }
+
+SampleFormat sample_format(const FireRequest& fire) {
+  SampleFormat format;
+  format.gamma = gamma_from_byte(fire.settings.gamma);
+  format.row_gains = (fire.settings.flags & flag::row_gains) != 0;
+  if (fire.version >= 2 && (fire.extension.flags & flag::extended_32_bit) != 0) {
+    format.bits = 32;
+    format.max_code = std::numeric_limits<std::uint32_t>::max();
+  } else if ((fire.settings.flags & flag::samples_16_bit) != 0) {
+    format.bits = 16;
+    format.max_code = 65535;
+  } else {
+    format.bits = 8;
+    format.max_code = 254;  // capture: 255 never occurs, 254 is saturation
+  }
+  return format;
+}
 
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo) {
   const bool high_frequency = fire.mode == 2;

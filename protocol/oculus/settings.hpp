@@ -27,6 +27,8 @@ RowLaw row_law(double range_m, double sound_speed_mps, double rate_hz = row_rate
 double table_rate_hz(PingRate rate);
 /// Exponent of the samples: value / 255, and 1 for 0.
 float gamma_from_byte(std::uint8_t value);
+/// Bits, saturation, gamma and row gains that a fire message asks for.
+SampleFormat sample_format(const FireRequest& fire);
 /// The gain as echoed, per cent (docs/protocols/oculus.md, 5.5): mode 2 without flag bit 4 is mapped to 40 + 0.6 g, see option
 /// gain_echo.
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo);
