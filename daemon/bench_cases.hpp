@@ -19,7 +19,7 @@ struct BenchCase {
   bool near_bottom = false;  // short ranges want the bed closer
 };
 
-/// All of them, lightest sonar first within each product.
+/// All of them, in the order of their names.
 std::vector<BenchCase> bench_cases();
 
 /// Scenes the cases run over, and where a sonar flies in them.
