@@ -15,7 +15,7 @@ using text::Node;
 using text::Range;
 
 constexpr Range finite_place{.min = -1e7, .max = 1e7};
-constexpr double hot_c = 30;  // a widely used driver sends the sonar to standby above this (oculus.md section 4)
+constexpr double hot_c = 30;  // a widely used driver sends the sonar to standby above this (docs/protocols/oculus.md, section 4)
 
 Ipv4 read_ip(const Node& node, Ipv4 fallback = {}) {
   if (!node.present()) return fallback;
