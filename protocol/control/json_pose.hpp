@@ -1,5 +1,5 @@
 // Poses as JSON lines: the keys of ArduPilot's JSON simulator reply, so that a physics back-end sends us a copy of what it
-// already has. Source: ArduPilot libraries/SITL/examples/JSON/readme.md (timestamp, position, attitude, quaternion, velocity).
+// already has. Source: ArduPilot libraries/SITL/examples/JSON (timestamp, position, attitude, quaternion, velocity).
 #pragma once
 
 #include <cstddef>

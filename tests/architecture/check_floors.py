@@ -63,6 +63,9 @@ FORBIDDEN = [
 ]
 CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc"}
 TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ""}
+# A page of ours, and what of it is cited: docs/acoustics.md, section 8; docs/protocols/oculus.md, 5.1; docs/architecture.md, "Errors".
+PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
+                      (?:,?\ section\ (?P<section>\d+(?:\.\d+)*)|,?\ (?P<number>\d+(?:\.\d+)*)|,\ "(?P<title>[^"\n]+)")?""", re.X)
 LONGEST_FILE = 400  # lines; tests may be longer
 
 
@@ -82,6 +85,25 @@ def without_comments(text):
     """Comments become blanks of the same number of lines; strings stay."""
     pattern = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.S)
     return pattern.sub(lambda m: m.group() if m.group().startswith('"') else re.sub(r"[^\n]", " ", m.group()), text)
+
+
+def comments_of(text):
+    """The opposite of without_comments."""
+    pattern = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|[^\n"/]+|.', re.S)
+    return pattern.sub(lambda m: m.group() if m.group().startswith(("//", "/*")) else re.sub(r"[^\n]", " ", m.group()), text)
+
+
+def citation_violations(root, name, text):
+    """Pages are named from the root or from the file's own folder; whoever reads the citation must find the place."""
+    for match in PAGE.finditer(text):
+        place = next((p for p in (root / match["page"], (root / name).parent / match["page"]) if p.is_file()), None)
+        if place is None:
+            yield match.start(), f"page: {match['page']} does not exist; name it from the root, or say here what it would say"
+            continue
+        section, title = match["section"] or match["number"], match["title"]
+        heading = rf"{re.escape(section)}\.? " if section else re.escape(title) if title else None
+        if heading and not re.search(rf"^#+ {heading}", place.read_text(encoding="utf-8"), re.M):
+            yield match.start(), f"page: {match['page']} has no heading {section or title}"
 
 
 def floor_of(name):
@@ -129,6 +151,8 @@ def violations(root):
                 yield f"{name}:1: header without #pragma once"
             if not name.startswith("tests/") and text.count("\n") > LONGEST_FILE:
                 yield f"{name}:{LONGEST_FILE}: longer than {LONGEST_FILE} lines: split it"
+        for position, what in citation_violations(root, name, comments_of(text) if is_code else text):
+            yield f"{name}:{line_of(text, position)}: {what}"
         for rule, where, excepted, pattern, why in FORBIDDEN:
             if not re.match(where, name) or (where and not is_code) or (excepted and re.match(excepted, name)):
                 continue

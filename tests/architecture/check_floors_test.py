@@ -9,7 +9,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 sys.dont_write_bytecode = True
 import check_floors  # noqa: E402
 
-SLASH = "/"  # keeps this file free of what it plants
+SLASH, DOT = "/", "."  # keep this file free of what it plants
+PAGE = "docs/a" + DOT + "md"
 
 
 def found_in(files):
@@ -72,10 +73,32 @@ class Planted(unittest.TestCase):
                 ("daemon/a.cpp", "std::mutex guard;", "mutex"),
                 ("core/scene/a.cpp", "std::mt19937 engine;", "global random"),
                 ("daemon/a.cpp", "int x;  // TO" + "DO later", "mark"),
-                ("docs/a.md", "run it in " + SLASH + "ho" + "me/me/sonard", "machine path"),
+                (PAGE, "run it in " + SLASH + "ho" + "me/me/sonard", "machine path"),
                 ("tests/daemon/a.cpp", 'open("' + SLASH + "t" + 'mp/x");', "machine path")]:
             with self.subTest(name=name, line=line):
                 self.expect(name, line + "\n", 1, rule)
+
+    def test_pages_that_are_cited_exist(self):
+        page = {PAGE: "# Title\n\n## 2. Second\n\n### 2.1 Part of it\n\n## Named\n"}
+        for name, line in [("core/base/a.cpp", f"int x;  // {PAGE}"), ("core/base/a.cpp", f"/* see\n{PAGE}, section 2 */"),
+                           ("core/base/a.cpp", f'// "quoted" {PAGE}, 2.1'), ("scenes/a.yaml", f'# {PAGE}, "Named"'),
+                           ("tests/a.py", f"# {PAGE}, section 2.1"), ("docs/b" + DOT + "md", "[link](a" + DOT + "md)"),
+                           ("core/base/a.cpp", "f(\"nowhere" + DOT + "md\");")]:
+            with self.subTest(name=name, line=line):
+                self.assertEqual(found_in({**page, name: line + "\n"}), [])
+        for name, line, words in [
+                ("core/base/a.cpp", "int x;  // nowhere" + DOT + "md 4", "does not exist"),
+                ("core/base/a.cpp", "int x;  // a" + DOT + "md, section 2", "does not exist"),  # its folder is missing
+                ("core/base/a.cpp", f"int x;  // {PAGE}, section 3", "no heading 3"),
+                ("core/base/a.cpp", f"int x;  // {PAGE} 2.2", "no heading 2.2"),
+                ("core/base/a.cpp", f'int x;  // {PAGE}, "Lost"', "no heading Lost"),
+                ("scenes/a.yaml", "# docs/nowhere" + DOT + "md", "does not exist"),
+                ("docs/b" + DOT + "md", "[link](../a" + DOT + "md)", "does not exist")]:
+            with self.subTest(name=name, line=line):
+                found = found_in({**page, name: line + "\n"})
+                self.assertEqual(len(found), 1, found)
+                self.assertTrue(found[0].startswith(f"{name}:1: page: "), found)
+                self.assertIn(words, found[0])
 
     def test_headers_and_sizes(self):
         found = found_in({"core/base/a.hpp": "int x;\n"})
@@ -97,7 +120,7 @@ class Innocent(unittest.TestCase):
             "daemon/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
             "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/oculus/decode.hpp"\n',
             "tests/core/a.cpp": '#include <Eigen/Dense>\n#include "daemon/world.hpp"\nstd::thread t; // steady_clock\n',
-            "docs/a.md": "see https://example.org/work/home and scenes/demo.yaml, /etc/sonard/sonard.yaml\n",
+            PAGE: "see https://example.org/work/home and scenes/demo.yaml, /etc/sonard/sonard.yaml\n",
         }), [])
 
 

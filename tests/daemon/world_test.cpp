@@ -1,4 +1,4 @@
-// Who is believed, when, and what the daemon answers for a moment: the rules of docs/configuration.md, "poses".
+// Who is believed, when, and what the daemon answers for a moment: the rules of docs/configuration.md, "Sending poses".
 #include "daemon/world.hpp"
 
 #include <gmock/gmock.h>
