@@ -50,12 +50,12 @@ struct DeviceState {
   } stored_address;
 };
 
-/// The client replaced the device's settings. `request`: its own bytes, echoed in the pings made with them.
+/// The client replaced the device's settings, perhaps by the same ones: some drivers repeat them at ping rate. `request`: its own
+/// bytes, echoed in the pings made with them.
 struct ChangeSettings {
   PingSettings settings;
   Bytes request;
-  std::string summary;    // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
-  bool repeated = false;  // byte-identical to this client's previous request: must not restart the ping timer
+  std::string summary;  // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
 };
 struct RequestPing {};  // one ping now (network trigger, BlueView)
 struct StoreAddress {

@@ -91,7 +91,7 @@ class OculusDialogue final : public protocol::Dialogue {
     const bool repeated = request == last_request_;
     last_request_ = request;
     const bool one_ping = settled.settings.triggered && !standby;
-    reaction.events.emplace_back(ChangeSettings{settled.settings, std::move(request), summary(*fire, settled), repeated});
+    reaction.events.emplace_back(ChangeSettings{settled.settings, std::move(request), summary(*fire, settled)});
     if (one_ping) reaction.events.emplace_back(RequestPing{});
     if (standby && !repeated) {  // drivers take a dummy as the acknowledgement of standby
       reaction.replies.push_back(make_dummy(device_.id));
@@ -99,12 +99,9 @@ class OculusDialogue final : public protocol::Dialogue {
     }
   }
 
-  std::string summary(const FireRequest& fire, const Settled& settled) const {
+  static std::string summary(const FireRequest& fire, const Settled& settled) {
     std::string text = describe(fire);
     for (const std::string& clamped : settled.clamped) text += "; " + clamped;
-    const bool bit = (fire.settings.flags & flag::gain_assist) != 0;
-    if (bit == (text_option(device_.options, option_name::gain_assist_bit) == "set_enables"))
-      text += "; gain assist has no effect";
     return text;
   }
 

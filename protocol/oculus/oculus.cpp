@@ -26,7 +26,7 @@ class OculusVendor final : public protocol::Vendor {
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     const FireRequest fire = stored_fire();
-    return {settle(fire, device).settings, make_fire(fire), "stored configuration: " + describe(fire), false};
+    return {settle(fire, device).settings, make_fire(fire), "stored configuration: " + describe(fire)};
   }
   bool pings_before_first_request(const protocol::DeviceState& device) const override {
     return text_option(device.options, option_name::before_first_fire) == "pings";

@@ -7,8 +7,8 @@
 namespace sonar::oculus {
 namespace {
 
-const std::array<protocol::Option, 13>& table() {
-  static const std::array<protocol::Option, 13> rows{{
+const std::array<protocol::Option, 12>& table() {
+  static const std::array<protocol::Option, 12> rows{{
       {option_name::before_first_fire,
        {"dummies", "pings"},
        "dummies",
@@ -29,10 +29,6 @@ const std::array<protocol::Option, 13>& table() {
        {"false", "true"},
        "false",
        "true lowers the ping rate to the Mbit/s the client asked for"},
-      {option_name::gain_assist_bit,
-       {"set_enables", "set_disables"},
-       "set_enables",
-       "meaning of flag bit 4 (sources contradict); gain assist itself is accepted without effect"},
       {option_name::reply_version,
        {"mirror", "0", "1", "2"},
        "mirror",

@@ -79,7 +79,6 @@ TEST(Dialogue, UnderstandsEveryPublicClient) {
     EXPECT_EQ(s.beam_count, c.beams) << c.name;
     EXPECT_EQ(s.format.bits, c.bits) << c.name;
     EXPECT_EQ(s.format.row_gains, c.gains) << c.name;
-    EXPECT_FALSE(changes[0].repeated) << c.name;
     EXPECT_FALSE(changes[0].summary.empty()) << c.name;
   }
 }
@@ -101,15 +100,14 @@ TEST(Dialogue, EchoSatisfiesEveryPublicClient) {
   }
 }
 
-TEST(Dialogue, IdenticalRepeatsAreMarked) {
+TEST(Dialogue, AnIdenticalRepeatMeansTheSame) {
   Conversation talk;
-  const Bytes first = make_fire(fire(0, 1, PingRate::hz10, 0x49, 5, 50), 0, true);
-  const Bytes other = make_fire(fire(0, 1, PingRate::hz10, 0x49, 6, 50), 0, true);
-  const auto repeated = [&](const Bytes& bytes) { return events_of<ChangeSettings>(talk.say(bytes)).at(0).repeated; };
-  EXPECT_FALSE(repeated(first));
-  EXPECT_TRUE(repeated(first));
-  EXPECT_FALSE(repeated(other));
-  EXPECT_FALSE(repeated(first));
+  const Bytes message = make_fire(fire(0, 1, PingRate::hz10, 0x49, 5, 50), 0, true);
+  const auto first = events_of<ChangeSettings>(talk.say(message)), again = events_of<ChangeSettings>(talk.say(message));
+  ASSERT_THAT(first, SizeIs(1));
+  ASSERT_THAT(again, SizeIs(1));
+  EXPECT_EQ(first[0].request, again[0].request) << "by this the daemon knows a repeat";
+  EXPECT_EQ(first[0].summary, again[0].summary);
 }
 
 TEST(Dialogue, NetworkTriggerAsksForOnePingPerMessage) {
@@ -183,17 +181,6 @@ TEST(Dialogue, SummarySaysWhatWasAsked) {
   EXPECT_THAT(summary(fire(0, 1, PingRate::standby, 0x4B, 5, 50), 1480, 0),
               HasSubstr("gamma 127, standby, sound speed 1480 m/s, 512 beams, 16 bits"));
   EXPECT_THAT(summary(fire(2, 1, PingRate::hz10, 0x0D, 5, 50), 0, 0x200), HasSubstr("256 beams, 32 bits"));
-}
-
-TEST(Dialogue, GainAssistIsMentioned) {
-  const auto summary = [](const protocol::OptionValues& options, int flags) {
-    return events_of<ChangeSettings>(Conversation(options).say(make_fire(fire(0, 1, PingRate::hz10, flags, 5, 50))))
-        .at(0)
-        .summary;
-  };
-  EXPECT_THAT(summary({}, 0x59), HasSubstr("gain assist has no effect"));
-  EXPECT_THAT(summary({}, 0x49), Not(HasSubstr("gain assist")));
-  EXPECT_THAT(summary({{"gain_assist_bit", "set_disables"}}, 0x49), HasSubstr("gain assist has no effect"));
 }
 
 TEST(Dialogue, ShortAndForeignMessagesAreNoticed) {
