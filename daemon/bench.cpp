@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "core/pipeline/ping_engine.hpp"
-#include "core/scene/load_scene.hpp"
 #include "daemon/bench_cases.hpp"
+#include "daemon/scene_file.hpp"
 
 namespace sonar {
 namespace {
@@ -23,7 +22,7 @@ struct BenchOptions {
   std::vector<int> threads;
   int pings = 100;
   std::string simd = "auto";
-  std::string scene_folder = SONARD_SCENES_SOURCE;
+  std::string scene_folder;
   std::string json_file;
 };
 
@@ -156,7 +155,13 @@ int bench(const BenchOptions& options) {
   std::printf("%s\n", processor().c_str());
   for (const BenchScene& where : bench_scenes()) {
     if (!wanted(options.scenes, where)) continue;
-    const auto scene = load_scene(std::filesystem::path(options.scene_folder) / (where.name + ".yaml"));
+    const auto file = find_scene(where.name + ".yaml", options.scene_folder);
+    if (!file) {
+      std::fprintf(stderr, "sonard: no scene %s.yaml; looked in %s\n", where.name.c_str(),
+                   scene_folders(options.scene_folder).c_str());
+      return exit_code(ErrorKind::missing_file);
+    }
+    const auto scene = load_scene(*file);
     if (!scene) {
       std::fprintf(stderr, "sonard: %s\n", scene.error().text.c_str());
       return exit_code(scene.error().kind);
@@ -195,7 +200,7 @@ int run_bench(int argc, char** argv) {
   cli.add_option("--simd", options.simd, "Instruction set")
       ->check(CLI::IsMember({"auto", "portable", "avx2", "avx512"}))
       ->capture_default_str();
-  cli.add_option("--scenes-dir", options.scene_folder, "Folder of the scene files")->capture_default_str();
+  cli.add_option("--scenes-dir", options.scene_folder, "Folder to look for the scene files in first; else the shipped ones");
   cli.add_option("--json", options.json_file, "Also write the figures to this file");
   try {
     cli.parse(argc, argv);

@@ -78,25 +78,15 @@ Pose read_mount(const Node& node) {
   return frd ? flu_from_frd(pose) : pose;
 }
 
-/// Beside the configuration, then in the directories of shipped scenes.
-std::filesystem::path find_scene(const Node& node, const std::filesystem::path& directory) {
-  const std::filesystem::path given = node.text();
-  const std::filesystem::path shipped[] = {SONARD_SCENES_SOURCE, SONARD_SCENES_INSTALLED};
-  std::vector<std::filesystem::path> places = {directory / given};
-  for (const auto& scenes : shipped) {
-    places.push_back(scenes / given);
-    places.push_back(scenes.parent_path() / given);
-  }
-  std::error_code ec;
-  for (const auto& place : places)
-    if (std::filesystem::is_regular_file(place, ec)) return place.lexically_normal();
-  node.fail("no such file; looked in " + (directory.empty() ? std::string(".") : directory.string()) + ", " +
-            shipped[0].string() + " and " + shipped[1].string());
-  return given;
+SceneFile read_scene_file(const Node& node, const std::filesystem::path& directory) {
+  const std::string given = node.text();
+  if (auto found = find_scene(given, directory)) return *std::move(found);
+  node.fail("no such file; looked in " + scene_folders(directory));
+  return {given};
 }
 
 void read_world(Map map, Config& config, const std::filesystem::path& directory) {
-  config.scene = find_scene(map.required("scene"), directory);
+  config.scene = read_scene_file(map.required("scene"), directory);
   config.seed = map.optional("seed").unsigned_integer_or(1);
   if (Node origin = map.optional("origin")) {  // kept for geodetic poses; checked so that it is right when they come
     Map place = origin.map();
@@ -309,7 +299,11 @@ Result<Config> parse_config(std::string_view yaml, const std::string& name, cons
   return read(*document, name, directory);
 }
 
-Result<Config> demo_config() { return parse_config(demo_yaml, "demo", {}); }
+Result<Config> demo_config() {
+  auto config = parse_config(demo_yaml, "demo", {});
+  if (config) config->scene = {"demo.yaml", true};  // whatever files there are
+  return config;
+}
 
 std::vector<std::filesystem::path> config_search_path() {
   std::vector<std::filesystem::path> places = {"./sonard.yaml"};

@@ -14,6 +14,7 @@
 #include "core/sonar/water.hpp"
 #include "daemon/log.hpp"
 #include "daemon/outbox.hpp"
+#include "daemon/scene_file.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar {
@@ -74,8 +75,8 @@ struct EngineConfig {
 };
 
 struct Config {
-  std::string source;           // the file, or what stands in for it
-  std::filesystem::path scene;  // as found
+  std::string source;  // the file, or what stands in for it
+  SceneFile scene;     // as found
   std::uint64_t seed = 1;
   Water water;
   std::vector<VehicleConfig> vehicles;
@@ -90,7 +91,7 @@ struct Config {
 Result<Config> load_config(const std::filesystem::path& file);
 /// `directory` is where relative scene paths start; `name` stands in errors for the file.
 Result<Config> parse_config(std::string_view yaml, const std::string& name, const std::filesystem::path& directory);
-/// What runs when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene.
+/// What runs when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. Needs no files.
 Result<Config> demo_config();
 
 /// ./sonard.yaml, ~/.config/sonard/sonard.yaml, /etc/sonard/sonard.yaml, in this order.

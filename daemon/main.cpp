@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <thread>
 
-#include "core/scene/load_scene.hpp"
 #include "daemon/app.hpp"
 #include "daemon/banner.hpp"
 #include "daemon/bench.hpp"
@@ -106,7 +105,7 @@ int check(const CheckCommand& command) {
   const auto scene = load_scene(config->scene);
   if (!scene) return complain(scene.error());
   std::printf("%s: ok, %zu sonar(s); scene %s: ok, %zu triangles\n", command.config.c_str(), config->sonars.size(),
-              config->scene.string().c_str(), (*scene)->triangle_count());
+              config->scene.name().c_str(), (*scene)->triangle_count());
   return 0;
 }
 

@@ -73,24 +73,29 @@ void gather(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>
 Result<LoadedMesh> load_mesh(const MeshFile& request) {
   const std::string name = request.file.filename().string();
   const auto bad = [&](std::string what) { return failure(ErrorKind::bad_data, name + ": " + std::move(what)); };
+  const bool on_disk = request.in_memory.empty();
   std::error_code error;
-  if (!std::filesystem::is_regular_file(request.file, error)) {
+  if (on_disk && !std::filesystem::is_regular_file(request.file, error)) {
     return failure(ErrorKind::missing_file,
                    "no mesh file at " + request.file.string() + "; paths are relative to the scene file");
   }
-  if (std::filesystem::file_size(request.file, error) > max_file_bytes) return bad("is larger than 2 GiB; simplify it");
+  if (on_disk && std::filesystem::file_size(request.file, error) > max_file_bytes)
+    return bad("is larger than 2 GiB; simplify it");
   const std::string extension = extension_of(request.file);
   static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
   if (std::find(known.begin(), known.end(), extension) == known.end()) {
     return bad("unknown mesh format; use OBJ, STL, PLY, glTF, GLB or DAE");
   }
-  if (extension == ".ply" && !has_ply_header(request.file)) return bad("cannot be read: not a PLY file with a whole header");
+  if (on_disk && extension == ".ply" && !has_ply_header(request.file))
+    return bad("cannot be read: not a PLY file with a whole header");
 
   Assimp::Importer importer;
   const bool dae = extension == ".dae";
   const bool y_up_by_default = extension == ".gltf" || extension == ".glb" || dae;  // Assimp turns a tagged DAE to y up
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());
-  const aiScene* scene = importer.ReadFile(request.file.string(), 0);  // its post-processing asserts on odd files
+  const aiScene* scene =  // without its post-processing, which asserts on odd files
+      on_disk ? importer.ReadFile(request.file.string(), 0)
+              : importer.ReadFileFromMemory(request.in_memory.data(), request.in_memory.size(), 0, extension.c_str() + 1);
   if (!scene || !scene->mRootNode) return bad("cannot be read: " + first_line(importer.GetErrorString()));
 
   Corners corners;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/scene/terrain.hpp"
@@ -14,8 +15,9 @@ enum class UpAxis { y, z };
 
 struct MeshFile {
   std::filesystem::path file;
-  double scale = 1;          // file units to metres
-  std::optional<UpAxis> up;  // which file axis is up; unset: y for glTF/GLB, its own tag for DAE, z otherwise
+  double scale = 1;              // file units to metres
+  std::optional<UpAxis> up;      // which file axis is up; unset: y for glTF/GLB, its own tag for DAE, z otherwise
+  std::string_view in_memory{};  // the contents, when `file` only names them and says the format
 };
 
 struct LoadedMesh {

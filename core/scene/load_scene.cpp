@@ -1,5 +1,8 @@
 #include "core/scene/load_scene.hpp"
 
+#include <algorithm>
+
+#include "core/scene/built_in_scenes.hpp"
 #include "core/scene/materials.hpp"
 #include "core/scene/read_objects.hpp"
 #include "core/scene/shapes.hpp"
@@ -20,10 +23,11 @@ void read_material_library(const text::Node& node, const std::filesystem::path& 
 }
 
 Result<std::shared_ptr<const Scene>> read_scene(const text::Document& document, const std::filesystem::path& folder,
-                                                const std::string& fallback_name) {
+                                                const std::string& fallback_name,
+                                                std::span<const BuiltInFile> meshes_in_memory = {}) {
   auto scene = std::make_shared<Scene>();
   MaterialTable materials(*scene);
-  ShapeReader shapes{.scene = *scene, .materials = materials, .folder = folder};
+  ShapeReader shapes{.scene = *scene, .materials = materials, .folder = folder, .in_memory = meshes_in_memory};
   text::Map root = document.root();
   scene->name = root.optional("name").text_or(fallback_name, 64);
   read_material_library(root.optional("material_library"), folder, materials);
@@ -47,6 +51,16 @@ Result<std::shared_ptr<const Scene>> parse_scene(std::string_view text, const st
   auto document = text::parse_yaml(text, name, {.error_kind = ErrorKind::bad_data});
   if (!document) return tl::make_unexpected(document.error());
   return read_scene(*document, folder, name);
+}
+
+Result<std::shared_ptr<const Scene>> load_built_in_scene(std::string_view name) {
+  const std::span<const BuiltInFile> files = built_in_files();
+  const auto file = std::find_if(files.begin(), files.end(), [&](const BuiltInFile& f) { return f.name == name; });
+  if (file == files.end() || !is_built_in_scene(name))
+    return failure(ErrorKind::missing_file, "no scene called " + std::string(name) + " is built in; give a scene file");
+  auto document = text::parse_yaml(file->contents, "built-in " + std::string(name), {.error_kind = ErrorKind::bug});
+  if (!document) return tl::make_unexpected(document.error());
+  return read_scene(*document, {}, std::string(name.substr(0, name.find('.'))), files);
 }
 
 }  // namespace sonar

@@ -16,5 +16,7 @@ Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& fil
 /// The same from text; `name` starts the errors, paths in the scene are relative to `folder`.
 Result<std::shared_ptr<const Scene>> parse_scene(std::string_view text, const std::string& name,
                                                  const std::filesystem::path& folder);
+/// One of built_in_scenes (core/scene/built_in_scenes.hpp); reads no files.
+Result<std::shared_ptr<const Scene>> load_built_in_scene(std::string_view name);
 
 }  // namespace sonar

@@ -4,8 +4,10 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 
+#include "core/scene/built_in_scenes.hpp"
 #include "core/scene/load_mesh.hpp"
 #include "core/scene/materials.hpp"
 #include "core/scene/scene.hpp"
@@ -23,6 +25,7 @@ struct ShapeReader {
   Scene& scene;
   MaterialTable& materials;
   std::filesystem::path folder;                   // paths in the scene are relative to it
+  std::span<const BuiltInFile> in_memory = {};    // of a built-in scene: its mesh files, which are then not looked for on disk
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
   std::map<std::string, Shape> files = {};        // the same with their materials: objects that agree share one
 

@@ -1,0 +1,24 @@
+// The shipped scenes that are part of the program, so that the demo and the benchmark need no files on disk.
+// Made from scenes/ when the program is configured; read by the scene loader, chosen by the daemon.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <string_view>
+
+namespace sonar {
+
+/// What load_built_in_scene() knows.
+inline constexpr std::array<std::string_view, 2> built_in_scenes{"demo.yaml", "local-search.yaml"};
+constexpr bool is_built_in_scene(std::string_view name) {
+  return std::find(built_in_scenes.begin(), built_in_scenes.end(), name) != built_in_scenes.end();
+}
+
+/// A scene, or a mesh that one of them names; `name` is relative to scenes/.
+struct BuiltInFile {
+  std::string_view name, contents;
+};
+std::span<const BuiltInFile> built_in_files();
+
+}  // namespace sonar
