@@ -1,6 +1,6 @@
 // Every Oculus message, described once: trade names in the structs, the vendor's spelling in fields(), wire order and widths.
 // Little-endian, byte-packed, sent over TCP 52100 both ways and (status) over UDP 52102; see README.md here.
-// Layouts: docs/protocols/oculus.md and the public drivers named there; captured pings confirm header and version-1 result.
+// Layouts: docs/protocols/oculus.md and the sources named there; captured pings confirm header and version-1 result.
 #pragma once
 
 #include "protocol/wire/wire.hpp"

@@ -9,7 +9,7 @@
 namespace sonar::oculus {
 namespace {
 
-// Sources of the numbers below. VND: the vendor's public sample viewer as mirrored in driver repositories. ENS:
+// Sources of the numbers below, facts only. VND: the vendor's own sample viewer as mirrored in public repositories. ENS:
 // ENSTABretagneRobotics oculus_driver. APL: liboculus, include/liboculus/Constants.h and part number list. BLU: BluEye-Robotics
 // oculus_driver. BAS: bastianschildknecht sonar_driver. CAP: the captured M1200d pings. unknown: no public source; the value is
 // our choice.
