@@ -1,7 +1,8 @@
 """The demo looks like a sonar image, in figures on its quantised samples, computed by `sonarctl stats`.
 
 From the demo's first pose, with 256 beams as in the captured pings of a real M1200d, whose figures are: adjacent-beam correlation
-0.80, adjacent-row 0.58, quiet near field with a mean of 8, noise rising towards the far end.
+0.80, adjacent-row 0.58, quiet near field with a mean of 8, noise rising towards the far end. In the 512 format, which the demo's
+picture has, beams are as wide but stand half as far apart (0.117 degrees, a beam is 0.4 wide), so that neighbours are more alike.
 """
 import json
 import pathlib
@@ -10,28 +11,41 @@ import unittest
 
 from running_sonard import SONARCTL, Sonard, run
 
-SAND = "250:350,75:125"              # 5.5 to 7.8 m, 12 degrees to port: rippled sand, nothing on it
-BOULDER_SHADOW = "200:208,68:74"     # 4.5 m, 13 degrees to port, behind the second small boulder
-BESIDE_IT = "200:208,80:110"
+# Rows and beams of 256; rows are 22 mm.
+SAND = (250, 350, 75, 125)            # 5.5 to 7.8 m, 12 degrees to port: rippled sand, nothing on it
+SHADOWS = {                           # a shadow, and sand at the same range
+    "the second cobble": ((200, 208, 68, 74), (200, 208, 80, 110)),  # 4.5 m, 13 degrees to port
+    "the wreck": ((236, 252, 222, 246), (236, 252, 66, 110)),        # 5.4 m, 25 degrees to starboard, behind its near side
+}
+
+
+def window(place, beams):
+    first_row, last_row, first_beam, last_beam = place
+    return f"{first_row}:{last_row},{first_beam * beams // 256}:{last_beam * beams // 256}"
 
 
 class Picture(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
-        raw, png = (pathlib.Path(cls.folder.name) / name for name in ("raw", "demo.png"))
+        cls.raw = {beams: pathlib.Path(cls.folder.name) / f"raw {beams}" for beams in (256, 512)}
+        png = pathlib.Path(cls.folder.name) / "demo.png"
         with Sonard(mount="{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}") as daemon:
-            result = daemon.ctl("listen", "--pings", 3, "--quiet", "--beams", 256, "--record", raw, "--png", png)
-        assert result.returncode == 0, result.stdout + result.stderr
+            for beams, raw in cls.raw.items():
+                result = daemon.ctl("listen", "--pings", 3, "--quiet", "--beams", beams, "--record", raw, "--png", png)
+                assert result.returncode == 0, result.stdout + result.stderr
         cls.png = png.read_bytes()
-        result = run(SONARCTL, "stats", "--from-raw", raw, "--ping", 1, "--rows", SAND, "--shadow", BOULDER_SHADOW,
-                     "--surroundings", BESIDE_IT, "--json")
-        assert result.returncode == 0, result.stderr
-        cls.figures = json.loads(result.stdout)
+        cls.figures = cls.stats(256)
 
     @classmethod
     def tearDownClass(cls):
         cls.folder.cleanup()
+
+    @classmethod
+    def stats(cls, beams, *arguments):
+        result = run(SONARCTL, "stats", "--from-raw", cls.raw[beams], "--ping", 1, "--rows", window(SAND, beams), *arguments, "--json")
+        assert result.returncode == 0, result.stderr
+        return json.loads(result.stdout)
 
     def test_speckle_is_wider_across_beams_than_along_range(self):
         beams = self.figures["window"]["correlation_of_adjacent_beams"][0]
@@ -40,6 +54,12 @@ class Picture(unittest.TestCase):
         self.assertTrue(0.4 <= rows <= 0.7, rows)
         self.assertGreater(beams, rows)
 
+    def test_with_512_beams_neighbours_are_more_alike(self):
+        half_as_far, as_far = self.stats(512)["window"]["correlation_of_adjacent_beams"][:2]
+        self.assertTrue(0.85 <= half_as_far <= 0.95, half_as_far)
+        of_256 = self.figures["window"]["correlation_of_adjacent_beams"][0]
+        self.assertAlmostEqual(as_far, of_256, delta=0.06, msg="every other beam of 512 is a beam of 256")
+
     def test_the_near_field_is_quiet_and_noise_rises_with_range(self):
         figures = self.figures["range"]
         self.assertGreater(figures["first_echo_row"], 100, "the bed is first met beyond 2 m")
@@ -47,7 +67,11 @@ class Picture(unittest.TestCase):
         self.assertGreater(figures["last_50_rows_mean"], figures["near_field_mean"])
 
     def test_shadows_are_dark(self):
-        self.assertLess(self.figures["shadow"]["ratio"], 1 / 3, self.figures["shadow"])
+        for name, (shadow, beside) in SHADOWS.items():
+            for beams in self.raw:
+                with self.subTest(behind=name, beams=beams):
+                    figures = self.stats(beams, "--shadow", window(shadow, beams), "--surroundings", window(beside, beams))
+                    self.assertLess(figures["shadow"]["ratio"], 1 / 3, figures["shadow"])
 
     def test_samples_use_their_range_without_burning_out(self):
         self.assertLess(self.figures["window"]["saturated_share"], 0.01)
