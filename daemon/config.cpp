@@ -88,7 +88,7 @@ SceneFile read_scene_file(const Node& node, const std::filesystem::path& directo
 void read_world(Map map, Config& config, const std::filesystem::path& directory) {
   config.scene = read_scene_file(map.required("scene"), directory);
   config.seed = map.optional("seed").unsigned_integer_or(1);
-  if (Node origin = map.optional("origin")) {  // kept for geodetic poses; checked so that it is right when they come
+  if (Node origin = map.optional("origin")) {  // nothing uses it before geodetic poses do; checked so that it is right then
     Map place = origin.map();
     place.required("lat").number(Range::between(-90, 90));
     place.required("lon").number(Range::between(-180, 180));
@@ -135,8 +135,17 @@ std::size_t read_vehicle_of(Map& map, const Config& config) {
 
 protocol::OptionValues read_options(const Node& node, const protocol::Vendor& vendor) {
   protocol::OptionValues given;
-  if (node.present())
-    for (auto& [key, value] : node.map().entries()) given[key] = value.text(64);
+  Map map = node.map();
+  for (const protocol::Option& option : vendor.options()) {  // asked for one by one: errors then stand where the mistake is
+    const Node value = map.optional(option.name);
+    if (!value.present()) continue;
+    if (option.allowed.empty()) {
+      value.number(Range::above(0));
+    } else {
+      value.choice_index(option.allowed);
+    }
+    given[std::string(option.name)] = value.text(64);
+  }
   auto complete = check_options(vendor, given);
   if (!complete) node.fail(complete.error().text);
   return complete.value_or(protocol::OptionValues{});

@@ -10,6 +10,7 @@
 namespace sonar {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -132,8 +133,12 @@ TEST(Config, UnknownKeysNameTheNearest) {
   EXPECT_THAT(why(world + vehicles + sonar + "    bind_pi: 127.0.0.3\n"),
               StartsWith("sonard.yaml:7:5: sonars[0].bind_pi: unknown key; did you mean \"bind_ip\"?"));
   EXPECT_THAT(why(world + vehicles + sonar + "pose: {}\n"), HasSubstr("did you mean \"poses\"?"));
-  EXPECT_THAT(why(world + vehicles + sonar + "    options: {gain_ehco: auto}\n"), HasSubstr("gain_echo"));
-  EXPECT_THAT(why(world + vehicles + sonar + "    options: {gain_echo: maybe}\n"), HasSubstr("sonars[0].options"));
+  EXPECT_THAT(why(world + vehicles + sonar + "    options: {gain_ehco: auto}\n"),
+              StartsWith("sonard.yaml:7:15: sonars[0].options.gain_ehco: unknown key; did you mean \"gain_echo\"?"));
+  EXPECT_THAT(why(world + vehicles + sonar + "    options: {before_first_fire: pings, gain_echo: aut}\n"),
+              AllOf(StartsWith("sonard.yaml:7:52: sonars[0].options.gain_echo: "), HasSubstr("did you mean \"auto\"?")));
+  EXPECT_THAT(why(world + vehicles + sonar + "    options: {dummy_period_ms: 0}\n"),
+              StartsWith("sonard.yaml:7:32: sonars[0].options.dummy_period_ms: "));
   EXPECT_THAT(why(world + vehicles + sonar + "    clients: {when_full: close}\n"), HasSubstr("close_new"));
 }
 
