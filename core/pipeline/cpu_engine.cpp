@@ -1,4 +1,6 @@
 // The CPU's ping engine: owns the rays' scene, the surface cells and the buffers, and runs simulate() for each request.
+#include <stdexcept>
+
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simulate.hpp"
 
@@ -20,6 +22,7 @@ class CpuEngine final : public PingEngine {
     std::vector<Ping> pings;
     pings.reserve(requests.size());
     for (const PingRequest& request : requests) {
+      if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
       if (!cells_ || cells_->seed() != request.seed)
         cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes);
       if (!scene_->bodies_in_world.empty())

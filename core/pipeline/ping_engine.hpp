@@ -36,7 +36,8 @@ struct PingStatistics {
 class PingEngine {
  public:
   virtual ~PingEngine() = default;
-  /// Requests must be valid (why_invalid in core/pipeline/ping_plan.hpp is empty). One caller at a time.
+  /// A request that cannot be simulated (why_invalid in core/pipeline/ping_plan.hpp) throws std::invalid_argument with the
+  /// reason. One caller at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
   /// Of the last ping.

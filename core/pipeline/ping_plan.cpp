@@ -35,7 +35,7 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings) {
                                    : static_cast<double>(mode.pattern.elevation_width_rad) * unit_fan_over_width / 2;
   fan.half_angle_rad = std::min(reach, widest_fan_rad);
   const double tangent = std::tan(fan.half_angle_rad);
-  const double wanted = static_cast<double>(settings.range_m) * 2 * tangent / (0.7 * static_cast<double>(settings.pulse_width_m));
+  const double wanted = settings.range_m * 2 * tangent / (0.7 * static_cast<double>(settings.pulse_width_m));
   fan.bins = 256;
   while (fan.bins < 2048 && fan.bins < wanted) fan.bins *= 2;
   fan.first_tangent = static_cast<float>(-tangent);
@@ -83,8 +83,7 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
 void fill_row_gains(PingPlan& plan) {
   const PingSettings& s = plan.settings;
   const auto tvg = [&](int row) {
-    return s.tvg ? tvg_db(plan.mode.receiver, (row + 0.5) * static_cast<double>(s.range_bin_m),
-                          static_cast<double>(s.device_absorption_db_per_m))
+    return s.tvg ? tvg_db(plan.mode.receiver, (row + 0.5) * s.range_bin_m, static_cast<double>(s.device_absorption_db_per_m))
                  : 0.0;
   };
   const double smallest = tvg(0);
@@ -185,7 +184,7 @@ std::vector<float> make_pulse_rows(double samples_per_width, int taps, int steps
     return std::exp(-(squared ? 2 : 1) * x * x);
   };
   std::vector<float> rows;
-  for (int step = 0; step < steps; ++step) {
+  for (int step = 0; step <= steps; ++step) {  // one more than steps: a fraction may round up to a whole
     for (int tap = 0; tap < taps; ++tap) rows.push_back(static_cast<float>(value(step, tap)));
     for (int tap = 0; tap < taps; ++tap) rows.push_back(static_cast<float>(value(step + 1, tap) - value(step, tap)));
   }
@@ -214,19 +213,25 @@ std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_
 }
 
 std::vector<float> make_noise_filter(double bt) {
-  const int order = static_cast<int>(std::clamp(std::ceil(4.3 / bt), 2.0, 64.0));
+  constexpr int longest = 160;
+  const int wanted = static_cast<int>(std::max(std::ceil(6.1 / bt), 2.0));  // the correlation falls to 1e-8
+  const int order = std::min(wanted, longest);
   std::vector<double> r(static_cast<std::size_t>(order) + 1);
-  for (int k = 0; k <= order; ++k) r[static_cast<std::size_t>(k)] = std::exp(-0.5 * bt * bt * k * k);
-  r[0] += 1e-4;  // keeps the factorisation definite on fine grids, where the spectrum falls to nothing
+  for (int k = 0; k <= order; ++k) {
+    // Cut short, a Gaussian is no correlation any more; under a triangle it still is.
+    const double window = wanted > longest ? 1.0 - static_cast<double>(k) / (order + 1) : 1.0;
+    r[static_cast<std::size_t>(k)] = window * std::exp(-0.5 * bt * bt * k * k);
+  }
+  r[0] += 1e-5;  // keeps the factorisation definite on fine grids, where the spectrum falls to nothing
   // Bauer's method: the rows of the Cholesky factor of the long banded Toeplitz matrix tend to the minimum-phase factor.
-  const int n = 64 * order;
+  const int n = 12 * order + 64;
   std::vector<std::vector<double>> band(static_cast<std::size_t>(n), std::vector<double>(static_cast<std::size_t>(order) + 1));
   const auto l = [&](int i, int j) -> double& { return band[static_cast<std::size_t>(i)][static_cast<std::size_t>(i - j)]; };
   for (int i = 0; i < n; ++i)
     for (int j = std::max(0, i - order); j <= i; ++j) {
       double sum = r[static_cast<std::size_t>(i - j)];
       for (int k = std::max(0, i - order); k < j; ++k) sum -= l(i, k) * l(j, k);
-      l(i, j) = i == j ? std::sqrt(sum) : sum / l(j, j);
+      l(i, j) = i == j ? std::sqrt(std::max(sum, 1e-12)) : sum / l(j, j);
     }
   std::vector<float> h;
   double energy = 0;
@@ -249,14 +254,14 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
 
   p.samples = settings.range_bin_count * settings.samples_per_row;
-  p.sample_spacing_m = static_cast<double>(settings.range_bin_m) / settings.samples_per_row;
+  p.sample_spacing_m = settings.range_bin_m / settings.samples_per_row;
   const double samples_per_width = static_cast<double>(settings.pulse_width_m) / p.sample_spacing_m;
   p.taps = 8 * std::max(1, static_cast<int>(std::ceil(2 * pulse_reach_widths * samples_per_width / 8 - 0.05)));
   p.pulse_rows = make_pulse_rows(samples_per_width, p.taps, p.pulse_steps, p.expected_power);
   const double c_dev = static_cast<double>(settings.device_sound_speed_mps);
   p.envelope_hz = envelope_parameter_hz(c_dev, static_cast<double>(settings.pulse_width_m));
   p.levels = make_cell_levels(static_cast<double>(settings.pulse_width_m), static_cast<double>(mode.pattern.azimuth_width_rad),
-                              static_cast<double>(settings.range_m) * 1.1);
+                              settings.range_m * 1.1);
 
   p.noise_filter = make_noise_filter(p.envelope_hz * 2 * p.sample_spacing_m / c_dev);
   p.column_noise_upa = noise_rms_upa(mode, noise_bandwidth_hz(p.envelope_hz)) / std::sqrt(p.coupling.weight_energy);
@@ -285,7 +290,7 @@ std::string why_invalid(const PingRequest& r) {
     return "range_bin_count " + std::to_string(s.range_bin_count) + " is not in 1..65535";
   if (s.samples_per_row < 1 || s.samples_per_row > 64)
     return "samples_per_row " + std::to_string(s.samples_per_row) + " is not in 1..64";
-  const auto positive = [](float x) { return x > 0 && std::isfinite(x); };
+  const auto positive = [](auto x) { return x > 0 && std::isfinite(x); };
   if (!positive(s.range_bin_m) || !positive(s.pulse_width_m) || !positive(s.range_m) || !positive(s.device_sound_speed_mps))
     return "range, row spacing, pulse width and sound speed must be positive and finite";
   if (!std::isfinite(s.gain_db) || !std::isfinite(s.device_absorption_db_per_m)) return "gain and absorption must be finite";

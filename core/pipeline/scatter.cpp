@@ -171,7 +171,7 @@ std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pos
     const double column = std::floor((plan.columns.first_sine - direction.u) / plan.columns.spacing + 0.5);
     if (std::abs(direction.psi_rad) > plan.fan.half_angle_rad || column < 0 || column >= plan.columns.count) continue;
 
-    RayPacket ray;
+    RayPacket ray{};
     const Vec3d along = (1 / r) * (in_world - sonar_in_world.position_m);
     ray.origin_x[0] = s.position_in_scene.x, ray.origin_y[0] = s.position_in_scene.y, ray.origin_z[0] = s.position_in_scene.z;
     const Vec3 d = to_float(along);

@@ -144,12 +144,8 @@ struct RayScene::Impl {
     for (std::size_t i = 0; i < scene->objects.size(); ++i) {
       const Object& object = scene->objects[i];
       if (!object.visible || object.mesh->triangles.empty()) continue;
-      Pose placed_in_group = object.in_world;
-      if (object.body < 0) {
-        placed_in_group.position_m = placed_in_group.position_m - origin;
-      } else {
-        placed_in_group = compose(inverse(scene->bodies_in_world.at(static_cast<std::size_t>(object.body))), object.in_world);
-      }
+      Pose placed_in_group = scene->in_body(object);
+      if (object.body < 0) placed_in_group.position_m = placed_in_group.position_m - origin;
       add_object(device, groups[static_cast<std::size_t>(object.body + 1)], *object.mesh, placed_in_group,
                  static_cast<std::uint32_t>(i));
     }

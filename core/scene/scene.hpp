@@ -59,6 +59,11 @@ struct Scene {
   SeaSurface sea_surface;               // its mesh, if present, is one of the objects
   std::vector<std::string> notes;       // what the loader did that its user should know, one sentence each
 
+  /// Where an object sits in its body; in the world for a static one.
+  Pose in_body(const Object& object) const {
+    if (object.body < 0) return object.in_world;
+    return compose(inverse(bodies_in_world.at(static_cast<std::size_t>(object.body))), object.in_world);
+  }
   std::size_t triangle_count() const {
     std::size_t n = 0;
     for (const Object& o : objects) n += o.mesh->triangles.size();

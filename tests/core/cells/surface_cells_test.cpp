@@ -195,6 +195,29 @@ TEST(SurfaceCells, SameBytesForAnyPoolAndAfterBeingForgotten) {
   EXPECT_EQ(b.built_last_time(), 0u);
 }
 
+TEST(SurfaceCells, AnObjectAttachedToABodyHasItsCellsWhereItIs) {
+  const Pose attached{{1.5, -0.4, 0.3}, quat_from_rpy({0.2, -0.1, 0.7})};  // in the body
+  const Pose body_then{{9, 9, -9}, quat_from_rpy({0, 0, 2})}, body_now{{3, 1, 0.5}, quat_from_rpy({0.1, 0.3, -0.4})};
+  auto fixed = std::make_shared<Scene>(*scene_of(sphere(0.4, 12)));
+  auto riding = std::make_shared<Scene>(*fixed);
+  fixed->objects[0].in_world = compose(body_now, attached);
+  riding->objects[0].in_world = compose(body_then, attached);
+  riding->objects[0].body = 0;
+  riding->body_names = {"rider"};
+  riding->bodies_in_world = {body_then};
+
+  Parallel pool(1);
+  SurfaceCells a(fixed, Seed{5}, 1u << 30), b(riding, Seed{5}, 1u << 30);
+  CellView view = whole_scene(6, {-2, 0, 0});
+  const auto expected = a.in_view(view, pool);
+  view.bodies_in_world = std::span(&body_now, 1);
+  const auto found = b.in_view(view, pool);
+  ASSERT_EQ(found.size(), expected.size());
+  ASSERT_FALSE(found.empty());
+  for (std::size_t i = 0; i < found.size(); ++i) EXPECT_LT(length(found[i].from_sonar_m - expected[i].from_sonar_m), 1e-9);
+  EXPECT_EQ(bytes_of(found), bytes_of(expected));  // its speckle rides with it
+}
+
 TEST(SurfaceCells, ALongJourneyStaysWithinItsBudget) {
   const std::size_t budget = 4u << 20;
   SurfaceCells cells(scene_of(terrain(200, 100.0, gentle)), Seed{5}, budget),

@@ -1,0 +1,39 @@
+// The filter that gives white noise the pulse's correlation, on every grid a sonar may ask for.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/pipeline/arithmetic/waveform.hpp"
+#include "core/pipeline/ping_plan.hpp"
+
+namespace sonar {
+namespace {
+
+class NoiseFilter : public ::testing::TestWithParam<double> {};  // samples per -3 dB pulse width
+
+double correlation(const std::vector<float>& h, std::size_t lag) {
+  double sum = 0;
+  for (std::size_t i = 0; i + lag < h.size(); ++i) sum += static_cast<double>(h[i]) * static_cast<double>(h[i + lag]);
+  return sum;
+}
+
+TEST_P(NoiseFilter, CorrelatesLikeThePulse) {
+  const double bt = 2 * half_power_bt / GetParam();
+  const std::vector<float> h = make_noise_filter(bt);
+  EXPECT_NEAR(correlation(h, 0), 1.0, 1e-5);
+  for (std::size_t lag = 1; lag < h.size(); ++lag)
+    EXPECT_NEAR(correlation(h, lag), std::exp(-0.5 * bt * bt * static_cast<double>(lag * lag)), 0.02) << "lag " << lag;
+}
+INSTANTIATE_TEST_SUITE_P(UsualGrids, NoiseFilter, ::testing::Values(0.5, 0.9, 1.0, 2.355, 5, 9, 10, 20, 30));
+
+TEST(NoiseFilter, StaysFiniteOnAbsurdlyFineGrids) {
+  for (const double samples_per_width : {40.0, 57.0, 64.0, 300.0}) {
+    const std::vector<float> h = make_noise_filter(2 * half_power_bt / samples_per_width);
+    for (const float tap : h) ASSERT_TRUE(std::isfinite(tap)) << samples_per_width;
+    EXPECT_NEAR(correlation(h, 0), 1.0, 1e-4);
+    EXPECT_GT(correlation(h, 1), 0.9);
+  }
+}
+
+}  // namespace
+}  // namespace sonar
