@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs the tests. usage: ./test.sh [--long] [ctest arguments...]
-#   --long   also the tests labelled "long", a minute of each fuzz target and the thread sanitizer on the daemon
+#   --long   also a minute of each fuzz target and the thread sanitizer on the daemon
 # Tests that read recordings of real devices take their folder from SONARD_CAPTURES and are skipped without it.
 set -u -o pipefail
 cd "$(dirname "$0")" || exit 70
@@ -18,6 +18,4 @@ if [ -n "$long" ]; then
   tests/tools/long_checks.sh || exit
 fi
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"
-only=(-LE long)
-[ -n "$long" ] && only=()
-ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-2}" --output-on-failure --no-tests=error "${only[@]}" "$@" </dev/null
+ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-2}" --output-on-failure --no-tests=error "$@" </dev/null
