@@ -27,7 +27,7 @@ std::string sonar_lines(const Device& device) {
   const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
   std::string text =
       "sonar     " + device.config().name + "  " + model.name + "  " + frequency_text(static_cast<double>(mode.centre_hz)) +
-      format("  %d beams  %g m  %g Hz\n", s.beam_count, static_cast<double>(s.range_m), static_cast<double>(s.rate_hz));
+      format("  %d beams  %g m  %g Hz\n", s.beam_count, s.range_m, static_cast<double>(s.rate_hz));
   const tcp::endpoint data = device.data_endpoint();
   text += format("  data    tcp %s:%d", data.address().to_string().c_str(), data.port());
   for (const udp::endpoint& to : device.status_destinations())

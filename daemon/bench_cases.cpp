@@ -16,10 +16,10 @@ BenchCase oculus(std::string name, std::string description, int mode, double ran
   PingSettings& s = c.settings;
   s.mode = mode;
   s.beam_count = 512;
-  s.range_m = static_cast<float>(range_m);
+  s.range_m = range_m;
   s.range_bin_count = rows;
-  s.range_bin_m = static_cast<float>(range_m / rows);
-  s.pulse_width_m = 0.9f * s.range_bin_m;
+  s.range_bin_m = range_m / rows;
+  s.pulse_width_m = static_cast<float>(0.9 * s.range_bin_m);
   s.gain_db = 48;
   s.device_sound_speed_mps = 1500;
   s.format.gamma = 127.0f / 255.0f;

@@ -7,7 +7,7 @@ namespace sonar {
 std::chrono::nanoseconds ping_period(const PingSettings& s) {
   if (!(s.rate_hz > 0)) return std::chrono::nanoseconds(0);
   const double sound_speed_mps = s.device_sound_speed_mps > 0 ? static_cast<double>(s.device_sound_speed_mps) : 1500.0;
-  const double travel_s = 2.0 * static_cast<double>(s.range_m) / sound_speed_mps + 0.002;
+  const double travel_s = 2.0 * s.range_m / sound_speed_mps + 0.002;
   return nanoseconds_from(std::max(1.0 / static_cast<double>(s.rate_hz), travel_s));
 }
 

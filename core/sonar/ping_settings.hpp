@@ -17,8 +17,8 @@ struct PingSettings {
   int mode = 0;  // index into SonarModel::modes
   int beam_count = 512;
   int range_bin_count = 437;      // rows
-  float range_m = 10;             // as used by the device, full scale
-  float range_bin_m = 0.0229f;    // row spacing, in the device's metres (with its believed sound speed)
+  double range_m = 10;            // as used by the device, full scale
+  double range_bin_m = 0.0229;    // row spacing, in the device's metres (with its believed sound speed); packets carry it exactly
   float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (docs/acoustics.md, section 4)
   int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples across it
   float rate_hz = 10;             // 0 = standby

@@ -42,8 +42,8 @@ PingSettings p900_90_preset() {
   PingSettings settings;
   settings.beam_count = 512;
   settings.range_bin_count = preset_rows;
-  settings.range_bin_m = static_cast<float>(row_m);
-  settings.range_m = static_cast<float>(preset_rows * row_m);
+  settings.range_bin_m = row_m;
+  settings.range_m = preset_rows * row_m;
   settings.pulse_width_m = static_cast<float>(row_m);  // DS: equal to the row
   settings.rate_hz = 15;
   settings.gain_db = 48;

@@ -37,7 +37,7 @@ void set_pulse(PingSettings& settings, double spacing_m, bool native) {
 
 double highest_rate_hz(const FireSettings& fire, const PingSettings& settings, const protocol::DeviceState& device) {
   double rate = std::min(table_rate_hz(fire.ping_rate), static_cast<double>(device.model->max_rate_hz));
-  const double echo_time_s = 2.0 * static_cast<double>(settings.range_m) / static_cast<double>(settings.device_sound_speed_mps);
+  const double echo_time_s = 2.0 * settings.range_m / static_cast<double>(settings.device_sound_speed_mps);
   rate = std::min(rate, 1.0 / (echo_time_s + rest_per_ping_s));
   const bool limited = fire.network_speed != 0 && fire.network_speed != 255;
   if (limited && text_option(device.options, option_name::honour_network_speed) == "true")
@@ -131,10 +131,10 @@ Settled settle(const FireRequest& fire, const protocol::DeviceState& device) {
   const bool metres = (asked.flags & flag::range_in_metres) != 0;
   const double range = metres ? asked.range : asked.range / 100 * static_cast<double>(mode.max_range_m);
   const double used_range = clamped(range, mode.min_range_m, mode.max_range_m, "range", "m", out.clamped);
-  settings.range_m = static_cast<float>(used_range);
+  settings.range_m = used_range;
   const RowLaw rows = row_law(used_range, speed, std::clamp(number_option(device.options, option_name::row_rate_hz), 1e4, 1e7));
   settings.range_bin_count = rows.count;
-  settings.range_bin_m = static_cast<float>(rows.spacing_m);
+  settings.range_bin_m = rows.spacing_m;
   set_pulse(settings, rows.spacing_m, text_option(device.options, option_name::pulse) == "native");
 
   settings.beam_count = (asked.flags & flag::beams_512) != 0 ? 512 : 256;

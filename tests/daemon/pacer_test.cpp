@@ -8,7 +8,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-PingSettings settings(float rate_hz, float range_m = 5, bool triggered = false) {
+PingSettings settings(float rate_hz, double range_m = 5, bool triggered = false) {
   PingSettings s;
   s.rate_hz = rate_hz;
   s.range_m = range_m;

@@ -28,7 +28,7 @@ void require(bool statement) {
 
 void check(const PingSettings& s) {
   require(s.mode == 0 || s.mode == 1);
-  require(s.range_m >= 0.1f && s.range_m <= 40 && s.range_bin_count >= 1 && s.range_bin_count <= 720);
+  require(s.range_m >= static_cast<double>(0.1f) && s.range_m <= 40 && s.range_bin_count >= 1 && s.range_bin_count <= 720);
   require(s.gain_db >= 0 && s.gain_db < 96.01f && s.rate_hz >= 0 && s.rate_hz <= 40);
   require(s.device_sound_speed_mps >= 1300 && s.device_sound_speed_mps <= 1700);
   require(std::isfinite(s.device_absorption_db_per_m) && s.format.gamma > 0 && s.format.gamma <= 1);

@@ -99,7 +99,7 @@ TEST(BlueView, PresetIsTheBenchmarksCase) {
   const PingSettings preset = blueview::p900_90_preset();
   EXPECT_EQ(preset.beam_count, 512);
   EXPECT_EQ(preset.range_bin_count, 394);
-  EXPECT_FLOAT_EQ(preset.range_bin_m, 0.0254f);
+  EXPECT_EQ(preset.range_bin_m, 0.0254);
   EXPECT_FLOAT_EQ(preset.pulse_width_m, 0.0254f);
   EXPECT_NEAR(preset.range_m, 10, 0.0254);
 }

@@ -23,7 +23,7 @@ std::shared_ptr<const Scene> flat_bed(double lambert_db) {
 double beam_energy(const Sounding& s, int beam, int from, int to) {
   double sum = 0;
   for (int row = from; row < to; ++row) sum += s.power(row, beam);
-  return sum * 2 * static_cast<double>(s.request.settings.range_bin_m) / 1500;
+  return sum * 2 * s.request.settings.range_bin_m / 1500;
 }
 
 /// Mean over the beams within `azimuth_deg` of ahead.
@@ -200,11 +200,20 @@ TEST(LevelOracles, EdgeBeamsAreNotDimAndNothingComesFromBeyond) {
   }
 }
 
-// Every sample of every beam within 40 degrees, pattern on: no holes, no stripes.
+// Every sample of every beam within 40 degrees, pattern on: no holes, no stripes. `share` of them lie within 1 dB; what some
+// settings lack is the jitter of few cells in a sample (docs/acoustics.md, section 3), and no sample is a hole.
 TEST(LevelOracles, Oracle32_FlatBedIsFilled) {
   const double height = 2, lambert_db = -27, tilt = 0.25;
-  for (const PingSettings& settings : {native_rows(10, 0.0254), default_rows(10, 354)}) {
-    Sounding s(flat_bed(lambert_db), p900(), settings);
+  struct Case {
+    FrequencyMode mode;
+    PingSettings settings;
+    double share;
+  };
+  for (const auto& [mode, settings, share] :
+       {Case{p900(), native_rows(10, 0.0254), 0.99}, Case{p900(), default_rows(10, 354), 0.99},
+        Case{oculus_high(), default_rows(10, 720), 0.99}, Case{oculus_high(), default_rows(10, 437), 0.98},
+        Case{oculus_low(), default_rows(30, 720), 0.98}}) {
+    Sounding s(flat_bed(lambert_db), mode, settings);
     s.request.switches.expected_power = true;
     s.ping_from({0, 0, height}, {0, tilt, 0});
     const reference::SeabedLevel bed(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, tilt);
@@ -225,7 +234,8 @@ TEST(LevelOracles, Oracle32_FlatBedIsFilled) {
       }
     }
     EXPECT_GT(all, 50000);
-    EXPECT_GE(good, 0.99 * all) << "worst " << worst << " dB, rows of " << settings.range_bin_m;
+    EXPECT_GE(good, share * all) << mode.name << ": worst " << worst << " dB, rows of " << settings.range_bin_m;
+    EXPECT_LT(worst, 4) << mode.name << ", rows of " << settings.range_bin_m;
   }
 }
 
@@ -264,8 +274,7 @@ TEST(LevelOracles, Oracle33_ShadowBehindABox) {
   }
   // Rows wholly behind the box, before its shadow ends: the box's top edge throws it to x = 4.3 * 2 / 0.8 m.
   const int from = static_cast<int>(s.row_of_range(5.3)), to = static_cast<int>(s.row_of_range(7.0));
-  reference::Grid grid{1500, s.envelope_hz(), s.range_of_row(from), static_cast<double>(s.request.settings.range_bin_m),
-                       to - from};
+  reference::Grid grid{1500, s.envelope_hz(), s.range_of_row(from), s.request.settings.range_bin_m, to - from};
   std::vector<int> beams;
   std::vector<double> sines;
   for (const double azimuth_deg : {9.0, 11.0, 13.0})

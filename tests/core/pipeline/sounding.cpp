@@ -47,9 +47,9 @@ PingSettings native_rows(double range_m, double pulse_width_m) {
   PingSettings s;
   const double spacing = 1500 / (2 * native_sample_rate_hz(envelope_parameter_hz(1500, pulse_width_m)));
   s.beam_count = 512;
-  s.range_bin_m = static_cast<float>(spacing);
+  s.range_bin_m = spacing;
   s.range_bin_count = static_cast<int>(std::ceil(range_m / spacing));
-  s.range_m = static_cast<float>(range_m);
+  s.range_m = range_m;
   s.pulse_width_m = static_cast<float>(pulse_width_m);
   s.format = {.bits = 16, .max_code = 65535, .gamma = 1, .row_gains = false};
   return s;
@@ -58,7 +58,7 @@ PingSettings native_rows(double range_m, double pulse_width_m) {
 PingSettings default_rows(double range_m, int rows) {
   PingSettings s = native_rows(range_m, 1);
   s.range_bin_count = rows;
-  s.range_bin_m = static_cast<float>(range_m / rows);
+  s.range_bin_m = range_m / rows;
   s.pulse_width_m = static_cast<float>(0.9 * range_m / rows);
   return s;
 }
@@ -98,8 +98,8 @@ double Sounding::envelope_hz() const {
   return envelope_parameter_hz(static_cast<double>(request.settings.device_sound_speed_mps),
                                static_cast<double>(request.settings.pulse_width_m));
 }
-double Sounding::range_of_row(double row) const { return (row + 0.5) * static_cast<double>(request.settings.range_bin_m); }
-double Sounding::row_of_range(double range_m) const { return range_m / static_cast<double>(request.settings.range_bin_m) - 0.5; }
+double Sounding::range_of_row(double row) const { return (row + 0.5) * request.settings.range_bin_m; }
+double Sounding::row_of_range(double range_m) const { return range_m / request.settings.range_bin_m - 0.5; }
 
 double Sounding::pressure(int row, int beam) const {
   return static_cast<double>(

@@ -185,7 +185,7 @@ TEST(StageOracles, PointsThroughTheEngineAgainstDirectSum) {
     for (const Vec3d& p : places) scatterers.push_back(reference::scatterer_at(mode, s.medium(), p, power_from_db(-20), 1));
     std::vector<double> sines;
     for (int j = 0; j < s.beams(); ++j) sines.push_back(s.beam_sine(j));
-    const reference::Grid grid{1500, s.envelope_hz(), s.range_of_row(0), static_cast<double>(settings.range_bin_m), s.rows()};
+    const reference::Grid grid{1500, s.envelope_hz(), s.range_of_row(0), settings.range_bin_m, s.rows()};
     const auto truth = reference::beams(scatterers, sines, mode.pattern, grid);
     double error = 0, power = 0;
     for (int j = 0; j < s.beams(); ++j) {
@@ -315,7 +315,7 @@ TEST(StageOracles, Oracle44_AwkwardSettingsAreRefusedWithASentence) {
   refused([&](PingRequest& r) { r.sonar_in_world.orientation.w = std::numeric_limits<double>::infinity(); });
   refused([&](PingRequest& r) { r.settings.range_m = nan; });
   refused([&](PingRequest& r) { r.settings.pulse_width_m = 0; });
-  refused([&](PingRequest& r) { r.settings.range_bin_m = std::numeric_limits<float>::infinity(); });
+  refused([&](PingRequest& r) { r.settings.range_bin_m = std::numeric_limits<double>::infinity(); });
   refused([&](PingRequest& r) { r.settings.device_sound_speed_mps = -1; });
   refused([&](PingRequest& r) { r.settings.gain_db = nan; });
   refused([&](PingRequest& r) { r.settings.beam_count = 0; });

@@ -93,7 +93,7 @@ TEST(StatisticsOracles, NoiseGrainsHaveThePulsesLength) {
       for (int row = 0; row + apart < s.rows(); ++row) {
         for (int j = 0; j < s.beams(); j += 3) a.push_back(s.power(row, j)), b.push_back(s.power(row + apart, j));
       }
-      const double seconds = apart * 2 * static_cast<double>(settings.range_bin_m) / 1500;
+      const double seconds = apart * 2 * settings.range_bin_m / 1500;
       // sqrt() lifts a correlation near nothing, hence the square is compared.
       EXPECT_NEAR(correlation(a, b), std::pow(noise_correlation(s.envelope_hz(), seconds), 2), 0.05) << apart;
     }
@@ -116,8 +116,7 @@ std::vector<double> independent_intensities(const FrequencyMode& mode, const Pin
       const double u = s.beam_sine(j);
       if (last_sine - u < 3.5 * width || std::abs(u) > 0.6) continue;
       last_sine = u;
-      const int step = static_cast<int>(
-          std::ceil(2 * static_cast<double>(settings.pulse_width_m) / static_cast<double>(settings.range_bin_m)));
+      const int step = static_cast<int>(std::ceil(2 * static_cast<double>(settings.pulse_width_m) / settings.range_bin_m));
       for (int row = 0; row < s.rows(); row += step) {
         const double r = s.range_of_row(row), pulse = static_cast<double>(settings.pulse_width_m);
         if (!(r - 2 * pulse > height / std::sqrt(1 - u * u))) continue;
@@ -275,8 +274,8 @@ TEST(StatisticsOracles, Oracle36_SpeckleRidesWithTheBedAhead) {
     const double one_row = 0.0254;
     for (const double range : {4.0, 6.0, 8.5}) {
       const double cosine = std::sqrt(1 - std::pow(height / range, 2));
-      const int rows = static_cast<int>(std::lround(one_row / static_cast<double>(s.request.settings.range_bin_m)));
-      const double dx = rows * static_cast<double>(s.request.settings.range_bin_m) / cosine;
+      const int rows = static_cast<int>(std::lround(one_row / s.request.settings.range_bin_m));
+      const double dx = rows * s.request.settings.range_bin_m / cosine;
       const std::vector<float> before = s.ping_from({0, 0, height}, {0, tilt, 0}).pressure_upa;
       const std::vector<float> after = s.ping_from({dx, 0, height}, {0, tilt, 0}).pressure_upa;
       EXPECT_GT(patch_correlation(s, before, after, range - 0.4, range + 0.4, 5, rows, 0), 0.9) << name << " " << range;

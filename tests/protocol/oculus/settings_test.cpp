@@ -24,6 +24,13 @@ TEST(RowLaw, IsTheCapturedOne) {
   EXPECT_DOUBLE_EQ(law.spacing_m, 0.0028421889710794315);
 }
 
+// The capture's request: its own double must come back in the packet, bit for bit.
+TEST(RowLaw, SpacingReachesThePacketUnrounded) {
+  FireRequest request = fire(0, 2, PingRate{195}, 0x19, 2, 50);
+  request.settings.sound_speed_mps = 1490.658551265436;
+  EXPECT_EQ(answer(device(), request).head.fixed.range_resolution_m, 0.0028421889710794315);
+}
+
 TEST(RowLaw, SpacingDoublesUntilTheRowsFit) {
   EXPECT_EQ(row_law(10, 1500).count, 437);  // 2^3
   EXPECT_EQ(row_law(30, 1500).count, 655);  // 2^4
@@ -75,13 +82,13 @@ TEST(Settle, ModesAndRanges) {
   const auto state = device();
   const PingSettings high = settings_of(fire(0, 2, PingRate::hz40, 0x49, 5, 50), state);
   EXPECT_EQ(high.mode, 1);
-  EXPECT_FLOAT_EQ(high.range_m, 5);
+  EXPECT_EQ(high.range_m, 5);
   EXPECT_EQ(high.beam_count, 512);
   EXPECT_EQ(high.rate_hz, 40);
   EXPECT_FALSE(high.triggered);
   const PingSettings per_cent = settings_of(fire(1, 1, PingRate::hz15, 0x00, 20, 50), state);
   EXPECT_EQ(per_cent.mode, 0);
-  EXPECT_FLOAT_EQ(per_cent.range_m, 8) << "20 per cent of 40 m";
+  EXPECT_DOUBLE_EQ(per_cent.range_m, 8) << "20 per cent of 40 m";
   EXPECT_EQ(per_cent.beam_count, 256);
 }
 
@@ -95,14 +102,14 @@ TEST(Settle, GainIsDecibelsPerEffectivePerCent) {
 TEST(Settle, ClampsWhatIsOutOfRangeAndSaysSo) {
   const auto state = device();
   const Settled far = settle(fire(0, 2, PingRate::hz10, 0x49, 20, 150), state);
-  EXPECT_FLOAT_EQ(far.settings.range_m, 10);
+  EXPECT_EQ(far.settings.range_m, 10);
   EXPECT_NEAR(far.settings.gain_db, 96, 1e-4) << "mapped from 100 per cent";
   EXPECT_THAT(far.clamped,
               ElementsAre("range 20 m is outside 0.1..10 m, 10 m is used", "gain 150 % is outside 0..100 %, 100 % is used"));
   const Settled near = settle(fire(0, 1, PingRate::hz10, 0x49, -3, -5), state);
-  EXPECT_FLOAT_EQ(near.settings.range_m, 0.1f);
+  EXPECT_NEAR(near.settings.range_m, 0.1, 1e-8);
   EXPECT_EQ(near.settings.gain_db, 0);
-  EXPECT_FLOAT_EQ(settings_of(fire(0, 1, PingRate::hz10, 0x49, 0, 0), device("oculus-m370s")).range_m, 0.2f);
+  EXPECT_NEAR(settings_of(fire(0, 1, PingRate::hz10, 0x49, 0, 0), device("oculus-m370s")).range_m, 0.2, 1e-7);
   for (const int mode : {0, 3, 255}) {
     const Settled odd = settle(fire(0, mode, PingRate{9}, 0x49, 5, 50), state);
     EXPECT_EQ(odd.settings.mode, 0);
@@ -124,7 +131,7 @@ TEST(Settle, EveryFiniteMessageGivesUsableSettings) {
       FireRequest request = fire(2, flags % 4, static_cast<PingRate>(flags % 8), flags, value, value);
       request.settings.sound_speed_mps = request.settings.salinity_ppt = value;
       const PingSettings s = settings_of(request, state);
-      EXPECT_GE(s.range_m, 0.1f);
+      EXPECT_GE(s.range_m, static_cast<double>(0.1f));
       EXPECT_LE(s.range_m, 40);
       EXPECT_GE(s.range_bin_count, 1);
       EXPECT_LE(s.range_bin_count, 720);
@@ -217,7 +224,7 @@ TEST(Settle, NetworkSpeedOnlyWhenHonoured) {
 TEST(Settle, PulseFollowsTheRows) {
   const FireRequest request = fire(0, 2, PingRate::hz10, 0x49, 10, 50);
   const PingSettings rows = settings_of(request, device());
-  EXPECT_FLOAT_EQ(rows.pulse_width_m, 0.9f * rows.range_bin_m);
+  EXPECT_FLOAT_EQ(rows.pulse_width_m, static_cast<float>(0.9 * rows.range_bin_m));
   EXPECT_EQ(rows.samples_per_row, 1);
   const PingSettings native = settings_of(request, device("oculus-m1200d", {{"pulse", "native"}}));
   EXPECT_FLOAT_EQ(native.pulse_width_m, 0.0025f);
