@@ -2,8 +2,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "core/base/result.hpp"
-
 namespace sonar {
 namespace {
 
@@ -20,6 +18,10 @@ void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("--simd", run.simd, "instruction set of the hot loops")
       ->check(CLI::IsMember({"auto", "portable", "avx2", "avx512"}))
       ->envname("SONARD_SIMD");
+  app.add_flag("--expected-power", run.expected_power, "mean echo power instead of speckle");
+  app.add_option("--noise", run.noise, "receiver noise, on or off")->check(CLI::IsMember({"on", "off"}));
+  app.add_option("--fixed-fan", run.fixed_fan, "rays a column with one scatterer each, no surface cells; 0 = as usual")
+      ->check(CLI::Range(0, most_fixed_rays));
   app.add_option("--bind", run.bind, "address of the first sonar instead of its bind_ip and advertise_ip")
       ->envname("SONARD_BIND");
   app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings");
@@ -61,6 +63,30 @@ Command parse_command_line(int argc, char** argv) {
   }
   if (!bare && app.got_subcommand("check")) return check;
   return run;
+}
+
+Result<void> override_config(Config& config, const RunCommand& command) {
+  if (!command.clock.empty()) config.clock = command.clock == "stepped" ? ClockMode::stepped : ClockMode::realtime;
+  if (command.threads) config.engine.threads = *command.threads;
+  if (command.seed) config.seed = *command.seed;
+  if (command.simd == "auto") config.engine.simd = SimdLevel::automatic;
+  if (command.simd == "portable") config.engine.simd = SimdLevel::portable;
+  if (command.simd == "avx2") config.engine.simd = SimdLevel::avx2;
+  if (command.simd == "avx512") config.engine.simd = SimdLevel::avx512;
+  if (command.expected_power) config.engine.switches.expected_power = true;
+  if (!command.noise.empty()) config.engine.switches.noise = command.noise == "on";
+  if (command.fixed_fan) config.engine.switches.fixed_fan = *command.fixed_fan;
+  if (!command.log_format.empty()) config.log.json = command.log_format == "json";
+  if (command.log_level == "debug") config.log.level = LogLevel::debug;
+  if (command.log_level == "info") config.log.level = LogLevel::info;
+  if (command.log_level == "warning") config.log.level = LogLevel::warning;
+  if (command.log_level == "error") config.log.level = LogLevel::error;
+  if (!command.bind.empty()) {
+    const auto ip = parse_ipv4(command.bind);
+    if (!ip) return failure(ErrorKind::usage, "--bind: " + ip.error().text);
+    config.sonars.front().bind_ip = config.sonars.front().advertise_ip = *ip;
+  }
+  return {};
 }
 
 }  // namespace sonar

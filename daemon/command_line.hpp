@@ -7,6 +7,9 @@
 #include <variant>
 #include <vector>
 
+#include "core/base/result.hpp"
+#include "daemon/config.hpp"
+
 namespace sonar {
 
 struct RunCommand {
@@ -18,6 +21,9 @@ struct RunCommand {
   std::string clock, simd, log_format, log_level, bind;
   std::optional<int> threads;
   std::optional<std::uint64_t> seed;
+  std::optional<int> fixed_fan;
+  std::string noise;            // "on", "off"
+  bool expected_power = false;  // false: as the configuration says
 };
 struct CheckCommand {
   std::string config;
@@ -31,5 +37,7 @@ struct Leave {  // help, version or a usage error, already printed
 using Command = std::variant<RunCommand, CheckCommand, BenchCommand, Leave>;
 
 Command parse_command_line(int argc, char** argv);
+/// What was given on the command line, or stands for it in the environment, wins over the file.
+Result<void> override_config(Config& config, const RunCommand& command);
 
 }  // namespace sonar

@@ -251,7 +251,7 @@ void read_engine(const Node& node, EngineConfig& engine) {
                                                                       {"avx512", SimdLevel::avx512}});
   engine.switches.expected_power = map.optional("expected_power").boolean_or(false);
   engine.switches.noise = map.optional("noise").choice_or<bool>(true, {{"on", true}, {"off", false}});
-  engine.switches.fixed_fan = static_cast<int>(map.optional("fixed_fan").integer_or(0, 0, 100000));
+  engine.switches.fixed_fan = static_cast<int>(map.optional("fixed_fan").integer_or(0, 0, most_fixed_rays));
 }
 
 void read_log(const Node& node, LogOptions& log) {

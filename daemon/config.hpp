@@ -68,6 +68,7 @@ struct PoseConfig {
   OnStale on_stale = OnStale::hold;
   double max_jump_m = 50;
 };
+inline constexpr int most_fixed_rays = 100000;  // a column
 struct EngineConfig {
   int threads = 0;  // 0 = all cores
   SimdLevel simd = SimdLevel::automatic;

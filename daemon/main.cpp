@@ -43,27 +43,6 @@ Result<Found> find_config(const RunCommand& command) {
   return found(demo_config(), "none found (looked in " + looked + ") -> demo");
 }
 
-Result<void> override_config(Config& config, const RunCommand& command) {
-  if (!command.clock.empty()) config.clock = command.clock == "stepped" ? ClockMode::stepped : ClockMode::realtime;
-  if (command.threads) config.engine.threads = *command.threads;
-  if (command.seed) config.seed = *command.seed;
-  if (command.simd == "auto") config.engine.simd = SimdLevel::automatic;
-  if (command.simd == "portable") config.engine.simd = SimdLevel::portable;
-  if (command.simd == "avx2") config.engine.simd = SimdLevel::avx2;
-  if (command.simd == "avx512") config.engine.simd = SimdLevel::avx512;
-  if (!command.log_format.empty()) config.log.json = command.log_format == "json";
-  if (command.log_level == "debug") config.log.level = LogLevel::debug;
-  if (command.log_level == "info") config.log.level = LogLevel::info;
-  if (command.log_level == "warning") config.log.level = LogLevel::warning;
-  if (command.log_level == "error") config.log.level = LogLevel::error;
-  if (!command.bind.empty()) {
-    const auto ip = parse_ipv4(command.bind);
-    if (!ip) return failure(ErrorKind::usage, "--bind: " + ip.error().text);
-    config.sonars.front().bind_ip = config.sonars.front().advertise_ip = *ip;
-  }
-  return {};
-}
-
 int compute_threads(const EngineConfig& engine) {
   if (engine.threads > 0) return engine.threads;
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
