@@ -200,8 +200,8 @@ TEST(LevelOracles, EdgeBeamsAreNotDimAndNothingComesFromBeyond) {
   }
 }
 
-// Every sample of every beam within 40 degrees, pattern on: no holes, no stripes. `share` of them lie within 1 dB; what some
-// settings lack is the jitter of few cells in a sample (docs/acoustics.md, section 3), and no sample is a hole.
+// Every sample of every beam within 40 degrees, pattern on: no holes, no stripes. `share` of them lie within 1 dB; few
+// cells in a sample keep some settings from 99 % (docs/acoustics.md, section 3), but no sample is a hole.
 TEST(LevelOracles, Oracle32_FlatBedIsFilled) {
   const double height = 2, lambert_db = -27, tilt = 0.25;
   struct Case {
