@@ -27,6 +27,8 @@ void fill(v1::Vec3& out, Vec3d v) {
 }
 
 Result<Stamp> stamp_from(const v1::Time& time) {
+  if (time.ns() > largest_stamp_ns || time.ns() < -largest_stamp_ns)
+    return failure(ErrorKind::bad_data, "time.ns is beyond 4.5e18 ns (142 years): send nanoseconds, or ARRIVAL time");
   switch (time.domain()) {
     case v1::CLOCK_UNSPECIFIED:
       if (time.ns() != 0) return failure(ErrorKind::bad_data, "time.domain is missing: say WALL, SIM or ARRIVAL");

@@ -19,6 +19,8 @@ enum class ClockDomain {
   sim,      // the sender's own, any origin
   arrival,  // no stamp: the moment of receipt counts
 };
+/// About 142 years on either side of 1970; sums and differences of such stamps fit int64 nanoseconds.
+inline constexpr std::int64_t largest_stamp_ns = 4'500'000'000'000'000'000;
 struct Stamp {
   ClockDomain domain = ClockDomain::arrival;
   std::int64_t ns = 0;

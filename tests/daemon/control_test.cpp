@@ -104,6 +104,11 @@ TEST(Control, RefusesWithASentence) {
   EXPECT_EQ(why(pose_bytes(2, origin, quat(1.0009, 0, 0, 0))), "accepted");
   EXPECT_THAT(why(Wire{}.varint(4, 2).sub(6, level).out), HasSubstr("position is missing"));
   EXPECT_THAT(why(Wire{}.varint(4, 2).sub(5, origin).out), HasSubstr("orientation is missing"));
+  for (const std::int64_t far : {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min(),
+                                 std::int64_t{4'500'000'000'000'000'001}})
+    for (const unsigned domain : {1u, 2u, 3u})
+      EXPECT_THAT(why(Wire{}.sub(3, Wire{}.varint(1, domain).fixed64(2, &far).out).varint(4, 2).sub(5, origin).sub(6, level).out),
+                  HasSubstr("beyond 4.5e18 ns"));
   const std::int64_t ns = 5;
   EXPECT_THAT(why(Wire{}.sub(3, Wire{}.fixed64(2, &ns).out).varint(4, 2).sub(5, origin).sub(6, level).out),
               HasSubstr("time.domain"));

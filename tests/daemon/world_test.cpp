@@ -112,6 +112,18 @@ TEST(World, SenderClockIsMappedByTheLeastDelay) {
   EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(160)).position_m.x, 1.5, 1e-9) << "sender time 5150 is our 160";
 }
 
+TEST(World, TheFarthestStampsOverflowNothing) {  // the undefined-behaviour sanitizer watches
+  World w = one_rov();
+  const std::chrono::nanoseconds far(control::largest_stamp_ns);
+  EXPECT_EQ(w.accept(stamped(1, ClockDomain::sim, -far), json, t0).verdict, PoseVerdict::accepted);
+  EXPECT_EQ(w.accept(stamped(2, ClockDomain::sim, far), json, t0 + milliseconds(10)).verdict, PoseVerdict::accepted);
+  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(10)).position_m.x, 2);
+  EXPECT_EQ(w.accept(stamped(3, ClockDomain::sim, -far), udp, t0 + milliseconds(20)).verdict, PoseVerdict::accepted);
+  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(20)).position_m.x, 3);
+  for (const auto t : {-far, far})
+    EXPECT_EQ(w.accept(stamped(4, ClockDomain::wall, t), udp, t0 + milliseconds(30)).verdict, PoseVerdict::bad_time);
+}
+
 TEST(World, ASlowSimulatorIsFollowedInSteps) {
   World w = one_rov();
   for (int i = 0; i <= 100; ++i)  // half real time
@@ -162,6 +174,52 @@ TEST(World, AChangedResetCounterOrAJumpClearsTheHistory) {
   EXPECT_THAT(w.accept(far, udp, t0 + milliseconds(300)).notice, HasSubstr("max_jump_m"));
   EXPECT_EQ(w.counters().jumps, 1u);
   EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(400)).position_m.x, 60) << "no extrapolation across the jump";
+}
+
+TEST(World, PosesBeyondOneKilohertzReplaceTheNewestAndAreCounted) {
+  PoseRules rules;
+  rules.burst = 4;
+  World w = one_rov(rules);
+  const auto sent = [](int i) { return stamped(0.001 * i, ClockDomain::sim, std::chrono::microseconds(100 * i)); };  // 10 kHz
+  for (int i = 0; i <= 1000; ++i) {
+    const Time now = t0 + std::chrono::microseconds(100 * i);
+    EXPECT_EQ(w.accept(sent(i), json, now).verdict, PoseVerdict::accepted);
+    ASSERT_NEAR(w.vehicle_at(0, now).position_m.x, 0.001 * i, 1e-12) << "the newest wins";
+  }
+  EXPECT_EQ(w.counters().accepted, 1001u);
+  EXPECT_NEAR(static_cast<double>(w.counters().over_rate), 1001 - 4 - 100, 2) << "100 ms at 1 kHz, and the first clump";
+  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(50)).position_m.x, 0.5, 1e-3) << "what was kept still interpolates";
+}
+
+TEST(World, OneKilohertzAndClumpsAreKeptWhole) {
+  World w = one_rov();
+  for (int i = 0; i < 1000; ++i) w.accept(stamped(i, ClockDomain::sim, milliseconds(i)), json, t0 + milliseconds(i));
+  for (int i = 1000; i < 1060; ++i)  // held back for 60 ms
+    w.accept(stamped(i, ClockDomain::sim, milliseconds(i)), json, t0 + milliseconds(1060));
+  EXPECT_EQ(w.counters().over_rate, 0u);
+}
+
+TEST(World, OneBodysRateIsNotAnothers) {
+  PoseRules rules;
+  rules.burst = 1;
+  World two(rules, {{"a", {}, false}, {"b", {}, false}}, {}, t0);
+  for (int i = 0; i < 3; ++i) {
+    for (const char* name : {"a", "b"}) {
+      PoseSample s = at_x(i);
+      s.name = name;
+      two.accept(s, udp, t0 + milliseconds(i));
+    }
+  }
+  EXPECT_EQ(two.counters().over_rate, 0u);
+}
+
+TEST(World, SteppedTimeHasNoRate) {
+  PoseRules rules;
+  rules.stepped = true;
+  rules.burst = 1;
+  World w = one_rov(rules);
+  for (int i = 0; i < 100; ++i) w.accept(stamped(i, ClockDomain::sim, milliseconds(i)), json, Time{});
+  EXPECT_EQ(w.counters().over_rate, 0u);
 }
 
 TEST(World, PosesGoStaleOnceAndComeBack) {
