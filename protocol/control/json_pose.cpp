@@ -8,7 +8,7 @@ namespace {
 
 using nlohmann::json;
 constexpr int deepest_nesting = 8;
-constexpr double latest_timestamp_s = 9e9;  // fits int64 nanoseconds
+constexpr double latest_timestamp_s = 1e-9 * static_cast<double>(largest_stamp_ns);
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
 
@@ -59,7 +59,7 @@ Result<Stamp> stamp_of(const json& object) {
   if (found == object.end()) return Stamp{};
   if (!found->is_number()) return refused("timestamp must be a number of seconds");
   const double s = found->get<double>();
-  if (!(std::abs(s) <= latest_timestamp_s)) return refused("timestamp must be a number of seconds below 9e9");
+  if (!(std::abs(s) <= latest_timestamp_s)) return refused("timestamp must be a number of seconds below 4.5e9");
   return Stamp{ClockDomain::sim, static_cast<std::int64_t>(std::llround(s * 1e9))};
 }
 
@@ -135,21 +135,25 @@ Result<PoseSample> parse_json_pose(std::string_view line) {
 }
 
 void LineParser::feed(std::span<const std::byte> received) {
+  buffer_.erase(0, start_);  // once for all lines that next() gave out
+  start_ = 0;
   for (const std::byte b : received) buffer_.push_back(static_cast<char>(b));
 }
 
 std::optional<LineParser::Line> LineParser::next() {
   while (true) {
-    const std::size_t end = buffer_.find('\n');
+    const std::size_t end = buffer_.find('\n', start_);
     if (end == std::string::npos) {
-      if (swallowing_) buffer_.clear();
-      if (buffer_.size() <= longest_line) return std::nullopt;
+      const bool too_long = !swallowing_ && buffer_.size() - start_ > longest_line;
+      if (!swallowing_ && !too_long) return std::nullopt;
       buffer_.clear();
+      start_ = 0;
+      if (!too_long) return std::nullopt;
       swallowing_ = true;
       return Line{{}, true};
     }
-    std::string text = buffer_.substr(0, end);
-    buffer_.erase(0, end + 1);
+    std::string text = buffer_.substr(start_, end - start_);
+    start_ = end + 1;
     if (std::exchange(swallowing_, false)) continue;  // the tail of a line already reported
     if (text.size() > longest_line) return Line{{}, true};
     if (!text.empty() && text.back() == '\r') text.pop_back();

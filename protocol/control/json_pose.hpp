@@ -34,7 +34,8 @@ class LineParser {
   std::optional<Line> next();
 
  private:
-  std::string buffer_;
+  std::string buffer_;     // never longer than one line and one read
+  std::size_t start_ = 0;  // of the next line
   bool swallowing_ = false;
 };
 
