@@ -2,6 +2,7 @@
 
 Places are those of scenes/l-targets.yaml; the spheres' nearest points are 0.1 m in front of their centres.
 """
+import math
 import time
 import unittest
 
@@ -97,7 +98,6 @@ class Mirror(unittest.TestCase):
         found = brightest_of_half(ahead, 5.4, 6.4, -1)
         self.assertAlmostEqual(found[0], 5.92, delta=0.12, msg="a metre ahead, C is a metre nearer")
 
-
     def test_the_control_stream_answers(self):
         to = f"{self.daemon.address}:14770"
         result = self.daemon.ctl_to(to, "pose", "line", "--from", "0,0,0", "--to-point", "0.1,0,0", "--confirm")
@@ -110,12 +110,26 @@ class Mirror(unittest.TestCase):
 
 
 class Rolled(unittest.TestCase):
+    def ping(self, attitude, **settings):
+        with Sonard(scene="l-targets.yaml", pose=f"{{frame: ENU_FLU, xyz_m: [0, 0, 0], rpy_deg: {list(attitude)}}}") as daemon:
+            with Client(daemon.address) as client:
+                return client.ping_made_with(fire_message(version=2, flags=VERBATIM_GAIN, gain=20.0, salinity=SALINITY, **settings))
+
+    def test_a_list_swings_what_lies_below_to_the_low_side(self):
+        """Bow 13 degrees down, `below` is 12 degrees under the axis: starboard down it comes to starboard, port down to port."""
+        bearing_deg = math.degrees(math.asin(math.sin(math.radians(12)) * math.sin(math.radians(20))))
+        for roll_deg in (20, -20):
+            with self.subTest(roll_deg=roll_deg):
+                ping = self.ping((roll_deg, 13, 0), mode=1)
+                self.assertAlmostEqual(ping.roll_deg, roll_deg, delta=0.5)
+                found = ping.brightest(*rows_between(ping, 4.5, 5.3))
+                self.assertAlmostEqual(found[0], BELOW[0], delta=0.12)
+                self.assertAlmostEqual(found[1], math.copysign(bearing_deg, roll_deg), delta=1)
+
     def test_a_starboard_list_lifts_port_targets_out_of_the_fan(self):
         """Rolled 90 degrees, left and right become up and down: A and C leave the 12 degree fan, the picture loses its L."""
-        with Sonard(scene="l-targets.yaml", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0], rpy_deg: [90, 0, 0]}") as daemon:
-            with Client(daemon.address) as client:
-                ping = client.ping_made_with(fire_message(version=2, flags=VERBATIM_GAIN, gain=20.0, salinity=SALINITY))
-        self.assertAlmostEqual(abs(ping.roll_deg), 90, delta=0.5)
+        ping = self.ping((90, 0, 0))
+        self.assertAlmostEqual(ping.roll_deg, 90, delta=0.5)
         self.assertLess(mean_around(ping, A, 0.15, 1), 40)
         self.assertLess(mean_around(ping, C, 0.15, 1), 40)
 
