@@ -25,9 +25,9 @@ std::string sonar_lines(const Device& device) {
   const PingSettings s = device.initial_settings();
   const SonarModel& model = *device.state().model;
   const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
-  std::string text =
-      "sonar     " + device.config().name + "  " + model.name + "  " + frequency_text(static_cast<double>(mode.centre_hz)) +
-      format("  %d beams  %g m  %g Hz\n", s.beam_count, s.range_m, static_cast<double>(s.rate_hz));
+  std::string text = "sonar     " + device.config().name + "  " + model.name + "  " +
+                     frequency_text(static_cast<double>(mode.centre_hz)) +
+                     format("  %d beams  %g m  %g Hz\n", s.beam_count, s.range_m, static_cast<double>(s.rate_hz));
   const tcp::endpoint data = device.data_endpoint();
   text += format("  data    tcp %s:%d", data.address().to_string().c_str(), data.port());
   for (const udp::endpoint& to : device.status_destinations())
@@ -91,9 +91,10 @@ std::string summary(const App& app) {
   }
   const PoseCounters& p = app.world().counters();
   if (p.accepted + p.refused + p.late > 0)
-    text += format("poses  %llu accepted, %llu refused, %llu late, %llu replaced\n", static_cast<unsigned long long>(p.accepted),
-                   static_cast<unsigned long long>(p.refused), static_cast<unsigned long long>(p.late),
-                   static_cast<unsigned long long>(p.replaced));
+    text += format("poses  %llu accepted, %llu refused, %llu late, %llu replaced, %llu over the rate\n",
+                   static_cast<unsigned long long>(p.accepted), static_cast<unsigned long long>(p.refused),
+                   static_cast<unsigned long long>(p.late), static_cast<unsigned long long>(p.replaced),
+                   static_cast<unsigned long long>(p.over_rate));
   return text + format("resident memory %.0f MB at most\n", peak_memory_mb());
 }
 

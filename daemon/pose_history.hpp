@@ -28,6 +28,9 @@ class PoseHistory {
 
   /// `sample.at` must not lie before newest().at; an equal time replaces.
   void put(const Sample& sample);
+  /// In place of newest(): for poses that come faster than anybody needs. The same demand on `sample.at`; not on an empty
+  /// history.
+  void replace_newest(const Sample& sample) { samples_.back() = sample; }
   /// Interpolated (lerp, slerp) between samples; before the first one held; after the last one carried on by its velocity, or
   /// by the difference of the last two samples, for at most `extrapolate_max`, then held there. Not on an empty history.
   Pose at(Time t, std::chrono::nanoseconds extrapolate_max) const;

@@ -24,11 +24,13 @@ std::string joined_names(const std::vector<std::string>& names) {
 
 World::World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start)
     : rules_(rules), start_(start) {
-  const auto add = [](std::vector<Track>& tracks, std::vector<BodyStart>& bodies) {
+  const auto add = [this](std::vector<Track>& tracks, std::vector<BodyStart>& bodies) {
     for (BodyStart& b : bodies) {
       Track t;
       t.source = b.orbits ? "demo orbit" : "initial pose";
       t.body = std::move(b);
+      t.allowance = rules_.burst;
+      t.allowance_at = start_;
       tracks.push_back(std::move(t));
     }
   };
@@ -55,6 +57,17 @@ World::Track* World::find(const PoseSample& sample, std::string& refusal) {
 bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time now) const {
   return !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain &&
          now - track.last_arrival <= rules_.stale_after;
+}
+
+/// Takes one from the allowance, or says that there is none.
+bool World::over_rate(Track& track, Time now) const {
+  if (rules_.stepped) return false;
+  const double refill = rules_.most_per_s * seconds(now - track.allowance_at);
+  track.allowance = std::min(rules_.burst, track.allowance + std::max(0.0, refill));
+  track.allowance_at = now;
+  if (track.allowance < 1) return true;
+  track.allowance -= 1;
+  return false;
 }
 
 PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time now) {
@@ -119,7 +132,13 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   track.last_arrival = now;
   track.hidden = sample.hidden;
   track.stale_reported = false;
-  track.history.put({at, sample.pose, sample.velocity_mps, sample.angular_velocity_radps});
+  const PoseHistory::Sample kept{at, sample.pose, sample.velocity_mps, sample.angular_velocity_radps};
+  if (over_rate(track, now) && !track.history.empty()) {
+    ++counters_.over_rate;
+    track.history.replace_newest(kept);
+  } else {
+    track.history.put(kept);
+  }
   ++counters_.accepted;
   return out;
 }

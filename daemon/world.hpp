@@ -17,7 +17,9 @@ struct PoseRules {
   std::chrono::nanoseconds extrapolate_max = std::chrono::milliseconds(200);
   std::chrono::nanoseconds stale_after = std::chrono::seconds(1);
   double max_jump_m = 50;
-  bool stepped = false;  // simulated time: WALL stamps are then read as the sender's own
+  bool stepped = false;      // simulated time: WALL stamps are then read as the sender's own, and there is no rate to limit
+  double most_per_s = 1000;  // poses kept of one body; faster ones replace the newest
+  double burst = 64;         // taken whole at once: what a network holds back and then delivers
 };
 
 /// A vehicle, or a moving object of the scene.
@@ -46,6 +48,7 @@ struct PoseCounters {
   std::uint64_t refused = 0;    // malformed, unknown name, impossible time
   std::uint64_t late = 0;       // out of order or repeated
   std::uint64_t replaced = 0;   // equal stamps
+  std::uint64_t over_rate = 0;  // replaced the newest because they came too fast
   std::uint64_t jumps = 0;      // beyond max_jump
   std::uint64_t resets = 0;     // reset counter changed
   std::uint64_t histories = 0;  // begun: first pose, other sender, or after silence
@@ -79,11 +82,14 @@ class World {
     Time last_arrival{};
     std::chrono::nanoseconds offset{0};  // our time = sender's time + offset
     bool hidden = false, stale_reported = false;
+    double allowance = 0;  // poses that may be kept now; refilled with time
+    Time allowance_at{};
   };
   using Ns = std::chrono::nanoseconds;
 
   Track* find(const control::PoseSample& sample, std::string& refusal);
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time now) const;
+  bool over_rate(Track& track, Time now) const;
   bool is_stale(const Track& track, Time now) const;
   Pose pose_at(const Track& track, Time t) const;
   Pose orbit(const Pose& initial, Time t) const;

@@ -85,6 +85,15 @@ TEST(PoseHistory, EqualTimesReplaceAndOldSamplesGo) {
   EXPECT_NEAR(h.at(t0 + milliseconds(4005), limit).position_m.x, 400.5, 1e-9);
 }
 
+TEST(PoseHistory, TheNewestCanBeReplacedByALaterOne) {
+  PoseHistory h;
+  h.put({t0, pose(0), {}, {}});
+  h.put({t0 + milliseconds(10), pose(1), {}, {}});
+  h.replace_newest({t0 + milliseconds(20), pose(4), {}, {}});
+  EXPECT_EQ(h.size(), 2u);
+  EXPECT_NEAR(h.at(t0 + milliseconds(10), limit).position_m.x, 2, 1e-12);
+}
+
 TEST(PoseHistory, StaysBoundedAtAnyRate) {
   PoseHistory h;
   for (int i = 0; i < 10000; ++i) h.put({t0 + std::chrono::microseconds(i), pose(i), {}, {}});
