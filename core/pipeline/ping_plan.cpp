@@ -83,7 +83,8 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
 void fill_row_gains(PingPlan& plan) {
   const PingSettings& s = plan.settings;
   const auto tvg = [&](int row) {
-    return s.tvg ? tvg_db(plan.mode.receiver, (row + 0.5) * s.range_bin_m, static_cast<double>(s.device_absorption_db_per_m))
+    return s.tvg ? tvg_db(plan.mode.receiver, (row + s.row_centre) * s.range_bin_m,
+                          static_cast<double>(s.device_absorption_db_per_m))
                  : 0.0;
   };
   const double smallest = tvg(0);
@@ -255,6 +256,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
 
   p.samples = settings.range_bin_count * settings.samples_per_row;
   p.sample_spacing_m = settings.range_bin_m / settings.samples_per_row;
+  p.sample_offset = 0.5 + (settings.row_centre - 0.5) * settings.samples_per_row;
   const double samples_per_width = static_cast<double>(settings.pulse_width_m) / p.sample_spacing_m;
   p.taps = 8 * std::max(1, static_cast<int>(std::ceil(2 * pulse_reach_widths * samples_per_width / 8 - 0.05)));
   p.pulse_rows = make_pulse_rows(samples_per_width, p.taps, p.pulse_steps, p.expected_power);
@@ -273,11 +275,12 @@ bool serves(const PingPlan& plan, const PingRequest& r) {
   const PingSettings &a = plan.settings, &b = r.settings;
   return plan.mode.name == r.model->modes[static_cast<std::size_t>(b.mode)].name && a.mode == b.mode &&
          a.beam_count == b.beam_count && a.range_bin_count == b.range_bin_count && a.range_m == b.range_m &&
-         a.range_bin_m == b.range_bin_m && a.pulse_width_m == b.pulse_width_m && a.samples_per_row == b.samples_per_row &&
-         a.gain_db == b.gain_db && a.tvg == b.tvg && a.device_sound_speed_mps == b.device_sound_speed_mps &&
-         a.device_absorption_db_per_m == b.device_absorption_db_per_m && a.format.bits == b.format.bits &&
-         a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma && a.format.row_gains == b.format.row_gains &&
-         plan.expected_power == r.switches.expected_power && plan.fixed_fan == r.switches.fixed_fan;
+         a.range_bin_m == b.range_bin_m && a.row_centre == b.row_centre && a.pulse_width_m == b.pulse_width_m &&
+         a.samples_per_row == b.samples_per_row && a.gain_db == b.gain_db && a.tvg == b.tvg &&
+         a.device_sound_speed_mps == b.device_sound_speed_mps && a.device_absorption_db_per_m == b.device_absorption_db_per_m &&
+         a.format.bits == b.format.bits && a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma &&
+         a.format.row_gains == b.format.row_gains && plan.expected_power == r.switches.expected_power &&
+         plan.fixed_fan == r.switches.fixed_fan;
 }
 
 std::string why_invalid(const PingRequest& r) {
@@ -293,6 +296,7 @@ std::string why_invalid(const PingRequest& r) {
   const auto positive = [](auto x) { return x > 0 && std::isfinite(x); };
   if (!positive(s.range_bin_m) || !positive(s.pulse_width_m) || !positive(s.range_m) || !positive(s.device_sound_speed_mps))
     return "range, row spacing, pulse width and sound speed must be positive and finite";
+  if (!(s.row_centre >= 0 && s.row_centre <= 1)) return "row_centre must be from 0 to 1";
   if (!std::isfinite(s.gain_db) || !std::isfinite(s.device_absorption_db_per_m)) return "gain and absorption must be finite";
   if (s.format.bits != 8 && s.format.bits != 16 && s.format.bits != 32) return "samples have 8, 16 or 32 bits";
   if (!positive(s.format.gamma)) return "gamma must be positive and finite";

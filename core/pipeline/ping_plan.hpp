@@ -53,9 +53,10 @@ struct PingPlan {
   std::vector<float> beam_azimuth_rad;
   std::vector<double> beam_sine;
 
-  // The sample grid: sample n lies at the device range (n + 1/2) sample_spacing_m.
+  // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
   int samples = 0;  // rows * samples_per_row
   double sample_spacing_m = 0;
+  double sample_offset = 0.5;     // 1/2 puts the samples of row i between i and i + 1 spacings, see PingSettings::row_centre
   std::vector<float> pulse_rows;  // simd::PulseRows
   int taps = 8, pulse_steps = 256;
   double envelope_hz = 0;  // b of p(t) = exp(-b^2 t^2)

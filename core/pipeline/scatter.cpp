@@ -97,6 +97,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.turns_per_m = static_cast<float>(s.turns_per_m);
   g.decay_per_m = static_cast<float>(2 * s.absorption_np_per_m);
   g.samples_per_m = static_cast<float>(s.samples_per_m);
+  g.sample_offset = static_cast<float>(s.sample_offset);
   g.first_sample = static_cast<float>(-plan.taps / 2);
   g.last_sample = static_cast<float>(plan.samples + plan.taps / 2 - 1);
   std::copy(plan.elevation.begin(), plan.elevation.end(), g.elevation);

@@ -19,6 +19,7 @@ struct PingSettings {
   int range_bin_count = 437;      // rows
   double range_m = 10;            // as used by the device, full scale
   double range_bin_m = 0.0229;    // row spacing, in the device's metres (with its believed sound speed); packets carry it exactly
+  double row_centre = 0.5;        // where in row i its samples centre: (i + row_centre) range_bin_m; 0 near edge, 1 far edge
   float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (docs/acoustics.md, section 4)
   int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples across it
   float rate_hz = 10;             // 0 = standby

@@ -7,8 +7,8 @@
 namespace sonar::oculus {
 namespace {
 
-const std::array<protocol::Option, 12>& table() {
-  static const std::array<protocol::Option, 12> rows{{
+const std::array<protocol::Option, 13>& table() {
+  static const std::array<protocol::Option, 13> rows{{
       {option_name::before_first_fire,
        {"dummies", "pings"},
        "dummies",
@@ -43,6 +43,10 @@ const std::array<protocol::Option, 12>& table() {
        "answer to a written user configuration: none, or the stored values"},
       {option_name::status_bit7, {"clear", "set"}, "clear", "bit 7 (\"main\" connection) of the status word"},
       {option_name::row_rate_hz, {}, "262237.76223776224", "sample rate behind the row law, 37.5 MHz / 143 in the capture"},
+      {option_name::row_origin,
+       {"middle", "near_edge", "far_edge"},
+       "middle",
+       "range of row i, in resolutions: i + 0.5, i, or i + 1"},
       {option_name::dummy_period_ms, {}, "1000", "silence after which a dummy message is sent"},
       {option_name::boot_text, {"off", "on"}, "off", "a log message to every client that connects"},
   }};

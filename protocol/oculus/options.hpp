@@ -15,7 +15,8 @@ inline constexpr std::string_view before_first_fire = "before_first_fire", gain_
                                   ping_start_time_unit = "ping_start_time_unit", honour_network_speed = "honour_network_speed",
                                   reply_version = "reply_version", out_of_range = "out_of_range",
                                   user_config_write = "user_config_write", status_bit7 = "status_bit7",
-                                  row_rate_hz = "row_rate_hz", dummy_period_ms = "dummy_period_ms", boot_text = "boot_text";
+                                  row_rate_hz = "row_rate_hz", row_origin = "row_origin", dummy_period_ms = "dummy_period_ms",
+                                  boot_text = "boot_text";
 }
 
 std::span<const protocol::Option> options();

@@ -27,6 +27,12 @@ double clamped(double value, double low, double high, const char* what, const ch
   return used;
 }
 
+/// Option `row_origin`; unknown: what the device does.
+double row_centre(const protocol::OptionValues& options) {
+  const std::string_view origin = text_option(options, option_name::row_origin);
+  return origin == "near_edge" ? 0 : origin == "far_edge" ? 1 : 0.5;
+}
+
 /// Pulse and range sampling of one row, option `pulse`.
 void set_pulse(PingSettings& settings, double spacing_m, bool native) {
   settings.pulse_width_m = static_cast<float>(native ? native_pulse_m : 0.9 * spacing_m);
@@ -135,6 +141,7 @@ Settled settle(const FireRequest& fire, const protocol::DeviceState& device) {
   const RowLaw rows = row_law(used_range, speed, std::clamp(number_option(device.options, option_name::row_rate_hz), 1e4, 1e7));
   settings.range_bin_count = rows.count;
   settings.range_bin_m = rows.spacing_m;
+  settings.row_centre = row_centre(device.options);
   set_pulse(settings, rows.spacing_m, text_option(device.options, option_name::pulse) == "native");
 
   settings.beam_count = (asked.flags & flag::beams_512) != 0 ? 512 : 256;

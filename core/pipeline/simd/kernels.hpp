@@ -34,10 +34,10 @@ struct GroupView {
   int bins;                                 // values per column of the depth map; the map has bins + 1
   const float* inverse_depth;               // [last - first][bins + 1], 1 / x of what the rays saw, 0 = nothing
   float depth_tolerance_m;
-  float turns_per_m;                               // 2 f / c
-  float decay_per_m;                               // 2 alpha [Np/m]
-  float samples_per_m, first_sample, last_sample;  // range window on the sample grid: s = r * samples_per_m - 0.5
-  float elevation[elevation_terms];                // two-way pattern, polynomial in w
+  float turns_per_m;                                              // 2 f / c
+  float decay_per_m;                                              // 2 alpha [Np/m]
+  float samples_per_m, sample_offset, first_sample, last_sample;  // range window: s = r * samples_per_m - sample_offset
+  float elevation[elevation_terms];                               // two-way pattern, polynomial in w
   bool expected_power;
 };
 

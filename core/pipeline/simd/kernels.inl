@@ -90,7 +90,7 @@ __attribute__((noinline)) void place_cells(const TileSeen& s, const GroupView& g
     const float column = (g.first_edge_sine - y * inverse_r) * g.columns_per_sine;
     const float inverse_x = 1.0f / larger(x, 1e-6f);
     const float bin = (z * inverse_x - g.first_tangent) * g.bins_per_tangent;
-    const float sample = r * g.samples_per_m - 0.5f;
+    const float sample = r * g.samples_per_m - g.sample_offset;
     const bool keep = (column >= lo) & (column < hi) & (bin >= 0) & (bin < bins) & (x > 1e-6f) & (sample > g.first_sample) &
                       (sample < g.last_sample) & (r >= s.fade_in_from_m) & (r < s.fade_out_to_m);
     c.range[i] = r;

@@ -98,8 +98,8 @@ double Sounding::envelope_hz() const {
   return envelope_parameter_hz(static_cast<double>(request.settings.device_sound_speed_mps),
                                static_cast<double>(request.settings.pulse_width_m));
 }
-double Sounding::range_of_row(double row) const { return (row + 0.5) * request.settings.range_bin_m; }
-double Sounding::row_of_range(double range_m) const { return range_m / request.settings.range_bin_m - 0.5; }
+double Sounding::range_of_row(double row) const { return (row + request.settings.row_centre) * request.settings.range_bin_m; }
+double Sounding::row_of_range(double range_m) const { return range_m / request.settings.range_bin_m - request.settings.row_centre; }
 
 double Sounding::pressure(int row, int beam) const {
   return static_cast<double>(

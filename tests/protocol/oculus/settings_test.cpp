@@ -237,6 +237,13 @@ TEST(Settle, RowRateIsAnOption) {
   EXPECT_EQ(fast.range_bin_count, settings_of(request, device()).range_bin_count / 2);
 }
 
+TEST(Settle, RowOriginIsAnOption) {
+  const FireRequest request = fire(0, 2, PingRate::hz10, 0x49, 2, 50);
+  EXPECT_EQ(settings_of(request, device()).row_centre, 0.5);
+  EXPECT_EQ(settings_of(request, device("oculus-m1200d", {{"row_origin", "near_edge"}})).row_centre, 0);
+  EXPECT_EQ(settings_of(request, device("oculus-m1200d", {{"row_origin", "far_edge"}})).row_centre, 1);
+}
+
 TEST(Settle, AbsurdRowRatesStayUsable) {
   for (const char* rate : {"1e-300", "1e300"}) {
     const PingSettings s = settings_of(fire(0, 2, PingRate::hz10, 0x49, 2, 50), device("oculus-m1200d", {{"row_rate_hz", rate}}));
