@@ -15,6 +15,8 @@ constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus is
 constexpr double rest_per_ping_s = 0.002;  // chosen: between the last echo and the next transmission
 constexpr double surface_pressure_bar = 1.013;
 
+constexpr int most_samples_per_row = 32;
+
 /// Clamps, and says so: "range 20 m is outside 0.1..10 m, 10 m is used".
 double clamped(double value, double low, double high, const char* what, const char* unit, std::vector<std::string>& said) {
   const double used = std::clamp(value, low, high);
@@ -37,8 +39,12 @@ double row_centre(const protocol::OptionValues& options) {
 void set_pulse(PingSettings& settings, double spacing_m, bool native) {
   settings.pulse_width_m = static_cast<float>(native ? native_pulse_m : 0.9 * spacing_m);
   if (!native) return;
-  const double sample_m = native_pulse_m / (4 * 0.5887);  // F_s = 2b, b = 0.5887 c / pulse
-  settings.samples_per_row = std::max(1, static_cast<int>(std::ceil(spacing_m / sample_m)));
+  // F_s = 2b, b = 0.5887 c / pulse. Long ranges get a longer pulse rather than samples without end.
+  constexpr double samples_per_pulse = 4 * 0.5887;
+  const double pulse_m = std::max(native_pulse_m, spacing_m * samples_per_pulse / most_samples_per_row);
+  settings.pulse_width_m = static_cast<float>(pulse_m);
+  settings.samples_per_row =
+      std::clamp(static_cast<int>(std::ceil(spacing_m * samples_per_pulse / pulse_m - 1e-9)), 1, most_samples_per_row);
 }
 
 double highest_rate_hz(const FireSettings& fire, const PingSettings& settings, const protocol::DeviceState& device) {

@@ -231,6 +231,13 @@ TEST(Settle, PulseFollowsTheRows) {
   EXPECT_EQ(native.samples_per_row, 22) << "22.9 mm rows at F_s = 2b, 1.06 mm";
 }
 
+TEST(Settle, NativePulseStaysAffordableAtLongRange) {
+  const FireRequest request = fire(0, 1, PingRate::hz10, 0x49, 200, 50);
+  const PingSettings native = settings_of(request, device("oculus-m370s", {{"pulse", "native"}}));
+  EXPECT_EQ(native.samples_per_row, 32);
+  EXPECT_NEAR(static_cast<double>(native.pulse_width_m), native.range_bin_m / 32 * 4 * 0.5887, 1e-4);
+}
+
 TEST(Settle, RowRateIsAnOption) {
   const FireRequest request = fire(0, 2, PingRate::hz10, 0x49, 2, 50);
   const PingSettings fast = settings_of(request, device("oculus-m1200d", {{"row_rate_hz", "131118.881"}}));
