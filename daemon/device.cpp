@@ -102,6 +102,7 @@ void Device::use_initial_settings() {
   protocol::ChangeSettings initial = vendor_.initial_settings(state_);
   settings_ = initial.settings;
   requests_[++settings_id_] = std::move(initial.request);
+  oldest_wanted_id_ = settings_id_;
 }
 
 bool Device::wants_pings() const {
@@ -214,8 +215,8 @@ void Device::on_ping(Simulator::Outcome outcome) {
   figures_.simulation_s += outcome.seconds;
   if (!outcome.ping) {
     context_.on_failure("sonar " + config_.name + ": the ping engine failed: " + outcome.failure);
-  } else if (!stopping_ && !sessions_.empty()) {
-    const PingRequest& request = outcome.ping->request;
+  } else if (const PingRequest& request = outcome.ping->request;
+             !stopping_ && !sessions_.empty() && request.settings_id >= oldest_wanted_id_) {
     const auto bytes = vendor_.frame(*outcome.ping, state_, requests_[request.settings_id]);
     const auto number = static_cast<std::uint32_t>(request.number);
     const Time now = context_.clock.now();

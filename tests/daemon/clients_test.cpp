@@ -103,6 +103,45 @@ TEST(Clients, PingIdsGoOnAcrossClientsAndSettingsDoNot) {
   EXPECT_GT(second.next_ping()->head.fixed.ping_id, last);
 }
 
+/// The first thing `heir` is sent while a ping made for the client before it is still being computed.
+void expect_only_its_own_pings(Daemon& daemon, Client& heir) {
+  const std::size_t asked = daemon.requests().size();
+  const auto first = heir.next();
+  ASSERT_TRUE(first);
+  EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*first)) << "a ping of the client before it";
+  heir.fire(fire_at(PingRate::hz10, 3));
+  const auto ping = heir.next_ping();
+  ASSERT_TRUE(ping);
+  EXPECT_EQ(ping->head.fixed.fire.range, 3);
+  EXPECT_EQ(daemon.requests().at(asked - 1).settings.range_m, 2) << "the other one was under way, or this shows nothing";
+}
+
+TEST(Clients, APingUnderWayIsNotForTheNextClient) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    options: {dummy_period_ms: 600}\n";
+  setup.engine_takes = milliseconds(400);
+  Daemon daemon(setup);
+  auto first = std::make_unique<Client>(daemon.address());
+  first->fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(eventually([&] { return daemon.requests().size() == 2; }));
+  first.reset();
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("client gone") != std::string::npos; }));
+  Client second(daemon.address());
+  expect_only_its_own_pings(daemon, second);
+}
+
+TEST(Admission, TakingOverWhileAPingIsUnderWayDoesNotInheritIt) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 1, when_full: take_over}\n    options: {dummy_period_ms: 600}\n";
+  setup.engine_takes = milliseconds(400);
+  Daemon daemon(setup);
+  Client old(daemon.address());
+  old.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(eventually([&] { return daemon.requests().size() == 2; }));
+  Client heir(daemon.address());
+  expect_only_its_own_pings(daemon, heir);
+}
+
 TEST(Admission, CloseNewSendsTheSecondAFinAndNoByte) {
   Daemon daemon;
   Client first(daemon.address());
