@@ -112,13 +112,13 @@ bool Device::wants_pings() const {
 void Device::change_settings(Session& from, const protocol::ChangeSettings& change) {
   // Repeats arrive at ping rate from some drivers; only what the device does not already do is news.
   if (!asked_ || requests_[settings_id_] != change.request) {
-    settings_ = change.settings;
     requests_[++settings_id_] = change.request;
     if (!busy_) requests_.erase(requests_.begin(), requests_.find(settings_id_));
     std::uint64_t unsaid = 0;
     if (from.log_limiter().allows(LogLimiter::Clock::now(), unsaid))
       context_.log.info("settings: " + change.summary, {{"sonar", config_.name}, {"client", from.client()}});
   }
+  settings_ = change.settings;  // of a repeat too: what the device knows by itself, its sound speed say, follows its depth
   asked_ = true;
   if (wants_pings()) pacer_.configure(settings_, context_.clock.now());
 }

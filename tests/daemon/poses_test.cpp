@@ -111,6 +111,20 @@ TEST_F(Poses, ControlStreamNeedsAHelloFirstAndTheRightVersion) {
   EXPECT_TRUE(oversized.read_to_end());
 }
 
+TEST_F(Poses, TheDevicesOwnSoundSpeedFollowsItsDepthThoughTheRequestIsRepeated) {
+  const float at_3_m = daemon.requests().back().settings.device_sound_speed_mps;
+  PoseSample deep = at_x(0);
+  deep.pose.position_m.z = -45;  // within max_jump_m
+  send_udp(daemon.address(), protobuf_port, control::encode_pose_datagram(deep));
+  EXPECT_TRUE(eventually([&] {
+    client.fire(fire_at(PingRate::hz40));
+    client.next_ping(milliseconds(100));
+    return daemon.requests().back().settings.device_sound_speed_mps > at_3_m + 0.3f;
+  }));
+  const std::string log = daemon.log_text();
+  EXPECT_EQ(log.find("settings: "), log.rfind("settings: ")) << "a repeat is no news";
+}
+
 TEST_F(Poses, NonsenseIsRefusedCountedAndChangesNothing) {
   PoseSample broken = at_x(77);
   broken.pose.position_m.y = std::numeric_limits<double>::quiet_NaN();
