@@ -213,7 +213,12 @@ void Device::on_ping(Simulator::Outcome outcome) {
   busy_ = false;
   ++figures_.pings;
   figures_.simulation_s += outcome.seconds;
-  if (!outcome.ping) {
+  if (outcome.refused) {
+    ++figures_.refused;
+    std::uint64_t unsaid = 0;
+    if (refusals_.allows(LogLimiter::Clock::now(), unsaid))
+      context_.log.warning("ping dropped: " + outcome.failure, {{"sonar", config_.name}, {"unsaid", unsaid}});
+  } else if (!outcome.ping) {
     context_.on_failure("sonar " + config_.name + ": the ping engine failed: " + outcome.failure);
   } else if (const PingRequest& request = outcome.ping->request;
              !stopping_ && !sessions_.empty() && request.settings_id >= oldest_wanted_id_) {

@@ -38,6 +38,7 @@ struct DeviceContext {
 
 struct DeviceFigures {
   std::uint64_t pings = 0;    // simulated
+  std::uint64_t refused = 0;  // of them by the engine: nothing came out
   std::uint64_t served = 0;   // written whole to at least one client
   std::uint64_t dropped = 0;  // whole pings a client was too slow for
   std::uint64_t skipped_ticks = 0;
@@ -124,6 +125,7 @@ class Device final : public SessionParent {
   bool busy_ = false, stopping_ = false, beacon_failed_ = false;
 
   DeviceFigures figures_;
+  LogLimiter refusals_;
   std::uint32_t last_served_ = 0;
   std::vector<StreamDigest> digests_;
 };

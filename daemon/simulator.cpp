@@ -4,6 +4,8 @@
 
 #include <chrono>
 #include <exception>
+#include <new>
+#include <stdexcept>
 
 namespace sonar {
 
@@ -25,6 +27,12 @@ void Simulator::submit(PingRequest request, Done done) {
     try {
       auto pings = engine_->run({&request, 1});
       outcome.ping = std::make_shared<const Ping>(std::move(pings.at(0)));
+    } catch (const std::invalid_argument& e) {
+      outcome.failure = e.what();
+      outcome.refused = true;
+    } catch (const std::bad_alloc&) {
+      outcome.failure = "out of memory";
+      outcome.refused = true;
     } catch (const std::exception& e) {
       outcome.failure = e.what();
     }

@@ -16,7 +16,8 @@ class Simulator {
   struct Outcome {
     std::shared_ptr<const Ping> ping;  // null on failure
     std::string failure;
-    double seconds = 0;  // of wall time it took
+    bool refused = false;  // only this ping could not be made: it is invalid or there was no memory for it
+    double seconds = 0;    // of wall time it took
   };
   using Done = std::function<void(Outcome)>;
 

@@ -68,7 +68,7 @@ std::vector<Ping> FakeEngine::run(std::span<const PingRequest> requests) {
     }
     if (takes_.count() > 0) std::this_thread::sleep_for(takes_);
     const auto number = static_cast<std::uint32_t>(request.number);
-    if (number == fails_at_) throw std::runtime_error("out of coffee");
+    if (before_) before_(number);
     Ping ping;
     ping.request = request;
     const auto rows = static_cast<std::size_t>(request.settings.range_bin_count);
@@ -100,7 +100,7 @@ Daemon::Daemon(DaemonSetup setup) : address_(setup.address) {
   };
   log_ = std::make_unique<Log>(log);
   const auto make_engine = [&](const std::shared_ptr<const Scene>&) -> std::unique_ptr<PingEngine> {
-    return std::make_unique<FakeEngine>(record_, setup.engine_takes, setup.engine_fails_at);
+    return std::make_unique<FakeEngine>(record_, setup.engine_takes, setup.engine_before);
   };
   app_ = std::make_unique<App>(*std::move(config), small_scene(setup.moving_object), make_engine, setup.options, *log_);
   if (const auto opened = app_->open(); !opened) throw std::runtime_error(opened.error().text);

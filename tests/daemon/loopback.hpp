@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -35,8 +36,10 @@ class FakeEngine final : public PingEngine {
       return requests;
     }
   };
-  FakeEngine(std::shared_ptr<Record> record, milliseconds takes, std::uint32_t fails_at = 0)
-      : record_(std::move(record)), takes_(takes), fails_at_(fails_at) {}
+  /// `before` is called with the number of each ping and may throw.
+  using Before = std::function<void(std::uint32_t)>;
+  FakeEngine(std::shared_ptr<Record> record, milliseconds takes, Before before = {})
+      : record_(std::move(record)), takes_(takes), before_(std::move(before)) {}
   std::vector<Ping> run(std::span<const PingRequest> requests) override;
   std::string description() const override { return "fake"; }
   static std::uint8_t sample(std::uint32_t ping, std::size_t row, std::size_t beam);
@@ -44,7 +47,7 @@ class FakeEngine final : public PingEngine {
  private:
   std::shared_ptr<Record> record_;
   milliseconds takes_;
-  std::uint32_t fails_at_;
+  Before before_;
 };
 
 struct DaemonSetup {
@@ -53,7 +56,7 @@ struct DaemonSetup {
   std::string more;         // more sections
   AppOptions options;
   milliseconds engine_takes{0};
-  std::uint32_t engine_fails_at = 0;
+  FakeEngine::Before engine_before;
   bool moving_object = false;
 };
 

@@ -145,12 +145,49 @@ TEST(Serving, GarbageIsSkippedAndLoggedFewTimes) {
 
 TEST(Serving, TheEngineFailingEndsTheDaemonWithExitCode70) {
   DaemonSetup setup;
-  setup.engine_fails_at = 3;
+  setup.engine_before = [](std::uint32_t ping) {
+    if (ping == 3) throw std::runtime_error("out of coffee");
+  };
   Daemon daemon(setup);
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
   EXPECT_EQ(daemon.wait(), 70);
   EXPECT_THAT(daemon.log_text(), HasSubstr("out of coffee"));
+}
+
+TEST(Serving, APingTheEngineRefusesIsDroppedCountedAndSaid) {
+  DaemonSetup setup;
+  setup.engine_before = [](std::uint32_t ping) {
+    if (ping == 2) throw std::invalid_argument("beam_count must be from 1 to 4096");
+    if (ping == 4) throw std::bad_alloc();
+  };
+  Daemon daemon(setup);
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  for (const std::uint32_t number : {1u, 3u, 5u, 6u}) {
+    const auto ping = client.next_ping();
+    ASSERT_TRUE(ping);
+    EXPECT_EQ(ping->head.fixed.ping_id, number);
+  }
+  EXPECT_EQ(daemon.stop(), 0);
+  EXPECT_EQ(daemon.figures().refused, 2u);
+  EXPECT_THAT(daemon.log_text(), HasSubstr("ping dropped: beam_count must be from 1 to 4096"));
+  EXPECT_THAT(daemon.log_text(), HasSubstr("ping dropped: out of memory"));
+}
+
+TEST(Serving, APingRefusedForEverDoesNotFloodTheLog) {
+  DaemonSetup setup;
+  setup.engine_before = [](std::uint32_t) { throw std::invalid_argument("no such mode"); };
+  Daemon daemon(setup);
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(eventually([&] { return daemon.requests().size() >= 30; }));
+  EXPECT_EQ(daemon.stop(), 0);
+  const std::string log = daemon.log_text();
+  std::size_t lines = 0;
+  for (std::size_t at = log.find("ping dropped"); at != std::string::npos; at = log.find("ping dropped", at + 1)) ++lines;
+  EXPECT_GE(lines, 5u);
+  EXPECT_LT(lines, 29u);
 }
 
 TEST(Serving, ExitAfterPingsEndsByItself) {
