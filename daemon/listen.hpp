@@ -1,6 +1,8 @@
 // Opening listeners with errors that say what, where, why and what to do next (docs/architecture.md, "Errors").
 #pragma once
 
+#include <chrono>
+
 #include "core/base/result.hpp"
 #include "daemon/asio.hpp"
 #include "daemon/config.hpp"
@@ -10,6 +12,10 @@ namespace sonar {
 Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at);
 /// `broadcast`: may send to broadcast addresses.
 Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast);
+
+/// A peer that answers nothing for `limit`, be it our bytes or the probes sent while there are none, ends the connection with
+/// asio::error::timed_out. Whole seconds; at least 3.
+void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit);
 
 asio::ip::address_v4 address_of(Ipv4 ip);
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "daemon/listen.hpp"
+
 namespace sonar {
 namespace {
 
@@ -11,12 +13,17 @@ namespace {
 constexpr int unsent_limit_bytes = 256 * 1024;
 constexpr auto idle_watch = std::chrono::seconds(1);
 
-void prepare(tcp::socket& socket) {
+std::string reason(const error_code& ec) {
+  if (ec == asio::error::eof) return "closed by the client";
+  return ec == asio::error::timed_out ? "takes no byte and does not answer any more" : ec.message();
+}
+
+void prepare(tcp::socket& socket, std::chrono::milliseconds stall_limit) {
   error_code ec;  // a refused option costs smoothness, not correctness
   socket.set_option(tcp::no_delay(true), ec);
-  socket.set_option(asio::socket_base::keep_alive(true), ec);
   using UnsentLimit = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
   socket.set_option(UnsentLimit(unsent_limit_bytes), ec);
+  end_when_silent(socket, stall_limit);  // one that is gone without a word, while little or nothing is sent to it
 }
 
 }  // namespace
@@ -34,7 +41,7 @@ Session::Session(SessionParent& parent, const Clock& clock, tcp::socket socket, 
   error_code ec;
   peer_ = socket_.remote_endpoint(ec);
   client_ = peer_.address().to_string() + ":" + std::to_string(peer_.port());
-  prepare(socket_);
+  prepare(socket_, setup_.stall_limit);
 }
 
 protocol::Ipv4 Session::client_ip() const {
@@ -59,7 +66,7 @@ asio::awaitable<void> Session::read() {
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(received_), into(ec));
     if (over_) co_return;
     if (ec) {
-      over(finishing_ ? why_ : ec == asio::error::eof ? "closed by the client" : ec.message());
+      over(finishing_ ? why_ : reason(ec));
       co_return;
     }
     if (!finishing_) handle(dialogue_->on_bytes(std::span(received_).first(n), clock_.now()));
@@ -89,7 +96,7 @@ asio::awaitable<bool> Session::write_whole(std::shared_ptr<const protocol::Bytes
     const std::size_t n = co_await socket_.async_write_some(asio::buffer(bytes->data() + done, bytes->size() - done), into(ec));
     if (over_) co_return false;
     if (ec) {
-      over(ec.message());
+      over(reason(ec));
       co_return false;
     }
     if (setup_.digest) digest_.add(std::span(*bytes).subspan(done, n));

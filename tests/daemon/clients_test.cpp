@@ -68,6 +68,34 @@ TEST(Clients, OneThatTakesNothingIsReset) {
   EXPECT_TRUE(stalled.was_reset);
 }
 
+TEST(Clients, OneWhoseComputerDiedInStandbyFreesItsPlace) {
+  DaemonSetup setup;
+  setup.options.stall_limit = milliseconds(3000);
+  setup.sonar_lines = "    options: {dummy_period_ms: 200}\n";
+  Daemon daemon(setup);
+  Client dead(daemon.address());
+  dead.fire(fire_at(PingRate::standby));
+  ASSERT_TRUE(dead.next());
+  dead.die();
+  EXPECT_TRUE(eventually([&] { return daemon.log_text().find("does not answer any more") != std::string::npos; }))
+      << "the kernel alone would try for a quarter of an hour";
+  Client next(daemon.address());
+  next.fire(fire_at(PingRate::hz10));
+  EXPECT_TRUE(next.next_ping());
+}
+
+/// Nothing is sent to it: dummies are far apart, so only the kernel's probes can find out.
+TEST(Clients, OneWhoseComputerDiedInSilenceFreesItsPlace) {
+  DaemonSetup setup;
+  setup.options.stall_limit = milliseconds(3000);
+  setup.sonar_lines = "    options: {dummy_period_ms: 60000}\n";
+  Daemon daemon(setup);
+  Client dead(daemon.address());
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("client connected") != std::string::npos; }));
+  dead.die();
+  EXPECT_TRUE(eventually([&] { return daemon.log_text().find("does not answer any more") != std::string::npos; }));
+}
+
 TEST(Clients, DeadOnesFreeTheirPlace) {
   Daemon daemon;
   for (int i = 0; i < 10; ++i) {

@@ -106,6 +106,8 @@ class Client {
   bool read_to_end(milliseconds timeout = patience);
   std::vector<std::byte> read_raw(std::size_t at_least, milliseconds timeout = patience);
   void reset();  // RST
+  /// From now on as a computer that lost its power: it takes and answers nothing, not even for its kernel.
+  void die();
   void close();
 
   std::uint64_t bytes_read = 0;
