@@ -2,6 +2,8 @@
 // needs std::exchange and does not include it) and every await spells its error code the same way.
 #pragma once
 
+#include <exception>
+#include <string>
 #include <utility>
 
 #include <boost/asio.hpp>
@@ -15,5 +17,16 @@ using boost::system::error_code;
 
 /// co_await socket.async_...(..., into(ec)): no exceptions in coroutines.
 inline auto into(error_code& ec) { return asio::redirect_error(asio::use_awaitable, ec); }
+
+/// What an exception that ended a coroutine says. asio::detached would swallow it.
+inline std::string text_of(const std::exception_ptr& fault) {
+  try {
+    std::rethrow_exception(fault);
+  } catch (const std::exception& e) {
+    return e.what();
+  } catch (...) {
+    return "an exception of no known kind";
+  }
+}
 
 }  // namespace sonar

@@ -71,11 +71,8 @@ tcp::endpoint Device::data_endpoint() const {
 }
 
 void Device::start() {
-  asio::co_spawn(
-      context_.io, [this] { return accept(); }, asio::detached);
-  if (beacon_period_.count() > 0)
-    asio::co_spawn(
-        context_.io, [this] { return announce(); }, asio::detached);
+  keep_accepting();
+  if (beacon_period_.count() > 0) keep_announcing();
 }
 
 void Device::stop() {
@@ -115,7 +112,7 @@ void Device::change_settings(Session& from, const protocol::ChangeSettings& chan
     requests_[++settings_id_] = change.request;
     if (!busy_) requests_.erase(requests_.begin(), requests_.find(settings_id_));
     std::uint64_t unsaid = 0;
-    if (from.log_limiter().allows(LogLimiter::Clock::now(), unsaid))
+    if (changes_.allows(LogLimiter::Clock::now(), unsaid))
       context_.log.info("settings: " + change.summary, {{"sonar", config_.name}, {"client", from.client()}});
   }
   settings_ = change.settings;  // of a repeat too: what the device knows by itself, its sound speed say, follows its depth
@@ -133,7 +130,7 @@ void Device::on_event(Session& from, const protocol::Event& event) {
     state_.stored_address = store->address;
   } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
     std::uint64_t unsaid = 0;
-    if (from.log_limiter().allows(LogLimiter::Clock::now(), unsaid))
+    if (notices_.allows(LogLimiter::Clock::now(), unsaid))
       context_.log.warning(notice->text, {{"sonar", config_.name}, {"client", from.client()}, {"unsaid", unsaid}});
     return;
   }
@@ -254,6 +251,19 @@ std::vector<StreamDigest> Device::digests() const {
 }
 
 // ---- beacon
+
+void Device::keep_announcing() {
+  asio::co_spawn(
+      context_.io, [this] { return announce(); },
+      [this](std::exception_ptr fault) {
+        if (!fault || stopping_) return;
+        say_fault(text_of(fault));
+        beacon_timer_.expires_after(beacon_period_);
+        beacon_timer_.async_wait([this](const error_code& ec) {
+          if (!ec && !stopping_) keep_announcing();
+        });
+      });
+}
 
 asio::awaitable<void> Device::announce() {
   while (!stopping_) {

@@ -78,15 +78,20 @@ class Device final : public SessionParent {
 
   void on_event(Session& from, const protocol::Event& event) override;
   void on_written(Session& by, std::uint32_t ping) override;
+  void on_fault(Session& session, const std::string& what) override;
   void on_over(Session& session, const std::string& why) override;
 
  private:
   using SessionPointer = std::shared_ptr<Session>;
 
+  void keep_accepting();
+  void keep_announcing();
   asio::awaitable<void> accept();
   asio::awaitable<void> turn_away(tcp::socket socket);
   asio::awaitable<void> announce();
   void admit(tcp::socket socket);
+  void say_visit(const std::string& what, std::vector<LogField> fields);
+  void say_fault(const std::string& what);
   void welcome(tcp::socket socket);
   void on_membership();
   void use_initial_settings();
@@ -125,7 +130,7 @@ class Device final : public SessionParent {
   bool busy_ = false, stopping_ = false, beacon_failed_ = false;
 
   DeviceFigures figures_;
-  LogLimiter refusals_;
+  LogLimiter refusals_, visits_, changes_, notices_, faults_;
   std::uint32_t last_served_ = 0;
   std::vector<StreamDigest> digests_;
 };

@@ -12,6 +12,34 @@ constexpr int most_turned_away_at_once = 16;
 
 }  // namespace
 
+/// For what any visitor can cause, again and again.
+void Device::say_visit(const std::string& what, std::vector<LogField> fields) {
+  std::uint64_t unsaid = 0;
+  if (!visits_.allows(LogLimiter::Clock::now(), unsaid)) return;
+  fields.insert(fields.begin(), {"sonar", config_.name});
+  if (unsaid > 0) fields.emplace_back("unsaid", unsaid);
+  context_.log.info(what, fields);
+}
+
+/// A mistake of ours, not of a client: it may cost that client its connection, never the others.
+void Device::say_fault(const std::string& what) {
+  std::uint64_t unsaid = 0;
+  if (faults_.allows(LogLimiter::Clock::now(), unsaid))
+    context_.log.error("internal fault: " + what + " (please report it)", {{"sonar", config_.name}, {"unsaid", unsaid}});
+}
+
+void Device::on_fault(Session&, const std::string& what) { say_fault(what); }
+
+void Device::keep_accepting() {
+  asio::co_spawn(
+      context_.io, [this] { return accept(); },
+      [this](std::exception_ptr fault) {
+        if (!fault || stopping_) return;
+        say_fault(text_of(fault));
+        keep_accepting();
+      });
+}
+
 asio::awaitable<void> Device::accept() {
   while (!stopping_) {
     error_code ec;
@@ -37,21 +65,25 @@ void Device::admit(tcp::socket socket) {
     return welcome(std::move(socket));
   }
   if (config_.when_full == WhenClientsFull::queue && queue_.size() < longest_queue) {
-    context_.log.info("client waits for a place", {{"sonar", config_.name}, {"waiting", queue_.size() + 1}});
+    say_visit("client waits for a place", {{"waiting", queue_.size() + 1}});
     queue_.push_back(std::move(socket));
     return;
   }
   ++figures_.refused_clients;
-  context_.log.info("client turned away: " + std::to_string(config_.max_clients) + " already connected",
-                    {{"sonar", config_.name}});
+  say_visit("client turned away: " + std::to_string(config_.max_clients) + " already connected", {});
+  if (turning_away_ >= most_turned_away_at_once || stopping_) return;
+  ++turning_away_;
   asio::co_spawn(
-      context_.io, [this, s = std::move(socket)]() mutable { return turn_away(std::move(s)); }, asio::detached);
+      context_.io, [this, s = std::move(socket)]() mutable { return turn_away(std::move(s)); },
+      [this](std::exception_ptr fault) {
+        if (fault) say_fault(text_of(fault));
+        --turning_away_;
+        context_.on_change();
+      });
 }
 
 /// FIN and no byte. What the client has sent meanwhile is read away, or the kernel would answer it with RST.
 asio::awaitable<void> Device::turn_away(tcp::socket socket) {
-  if (turning_away_ >= most_turned_away_at_once || stopping_) co_return;
-  ++turning_away_;
   error_code ec;
   socket.shutdown(tcp::socket::shutdown_send, ec);
   asio::steady_timer deadline(context_.io, std::chrono::seconds(1));
@@ -63,8 +95,6 @@ asio::awaitable<void> Device::turn_away(tcp::socket socket) {
   deadline.cancel();
   // The handler above must be done with `socket` before this frame goes.
   co_await asio::post(context_.io, asio::use_awaitable);
-  --turning_away_;
-  context_.on_change();
 }
 
 void Device::welcome(tcp::socket socket) {
@@ -72,7 +102,7 @@ void Device::welcome(tcp::socket socket) {
   Session::Setup setup{config_.outbox, context_.digest, ++figures_.clients, context_.stall_limit};
   update_state(now);
   auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket), vendor_.converse(state_, now), setup);
-  context_.log.info("client connected", {{"sonar", config_.name}, {"client", session->client()}});
+  say_visit("client connected", {{"client", session->client()}});
   sessions_.push_back(session);
   session->start();
   on_membership();
@@ -91,10 +121,9 @@ void Device::on_membership() {
 }
 
 void Device::on_over(Session& session, const std::string& why) {
-  context_.log.info("client gone: " + why, {{"sonar", config_.name},
-                                            {"client", session.client()},
-                                            {"pings", session.outbox().pings_written()},
-                                            {"dropped", session.outbox().pings_dropped()}});
+  say_visit(
+      "client gone: " + why,
+      {{"client", session.client()}, {"pings", session.outbox().pings_written()}, {"dropped", session.outbox().pings_dropped()}});
   figures_.dropped += session.outbox().pings_dropped();
   if (context_.digest) digests_.push_back({session.number(), session.digest().size(), session.digest().hex()});
   const auto is_it = [&session](const SessionPointer& s) { return s.get() == &session; };

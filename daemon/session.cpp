@@ -49,14 +49,21 @@ protocol::Ipv4 Session::client_ip() const {
 }
 
 void Session::start() {
-  const auto executor = socket_.get_executor();
+  spawn(&Session::read);
+  spawn(&Session::write);
+  spawn(&Session::watch);
+}
+
+/// A session without one of its parts would hold its place for ever: an exception ends it, and it alone.
+void Session::spawn(asio::awaitable<void> (Session::*part)()) {
   const auto self = shared_from_this();
   asio::co_spawn(
-      executor, [self]() -> asio::awaitable<void> { return self->read(); }, asio::detached);
-  asio::co_spawn(
-      executor, [self]() -> asio::awaitable<void> { return self->write(); }, asio::detached);
-  asio::co_spawn(
-      executor, [self]() -> asio::awaitable<void> { return self->watch(); }, asio::detached);
+      socket_.get_executor(), [self, part] { return ((*self).*part)(); },
+      [self](std::exception_ptr fault) {
+        if (!fault) return;
+        self->parent_.on_fault(*self, text_of(fault));
+        self->reset("an internal fault");
+      });
 }
 
 asio::awaitable<void> Session::read() {

@@ -10,7 +10,6 @@
 
 #include "daemon/asio.hpp"
 #include "daemon/clock.hpp"
-#include "daemon/log.hpp"
 #include "daemon/outbox.hpp"
 #include "daemon/sha256.hpp"
 #include "protocol/vendor.hpp"
@@ -27,6 +26,8 @@ class SessionParent {
   virtual void on_event(Session& from, const protocol::Event& event) = 0;
   /// A message has been handed to the kernel whole; `ping` is its number or 0.
   virtual void on_written(Session& by, std::uint32_t ping) = 0;
+  /// An exception ended one of its coroutines; on_over follows.
+  virtual void on_fault(Session& session, const std::string& what) = 0;
   virtual void on_over(Session& session, const std::string& why) = 0;
 };
 
@@ -59,7 +60,6 @@ class Session : public std::enable_shared_from_this<Session> {
   std::uint64_t number() const { return setup_.number; }
   protocol::Ipv4 client_ip() const;
   std::string client() const { return client_; }  // "127.0.0.1:40123"
-  LogLimiter& log_limiter() { return log_limiter_; }
 
  private:
   using Steady = std::chrono::steady_clock;
@@ -71,6 +71,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void handle(protocol::Reaction reaction);
   Steady::time_point watch_until() const;
   void over(std::string why);
+  void spawn(asio::awaitable<void> (Session::*part)());
 
   SessionParent& parent_;
   const Clock& clock_;
@@ -81,7 +82,6 @@ class Session : public std::enable_shared_from_this<Session> {
   Setup setup_;
   Outbox outbox_;
   Sha256 digest_;
-  LogLimiter log_limiter_;
   asio::steady_timer wake_writer_, wake_watch_;
   std::array<std::byte, 8192> received_{};
   Steady::time_point progress_at_{};  // a byte went out, while writing
