@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::size_t most_connections = 32;
 constexpr auto accept_pause = std::chrono::milliseconds(100);
+constexpr std::chrono::milliseconds dead_after{30000};             // a sender whose computer answers nothing
+constexpr auto silence_before_eviction = std::chrono::seconds(1);  // newcomers do not push out those who send
 
 Sender sender_of(bool json, const char* transport, const asio::ip::address& ip, std::uint16_t port) {
   const std::string encoding = json ? "json" : "protobuf";
@@ -50,11 +52,35 @@ Result<void> PoseServer::open() {
 
 void PoseServer::start() {
   for (Listener& l : listeners_) {
-    asio::co_spawn(
-        io_, [this, &l] { return receive(l); }, asio::detached);
-    asio::co_spawn(
-        io_, [this, &l] { return accept(l); }, asio::detached);
+    keep_receiving(l);
+    keep_accepting(l);
   }
+}
+
+void PoseServer::say_fault(const std::exception_ptr& fault, const std::string& at) {
+  std::uint64_t unsaid = 0;
+  if (faults_.allows(LogLimiter::Clock::now(), unsaid))
+    log_.error("internal fault: " + text_of(fault) + " (please report it)", {{"at", at}, {"unsaid", unsaid}});
+}
+
+/// A listener outlives whatever one message does to us.
+void PoseServer::keep_receiving(Listener& listener) {
+  asio::co_spawn(
+      io_, [this, &listener] { return receive(listener); },
+      [this, &listener](std::exception_ptr fault) {
+        if (!fault || stopping_) return;
+        say_fault(fault, "pose datagrams");
+        keep_receiving(listener);
+      });
+}
+void PoseServer::keep_accepting(Listener& listener) {
+  asio::co_spawn(
+      io_, [this, &listener] { return accept(listener); },
+      [this, &listener](std::exception_ptr fault) {
+        if (!fault || stopping_) return;
+        say_fault(fault, "pose connections");
+        keep_accepting(listener);
+      });
 }
 
 void PoseServer::stop() {
@@ -149,16 +175,41 @@ asio::awaitable<void> PoseServer::accept(Listener& listener) {
     const auto peer = socket.remote_endpoint(ec);
     const bool json = listener.encoding == Encoding::json;
     const Sender sender = sender_of(json, "tcp", peer.address(), peer.port());
-    if (ec || !allowed(peer.address()) || connections_.size() >= most_connections) {
-      if (!ec) refuse(allowed(peer.address()) ? "32 connections are open already" : "address is not in poses.allow_from", sender);
+    if (ec) continue;  // gone already
+    if (!allowed(peer.address())) {
+      refuse("address is not in poses.allow_from", sender);
       continue;  // closes it
     }
+    if (!make_place()) {
+      refuse("32 connections are open and busy already", sender);
+      continue;
+    }
+    end_when_silent(socket, dead_after);
     auto connection = std::make_shared<Connection>(Connection{std::move(socket), sender});
     connections_.push_back(connection);
     asio::co_spawn(
         io_, [this, connection, json] { return json ? read_lines(connection) : read_requests(connection); },
-        [this, connection](std::exception_ptr) { connections_.remove(connection); });
+        [this, connection](std::exception_ptr fault) {
+          if (fault) say_fault(fault, connection->sender.id);
+          connections_.remove(connection);
+        });
   }
+}
+
+/// True when there is a place for one more connection, if need be that of the one silent for longest.
+bool PoseServer::make_place() {
+  if (connections_.size() < most_connections) return true;
+  const auto longest =
+      std::min_element(connections_.begin(), connections_.end(),
+                       [](const ConnectionPointer& a, const ConnectionPointer& b) { return a->heard_at < b->heard_at; });
+  if (Steady::now() - (*longest)->heard_at < silence_before_eviction) return false;
+  std::uint64_t unsaid = 0;
+  if (notices_.allows(LogLimiter::Clock::now(), unsaid))
+    log_.info("pose connection closed: silent for longest, and its place was needed", {{"from", (*longest)->sender.id}});
+  error_code ec;
+  (*longest)->socket.close(ec);  // its coroutine ends by itself
+  connections_.erase(longest);
+  return true;
 }
 
 asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
@@ -168,6 +219,7 @@ asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
     error_code ec;
     const std::size_t n = co_await connection->socket.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || stopping_) co_return;
+    connection->heard_at = Steady::now();
     lines.feed(std::span(buffer).first(n));
     while (const auto line = lines.next())
       line->too_long ? refuse("line is longer than 4096 bytes", connection->sender) : on_line(line->text, connection->sender);
@@ -214,6 +266,7 @@ asio::awaitable<void> PoseServer::read_requests(ConnectionPointer connection) {
     error_code ec;
     const std::size_t n = co_await connection->socket.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || stopping_) co_return;
+    connection->heard_at = Steady::now();
     parser.feed(std::span(buffer).first(n));
     while (true) {
       const auto message = parser.next();

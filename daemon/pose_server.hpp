@@ -38,16 +38,22 @@ class PoseServer {
     udp::socket datagrams;
     tcp::acceptor acceptor;
   };
-  /// One TCP sender; closed by stop().
+  using Steady = std::chrono::steady_clock;
+  /// One TCP sender; closed by stop(), or when its place is needed and it has been silent for longest.
   struct Connection {
     tcp::socket socket;
     Sender sender;
+    Steady::time_point heard_at = Steady::now();
     bool greeted = false;
   };
   using ConnectionPointer = std::shared_ptr<Connection>;
 
   Result<Endpoint> open(Listener& listener, Endpoint at);
   bool allowed(const asio::ip::address& from);
+  bool make_place();
+  void keep_receiving(Listener& listener);
+  void keep_accepting(Listener& listener);
+  void say_fault(const std::exception_ptr& fault, const std::string& at);
   asio::awaitable<void> receive(Listener& listener);
   asio::awaitable<void> accept(Listener& listener);
   asio::awaitable<void> read_lines(ConnectionPointer connection);
@@ -68,7 +74,7 @@ class PoseServer {
   const Clock& clock_;
   Log& log_;
   std::function<void()> on_pose_;
-  LogLimiter refusals_, notices_;
+  LogLimiter refusals_, notices_, faults_;
   std::list<Listener> listeners_;
   std::list<ConnectionPointer> connections_;
   Endpoint protobuf_at_, json_at_;

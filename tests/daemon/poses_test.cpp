@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <limits>
+#include <list>
 
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
@@ -39,6 +40,7 @@ struct Poses : ::testing::Test {
     s.pose.position_m = {x, 0, -3};
     return s;
   }
+  static std::string json_at_x(int x) { return "{\"position\":[0," + std::to_string(x) + ",3],\"attitude\":[0,0,0]}\n"; }
   Daemon daemon;
   Client client;
   std::uint16_t protobuf_port = 0, json_port = 0;
@@ -143,6 +145,26 @@ TEST_F(Poses, NonsenseIsRefusedCountedAndChangesNothing) {
   daemon.stop();
   EXPECT_EQ(daemon.app().world().counters().refused, 6u);
   EXPECT_EQ(daemon.app().world().counters().accepted, 1u);
+}
+
+TEST_F(Poses, ASilentConnectionGivesItsPlaceToANewOne) {
+  std::list<Client> senders;
+  for (int i = 0; i < 32; ++i) {
+    senders.emplace_back(daemon.address(), json_port);
+    senders.back().send(json_at_x(20));
+  }
+  ASSERT_TRUE(asked_from(20));
+  std::this_thread::sleep_for(milliseconds(1200));
+  for (Client& s : senders)
+    if (&s != &senders.back()) s.send(json_at_x(21));  // all but the last
+  ASSERT_TRUE(asked_from(21));
+  Client late(daemon.address(), json_port);
+  late.send(json_at_x(22));
+  EXPECT_TRUE(asked_from(22));
+  EXPECT_TRUE(senders.back().read_to_end());
+  EXPECT_THAT(daemon.log_text(), HasSubstr("silent for longest"));
+  senders.front().send(json_at_x(23));
+  EXPECT_TRUE(asked_from(23)) << "the others keep theirs";
 }
 
 TEST(PoseRules, MountIsAppliedAndStalePosesBlankThePicture) {
