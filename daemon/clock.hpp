@@ -10,14 +10,17 @@ namespace sonar {
 
 class Clock {
  public:
-  explicit Clock(bool stepped)
-      : stepped_(stepped),
-        started_(std::chrono::steady_clock::now()),
-        origin_(stepped ? Time{} : std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())) {}
+  /// What the computer's clock on the wall says; people and NTP set it, now() does not follow.
+  using Wall = Time (*)();
+  static Time system_wall() { return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now()); }
+  explicit Clock(bool stepped, Wall wall = system_wall)
+      : stepped_(stepped), wall_(wall), started_(std::chrono::steady_clock::now()), origin_(stepped ? Time{} : wall()) {}
 
   bool stepped() const { return stepped_; }
   /// Stepped time begins at the epoch: packets of two runs are the same.
   Time now() const { return stepped_ ? origin_ : origin_ + (std::chrono::steady_clock::now() - started_); }
+  /// How far now() is ahead of the wall clock at this moment: 0 until somebody sets that clock. Real time only.
+  std::chrono::nanoseconds ahead_of_wall() const { return now() - wall_(); }
   /// When a timer must expire for `t`. Real time only.
   std::chrono::steady_clock::time_point timer_at(Time t) const { return started_ + (t - origin_); }
   /// Stepped time only; never backwards.
@@ -25,6 +28,7 @@ class Clock {
 
  private:
   bool stepped_;
+  Wall wall_;
   std::chrono::steady_clock::time_point started_;
   Time origin_;  // real: the UNIX time at started_; stepped: now
 };

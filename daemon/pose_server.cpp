@@ -11,6 +11,7 @@ namespace sonar {
 namespace {
 
 constexpr std::size_t most_connections = 32;
+constexpr auto wall_tolerance = std::chrono::milliseconds(1);
 constexpr auto accept_pause = std::chrono::milliseconds(100);
 constexpr std::chrono::milliseconds dead_after{30000};             // a sender whose computer answers nothing
 constexpr auto silence_before_eviction = std::chrono::seconds(1);  // newcomers do not push out those who send
@@ -112,7 +113,17 @@ void PoseServer::refuse(const std::string& why, const Sender& sender) {
   say_refusal(why, sender);
 }
 
-std::string PoseServer::take(const control::PoseSample& sample, const Sender& sender) {
+/// WALL stamps are of the clocks as they are now, also when somebody has set ours since we started; the World has a time of its
+/// own that never jumps. A shift is kept while it is right to a millisecond, so that equal stamps stay equal.
+void PoseServer::map_wall(control::Stamp& stamp) {
+  if (stamp.domain != control::ClockDomain::wall || clock_.stepped()) return;
+  const auto shift = clock_.ahead_of_wall();
+  if (std::chrono::abs(shift - wall_shift_) > wall_tolerance) wall_shift_ = shift;
+  stamp.ns += wall_shift_.count();
+}
+
+std::string PoseServer::take(control::PoseSample sample, const Sender& sender) {
+  map_wall(sample.stamp);
   const PoseOutcome outcome = world_.accept(sample, sender, clock_.now());
   if (!outcome.refusal.empty() && outcome.verdict != PoseVerdict::late) say_refusal(outcome.refusal, sender);
   std::uint64_t unsaid = 0;

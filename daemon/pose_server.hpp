@@ -64,7 +64,8 @@ class PoseServer {
   void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);
   void on_line(const std::string& text, const Sender& sender);
   /// The refusal's sentence, or empty.
-  std::string take(const control::PoseSample& sample, const Sender& sender);
+  std::string take(control::PoseSample sample, const Sender& sender);
+  void map_wall(control::Stamp& stamp);
   void refuse(const std::string& why, const Sender& sender);
   void say_refusal(const std::string& why, const Sender& sender);
 
@@ -78,6 +79,7 @@ class PoseServer {
   std::list<Listener> listeners_;
   std::list<ConnectionPointer> connections_;
   Endpoint protobuf_at_, json_at_;
+  std::chrono::nanoseconds wall_shift_{0};  // our time = WALL stamp + shift
   bool stopping_ = false;
 };
 

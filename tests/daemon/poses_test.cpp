@@ -1,6 +1,7 @@
 // Poses by every road change what the engine is asked; nonsense changes nothing and is counted.
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <limits>
 #include <list>
 
@@ -165,6 +166,48 @@ TEST_F(Poses, ASilentConnectionGivesItsPlaceToANewOne) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("silent for longest"));
   senders.front().send(json_at_x(23));
   EXPECT_TRUE(asked_from(23)) << "the others keep theirs";
+}
+
+/// Wall stamps are of the clocks as they are, not as ours was when the daemon started.
+std::atomic<std::int64_t> clock_set_by_ns{0};
+Time set_wall() { return Clock::system_wall() + std::chrono::nanoseconds(clock_set_by_ns.load()); }
+
+TEST(PoseRules, WallStampsFollowAClockThatWasSetAfterTheStart) {
+  clock_set_by_ns = 0;
+  asio::io_context io;
+  const Clock clock(false, set_wall);
+  World world(PoseRules{}, {{"rov", {}, false}}, {}, clock.now());
+  LogOptions options;
+  std::string log_text;
+  options.sink = [&](LogLevel, const std::string& line) { log_text += line + "\n"; };
+  Log log(options);
+  PoseConfig config;
+  config.json.enabled = false;
+  config.protobuf.at = {*parse_ipv4(own_address()), 0};
+  PoseServer server(io, config, world, clock, log, [&io] { io.stop(); });
+  ASSERT_TRUE(server.open());
+  server.start();
+  const auto accepted_at = [&](Time stamp) {
+    const auto before = world.counters().accepted;
+    PoseSample sample;
+    sample.pose.position_m = {5, 0, -3};
+    sample.stamp = {control::ClockDomain::wall, stamp.time_since_epoch().count()};
+    const Endpoint to = server.protobuf();
+    send_udp(text_of(to.ip), to.port, control::encode_pose_datagram(sample));
+    io.restart();
+    io.run_for(patience);
+    return world.counters().accepted > before;
+  };
+  EXPECT_TRUE(accepted_at(set_wall())) << log_text;
+  for (const int hours : {24, -48}) {
+    clock_set_by_ns = std::chrono::nanoseconds(std::chrono::hours(hours)).count();
+    EXPECT_TRUE(accepted_at(set_wall())) << log_text;
+    EXPECT_NEAR(world.vehicle_at(0, clock.now()).position_m.x, 5, 1e-9);
+  }
+  clock_set_by_ns = 0;
+  EXPECT_FALSE(accepted_at(set_wall() + std::chrono::hours(24))) << "judged by the clock as it is now";
+  EXPECT_THAT(log_text, HasSubstr("synchronise the clocks"));
+  server.stop();
 }
 
 TEST(PoseRules, MountIsAppliedAndStalePosesBlankThePicture) {
