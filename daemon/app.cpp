@@ -58,6 +58,7 @@ Result<void> App::open() {
   if (options_.handle_signals) {  // before anybody can read that we are ready
     signals_.add(SIGINT);
     signals_.add(SIGTERM);
+    signals_.add(SIGHUP);  // else it would end us at once, without a word to the clients
   }
   for (Device& d : devices_)
     if (auto r = d.open(); !r) return r;
@@ -77,8 +78,12 @@ int App::run() {
 void App::wait_for_signal() {
   signals_.async_wait([this](const error_code& ec, int signal) {
     if (ec) return;
-    if (stopping_) ::_exit(128 + signal);
-    stop(signal == SIGINT ? "interrupted" : "terminated");
+    if (signal == SIGHUP) {
+      log_.info("SIGHUP: reload is not in this version; nothing changed");
+    } else {
+      if (stopping_) ::_exit(128 + signal);
+      stop(signal == SIGINT ? "interrupted" : "terminated");
+    }
     wait_for_signal();  // cancelled in look() when all is done
   });
 }

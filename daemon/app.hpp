@@ -28,7 +28,7 @@ struct AppOptions {
   std::uint64_t exit_after_pings = 0;            // served, over all sonars; 0 = never
   bool digest = false;                           // SHA-256 of every client's stream
   std::chrono::milliseconds stall_limit{10000};  // a client that takes no byte for so long is reset
-  bool handle_signals = false;                   // SIGINT and SIGTERM stop gracefully, a second one at once
+  bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP does nothing yet
 };
 
 class App {

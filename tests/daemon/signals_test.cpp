@@ -1,0 +1,51 @@
+// Signals, sent to this process as a user or a terminal would: what ends the daemon gracefully, and what must not end it.
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "tests/daemon/loopback.hpp"
+
+namespace sonar::testing_daemon {
+namespace {
+
+using oculus::PingRate;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+DaemonSetup with_signals() {
+  DaemonSetup setup;
+  setup.options.handle_signals = true;
+  return setup;
+}
+bool logs(Daemon& daemon, const std::string& words) {
+  return eventually([&] { return daemon.log_text().find(words) != std::string::npos; });
+}
+
+TEST(Signals, HangupIsLoggedAndTheClientsGoOn) {
+  Daemon daemon(with_signals());
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(client.next_ping());
+  ASSERT_EQ(kill(getpid(), SIGHUP), 0);
+  ASSERT_TRUE(logs(daemon, "SIGHUP: reload is not in this version; nothing changed"));
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
+  EXPECT_THAT(daemon.log_text(), Not(HasSubstr("stopping")));
+  EXPECT_EQ(daemon.stop(), 0);
+}
+
+TEST(Signals, TerminateStillEndsGracefullyAfterAHangup) {
+  Daemon daemon(with_signals());
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz10));
+  ASSERT_TRUE(client.next_ping());
+  ASSERT_EQ(kill(getpid(), SIGHUP), 0);
+  ASSERT_TRUE(logs(daemon, "SIGHUP"));
+  ASSERT_EQ(kill(getpid(), SIGTERM), 0);
+  EXPECT_TRUE(client.read_to_end()) << "a FIN, not a reset";
+  EXPECT_EQ(daemon.wait(), 0);
+  EXPECT_THAT(daemon.log_text(), HasSubstr("stopping: terminated"));
+}
+
+}  // namespace
+}  // namespace sonar::testing_daemon
