@@ -140,7 +140,8 @@ protocol::OptionValues read_options(const Node& node, const protocol::Vendor& ve
     const Node value = map.optional(option.name);
     if (!value.present()) continue;
     if (option.allowed.empty()) {
-      value.number(Range::above(0));
+      const Range range = option.highest > 0 ? Range::between(option.lowest, option.highest) : Range::above(0);
+      if (value.text(64) != option.default_value) value.number(range);
     } else {
       value.choice_index(option.allowed);
     }
@@ -198,6 +199,9 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
   if (profile) {
     sonar.profile = *profile;
     sonar.options = read_options(options, *profile->vendor);
+    const auto tuned = profile->vendor->tuned(profile->model, sonar.options);
+    if (!tuned) options.fail(tuned.error().text);
+    sonar.profile.model = tuned.value_or(profile->model);
   } else if (options.present()) {
     options.map().entries();
   }

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <span>
@@ -26,10 +27,18 @@ using Ipv4 = std::array<std::uint8_t, 4>;  // 192.168.1.2 = {192, 168, 1, 2}
 /// One named choice of a protocol's unknowns, settable under `options:` of a sonar in the configuration.
 struct Option {
   std::string_view name;
-  std::vector<std::string_view> allowed;  // first = default; empty = free number
+  std::vector<std::string_view> allowed;  // first = default; empty = a number above 0, or the word of default_value
   std::string_view default_value;
   std::string_view meaning;
+  double lowest = 0, highest = 0;  // of a number, inclusive; 0, 0 = any above 0
 };
+/// "number above 0", "number from 5 to 170".
+inline std::string numbers_of(const Option& option) {
+  if (option.highest <= 0) return "number above 0";
+  char text[64];
+  std::snprintf(text, sizeof text, "number from %g to %g", option.lowest, option.highest);
+  return text;
+}
 using OptionValues = std::map<std::string, std::string>;
 
 /// The emulated device as its own packets describe it. Owned by the daemon's Device; read on the I/O thread only.
@@ -99,6 +108,9 @@ class Vendor {
   virtual std::span<const Port> ports() const = 0;
   virtual std::span<const Option> options() const = 0;
   virtual int default_max_clients() const = 0;
+  /// The model that a device with these (complete) options emulates; asked once, when its configuration is read.
+  virtual Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
+                                                          const OptionValues& options) const = 0;
   /// What the device does before any client spoke (its stored configuration). `request` may be empty.
   virtual ChangeSettings initial_settings(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;

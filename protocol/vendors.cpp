@@ -47,10 +47,11 @@ const Option* find_option(const Vendor& vendor, std::string_view name) {
   return nullptr;
 }
 
-bool is_positive_number(std::string_view text) {
+bool is_number_of(const Option& option, std::string_view text) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc{} && end == text.data() + text.size() && std::isfinite(value) && value > 0;
+  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return false;
+  return option.highest > 0 ? value >= option.lowest && value <= option.highest : value > 0;
 }
 
 /// Empty when the pair is fine.
@@ -62,8 +63,10 @@ std::string complaint(const Vendor& vendor, const std::string& name, const std::
     return "unknown option " + quoted(name) + " of " + std::string(vendor.name()) + ", the nearest is " +
            quoted(nearest(name, names));
   }
-  if (option->allowed.empty())
-    return is_positive_number(value) ? "" : "option " + name + " must be a number above 0, not " + quoted(value);
+  if (option->allowed.empty()) {
+    const bool fine = value == option->default_value || is_number_of(*option, value);
+    return fine ? "" : "option " + name + " must be a " + numbers_of(*option) + ", not " + quoted(value);
+  }
   if (std::find(option->allowed.begin(), option->allowed.end(), value) != option->allowed.end()) return "";
   return "option " + name + " cannot be " + quoted(value) + ", the nearest is " + quoted(nearest(value, option->allowed)) +
          " (valid: " + listed(option->allowed) + ")";

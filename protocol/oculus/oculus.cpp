@@ -6,6 +6,7 @@
 #include "protocol/oculus/options.hpp"
 #include "protocol/oculus/replies.hpp"
 #include "protocol/oculus/settings.hpp"
+#include "protocol/oculus/tune_model.hpp"
 
 namespace sonar::oculus {
 namespace {
@@ -23,6 +24,10 @@ class OculusVendor final : public protocol::Vendor {
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return oculus::options(); }
   int default_max_clients() const override { return 1; }  // the status message has room for one client's address
+  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
+                                                  const protocol::OptionValues& options) const override {
+    return oculus::tuned(std::move(model), options);
+  }
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     const FireRequest fire = stored_fire();

@@ -7,8 +7,8 @@
 namespace sonar::oculus {
 namespace {
 
-const std::array<protocol::Option, 13>& table() {
-  static const std::array<protocol::Option, 13> rows{{
+const std::array<protocol::Option, 20>& table() {
+  static const std::array<protocol::Option, 20> rows{{
       {option_name::before_first_fire,
        {"dummies", "pings"},
        "dummies",
@@ -49,6 +49,16 @@ const std::array<protocol::Option, 13>& table() {
        "range of row i, in resolutions: i + 0.5, i, or i + 1"},
       {option_name::dummy_period_ms, {}, "1000", "silence after which a dummy message is sent"},
       {option_name::boot_text, {"off", "on"}, "off", "a log message to every client that connects"},
+      {option_name::lf_aperture_deg, {}, "product", "horizontal aperture of the low frequency, degrees", 5, 170},
+      {option_name::hf_aperture_deg, {}, "product", "the same of the high frequency", 5, 170},
+      {option_name::lf_azimuth_width_deg, {}, "product", "-3 dB width of a low-frequency beam in azimuth, degrees", 0.1, 10},
+      {option_name::hf_azimuth_width_deg, {}, "product", "the same of the high frequency", 0.1, 10},
+      {option_name::lf_elevation_width_deg, {}, "product", "-3 dB width in elevation of the low frequency, degrees", 1, 60},
+      {option_name::hf_elevation_width_deg, {}, "product", "the same of the high frequency", 1, 60},
+      {option_name::elevation_width_is,
+       {"two_way", "one_way"},
+       "two_way",
+       "which pattern the elevation width belongs to: transmit times receive, or one of them"},
   }};
   return rows;
 }
@@ -80,11 +90,16 @@ double number_option(const protocol::OptionValues& values, std::string_view name
   return value;
 }
 
+std::optional<double> given_number(const protocol::OptionValues& values, std::string_view name) {
+  double value = 0;
+  return parse_number(text_option(values, name), value) ? std::optional(value) : std::nullopt;
+}
+
 std::string options_table() {
   std::string text = "| option | values, default first | meaning |\n|---|---|---|\n";
   for (const protocol::Option& option : table()) {
     text.append("| `").append(option.name).append("` | ");
-    if (option.allowed.empty()) text.append(option.default_value).append(", any number above 0");
+    if (option.allowed.empty()) text.append(option.default_value).append(", any ").append(protocol::numbers_of(option));
     for (const std::string_view& value : option.allowed) text.append(&value == option.allowed.data() ? "" : ", ").append(value);
     text.append(" | ").append(option.meaning).append(" |\n");
   }

@@ -2,6 +2,7 @@
 // The first allowed value of each is the default; read through the accessors here by dialogue, frame and beacon.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,7 +17,11 @@ inline constexpr std::string_view before_first_fire = "before_first_fire", gain_
                                   reply_version = "reply_version", out_of_range = "out_of_range",
                                   user_config_write = "user_config_write", status_bit7 = "status_bit7",
                                   row_rate_hz = "row_rate_hz", row_origin = "row_origin", dummy_period_ms = "dummy_period_ms",
-                                  boot_text = "boot_text";
+                                  boot_text = "boot_text", lf_aperture_deg = "lf_aperture_deg",
+                                  hf_aperture_deg = "hf_aperture_deg", lf_azimuth_width_deg = "lf_azimuth_width_deg",
+                                  hf_azimuth_width_deg = "hf_azimuth_width_deg",
+                                  lf_elevation_width_deg = "lf_elevation_width_deg",
+                                  hf_elevation_width_deg = "hf_elevation_width_deg", elevation_width_is = "elevation_width_is";
 }
 
 std::span<const protocol::Option> options();
@@ -25,6 +30,8 @@ std::span<const protocol::Option> options();
 std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
 /// For free numbers; the default when the text is not a finite number above 0.
 double number_option(const protocol::OptionValues& values, std::string_view name);
+/// For numbers that replace a product's own: nothing when that stands.
+std::optional<double> given_number(const protocol::OptionValues& values, std::string_view name);
 
 /// The table of README.md.
 std::string options_table();

@@ -142,6 +142,16 @@ TEST(Config, UnknownKeysNameTheNearest) {
   EXPECT_THAT(why(world + vehicles + sonar + "    clients: {when_full: close}\n"), HasSubstr("close_new"));
 }
 
+TEST(Config, OptionsReachTheModel) {
+  const auto c = parse(world + vehicles + sonar + "    options: {lf_aperture_deg: 100, hf_aperture_deg: product}\n");
+  ASSERT_TRUE(c) << c.error().text;
+  const auto& modes = c->sonars.at(0).profile.model->modes;
+  EXPECT_NEAR(deg_from_rad(modes.at(0).horizontal_aperture_rad), 100, 1e-4);
+  EXPECT_NEAR(deg_from_rad(modes.at(1).horizontal_aperture_rad), 60, 1e-4);
+  EXPECT_THAT(why(world + vehicles + sonar + "    options: {lf_aperture_deg: 180}\n"),
+              StartsWith("sonard.yaml:7:32: sonars[0].options.lf_aperture_deg: "));
+}
+
 TEST(Config, EveryRefusalSaysWhatAndWhere) {
   const auto with = [&](const std::string& more) { return why(world + vehicles + sonar + more); };
   EXPECT_THAT(why("world: {scene: nowhere.yaml}\n" + vehicles + sonar),

@@ -53,6 +53,48 @@ TEST(Models, EveryPublicPartNumberHasAProfile) {
     EXPECT_TRUE(have.contains(number)) << number;
 }
 
+Result<std::shared_ptr<const SonarModel>> tuned(const char* profile, const protocol::OptionValues& given) {
+  const auto found = protocol::find_profile(profile).value();
+  return found.vendor->tuned(found.model, protocol::check_options(*found.vendor, given).value());
+}
+
+TEST(Tuning, NothingGivenIsTheProductItself) {
+  EXPECT_EQ(tuned("oculus-m1200d", {}).value(), protocol::find_profile("oculus-m1200d")->model);
+  EXPECT_EQ(tuned("oculus-m1200d", {{"lf_aperture_deg", "product"}}).value(), protocol::find_profile("oculus-m1200d")->model);
+}
+
+TEST(Tuning, EveryFigureReachesItsMode) {
+  const auto model = tuned("oculus-c550d", {{"lf_aperture_deg", "130"},
+                                            {"hf_aperture_deg", "80"},
+                                            {"lf_azimuth_width_deg", "1.2"},
+                                            {"hf_azimuth_width_deg", "0.8"},
+                                            {"lf_elevation_width_deg", "25"},
+                                            {"hf_elevation_width_deg", "15"},
+                                            {"elevation_width_is", "one_way"}})
+                         .value();
+  ASSERT_EQ(model->modes.size(), 2u);
+  const double expected[2][3] = {{130, 1.2, 25}, {80, 0.8, 15}};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const FrequencyMode& mode = model->modes[i];
+    EXPECT_NEAR(deg_from_rad(mode.horizontal_aperture_rad), expected[i][0], 1e-4) << mode.name;
+    EXPECT_NEAR(deg_from_rad(mode.pattern.azimuth_width_rad), expected[i][1], 1e-5) << mode.name;
+    EXPECT_NEAR(deg_from_rad(mode.pattern.elevation_width_rad), expected[i][2], 1e-5) << mode.name;
+    EXPECT_EQ(mode.pattern.elevation_width_is, ElevationWidthIs::one_way) << mode.name;
+  }
+  EXPECT_EQ(model->part_number, 4713);
+  const FrequencyMode& shared = protocol::find_profile("oculus-c550d")->model->modes[0];
+  EXPECT_NEAR(deg_from_rad(shared.horizontal_aperture_rad), 120, 1e-4) << "other sonars of the product keep theirs";
+}
+
+TEST(Tuning, WhatCannotBeIsRefused) {
+  const auto& vendor = *protocol::vendors().front();
+  EXPECT_EQ(protocol::check_options(vendor, {{"hf_aperture_deg", "180"}}).error().text,
+            "option hf_aperture_deg must be a number from 5 to 170, not '180'");
+  EXPECT_EQ(tuned("oculus-m370s", {{"hf_aperture_deg", "60"}}).error().text,
+            "option hf_aperture_deg: Oculus M370s has one frequency only, set the lf_ figure instead");
+  EXPECT_TRUE(tuned("oculus-m370s", {{"lf_aperture_deg", "60"}}).has_value());
+}
+
 TEST(Models, AllAreUsable) {
   for (const auto& model : models()) {
     EXPECT_FALSE(model->modes.empty()) << model->profile;

@@ -1,0 +1,16 @@
+// A product with the figures that no public source tells replaced by those of the configuration: apertures and beam widths.
+// Made once per sonar when its configuration is read; everything after it sees the tuned model only.
+#pragma once
+
+#include <memory>
+
+#include "core/base/result.hpp"
+#include "core/sonar/sonar_model.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::oculus {
+
+/// The model itself when no option asks for a change. Error: a figure of a mode this product lacks.
+Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model, const protocol::OptionValues& options);
+
+}  // namespace sonar::oculus
