@@ -81,11 +81,8 @@ Result<void> override_config(Config& config, const RunCommand& command) {
   if (command.log_level == "info") config.log.level = LogLevel::info;
   if (command.log_level == "warning") config.log.level = LogLevel::warning;
   if (command.log_level == "error") config.log.level = LogLevel::error;
-  if (!command.bind.empty()) {
-    const auto ip = parse_ipv4(command.bind);
-    if (!ip) return failure(ErrorKind::usage, "--bind: " + ip.error().text);
-    config.sonars.front().bind_ip = config.sonars.front().advertise_ip = *ip;
-  }
+  if (!command.bind.empty())
+    if (const auto r = rebind(config, command.bind); !r) return failure(r.error().kind, "--bind: " + r.error().text);
   return {};
 }
 

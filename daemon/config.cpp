@@ -157,14 +157,12 @@ void read_addresses(Map& map, SonarConfig& sonar) {
   const bool any = sonar.bind_ip == Ipv4{};
   const Node advertise = any ? map.required("advertise_ip") : map.optional("advertise_ip");
   sonar.advertise_ip = read_ip(advertise, sonar.bind_ip);
-  sonar.netmask = read_ip(map.optional("netmask"), is_loopback(sonar.advertise_ip) ? Ipv4{255, 0, 0, 0} : Ipv4{255, 255, 255, 0});
+  const Node netmask = map.optional("netmask");
+  sonar.has_own_netmask = netmask.present();
+  sonar.netmask = read_ip(netmask);
   for (const Node& to : map.optional("status_to").items(0, 16)) sonar.status_to.push_back(read_endpoint(to, false));
-  if (sonar.status_to.empty()) {
-    Endpoint broadcast;
-    for (std::size_t i = 0; i < 4; ++i)
-      broadcast.ip[i] = static_cast<std::uint8_t>(sonar.advertise_ip[i] | (~sonar.netmask[i] & 0xff));
-    sonar.status_to.push_back(broadcast);
-  }
+  sonar.has_own_status_to = !sonar.status_to.empty();
+  derive_addresses(sonar);
 }
 
 SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {

@@ -49,7 +49,8 @@ struct SonarConfig {
   std::size_t vehicle = 0;  // index into Config::vehicles
   Pose mount;               // sonar in vehicle, FLU
   Ipv4 bind_ip{}, advertise_ip{}, netmask{};
-  std::vector<Endpoint> status_to;  // port 0 = the vendor's own
+  std::vector<Endpoint> status_to;                          // port 0 = the vendor's own
+  bool has_own_netmask = false, has_own_status_to = false;  // from the file, not derived from advertise_ip
   std::uint16_t device_id = 0;
   int max_clients = 1;
   WhenClientsFull when_full = WhenClientsFull::close_new;
@@ -98,7 +99,10 @@ Result<Config> demo_config();
 /// ./sonard.yaml, ~/.config/sonard/sonard.yaml, /etc/sonard/sonard.yaml, in this order.
 std::vector<std::filesystem::path> config_search_path();
 
-/// For addresses given on the command line.
 Result<Ipv4> parse_ipv4(std::string_view text);
+/// Fills netmask and status_to from advertise_ip, unless the file gives them.
+void derive_addresses(SonarConfig& sonar);
+/// Moves the first sonar to another address, with all that is derived from it. Errors are sentences for the command line.
+Result<void> rebind(Config& config, std::string_view address);
 
 }  // namespace sonar

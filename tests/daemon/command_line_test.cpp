@@ -64,6 +64,11 @@ TEST(CommandLine, TheOtherRunOptionsReplaceTheFilesValues) {
   EXPECT_EQ(c.log.level, LogLevel::error);
 }
 
+TEST(CommandLine, AddressesThatCannotServeAreRefused) {
+  EXPECT_THROW(overridden({"--bind", "0.0.0.0"}), std::runtime_error);
+  EXPECT_THROW(overridden({"--bind", "localhost"}), std::runtime_error);
+}
+
 TEST(CommandLine, WrongValuesAreUsageErrors) {
   EXPECT_EQ(usage_error({"run", "--noise", "maybe"}), 64);
   EXPECT_EQ(usage_error({"run", "--fixed-fan", "-1"}), 64);

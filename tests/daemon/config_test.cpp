@@ -216,5 +216,54 @@ TEST(Config, TheShippedExampleIsValid) {
   EXPECT_EQ(text_of(demo->sonars.at(0).bind_ip), "127.0.0.2");
 }
 
+std::string two_sonars(const std::string& first, const std::string& second_ip) {
+  return "world: {scene: scene.yaml}\nvehicles: [{name: rov}]\nsonars:\n"
+         "  - {name: a, profile: oculus-m1200d, bind_ip: 192.168.2.4" +
+         first + "}\n  - {name: b, profile: oculus-m1200d, bind_ip: " + second_ip +
+         (second_ip == "0.0.0.0" ? ", advertise_ip: 10.0.0.9}\n" : "}\n");
+}
+
+TEST(Rebind, WhatIsDerivedFromTheAddressFollowsIt) {
+  auto config = parse(two_sonars("", "192.168.2.5"));
+  ASSERT_TRUE(config) << config.error().text;
+  EXPECT_EQ(text_of(config->sonars[0].status_to.at(0).ip), "192.168.2.255");
+  ASSERT_TRUE(rebind(*config, "127.0.0.9"));
+  const SonarConfig& moved = config->sonars[0];
+  EXPECT_EQ(text_of(moved.bind_ip), "127.0.0.9");
+  EXPECT_EQ(text_of(moved.advertise_ip), "127.0.0.9");
+  EXPECT_EQ(text_of(moved.netmask), "255.0.0.0");
+  ASSERT_EQ(moved.status_to.size(), 1u);
+  EXPECT_EQ(text_of(moved.status_to[0].ip), "127.255.255.255");
+  EXPECT_EQ(text_of(config->sonars[1].bind_ip), "192.168.2.5");
+  ASSERT_TRUE(rebind(*config, "10.1.2.3"));
+  EXPECT_EQ(text_of(moved.netmask), "255.255.255.0");
+  EXPECT_EQ(text_of(moved.status_to.at(0).ip), "10.1.2.255");
+}
+
+TEST(Rebind, WhatTheFileSaysStays) {
+  auto config = parse(two_sonars(", netmask: 255.255.0.0, status_to: [192.168.2.7]", "192.168.2.5"));
+  ASSERT_TRUE(config) << config.error().text;
+  ASSERT_TRUE(rebind(*config, "10.1.2.3"));
+  EXPECT_EQ(text_of(config->sonars[0].netmask), "255.255.0.0");
+  EXPECT_EQ(text_of(config->sonars[0].status_to.at(0).ip), "192.168.2.7");
+  auto with_mask = parse(two_sonars(", netmask: 255.255.0.0", "192.168.2.5"));
+  ASSERT_TRUE(with_mask && rebind(*with_mask, "10.1.2.3"));
+  EXPECT_EQ(text_of(with_mask->sonars[0].status_to.at(0).ip), "10.1.255.255");
+}
+
+TEST(Rebind, RefusesWhatCannotServe) {
+  const auto refusal = [](const std::string& second_ip, const char* address) {
+    auto config = parse(two_sonars("", second_ip));
+    if (!config) return config.error().text;
+    const auto r = rebind(*config, address);
+    return r ? std::string("accepted") : r.error().text;
+  };
+  EXPECT_THAT(refusal("192.168.2.5", "0.0.0.0"), HasSubstr("advertise_ip in a configuration file"));
+  EXPECT_THAT(refusal("192.168.2.5", "192.168.2.5"), HasSubstr("already used by sonar \"b\""));
+  EXPECT_THAT(refusal("0.0.0.0", "192.168.2.9"), HasSubstr("already used by sonar \"b\""));
+  EXPECT_THAT(refusal("192.168.2.5", "localhost"), HasSubstr("not an IPv4 address"));
+  EXPECT_EQ(refusal("192.168.2.5", "192.168.2.4"), "accepted") << "its own";
+}
+
 }  // namespace
 }  // namespace sonar
