@@ -1,5 +1,6 @@
 // sonard: reads the configuration, loads the scene, builds the engine and runs the App. The only place that knows all of them.
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -49,6 +50,7 @@ int compute_threads(const EngineConfig& engine) {
 }
 
 int run(const RunCommand& command, Steady::time_point begin) {
+  std::signal(SIGPIPE, SIG_IGN);  // nobody reads the log any more (sonard 2>&1 | head): no reason to leave the clients
   auto found = find_config(command);
   if (!found) return complain(found.error());
   Config config = std::move(found->config);
