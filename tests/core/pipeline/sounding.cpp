@@ -99,7 +99,9 @@ double Sounding::envelope_hz() const {
                                static_cast<double>(request.settings.pulse_width_m));
 }
 double Sounding::range_of_row(double row) const { return (row + request.settings.row_centre) * request.settings.range_bin_m; }
-double Sounding::row_of_range(double range_m) const { return range_m / request.settings.range_bin_m - request.settings.row_centre; }
+double Sounding::row_of_range(double range_m) const {
+  return range_m / request.settings.range_bin_m - request.settings.row_centre;
+}
 
 double Sounding::pressure(int row, int beam) const {
   return static_cast<double>(
