@@ -7,7 +7,7 @@ folder=${1:?usage: check_demo.sh BUILD_FOLDER [PICTURE]}
 picture=${2:-out/demo.png}
 # Sand with nothing on it, 5.5 to 7.8 m, 12 degrees to port. tests/acceptance/picture_test.py judges these figures with 256 beams.
 sand=250:350,150:250
-pings=20 memory_limit_mb=300 first_ping_goal_s=1 first_ping_limit_s=10
+pings=20 memory_limit_mb=300 first_ping_goal_s=1 first_ping_limit_s=5 stop_goal_ms=2000 stop_limit_ms=10000
 
 scratch=$(mktemp -d)
 daemon=
@@ -68,12 +68,14 @@ cat "$scratch/figures"
 "$folder/clients/sonarctl" stats --from-raw "$scratch/raw" --ping $((pings - 1)) --rows $sand | sed 's/^/  /'
 echo "resident memory $memory_mb MB at most (limit $memory_limit_mb)"
 echo "from start to first ping $first_ping_s s (goal $first_ping_goal_s)"
-echo "stopped in $stopped_ms ms"
+echo "stopped in $stopped_ms ms (goal $stop_goal_ms)"
 
 exceeds() { awk -v a="$1" -v b="$2" 'BEGIN {exit !(a > b)}'; }
 [ $ended = 0 ] || fail "the daemon ended with code $ended after SIGTERM"
 [ -s "$picture" ] || fail "no picture in $picture"
 exceeds "$memory_mb" "$memory_limit_mb" && fail "resident memory above $memory_limit_mb MB"
+exceeds "$stopped_ms" "$stop_limit_ms" && fail "stopped only after $stopped_ms ms"
+exceeds "$stopped_ms" "$stop_goal_ms" && echo "note: slower than $stop_goal_ms ms to stop; is the machine busy?"
 exceeds "$first_ping_s" "$first_ping_limit_s" && fail "first ping only after $first_ping_s s"
 exceeds "$first_ping_s" "$first_ping_goal_s" && echo "note: slower than $first_ping_goal_s s to the first ping; is the machine busy?"
 echo "demo ok: $picture"
