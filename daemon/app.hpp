@@ -3,14 +3,12 @@
 #pragma once
 
 #include <deque>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/result.hpp"
-#include "core/pipeline/ping_engine.hpp"
 #include "daemon/asio.hpp"
 #include "daemon/clock.hpp"
 #include "daemon/config.hpp"
@@ -18,11 +16,10 @@
 #include "daemon/log.hpp"
 #include "daemon/pose_server.hpp"
 #include "daemon/simulator.hpp"
+#include "daemon/start_engine.hpp"
 #include "daemon/world.hpp"
 
 namespace sonar {
-
-using EngineFactory = std::function<std::unique_ptr<PingEngine>(std::shared_ptr<const Scene>)>;
 
 struct AppOptions {
   std::uint64_t exit_after_pings = 0;            // served, over all sonars; 0 = never

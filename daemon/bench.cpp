@@ -11,6 +11,7 @@
 #include "core/pipeline/ping_engine.hpp"
 #include "daemon/bench_cases.hpp"
 #include "daemon/scene_file.hpp"
+#include "daemon/start_engine.hpp"
 
 namespace sonar {
 namespace {
@@ -52,13 +53,8 @@ SimdLevel level_of(const std::string& name) {
   return SimdLevel::automatic;
 }
 
-Figures measure(const BenchCase& c, const BenchScene& where, std::shared_ptr<const Scene> scene, int threads,
+Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene, PingEngine& engine, int threads,
                 const BenchOptions& options) {
-  Parallel pool(threads);
-  EngineOptions engine_options;
-  engine_options.simd = level_of(options.simd);
-  engine_options.now_s = now_s;
-  const auto engine = make_cpu_engine(scene, pool, engine_options);
   protocol::DeviceState device;
   device.model = c.profile.model;
   device.id = 1;
@@ -70,10 +66,10 @@ Figures measure(const BenchCase& c, const BenchScene& where, std::shared_ptr<con
   f.case_name = c.name;
   f.description = c.description;
   f.scene = where.name;
-  f.engine = engine->description();
+  f.engine = engine.description();
   f.threads = threads;
   f.pings = options.pings;
-  f.scene_triangles = scene->triangle_count();
+  f.scene_triangles = scene.triangle_count();
   std::vector<double> times;
   const int warm_up = std::max(3, options.pings / 10);
   for (int k = 0; k < options.pings + warm_up; ++k) {
@@ -84,7 +80,7 @@ Figures measure(const BenchCase& c, const BenchScene& where, std::shared_ptr<con
     r.seed = Seed{1};
     r.sonar_in_world = r.vehicle_in_world = bench_pose(c, where, k / 40.0);
     const double begin = now_s();
-    const auto pings = engine->run({&r, 1});
+    const auto pings = engine.run({&r, 1});
     const double done = now_s();
     if (c.profile.vendor) static_cast<void>(c.profile.vendor->frame(pings.front(), device, request));
     const double end = now_s();
@@ -92,7 +88,7 @@ Figures measure(const BenchCase& c, const BenchScene& where, std::shared_ptr<con
     if (k < warm_up) continue;
     times.push_back(1e3 * (end - begin));
     f.frame_ms += 1e3 * (end - done) / options.pings;
-    f.last = engine->statistics();
+    f.last = engine.statistics();
     for (std::size_t s = 0; s < f.stage_ms.size(); ++s) f.stage_ms[s] += 1e3 * f.last.seconds[s] / options.pings;
   }
   std::sort(times.begin(), times.end());
@@ -150,6 +146,11 @@ std::vector<std::string> names_of(const Items& items) {
   return names;
 }
 
+int complain(const Error& error) {
+  std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
+  return exit_code(error.kind);
+}
+
 int bench(const BenchOptions& options) {
   nlohmann::json all{{"processor", processor()}, {"results", nlohmann::json::array()}};
   std::printf("%s\n", processor().c_str());
@@ -162,14 +163,16 @@ int bench(const BenchOptions& options) {
       return exit_code(ErrorKind::missing_file);
     }
     const auto scene = load_scene(*file);
-    if (!scene) {
-      std::fprintf(stderr, "sonard: %s\n", scene.error().text.c_str());
-      return exit_code(scene.error().kind);
-    }
+    if (!scene) return complain(scene.error());
     for (const BenchCase& c : bench_cases()) {
       if (!wanted(options.cases, c)) continue;
       for (const int threads : options.threads) {
-        const Figures f = measure(c, where, *scene, threads, options);
+        Parallel pool(threads);
+        const EngineOptions engine_options{.simd = level_of(options.simd), .now_s = now_s};
+        const auto engine = start_engine(
+            [&](std::shared_ptr<const Scene> s) { return make_cpu_engine(std::move(s), pool, engine_options); }, *scene);
+        if (!engine) return complain(engine.error());
+        const Figures f = measure(c, where, **scene, **engine, threads, options);
         print(f);
         all["results"].push_back(json_of(f));
       }

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <new>
 #include <thread>
 
 #include "daemon/app.hpp"
@@ -63,7 +64,10 @@ int run(const RunCommand& command, Steady::time_point begin) {
   for (const std::string& note : (*scene)->notes) log.info(note);
   Parallel pool(compute_threads(config.engine), compute_niceness);  // outlives the engine inside App
   const EngineOptions engine_options{config.engine.simd};
-  const auto make_engine = [&](std::shared_ptr<const Scene> s) { return make_cpu_engine(std::move(s), pool, engine_options); };
+  auto engine = start_engine(
+      [&](std::shared_ptr<const Scene> s) { return make_cpu_engine(std::move(s), pool, engine_options); }, *scene);
+  if (!engine) return complain(engine.error());
+  const auto make_engine = [&](const std::shared_ptr<const Scene>&) { return *std::move(engine); };
   AppOptions options;
   options.exit_after_pings = command.exit_after_pings;
   options.digest = command.digest;
@@ -109,6 +113,9 @@ int main(int argc, char** argv) {
     if (const auto* check = std::get_if<sonar::CheckCommand>(&command)) return sonar::check(*check);
     if (const auto* bench = std::get_if<sonar::BenchCommand>(&command)) return sonar::bench(*bench);
     return sonar::run(std::get<sonar::RunCommand>(command), begin);
+  } catch (const std::bad_alloc&) {
+    std::fputs("sonard: not enough memory; use a smaller scene or free some\n", stderr);
+    return sonar::exit_code(sonar::ErrorKind::unavailable);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "sonard: %s (this is a bug, please report it)\n", e.what());
     return sonar::exit_code(sonar::ErrorKind::bug);

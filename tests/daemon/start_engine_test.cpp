@@ -1,0 +1,53 @@
+// An engine that this machine cannot start is a sentence and exit code 69; only our own mistakes are bugs.
+#include "daemon/start_engine.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <new>
+#include <stdexcept>
+
+namespace sonar {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Idle final : public PingEngine {
+ public:
+  std::vector<Ping> run(std::span<const PingRequest>) override { return {}; }
+  std::string description() const override { return "idle"; }
+};
+
+std::shared_ptr<const Scene> harbour() {
+  auto scene = std::make_shared<Scene>();
+  scene->name = "harbour";
+  return scene;
+}
+template <class Exception>
+EngineFactory throwing(Exception e) {
+  return [e](const std::shared_ptr<const Scene>&) -> std::unique_ptr<PingEngine> { throw e; };
+}
+
+TEST(StartEngine, HandsOverWhatWasMade) {
+  const auto engine = start_engine([](const auto&) { return std::make_unique<Idle>(); }, harbour());
+  ASSERT_TRUE(engine);
+  EXPECT_EQ((*engine)->description(), "idle");
+}
+
+TEST(StartEngine, WhatTheMachineCannotDoIs69AndSaysWhy) {
+  const auto processor = start_engine(throwing(std::runtime_error("cannot start on this processor")), harbour());
+  ASSERT_FALSE(processor);
+  EXPECT_EQ(exit_code(processor.error().kind), 69);
+  EXPECT_THAT(processor.error().text, HasSubstr("scene harbour: cannot start on this processor"));
+  const auto memory = start_engine(throwing(std::bad_alloc()), harbour());
+  ASSERT_FALSE(memory);
+  EXPECT_EQ(exit_code(memory.error().kind), 69);
+  EXPECT_THAT(memory.error().text, HasSubstr("not enough memory"));
+}
+
+TEST(StartEngine, OurOwnMistakesAreNotExplainedAway) {
+  EXPECT_THROW(static_cast<void>(start_engine(throwing(std::logic_error("ours")), harbour())), std::logic_error);
+}
+
+}  // namespace
+}  // namespace sonar
