@@ -192,7 +192,9 @@ int bench(const BenchOptions& options) {
 int run_bench(int argc, char** argv) {
   BenchOptions options;
   CLI::App cli{
-      "Times whole pings, stage by stage.\nExample: sonard bench --case P1 --case P3d --threads 1 --threads 2 --json out.json",
+      "Times whole pings, stage by stage, warm: the cells of the scene are made already. The first ping, which makes them, is\n"
+      "the figure \"cold\" of every case; it has no case of its own.\nExample: sonard bench --case P1 --case P3d --threads 1 "
+      "--threads 2 --json out.json",
       "sonard bench"};
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   cli.add_option("--case", options.cases, "Case to run (may repeat; default all)")->check(CLI::IsMember(names_of(bench_cases())));
