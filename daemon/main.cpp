@@ -64,8 +64,8 @@ int run(const RunCommand& command, Steady::time_point begin) {
   for (const std::string& note : (*scene)->notes) log.info(note);
   Parallel pool(compute_threads(config.engine), compute_niceness);  // outlives the engine inside App
   const EngineOptions engine_options{config.engine.simd};
-  auto engine = start_engine(
-      [&](std::shared_ptr<const Scene> s) { return make_cpu_engine(std::move(s), pool, engine_options); }, *scene);
+  auto engine =
+      start_engine([&](std::shared_ptr<const Scene> s) { return make_cpu_engine(std::move(s), pool, engine_options); }, *scene);
   if (!engine) return complain(engine.error());
   const auto make_engine = [&](const std::shared_ptr<const Scene>&) { return *std::move(engine); };
   AppOptions options;
