@@ -48,7 +48,7 @@ Result<void> rebind(Config& config, std::string_view address) {
 
 Result<Ipv4> parse_ipv4(std::string_view text) {
   const auto wrong = [&] {
-    return failure(ErrorKind::config, std::string("\"").append(text).append("\" is not an IPv4 address; write it as 127.0.0.2"));
+    return failure(ErrorKind::config, std::string("\"").append(text).append("\" is not an IPv4 address such as 127.0.0.2"));
   };
   Ipv4 ip{};
   std::string_view rest = text;
