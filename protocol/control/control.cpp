@@ -1,5 +1,7 @@
 #include "protocol/control/control.hpp"
 
+#include <google/protobuf/stubs/logging.h>
+
 #include <limits>
 
 #include "control.pb.h"
@@ -9,6 +11,8 @@ namespace {
 
 template <class Message>
 bool parse(Message& message, BytesView bytes) {
+  // The library would write a line of its own for every ill-formed string, as fast as a stranger can send them.
+  [[maybe_unused]] static const auto previous = google::protobuf::SetLogHandler(nullptr);
   return bytes.size() <= static_cast<std::size_t>(std::numeric_limits<int>::max()) &&
          message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }

@@ -120,6 +120,15 @@ TEST(Control, RefusesWithASentence) {
   EXPECT_THAT(why(Bytes(1201)), HasSubstr("1200"));
 }
 
+TEST(Control, IllFormedNamesAreRefusedWithoutALineOnStderr) {
+  Wire w;
+  w.sub(1, text("\xff\xfe")).varint(2, 7).varint(4, 2).sub(5, vec(0, 0, 0)).sub(6, quat(1, 0, 0, 0));
+  testing::internal::CaptureStderr();
+  const auto refused = decode_pose_datagram(w.out);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_FALSE(refused.has_value());
+}
+
 TEST(Control, SlightDriftOfTheNormIsRepaired) {
   const auto s = decode_pose_datagram(pose_bytes(2, vec(0, 0, 0), quat(1.0005, 0, 0, 0)));
   ASSERT_TRUE(s);
