@@ -29,7 +29,6 @@ class SurfaceCells::Sheet {
  public:
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
-  std::uint32_t texture_seed = 0;
   std::shared_ptr<const Mesh> mesh;
   std::vector<std::unique_ptr<Node>> roots;
 
@@ -162,7 +161,6 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
       auto sheet = std::make_unique<Sheet>();
       sheet->object = static_cast<int>(o);
       std::tie(sheet->material, sheet->axis, sheet->negative_side) = key;
-      sheet->texture_seed = scene_->materials[static_cast<std::size_t>(sheet->material)].texture_seed;
       sheet->mesh = object.mesh;
       sheet->plant(triangles);
       sheets_.push_back(std::move(sheet));

@@ -53,7 +53,7 @@ inline constexpr int chunk = 256;
 struct Chunk {  // one stretch of a tile on its way through the loops below
   alignas(64) float range[chunk + 16], offset[chunk + 16], cosine[chunk + 16], sine2[chunk + 16], column[chunk + 16],
       sample[chunk + 16];
-  alignas(64) float tangent[chunk], nearness[chunk];
+  alignas(64) float depth_bin[chunk], nearness[chunk];
   alignas(64) float weight_re[chunk + 16], weight_im[chunk + 16];
   alignas(64) std::int32_t keep[chunk], index[chunk + 16];
 };
@@ -97,7 +97,7 @@ __attribute__((noinline)) void place_cells(const TileSeen& s, const GroupView& g
     c.offset[i] = e / (r0 + r);
     c.cosine[i] = std::fabs(along) * (CellTile::normal_unit * inverse_r);
     c.sine2[i] = z * z / (x * x + z * z);
-    c.tangent[i] = keep ? bin : 0.0f;
+    c.depth_bin[i] = keep ? bin : 0.0f;
     c.nearness[i] = inverse_x * (1.0f + g.depth_tolerance_m * inverse_r);
     c.column[i] = keep ? column : lo;
     c.sample[i] = sample;
@@ -113,10 +113,10 @@ __attribute__((noinline)) int look_up(const GroupView& g, int n, Chunk& c) {
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) {
     const std::int32_t column = static_cast<std::int32_t>(c.column[i]);
-    const std::int32_t bin = static_cast<std::int32_t>(c.tangent[i]);
+    const std::int32_t bin = static_cast<std::int32_t>(c.depth_bin[i]);
     const std::int32_t at = (column - first) * row + bin;
     const float a = map[at], b = map[at + 1];
-    const float seen = a + (c.tangent[i] - static_cast<float>(bin)) * (b - a);
+    const float seen = a + (c.depth_bin[i] - static_cast<float>(bin)) * (b - a);
     const std::int32_t visible = c.keep[i] & static_cast<std::int32_t>(c.nearness[i] >= seen);
     c.keep[i] = visible;
     kept += visible;
