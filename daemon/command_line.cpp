@@ -19,7 +19,14 @@ void add_run_options(CLI::App& app, RunCommand& run) {
       ->check(CLI::IsMember({"auto", "portable", "avx2", "avx512"}))
       ->envname("SONARD_SIMD");
   app.add_flag("--expected-power", run.expected_power, "mean echo power instead of speckle");
-  app.add_option("--noise", run.noise, "receiver noise, on or off")->check(CLI::IsMember({"on", "off"}));
+  for (std::size_t i = 0; i < named_switches.size(); ++i)
+    app.add_option(std::string("--") + named_switches[i].name, run.switches[i],
+                   named_switches[i].meaning + std::string(": on or off"))
+        ->check(CLI::IsMember({"on", "off"}))
+        ->group("Parts of the model");
+  app.add_option("--mode", run.mode, "canonical, or paper and raster: Choi 2025 as printed, for comparison")
+      ->check(CLI::IsMember({"canonical", "paper", "raster"}))
+      ->group("Parts of the model");
   app.add_option("--fixed-fan", run.fixed_fan, "rays a column with one scatterer each, no surface cells; 0 = as usual")
       ->check(CLI::Range(0, most_fixed_rays));
   app.add_option("--bind", run.bind, "address of the first sonar instead of its bind_ip and advertise_ip")
@@ -74,7 +81,11 @@ Result<void> override_config(Config& config, const RunCommand& command) {
   if (command.simd == "avx2") config.engine.simd = SimdLevel::avx2;
   if (command.simd == "avx512") config.engine.simd = SimdLevel::avx512;
   if (command.expected_power) config.engine.switches.expected_power = true;
-  if (!command.noise.empty()) config.engine.switches.noise = command.noise == "on";
+  for (std::size_t i = 0; i < named_switches.size(); ++i)
+    if (!command.switches[i].empty()) config.engine.switches.*named_switches[i].is_on = command.switches[i] == "on";
+  if (command.mode == "canonical") config.engine.switches.mode = Mode::canonical;
+  if (command.mode == "paper") config.engine.switches.mode = Mode::paper;
+  if (command.mode == "raster") config.engine.switches.mode = Mode::raster;
   if (command.fixed_fan) config.engine.switches.fixed_fan = *command.fixed_fan;
   if (!command.log_format.empty()) config.log.json = command.log_format == "json";
   if (command.log_level == "debug") config.log.level = LogLevel::debug;

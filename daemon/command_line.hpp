@@ -1,6 +1,7 @@
 // What the user typed. CLI11 is included by command_line.cpp only: it is slow to compile.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -22,8 +23,9 @@ struct RunCommand {
   std::optional<int> threads;
   std::optional<std::uint64_t> seed;
   std::optional<int> fixed_fan;
-  std::string noise;            // "on", "off"
-  bool expected_power = false;  // false: as the configuration says
+  bool expected_power = false;                              // false: as the configuration says
+  std::array<std::string, named_switches.size()> switches;  // "on", "off", in the order of named_switches
+  std::string mode;
 };
 struct CheckCommand {
   std::string config;

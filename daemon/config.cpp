@@ -252,7 +252,12 @@ void read_engine(const Node& node, EngineConfig& engine) {
                                                                       {"avx2", SimdLevel::avx2},
                                                                       {"avx512", SimdLevel::avx512}});
   engine.switches.expected_power = map.optional("expected_power").boolean_or(false);
-  engine.switches.noise = map.optional("noise").choice_or<bool>(true, {{"on", true}, {"off", false}});
+  for (const NamedSwitch& part : named_switches) {
+    bool& is_on = engine.switches.*part.is_on;
+    is_on = map.optional(part.name).choice_or<bool>(is_on, {{"on", true}, {"off", false}});
+  }
+  engine.switches.mode = map.optional("mode").choice_or(
+      Mode::canonical, {{"canonical", Mode::canonical}, {"paper", Mode::paper}, {"raster", Mode::raster}});
   engine.switches.fixed_fan = static_cast<int>(map.optional("fixed_fan").integer_or(0, 0, most_fixed_rays));
 }
 

@@ -12,11 +12,31 @@
 
 namespace sonar {
 
+/// How strongly a surface scatters back per unit area, against the incidence angle a (docs/acoustics.md, section 3).
+enum class ScatteringLaw {
+  lambert,  // mu cos^2 a
+  gsab,     // A exp(-a^2 / 2 B^2) + C cos^D a + E exp(-a^2 / 2 F^2), generalised seafloor angular backscatter
+};
+struct GsabLaw {
+  float a_db = -8, b_rad = 0.14f, c_db = -24, d = 2, e_db = -200, f_rad = 0.5f;
+};
+
+/// Patches of stronger and weaker scattering, fixed to the surface: a Gamma field with mean 1. Makes K-distributed echoes.
+struct Texture {
+  float shape = 0;  // nu: scintillation index 1 + 2 / nu; 0 = no texture
+  float correlation_m = 0.5f;
+};
+
 struct Material {
   std::string name;
-  float lambert_db = -27;     // 10 log10 mu, Mackenzie coefficient; at most -4.97 (energy conservation)
-  float roughness_m = 1e-3f;  // rms
+  ScatteringLaw law = ScatteringLaw::lambert;
+  float lambert_db = -27;         // 10 log10 mu, Mackenzie coefficient; at most -4.97 (energy conservation)
+  GsabLaw gsab = {};              // when law is gsab
+  float trend_db_per_decade = 0;  // of the scattering strength with frequency, re trend_reference_hz
+  float trend_reference_hz = 1e6f;
+  float roughness_m = 1e-3f;  // rms; decides how much mirrors and how much scatters
   float reflection = 0.5f;    // pressure reflection coefficient at normal incidence, water-referenced, -1..1
+  Texture texture = {};
   std::uint32_t texture_seed = 0;
 };
 
@@ -27,6 +47,15 @@ struct Mesh {
   std::vector<std::uint16_t> material;                  // per triangle, index into Scene::materials
 };
 
+/// The true surface behind a mesh that was made from one: where mirror echoes are exact. Same frame as the mesh.
+struct Primitive {
+  enum class Kind { none, sphere, cylinder, box, plane };
+  Kind kind = Kind::none;
+  double radius_m = 0;  // sphere, cylinder
+  Vec3d size_m;         // box: edges; plane: x, y; cylinder: z = length along z
+  bool inside = false;  // seen from within, open at the top: a tank
+};
+
 /// A mesh placed in the world. `id` is its place in Scene::objects and keys its speckle.
 struct Object {
   std::string name;
@@ -34,6 +63,7 @@ struct Object {
   Pose in_world;  // static objects: for ever; moving ones: initially
   int body = -1;  // index into PingRequest::bodies_in_world, -1 = static
   bool visible = true;
+  Primitive primitive = {};
 };
 
 /// An analytic echo without a surface.
@@ -47,6 +77,23 @@ struct PointTarget {
 struct SeaSurface {
   bool present = false;
   float lambert_db = -30;
+  float roughness_m = 0.01f;       // rms height; still water (0) mirrors
+  float bubble_layer_m = 0;        // thickness of the layer of bubbles under it
+  float bubble_loss_db_per_m = 0;  // extra absorption in that layer, one way
+};
+
+/// What fills the water (docs/acoustics.md, section 3).
+struct WaterColumn {
+  float volume_db = -200;  // S_v, backscattering strength per cubic metre [dB re 1/m]; below -150 = none
+};
+
+/// Another sonar within earshot; its pulses arrive whenever they do.
+struct OtherSonar {
+  std::string name;
+  Vec3d position_m;     // in the world
+  float level_upa = 0;  // amplitude in a channel of ours that looks at it, 1 m away; falls as 1 / r and with absorption
+  float rate_hz = 7;
+  float pulse_s = 1e-4f;
 };
 
 struct Scene {
@@ -57,7 +104,9 @@ struct Scene {
   std::vector<std::string> body_names;  // moving bodies, in the order of PingRequest::bodies_in_world
   std::vector<Pose> bodies_in_world;    // where the scene file put them
   SeaSurface sea_surface;               // its mesh, if present, is one of the objects
-  std::vector<std::string> notes;       // what the loader did that its user should know, one sentence each
+  WaterColumn water_column;
+  std::vector<OtherSonar> other_sonars;
+  std::vector<std::string> notes;  // what the loader did that its user should know, one sentence each
 
   /// Where an object sits in its body; in the world for a static one.
   Pose in_body(const Object& object) const {

@@ -2,6 +2,8 @@
 // scene.
 #pragma once
 
+#include <array>
+#include <complex>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -15,19 +17,71 @@
 
 namespace sonar {
 
+/// What makes scatterers of the scene (docs/acoustics.md, section 8).
+enum class Mode {
+  canonical,  // surface cells: the model of docs/acoustics.md
+  paper,      // Choi 2025 as printed: a fixed fan of rays, a frequency sum, its own beam coupling
+  raster,     // the same with scatterers sampled on a perspective pixel grid, as the older method does
+};
+
 /// Parts of the model that can be switched (docs/acoustics.md, section 8). The defaults are the canonical model.
 struct Switches {
+  Mode mode = Mode::canonical;
   bool expected_power = false;  // |sum a|^2 replaced by sum |a|^2: deterministic radiometry
+  int fixed_fan = 0;            // n > 0: n uniform rays a column, one scatterer a ray, no cells
+  bool keep_pressure = false;   // fill Ping::pressure_upa
+  bool keep_beams = false;      // fill Ping::beam_signal_upa
+  bool keep_truth = false;      // fill Ping::truth
+
+  // Switched by name, see named_switches. A part that needs something of the scene or the model (volume, interference, leak, ...)
+  // is silent where that is not given, even when it is on.
   bool noise = true;
-  int fixed_fan = 0;           // n > 0: n uniform rays a column, one scatterer a ray, no cells
-  bool keep_pressure = false;  // fill Ping::pressure_upa
+  bool specular = true;
+  bool texture = true;
+  bool volume = true;
+  bool multipath = false;  // costs a second look at the scene for every mirror
+  bool motion = true;
+  bool doppler = true;
+  bool conical = true;
+  bool crosstalk = true;
+  bool leak = true;
+  bool interference = true;
+
+  bool operator==(const Switches&) const = default;
+};
+
+/// The names by which the command line and the configuration switch parts of the model on and off.
+struct NamedSwitch {
+  const char* name;
+  bool Switches::*is_on;
+  const char* meaning;
+};
+inline constexpr std::array<NamedSwitch, 11> named_switches{{
+    {"noise", &Switches::noise, "receiver noise"},
+    {"specular", &Switches::specular, "mirror echoes of smooth surfaces"},
+    {"texture", &Switches::texture, "patchiness of materials that have a texture"},
+    {"volume", &Switches::volume, "reverberation of the water itself"},
+    {"multipath", &Switches::multipath, "paths by way of flat mirrors: water surface, tank walls"},
+    {"motion", &Switches::motion, "movement of the sonar while the ping is under way"},
+    {"doppler", &Switches::doppler, "range shift of a moving sonar's frequency-modulated pulse"},
+    {"conical", &Switches::conical, "beams as cones about the array; off: flat beams of constant azimuth"},
+    {"crosstalk", &Switches::crosstalk, "leakage between receive channels"},
+    {"leak", &Switches::leak, "the transmitter heard directly in the first rows"},
+    {"interference", &Switches::interference, "pulses of other sonars nearby"},
+}};
+
+/// How the sonar moves while a ping is under way.
+struct Twist {
+  Vec3d velocity_mps;        // of the sonar, world axes
+  Vec3d angular_rate_radps;  // sonar axes
 };
 
 struct PingRequest {
   std::shared_ptr<const SonarModel> model;
   PingNumber number{};
   Time fired_at{};
-  Pose sonar_in_world;
+  Pose sonar_in_world;                // when it fires
+  Twist sonar_moves;                  // from then on
   Pose vehicle_in_world;              // for the attitude and heading in packets
   std::vector<Pose> bodies_in_world;  // moving bodies, in the scene's order; empty = where the scene file put them
   Water water;
@@ -39,6 +93,13 @@ struct PingRequest {
   Switches switches;
 };
 
+/// What a beam meets first: the nearest hit of the rays in its column within the -3 dB elevation width.
+struct BeamTruth {
+  static constexpr std::uint32_t nothing = 0xFFFFFFFFu;
+  float range_m = 0;               // true range, 0 = nothing
+  std::uint32_t object = nothing;  // index into Scene::objects
+};
+
 /// Vendor-neutral result. Rows by range, row 0 nearest; beam 0 = most to port (azimuth falls from + to -).
 struct Ping {
   PingRequest request;
@@ -46,6 +107,9 @@ struct Ping {
   std::vector<std::byte> samples;       // [rows][beams], little-endian, format.bits / 8 bytes each
   std::vector<std::uint32_t> row_gain;  // [rows] when format.row_gains: power gain applied to the row, at least 1
   std::vector<float> pressure_upa;      // [rows][beams] before TVG, when switches.keep_pressure
+  std::vector<std::complex<float>>
+      beam_signal_upa;           // [samples][beams] before TVG, when switches.keep_beams; not in expected power
+  std::vector<BeamTruth> truth;  // [beams], when switches.keep_truth
 
   const FrequencyMode& mode() const { return request.model->modes[static_cast<std::size_t>(request.settings.mode)]; }
 };

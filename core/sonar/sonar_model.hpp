@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core/sonar/waveform.hpp"
+
 namespace sonar {
 
 /// Aperture shading of the receive array; sets the side lobes. `unit` switches the pattern off (1 everywhere).
@@ -31,6 +33,9 @@ struct ReceiverLaw {
   float tvg_ceiling_db = 80;  // infinity switches it off
   float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
+  float crosstalk_db = -200;  // amplitude that every channel leaks to every beam, re the channel; below -150 = none
+  float leak_upa = 0;         // rms pressure of the transmitter heard directly, at range 0; 0 = none
+  float leak_decay_db_per_m = 30;
 };
 
 struct FrequencyMode {
@@ -42,6 +47,7 @@ struct FrequencyMode {
   float source_level_db = 0;  // dB re 1 uPa rms at 1 m
   BeamSpacing beam_spacing = BeamSpacing::uniform_in_sine;
   BeamPattern pattern;
+  Waveform waveform;
   ReceiverLaw receiver;
 };
 

@@ -59,7 +59,7 @@ std::shared_ptr<Mesh> sphere(double radius, int rings) {
 
 std::shared_ptr<const Scene> scene_of(std::shared_ptr<const Mesh> mesh) {
   auto scene = std::make_shared<Scene>();
-  scene->materials.push_back({"sand", -27, 0, 0, 0});
+  scene->materials.emplace_back();
   Object object;
   object.name = "it";
   object.mesh = std::move(mesh);
