@@ -93,6 +93,29 @@ SONAR_HD inline Rotation rotation_from(Quatd q) {
   return r;
 }
 
+SONAR_HD constexpr Vec3d operator*(const Rotation& r, Vec3d v) {
+  return {r.m[0][0] * v.x + r.m[0][1] * v.y + r.m[0][2] * v.z, r.m[1][0] * v.x + r.m[1][1] * v.y + r.m[1][2] * v.z,
+          r.m[2][0] * v.x + r.m[2][1] * v.y + r.m[2][2] * v.z};
+}
+SONAR_HD constexpr Rotation operator*(const Rotation& a, const Rotation& b) {
+  Rotation c;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) c.m[i][j] = a.m[i][0] * b.m[0][j] + a.m[i][1] * b.m[1][j] + a.m[i][2] * b.m[2][j];
+  return c;
+}
+SONAR_HD constexpr Rotation transposed(const Rotation& r) {
+  Rotation t;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) t.m[i][j] = r.m[j][i];
+  return t;
+}
+
+/// The turn about the vector's direction by its length [rad].
+SONAR_HD inline Quatd turned_by(Vec3d rotation_rad) {
+  const double angle = length(rotation_rad);
+  const double part = angle > 0 ? std::sin(angle / 2) / angle : 0.5;
+  return {std::cos(angle / 2), part * rotation_rad.x, part * rotation_rad.y, part * rotation_rad.z};
+}
 SONAR_HD inline Quatd quat_from_rpy(const RollPitchYaw& a) {
   const double cr = std::cos(a.roll_rad / 2), sr = std::sin(a.roll_rad / 2);
   const double cp = std::cos(a.pitch_rad / 2), sp = std::sin(a.pitch_rad / 2);

@@ -241,10 +241,17 @@ std::vector<float> make_noise_filter(double bt) {
   return h;
 }
 
+double PingPlan::widest_about_axis_rad() const {
+  if (switches.conical) return fan.half_angle_rad;
+  const double sine = std::min(columns.first_sine + columns.spacing, 0.9999);
+  return std::atan(std::tan(fan.half_angle_rad) / std::sqrt(1 - sine * sine));
+}
+
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
   PingPlan p;
   p.mode = mode;
   p.settings = settings;
+  p.switches = switches;
   p.expected_power = switches.expected_power;
   p.fixed_fan = switches.fixed_fan;
   p.columns = make_columns(mode, settings.beam_count);
@@ -279,8 +286,7 @@ bool serves(const PingPlan& plan, const PingRequest& r) {
          a.samples_per_row == b.samples_per_row && a.gain_db == b.gain_db && a.tvg == b.tvg &&
          a.device_sound_speed_mps == b.device_sound_speed_mps && a.device_absorption_db_per_m == b.device_absorption_db_per_m &&
          a.format.bits == b.format.bits && a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma &&
-         a.format.row_gains == b.format.row_gains && plan.expected_power == r.switches.expected_power &&
-         plan.fixed_fan == r.switches.fixed_fan;
+         a.format.row_gains == b.format.row_gains && plan.switches == r.switches;
 }
 
 std::string why_invalid(const PingRequest& r) {

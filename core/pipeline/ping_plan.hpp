@@ -44,6 +44,7 @@ struct Coupling {
 struct PingPlan {
   FrequencyMode mode;
   PingSettings settings;
+  Switches switches;
   bool expected_power = false;
   int fixed_fan = 0;
 
@@ -68,6 +69,8 @@ struct PingPlan {
   std::vector<float> row_power_factor;  // per row: (gain * TVG / full scale)^2
   std::vector<std::uint32_t> row_gain;  // when settings.format.row_gains
 
+  /// Largest angle about the array's axis that the fan reaches: flat beams off the middle reach farther round it than they rise.
+  double widest_about_axis_rad() const;
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
 };
 

@@ -6,6 +6,25 @@
 
 namespace sonar {
 
+Pose carried_on(const Pose& pose, const Twist& twist, double seconds) {
+  return {pose.position_m + seconds * twist.velocity_mps,
+          normalized(pose.orientation * turned_by(seconds * twist.angular_rate_radps))};
+}
+
+Meeting PingScalars::meet(Vec3d from_sonar_m) const {
+  if (!moves) return {from_sonar_m, {}, {}};
+  const double one_way_s = length(from_sonar_m) / sound_speed_mps;
+  const Vec3d moved = (one_way_s - seen_at_s) * rotate(conjugate(seen_from.orientation), twist.velocity_mps);
+  const Rotation turn = rotation_from(conjugate(turned_by((2 * one_way_s - seen_at_s) * twist.angular_rate_radps)));
+  return {turn * (from_sonar_m - moved), moved, turn};
+}
+
+double PingScalars::doppler_samples(Vec3d from_sonar_m) const {
+  if (doppler_m_per_mps == 0) return 0;
+  const Vec3d velocity = rotate(conjugate(seen_from.orientation), twist.velocity_mps);
+  return doppler_m_per_mps * dot(velocity, from_sonar_m) / length(from_sonar_m) * samples_per_m;
+}
+
 PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d scene_origin) {
   PingScalars s;
   const double depth = depth_from_z(request.sonar_in_world.position_m.z);
@@ -18,8 +37,12 @@ PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d
   s.sample_offset = plan.sample_offset;
   s.max_range_m = (plan.samples + plan.sample_offset + plan.taps) / s.samples_per_m;
   s.turns_per_m = 2 * hz / s.sound_speed_mps;
-  s.world_from_sonar = rotation_from(request.sonar_in_world.orientation);
-  s.position_in_scene = to_float(request.sonar_in_world.position_m - scene_origin);
+  s.twist = request.sonar_moves;
+  s.moves = request.switches.motion && (length(s.twist.velocity_mps) > 0 || length(s.twist.angular_rate_radps) > 0);
+  if (s.moves) s.seen_at_s = request.settings.range_m / static_cast<double>(request.settings.device_sound_speed_mps);
+  s.seen_from = s.moves ? carried_on(request.sonar_in_world, s.twist, s.seen_at_s) : request.sonar_in_world;
+  s.world_from_sonar = rotation_from(s.seen_from.orientation);
+  s.position_in_scene = to_float(s.seen_from.position_m - scene_origin);
   return s;
 }
 

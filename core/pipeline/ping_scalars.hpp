@@ -7,6 +7,14 @@
 
 namespace sonar {
 
+/// Where something is at the moments that count for it: it scatters when the pulse passes, half way through its echo's flight,
+/// and is heard in the sonar's axes of the moment the echo comes home.
+struct Meeting {
+  Vec3d from_sonar_m;  // sonar axes at reception
+  Vec3d moved_m;       // by how far the sonar had moved by then, in the axes of PingScalars::seen_from
+  Rotation turn;       // from those axes to the ones at reception
+};
+
 struct PingScalars {
   double sound_speed_mps = 1500;
   double absorption_np_per_m = 0;  // one way, true
@@ -18,8 +26,23 @@ struct PingScalars {
   Rotation world_from_sonar;
   Vec3 position_in_scene;  // relative to RayScene::origin() [m]
 
+  // What the rays and the cells are seen from, and how that moves. An echo from range r bounced at r / c and came home at 2 r /
+  // c.
+  Pose seen_from;        // the sonar in the world half way through the ping; the pose of firing when it rests
+  double seen_at_s = 0;  // after firing
+  bool moves = false;
+  Twist twist;
+  double doppler_m_per_mps = 0;  // an echo that closes in by 1 m/s appears so much farther (docs/acoustics.md, section 4)
+
+  /// Of a place in the axes of `seen_from`.
+  Meeting meet(Vec3d from_sonar_m) const;
+  /// By how many samples the Doppler shift of a sweep delays the echo from a place in the sonar's axes.
+  double doppler_samples(Vec3d from_sonar_m) const;
   double sample_of(double range_m) const { return range_m * samples_per_m - sample_offset; }
 };
+
+/// The sonar's pose `seconds` after `pose`.
+Pose carried_on(const Pose& pose, const Twist& twist, double seconds);
 
 PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d scene_origin);
 

@@ -18,22 +18,28 @@ double fraction(double turns) { return turns - std::floor(turns); }
 
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
-TileToSound prepare(const TileInView& t, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan,
+TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<const LawTable> laws, const PingPlan& plan,
                     const PingScalars& s) {
   TileToSound out;
   simd::TileSeen& seen = out.seen;
   const CellTile& tile = *t.tile;
-  const double range = length(t.from_sonar_m);
+  const Meeting at = s.meet(t.from_sonar_m);
+  const Rotation& seen_from_object = cells.sonar_from_object(t.object);
+  const Rotation sonar_from_object = s.moves ? at.turn * seen_from_object : seen_from_object;
+  const Vec3d from_sonar_object_m =
+      s.moves ? t.from_sonar_object_m - transposed(seen_from_object) * at.moved_m : t.from_sonar_object_m;
+  const double range = length(at.from_sonar_m);
   seen.tile = &tile;
-  const Vec3 q = to_float(t.from_sonar_object_m), p = to_float(t.from_sonar_m);
+  const Vec3 q = to_float(from_sonar_object_m), p = to_float(at.from_sonar_m);
   seen.from_sonar_object[0] = q.x, seen.from_sonar_object[1] = q.y, seen.from_sonar_object[2] = q.z;
   seen.from_sonar[0] = p.x, seen.from_sonar[1] = p.y, seen.from_sonar[2] = p.z;
-  const Rotation& turn = cells.sonar_from_object(t.object);
-  for (int i = 0; i < 9; ++i) seen.turn[i] = static_cast<float>(turn.m[i / 3][i % 3]);
+  for (int i = 0; i < 9; ++i) seen.turn[i] = static_cast<float>(sonar_from_object.m[i / 3][i % 3]);
   seen.range_m = static_cast<float>(range);
   seen.phase_turns = static_cast<float>(fraction(range * s.turns_per_m));
-  const double mu = lambert_coefficient(static_cast<double>(scene.materials[static_cast<std::size_t>(tile.material)].lambert_db));
-  const double constant = s.source_upa * std::sqrt(mu) * std::exp(-2 * s.absorption_np_per_m * range);
+  seen.sample_shift = static_cast<float>(s.doppler_samples(at.from_sonar_m));
+  const LawTable& law = laws[static_cast<std::size_t>(tile.material)];
+  seen.law = law.table();
+  const double constant = s.source_upa * std::sqrt(law.mu) * std::exp(-2 * s.absorption_np_per_m * range);
   seen.amplitude = static_cast<float>(constant * static_cast<double>(tile.weight_unit));
   seen.area_amplitude = static_cast<float>(constant * lattice::cell_size_m(tile.level));
   seen.fade_in_from_m = t.level->fade_in_from_m;
@@ -44,8 +50,11 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, const Scene&
   const double radius = static_cast<double>(tile.half_edge_m) * 1.7320508;
   out.first_column = 0, out.last_column = plan.columns.count;
   if (range > 2 * radius) {
-    // |grad u| <= 1 / r, and r >= range - radius inside the cube.
-    const double sine = t.from_sonar_m.y / range, spread = radius / (range - radius) + 1e-6;
+    // |grad u| <= 1 / r (1 / h for flat beams), and r >= range - radius inside the cube.
+    const Vec3d c = at.from_sonar_m;
+    const double from_axis = plan.switches.conical ? range : std::sqrt(c.x * c.x + c.y * c.y);
+    const double sine = c.y / std::max(from_axis, 1e-9);
+    const double spread = from_axis > 2 * radius ? radius / (from_axis - radius) + 1e-6 : 2.0;
     const double from = (plan.columns.first_sine - (sine + spread)) / plan.columns.spacing + 0.5;
     const double to = (plan.columns.first_sine - (sine - spread)) / plan.columns.spacing + 1.5;
     out.first_column = static_cast<int>(std::clamp(std::floor(from), 0.0, static_cast<double>(plan.columns.count)));
@@ -73,18 +82,27 @@ void Echoes::add(float at_sample, std::complex<float> amplitude, int in_column) 
   column[i] = in_column;
 }
 
+std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& s) {
+  std::vector<LawTable> laws;
+  for (const Material& m : scene.materials)
+    laws.push_back(make_law(m, static_cast<double>(plan.mode.centre_hz), s.sound_speed_mps, plan.switches.specular));
+  return laws;
+}
+
 void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan,
                    const PingScalars& scalars, Parallel& pool, std::vector<TileToSound>& tiles) {
+  const std::vector<LawTable> laws = laws_of(scene, plan, scalars);
   tiles.resize(in_view.size());
   constexpr std::size_t batch = 256;
   pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);
-    for (std::size_t i = b * batch; i < end; ++i) tiles[i] = prepare(in_view[i], cells, scene, plan, scalars);
+    for (std::size_t i = b * batch; i < end; ++i) tiles[i] = prepare(in_view[i], cells, laws, plan, scalars);
   });
 }
 
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, const DepthMap& seen) {
   simd::GroupView g{};
+  g.conical = plan.switches.conical;
   g.first_edge_sine = static_cast<float>(plan.columns.first_sine + plan.columns.spacing / 2);
   g.columns_per_sine = static_cast<float>(1 / plan.columns.spacing);
   g.first_column = seen.first_column;
@@ -129,7 +147,7 @@ std::size_t scatter(const std::vector<TileToSound>& tiles, std::span<const std::
 
 void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPlan& plan, const PingScalars& s, Seed seed,
                   Echoes& echoes) {
-  const double solid_angle = plan.columns.spacing * 2 * plan.fan.half_angle_rad / plan.fixed_fan;
+  const double step_rad = 2 * plan.fan.half_angle_rad / plan.fixed_fan;
   const auto bits = static_cast<std::uint64_t>(seed);
   const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
   const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
@@ -138,8 +156,15 @@ void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPl
     const double at_sample = s.sample_of(r);
     if (at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) continue;
     const Object& object = scene.objects[hit.object];
-    const double mu = lambert_coefficient(static_cast<double>(scene.materials[object.mesh->material[hit.triangle]].lambert_db));
-    const double sigma = lambert_cross_section_m2(mu, static_cast<double>(hit.cosine), r, solid_angle);
+    const double cosine = static_cast<double>(hit.cosine);
+    const double strength =
+        scattering_strength(scene.materials[object.mesh->material[hit.triangle]], cosine,
+                            static_cast<double>(plan.mode.centre_hz), s.sound_speed_mps, plan.switches.specular);
+    const double sine = plan.columns.sine(hit.column);
+    const double solid_angle =
+        plan.columns.spacing * step_rad *
+        (plan.switches.conical ? 1.0 : std::cos(static_cast<double>(hit.elevation_rad)) / std::sqrt(1 - sine * sine));
+    const double sigma = strength * footprint_area_m2(cosine, r, solid_angle);
     const double pattern = has_pattern ? elevation_two_way(aperture, static_cast<double>(hit.elevation_rad)) : 1.0;
     const double amplitude = s.source_upa * std::sqrt(sigma) * two_way_transmission(r, s.absorption_np_per_m) * pattern;
     if (plan.expected_power) {
@@ -156,38 +181,45 @@ void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPl
 }
 
 std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pose> bodies_in_world, const PingPlan& plan,
-                                      const PingScalars& s, const Pose& sonar_in_world) {
+                                      const PingScalars& s) {
   std::vector<PointEcho> points;
-  const Pose world_in_sonar = inverse(sonar_in_world);
+  const Pose world_in_sonar = inverse(s.seen_from);
   for (const PointTarget& target : scene.scene().point_targets) {
     const Vec3d local = target.position_m;
     const bool rides = target.body >= 0 && static_cast<std::size_t>(target.body) < bodies_in_world.size();
     const Vec3d in_world = rides ? transform(bodies_in_world[static_cast<std::size_t>(target.body)], local) : local;
-    const Vec3d p = transform(world_in_sonar, in_world);
-    const double r = length(p);
-    const double at_sample = s.sample_of(r);
-    if (r < nearest_scatterer_m || p.x <= 0 || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1)
-      continue;
-    const ConicalDirection direction = conical_from_sonar(p);
-    const double column = std::floor((plan.columns.first_sine - direction.u) / plan.columns.spacing + 0.5);
-    if (std::abs(direction.psi_rad) > plan.fan.half_angle_rad || column < 0 || column >= plan.columns.count) continue;
+    const Vec3d seen = transform(world_in_sonar, in_world);
+    const double r_seen = length(seen);
+    if (r_seen < nearest_scatterer_m || seen.x <= 0) continue;
+    const double strength = amplitude_from_db(static_cast<double>(target.target_strength_db));
+    const std::optional<PointEcho> echo = point_echo(seen, strength, plan, s);
+    if (!echo) continue;
 
     RayPacket ray{};
-    const Vec3d along = (1 / r) * (in_world - sonar_in_world.position_m);
+    const Vec3d along = (1 / r_seen) * (in_world - s.seen_from.position_m);
     ray.origin_x[0] = s.position_in_scene.x, ray.origin_y[0] = s.position_in_scene.y, ray.origin_z[0] = s.position_in_scene.z;
     const Vec3 d = to_float(along);
     ray.direction_x[0] = d.x, ray.direction_y[0] = d.y, ray.direction_z[0] = d.z;
-    ray.far[0] = static_cast<float>(r) * 0.9999f;
+    ray.far[0] = static_cast<float>(r_seen) * 0.9999f;
     scene.trace(ray, 1u, false);
-    if (ray.object[0] != RayPacket::miss) continue;
-
-    const double transmit = static_cast<double>(plan.columns.transmit[static_cast<std::size_t>(column)]);
-    const double amplitude = s.source_upa * amplitude_from_db(static_cast<double>(target.target_strength_db)) *
-                             two_way_transmission(r, s.absorption_np_per_m) *
-                             elevation_two_way(plan.mode.pattern, direction.psi_rad) * transmit;
-    points.push_back({direction.u, at_sample, std::polar(amplitude, -2 * pi * fraction(r * s.turns_per_m))});
+    if (ray.object[0] == RayPacket::miss) points.push_back(*echo);
   }
   return points;
+}
+
+std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> strength_m, const PingPlan& plan,
+                                    const PingScalars& s) {
+  const Vec3d p = s.meet(from_sonar_m).from_sonar_m;
+  const double r = length(p);
+  const double at_sample = s.sample_of(r) + s.doppler_samples(p);
+  if (r < nearest_scatterer_m || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) return {};
+  const ConicalDirection direction = plan.switches.conical ? conical_from_sonar(p) : flat_from_sonar(p);
+  const double column = std::floor((plan.columns.first_sine - direction.u) / plan.columns.spacing + 0.5);
+  if (std::abs(direction.psi_rad) > plan.fan.half_angle_rad || !(column >= 0) || column >= plan.columns.count) return {};
+  const double transmit = static_cast<double>(plan.columns.transmit[static_cast<std::size_t>(column)]);
+  const double amplitude = s.source_upa * two_way_transmission(r, s.absorption_np_per_m) *
+                           elevation_two_way(plan.mode.pattern, direction.psi_rad) * transmit;
+  return PointEcho{direction.u, at_sample, strength_m * std::polar(amplitude, -2 * pi * fraction(r * s.turns_per_m))};
 }
 
 }  // namespace sonar

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <complex>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/ping_scalars.hpp"
+#include "core/pipeline/scattering_law.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/pipeline/trace_fan.hpp"
 #include "core/scene/ray_scene.hpp"
@@ -34,6 +36,9 @@ struct TileToSound {
   int first_column = 0, last_column = 0;  // half-open
 };
 
+/// The scattering law of every material of the scene, as this ping hears it.
+std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& scalars);
+
 /// Prepares the tiles in view, in parallel; the order is kept.
 void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan,
                    const PingScalars& scalars, Parallel& pool, std::vector<TileToSound>& tiles);
@@ -58,8 +63,13 @@ struct PointEcho {
   double sample = 0;
   std::complex<double> amplitude;  // [uPa]
 };
+/// The echo of a place in the axes of PingScalars::seen_from whose backscattering amplitude is `strength_m` [m]: pressure at 1 m
+/// per pressure there, sqrt of the cross-section, with a phase if it has one. Nothing when the sonar does not hear that place;
+/// what hides it is the caller's business.
+std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> strength_m, const PingPlan& plan,
+                                    const PingScalars& scalars);
 /// Point targets in the fan that no surface hides.
 std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pose> bodies_in_world, const PingPlan& plan,
-                                      const PingScalars& scalars, const Pose& sonar_in_world);
+                                      const PingScalars& scalars);
 
 }  // namespace sonar

@@ -100,15 +100,15 @@ class PingUnderWay {
 /// Surface cells that may be in view, sorted by the columns they reach; analytic points that are.
 void PingUnderWay::find_echo_sources() {
   if (request_.blank) return;
-  points_ = scatter_points(scene_, bodies_, plan_, scalars_, request_.sonar_in_world);
+  points_ = scatter_points(scene_, bodies_, plan_, scalars_);
   if (ray_is_scatterer()) return;
   Stopwatch watch(w_.now_s, w_.statistics);
   CellView view;
-  view.sonar_in_world = request_.sonar_in_world;
+  view.sonar_in_world = scalars_.seen_from;
   view.bodies_in_world = bodies_;
   view.max_range_m = static_cast<float>(scalars_.max_range_m);
   view.max_sine = static_cast<float>(std::min(1.0, plan_.columns.first_sine + plan_.columns.spacing));
-  view.max_elevation_rad = static_cast<float>(plan_.fan.half_angle_rad);
+  view.max_elevation_rad = static_cast<float>(plan_.widest_about_axis_rad());
   view.levels = plan_.levels;
   const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);

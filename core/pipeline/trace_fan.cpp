@@ -32,13 +32,15 @@ std::vector<ColumnSine> column_sines(const Columns& columns, int first, int last
 /// Sixteen rays on their way: fills a packet lane by lane. Rays decide shadows only, so float directions do.
 class PacketFiller {
  public:
-  PacketFiller(const PingScalars& scalars, float far_m) : origin_(scalars.position_in_scene), far_m_(far_m) {
+  PacketFiller(const PingPlan& plan, const PingScalars& scalars, float far_m)
+      : origin_(scalars.position_in_scene), far_m_(far_m), conical_(plan.switches.conical) {
     for (int i = 0; i < 9; ++i) m_[i] = static_cast<float>(scalars.world_from_sonar.m[i / 3][i % 3]);
   }
 
   void add(ColumnSine column, Elevation e) {
     const auto i = static_cast<std::size_t>(count_++);
-    const float x = column.across * e.cosine, y = column.along, z = column.across * e.sine;
+    const float x = column.across * e.cosine, y = conical_ ? column.along : column.along * e.cosine;
+    const float z = conical_ ? column.across * e.sine : e.sine;
     packet.direction_x[i] = m_[0] * x + m_[1] * y + m_[2] * z;
     packet.direction_y[i] = m_[3] * x + m_[4] * y + m_[5] * z;
     packet.direction_z[i] = m_[6] * x + m_[7] * y + m_[8] * z;
@@ -59,6 +61,7 @@ class PacketFiller {
  private:
   Vec3 origin_;
   float far_m_;
+  bool conical_;
   float m_[9];
   int count_ = 0;
 };
@@ -68,7 +71,7 @@ class FanTracer {
   FanTracer(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, FanScratch& scratch)
       : scene_(scene),
         plan_(plan),
-        filler_(scalars, static_cast<float>(scalars.max_range_m)),
+        filler_(plan, scalars, static_cast<float>(scalars.max_range_m)),
         first_(first),
         last_(last),
         s_(scratch) {
@@ -98,7 +101,7 @@ class FanTracer {
     const auto i = static_cast<std::size_t>(lane);
     const bool hit = filler_.packet.object[i] != RayPacket::miss;
     sample.elevation_rad = e.angle_rad;
-    sample.forward = column.across * e.cosine;
+    sample.forward = plan_.switches.conical ? column.across * e.cosine : e.cosine;
     sample.tangent = e.sine / e.cosine;
     sample.object = filler_.packet.object[i];
     sample.range_m = hit ? filler_.packet.far[i] : 0;
@@ -229,7 +232,7 @@ std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingSca
 
 void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, int rays,
                      std::vector<FanHit>& hits) {
-  PacketFiller filler(scalars, static_cast<float>(scalars.max_range_m));
+  PacketFiller filler(plan, scalars, static_cast<float>(scalars.max_range_m));
   const double step = 2 * plan.fan.half_angle_rad / rays;
   const std::vector<ColumnSine> sines = column_sines(plan.columns, first, last);
   for (int column = first; column < last; ++column) {

@@ -11,7 +11,8 @@
 
 namespace sonar {
 
-/// What the rays saw, column by column: 1 / x (x = forward coordinate in the sonar's frame) against the tangent z / x.
+/// What the rays saw, column by column: 1 / x (x = forward coordinate in the sonar's frame) against the tangent z / x. For flat
+/// beams (conical off) the horizontal distance stands in for x.
 struct DepthMap {
   int first_column = 0, columns = 0, bins = 0;
   std::vector<float> inverse_x;  // [columns][bins + 1], 0 = nothing was hit

@@ -147,6 +147,11 @@ struct ConicalDirection {
 SONAR_HD inline ConicalDirection conical_from_sonar(Vec3d direction_in_sonar) {
   return {direction_in_sonar.y / length(direction_in_sonar), std::atan2(direction_in_sonar.z, direction_in_sonar.x)};
 }
+/// Flat beams of constant azimuth (Choi 2025): u = sin(azimuth), psi = elevation from the x-y plane.
+SONAR_HD inline ConicalDirection flat_from_sonar(Vec3d direction_in_sonar) {
+  const double h = std::sqrt(direction_in_sonar.x * direction_in_sonar.x + direction_in_sonar.y * direction_in_sonar.y);
+  return {direction_in_sonar.y / h, std::atan2(direction_in_sonar.z, h)};
+}
 SONAR_HD inline Vec3d sonar_from_conical(const ConicalDirection& d) {
   const double across = std::sqrt(1 - d.u * d.u);
   return {across * std::cos(d.psi_rad), d.u, across * std::sin(d.psi_rad)};

@@ -13,6 +13,9 @@ namespace sonar::simd {
 /// Degree of the even polynomial that stands for the elevation pattern, in w = sin^2(elevation angle).
 inline constexpr int elevation_terms = 9;
 
+/// Intervals of a tabulated scattering law, see TileSeen::law.
+inline constexpr int law_steps = 128;
+
 /// One tile as one ping sees it.
 struct TileSeen {
   const CellTile* tile = nullptr;
@@ -20,19 +23,22 @@ struct TileSeen {
   float from_sonar[3];         // the same, sonar axes [m]
   float turn[9];               // object to sonar axes, row-major
   float range_m;               // of the tile centre
+  float sample_shift;          // echoes appear so much later (Doppler)
   float phase_turns;           // carrier phase of the tile centre, in [0, 1)
   float amplitude;             // everything that is constant over the tile, times weight_unit
+  const float* law;            // root of the scattering strength over sqrt(1 - cosine), law_steps + 2 values; null = cosine
   float area_amplitude;        // the same with the cell size in place of the speckle (expected power)
   float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
 };
 
 /// What holds for all tiles of one column group.
 struct GroupView {
-  float first_edge_sine, columns_per_sine;  // column = (first_edge_sine - y / r) * columns_per_sine
+  bool conical;  // cones about the array: u = y / r, t = z / x; else flat beams: u = y / h, t = z / h, h^2 = x^2 + y^2
+  float first_edge_sine, columns_per_sine;  // column = (first_edge_sine - u) * columns_per_sine
   int first_column, last_column;            // half-open
-  float first_tangent, bins_per_tangent;    // depth map axis t = z / x
+  float first_tangent, bins_per_tangent;    // depth map axis t
   int bins;                                 // values per column of the depth map; the map has bins + 1
-  const float* inverse_depth;               // [last - first][bins + 1], 1 / x of what the rays saw, 0 = nothing
+  const float* inverse_depth;               // [last - first][bins + 1], 1 / x (or 1 / h) of what the rays saw, 0 = nothing
   float depth_tolerance_m;
   float turns_per_m;                                              // 2 f / c
   float decay_per_m;                                              // 2 alpha [Np/m]

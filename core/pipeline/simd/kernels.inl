@@ -59,6 +59,7 @@ struct Chunk {  // one stretch of a tile on its way through the loops below
 };
 
 /// Where the cells are: range, column, elevation, cosine of incidence; and which lie in the group's window.
+template <bool conical>
 __attribute__((noinline)) void place_cells(const TileSeen& s, const GroupView& g, int from, int n, Chunk& c) {
   const CellTile& t = *s.tile;
   const std::int16_t* __restrict tx = t.column(CellTile::x) + from;
@@ -87,18 +88,19 @@ __attribute__((noinline)) void place_cells(const TileSeen& s, const GroupView& g
     const float z = pz0 + m20 * dx + m21 * dy + m22 * dz;
     const float along =
         static_cast<float>(nx[i]) * (qx0 + dx) + static_cast<float>(ny[i]) * (qy0 + dy) + static_cast<float>(nz[i]) * (qz0 + dz);
-    const float column = (g.first_edge_sine - y * inverse_r) * g.columns_per_sine;
-    const float inverse_x = 1.0f / larger(x, 1e-6f);
-    const float bin = (z * inverse_x - g.first_tangent) * g.bins_per_tangent;
-    const float sample = r * g.samples_per_m - g.sample_offset;
+    const float h = conical ? x : std::sqrt(x * x + y * y);  // what elevations are measured against
+    const float inverse_h = 1.0f / larger(h, 1e-6f);
+    const float column = (g.first_edge_sine - y * (conical ? inverse_r : inverse_h)) * g.columns_per_sine;
+    const float bin = (z * inverse_h - g.first_tangent) * g.bins_per_tangent;
+    const float sample = r * g.samples_per_m - g.sample_offset + s.sample_shift;
     const bool keep = (column >= lo) & (column < hi) & (bin >= 0) & (bin < bins) & (x > 1e-6f) & (sample > g.first_sample) &
                       (sample < g.last_sample) & (r >= s.fade_in_from_m) & (r < s.fade_out_to_m);
     c.range[i] = r;
     c.offset[i] = e / (r0 + r);
     c.cosine[i] = std::fabs(along) * (CellTile::normal_unit * inverse_r);
-    c.sine2[i] = z * z / (x * x + z * z);
+    c.sine2[i] = z * z / (h * h + z * z);
     c.depth_bin[i] = keep ? bin : 0.0f;
-    c.nearness[i] = inverse_x * (1.0f + g.depth_tolerance_m * inverse_r);
+    c.nearness[i] = inverse_h * (1.0f + g.depth_tolerance_m * inverse_r);
     c.column[i] = keep ? column : lo;
     c.sample[i] = sample;
     c.keep[i] = keep ? 1 : 0;
@@ -182,6 +184,17 @@ inline float elevation_pattern(const float (&e)[elevation_terms], float w) {
   return e[0] + w * (e[1] + w * (e[2] + w * (e[3] + w * (e[4] + w * (e[5] + w * (e[6] + w * (e[7] + w * e[8])))))));
 }
 
+/// Replaces the cosines by the root of the material's scattering strength; without a table Lambert's cosine is that already.
+__attribute__((noinline)) void apply_law(const float* __restrict law, int n, Chunk& c) {
+#pragma GCC ivdep
+  for (int i = 0; i < n; ++i) {
+    const float at = static_cast<float>(law_steps) * std::sqrt(larger(1.0f - c.cosine[i], 0.0f));
+    const std::int32_t step = static_cast<std::int32_t>(at);
+    const float a = law[step], b = law[step + 1];
+    c.cosine[i] = a + (at - static_cast<float>(step)) * (b - a);
+  }
+}
+
 /// Amplitude and carrier of every visible cell, times its speckle.
 __attribute__((noinline)) void sound_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
   float* __restrict out_re = out.re;
@@ -238,9 +251,13 @@ int scatter_tile(const TileSeen& s, const GroupView& g, EchoArrays out) {
   int appended = 0;
   for (int from = 0; from < s.tile->count; from += chunk) {
     const int n = s.tile->count - from < chunk ? s.tile->count - from : chunk;
-    place_cells(s, g, from, n, c);
+    if (g.conical)
+      place_cells<true>(s, g, from, n, c);
+    else
+      place_cells<false>(s, g, from, n, c);
     if (look_up(g, n, c) == 0) continue;
     const int m = gather_visible(s, from, n, c);
+    if (s.law != nullptr) apply_law(s.law, m, c);
     if (g.expected_power) {
       inverse_slopes(s, from, n, c);
       power_of_cells(s, g, m, c, out);

@@ -1,0 +1,26 @@
+// A material's scattering law as one ping hears it: how strongly a unit of surface sends back against the cosine of incidence.
+// Lambert's needs a number, the others a table for the kernels (docs/acoustics.md, section 3).
+#pragma once
+
+#include <vector>
+
+#include "core/pipeline/simd/kernels.hpp"
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+
+struct LawTable {
+  double mu = 0;            // 1/sr; with an empty table sigma_b = mu cos^2
+  std::vector<float> root;  // sqrt(sigma_b / mu) over sqrt(1 - cosine), simd::law_steps + 2 values; or empty
+
+  const float* table() const { return root.empty() ? nullptr : root.data(); }
+};
+
+/// Roughness below this many radians of phase, k h, is smooth: the surface mirrors in part, and only the rest scatters.
+inline constexpr double smooth_below_kh = 1.5;
+
+/// sigma_b [1/sr] of a material at a frequency, cosine in [0, 1]. `specular`: mirrored energy is taken from the diffuse part.
+double scattering_strength(const Material& material, double cosine, double centre_hz, double sound_speed_mps, bool specular);
+LawTable make_law(const Material& material, double centre_hz, double sound_speed_mps, bool specular);
+
+}  // namespace sonar
