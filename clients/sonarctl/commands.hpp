@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "clients/fan_image/draw_fan.hpp"
 #include "clients/sonarctl/net.hpp"
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
+#include "core/image/draw_fan.hpp"
 #include "protocol/control/pose_sample.hpp"
 #include "protocol/oculus/fire.hpp"
 

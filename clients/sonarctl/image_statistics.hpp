@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/fan_image/polar_image.hpp"
 #include "core/base/result.hpp"
+#include "core/image/polar_image.hpp"
 
 namespace sonar::clients {
 

@@ -1,8 +1,8 @@
 // From a decoded Oculus ping to the picture the fan tools draw and measure.
 #pragma once
 
-#include "clients/fan_image/polar_image.hpp"
 #include "core/base/result.hpp"
+#include "core/image/polar_image.hpp"
 #include "protocol/oculus/decode.hpp"
 
 namespace sonar::clients {

@@ -11,6 +11,7 @@ import sys
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
     "core/base": ["core/base/"],
+    "core/image": ["core/base/", "core/image/"],
     "core/text": ["core/base/", "core/text/"],
     "core/sonar": ["core/base/", "core/sonar/"],
     "core/scene": ["core/base/", "core/text/", "core/sonar/", "core/scene/"],
@@ -24,7 +25,7 @@ FLOORS = {
     "protocol/oculus": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
     "protocol/blueview": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
-    "clients": ["core/base/", "core/sonar/", "protocol/", "clients/"],
+    "clients": ["core/base/", "core/image/", "core/sonar/", "protocol/", "clients/"],
     "tests": [""],
 }
 # Header of a dependency -> the only files that may include it (tests may include anything).
@@ -33,7 +34,7 @@ DEPENDENCIES = {
     r"fftw": [],  # not linked yet; its one file will stand here
     r"yaml-cpp/": ["core/text/"],
     r"assimp/": ["core/scene/load_mesh.cpp"],
-    r"png\.h|pngconf\.h": ["core/scene/", "clients/fan_image/raster.cpp"],
+    r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp"],
     r"boost/": ["daemon/"],
     r"boost/asio\.hpp": ["daemon/asio.hpp"],
     r"spdlog/|fmt/": ["daemon/", "clients/"],

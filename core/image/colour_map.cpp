@@ -1,9 +1,9 @@
-#include "clients/fan_image/colour_map.hpp"
+#include "core/image/colour_map.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-namespace sonar::clients {
+namespace sonar {
 namespace {
 
 std::uint8_t byte_from(float unit) { return static_cast<std::uint8_t>(std::lround(std::clamp(unit, 0.0f, 1.0f) * 255.0f)); }
@@ -59,4 +59,4 @@ Result<ColourMap> find_colour_map(std::string_view name) {
   return failure(ErrorKind::usage, "no colour map \"" + std::string(name) + "\"; there are " + colour_map_names());
 }
 
-}  // namespace sonar::clients
+}  // namespace sonar

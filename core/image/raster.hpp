@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/fan_image/colour_map.hpp"
 #include "core/base/result.hpp"
+#include "core/image/colour_map.hpp"
 
-namespace sonar::clients {
+namespace sonar {
 
 struct Raster {
   int width = 0, height = 0;
@@ -34,4 +34,4 @@ int text_width(std::string_view text, int scale);
 /// Written beside its final name and renamed, so that a reader never sees half a picture.
 Result<void> write_png(const Raster& raster, const std::filesystem::path& file);
 
-}  // namespace sonar::clients
+}  // namespace sonar

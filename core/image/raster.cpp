@@ -1,4 +1,4 @@
-#include "clients/fan_image/raster.hpp"
+#include "core/image/raster.hpp"
 
 #include <png.h>
 
@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <system_error>
 
-namespace sonar::clients {
+namespace sonar {
 namespace {
 
 /// Five rows of three dots, top row in the highest bits.
@@ -68,4 +68,4 @@ Result<void> write_png(const Raster& raster, const std::filesystem::path& file) 
   return {};
 }
 
-}  // namespace sonar::clients
+}  // namespace sonar

@@ -10,7 +10,7 @@
 
 #include "core/base/result.hpp"
 
-namespace sonar::clients {
+namespace sonar {
 
 struct Rgb {
   std::uint8_t r = 0, g = 0, b = 0;
@@ -33,4 +33,4 @@ std::string colour_map_names();  // "gray, copper, ..."
 /// Or a sentence with the names there are.
 Result<ColourMap> find_colour_map(std::string_view name);
 
-}  // namespace sonar::clients
+}  // namespace sonar

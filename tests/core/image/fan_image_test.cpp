@@ -1,5 +1,5 @@
 // The fan: what is to port must be left, what is far must be up, and nothing may be lost between samples and pixels.
-#include "clients/fan_image/draw_fan.hpp"
+#include "core/image/draw_fan.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 
 #include "core/base/geometry.hpp"
 
-namespace sonar::clients {
+namespace sonar {
 namespace {
 
 PolarImage black_fan(std::size_t rows, std::size_t beams, double half_aperture_deg) {
@@ -122,4 +122,4 @@ TEST(Png, IsWrittenWholeOrRefusedWithASentence) {
 }
 
 }  // namespace
-}  // namespace sonar::clients
+}  // namespace sonar

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace sonar::clients {
+namespace sonar {
 
 struct PolarImage {
   std::size_t rows = 0, beams = 0;
@@ -18,4 +18,4 @@ struct PolarImage {
   double range_m() const { return static_cast<double>(rows) * row_spacing_m; }
 };
 
-}  // namespace sonar::clients
+}  // namespace sonar

@@ -1,4 +1,4 @@
-#include "clients/fan_image/draw_fan.hpp"
+#include "core/image/draw_fan.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "core/base/geometry.hpp"
 
-namespace sonar::clients {
+namespace sonar {
 namespace {
 
 constexpr Rgb background{13, 17, 23}, ring_colour{150, 160, 170}, text_colour{190, 198, 206};
@@ -140,4 +140,4 @@ Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style) {
   return raster;
 }
 
-}  // namespace sonar::clients
+}  // namespace sonar

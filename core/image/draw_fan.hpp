@@ -4,12 +4,12 @@
 
 #include <string>
 
-#include "clients/fan_image/colour_map.hpp"
-#include "clients/fan_image/polar_image.hpp"
-#include "clients/fan_image/raster.hpp"
 #include "core/base/result.hpp"
+#include "core/image/colour_map.hpp"
+#include "core/image/polar_image.hpp"
+#include "core/image/raster.hpp"
 
-namespace sonar::clients {
+namespace sonar {
 
 struct FanStyle {
   int width_px = 1000;  // 64..8000
@@ -24,4 +24,4 @@ Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 /// Distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.
 double ring_spacing_m(double range_m);
 
-}  // namespace sonar::clients
+}  // namespace sonar
