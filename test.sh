@@ -19,3 +19,10 @@ if [ -n "$long" ]; then
 fi
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"
 ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-2}" --output-on-failure --no-tests=error "$@" </dev/null
+status=$?
+# What the oracles of docs/acoustics.md measured. A run of some tests only need not have figures for all of them.
+partial=()
+[ $# -eq 0 ] || partial=(--partial)
+say "the oracles of the acoustic model"
+python3 tests/oracles/oracle_table.py build/release/oracles "${partial[@]}" || [ $status -ne 0 ] || status=1
+exit $status
