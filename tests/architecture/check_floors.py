@@ -31,7 +31,7 @@ FLOORS = {
 # Header of a dependency -> the only files that may include it (tests may include anything).
 DEPENDENCIES = {
     r"embree[34]?/": ["core/scene/embree_scene.cpp"],
-    r"fftw": [],  # not linked yet; its one file will stand here
+    r"fftw": ["core/pipeline/spectral_transform.cpp"],
     r"yaml-cpp/": ["core/text/"],
     r"assimp/": ["core/scene/load_mesh.cpp"],
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp"],

@@ -5,6 +5,7 @@
 build_packages=(
   g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libpng-dev libexpected-dev
   libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libeigen3-dev libgtest-dev libgmock-dev
+  libfftw3-dev
 )
 
 say() { printf '\n== %s\n' "$*"; }

@@ -1,0 +1,36 @@
+// The discrete Fourier transform of the frequency-domain path (docs/acoustics.md, section 4): FFTW behind one class.
+// Its .cpp is the only file that includes FFTW; a build without it (SONAR_FFTW=OFF) knows from have_transform.
+#pragma once
+
+#include <complex>
+#include <memory>
+
+namespace sonar::spectral {
+
+using Complex = std::complex<double>;
+
+/// Whether this build has a transform. Without one an Fft must not be made.
+extern const bool have_transform;
+/// Why not, and what to do: one sentence for whoever asked.
+inline constexpr const char* no_transform =
+    "this build has no Fourier transform: measured and exact pulses need one; install libfftw3-dev and build with SONAR_FFTW=ON";
+
+/// x[k] = sum_n x[n] e^{-+ i 2 pi k n / size}, in place, not scaled. Made once, then used by any number of threads at once; the
+/// result depends on the input alone (plans are estimated, never measured).
+class Fft {
+ public:
+  enum class Direction { forward, inverse };  // e^{-i ...}, e^{+i ...}
+  Fft(int size, Direction direction);
+  int size() const { return size_; }
+  void run(Complex* values) const;
+
+ private:
+  struct Plan;
+  int size_;
+  std::shared_ptr<const Plan> plan_;
+};
+
+/// The smallest even size of at least n without prime factors above 7.
+int quick_size(int n);
+
+}  // namespace sonar::spectral
