@@ -24,6 +24,17 @@ void detect(const BeamSignals& beams, const PingPlan& plan, int rows, int width,
   }
 }
 
+/// The window's part of [samples][beams].
+void keep_signal(const BeamSignals& beams, std::vector<std::complex<float>>& kept) {
+  for (int j = 0; j < beams.beams; ++j) {
+    const float* s = beams.beam(j);
+    for (int n = 0; n < beams.samples; ++n) {
+      const std::size_t at = static_cast<std::size_t>(beams.first_sample + n) * static_cast<std::size_t>(beams.beams);
+      kept[at + static_cast<std::size_t>(j)] = {s[2 * n], s[2 * n + 1]};
+    }
+  }
+}
+
 void put(std::uint32_t code, int bytes, std::byte* at) {
   for (int b = 0; b < bytes; ++b) at[b] = static_cast<std::byte>(code >> (8 * b) & 0xFFu);
 }
@@ -37,6 +48,8 @@ void shape_ping(const PingPlan& plan, const Switches& switches, Ping& ping) {
   ping.samples.resize(cells * static_cast<std::size_t>(s.format.bits / 8));
   ping.row_gain = plan.row_gain;
   if (switches.keep_pressure) ping.pressure_upa.resize(cells);
+  if (switches.keep_beams && !plan.expected_power)
+    ping.beam_signal_upa.resize(static_cast<std::size_t>(plan.samples) * static_cast<std::size_t>(s.beam_count));
 }
 
 void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels& kernels, ReceiveScratch& scratch, Ping& ping) {
@@ -44,6 +57,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
   const int per_row = s.samples_per_row, first_row = beams.first_sample / per_row, rows = beams.samples / per_row;
   const int width = (s.beam_count + 15) / 16 * 16;
   const int bytes = s.format.bits / 8;
+  if (!ping.beam_signal_upa.empty()) keep_signal(beams, ping.beam_signal_upa);
   detect(beams, plan, rows, width, scratch.power);
   scratch.codes.resize(static_cast<std::size_t>(width));
   const auto max_code = static_cast<float>(s.format.max_code);

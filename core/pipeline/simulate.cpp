@@ -66,6 +66,7 @@ class PingUnderWay {
     w_.columns.shape(plan_.columns.count, plan_.samples, plan_.taps);
     w_.workers.resize(static_cast<std::size_t>(pool.threads()));
     w_.statistics = {};
+    w_.first_hits.assign(request.switches.keep_truth ? static_cast<std::size_t>(plan_.columns.count) : 0, BeamTruth{});
     for (Workspace::PerWorker& worker : w_.workers) {
       worker.statistics = {};
       if (worker.echoes.column.empty()) worker.echoes.reserve(echo_room);
@@ -146,6 +147,7 @@ void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) 
 void PingUnderWay::scatter_hits_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch) {
   mine.hits.clear();
   trace_fixed_fan(scene_, plan_, scalars_, first, last, plan_.fixed_fan, mine.hits);
+  if (!w_.first_hits.empty()) note_first_hits(mine.hits, plan_, w_.first_hits);
   mine.statistics.rays += static_cast<std::size_t>(last - first) * static_cast<std::size_t>(plan_.fixed_fan);
   watch.lap(Stage::trace);
   scatter_hits(mine.hits, scene_.scene(), plan_, scalars_, request_.seed, mine.echoes);
@@ -157,6 +159,7 @@ void PingUnderWay::scatter_hits_of(int first, int last, Workspace::PerWorker& mi
 
 void PingUnderWay::scatter_cells_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch) {
   mine.statistics.rays += trace_fan(scene_, plan_, scalars_, first, last, mine.fan, mine.seen);
+  if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, first, last, w_.first_hits);
   watch.lap(Stage::trace);
   const simd::GroupView group = make_group_view(plan_, scalars_, mine.seen);
   const auto& wanted = w_.tiles_by_group[static_cast<std::size_t>(first / group_columns)];
@@ -174,6 +177,7 @@ Ping PingUnderWay::image() {
   Ping ping;
   ping.request = request_;
   shape_ping(plan_, request_.switches, ping);
+  if (!w_.first_hits.empty()) ping.truth = truth_of_beams(plan_, w_.first_hits);
   const int rows = plan_.settings.range_bin_count, rows_at_once = std::max(1, window_samples / plan_.settings.samples_per_row);
   pool_.for_each(static_cast<std::size_t>((rows + rows_at_once - 1) / rows_at_once), [&](std::size_t window, int worker) {
     const int first = static_cast<int>(window) * rows_at_once;

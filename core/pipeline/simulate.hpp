@@ -15,6 +15,7 @@
 #include "core/pipeline/scatter.hpp"
 #include "core/pipeline/synthesize.hpp"
 #include "core/pipeline/trace_fan.hpp"
+#include "core/pipeline/truth.hpp"
 #include "core/scene/ray_scene.hpp"
 #include "core/scene/surface_cells.hpp"
 
@@ -35,6 +36,7 @@ struct Workspace {
   std::vector<TileToSound> tiles;
   std::vector<std::vector<std::uint32_t>> tiles_by_group;
   ColumnSignals columns;
+  std::vector<BeamTruth> first_hits;  // by column, when switches.keep_truth
   struct PerWorker {
     FanScratch fan;
     DepthMap seen;

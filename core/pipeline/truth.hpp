@@ -1,0 +1,20 @@
+// Ground truth beside the picture: what each beam meets first. Taken from the rays that have been traced anyway.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/pipeline/trace_fan.hpp"
+#include "core/sonar/ping.hpp"
+
+namespace sonar {
+
+/// The nearest hit within the -3 dB elevation width of every column of [first, last), which the fan has just traced.
+void note_first_hits(const FanScratch& fan, const PingPlan& plan, int first, int last, std::span<BeamTruth> by_column);
+/// The same from the fixed fan's hits.
+void note_first_hits(std::span<const FanHit> hits, const PingPlan& plan, std::span<BeamTruth> by_column);
+
+/// Each beam takes what the column nearest to it met.
+std::vector<BeamTruth> truth_of_beams(const PingPlan& plan, std::span<const BeamTruth> by_column);
+
+}  // namespace sonar
