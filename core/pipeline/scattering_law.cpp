@@ -9,12 +9,9 @@
 namespace sonar {
 namespace {
 
-double from_db(float db) { return std::pow(10.0, 0.1 * static_cast<double>(db)); }
+constexpr double largest_strength = 1 / pi;  // of backscatter; a trend may not carry a surface beyond what comes in
 
-double trend(const Material& m, double centre_hz) {
-  if (m.trend_db_per_decade == 0) return 1;
-  return std::pow(centre_hz / static_cast<double>(m.trend_reference_hz), 0.1 * static_cast<double>(m.trend_db_per_decade));
-}
+double from_db(float db) { return std::pow(10.0, 0.1 * static_cast<double>(db)); }
 
 double gsab(const GsabLaw& g, double cosine) {
   const double a = std::acos(std::clamp(cosine, 0.0, 1.0));
@@ -25,6 +22,17 @@ double gsab(const GsabLaw& g, double cosine) {
   return bell(g.a_db, g.b_rad) + from_db(g.c_db) * std::pow(cosine, static_cast<double>(g.d)) + bell(g.e_db, g.f_rad);
 }
 
+double lambert_mu(const Material& m) { return lambert_coefficient(static_cast<double>(m.lambert_db)); }
+
+/// Straight on, where every law is strongest.
+double strongest(const Material& m) { return m.law == ScatteringLaw::gsab ? gsab(m.gsab, 1) : lambert_mu(m); }
+
+double trend(const Material& m, double centre_hz) {
+  if (m.trend_db_per_decade == 0) return 1;
+  const double decades = std::log10(centre_hz / static_cast<double>(m.trend_reference_hz));
+  return std::min(std::pow(10.0, 0.1 * static_cast<double>(m.trend_db_per_decade) * decades), largest_strength / strongest(m));
+}
+
 double phase_roughness(const Material& m, double centre_hz, double sound_speed_mps) {
   return 2 * pi * centre_hz / sound_speed_mps * static_cast<double>(m.roughness_m);
 }
@@ -32,9 +40,7 @@ double phase_roughness(const Material& m, double centre_hz, double sound_speed_m
 }  // namespace
 
 double scattering_strength(const Material& m, double cosine, double centre_hz, double sound_speed_mps, bool specular) {
-  const double law = m.law == ScatteringLaw::gsab
-                         ? gsab(m.gsab, cosine)
-                         : lambert_per_area(lambert_coefficient(static_cast<double>(m.lambert_db)), cosine);
+  const double law = m.law == ScatteringLaw::gsab ? gsab(m.gsab, cosine) : lambert_per_area(lambert_mu(m), cosine);
   const double kh = phase_roughness(m, centre_hz, sound_speed_mps);
   const bool smooth = specular && kh < smooth_below_kh;
   const double scattered = smooth ? 1 - std::exp(-4 * kh * kh * cosine * cosine) : 1;
@@ -43,7 +49,7 @@ double scattering_strength(const Material& m, double cosine, double centre_hz, d
 
 LawTable make_law(const Material& m, double centre_hz, double sound_speed_mps, bool specular) {
   LawTable law;
-  law.mu = lambert_coefficient(static_cast<double>(m.lambert_db)) * trend(m, centre_hz);
+  law.mu = lambert_mu(m) * trend(m, centre_hz);
   const bool smooth = specular && phase_roughness(m, centre_hz, sound_speed_mps) < smooth_below_kh;
   if (m.law == ScatteringLaw::lambert && !smooth) return law;
   for (int i = 0; i < simd::law_steps + 2; ++i) {
