@@ -10,6 +10,9 @@
 #include "core/scene/scene.hpp"
 
 namespace sonar {
+namespace text {
+class Map;
+}
 
 /// Errors: file:line:col: key.path: what, and the nearest valid name.
 Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& file);
@@ -18,5 +21,8 @@ Result<std::shared_ptr<const Scene>> parse_scene(std::string_view text, const st
                                                  const std::filesystem::path& folder);
 /// One of built_in_scenes (core/scene/built_in_scenes.hpp); reads no files.
 Result<std::shared_ptr<const Scene>> load_built_in_scene(std::string_view name);
+
+/// The scene that stands in a map of a larger document, whose finish() then tells what was wrong with it. Never null.
+std::shared_ptr<const Scene> read_scene(text::Map map, const std::filesystem::path& folder, const std::string& name);
 
 }  // namespace sonar

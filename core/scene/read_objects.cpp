@@ -93,7 +93,8 @@ class ObjectsReader {
                                     .mesh = shape.mesh,
                                     .in_world = compose(in_world, Pose{shape.centre_m, {}}),
                                     .body = body,
-                                    .visible = visible});
+                                    .visible = visible,
+                                    .primitive = shape.primitive});
   }
 
   void read_point(Map& keys, const std::string& name, int body, bool moving) {

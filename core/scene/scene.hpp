@@ -52,7 +52,7 @@ struct Primitive {
   enum class Kind { none, sphere, cylinder, box, plane };
   Kind kind = Kind::none;
   double radius_m = 0;  // sphere, cylinder
-  Vec3d size_m;         // box: edges; plane: x, y; cylinder: z = length along z
+  Vec3d size_m = {};    // box: edges; plane: x, y; cylinder: z = length along z
   bool inside = false;  // seen from within, open at the top: a tank
 };
 

@@ -15,9 +15,9 @@ using text::Range;
 
 const Range a_size{.min = 1e-4, .max = 1e5};
 
-Shape with_material(Mesh mesh, std::uint16_t material) {
+Shape with_material(Mesh mesh, std::uint16_t material, const Primitive& primitive = {}) {
   std::fill(mesh.material.begin(), mesh.material.end(), material);
-  return Shape{std::make_shared<const Mesh>(std::move(mesh)), {}};
+  return Shape{std::make_shared<const Mesh>(std::move(mesh)), {}, primitive};
 }
 
 Shape from_grid(const Result<HeightGrid>& grid, std::uint16_t material, const Node& at, bool centred) {
@@ -91,12 +91,18 @@ Shape ShapeReader::read_primitive(std::string_view type, Map& keys) {
     const auto v = keys.required(key).numbers<3>(a_size);
     return Vec3d{std::max(v[0], a_size.min), std::max(v[1], a_size.min), std::max(v[2], a_size.min)};
   };
-  const auto done = [&](Mesh mesh) { return with_material(std::move(mesh), material); };
+  const auto done = [&](Mesh mesh, const Primitive& primitive = {}) {
+    return with_material(std::move(mesh), material, primitive);
+  };
   if (type == "plane") {
     const auto size = keys.required("size_m").numbers<2>(a_size);
-    return done(make_plane(std::max(size[0], a_size.min), std::max(size[1], a_size.min), patch()));
+    const Vec3d sheet{std::max(size[0], a_size.min), std::max(size[1], a_size.min), 0};
+    return done(make_plane(sheet.x, sheet.y, patch()), {.kind = Primitive::Kind::plane, .size_m = sheet});
   }
-  if (type == "box") return done(make_box(three("size_m"), patch()));
+  if (type == "box") {
+    const Vec3d edges = three("size_m");
+    return done(make_box(edges, patch()), {.kind = Primitive::Kind::box, .size_m = edges});
+  }
   if (type == "rock") {
     const Vec3d size = three("size_m");
     const double bumpiness = keys.optional("bumpiness").number_or(0.2, Range::between(0, 0.5));
@@ -105,7 +111,7 @@ Shape ShapeReader::read_primitive(std::string_view type, Map& keys) {
     return done(make_rock(0.5 * size, bumpiness, seed, n));
   }
   const double radius = size_of("radius_m");
-  if (type == "sphere") return done(make_sphere(radius, segments(radius)));
+  if (type == "sphere") return done(make_sphere(radius, segments(radius)), {.kind = Primitive::Kind::sphere, .radius_m = radius});
   if (type == "torus") {
     const double tube = size_of("tube_radius_m");
     if (tube >= radius) keys.required("tube_radius_m").fail("must be smaller than radius_m");
@@ -113,10 +119,11 @@ Shape ShapeReader::read_primitive(std::string_view type, Map& keys) {
   }
   const double length = size_of("length_m");
   if (type == "cylinder") {
-    const Node caps = keys.optional("caps");
+    const Caps caps =
+        keys.optional("caps").choice_or(Caps::both, {{"both", Caps::both}, {"bottom", Caps::bottom}, {"none", Caps::none}});
     return done(
-        make_cylinder(radius, length, segments(radius),
-                      caps.choice_or(Caps::both, {{"both", Caps::both}, {"bottom", Caps::bottom}, {"none", Caps::none}})));
+        make_cylinder(radius, length, segments(radius), caps),
+        {.kind = Primitive::Kind::cylinder, .radius_m = radius, .size_m = {0, 0, length}, .inside = caps == Caps::bottom});
   }
   if (type == "capsule") return done(make_capsule(radius, length, segments(radius)));
   const double top = keys.optional("top_radius_m").number_or(0, Range::between(0, 1e5));

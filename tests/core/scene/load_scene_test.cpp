@@ -255,5 +255,34 @@ sea_surface: {size_m: [9, 9]}
   }
 }
 
+TEST(LoadScene, ShapesKnowTheTrueSurfaceBehindTheirMesh) {
+  const auto scene = parsed(R"(
+objects:
+  - {name: ball, type: sphere, material: steel, radius_m: 0.3}
+  - {name: rod, type: cylinder, material: steel, radius_m: 0.1, length_m: 2, instances: [{}, {xyz_m: [1, 0, 0]}]}
+  - {name: tank, type: cylinder, material: steel, radius_m: 1, length_m: 1.2, caps: bottom}
+  - {name: block, type: box, material: steel, size_m: [1, 2, 3]}
+  - {name: plate, type: plane, material: steel, size_m: [0.2, 0.4]}
+  - {name: buoy, type: capsule, material: steel, radius_m: 0.1, length_m: 1}
+)");
+  using Kind = Primitive::Kind;
+  const auto of = [&](std::size_t i) { return scene->objects.at(i).primitive; };
+  EXPECT_EQ(of(0).kind, Kind::sphere);
+  EXPECT_EQ(of(0).radius_m, 0.3);
+  for (const std::size_t rod : {1u, 2u}) {
+    EXPECT_EQ(of(rod).kind, Kind::cylinder);
+    EXPECT_EQ(of(rod).radius_m, 0.1);
+    EXPECT_EQ(of(rod).size_m.z, 2);
+    EXPECT_FALSE(of(rod).inside);
+  }
+  EXPECT_TRUE(of(3).inside);
+  EXPECT_EQ(of(4).kind, Kind::box);
+  EXPECT_EQ(of(4).size_m.y, 2);
+  EXPECT_EQ(of(5).kind, Kind::plane);
+  EXPECT_EQ(of(5).size_m.x, 0.2);
+  EXPECT_EQ(of(5).size_m.y, 0.4);
+  EXPECT_EQ(of(6).kind, Kind::none);
+}
+
 }  // namespace
 }  // namespace sonar
