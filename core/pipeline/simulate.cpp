@@ -44,7 +44,8 @@ PreparedSettings& prepared_for(const PingRequest& request, Workspace& w) {
   }
   PreparedSettings& p = **it;
   p.last_used = w.pings;
-  if (request.switches.noise && !p.plan.expected_power) p.noise.prepare(request.seed, p.plan.noise_filter);
+  const bool leak = request.switches.leak && p.plan.mode.receiver.leak_upa > 0;
+  if ((request.switches.noise || leak) && !p.plan.expected_power) p.noise.prepare(request.seed, p.plan.noise_filter);
   return p;
 }
 
@@ -62,6 +63,8 @@ class PingUnderWay {
         prepared_(prepared_for(request, work)),
         plan_(prepared_.plan),
         scalars_(make_scalars(plan_, request, scene.origin())),
+        leak_(plan_, request.switches),
+        crosstalk_(plan_, request.switches),
         bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world) {
     w_.columns.shape(plan_.columns.count, plan_.samples, plan_.taps);
     w_.workers.resize(static_cast<std::size_t>(pool.threads()));
@@ -94,14 +97,18 @@ class PingUnderWay {
   PreparedSettings& prepared_;
   const PingPlan& plan_;
   PingScalars scalars_;
+  Leak leak_;
+  Crosstalk crosstalk_;
   std::span<const Pose> bodies_;
   std::vector<PointEcho> points_;
+  std::vector<PulseHeard> other_sonars_;
 };
 
 /// Surface cells that may be in view, sorted by the columns they reach; analytic points that are.
 void PingUnderWay::find_echo_sources() {
   if (request_.blank) return;
   points_ = scatter_points(scene_, bodies_, plan_, scalars_);
+  other_sonars_ = hear_other_sonars(scene_, plan_, scalars_, request_);
   if (ray_is_scatterer()) return;
   Stopwatch watch(w_.now_s, w_.statistics);
   CellView view;
@@ -141,6 +148,8 @@ void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) 
   }
   finish_columns(plan_, request_.switches.noise ? &prepared_.noise : nullptr, request_.sonar_id,
                  static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
+  if (leak_.is_heard())
+    leak_.add(plan_, prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
   watch.lap(Stage::noise);
 }
 
@@ -197,6 +206,8 @@ void PingUnderWay::image_rows(int first, int last, Workspace::PerWorker& mine, P
   couple(w_.columns, plan_.coupling, kernels_, first * per_row, (last - first) * per_row, plan_.settings.beam_count, mine.couple,
          mine.beams);
   add_points(points_, plan_, mine.beams);
+  add_pulses(other_sonars_, plan_, mine.beams);
+  if (crosstalk_.is_heard()) crosstalk_.add(plan_, mine.beams);
   watch.lap(Stage::couple);
   receive(mine.beams, plan_, kernels_, mine.receive, ping);
   watch.lap(Stage::receive);

@@ -8,6 +8,7 @@
 
 #include "core/base/parallel.hpp"
 #include "core/pipeline/couple.hpp"
+#include "core/pipeline/disturbances.hpp"
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/ping_plan.hpp"

@@ -1,0 +1,179 @@
+#include "core/pipeline/disturbances.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/random.hpp"
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/scattering.hpp"
+#include "core/pipeline/arithmetic/waveform.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr double no_crosstalk_db = -150;
+constexpr std::uint32_t leak_key = 0x6c65616bu, other_sonar_key = 0x6f746872u;  // keep these draws apart
+constexpr std::uint32_t every_ping = 0xFFFFFFFFu;
+constexpr int most_pulses = 64;        // of one other sonar in one ping
+constexpr double edge_widths = 3;      // erf is 1 to 2e-5 there
+constexpr double widest_offset = 0.2;  // of b: how far off our carrier another sonar's tone may be and still pass
+
+double unit_uniform(std::uint32_t bits) { return static_cast<double>(bits) / 4294967296.0; }
+
+bool hidden(const RayScene& scene, Vec3d from, Vec3d place) {
+  RayPacket ray{};
+  const double distance = length(place - from);
+  const Vec3 o = to_float(from - scene.origin()), d = to_float((1 / distance) * (place - from));
+  ray.origin_x[0] = o.x, ray.origin_y[0] = o.y, ray.origin_z[0] = o.z;
+  ray.direction_x[0] = d.x, ray.direction_y[0] = d.y, ray.direction_z[0] = d.z;
+  ray.far[0] = static_cast<float>(distance) * 0.9999f;
+  scene.trace(ray, 1u, false);
+  return ray.object[0] != RayPacket::miss;
+}
+
+/// The Gaussian filter's step response, 0 to 1; `x` in b t.
+double rise(double x) { return 0.5 * (1 + std::erf(x)); }
+
+}  // namespace
+
+Leak::Leak(const PingPlan& plan, const Switches& switches) {
+  const ReceiverLaw& law = plan.mode.receiver;
+  if (!switches.leak || !(law.leak_upa > 0)) return;
+  const double per_column = static_cast<double>(law.leak_upa) / std::sqrt(plan.coupling.weight_energy);
+  for (int n = 0; n < plan.samples; ++n) {
+    const double down_db = static_cast<double>(law.leak_decay_db_per_m) * (n + plan.sample_offset) * plan.sample_spacing_m;
+    if (down_db > forgotten_db) break;
+    rms_upa_.push_back(static_cast<float>(per_column * std::pow(10.0, -down_db / 20)));
+  }
+}
+
+void Leak::add(const PingPlan& plan, const NoiseTable& noise, std::uint32_t sonar, std::uint32_t ping, int first, int last,
+               ColumnSignals& signals) const {
+  const std::size_t n = rms_upa_.size();
+  std::vector<float> grain(2 * n);
+  for (int k = first; k < last; ++k) {
+    float* to = signals.column(k) + 2 * signals.lead;
+    if (plan.expected_power) {
+      for (std::size_t i = 0; i < n; ++i) to[2 * i] += rms_upa_[i] * rms_upa_[i];
+      continue;
+    }
+    std::fill(grain.begin(), grain.end(), 0.0f);
+    const int count = static_cast<int>(n);
+    noise.add(sonar ^ leak_key, every_ping, k, static_cast<float>(std::sqrt(1 - changing_share)), count, grain.data());
+    noise.add(sonar ^ leak_key, ping, k, static_cast<float>(std::sqrt(changing_share)), count, grain.data());
+    for (std::size_t i = 0; i < n; ++i) {
+      to[2 * i] += rms_upa_[i] * grain[2 * i];
+      to[2 * i + 1] += rms_upa_[i] * grain[2 * i + 1];
+    }
+  }
+}
+
+std::vector<PulseHeard> hear_other_sonars(const RayScene& scene, const PingPlan& plan, const PingScalars& s,
+                                          const PingRequest& request) {
+  std::vector<PulseHeard> heard;
+  if (!request.switches.interference || request.blank) return heard;
+  const auto bits = static_cast<std::uint64_t>(request.seed);
+  const double per_sample = 2 * half_power_bt * plan.sample_spacing_m / static_cast<double>(plan.settings.pulse_width_m);
+  const double samples_per_s = s.sound_speed_mps / 2 * s.samples_per_m;
+  const double fired_s = seconds(request.fired_at.time_since_epoch());
+  const std::vector<OtherSonar>& others = scene.scene().other_sonars;
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const OtherSonar& other = others[i];
+    const double range_m = length(other.position_m - request.sonar_in_world.position_m);
+    if (!(other.rate_hz > 0) || !(other.level_upa > 0) || range_m < nearest_scatterer_m) continue;
+    if (hidden(scene, request.sonar_in_world.position_m, other.position_m)) continue;
+    const Random4 draw = philox(static_cast<std::uint32_t>(i), request.sonar_id, 0, other_sonar_key,
+                                static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32));
+    const double rate_hz = static_cast<double>(other.rate_hz), travel_s = range_m / s.sound_speed_mps;
+    // Pulse number n of all time arrives at (n + phase) / rate + travel; the first that may reach into the record:
+    const double phase = unit_uniform(draw.v[0]), pulse_s = static_cast<double>(other.pulse_s);
+    const double edge_samples = edge_widths / per_sample;
+    const double earliest_s = -pulse_s - edge_samples / samples_per_s;
+    const double first = std::ceil((fired_s + earliest_s - travel_s) * rate_hz - phase);
+    for (int p = 0; p < most_pulses; ++p) {
+      const double at_s = (first + p + phase) / rate_hz + travel_s - fired_s;  // after we fired
+      PulseHeard pulse;
+      pulse.from_sample = at_s * samples_per_s - s.sample_offset;
+      if (pulse.from_sample - edge_samples > plan.samples) break;
+      pulse.to_sample = pulse.from_sample + pulse_s * samples_per_s;
+      const Pose now = s.moves ? carried_on(request.sonar_in_world, s.twist, at_s) : request.sonar_in_world;
+      const Vec3d seen = transform(inverse(now), other.position_m);
+      if (seen.x <= 0) continue;
+      const ConicalDirection from = plan.switches.conical ? conical_from_sonar(seen) : flat_from_sonar(seen);
+      const double both_ways = elevation_two_way(plan.mode.pattern, from.psi_rad);  // two equal patterns; we only receive
+      pulse.sine = from.u;
+      pulse.amplitude_upa = static_cast<double>(other.level_upa) / range_m * std::exp(-s.absorption_np_per_m * range_m) *
+                            std::sqrt(std::max(both_ways, 0.0));
+      const Random4 own =
+          philox(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(static_cast<std::int64_t>(first) + p),
+                 request.sonar_id, other_sonar_key, static_cast<std::uint32_t>(bits >> 32), static_cast<std::uint32_t>(bits));
+      pulse.phase_turns = unit_uniform(own.v[0]);
+      pulse.turns_per_sample = widest_offset * (2 * unit_uniform(draw.v[1]) - 1) * per_sample;
+      pulse.edge_per_sample = per_sample;
+      heard.push_back(pulse);
+    }
+  }
+  return heard;
+}
+
+void add_pulses(std::span<const PulseHeard> pulses, const PingPlan& plan, BeamSignals& beams) {
+  const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
+  std::vector<std::complex<double>> tone;
+  for (const PulseHeard& pulse : pulses) {
+    const double soft = edge_widths / pulse.edge_per_sample;
+    const int from = std::max(beams.first_sample, static_cast<int>(std::ceil(std::max(pulse.from_sample - soft, 0.0))));
+    const int to = static_cast<int>(
+        std::min(std::floor(pulse.to_sample + soft) + 1, static_cast<double>(beams.first_sample + beams.samples)));
+    if (from >= to) continue;
+    tone.clear();
+    for (int n = from; n < to; ++n) {
+      const double level =
+          rise((n - pulse.from_sample) * pulse.edge_per_sample) * rise((pulse.to_sample - n) * pulse.edge_per_sample);
+      const double turns = pulse.phase_turns + (n - pulse.from_sample) * pulse.turns_per_sample;
+      tone.push_back(std::polar(pulse.amplitude_upa * level, 2 * pi * turns));
+    }
+    for (int j = 0; j < beams.beams; ++j) {
+      const double weight = pattern(pulse.sine - plan.beam_sine[static_cast<std::size_t>(j)]);
+      float* out = beams.beam(j) + 2 * (from - beams.first_sample);
+      for (const std::complex<double>& t : tone) {
+        out[0] += static_cast<float>(plan.expected_power ? weight * weight * std::norm(t) : weight * t.real());
+        if (!plan.expected_power) out[1] += static_cast<float>(weight * t.imag());
+        out += 2;
+      }
+    }
+  }
+}
+
+Crosstalk::Crosstalk(const PingPlan& plan, const Switches& switches) {
+  const double level_db = static_cast<double>(plan.mode.receiver.crosstalk_db);
+  if (!switches.crosstalk || level_db < no_crosstalk_db) return;
+  amplitude_ = std::pow(10.0, level_db / 20);
+  // What all beams together make of a lone echo amid the sector: sum_j W_j, or in power sum_j W_j^2.
+  const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
+  const double middle = plan.beam_sine[plan.beam_sine.size() / 2];
+  double sum = 0, squares = 0;
+  for (const double sine : plan.beam_sine) {
+    const double w = pattern(middle - sine);
+    sum += w;
+    squares += w * w;
+  }
+  share_ = 1 / (plan.expected_power ? squares : sum);
+  own_in_power_ = 2 * sum / squares;
+}
+
+void Crosstalk::add(const PingPlan& plan, BeamSignals& beams) const {
+  const auto floats = static_cast<std::size_t>(2 * beams.samples);
+  std::vector<float> sum(floats, 0.0f);
+  for (int j = 0; j < beams.beams; ++j) {
+    const float* from = beams.beam(j);
+    for (std::size_t i = 0; i < floats; ++i) sum[i] += from[i];
+  }
+  const auto leaked = static_cast<float>((plan.expected_power ? amplitude_ * amplitude_ : amplitude_) * share_);
+  const auto own = static_cast<float>(plan.expected_power ? 1 + amplitude_ * own_in_power_ : 1.0);
+  for (int j = 0; j < beams.beams; ++j) {
+    float* to = beams.beam(j);
+    for (std::size_t i = 0; i < floats; ++i) to[i] = own * to[i] + leaked * sum[i];
+  }
+}
+
+}  // namespace sonar
