@@ -1,0 +1,128 @@
+// A sonar that moves while its ping is under way: bearings of the moment an echo comes home, ranges of the moment it bounced.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+#include "tests/oracles/record.hpp"
+
+namespace sonar::test {
+namespace {
+
+/// Azimuth of the loudest beam about a range, between beams, degrees.
+double bearing_deg(const Sounding& s, double range_m) {
+  const int row = static_cast<int>(std::lround(s.row_of_range(range_m)));
+  const int beam = s.loudest_beam(row);
+  const Peak peak = log_parabola(s.pressure(row, beam - 1), s.pressure(row, beam), s.pressure(row, beam + 1));
+  const double step = s.beam_sine(beam + 1) - s.beam_sine(beam);
+  return deg_from_rad(std::asin(s.beam_sine(beam) + peak.offset * step));
+}
+
+/// Two upright poles 2 cm thick on boresight at 2 and 10 m, the far one looking out above the near one.
+std::shared_ptr<const Scene> two_poles() {
+  SceneMaker maker;
+  maker.add(box({0.01, 0.01, 0.1}), -10, {2.01, 0, -0.15});
+  maker.add(box({0.01, 0.01, 0.3}), -10, {10.01, 0, 0.35});
+  return maker.make();
+}
+
+Sounding looking_at(std::shared_ptr<const Scene> scene) {
+  PingSettings settings = default_rows(11, 480);
+  settings.beam_count = 512;
+  return Sounding(std::move(scene), oculus_high(), settings);
+}
+
+constexpr double yaw_rate_deg_per_s = 40;
+const Twist turning_to_port{{}, {0, 0, rad_from_deg(yaw_rate_deg_per_s)}};
+
+TEST(Motion, O40APoleFartherAwayIsTurnedFartherByAYaw) {
+  const double expected = yaw_rate_deg_per_s * 2 * 8 / 1500;
+  for (const bool points : {false, true}) {
+    SceneMaker maker;
+    maker.add_point({2, 0, 0}, -20).add_point({10, 0, 0}, 0);
+    Sounding s = looking_at(points ? maker.make() : two_poles());
+    s.request.switches.expected_power = true;
+    s.ping();
+    EXPECT_NEAR(bearing_deg(s, 2), 0, 0.02);
+    EXPECT_NEAR(bearing_deg(s, 10), 0, 0.02);
+    s.request.sonar_moves = turning_to_port;
+    s.ping();
+    // The sonar turns to port, so things fall behind to starboard, the later the more.
+    record_oracle(40, points ? "yaw during the ping, points at 2 and 10 m" : "yaw during the ping, poles at 2 and 10 m", expected,
+                  bearing_deg(s, 2) - bearing_deg(s, 10), 0.1 * expected, "deg");
+    EXPECT_NEAR(bearing_deg(s, 10), -yaw_rate_deg_per_s * 2 * 10 / 1500, 0.1 * expected);
+  }
+}
+
+TEST(Motion, RangeIsThatOfTheBounce) {
+  constexpr double speed = 12, range = 9;
+  for (const Vec3d velocity : {Vec3d{speed, 0, 0}, Vec3d{-speed, 0, 0}, Vec3d{0, speed, 0}}) {
+    for (const bool point : {true, false}) {
+      SceneMaker maker;
+      if (point)
+        maker.add_point({range, 0, 0}, 0);
+      else
+        maker.add(wall(0.2, 0.2), -10, {range, 0, 0});
+      Sounding s(maker.make(), oculus_high(), native_rows(10, 0.02));
+      s.request.switches.expected_power = true;
+      const auto place = [&] {
+        s.ping();
+        const int row = s.loudest_row(256);
+        const Peak peak = log_parabola(s.pressure(row - 1, 256), s.pressure(row, 256), s.pressure(row + 1, 256));
+        return s.range_of_row(row + peak.offset);
+      };
+      const double at_rest = place();
+      s.request.sonar_moves = {velocity, {}};
+      EXPECT_NEAR(place() - at_rest, -velocity.x * range / 1500, 2e-3) << velocity.x << " " << velocity.y << " " << point;
+    }
+  }
+}
+
+TEST(Motion, SwitchedOffOrAtRestItChangesNoByte) {
+  SceneMaker maker;
+  maker.add(height_field(-2, 14, -8, 8, 2, [](double, double) { return 0.0; }), -20).add_point({6, 1, 1}, -20);
+  Sounding s = looking_at(maker.make());
+  s.request.sonar_in_world = {{0, 0, 1.5}, quat_from_rpy({0, 0.2, 0})};
+  s.request.switches.noise = true;
+  s.request.switches.motion = false;
+  const Ping at_rest = s.ping();
+  s.request.sonar_moves = {{1, 0.5, 0}, {0, 0, 0.5}};
+  EXPECT_EQ(s.ping().samples, at_rest.samples) << "off";
+  s.request.switches.motion = true;
+  EXPECT_NE(s.ping().samples, at_rest.samples);
+  s.request.sonar_moves = {};
+  EXPECT_EQ(s.ping().samples, at_rest.samples) << "at rest";
+}
+
+TEST(Motion, AWorldThatMovesTheOtherWayLooksTheSame) {
+  // Range and bearing depend on relative motion alone: a sonar in steady motion sees at the far end what one at the place and
+  // heading of that echo's return would.
+  SceneMaker maker;
+  maker.add(height_field(-4, 16, -10, 10, 0.5, rough_relief(0.05, 12)), -20);
+  Sounding s = looking_at(maker.make());
+  s.request.switches.expected_power = true;
+  const Pose start{{0, 0, 1.5}, quat_from_rpy({0, 0.2, 0})};
+  const double at_m = 8, one_way_s = at_m / 1500;
+  const Twist twist{{2, 0, 0}, {0, 0, rad_from_deg(20)}};
+  s.request.sonar_in_world = start;
+  s.request.sonar_moves = twist;
+  s.ping();
+  const auto rows_about = [&](const Sounding& from) {
+    std::vector<double> all;
+    const int middle = static_cast<int>(from.row_of_range(at_m));
+    for (int row = middle - 4; row <= middle + 4; ++row)
+      for (int j = 30; j < 482; ++j) all.push_back(std::log(from.power(row, j) + 1));
+    return all;
+  };
+  const std::vector<double> moving = rows_about(s);
+  s.request.sonar_in_world = {start.position_m + one_way_s * twist.velocity_mps,
+                              start.orientation * turned_by(2 * one_way_s * twist.angular_rate_radps)};
+  s.request.sonar_moves = {};
+  s.ping();
+  EXPECT_GT(correlation(moving, rows_about(s)), 0.98);
+}
+
+}  // namespace
+}  // namespace sonar::test
