@@ -10,7 +10,8 @@
 namespace sonar {
 namespace {
 
-constexpr int side = 16;  // cells along a tile
+constexpr int side = 16;                        // cells along a tile
+constexpr std::uint32_t block_key = 0x6e6574u;  // keeps the draws of blocks apart from those of cells
 
 struct LatticePoint {
   double u, v;
@@ -24,22 +25,41 @@ struct Cell {
   float re, im;
 };
 
-/// One draw gives a lattice cell all it needs: two numbers for where its point lies, two for its speckle.
+/// Which quarter of its cell a point lies in, across a 4 x 4 block, from where the cell lies along it: two binary digits, each
+/// flipped by random bits that depend on the digits before it (nested scrambling).
+int quarter_of(int along, std::uint32_t scramble) {
+  const auto bit = [&](int i) { return static_cast<int>(scramble >> i & 1u); };
+  const int half = (along & 1) ^ bit(along >> 1);
+  return 2 * half + ((along >> 1) ^ bit(2 + half));
+}
+
+/// One draw gives a lattice cell all it needs: two numbers for where its point lies, two for its speckle. Points of a block of 4
+/// x 4 cells share the block out: its sixteen strips of any shape from 1/16 x 1 to 1 x 1/16 hold one point each (a scrambled
+/// digital net), so that the echo of a stretch of range depends little on the draw. Each point alone is uniform in its cell.
 std::array<LatticePoint, side * side> draw_points(const TileAddress& a, std::uint32_t texture_seed, Seed seed) {
   std::array<LatticePoint, side * side> points;
   const double s = lattice::cell_size_m(a.level);
   const auto bits = static_cast<std::uint64_t>(seed);
   const std::uint32_t sheet = static_cast<std::uint32_t>(a.object) * 8u + static_cast<std::uint32_t>(a.axis) * 2u +
                               static_cast<std::uint32_t>(a.negative_side);
+  const auto draw_at = [&](std::int32_t i, std::int32_t j, std::uint32_t key) {
+    return philox(sheet, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(a.level),
+                  static_cast<std::uint32_t>(bits) ^ key, static_cast<std::uint32_t>(bits >> 32) ^ texture_seed);
+  };
+  std::array<Random4, (side / 4) * (side / 4)> blocks;
+  for (int b = 0; b < static_cast<int>(blocks.size()); ++b)
+    blocks[static_cast<std::size_t>(b)] =
+        draw_at(a.i * (side / 4) + b % (side / 4), a.j * (side / 4) + b / (side / 4), block_key);
   for (int row = 0; row < side; ++row)
     for (int col = 0; col < side; ++col) {
       const std::int32_t i = a.i * side + col, j = a.j * side + row;
-      const Random4 draw =
-          philox(sheet, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(a.level),
-                 static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32) ^ texture_seed);
-      points[static_cast<std::size_t>(row * side + col)] = {(i + static_cast<double>(uniform_open(draw.v[0]))) * s,
-                                                            (j + static_cast<double>(uniform_open(draw.v[1]))) * s, draw.v[2],
-                                                            draw.v[3]};
+      const Random4 draw = draw_at(i, j, 0);
+      const Random4& block = blocks[static_cast<std::size_t>(row / 4 * (side / 4) + col / 4)];
+      const int quarter_u = quarter_of(row % 4, block.v[0] >> 4 * (col % 4)),
+                quarter_v = quarter_of(col % 4, block.v[1] >> 4 * (row % 4));
+      points[static_cast<std::size_t>(row * side + col)] = {
+          (i + 0.25 * (quarter_u + static_cast<double>(uniform_open(draw.v[0])))) * s,
+          (j + 0.25 * (quarter_v + static_cast<double>(uniform_open(draw.v[1])))) * s, draw.v[2], draw.v[3]};
     }
   return points;
 }

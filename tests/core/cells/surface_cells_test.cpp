@@ -6,6 +6,8 @@
 #include <complex>
 #include <cstring>
 #include <map>
+#include <tuple>
+#include <utility>
 
 #include "core/base/random.hpp"
 #include "core/scene/cell_lattice.hpp"
@@ -108,6 +110,38 @@ TEST(SurfaceCells, EveryLatticePointOfATerrainHasExactlyOneOwner) {
   }
   EXPECT_EQ(total, 128 * 128);
   EXPECT_LE(wrong, 20);  // rounding of stored places only
+}
+
+// What makes a flat bed even (docs/acoustics.md, section 3): a strip of a block's sixteenth holds one point, whatever its shape.
+TEST(SurfaceCells, SixteenNeighboursShareTheirBlockOutEvenly) {
+  SurfaceCells cells(scene_of(terrain(1, 2.0, [](double, double) { return 0.0; })), Seed{5}, 1u << 30);
+  Parallel pool(1);
+  constexpr double blocks_per_m = 8;  // cells of 1 / 32 m
+  std::map<std::tuple<int, long, long>, int> in_strip;
+  double sum[2] = {}, corner = 0;
+  int total = 0;
+  for (const TileInView& t : cells.in_view(whole_scene(5), pool)) {
+    for (int i = 0; i < t.tile->count; ++i) {
+      if (!real(*t.tile, i)) continue;
+      const Vec3d p = place(*t.tile, i);
+      for (int shape = 0; shape < 5; ++shape) {
+        const long strip_x = std::lround(std::floor(p.x * blocks_per_m * (1 << shape))),
+                   strip_y = std::lround(std::floor(p.y * blocks_per_m * (16 >> shape)));
+        ++in_strip[{shape, strip_x, strip_y}];
+      }
+      const double u = p.x * 32 - std::floor(p.x * 32), v = p.y * 32 - std::floor(p.y * 32);
+      sum[0] += u, sum[1] += v, corner += u < 0.5 && v < 0.5;
+      ++total;
+    }
+  }
+  ASSERT_EQ(total, 64 * 64);
+  int wrong = 0;
+  for (const auto& [strip, n] : in_strip) wrong += n != 1;
+  EXPECT_NEAR(static_cast<double>(in_strip.size()), 5 * 64 * 64, 12);
+  EXPECT_LE(wrong, 12);                    // places are stored to 1 / 4000 of a cell: a few round over a border
+  EXPECT_NEAR(sum[0] / total, 0.5, 0.01);  // alone, a point is uniform in its cell
+  EXPECT_NEAR(sum[1] / total, 0.5, 0.01);
+  EXPECT_NEAR(corner / total, 0.25, 0.02);
 }
 
 TEST(SurfaceCells, CellsLieOnTheirTriangles) {
