@@ -17,6 +17,7 @@ FLOORS = {
     "core/scene": ["core/base/", "core/text/", "core/sonar/", "core/scene/"],
     "core/pipeline": ["core/base/", "core/sonar/", "core/scene/", "core/pipeline/"],
     "core/pipeline/arithmetic": ["core/base/", "core/sonar/", "core/pipeline/arithmetic/"],
+    "core/paper": ["core/base/", "core/sonar/", "core/scene/", "core/pipeline/", "core/paper/"],
     "cuda": ["core/base/", "core/sonar/", "core/pipeline/ping_engine.hpp", "core/pipeline/arithmetic/",
              "core/scene/flat_scene.hpp", "cuda/"],
     "protocol": ["core/base/", "core/sonar/", "protocol/"],

@@ -1,0 +1,51 @@
+// The rays of the two comparison modes: every ray is a scatterer, as in Choi 2025 (Sensors 25(5):1516) and the older raster
+// method. First stage of core/paper; docs/acoustics.md, section 8.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/ping_scalars.hpp"
+#include "core/scene/ray_scene.hpp"
+
+namespace sonar::paper {
+
+/// Rays a column where the request names none: the paper's model, and what its raster run was left with.
+inline constexpr int default_rays = 300, default_raster_rows = 11;
+
+/// Directions of the rays, one column a beam. Fan (paper): uniform in azimuth and elevation. Grid (raster): uniform on an image
+/// plane ahead of the sonar, like the pixels of a camera.
+struct PaperFan {
+  bool perspective = false;
+  std::vector<double> azimuth_rad;     // [columns] falling from port to starboard: what the beams are taken to look at
+  std::vector<double> column_width;    // [columns] of azimuth [rad]; perspective: of the tangent
+  double first_row = 0, row_step = 0;  // elevation [rad] of row 0; perspective: its tangent over the horizontal x axis
+  int rows = 0;
+
+  int columns() const { return static_cast<int>(azimuth_rad.size()); }
+  /// Unit vector in the sonar's frame.
+  Vec3d direction(int column, int row) const;
+  /// Solid angle a ray stands for [sr]. Fan: dtheta dphi as printed in eq. (2), without cos(phi).
+  double solid_angle_sr(int column, int row) const;
+};
+
+/// `mode` is paper or raster; `rays` a column, 0 = the default. The fan spans twice the quoted vertical width (P900: 40 degrees
+/// for 20), as the paper's own model does.
+PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays);
+
+/// What a ray met.
+struct PaperHit {
+  int column = 0, row = 0;
+  double range_m = 0;
+  double elevation_rad = 0;
+  double cosine = 0;  // of incidence, with the triangle's own normal
+  double solid_angle_sr = 0;
+  std::uint32_t object = 0, triangle = 0;
+};
+
+/// Appends the hits of one column, lowest row first.
+void trace_column(const RayScene& scene, const PaperFan& fan, const PingScalars& scalars, int column, float far_m,
+                  std::vector<PaperHit>& hits);
+
+}  // namespace sonar::paper

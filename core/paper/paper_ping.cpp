@@ -1,0 +1,260 @@
+#include "core/paper/paper_ping.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/random.hpp"
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/scattering.hpp"
+#include "core/pipeline/receive.hpp"
+
+namespace sonar::paper {
+namespace {
+
+constexpr std::uint32_t speckle_key = 0x50323521;  // keeps these draws apart from all others
+constexpr double width_constant = 0.884;           // P25's code, for sinc patterns: -3 dB width times aperture
+
+double fraction(double x) { return x - std::floor(x); }
+
+/// The comparison modes know no motion within the ping.
+PingScalars still_scalars(const PingPlan& plan, PingRequest request, Vec3d origin) {
+  request.switches.motion = false;
+  return make_scalars(plan, request, origin);
+}
+
+std::vector<double> coefficients(const Scene& scene) {
+  std::vector<double> mu;
+  for (const Material& m : scene.materials) mu.push_back(lambert_coefficient(static_cast<double>(m.lambert_db)));
+  return mu;
+}
+
+double elevation_pattern(const Prepared& p, double elevation_rad) {
+  return p.elevation_per_sine > 0 ? sinc(p.elevation_per_sine * std::sin(elevation_rad)) : 1.0;
+}
+
+/// What a scatterer of a known cross-section sends back; none when it lies outside the record.
+bool add_echo(double range_m, double elevation_rad, double cross_section_m2, ComplexNormal xi, const Prepared& p,
+              const PingScalars& s, std::vector<PaperEcho>& echoes) {
+  const double turns = range_m * s.samples_per_m / p.plan.samples;
+  if (!(turns < 1)) return false;
+  const double amplitude = s.source_upa * std::sqrt(cross_section_m2) * elevation_pattern(p, elevation_rad) *
+                           two_way_transmission(range_m, s.absorption_np_per_m);
+  if (p.plan.expected_power)
+    echoes.push_back({turns, {amplitude * amplitude, 0}});
+  else
+    echoes.push_back({turns, spectral::Complex(static_cast<double>(xi.re), static_cast<double>(xi.im)) *
+                                 std::polar(amplitude, -2 * pi * fraction(range_m * s.turns_per_m))});
+  return true;
+}
+
+struct PointInView {
+  int column = 0;
+  double range_m = 0, elevation_rad = 0, cross_section_m2 = 0;
+};
+
+/// P25 has no points; here they are scatterers of their column, like a ray's, if nothing hides them.
+std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p, const PingScalars& s,
+                                        const PingRequest& request) {
+  const std::vector<Pose>& bodies = request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world;
+  std::vector<PointInView> points;
+  for (const PointTarget& target : scene.scene().point_targets) {
+    const bool rides = target.body >= 0 && static_cast<std::size_t>(target.body) < bodies.size();
+    const Vec3d in_world =
+        rides ? transform(bodies[static_cast<std::size_t>(target.body)], target.position_m) : target.position_m;
+    const Vec3d at = transform(inverse(s.seen_from), in_world);
+    const double range = length(at), azimuth = std::atan2(at.y, at.x), elevation = std::asin(at.z / std::max(range, 1e-9));
+    int nearest = 0;
+    const auto off = [&](int k) { return std::abs(p.fan.azimuth_rad[static_cast<std::size_t>(k)] - azimuth); };
+    for (int k = 1; k < p.fan.columns(); ++k) {
+      if (off(k) < off(nearest)) nearest = k;
+    }
+    const double row = ((p.fan.perspective ? at.z / at.x : elevation) - p.fan.first_row) / p.fan.row_step;
+    if (at.x <= 0 || off(nearest) > p.fan.column_width[static_cast<std::size_t>(nearest)] || row < -0.5 || row > p.fan.rows - 0.5)
+      continue;
+    RayPacket ray{};
+    const Vec3 along = to_float((1 / range) * (in_world - s.seen_from.position_m));
+    ray.origin_x[0] = s.position_in_scene.x, ray.origin_y[0] = s.position_in_scene.y, ray.origin_z[0] = s.position_in_scene.z;
+    ray.direction_x[0] = along.x, ray.direction_y[0] = along.y, ray.direction_z[0] = along.z;
+    ray.far[0] = static_cast<float>(range) * 0.9999f;
+    scene.trace(ray, 1u, false);
+    if (ray.object[0] == RayPacket::miss)
+      points.push_back({nearest, range, elevation, std::pow(10.0, 0.1 * static_cast<double>(target.target_strength_db))});
+  }
+  return points;
+}
+
+BeamTruth truth_of(std::span<const PaperHit> hits, double half_width_rad) {
+  BeamTruth truth;
+  for (const PaperHit& hit : hits) {
+    if (std::abs(hit.elevation_rad) > half_width_rad) continue;
+    if (truth.object == BeamTruth::nothing || hit.range_m < static_cast<double>(truth.range_m))
+      truth = {static_cast<float>(hit.range_m), hit.object};
+  }
+  return truth;
+}
+
+/// One ping under way, stage by stage.
+class PaperPing {
+ public:
+  PaperPing(const RayScene& scene, const PingRequest& request, const Prepared& prepared, Parallel& pool, double (*now_s)(),
+            PingStatistics& statistics)
+      : scene_(scene),
+        request_(request),
+        p_(prepared),
+        s_(still_scalars(prepared.plan, request, scene.origin())),
+        mu_(coefficients(scene.scene())),
+        pool_(pool),
+        now_s_(now_s),
+        statistics_(statistics),
+        shares_(static_cast<std::size_t>(pool.threads())) {
+    values_ = static_cast<std::size_t>(p_.plan.expected_power ? p_.plan.samples : 2 * p_.spectrum.count);
+    columns_.resize(values_ * static_cast<std::size_t>(p_.fan.columns()));
+    if (request.switches.keep_truth) truth_.resize(static_cast<std::size_t>(p_.fan.columns()));
+  }
+
+  void sound_columns();
+  void correct_beams();
+  Ping image(const simd::Kernels& kernels);
+
+ private:
+  double now() const { return now_s_ ? now_s_() : 0; }
+  void sound_column(int column, PingStatistics& mine);
+
+  const RayScene& scene_;
+  const PingRequest& request_;
+  const Prepared& p_;
+  PingScalars s_;
+  std::vector<double> mu_;
+  Parallel& pool_;
+  double (*now_s_)();
+  PingStatistics& statistics_;
+  std::vector<PingStatistics> shares_;  // per worker
+  std::vector<PointInView> points_;
+  std::size_t values_ = 0;  // floats a column: spectrum, or in expected power samples
+  std::vector<float> columns_, beams_;
+  std::vector<BeamTruth> truth_;
+};
+
+void PaperPing::sound_columns() {
+  if (request_.blank) return;
+  points_ = points_in_view(scene_, p_, s_, request_);
+  pool_.for_each(static_cast<std::size_t>(p_.fan.columns()), [&](std::size_t column, int worker) {
+    sound_column(static_cast<int>(column), shares_[static_cast<std::size_t>(worker)]);
+  });
+  for (const PingStatistics& share : shares_) {
+    for (std::size_t i = 0; i < share.seconds.size(); ++i) statistics_.seconds[i] += share.seconds[i];
+    statistics_.rays += share.rays;
+    statistics_.echoes += share.echoes;
+  }
+}
+
+void PaperPing::sound_column(int column, PingStatistics& mine) {
+  const double begin = now();
+  std::vector<PaperHit> hits;
+  trace_column(scene_, p_.fan, s_, column, static_cast<float>(s_.max_range_m), hits);
+  const double traced = now();
+  if (!truth_.empty())
+    truth_[static_cast<std::size_t>(column)] =
+        truth_of(hits, 0.5 * static_cast<double>(p_.plan.mode.pattern.elevation_width_rad));
+  std::vector<PaperEcho> echoes = echoes_of(hits, mu_, scene_.scene(), p_, s_, request_);
+  for (const PointInView& point : points_) {
+    if (point.column == column) add_echo(point.range_m, point.elevation_rad, point.cross_section_m2, {1, 0}, p_, s_, echoes);
+  }
+  const double scattered = now();
+  const std::span<float> out = std::span(columns_).subspan(static_cast<std::size_t>(column) * values_, values_);
+  if (p_.plan.expected_power) {
+    for (const PaperEcho& echo : echoes) p_.pulse_power->add(echo, out);
+  } else {
+    std::vector<std::complex<float>> sums(static_cast<std::size_t>(p_.spectrum.count));
+    sum_frequencies(echoes, p_.spectrum, p_.fast.get(), sums);
+    for (std::size_t m = 0; m < sums.size(); ++m) out[2 * m] = sums[m].real(), out[2 * m + 1] = sums[m].imag();
+  }
+  mine.rays += static_cast<std::size_t>(p_.fan.rows);
+  mine.echoes += echoes.size();
+  mine.seconds[static_cast<std::size_t>(Stage::trace)] += traced - begin;
+  mine.seconds[static_cast<std::size_t>(Stage::scatter)] += scattered - traced;
+  mine.seconds[static_cast<std::size_t>(Stage::synthesize)] += now() - scattered;
+}
+
+void PaperPing::correct_beams() {
+  const double begin = now();
+  beams_.resize(columns_.size());
+  correct(p_.correction, p_.plan.settings.beam_count, p_.fan.columns(), columns_, static_cast<int>(values_), pool_, beams_);
+  statistics_.seconds[static_cast<std::size_t>(Stage::couple)] += now() - begin;
+}
+
+Ping PaperPing::image(const simd::Kernels& kernels) {
+  const double begin = now();
+  const int beams = p_.plan.settings.beam_count;
+  BeamSignals signals;
+  signals.beams = beams;
+  signals.samples = p_.plan.samples;
+  signals.stride = 2 * static_cast<std::ptrdiff_t>(p_.plan.samples);
+  signals.data.resize(static_cast<std::size_t>(beams) * static_cast<std::size_t>(signals.stride));
+  std::vector<std::vector<spectral::Complex>> work(static_cast<std::size_t>(pool_.threads()));
+  pool_.for_each(static_cast<std::size_t>(beams), [&](std::size_t j, int worker) {
+    const float* in = beams_.data() + j * values_;
+    float* out = signals.beam(static_cast<int>(j));
+    if (p_.plan.expected_power) {
+      for (std::size_t n = 0; n < values_; ++n) out[2 * n] = in[n];
+      return;
+    }
+    std::vector<std::complex<float>> spectrum(values_ / 2);
+    for (std::size_t m = 0; m < spectrum.size(); ++m) spectrum[m] = {in[2 * m], in[2 * m + 1]};
+    p_.inverse.run(spectrum, work[static_cast<std::size_t>(worker)], out);
+  });
+  Ping ping;
+  ping.request = request_;
+  shape_ping(p_.plan, request_.switches, ping);
+  for (std::size_t j = 0; j < ping.beam_azimuth_rad.size(); ++j)
+    ping.beam_azimuth_rad[j] = static_cast<float>(p_.fan.azimuth_rad[j]);
+  ping.truth = truth_;
+  ReceiveScratch scratch;
+  receive(signals, p_.plan, kernels, scratch, ping);
+  statistics_.seconds[static_cast<std::size_t>(Stage::receive)] += now() - begin;
+  return ping;
+}
+
+}  // namespace
+
+Prepared::Prepared(const PingRequest& request, FrequencySum sum)
+    : model(request.model),
+      plan(make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings, request.switches)),
+      fan(make_paper_fan(plan, request.switches.mode, request.switches.fixed_fan)),
+      spectrum(make_spectrum(plan)),
+      inverse(spectrum) {
+  if (sum == FrequencySum::fast && spectral::have_transform) fast = std::make_unique<spectral::FrequencySums>(spectrum.count);
+  if (plan.expected_power) pulse_power = std::make_unique<PulsePower>(spectrum, inverse);
+  const double spacing = static_cast<double>(plan.mode.horizontal_aperture_rad) / plan.settings.beam_count;
+  correction = make_correction(fan.azimuth_rad, spacing, plan.expected_power);
+  if (plan.mode.pattern.elevation_taper != Taper::unit)
+    elevation_per_sine = width_constant / static_cast<double>(plan.mode.pattern.elevation_width_rad);
+}
+
+bool Prepared::serves(const PingRequest& request) const { return request.model == model && sonar::serves(plan, request); }
+
+std::vector<PaperEcho> echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene,
+                                 const Prepared& p, const PingScalars& s, const PingRequest& request) {
+  const auto bits = static_cast<std::uint64_t>(request.seed);
+  std::vector<PaperEcho> echoes;
+  echoes.reserve(hits.size() + 1);
+  for (const PaperHit& hit : hits) {
+    const double strength = mu[scene.objects[hit.object].mesh->material[hit.triangle]];
+    const Random4 draw = philox(static_cast<std::uint32_t>(request.number), static_cast<std::uint32_t>(hit.column),
+                                static_cast<std::uint32_t>(hit.row), speckle_key, static_cast<std::uint32_t>(bits),
+                                static_cast<std::uint32_t>(bits >> 32));
+    add_echo(hit.range_m, hit.elevation_rad, printed_cross_section_m2(strength, hit.cosine, hit.range_m, hit.solid_angle_sr),
+             complex_normal(draw.v[0], draw.v[1]), p, s, echoes);
+  }
+  return echoes;
+}
+
+Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
+              Parallel& pool, double (*now_s)(), PingStatistics& statistics) {
+  PaperPing ping(scene, request, prepared, pool, now_s, statistics);
+  ping.sound_columns();  // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, a column a beam
+  ping.correct_beams();  // "as coded"
+  return ping.image(kernels);
+}
+
+}  // namespace sonar::paper

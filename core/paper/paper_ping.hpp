@@ -1,0 +1,39 @@
+// The table of contents of a ping in paper or raster mode: rays, eq. (2), the frequency sum, the beam correction, the inverse
+// transform, samples. Called by the engine of core/paper; a pure function of request and scene.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/paper/paper_signal.hpp"
+#include "core/pipeline/ping_engine.hpp"
+#include "core/pipeline/simd/kernels.hpp"
+
+namespace sonar::paper {
+
+/// What one model with one set of settings needs from ping to ping.
+struct Prepared {
+  Prepared(const PingRequest& request, FrequencySum sum);
+  bool serves(const PingRequest& request) const;
+
+  std::shared_ptr<const SonarModel> model;
+  PingPlan plan;
+  PaperFan fan;
+  PaperSpectrum spectrum;
+  std::unique_ptr<spectral::FrequencySums> fast;  // none: term by term
+  InverseTransform inverse;
+  std::unique_ptr<PulsePower> pulse_power;  // in expected power only
+  std::vector<float> correction;            // [beams][columns]
+  double elevation_per_sine = 0;            // D(phi) = sinc(elevation_per_sine sin phi); 0 = no pattern
+};
+
+/// Eq. (2) and the rest of eq. (1) but the sum: one column's hits as echoes. `mu` per material. Hits outside the record are
+/// dropped, as the reference code does.
+std::vector<PaperEcho> echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene,
+                                 const Prepared& prepared, const PingScalars& scalars, const PingRequest& request);
+
+/// Bodies must have been placed.
+Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
+              Parallel& pool, double (*now_s)(), PingStatistics& statistics);
+
+}  // namespace sonar::paper

@@ -1,0 +1,142 @@
+#include "core/paper/paper_signal.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar::paper {
+namespace {
+
+using spectral::Complex;
+
+Complex turned(double turns) { return std::polar(1.0, 2 * pi * (turns - std::floor(turns))); }
+
+constexpr std::size_t largest_power_table = std::size_t{1} << 22;  // values
+constexpr int most_steps = 64;
+
+}  // namespace
+
+PaperSpectrum make_spectrum(const PingPlan& plan) {
+  PaperSpectrum s;
+  s.samples = plan.samples;
+  s.sample_offset = plan.sample_offset;
+  const double record_s = plan.samples * 2 * plan.sample_spacing_m / static_cast<double>(plan.settings.device_sound_speed_mps);
+  const double band = plan.envelope_hz * record_s;                  // b T, in units of df
+  s.count = std::max(1, static_cast<int>(std::ceil(band - 1e-3)));  // b T meant whole may not come out whole
+  s.first_frequency = 1 - 0.5 * band;                               // f_min = f_c - b / 2, m from 1
+  double sum = 0;
+  for (int m = 0; m < s.count; ++m) {
+    const double x = pi * (s.first_frequency + m) / band;  // (f - f_c) pi / b
+    s.weight.push_back(std::exp(-x * x));
+    sum += s.weight.back();
+  }
+  for (double& w : s.weight) w /= sum;
+  return s;
+}
+
+void sum_frequencies(std::span<const PaperEcho> echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
+                     std::span<std::complex<float>> out) {
+  std::vector<Complex> sums(static_cast<std::size_t>(spectrum.count));
+  if (fast) {
+    std::vector<Complex> grid(static_cast<std::size_t>(fast->grid_points()));
+    const double middle = spectrum.first_frequency + spectrum.count / 2;
+    for (const PaperEcho& e : echoes) fast->add(e.turns, e.amplitude * turned(-middle * e.turns), grid.data());
+    fast->transform(grid.data(), sums.data());
+  } else {
+    std::vector<spectral::Arrival> arrivals;
+    for (const PaperEcho& e : echoes) arrivals.push_back({e.turns, e.amplitude});
+    sums = spectral::direct_sum(arrivals, {spectrum.first_frequency, 1.0, spectrum.count});
+  }
+  for (std::size_t m = 0; m < sums.size(); ++m) out[m] = std::complex<float>(spectrum.weight[m] * sums[m]);
+}
+
+std::vector<float> make_correction(std::span<const double> azimuth_rad, double spacing_rad, bool squared) {
+  std::vector<double> v;
+  double energy = 0;
+  for (const double to : azimuth_rad)
+    for (const double from : azimuth_rad) {
+      const double y = pi * 0.884 / spacing_rad * std::sin(to - from);
+      v.push_back(std::abs(y) < 1e-12 ? 1.0 : std::abs(std::sin(y) / y));
+      energy += v.back() * v.back();
+    }
+  std::vector<float> weights;
+  weights.reserve(v.size());
+  for (const double x : v) weights.push_back(static_cast<float>(squared ? x * x / energy : x / std::sqrt(energy)));
+  return weights;
+}
+
+void correct(std::span<const float> weights, int beams, int columns, std::span<const float> in, int values, Parallel& pool,
+             std::span<float> out) {
+  constexpr int block = 128;  // values at a time: those of all columns stay in the second cache
+  const auto length = static_cast<std::size_t>(values);
+  pool.for_each((length + block - 1) / block, [&](std::size_t b, int) {
+    const std::size_t from = b * block, n = std::min<std::size_t>(block, length - from);
+    for (std::size_t j = 0; j < static_cast<std::size_t>(beams); ++j) {
+      float sum[block] = {};
+      const float* weight = weights.data() + j * static_cast<std::size_t>(columns);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(columns); ++k) {
+        const float* column = in.data() + k * length + from;
+        const float w = weight[k];
+        for (std::size_t i = 0; i < n; ++i) sum[i] += w * column[i];
+      }
+      std::copy(sum, sum + n, out.data() + j * length + from);
+    }
+  });
+}
+
+InverseTransform::InverseTransform(const PaperSpectrum& spectrum) : grid_(spectrum) {
+  const double samples = spectrum.samples;
+  if (spectral::have_transform) inverse_ = std::make_unique<spectral::Fft>(spectrum.samples, spectral::Fft::Direction::inverse);
+  for (int m = 0; m < spectrum.count; ++m)
+    half_turn_.push_back(turned((spectrum.first_frequency + m) * spectrum.sample_offset / samples));
+  for (int n = 0; n < spectrum.samples; ++n) {
+    root_.push_back(turned(n / samples));
+    baseband_.push_back(turned(n * spectrum.first_frequency / samples));
+  }
+}
+
+void InverseTransform::run(std::span<const std::complex<float>> spectrum, std::vector<Complex>& work, float* out) const {
+  // Frequencies a whole sample rate apart look the same on the samples: they share a slot.
+  const auto n = static_cast<std::size_t>(grid_.samples);
+  work.assign(n, {});
+  for (std::size_t m = 0; m < spectrum.size(); ++m) work[m % n] += Complex(spectrum[m]) * half_turn_[m];
+  if (inverse_) {
+    inverse_->run(work.data());
+  } else {
+    std::vector<Complex> sums(n);
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t m = 0; m < n; ++m) sums[i] += work[m] * root_[i * m % n];
+    work.swap(sums);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const Complex s = work[i] * baseband_[i];
+    out[2 * i] = static_cast<float>(s.real()), out[2 * i + 1] = static_cast<float>(s.imag());
+  }
+}
+
+PulsePower::PulsePower(const PaperSpectrum& spectrum, const InverseTransform& inverse)
+    : samples_(spectrum.samples), offset_(spectrum.sample_offset) {
+  const auto n = static_cast<std::size_t>(samples_);
+  steps_ = static_cast<int>(std::clamp<std::size_t>(largest_power_table / n, 1, most_steps));
+  std::vector<std::complex<float>> lone(static_cast<std::size_t>(spectrum.count));
+  std::vector<Complex> work;
+  std::vector<float> signal(2 * n);
+  for (int step = 0; step <= steps_; ++step) {  // an echo that falls step / steps of a sample after sample 0
+    const PaperEcho echo{(offset_ + static_cast<double>(step) / steps_) / samples_, {1, 0}};
+    sum_frequencies({&echo, 1}, spectrum, nullptr, lone);
+    inverse.run(lone, work, signal.data());
+    for (std::size_t i = 0; i < n; ++i) table_.push_back(signal[2 * i] * signal[2 * i] + signal[2 * i + 1] * signal[2 * i + 1]);
+  }
+}
+
+void PulsePower::add(const PaperEcho& echo, std::span<float> power) const {
+  const double place = echo.turns * samples_ - offset_, whole = std::floor(place);
+  const auto step = std::min(static_cast<std::size_t>((place - whole) * steps_ + 0.5), static_cast<std::size_t>(steps_));
+  const float* pulse = table_.data() + step * static_cast<std::size_t>(samples_);
+  const auto scale = static_cast<float>(echo.amplitude.real());
+  const auto shift = static_cast<std::size_t>(((static_cast<int>(whole) % samples_) + samples_) % samples_);
+  const std::size_t n = power.size();  // the record is periodic: what leaves at its end comes in at its beginning
+  for (std::size_t i = shift; i < n; ++i) power[i] += scale * pulse[i - shift];
+  for (std::size_t i = 0; i < shift; ++i) power[i] += scale * pulse[n - shift + i];
+}
+
+}  // namespace sonar::paper

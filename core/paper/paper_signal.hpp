@@ -1,0 +1,83 @@
+// From hits to beams as Choi 2025 (Sensors 25(5):1516, "P25") prints it: eq. (1)-(4) per column, the reference code's beam
+// coupling, an inverse transform. Second stage of core/paper; what differs from the canonical model: docs/acoustics.md,
+// section 8.
+#pragma once
+
+#include <complex>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/base/parallel.hpp"
+#include "core/paper/paper_fan.hpp"
+#include "core/pipeline/couple.hpp"
+#include "core/pipeline/spectral.hpp"
+
+namespace sonar::paper {
+
+/// How eq. (1) is summed over the scatterers: term by term, or by a non-uniform transform (relative error 8e-6).
+enum class FrequencySum { fast, direct };
+
+/// Eq. (2) without xi: mu cos^2(incidence) r^2 dOmega [m^2], the printed footprint. Lambert's law would have cos^1 here.
+inline double printed_cross_section_m2(double mu, double cosine, double range_m, double solid_angle_sr) {
+  return mu * cosine * cosine * range_m * range_m * solid_angle_sr;
+}
+
+/// A scatterer on the record of one column. The record is one period long: `turns` = delay / record length.
+struct PaperEcho {
+  double turns = 0;
+  spectral::Complex amplitude;  // [uPa] e^{-i 2 pi f_c tau} included; in expected power the power [uPa^2]
+};
+
+/// The frequencies of eq. (4), f_m = f_min + m df with df = 1 / T and M = b T, and the spectrum of eq. (3) at them. S_0 is set so
+/// that a lone echo on a sample peaks at its own amplitude.
+struct PaperSpectrum {
+  int samples = 0;  // of the record T
+  int count = 0;    // M
+  double sample_offset = 0.5;
+  double first_frequency = 0;  // f_1 - f_c in units of df
+  std::vector<double> weight;  // [M] |S(f_m)| df, sum 1
+};
+PaperSpectrum make_spectrum(const PingPlan& plan);
+
+/// P_j(f_m) of one column: sum over echoes times |S|. `fast` null = term by term.
+void sum_frequencies(std::span<const PaperEcho> echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
+                     std::span<std::complex<float>> out);
+
+/// "As coded" (P25 does not print it): V_jk = |sin y / y|, y = pi 0.884 / spacing sin(theta_j - theta_k), over the root of the
+/// sum of all V^2. `squared` for expected power. [beams][columns]
+std::vector<float> make_correction(std::span<const double> azimuth_rad, double spacing_rad, bool squared);
+
+/// out[j] = sum_k weights[j][k] in[k], rows of `values` floats.
+void correct(std::span<const float> weights, int beams, int columns, std::span<const float> in, int values, Parallel& pool,
+             std::span<float> out);
+
+/// s[n] = sum_m P(f_m) e^{i 2 pi (f_m - f_c) t_n}: the record's samples from its spectrum.
+class InverseTransform {
+ public:
+  explicit InverseTransform(const PaperSpectrum& spectrum);
+  /// `spectrum`: [M]; `out`: [samples], interleaved complex. Thread-safe, `work` is the caller's.
+  void run(std::span<const std::complex<float>> spectrum, std::vector<spectral::Complex>& work, float* out) const;
+
+ private:
+  const PaperSpectrum& grid_;
+  std::unique_ptr<spectral::Fft> inverse_;    // none in a build without a transform
+  std::vector<spectral::Complex> half_turn_;  // [M] e^{i 2 pi f_m t_0}
+  std::vector<spectral::Complex> root_;       // [samples] e^{i 2 pi n / samples}
+  std::vector<spectral::Complex> baseband_;   // [samples] e^{i 2 pi f_1 t_n}
+};
+
+/// |p|^2 of a lone echo on the record, tabulated: expected power is a sum of these.
+class PulsePower {
+ public:
+  PulsePower(const PaperSpectrum& spectrum, const InverseTransform& inverse);
+  /// power[n] += echo power * |p(t_n - tau)|^2 for all samples of the record.
+  void add(const PaperEcho& echo, std::span<float> power) const;
+
+ private:
+  int samples_, steps_;
+  double offset_;
+  std::vector<float> table_;  // [steps + 1][samples]
+};
+
+}  // namespace sonar::paper
