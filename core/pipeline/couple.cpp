@@ -5,7 +5,6 @@
 #include <complex>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
-#include "core/pipeline/arithmetic/waveform.hpp"
 
 namespace sonar {
 
@@ -31,29 +30,29 @@ void couple(const ColumnSignals& columns, const Coupling& coupling, const simd::
 void add_points(std::span<const PointEcho> points, const PingPlan& plan, BeamSignals& out) {
   struct Reach {
     const PointEcho* point;
-    int from, to;  // samples of this window that its pulse touches
+    int from, to;                            // samples of this window that its pulse touches
+    std::vector<std::complex<double>> echo;  // its pulse there
   };
   std::vector<Reach> here;
   for (const PointEcho& point : points) {
     const int middle = static_cast<int>(std::floor(point.sample));
     const int from = std::max(middle - plan.taps / 2 + 1, out.first_sample);
     const int to = std::min(middle + plan.taps / 2 + 1, out.first_sample + out.samples);
-    if (from < to) here.push_back({&point, from, to});
+    if (from >= to) continue;
+    here.push_back({&point, from, to, {}});
+    for (int n = from; n < to; ++n)
+      here.back().echo.push_back(point.amplitude * plan.pulse_shape.at(plan.sample_time_s * (n - point.sample)));
   }
   if (here.empty()) return;
 
   const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
-  const double per_sample = 2 * half_power_bt * plan.sample_spacing_m / static_cast<double>(plan.settings.pulse_width_m);
   std::vector<std::complex<double>> sum;
   for (int j = 0; j < out.beams; ++j) {
     sum.assign(static_cast<std::size_t>(out.samples), 0.0);
-    for (const auto& [point, from, to] : here) {
-      const std::complex<double> amplitude =
-          point->amplitude * pattern(point->sine - plan.beam_sine[static_cast<std::size_t>(j)]);
-      for (int n = from; n < to; ++n) {
-        const double x = per_sample * (n - point->sample);
-        sum[static_cast<std::size_t>(n - out.first_sample)] += amplitude * std::exp(-x * x);
-      }
+    for (const Reach& r : here) {
+      const double weight = pattern(r.point->sine - plan.beam_sine[static_cast<std::size_t>(j)]);
+      for (int n = r.from; n < r.to; ++n)
+        sum[static_cast<std::size_t>(n - out.first_sample)] += weight * r.echo[static_cast<std::size_t>(n - r.from)];
     }
     float* beam = out.beam(j);
     for (int n = 0; n < out.samples; ++n) {

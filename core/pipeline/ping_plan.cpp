@@ -8,6 +8,7 @@
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
+#include "core/pipeline/spectral_columns.hpp"
 
 namespace sonar {
 namespace {
@@ -19,23 +20,22 @@ constexpr int base_elevations = 48;              // docs/acoustics.md, section 2
 constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
 constexpr double unit_fan_over_width = 2.3;      // where there is no pattern to end it
 constexpr double widest_fan_rad = 1.4;
-constexpr double dropped_energy = 1e-4;      // of the coupling band, -40 dB
-constexpr double pulse_reach_widths = 3.99;  // p falls to 2e-10 at this many -3 dB widths
-constexpr double level_fade = 1.15;          // cell levels cross-fade over 15 % of range
+constexpr double dropped_energy = 1e-4;  // of the coupling band, -40 dB
+constexpr double level_fade = 1.15;      // cell levels cross-fade over 15 % of range
 
 double half_aperture_sine(const FrequencyMode& mode) { return std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2); }
 double beam_width_sine(const FrequencyMode& mode) {
   return 2 * std::sin(static_cast<double>(mode.pattern.azimuth_width_rad) / 2);
 }
 
-Fan make_fan(const FrequencyMode& mode, const PingSettings& settings) {
+Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pulse_width_m) {
   Fan fan;
   const bool has_pattern = mode.pattern.elevation_taper != Taper::unit;
   const double reach = has_pattern ? elevation_reach_rad(mode.pattern, fan_edge_amplitude)
                                    : static_cast<double>(mode.pattern.elevation_width_rad) * unit_fan_over_width / 2;
   fan.half_angle_rad = std::min(reach, widest_fan_rad);
   const double tangent = std::tan(fan.half_angle_rad);
-  const double wanted = settings.range_m * 2 * tangent / (0.7 * static_cast<double>(settings.pulse_width_m));
+  const double wanted = settings.range_m * 2 * tangent / (0.7 * pulse_width_m);
   fan.bins = 256;
   while (fan.bins < 2048 && fan.bins < wanted) fan.bins *= 2;
   fan.first_tangent = static_cast<float>(-tangent);
@@ -78,6 +78,27 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
     power[0] = -node[static_cast<std::size_t>(i)] * power[0] + coefficient[static_cast<std::size_t>(i)];
   }
   return {power.begin(), power.end()};
+}
+
+/// The sample grid, and the pulse on it.
+void lay_out_samples(PingPlan& p) {
+  const PingSettings& s = p.settings;
+  const double c_dev = static_cast<double>(s.device_sound_speed_mps);
+  p.samples = s.range_bin_count * s.samples_per_row;
+  p.sample_spacing_m = s.range_bin_m / s.samples_per_row;
+  p.sample_offset = 0.5 + (s.row_centre - 0.5) * s.samples_per_row;
+  p.sample_time_s = 2 * p.sample_spacing_m / c_dev;
+
+  const Waveform& waveform = p.mode.waveform;
+  p.pulse_width_m = static_cast<double>(s.pulse_width_m);
+  p.pulse_shape = Pulse(waveform, 2 * p.pulse_width_m / c_dev);
+  if (waveform.shape == Waveform::Shape::measured) p.pulse_width_m = p.pulse_shape.width_s() * c_dev / 2;
+  p.envelope_hz = envelope_parameter_hz(c_dev, p.pulse_width_m);
+  p.taps = taps_of(p.pulse_shape, p.sample_time_s);
+  if (!p.expected_power && (waveform.exact || !p.pulse_shape.is_real()))
+    p.spectral = std::make_shared<const SpectralColumns>(p.pulse_shape, p.sample_time_s, p.samples, p.taps);
+  else
+    p.pulse_rows = make_pulse_rows(p.pulse_shape, p.sample_time_s, p.taps, p.pulse_steps, p.expected_power);
 }
 
 void fill_row_gains(PingPlan& plan) {
@@ -178,20 +199,6 @@ Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const 
   return c;
 }
 
-std::vector<float> make_pulse_rows(double samples_per_width, int taps, int steps, bool squared) {
-  const double per_sample = 2 * half_power_bt / samples_per_width;  // b t of one sample: -3 dB width is 2 * 0.5887 / b
-  const auto value = [&](int step, int tap) {
-    const double x = per_sample * (tap - (taps / 2 - 1) - static_cast<double>(step) / steps);
-    return std::exp(-(squared ? 2 : 1) * x * x);
-  };
-  std::vector<float> rows;
-  for (int step = 0; step <= steps; ++step) {  // one more than steps: a fraction may round up to a whole
-    for (int tap = 0; tap < taps; ++tap) rows.push_back(static_cast<float>(value(step, tap)));
-    for (int tap = 0; tap < taps; ++tap) rows.push_back(static_cast<float>(value(step + 1, tap) - value(step, tap)));
-  }
-  return rows;
-}
-
 std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m) {
   const int coarsest = static_cast<int>(std::ceil(-std::log2(pulse_width_m) - 1e-9));
   constexpr double nearest_m = 0.2;  // nearer than this nobody images; one level serves what is left
@@ -213,34 +220,6 @@ std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_
   return levels;
 }
 
-std::vector<float> make_noise_filter(double bt) {
-  constexpr int longest = 160;
-  const int wanted = static_cast<int>(std::max(std::ceil(6.1 / bt), 2.0));  // the correlation falls to 1e-8
-  const int order = std::min(wanted, longest);
-  std::vector<double> r(static_cast<std::size_t>(order) + 1);
-  for (int k = 0; k <= order; ++k) {
-    // Cut short, a Gaussian is no correlation any more; under a triangle it still is.
-    const double window = wanted > longest ? 1.0 - static_cast<double>(k) / (order + 1) : 1.0;
-    r[static_cast<std::size_t>(k)] = window * std::exp(-0.5 * bt * bt * k * k);
-  }
-  r[0] += 1e-5;  // keeps the factorisation definite on fine grids, where the spectrum falls to nothing
-  // Bauer's method: the rows of the Cholesky factor of the long banded Toeplitz matrix tend to the minimum-phase factor.
-  const int n = 12 * order + 64;
-  std::vector<std::vector<double>> band(static_cast<std::size_t>(n), std::vector<double>(static_cast<std::size_t>(order) + 1));
-  const auto l = [&](int i, int j) -> double& { return band[static_cast<std::size_t>(i)][static_cast<std::size_t>(i - j)]; };
-  for (int i = 0; i < n; ++i)
-    for (int j = std::max(0, i - order); j <= i; ++j) {
-      double sum = r[static_cast<std::size_t>(i - j)];
-      for (int k = std::max(0, i - order); k < j; ++k) sum -= l(i, k) * l(j, k);
-      l(i, j) = i == j ? std::sqrt(std::max(sum, 1e-12)) : sum / l(j, j);
-    }
-  std::vector<float> h;
-  double energy = 0;
-  for (const double v : band.back()) energy += v * v;
-  for (const double v : band.back()) h.push_back(static_cast<float>(v / std::sqrt(energy)));
-  return h;
-}
-
 double PingPlan::widest_about_axis_rad() const {
   if (switches.conical) return fan.half_angle_rad;
   const double sine = std::min(columns.first_sine + columns.spacing, 0.9999);
@@ -258,22 +237,12 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.beam_sine = make_beam_sines(mode, settings.beam_count);
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
   p.coupling = make_coupling(mode, p.columns, p.beam_sine, p.expected_power);
-  p.fan = make_fan(mode, settings);
+  lay_out_samples(p);
+  p.fan = make_fan(mode, settings, p.pulse_width_m);
   p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
-
-  p.samples = settings.range_bin_count * settings.samples_per_row;
-  p.sample_spacing_m = settings.range_bin_m / settings.samples_per_row;
-  p.sample_offset = 0.5 + (settings.row_centre - 0.5) * settings.samples_per_row;
-  const double samples_per_width = static_cast<double>(settings.pulse_width_m) / p.sample_spacing_m;
-  p.taps = 8 * std::max(1, static_cast<int>(std::ceil(2 * pulse_reach_widths * samples_per_width / 8 - 0.05)));
-  p.pulse_rows = make_pulse_rows(samples_per_width, p.taps, p.pulse_steps, p.expected_power);
-  const double c_dev = static_cast<double>(settings.device_sound_speed_mps);
-  p.envelope_hz = envelope_parameter_hz(c_dev, static_cast<double>(settings.pulse_width_m));
-  p.levels = make_cell_levels(static_cast<double>(settings.pulse_width_m), static_cast<double>(mode.pattern.azimuth_width_rad),
-                              settings.range_m * 1.1);
-
-  p.noise_filter = make_noise_filter(p.envelope_hz * 2 * p.sample_spacing_m / c_dev);
-  p.column_noise_upa = noise_rms_upa(mode, noise_bandwidth_hz(p.envelope_hz)) / std::sqrt(p.coupling.weight_energy);
+  p.levels = make_cell_levels(p.pulse_width_m, static_cast<double>(mode.pattern.azimuth_width_rad), settings.range_m * 1.1);
+  p.noise_filter = make_noise_filter(p.pulse_shape, p.sample_time_s);
+  p.column_noise_upa = noise_rms_upa(mode, p.pulse_shape.noise_bandwidth_hz()) / std::sqrt(p.coupling.weight_energy);
   fill_row_gains(p);
   return p;
 }
@@ -304,6 +273,9 @@ std::string why_invalid(const PingRequest& r) {
     return "range, row spacing, pulse width and sound speed must be positive and finite";
   if (!(s.row_centre >= 0 && s.row_centre <= 1)) return "row_centre must be from 0 to 1";
   if (!std::isfinite(s.gain_db) || !std::isfinite(s.device_absorption_db_per_m)) return "gain and absorption must be finite";
+  const Waveform& waveform = r.model->modes[static_cast<std::size_t>(s.mode)].waveform;
+  const double sample_time_s = 2 * s.range_bin_m / s.samples_per_row / static_cast<double>(s.device_sound_speed_mps);
+  if (std::string why = why_invalid(waveform, sample_time_s); !why.empty()) return why;
   if (s.format.bits != 8 && s.format.bits != 16 && s.format.bits != 32) return "samples have 8, 16 or 32 bits";
   if (!positive(s.format.gamma)) return "gamma must be positive and finite";
   if (!is_finite(r.sonar_in_world.position_m) || !is_finite(r.sonar_in_world.orientation))

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "core/pipeline/pulse.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/scene/surface_cells.hpp"
 #include "core/sonar/ping.hpp"
@@ -41,6 +43,8 @@ struct Coupling {
   double weight_energy = 1;  // sum_k W_jk^2 of the middle beam
 };
 
+class SpectralColumns;
+
 struct PingPlan {
   FrequencyMode mode;
   PingSettings settings;
@@ -57,10 +61,14 @@ struct PingPlan {
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
   int samples = 0;  // rows * samples_per_row
   double sample_spacing_m = 0;
-  double sample_offset = 0.5;     // 1/2 puts the samples of row i between i and i + 1 spacings, see PingSettings::row_centre
+  double sample_offset = 0.5;  // 1/2 puts the samples of row i between i and i + 1 spacings, see PingSettings::row_centre
+  double sample_time_s = 0;    // 2 sample_spacing_m / the device's sound speed
+  Pulse pulse_shape;
+  double pulse_width_m = 0;       // -3 dB, in the device's metres: the settings', or a measured pulse's own
   std::vector<float> pulse_rows;  // simd::PulseRows
   int taps = 8, pulse_steps = 256;
-  double envelope_hz = 0;  // b of p(t) = exp(-b^2 t^2)
+  double envelope_hz = 0;                           // b of the Gaussian of that width
+  std::shared_ptr<const SpectralColumns> spectral;  // takes the place of pulse_rows when set
 
   std::vector<CellLevel> levels;        // coarsest first
   std::vector<float> elevation;         // polynomial of the two-way pattern in sin^2(angle)
@@ -85,9 +93,5 @@ std::string why_invalid(const PingRequest& request);
 Columns make_columns(const FrequencyMode& mode, int beam_count);
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count);
 Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared);
-std::vector<float> make_pulse_rows(double samples_per_half_power_width, int taps, int steps, bool squared);
 std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m);
-/// Taps h with sum_n h_n h_{n+k} = exp(-(b t k)^2 / 2), t = sample time: white noise filtered by h has the pulse's correlation.
-std::vector<float> make_noise_filter(double b_times_sample_time);
-
 }  // namespace sonar

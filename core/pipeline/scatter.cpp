@@ -111,7 +111,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.bins_per_tangent = plan.fan.bins_per_tangent;
   g.bins = seen.bins;
   g.inverse_depth = seen.inverse_x.data();
-  g.depth_tolerance_m = depth_tolerance_in_pulses * plan.settings.pulse_width_m;
+  g.depth_tolerance_m = depth_tolerance_in_pulses * static_cast<float>(plan.pulse_width_m);
   g.turns_per_m = static_cast<float>(s.turns_per_m);
   g.decay_per_m = static_cast<float>(2 * s.absorption_np_per_m);
   g.samples_per_m = static_cast<float>(s.samples_per_m);

@@ -86,6 +86,7 @@ class PingUnderWay {
   void sound_group(int first, int last, Workspace::PerWorker& mine);
   void scatter_hits_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch);
   void scatter_cells_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch);
+  void sum_pulses(int first, Workspace::PerWorker& mine);
   void image_rows(int first, int last, Workspace::PerWorker& mine, Ping& ping);
 
   const RayScene& scene_;
@@ -140,12 +141,14 @@ void PingUnderWay::sound_columns() {
 void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) {
   Stopwatch watch(w_.now_s, mine.statistics);
   clear_columns(w_.columns, first, last);
+  if (plan_.spectral) plan_.spectral->begin(last - first, mine.spectral);
   if (!request_.blank) {
     if (ray_is_scatterer())
       scatter_hits_of(first, last, mine, watch);
     else
       scatter_cells_of(first, last, mine, watch);
   }
+  if (plan_.spectral) plan_.spectral->finish(first, last, mine.spectral, w_.columns);
   finish_columns(plan_, request_.switches.noise ? &prepared_.noise : nullptr, request_.sonar_id,
                  static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
   if (leak_.is_heard())
@@ -162,7 +165,7 @@ void PingUnderWay::scatter_hits_of(int first, int last, Workspace::PerWorker& mi
   scatter_hits(mine.hits, scene_.scene(), plan_, scalars_, request_.seed, mine.echoes);
   mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
   watch.lap(Stage::scatter);
-  synthesize(mine.echoes, plan_.pulse(), kernels_, w_.columns);
+  sum_pulses(first, mine);
   watch.lap(Stage::synthesize);
 }
 
@@ -176,9 +179,17 @@ void PingUnderWay::scatter_cells_of(int first, int last, Workspace::PerWorker& m
     next = scatter(w_.tiles, wanted, next, group, kernels_, mine.echoes);
     mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
     watch.lap(Stage::scatter);
-    synthesize(mine.echoes, plan_.pulse(), kernels_, w_.columns);
+    sum_pulses(first, mine);
     watch.lap(Stage::synthesize);
   }
+}
+
+/// In time where the pulse is real and tabulated, else by way of the spectrum.
+void PingUnderWay::sum_pulses(int first, Workspace::PerWorker& mine) {
+  if (plan_.spectral)
+    plan_.spectral->add(mine.echoes, first, mine.spectral);
+  else
+    synthesize(mine.echoes, plan_.pulse(), kernels_, w_.columns);
 }
 
 /// Beams, envelope, gain and codes, a window of rows at a time.

@@ -14,6 +14,7 @@
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/receive.hpp"
 #include "core/pipeline/scatter.hpp"
+#include "core/pipeline/spectral_columns.hpp"
 #include "core/pipeline/synthesize.hpp"
 #include "core/pipeline/trace_fan.hpp"
 #include "core/pipeline/truth.hpp"
@@ -43,6 +44,7 @@ struct Workspace {
     DepthMap seen;
     std::vector<FanHit> hits;
     Echoes echoes;
+    SpectralScratch spectral;
     CoupleScratch couple;
     BeamSignals beams;
     ReceiveScratch receive;

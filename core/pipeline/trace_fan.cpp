@@ -75,7 +75,7 @@ class FanTracer {
         first_(first),
         last_(last),
         s_(scratch) {
-    tolerance_m_ = plan.settings.pulse_width_m;
+    tolerance_m_ = static_cast<float>(plan.pulse_width_m);
     columns_ = column_sines(plan.columns, first, last);
     for (const float angle : plan.fan.elevation_rad) base_.push_back(elevation_at(angle));
   }

@@ -1,11 +1,13 @@
-// The Gaussian pulse p(t) = exp(-b^2 t^2) after the receiver's filter, and the widths that follow from it.
-// Used by synthesis, shaped noise and level predictions (docs/acoustics.md, section 4). C++17-clean, standard library only.
+// The pulses p(t) after the receiver's filter that have a formula, and the widths that follow from it: Gaussian, rectangular
+// tone, linear sweep. Used by synthesis, shaped noise and level predictions (docs/acoustics.md, section 4). C++17-clean, standard
+// library.
 #pragma once
 
 #include <cmath>
 
 #include "core/base/geometry.hpp"
 #include "core/base/host_device.hpp"
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
 
 namespace sonar {
 
@@ -41,5 +43,32 @@ SONAR_HD inline double noise_correlation(double b_hz, double time_s) {
   const double x = b_hz * time_s;
   return std::exp(-0.5 * x * x);
 }
+
+/// Rectangular tone of length T after its matched filter: a triangle, as long as the tone on either side.
+SONAR_HD inline double tone_envelope(double length_s, double time_s) {
+  const double x = std::fabs(time_s) / length_s;
+  return x < 1 ? 1 - x : 0;
+}
+/// Its spectrum, T sinc^2(nu T) [s].
+SONAR_HD inline double tone_envelope_spectrum_s(double length_s, double frequency_offset_hz) {
+  const double d = sinc(frequency_offset_hz * length_s);
+  return length_s * d * d;
+}
+/// -3 dB width in delay over the tone's length, 2 - sqrt 2: in range 0.293 c T.
+inline constexpr double tone_width_per_length = 0.58578643762690485;
+
+/// Linear sweep over B after its matched filter with a Hamming window: the transform of 0.54 + 0.46 cos(2 pi nu / B), side lobes
+/// at -42.6 dB and falling as 1 / t. Let fade from 24 / B on, and over at 48 / B, where they are at -60 dB.
+SONAR_HD inline double sweep_envelope(double bandwidth_hz, double time_s) {
+  constexpr double fade_from = 24, over_at = 48, neighbour = 0.23 / 0.54;
+  const double x = std::fabs(bandwidth_hz * time_s);
+  if (x >= over_at) return 0;
+  const double p = sinc(x) + neighbour * (sinc(x - 1) + sinc(x + 1));
+  const double fade = x > fade_from ? std::cos(0.5 * pi * (x - fade_from) / (over_at - fade_from)) : 1.0;
+  return p * fade * fade;
+}
+inline constexpr double sweep_reach = 48;  // p(t) = 0 from here on, in 1 / B
+/// -3 dB width in delay times B.
+inline constexpr double sweep_width_times_bandwidth = 1.3029820808162345;
 
 }  // namespace sonar

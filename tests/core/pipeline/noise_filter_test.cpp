@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/pulse.hpp"
 
 namespace sonar {
 namespace {
@@ -19,7 +19,7 @@ double correlation(const std::vector<float>& h, std::size_t lag) {
 
 TEST_P(NoiseFilter, CorrelatesLikeThePulse) {
   const double bt = 2 * half_power_bt / GetParam();
-  const std::vector<float> h = make_noise_filter(bt);
+  const std::vector<float> h = make_noise_filter(Pulse({}, 2 * half_power_bt), bt);  // b = 1
   EXPECT_NEAR(correlation(h, 0), 1.0, 1e-5);
   for (std::size_t lag = 1; lag < h.size(); ++lag)
     EXPECT_NEAR(correlation(h, lag), std::exp(-0.5 * bt * bt * static_cast<double>(lag * lag)), 0.02) << "lag " << lag;
@@ -28,7 +28,7 @@ INSTANTIATE_TEST_SUITE_P(UsualGrids, NoiseFilter, ::testing::Values(0.5, 0.9, 1.
 
 TEST(NoiseFilter, StaysFiniteOnAbsurdlyFineGrids) {
   for (const double samples_per_width : {40.0, 57.0, 64.0, 300.0}) {
-    const std::vector<float> h = make_noise_filter(2 * half_power_bt / samples_per_width);
+    const std::vector<float> h = make_noise_filter(Pulse({}, samples_per_width), 1);
     for (const float tap : h) ASSERT_TRUE(std::isfinite(tap)) << samples_per_width;
     EXPECT_NEAR(correlation(h, 0), 1.0, 1e-4);
     EXPECT_GT(correlation(h, 1), 0.9);
