@@ -6,6 +6,7 @@
 
 #include "core/text/decimal.hpp"
 #include "core/text/strict_yaml.hpp"
+#include "daemon/config_parts.hpp"
 
 namespace sonar {
 namespace {
@@ -13,9 +14,6 @@ namespace {
 using text::Map;
 using text::Node;
 using text::Range;
-
-constexpr Range finite_place{.min = -1e7, .max = 1e7};
-constexpr double hot_c = 30;  // a widely used driver sends the sonar to standby above this (docs/protocols/oculus.md, section 4)
 
 Ipv4 read_ip(const Node& node, Ipv4 fallback = {}) {
   if (!node.present()) return fallback;
@@ -53,38 +51,6 @@ AddressRange read_range(const Node& node) {
   return {*ip, static_cast<int>(*bits)};
 }
 
-Pose pose_from(const std::array<double, 3>& xyz_m, const std::array<double, 3>& rpy_deg) {
-  return {{xyz_m[0], xyz_m[1], xyz_m[2]},
-          quat_from_rpy({rad_from_deg(rpy_deg[0]), rad_from_deg(rpy_deg[1]), rad_from_deg(rpy_deg[2])})};
-}
-
-Pose read_world_pose(const Node& node) {
-  if (!node.present()) return {};
-  Map map = node.map();
-  const bool ned = map.required("frame").choice<bool>({{"ENU_FLU", false}, {"NED_FRD", true}});
-  const auto xyz_m = map.required("xyz_m").numbers<3>(finite_place);
-  const auto rpy_deg = map.optional("rpy_deg").numbers_or<3>({0, 0, 0}, Range::between(-360, 360));
-  const Pose pose = pose_from(xyz_m, rpy_deg);
-  return ned ? enu_flu_from_ned_frd(pose) : pose;
-}
-
-Pose read_mount(const Node& node) {
-  if (!node.present()) return {};
-  Map map = node.map();
-  const bool frd = map.required("frame").choice<bool>({{"FLU", false}, {"FRD", true}});
-  const auto xyz_m = map.optional("xyz_m").numbers_or<3>({0, 0, 0}, Range::between(-1000, 1000));
-  const auto rpy_deg = map.optional("rpy_deg").numbers_or<3>({0, 0, 0}, Range::between(-360, 360));
-  const Pose pose = pose_from(xyz_m, rpy_deg);
-  return frd ? flu_from_frd(pose) : pose;
-}
-
-SceneFile read_scene_file(const Node& node, const std::filesystem::path& directory) {
-  const std::string given = node.text();
-  if (auto found = find_scene(given, directory)) return *std::move(found);
-  node.fail("no such file; looked in " + scene_folders(directory));
-  return {given};
-}
-
 void read_world(Map map, Config& config, const std::filesystem::path& directory) {
   config.scene = read_scene_file(map.required("scene"), directory);
   config.seed = map.optional("seed").unsigned_integer_or(1);
@@ -94,18 +60,7 @@ void read_world(Map map, Config& config, const std::filesystem::path& directory)
     place.required("lon").number(Range::between(-180, 180));
     place.optional("alt").number_or(0, Range::between(-12000, 10000));
   }
-  if (Node node = map.optional("water")) {
-    Map water = node.map();
-    const Node temperature = water.optional("temperature_c");
-    config.water.temperature_c = temperature.number_or(config.water.temperature_c, Range::between(-2, 40));
-    config.water.salinity_psu = water.optional("salinity_psu").number_or(config.water.salinity_psu, Range::between(0, 42));
-    config.water.ph = water.optional("ph").number_or(config.water.ph, Range::between(6, 9));
-    config.water.sound_speed_mps = water.optional("sound_speed_mps").number_or(0, Range::between(0, 2000));
-    if (config.water.sound_speed_mps != 0 && config.water.sound_speed_mps < 1000)
-      water.optional("sound_speed_mps").fail("must be 0 (computed from the rest) or from 1000 to 2000");
-    if (!water.optional("allow_hot").boolean_or(false) && config.water.temperature_c >= hot_c)
-      temperature.fail("30 C or more sends a real driver to standby; add allow_hot: true if that is what you want");
-  }
+  config.water = read_water(map.optional("water"));
 }
 
 void read_vehicles(const Node& node, Config& config) {
@@ -131,25 +86,6 @@ std::size_t read_vehicle_of(Map& map, const Config& config) {
   std::vector<std::string_view> names;
   for (const VehicleConfig& v : config.vehicles) names.push_back(v.name);
   return node.choice_index(std::move(names));
-}
-
-protocol::OptionValues read_options(const Node& node, const protocol::Vendor& vendor) {
-  protocol::OptionValues given;
-  Map map = node.map();
-  for (const protocol::Option& option : vendor.options()) {  // asked for one by one: errors then stand where the mistake is
-    const Node value = map.optional(option.name);
-    if (!value.present()) continue;
-    if (option.allowed.empty()) {
-      const Range range = option.highest > 0 ? Range::between(option.lowest, option.highest) : Range::above(0);
-      if (value.text(64) != option.default_value) value.number(range);
-    } else {
-      value.choice_index(option.allowed);
-    }
-    given[std::string(option.name)] = value.text(64);
-  }
-  auto complete = check_options(vendor, given);
-  if (!complete) node.fail(complete.error().text);
-  return complete.value_or(protocol::OptionValues{});
 }
 
 void read_addresses(Map& map, SonarConfig& sonar) {
@@ -242,25 +178,6 @@ void read_poses(const Node& node, PoseConfig& poses) {
                        .choice_or(OnStale::hold, {{"hold", OnStale::hold}, {"blank", OnStale::blank}, {"stop", OnStale::stop}});
 }
 
-void read_engine(const Node& node, EngineConfig& engine) {
-  if (!node.present()) return;
-  Map map = node.map();
-  engine.threads = static_cast<int>(map.optional("threads").integer_or(0, 0, 256));
-  map.optional("quality").choice_or<int>(0, {{"default", 0}});
-  engine.simd = map.optional("simd").choice_or(SimdLevel::automatic, {{"auto", SimdLevel::automatic},
-                                                                      {"portable", SimdLevel::portable},
-                                                                      {"avx2", SimdLevel::avx2},
-                                                                      {"avx512", SimdLevel::avx512}});
-  engine.switches.expected_power = map.optional("expected_power").boolean_or(false);
-  for (const NamedSwitch& part : named_switches) {
-    bool& is_on = engine.switches.*part.is_on;
-    is_on = map.optional(part.name).choice_or<bool>(is_on, {{"on", true}, {"off", false}});
-  }
-  engine.switches.mode = map.optional("mode").choice_or(
-      Mode::canonical, {{"canonical", Mode::canonical}, {"paper", Mode::paper}, {"raster", Mode::raster}});
-  engine.switches.fixed_fan = static_cast<int>(map.optional("fixed_fan").integer_or(0, 0, most_fixed_rays));
-}
-
 void read_log(const Node& node, LogOptions& log) {
   if (!node.present()) return;
   Map map = node.map();
@@ -279,7 +196,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   std::size_t index = 0;
   for (const Node& item : root.required("sonars").items(1, 64)) config.sonars.push_back(read_sonar(item.map(), config, index++));
   read_poses(root.optional("poses"), config.poses);
-  read_engine(root.optional("engine"), config.engine);
+  config.engine = read_engine(root.optional("engine"));
   config.clock =
       root.optional("clock").choice_or(ClockMode::realtime, {{"realtime", ClockMode::realtime}, {"stepped", ClockMode::stepped}});
   read_log(root.optional("log"), config.log);

@@ -1,0 +1,103 @@
+#include "daemon/config_parts.hpp"
+
+namespace sonar {
+namespace {
+
+using text::Map;
+using text::Node;
+using text::Range;
+
+constexpr Range finite_place{.min = -1e7, .max = 1e7};
+constexpr double hot_c = 30;  // a widely used driver sends the sonar to standby above this (docs/protocols/oculus.md, section 4)
+
+Pose pose_from(const std::array<double, 3>& xyz_m, const std::array<double, 3>& rpy_deg) {
+  return {{xyz_m[0], xyz_m[1], xyz_m[2]},
+          quat_from_rpy({rad_from_deg(rpy_deg[0]), rad_from_deg(rpy_deg[1]), rad_from_deg(rpy_deg[2])})};
+}
+
+}  // namespace
+
+Pose read_world_pose(const Node& node) {
+  if (!node.present()) return {};
+  Map map = node.map();
+  const bool ned = map.required("frame").choice<bool>({{"ENU_FLU", false}, {"NED_FRD", true}});
+  const auto xyz_m = map.required("xyz_m").numbers<3>(finite_place);
+  const auto rpy_deg = map.optional("rpy_deg").numbers_or<3>({0, 0, 0}, Range::between(-360, 360));
+  const Pose pose = pose_from(xyz_m, rpy_deg);
+  return ned ? enu_flu_from_ned_frd(pose) : pose;
+}
+
+Pose read_mount(const Node& node) {
+  if (!node.present()) return {};
+  Map map = node.map();
+  const bool frd = map.required("frame").choice<bool>({{"FLU", false}, {"FRD", true}});
+  const auto xyz_m = map.optional("xyz_m").numbers_or<3>({0, 0, 0}, Range::between(-1000, 1000));
+  const auto rpy_deg = map.optional("rpy_deg").numbers_or<3>({0, 0, 0}, Range::between(-360, 360));
+  const Pose pose = pose_from(xyz_m, rpy_deg);
+  return frd ? flu_from_frd(pose) : pose;
+}
+
+SceneFile read_scene_file(const Node& node, const std::filesystem::path& directory) {
+  const std::string given = node.text();
+  if (auto found = find_scene(given, directory)) return *std::move(found);
+  node.fail("no such file; looked in " + scene_folders(directory));
+  return {given};
+}
+
+Water read_water(const Node& node) {
+  Water water;
+  if (!node.present()) return water;
+  Map map = node.map();
+  const Node temperature = map.optional("temperature_c");
+  water.temperature_c = temperature.number_or(water.temperature_c, Range::between(-2, 40));
+  water.salinity_psu = map.optional("salinity_psu").number_or(water.salinity_psu, Range::between(0, 42));
+  water.ph = map.optional("ph").number_or(water.ph, Range::between(6, 9));
+  water.sound_speed_mps = map.optional("sound_speed_mps").number_or(0, Range::between(0, 2000));
+  if (water.sound_speed_mps != 0 && water.sound_speed_mps < 1000)
+    map.optional("sound_speed_mps").fail("must be 0 (computed from the rest) or from 1000 to 2000");
+  if (!map.optional("allow_hot").boolean_or(false) && water.temperature_c >= hot_c)
+    temperature.fail("30 C or more sends a real driver to standby; add allow_hot: true if that is what you want");
+  return water;
+}
+
+protocol::OptionValues read_options(const Node& node, const protocol::Vendor& vendor) {
+  protocol::OptionValues given;
+  Map map = node.map();
+  for (const protocol::Option& option : vendor.options()) {  // asked for one by one: errors then stand where the mistake is
+    const Node value = map.optional(option.name);
+    if (!value.present()) continue;
+    if (option.allowed.empty()) {
+      const Range range = option.highest > 0 ? Range::between(option.lowest, option.highest) : Range::above(0);
+      if (value.text(64) != option.default_value) value.number(range);
+    } else {
+      value.choice_index(option.allowed);
+    }
+    given[std::string(option.name)] = value.text(64);
+  }
+  auto complete = check_options(vendor, given);
+  if (!complete) node.fail(complete.error().text);
+  return complete.value_or(protocol::OptionValues{});
+}
+
+EngineConfig read_engine(const Node& node) {
+  EngineConfig engine;
+  if (!node.present()) return engine;
+  Map map = node.map();
+  engine.threads = static_cast<int>(map.optional("threads").integer_or(0, 0, 256));
+  map.optional("quality").choice_or<int>(0, {{"default", 0}});
+  engine.simd = map.optional("simd").choice_or(SimdLevel::automatic, {{"auto", SimdLevel::automatic},
+                                                                      {"portable", SimdLevel::portable},
+                                                                      {"avx2", SimdLevel::avx2},
+                                                                      {"avx512", SimdLevel::avx512}});
+  engine.switches.expected_power = map.optional("expected_power").boolean_or(false);
+  for (const NamedSwitch& part : named_switches) {
+    bool& is_on = engine.switches.*part.is_on;
+    is_on = map.optional(part.name).choice_or<bool>(is_on, {{"on", true}, {"off", false}});
+  }
+  engine.switches.mode = map.optional("mode").choice_or(
+      Mode::canonical, {{"canonical", Mode::canonical}, {"paper", Mode::paper}, {"raster", Mode::raster}});
+  engine.switches.fixed_fan = static_cast<int>(map.optional("fixed_fan").integer_or(0, 0, most_fixed_rays));
+  return engine;
+}
+
+}  // namespace sonar
