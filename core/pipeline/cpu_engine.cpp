@@ -23,8 +23,8 @@ class CpuEngine final : public PingEngine {
     pings.reserve(requests.size());
     for (const PingRequest& request : requests) {
       if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
-      if (!cells_ || cells_->seed() != request.seed)
-        cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes);
+      if (!cells_ || !cells_->serves(request.seed, request.switches.texture))
+        cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, request.switches.texture);
       if (!scene_->bodies_in_world.empty())
         rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
       pings.push_back(simulate(rays_, *cells_, request, kernels_, work_, pool_));

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "core/base/random.hpp"
 #include "core/scene/cell_lattice.hpp"
+#include "core/scene/texture.hpp"
 
 namespace sonar {
 namespace {
@@ -79,7 +81,7 @@ CellRange cells_between(double lo, double hi, double s, std::int32_t tile) {
 }
 
 void add_cells(const lattice::Facet& f, const TileAddress& a, Vec3d centre, const std::array<LatticePoint, side * side>& points,
-               std::vector<Cell>& cells) {
+               std::optional<TexturePatch>& patch, std::vector<Cell>& cells) {
   const double s = lattice::cell_size_m(a.level), edge = lattice::tile_edge_m(a.level);
   const auto [u_lo, u_hi] = std::minmax({f.u[0], f.u[1], f.u[2]});
   const auto [v_lo, v_hi] = std::minmax({f.v[0], f.v[1], f.v[2]});
@@ -93,8 +95,10 @@ void add_cells(const lattice::Facet& f, const TileAddress& a, Vec3d centre, cons
       const double w = lattice::height(f, p.u, p.v);
       if (std::floor(w / edge) != static_cast<double>(a.k)) continue;
       const ComplexNormal xi = complex_normal(p.speckle_a, p.speckle_b);
-      cells.push_back({sub_square_order(row, col), lattice::from_permuted(p.u, p.v, w, a.axis) - centre, normal,
-                       static_cast<float>(xi.re * root_area), static_cast<float>(xi.im * root_area)});
+      const Vec3d place = lattice::from_permuted(p.u, p.v, w, a.axis);
+      const double root = patch ? root_area * static_cast<double>(patch->root_at(place)) : root_area;
+      cells.push_back({sub_square_order(row, col), place - centre, normal, static_cast<float>(xi.re * root),
+                       static_cast<float>(xi.im * root)});
     }
 }
 
@@ -127,7 +131,7 @@ void pack(const std::vector<Cell>& cells, CellTile& tile) {
 }  // namespace
 
 CellTile build_tile(const TileAddress& a, const Mesh& mesh, std::span<const std::uint32_t> triangles, std::uint32_t texture_seed,
-                    Seed seed) {
+                    Seed seed, const TextureField* texture) {
   const double edge = lattice::tile_edge_m(a.level);
   CellTile tile;
   tile.object = a.object;
@@ -141,7 +145,9 @@ CellTile build_tile(const TileAddress& a, const Mesh& mesh, std::span<const std:
   const auto points = draw_points(a, texture_seed, seed);
   std::vector<Cell> cells;
   cells.reserve(side * side);
-  for (const std::uint32_t t : triangles) add_cells(lattice::facet_of(mesh, t, a.axis), a, tile.centre_m, points, cells);
+  std::optional<TexturePatch> patch;
+  if (texture) patch.emplace(*texture, a.object);
+  for (const std::uint32_t t : triangles) add_cells(lattice::facet_of(mesh, t, a.axis), a, tile.centre_m, points, patch, cells);
   if (cells.empty()) return tile;
   std::stable_sort(cells.begin(), cells.end(), [](const Cell& p, const Cell& q) { return p.order < q.order; });
   pack(cells, tile);

@@ -10,6 +10,8 @@
 
 namespace sonar {
 
+class TextureField;
+
 /// Which lattice cube, of which sheet: the triangles of one object that share material, dominant axis and side.
 struct TileAddress {
   int object = 0, material = 0, axis = 0;
@@ -18,8 +20,8 @@ struct TileAddress {
   std::int32_t i = 0, j = 0, k = 0;  // cube index along u, v, w (cell_lattice.hpp)
 };
 
-/// `data` stays null when no cell lies in the cube. Cost: about 0.1 us a cell.
+/// `data` stays null when no cell lies in the cube. `texture` null = none. Cost: about 0.1 us a cell.
 CellTile build_tile(const TileAddress& address, const Mesh& mesh, std::span<const std::uint32_t> triangles,
-                    std::uint32_t texture_seed, Seed seed);
+                    std::uint32_t texture_seed, Seed seed, const TextureField* texture = nullptr);
 
 }  // namespace sonar

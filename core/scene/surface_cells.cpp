@@ -8,6 +8,7 @@
 
 #include "core/scene/cell_lattice.hpp"
 #include "core/scene/cell_tile.hpp"
+#include "core/scene/texture.hpp"
 
 namespace sonar {
 
@@ -144,8 +145,13 @@ std::size_t SurfaceCells::Sheet::forget_below(Node& node, std::uint64_t then) {
   return freed;
 }
 
-SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes)
-    : scene_(std::move(scene)), seed_(seed), cache_bytes_(cache_bytes) {
+SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, bool textured)
+    : scene_(std::move(scene)), seed_(seed), textured_(textured), cache_bytes_(cache_bytes) {
+  for (const Material& m : scene_->materials) {
+    const bool has = m.texture.shape > 0;
+    has_texture_ = has_texture_ || has;
+    textures_.push_back(has && textured ? std::make_unique<TextureField>(m.texture, m.texture_seed, seed) : nullptr);
+  }
   for (std::size_t o = 0; o < scene_->objects.size(); ++o) {
     const Object& object = scene_->objects[o];
     if (!object.visible) continue;
@@ -231,8 +237,9 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
   pool.for_each(missing.size(), [&](std::size_t n, int) {
     Node& node = *missing[n];
     const TileAddress& a = node.address;
+    const auto material = static_cast<std::size_t>(a.material);
     node.tile = build_tile(a, *scene_->objects[static_cast<std::size_t>(a.object)].mesh, node.triangles,
-                           scene_->materials[static_cast<std::size_t>(a.material)].texture_seed, seed_);
+                           scene_->materials[material].texture_seed, seed_, textures_[material].get());
     node.built = true;
   });
   built_ = missing.size();

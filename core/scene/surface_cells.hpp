@@ -60,14 +60,19 @@ struct TileInView {
   int object = 0;
 };
 
+class TextureField;
+
 class SurfaceCells {
  public:
-  SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes);
+  /// `textured`: with the patches of the materials that have a texture.
+  SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, bool textured = true);
   ~SurfaceCells();
   SurfaceCells(const SurfaceCells&) = delete;
   SurfaceCells& operator=(const SurfaceCells&) = delete;
 
   Seed seed() const { return seed_; }
+  /// Whether these are the cells of that seed, with or without texture; where no material has one, both are the same.
+  bool serves(Seed seed, bool textured) const { return seed == seed_ && (textured == textured_ || !has_texture_); }
   /// Tiles that may lie in the view, missing ones built first, in an order that does not depend on the pool.
   /// Valid until the next call. `view` must outlive the result.
   const std::vector<TileInView>& in_view(const CellView& view, Parallel& pool);
@@ -85,6 +90,8 @@ class SurfaceCells {
 
   std::shared_ptr<const Scene> scene_;
   Seed seed_{};
+  bool textured_ = true, has_texture_ = false;
+  std::vector<std::unique_ptr<const TextureField>> textures_;  // per material, null = none
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0;
   double fan_cosine_ = 1, fan_sine_ = 0;  // of the last view's half angle

@@ -1,0 +1,52 @@
+// Patches of stronger and weaker scattering that belong to a surface: a continuous Gamma field of mean 1 over object coordinates
+// (docs/acoustics.md, section 3). build_tile multiplies the cells' speckle by its root, which makes their echoes K-distributed.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+#include "core/base/units.hpp"
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+
+/// One material's field: a smooth Gaussian field of unit variance (normals on a cubic lattice of the correlation length, blended
+/// by quadratic splines) whose values are carried over to the Gamma distribution, quantile by quantile.
+class TextureField {
+ public:
+  /// texture.shape > 0; texture.correlation_m: where the correlation of the field has fallen to about 1 / e.
+  TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed);
+
+  double lattice_m() const { return lattice_m_; }
+  /// Standard normal of a lattice point; a function of (seed, texture seed, object, point) alone.
+  float normal_at(int object, std::int32_t i, std::int32_t j, std::int32_t k) const;
+  /// Root of the Gamma variable (mean 1) at the same quantile as a standard normal.
+  float root_of(float normal) const;
+
+ private:
+  double lattice_m_;
+  std::uint32_t key_lo_, key_hi_;
+  std::vector<float> roots_;
+};
+
+/// A field near one place on one object; remembers the lattice points that neighbouring cells share. One thread at a time.
+class TexturePatch {
+ public:
+  TexturePatch(const TextureField& field, int object);
+  /// Root of the field at a place in object coordinates: factor on amplitudes.
+  float root_at(Vec3d place_m);
+
+ private:
+  struct Point {
+    std::int32_t i, j, k;
+    float normal;
+  };
+  float normal_at(std::int32_t i, std::int32_t j, std::int32_t k);
+
+  const TextureField& field_;
+  int object_;
+  std::vector<Point> points_;
+};
+
+}  // namespace sonar
