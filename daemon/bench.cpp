@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "core/paper/paper_engine.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "daemon/bench_cases.hpp"
 #include "daemon/scene_file.hpp"
@@ -23,12 +24,14 @@ struct BenchOptions {
   std::vector<int> threads;
   int pings = 100;
   std::string simd = "auto";
+  std::string mode = "canonical", frequency_sum = "fast";
+  int fixed_fan = 0;
   std::string scene_folder;
   std::string json_file;
 };
 
 struct Figures {
-  std::string case_name, description, scene, engine;
+  std::string case_name, description, scene, engine, mode;
   int threads = 0, pings = 0;
   double cold_ms = 0, min_ms = 0, median_ms = 0, p90_ms = 0;
   std::array<double, static_cast<std::size_t>(Stage::stages)> stage_ms{};  // mean a ping, summed over threads
@@ -53,6 +56,10 @@ SimdLevel level_of(const std::string& name) {
   return SimdLevel::automatic;
 }
 
+Mode mode_of(const std::string& name) {
+  return name == "paper" ? Mode::paper : name == "raster" ? Mode::raster : Mode::canonical;
+}
+
 Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene, PingEngine& engine, int threads,
                 const BenchOptions& options) {
   protocol::DeviceState device;
@@ -67,6 +74,7 @@ Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene,
   f.description = c.description;
   f.scene = where.name;
   f.engine = engine.description();
+  f.mode = options.mode;
   f.threads = threads;
   f.pings = options.pings;
   f.scene_triangles = scene.triangle_count();
@@ -78,6 +86,8 @@ Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene,
     r.number = PingNumber{static_cast<std::uint32_t>(k)};
     r.settings = c.settings;
     r.seed = Seed{1};
+    r.switches.mode = mode_of(options.mode);
+    r.switches.fixed_fan = options.fixed_fan;
     r.sonar_in_world = r.vehicle_in_world = bench_pose(c, where, k / 40.0);
     const double begin = now_s();
     const auto pings = engine.run({&r, 1});
@@ -118,6 +128,7 @@ nlohmann::json json_of(const Figures& f) {
           {"description", f.description},
           {"scene", f.scene},
           {"engine", f.engine},
+          {"mode", f.mode},
           {"threads", f.threads},
           {"pings", f.pings},
           {"cold_ms", f.cold_ms},
@@ -169,8 +180,9 @@ int bench(const BenchOptions& options) {
       for (const int threads : options.threads) {
         Parallel pool(threads);
         const EngineOptions engine_options{.simd = level_of(options.simd), .now_s = now_s};
+        const auto sum = options.frequency_sum == "direct" ? paper::FrequencySum::direct : paper::FrequencySum::fast;
         const auto engine = start_engine(
-            [&](std::shared_ptr<const Scene> s) { return make_cpu_engine(std::move(s), pool, engine_options); }, *scene);
+            [&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, engine_options, sum); }, *scene);
         if (!engine) return complain(engine.error());
         const Figures f = measure(c, where, **scene, **engine, threads, options);
         print(f);
@@ -204,6 +216,14 @@ int run_bench(int argc, char** argv) {
   cli.add_option("--pings", options.pings, "Pings to time")->check(CLI::Range(1, 100000))->capture_default_str();
   cli.add_option("--simd", options.simd, "Instruction set")
       ->check(CLI::IsMember({"auto", "portable", "avx2", "avx512"}))
+      ->capture_default_str();
+  cli.add_option("--mode", options.mode, "What makes scatterers of the scene (docs/acoustics.md, section 8)")
+      ->check(CLI::IsMember({"canonical", "paper", "raster"}))
+      ->capture_default_str();
+  cli.add_option("--fixed-fan", options.fixed_fan, "N rays a column, each a scatterer; 0 = as the mode has it")
+      ->check(CLI::Range(0, 100000));
+  cli.add_option("--frequency-sum", options.frequency_sum, "Of the modes paper and raster: by a transform, or term by term")
+      ->check(CLI::IsMember({"fast", "direct"}))
       ->capture_default_str();
   cli.add_option("--scenes-dir", options.scene_folder, "Folder to look for the scene files in first; else the shipped ones");
   cli.add_option("--json", options.json_file, "Also write the figures to this file");

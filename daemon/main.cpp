@@ -7,6 +7,7 @@
 #include <new>
 #include <thread>
 
+#include "core/paper/paper_engine.hpp"
 #include "daemon/app.hpp"
 #include "daemon/banner.hpp"
 #include "daemon/bench.hpp"
@@ -65,7 +66,7 @@ int run(const RunCommand& command, Steady::time_point begin) {
   Parallel pool(compute_threads(config.engine), compute_niceness);  // outlives the engine inside App
   const EngineOptions engine_options{config.engine.simd};
   auto engine =
-      start_engine([&](std::shared_ptr<const Scene> s) { return make_cpu_engine(std::move(s), pool, engine_options); }, *scene);
+      start_engine([&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, engine_options); }, *scene);
   if (!engine) return complain(engine.error());
   const auto make_engine = [&](const std::shared_ptr<const Scene>&) { return *std::move(engine); };
   AppOptions options;
