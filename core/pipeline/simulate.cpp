@@ -28,7 +28,7 @@ class Stopwatch {
   double since_;
 };
 
-PreparedSettings& prepared_for(const PingRequest& request, Workspace& w) {
+PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Workspace& w) {
   ++w.pings;
   auto it = std::find_if(w.prepared.begin(), w.prepared.end(),
                          [&](const auto& p) { return p->model == request.model && serves(p->plan, request); });
@@ -44,8 +44,9 @@ PreparedSettings& prepared_for(const PingRequest& request, Workspace& w) {
   }
   PreparedSettings& p = **it;
   p.last_used = w.pings;
+  const bool volume = request.switches.volume && scene.water_column.has_volume();
   const bool leak = request.switches.leak && p.plan.mode.receiver.leak_upa > 0;
-  if ((request.switches.noise || leak) && !p.plan.expected_power) p.noise.prepare(request.seed, p.plan.noise_filter);
+  if ((request.switches.noise || leak || volume) && !p.plan.expected_power) p.noise.prepare(request.seed, p.plan.noise_filter);
   return p;
 }
 
@@ -60,9 +61,10 @@ class PingUnderWay {
         kernels_(kernels),
         w_(work),
         pool_(pool),
-        prepared_(prepared_for(request, work)),
+        prepared_(prepared_for(request, scene.scene(), work)),
         plan_(prepared_.plan),
         scalars_(make_scalars(plan_, request, scene.origin())),
+        volume_(scene.scene().water_column, plan_, scalars_),
         leak_(plan_, request.switches),
         crosstalk_(plan_, request.switches),
         bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world) {
@@ -98,6 +100,7 @@ class PingUnderWay {
   PreparedSettings& prepared_;
   const PingPlan& plan_;
   PingScalars scalars_;
+  Volume volume_;
   Leak leak_;
   Crosstalk crosstalk_;
   std::span<const Pose> bodies_;
@@ -149,6 +152,9 @@ void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) 
       scatter_cells_of(first, last, mine, watch);
   }
   if (plan_.spectral) plan_.spectral->finish(first, last, mine.spectral, w_.columns);
+  if (volume_.is_heard() && !request_.blank)
+    volume_.add(ray_is_scatterer() ? nullptr : &mine.seen, prepared_.noise, request_.sonar_id,
+                static_cast<std::uint32_t>(request_.number), first, last, mine.volume, w_.columns);
   finish_columns(plan_, request_.switches.noise ? &prepared_.noise : nullptr, request_.sonar_id,
                  static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
   if (leak_.is_heard())

@@ -18,6 +18,7 @@
 #include "core/pipeline/synthesize.hpp"
 #include "core/pipeline/trace_fan.hpp"
 #include "core/pipeline/truth.hpp"
+#include "core/pipeline/volume.hpp"
 #include "core/scene/ray_scene.hpp"
 #include "core/scene/surface_cells.hpp"
 
@@ -44,6 +45,7 @@ struct Workspace {
     DepthMap seen;
     std::vector<FanHit> hits;
     Echoes echoes;
+    VolumeScratch volume;
     SpectralScratch spectral;
     CoupleScratch couple;
     BeamSignals beams;

@@ -134,16 +134,36 @@ void read_sea_surface(const Node& node, ShapeReader& shapes) {
   Map keys = node.map();
   const auto size = keys.optional("size_m").numbers_or<2>({200, 200}, Range{.min = 0.1, .max = 1e5});
   const auto centre = keys.optional("centre_m").numbers_or<2>({0, 0}, a_place);
+  const auto number = [&](const char* key, float& value, Range range) {
+    value = static_cast<float>(keys.optional(key).number_or(static_cast<double>(value), range));
+  };
   Scene& scene = shapes.scene;
-  scene.sea_surface.present = true;
-  scene.sea_surface.lambert_db = static_cast<float>(keys.optional("lambert_db").number_or(-30, Range::between(-80, -4.97)));
+  SeaSurface& sea = scene.sea_surface;
+  sea.present = true;
+  number("lambert_db", sea.lambert_db, Range::between(-80, -4.97));
+  number("roughness_m", sea.roughness_m, Range::between(0, 20));
+  number("bubble_layer_m", sea.bubble_layer_m, Range::between(0, 100));
+  number("bubble_loss_db_per_m", sea.bubble_loss_db_per_m, Range::between(0, 1000));
+  if (sea.bubble_loss_db_per_m > 0 && !(sea.bubble_layer_m > 0))
+    node.fail("bubble_loss_db_per_m needs bubble_layer_m, the thickness of the layer that it holds for");
   if (size[0] <= 0 || size[1] <= 0) return;
-  Material air{.name = "sea_surface", .lambert_db = scene.sea_surface.lambert_db, .roughness_m = 0.01f, .reflection = -1};
+  Material air{.name = "sea_surface", .lambert_db = sea.lambert_db, .roughness_m = sea.roughness_m, .reflection = -1};
   Mesh mesh = make_plane(size[0], size[1], std::max(1.0, std::max(size[0], size[1]) / 100));
   std::fill(mesh.material.begin(), mesh.material.end(), shapes.materials.add(air));
   scene.objects.push_back(Object{.name = "sea surface",
                                  .mesh = std::make_shared<const Mesh>(std::move(mesh)),
-                                 .in_world = Pose{{centre[0], centre[1], 0}, {}}});
+                                 .in_world = Pose{{centre[0], centre[1], 0}, {}},
+                                 .primitive = {.kind = Primitive::Kind::plane, .size_m = {size[0], size[1], 0}}});
+}
+
+void read_water_column(const Node& node, Scene& scene) {
+  if (!node.present()) return;
+  Map keys = node.map();
+  const Node volume = keys.optional("volume_db"), clarity = keys.optional("clarity");
+  if (volume.present() && clarity.present()) clarity.fail("give clarity or volume_db, not both");
+  float& volume_db = scene.water_column.volume_db;
+  volume_db = clarity.choice_or(volume_db, {{"clear", -80.0f}, {"turbid", -60.0f}});
+  volume_db = static_cast<float>(volume.number_or(static_cast<double>(volume_db), Range::between(-200, -20)));
 }
 
 }  // namespace sonar

@@ -85,6 +85,7 @@ struct SeaSurface {
 /// What fills the water (docs/acoustics.md, section 3).
 struct WaterColumn {
   float volume_db = -200;  // S_v, backscattering strength per cubic metre [dB re 1/m]; below -150 = none
+  bool has_volume() const { return volume_db > -150; }
 };
 
 /// Another sonar within earshot; its pulses arrive whenever they do.

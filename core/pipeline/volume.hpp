@@ -1,0 +1,49 @@
+// Reverberation of the water itself: what floats in it scatters a little everywhere, as far as nothing solid stands in the way.
+// Added to the column signals between synthesis and coupling (docs/acoustics.md, section 3).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/pipeline/noise.hpp"
+#include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/ping_scalars.hpp"
+#include "core/pipeline/synthesize.hpp"
+#include "core/pipeline/trace_fan.hpp"
+
+namespace sonar {
+
+/// Buffers of add_volume that live from ping to ping; one per worker.
+struct VolumeScratch {
+  std::vector<double> blocked;     // by sample: how much of the fan ends there
+  std::vector<float> rms, grains;  // by sample; grains are complex
+};
+
+/// One ping's volume reverberation. Silent in clear water, and when switched off.
+class Volume {
+ public:
+  Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars);
+
+  bool is_heard() const { return !open_power_.empty(); }
+  /// Adds to columns [first, last), before the transmitter's pattern is applied. `seen`: what the rays saw of these columns; null
+  /// = the fan is open as far as it reaches. Drawn anew for every (seed, sonar, ping); in expected power the mean is added, and
+  /// `noise` is not used.
+  void add(const DepthMap* seen, const NoiseTable& noise, std::uint32_t sonar, std::uint32_t ping, int first, int last,
+           VolumeScratch& scratch, ColumnSignals& signals) const;
+
+ private:
+  /// A slice of the fan: its tangent, and the integral of the two-way power pattern over it [rad].
+  struct Slice {
+    int bin;
+    double range_per_x, weight;
+  };
+  void find_blocked(const DepthMap& seen, int column, std::vector<double>& blocked) const;
+
+  const PingPlan& plan_;
+  const PingScalars& scalars_;
+  std::vector<Slice> slices_;
+  double open_fan_ = 0;             // sum of the weights
+  std::vector<double> open_power_;  // by sample, per weight and before the column's own factor [uPa^2]
+};
+
+}  // namespace sonar
