@@ -194,9 +194,11 @@ void Device::ping(Time at) {
   request.fired_at = at;
   request.vehicle_in_world = context_.world.vehicle_at(config_.vehicle, at);
   request.sonar_in_world = compose(request.vehicle_in_world, config_.mount);
+  request.sonar_moves = mounted_moves(context_.world.vehicle_moves(config_.vehicle, at), request.vehicle_in_world, config_.mount);
   request.bodies_in_world = context_.world.objects_at(at);
   request.water = context_.config.water;
   request.settings = settings_;
+  request.settings.gain_db = gain_assist_.gain_db(settings_, at);
   request.settings_id = settings_id_;
   request.sonar_id = index_;
   request.seed = Seed(context_.config.seed);
@@ -210,6 +212,7 @@ void Device::on_ping(Simulator::Outcome outcome) {
   busy_ = false;
   ++figures_.pings;
   figures_.simulation_s += outcome.seconds;
+  if (outcome.ping) gain_assist_.look_at(*outcome.ping);
   if (outcome.refused) {
     ++figures_.refused;
     std::uint64_t unsaid = 0;

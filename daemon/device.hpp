@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "core/sonar/gain_assist.hpp"
 #include "daemon/asio.hpp"
 #include "daemon/clock.hpp"
 #include "daemon/config.hpp"
@@ -122,6 +123,7 @@ class Device final : public SessionParent {
 
   Pacer pacer_;
   PingSettings settings_;
+  GainAssist gain_assist_;
   std::uint64_t settings_id_ = 0;
   std::uint64_t oldest_wanted_id_ = 0;                 // pings of settings before it belong to clients that have gone
   std::map<std::uint64_t, protocol::Bytes> requests_;  // settings_id -> the client's own bytes, echoed in its pings

@@ -37,27 +37,44 @@ void PoseHistory::put(const Sample& sample) {
     samples_.pop_front();
 }
 
+PoseHistory::Motion PoseHistory::between(const Sample& before, const Sample& after) {
+  const auto gap = after.at - before.at;
+  if (gap < shortest_difference) return {};
+  const double per_s = 1 / seconds(gap);
+  return {per_s * (after.pose.position_m - before.pose.position_m),
+          per_s * rotation_between(before.pose.orientation, after.pose.orientation)};
+}
+
+PoseHistory::Motion PoseHistory::newest_motion() const {
+  const Sample& last = samples_.back();
+  Motion motion;
+  if (samples_.size() > 1) motion = between(samples_[samples_.size() - 2], last);
+  if (last.velocity_mps) motion.velocity_mps = rotate(last.pose.orientation, *last.velocity_mps);
+  if (last.angular_velocity_radps) motion.angular_velocity_radps = *last.angular_velocity_radps;
+  return motion;
+}
+
 Pose PoseHistory::beyond_newest(std::chrono::nanoseconds ahead) const {
   const Sample& last = samples_.back();
   const double ahead_s = seconds(ahead);
-  Vec3d velocity_in_world, turn_in_body;
-  if (samples_.size() > 1) {
-    const Sample& before = samples_[samples_.size() - 2];
-    const auto gap = last.at - before.at;
-    if (gap >= shortest_difference) {
-      const double per_s = 1 / seconds(gap);
-      velocity_in_world = per_s * (last.pose.position_m - before.pose.position_m);
-      turn_in_body = per_s * rotation_between(before.pose.orientation, last.pose.orientation);
-    }
-  }
-  if (last.velocity_mps) velocity_in_world = rotate(last.pose.orientation, *last.velocity_mps);
-  if (last.angular_velocity_radps) turn_in_body = *last.angular_velocity_radps;
-  return {last.pose.position_m + ahead_s * velocity_in_world,
-          normalized(last.pose.orientation * quat_from_rotation(ahead_s * turn_in_body))};
+  const Motion motion = newest_motion();
+  return {last.pose.position_m + ahead_s * motion.velocity_mps,
+          normalized(last.pose.orientation * quat_from_rotation(ahead_s * motion.angular_velocity_radps))};
+}
+
+PoseHistory::Samples::const_iterator PoseHistory::not_before(Time t) const {
+  return std::lower_bound(samples_.begin(), samples_.end(), t, [](const Sample& s, Time x) { return s.at < x; });
+}
+
+PoseHistory::Motion PoseHistory::motion_at(Time t, std::chrono::nanoseconds extrapolate_max) const {
+  if (t - samples_.back().at > extrapolate_max || t < samples_.front().at) return {};
+  const auto after = not_before(t);
+  if (after == samples_.end() || (after->at == t && after + 1 == samples_.end())) return newest_motion();
+  return after->at == t ? between(*after, *(after + 1)) : between(*(after - 1), *after);
 }
 
 Pose PoseHistory::at(Time t, std::chrono::nanoseconds extrapolate_max) const {
-  const auto after = std::lower_bound(samples_.begin(), samples_.end(), t, [](const Sample& s, Time x) { return s.at < x; });
+  const auto after = not_before(t);
   if (after == samples_.end()) return beyond_newest(std::min<std::chrono::nanoseconds>(t - samples_.back().at, extrapolate_max));
   if (after->at == t || after == samples_.begin()) return after->pose;
   const Sample& a = *(after - 1);

@@ -18,6 +18,11 @@ class PoseHistory {
     std::optional<Vec3d> velocity_mps;            // body axes
     std::optional<Vec3d> angular_velocity_radps;  // body axes
   };
+  /// How a body moves; at rest by default.
+  struct Motion {
+    Vec3d velocity_mps;              // world axes
+    Vec3d angular_velocity_radps{};  // body axes
+  };
   static constexpr std::chrono::nanoseconds length = std::chrono::seconds(2);
   static constexpr std::size_t most_samples = 2048;  // two seconds at the rate limit of 1 kHz
 
@@ -34,10 +39,18 @@ class PoseHistory {
   /// Interpolated (lerp, slerp) between samples; before the first one held; after the last one carried on by its velocity, or
   /// by the difference of the last two samples, for at most `extrapolate_max`, then held there. Not on an empty history.
   Pose at(Time t, std::chrono::nanoseconds extrapolate_max) const;
+  /// The motion by which at() carries a pose on: between samples their difference, beyond the newest one its velocity, none
+  /// before the first and where it is held.
+  Motion motion_at(Time t, std::chrono::nanoseconds extrapolate_max) const;
 
  private:
+  using Samples = std::deque<Sample>;
+  static Motion between(const Sample& before, const Sample& after);
+  Motion newest_motion() const;
+  /// The first sample not before t.
+  Samples::const_iterator not_before(Time t) const;
   Pose beyond_newest(std::chrono::nanoseconds ahead) const;
-  std::deque<Sample> samples_;
+  Samples samples_;
 };
 
 /// Shortest way from a (u = 0) to b (u = 1) at constant turn rate.

@@ -12,6 +12,7 @@ using control::PoseSample;
 constexpr double hidden_height_m = 1e4;  // far beyond any sonar's range, near enough for exact placement
 constexpr double smallest_orbit_m = 4;
 constexpr double orbit_speed_mps = 0.5;
+constexpr double fastest_mps = 30, fastest_radps = 10;  // beyond: a jump, not a movement
 constexpr std::chrono::nanoseconds future_allowed = std::chrono::seconds(1);
 
 std::string joined_names(const std::vector<std::string>& names) {
@@ -172,6 +173,26 @@ Pose World::orbit(const Pose& initial, Time t) const {
   const double angle = std::atan2(p.y, p.x) + orbit_speed_mps / radius_m * seconds(t - start_);
   const RollPitchYaw inward{0, 0, angle + pi};  // the sonar looks across the middle of the world
   return {{radius_m * std::cos(angle), radius_m * std::sin(angle), p.z}, quat_from_rpy(inward)};
+}
+
+PoseHistory::Motion World::vehicle_moves(std::size_t vehicle, Time t) const {
+  const Track& track = vehicles_[vehicle];
+  if (track.hidden) return {};
+  if (track.history.empty()) {
+    if (!track.body.orbits) return {};
+    const Vec3d p = orbit(track.body.initial_pose, t).position_m;
+    const double per_s = orbit_speed_mps / std::hypot(p.x, p.y);
+    return {{-per_s * p.y, per_s * p.x, 0}, {0, 0, per_s}};
+  }
+  const PoseHistory::Motion moves = track.history.motion_at(t - track.offset, rules_.extrapolate_max);
+  // Written so that what is not a number is no movement either.
+  const bool sane = length(moves.velocity_mps) <= fastest_mps && length(moves.angular_velocity_radps) <= fastest_radps;
+  return sane ? moves : PoseHistory::Motion{};
+}
+
+Twist mounted_moves(const PoseHistory::Motion& body_moves, const Pose& body_in_world, const Pose& mount) {
+  const Vec3d swing = rotate(body_in_world.orientation, cross(body_moves.angular_velocity_radps, mount.position_m));
+  return {body_moves.velocity_mps + swing, rotate(conjugate(mount.orientation), body_moves.angular_velocity_radps)};
 }
 
 std::vector<Pose> World::objects_at(Time t) const {

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/sonar/ping.hpp"
 #include "daemon/pose_history.hpp"
 #include "protocol/control/pose_sample.hpp"
 
@@ -55,6 +56,9 @@ struct PoseCounters {
   std::uint64_t stale = 0;      // times a body's poses stopped coming
 };
 
+/// The motion of a sonar that is mounted on a body: its lever arm swings it round.
+Twist mounted_moves(const PoseHistory::Motion& body_moves, const Pose& body_in_world, const Pose& mount);
+
 class World {
  public:
   World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start);
@@ -63,6 +67,8 @@ class World {
   void count_refused() { ++counters_.refused; }
 
   Pose vehicle_at(std::size_t vehicle, Time t) const { return pose_at(vehicles_[vehicle], t); }
+  /// How it moves then, as vehicle_at() carries it on; at rest where that is faster than anything that carries a sonar.
+  PoseHistory::Motion vehicle_moves(std::size_t vehicle, Time t) const;
   std::vector<Pose> objects_at(Time t) const;
   /// True when poses came once and then stopped for longer than the rules allow.
   bool is_stale(std::size_t vehicle, Time now) const { return is_stale(vehicles_[vehicle], now); }

@@ -102,6 +102,8 @@ void lay_out_samples(PingPlan& p) {
 }
 
 void fill_row_gains(PingPlan& plan) {
+  plan.row_power_factor.clear();
+  plan.row_gain.clear();
   const PingSettings& s = plan.settings;
   const auto tvg = [&](int row) {
     return s.tvg ? tvg_db(plan.mode.receiver, (row + s.row_centre) * s.range_bin_m,
@@ -250,12 +252,18 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   return p;
 }
 
+void set_gain(PingPlan& plan, float gain_db) {
+  if (plan.settings.gain_db == gain_db) return;
+  plan.settings.gain_db = gain_db;
+  fill_row_gains(plan);
+}
+
 bool serves(const PingPlan& plan, const PingRequest& r) {
   const PingSettings &a = plan.settings, &b = r.settings;
   return plan.mode.name == r.model->modes[static_cast<std::size_t>(b.mode)].name && a.mode == b.mode &&
          a.beam_count == b.beam_count && a.range_bin_count == b.range_bin_count && a.range_m == b.range_m &&
          a.range_bin_m == b.range_bin_m && a.row_centre == b.row_centre && a.pulse_width_m == b.pulse_width_m &&
-         a.samples_per_row == b.samples_per_row && a.gain_db == b.gain_db && a.tvg == b.tvg &&
+         a.samples_per_row == b.samples_per_row && a.tvg == b.tvg &&
          a.device_sound_speed_mps == b.device_sound_speed_mps && a.device_absorption_db_per_m == b.device_absorption_db_per_m &&
          a.format.bits == b.format.bits && a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma &&
          a.format.row_gains == b.format.row_gains && plan.switches == r.switches;

@@ -83,7 +83,9 @@ struct PingPlan {
 };
 
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
-/// Whether the plan still serves this request.
+/// The client's gain alone, which may change with every ping.
+void set_gain(PingPlan& plan, float gain_db);
+/// Whether the plan still serves this request, but for its gain.
 bool serves(const PingPlan& plan, const PingRequest& request);
 
 /// The sentence that says why a request cannot be simulated; empty when it can.

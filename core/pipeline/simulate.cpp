@@ -44,6 +44,7 @@ PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, W
   }
   PreparedSettings& p = **it;
   p.last_used = w.pings;
+  set_gain(p.plan, request.settings.gain_db);
   const bool volume = request.switches.volume && scene.water_column.has_volume();
   const bool leak = request.switches.leak && p.plan.mode.receiver.leak_upa > 0;
   if ((request.switches.noise || leak || volume) && !p.plan.expected_power) p.noise.prepare(request.seed, p.plan.noise_filter);

@@ -24,6 +24,7 @@ struct PingSettings {
   int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples across it
   float rate_hz = 10;             // 0 = standby
   float gain_db = 0;
+  bool gain_assist = false;              // the device turns the gain itself, from gain_db on (core/sonar/gain_assist.hpp)
   bool tvg = true;                       // false: no time-varied gain, G0 only (Oculus 32-bit "scientific" data)
   float device_sound_speed_mps = 1500;   // what the device believes
   float device_absorption_db_per_m = 0;  // one way, what its TVG believes

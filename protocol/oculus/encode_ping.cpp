@@ -138,6 +138,7 @@ wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, w
   fixed.header.version = reply_version(fire, text_option(device.options, option_name::reply_version));
   fixed.sound_speed_mps = sound_speed_used(fire.settings, settings);
   fixed.fire = echo_of(fire.settings, text_option(device.options, option_name::gain_echo), fixed.sound_speed_mps);
+  if (settings.gain_assist) fixed.fire.gain_percent = static_cast<double>(settings.gain_db) / db_per_percent;
   fixed.extension = fire.extension;
   fixed.ping_id = static_cast<std::uint32_t>(ping.request.number);
   fixed.frequency_hz = ping.mode().centre_hz;

@@ -7,8 +7,8 @@
 namespace sonar::oculus {
 namespace {
 
-const std::array<protocol::Option, 20>& table() {
-  static const std::array<protocol::Option, 20> rows{{
+const std::array<protocol::Option, 21>& table() {
+  static const std::array<protocol::Option, 21> rows{{
       {option_name::before_first_fire,
        {"dummies", "pings"},
        "dummies",
@@ -17,6 +17,10 @@ const std::array<protocol::Option, 20>& table() {
        {"auto", "verbatim", "mapped"},
        "auto",
        "gain in the echo: auto = 40 + 0.6 g in mode 2 with flag bit 4 clear, mapped = in mode 2 always, verbatim = never"},
+      {option_name::gain_assist,
+       {"off", "flag_set", "flag_clear"},
+       "off",
+       "which state of flag bit 4 leaves the gain to the device; its echo is then the gain used, which no client expects"},
       {option_name::pulse,
        {"rows", "native"},
        "rows",

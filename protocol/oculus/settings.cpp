@@ -11,7 +11,6 @@
 namespace sonar::oculus {
 namespace {
 
-constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus issue 13: 0-100 % is 0-96 dB
 constexpr double rest_per_ping_s = 0.002;  // chosen: between the last echo and the next transmission
 constexpr double surface_pressure_bar = 1.013;
 
@@ -102,6 +101,11 @@ SampleFormat sample_format(const FireRequest& fire) {
   return format;
 }
 
+bool asks_for_gain_assist(const FireSettings& fire, std::string_view option) {
+  const bool bit = (fire.flags & flag::gain_assist) != 0;
+  return (option == "flag_set" && bit) || (option == "flag_clear" && !bit);
+}
+
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo) {
   const bool high_frequency = fire.mode == 2;
   const bool mapped = gain_echo == "mapped" || (gain_echo == "auto" && (fire.flags & flag::gain_assist) == 0);
@@ -159,6 +163,7 @@ Settled settle(const FireRequest& fire, const protocol::DeviceState& device) {
   const double percent =
       scientific ? used.gain_percent : echoed_gain_percent(used, text_option(device.options, option_name::gain_echo));
   settings.gain_db = static_cast<float>(db_per_percent * percent);
+  settings.gain_assist = !scientific && asks_for_gain_assist(asked, text_option(device.options, option_name::gain_assist));
   settings.triggered = (asked.flags & flag::network_trigger) != 0;
   settings.rate_hz = static_cast<float>(highest_rate_hz(asked, settings, device));
   return out;

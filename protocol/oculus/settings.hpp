@@ -13,6 +13,7 @@ namespace sonar::oculus {
 
 /// 37.5 MHz / 143, exact in the capture (M1200d mode 2). unknown: other modes; the same is used.
 inline constexpr double row_rate_hz = 37.5e6 / 143.0;
+inline constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus issue 13: 0-100 % is 0-96 dB
 inline constexpr int row_limit = 720;             // liboculus node README, measured by its authors
 inline constexpr double native_pulse_m = 0.0025;  // the finest range resolution the data sheets quote
 
@@ -32,6 +33,9 @@ SampleFormat sample_format(const FireRequest& fire);
 /// The gain as echoed, per cent (docs/protocols/oculus.md, 5.5): mode 2 without flag bit 4 is mapped to 40 + 0.6 g, see option
 /// gain_echo.
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo);
+
+/// Option gain_assist: which state of flag bit 4, if any, leaves the gain to the device.
+bool asks_for_gain_assist(const FireSettings& fire, std::string_view option);
 
 /// True when a double of the message is NaN or infinite: the message must be ignored.
 bool has_non_finite(const FireSettings& fire);

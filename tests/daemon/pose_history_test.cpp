@@ -100,5 +100,35 @@ TEST(PoseHistory, StaysBoundedAtAnyRate) {
   EXPECT_LE(h.size(), PoseHistory::most_samples);
 }
 
+TEST(PoseHistory, MotionIsThatOfThePoseItTells) {
+  PoseHistory h;
+  h.put({t0, pose(0, 0), {}, {}});
+  h.put({t0 + milliseconds(100), pose(1, 10), {}, {}});
+  h.put({t0 + milliseconds(200), pose(1, 30), {}, {}});
+  const auto motion = [&](int ms) { return h.motion_at(t0 + milliseconds(ms), limit); };
+  EXPECT_NEAR(motion(50).velocity_mps.x, 10, 1e-9);
+  EXPECT_NEAR(motion(50).angular_velocity_radps.z, rad_from_deg(100), 1e-9);
+  EXPECT_NEAR(motion(100).velocity_mps.x, 0, 1e-9) << "from that moment on";
+  EXPECT_NEAR(motion(200).angular_velocity_radps.z, rad_from_deg(200), 1e-9);
+  EXPECT_NEAR(motion(390).angular_velocity_radps.z, rad_from_deg(200), 1e-9) << "carried on";
+  EXPECT_EQ(length(motion(401).angular_velocity_radps), 0) << "held";
+  EXPECT_EQ(length(motion(-1).velocity_mps), 0) << "before the first";
+  // In steps, against the poses themselves.
+  for (const int ms : {20, 120, 250}) {
+    const Time t = t0 + milliseconds(ms), later = t + milliseconds(10);
+    const Vec3d moved = h.at(later, limit).position_m - h.at(t, limit).position_m;
+    EXPECT_NEAR(length(moved - 0.01 * motion(ms).velocity_mps), 0, 1e-9) << ms;
+  }
+}
+
+TEST(PoseHistory, GivenVelocitiesAreTheMotionBeyondTheNewest) {
+  PoseHistory h;
+  h.put({t0, pose(0, 90), Vec3d{2, 0, 0}, Vec3d{0.1, 0, 1}});
+  const PoseHistory::Motion m = h.motion_at(t0 + milliseconds(20), limit);
+  EXPECT_NEAR(m.velocity_mps.x, 0, 1e-12);
+  EXPECT_NEAR(m.velocity_mps.y, 2, 1e-12) << "world axes";
+  EXPECT_NEAR(m.angular_velocity_radps.x, 0.1, 1e-12) << "body axes";
+}
+
 }  // namespace
 }  // namespace sonar

@@ -77,6 +77,35 @@ TEST(Stepped, WaitsForEveryClient) {
   daemon.stop();
 }
 
+TEST(Stepped, GainAssistFollowsThePicturesAndTellsItsGain) {
+  DaemonSetup setup;
+  setup.more = "clock: stepped\n";
+  setup.sonar_lines = "    options: {gain_assist: flag_set}\n";
+  Daemon daemon(setup);
+  Client client(daemon.address());
+  auto fire = fire_at(PingRate::hz10);
+  fire.settings.flags |= oculus::flag::gain_assist;
+  fire.settings.gamma = 255;
+  client.fire(fire);
+  double expected_db = 0.96 * fire.settings.gain_percent;
+  for (int i = 0; i < 5; ++i) {
+    const auto ping = client.next_ping();
+    ASSERT_TRUE(ping);
+    const double gain_db = 0.96 * ping->head.fixed.fire.gain_percent;
+    EXPECT_NEAR(gain_db, expected_db, 1e-3) << i;
+    // The fake engine's pictures are loud whatever the gain is.
+    Ping picture;
+    picture.request.settings.format.max_code = 254;
+    for (std::size_t row = 0; row < ping->rows(); ++row) {
+      const auto samples = ping->row_samples(row);
+      picture.samples.insert(picture.samples.end(), samples.begin(), samples.end());
+    }
+    expected_db = next_gain_db(gain_db, percentile_of_full_scale(picture), 1, 0.1);
+    EXPECT_LT(expected_db, gain_db);
+  }
+  daemon.stop();
+}
+
 TEST(Stepped, NothingHappensWithoutAClient) {
   DaemonSetup setup;
   setup.more = "clock: stepped\n";

@@ -263,5 +263,31 @@ TEST(World, ObjectsMoveAndHide) {
   EXPECT_GT(w.objects_at(t0)[0].position_m.z, 1000) << "far out of every sonar's range";
 }
 
+TEST(World, AnOrbitMovesAsItsPosesDo) {
+  const World w = World({}, {{"rov", {{-7, 1, -3}, {}}, true}}, {}, t0);
+  const Pose mount{{0.3, 0.1, -0.1}, quat_from_rpy({0, 0.26, 0.1})};
+  for (const int s : {0, 7, 40}) {
+    const Time t = t0 + seconds(s), later = t + milliseconds(10);
+    const Twist moves = mounted_moves(w.vehicle_moves(0, t), w.vehicle_at(0, t), mount);
+    const Pose from = compose(w.vehicle_at(0, t), mount), to = compose(w.vehicle_at(0, later), mount);
+    EXPECT_NEAR(length(to.position_m - from.position_m - 0.01 * moves.velocity_mps), 0, 1e-5) << s;
+    const Vec3d turned = rotation_between(from.orientation, to.orientation);
+    EXPECT_NEAR(length(turned - 0.01 * moves.angular_rate_radps), 0, 1e-7) << s;
+  }
+  const Twist centre = mounted_moves(w.vehicle_moves(0, t0), w.vehicle_at(0, t0), {});
+  EXPECT_NEAR(length(centre.velocity_mps), 0.5, 1e-9);
+}
+
+TEST(World, AVehicleMovesByItsPosesAndNotByAJump) {
+  World w = one_rov();
+  EXPECT_EQ(length(w.vehicle_moves(0, t0).velocity_mps), 0) << "at rest where it was put";
+  w.accept(stamped(0, ClockDomain::wall, t0.time_since_epoch(), 1), udp, t0);
+  w.accept(stamped(0.2, ClockDomain::wall, (t0 + milliseconds(100)).time_since_epoch(), 2), udp, t0 + milliseconds(100));
+  EXPECT_NEAR(w.vehicle_moves(0, t0 + milliseconds(110)).velocity_mps.x, 2, 1e-6);
+  EXPECT_EQ(length(w.vehicle_moves(0, t0 + seconds(2)).velocity_mps), 0) << "held";
+  w.accept(stamped(20, ClockDomain::wall, (t0 + milliseconds(200)).time_since_epoch(), 3), udp, t0 + milliseconds(200));
+  EXPECT_EQ(length(w.vehicle_moves(0, t0 + milliseconds(210)).velocity_mps), 0) << "198 m/s is no movement";
+}
+
 }  // namespace
 }  // namespace sonar

@@ -50,6 +50,24 @@ TEST(EncodePing, RangeIsEchoedVerbatimEvenWhenClamped) {
   EXPECT_NEAR(ping.head.fixed.range_resolution_m * static_cast<double>(ping.rows()), 10, 0.05);
 }
 
+TEST(EncodePing, WithGainAssistTheEchoIsTheGainUsed) {
+  const FireRequest set = fire(0, 2, PingRate::hz10, 0x19, 2, 50), clear = fire(0, 2, PingRate::hz10, 0x09, 2, 50);
+  const auto assisted = [](const char* option, const FireRequest& request) {
+    return settle(request, device("oculus-m1200d", {{"gain_assist", option}})).settings.gain_assist;
+  };
+  EXPECT_FALSE(assisted("off", set));
+  EXPECT_FALSE(assisted("off", clear));
+  EXPECT_TRUE(assisted("flag_set", set));
+  EXPECT_FALSE(assisted("flag_set", clear));
+  EXPECT_TRUE(assisted("flag_clear", clear));
+  FireRequest scientific = fire(2, 2, PingRate::hz10, 0x19, 2, 50);
+  scientific.extension.flags = flag::extended_32_bit;
+  EXPECT_FALSE(assisted("flag_set", scientific));
+  const auto state = device("oculus-m1200d", {{"gain_assist", "flag_set"}});
+  const DecodedPing ping = answer(state, set);
+  EXPECT_NEAR(ping.head.fixed.fire.gain_percent, 50, 1e-5);
+}
+
 TEST(EncodePing, GainEchoFollowsTheOption) {
   const FireRequest ens = fire(0, 2, PingRate::hz10, 0x0D, 2.54, 50), blu = fire(2, 2, PingRate::hz10, 0x1D, 2.54, 50);
   const auto gain = [](const char* option, const FireRequest& request) {
