@@ -6,6 +6,7 @@
 #include "core/base/random.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
+#include "core/pipeline/bubbles.hpp"
 #include "core/scene/cell_lattice.hpp"
 
 namespace sonar {
@@ -18,8 +19,16 @@ double fraction(double turns) { return turns - std::floor(turns); }
 
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
-TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<const LawTable> laws, const PingPlan& plan,
-                    const PingScalars& s) {
+/// Of a cell in the midst of the tile, from its centre: on the surface, which the centre need not be. Object axes.
+Vec3d middle_cell(const CellTile& tile) {
+  const int i = tile.count / 2;
+  const auto unit = static_cast<double>(tile.position_unit_m);
+  const auto along = [&](CellTile::Column c) { return unit * tile.column(c)[i]; };
+  return {along(CellTile::x), along(CellTile::y), along(CellTile::z)};
+}
+
+TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<const LawTable> laws, const BubbleLayer& bubbles,
+                    const PingPlan& plan, const PingScalars& s) {
   TileToSound out;
   simd::TileSeen& seen = out.seen;
   const CellTile& tile = *t.tile;
@@ -39,7 +48,12 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<co
   seen.sample_shift = static_cast<float>(s.doppler_samples(at.from_sonar_m));
   const LawTable& law = laws[static_cast<std::size_t>(tile.material)];
   seen.law = law.table();
-  const double constant = s.source_upa * std::sqrt(law.mu) * std::exp(-2 * s.absorption_np_per_m * range);
+  double constant = s.source_upa * std::sqrt(law.mu) * std::exp(-2 * s.absorption_np_per_m * range);
+  if (bubbles.present()) {
+    const Vec3d seen_at = t.from_sonar_m + seen_from_object * middle_cell(tile);
+    const double sonar_z_m = s.seen_from.position_m.z;
+    constant *= bubbles.two_way(sonar_z_m, sonar_z_m + (s.world_from_sonar * seen_at).z, length(seen_at));
+  }
   seen.amplitude = static_cast<float>(constant * static_cast<double>(tile.weight_unit));
   seen.area_amplitude = static_cast<float>(constant * lattice::cell_size_m(tile.level));
   seen.fade_in_from_m = t.level->fade_in_from_m;
@@ -92,11 +106,12 @@ std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const Pi
 void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan,
                    const PingScalars& scalars, Parallel& pool, std::vector<TileToSound>& tiles) {
   const std::vector<LawTable> laws = laws_of(scene, plan, scalars);
+  const BubbleLayer bubbles(scene.sea_surface);
   tiles.resize(in_view.size());
   constexpr std::size_t batch = 256;
   pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);
-    for (std::size_t i = b * batch; i < end; ++i) tiles[i] = prepare(in_view[i], cells, laws, plan, scalars);
+    for (std::size_t i = b * batch; i < end; ++i) tiles[i] = prepare(in_view[i], cells, laws, bubbles, plan, scalars);
   });
 }
 

@@ -1,0 +1,126 @@
+// The sea surface from below: a rough sheet, a mirror when still, and the bubbles under it (docs/acoustics.md, section 3).
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/pipeline/bubbles.hpp"
+#include "core/pipeline/scattering_law.hpp"
+#include "core/scene/load_scene.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+#include "tests/oracles/record.hpp"
+
+namespace sonar::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+Result<std::shared_ptr<const Scene>> read(const std::string& keys) {
+  return parse_scene(keys + "\nobjects: []\n", "s.yaml", ".");
+}
+std::shared_ptr<const Scene> sea(const std::string& keys) {
+  const auto scene = read("sea_surface: {" + keys + "}");
+  if (!scene) throw std::runtime_error(scene.error().text);
+  return *scene;
+}
+std::string refusal(const std::string& keys) {
+  const auto scene = read(keys);
+  return scene ? "accepted" : scene.error().text;
+}
+
+TEST(SeaSurface, KeysReachTheSceneAndItsMaterial) {
+  const auto scene = sea("lambert_db: -18, roughness_m: 0.2, bubble_layer_m: 0.5, bubble_loss_db_per_m: 3, size_m: [40, 60]");
+  EXPECT_FLOAT_EQ(scene->sea_surface.lambert_db, -18);
+  EXPECT_FLOAT_EQ(scene->sea_surface.roughness_m, 0.2f);
+  EXPECT_FLOAT_EQ(scene->sea_surface.bubble_layer_m, 0.5f);
+  EXPECT_FLOAT_EQ(scene->sea_surface.bubble_loss_db_per_m, 3);
+  EXPECT_FLOAT_EQ(scene->materials.at(0).roughness_m, 0.2f);
+  EXPECT_FLOAT_EQ(scene->materials.at(0).reflection, -1);
+  EXPECT_EQ(scene->objects.at(0).primitive.kind, Primitive::Kind::plane);
+  EXPECT_EQ(scene->objects.at(0).primitive.size_m.y, 60);
+  EXPECT_FALSE((*read(""))->sea_surface.present);
+  EXPECT_THAT(refusal("sea_surface: {roughness_m: -1}"), HasSubstr("sea_surface.roughness_m"));
+  EXPECT_THAT(refusal("sea_surface: {bubble_loss_db_per_m: 3}"),
+              HasSubstr("sea_surface: bubble_loss_db_per_m needs bubble_layer_m"));
+}
+
+TEST(SeaSurface, WaterColumnHasPresetsAndANumber) {
+  EXPECT_FALSE((*read(""))->water_column.has_volume());
+  EXPECT_EQ((*read("water_column: {clarity: clear}"))->water_column.volume_db, -80);
+  EXPECT_EQ((*read("water_column: {clarity: turbid}"))->water_column.volume_db, -60);
+  EXPECT_EQ((*read("water_column: {volume_db: -66}"))->water_column.volume_db, -66);
+  EXPECT_THAT(refusal("water_column: {volume_db: -66, clarity: clear}"),
+              HasSubstr("water_column.clarity: give clarity or volume_db, not both"));
+  EXPECT_THAT(refusal("water_column: {clarity: murky}"), HasSubstr("turbid"));
+  EXPECT_THAT(refusal("water_column: {volume_db: 3}"), HasSubstr("water_column.volume_db"));
+  EXPECT_THAT(refusal("water_column: {volume: -60}"), HasSubstr("volume_db"));
+}
+
+TEST(SeaSurface, TheRougherTheLessItMirrorsTheMoreItScatters) {
+  double last = -1;
+  for (const char* roughness : {"0", "0.00005", "0.0001", "0.0002", "0.01", "0.3"}) {
+    const Material m = sea(std::string("roughness_m: ") + roughness)->materials.at(0);
+    const double straight_up = scattering_strength(m, 1, 900e3, 1500, true);
+    EXPECT_GE(straight_up, last) << roughness;
+    last = straight_up;
+  }
+  EXPECT_EQ(scattering_strength(sea("roughness_m: 0")->materials.at(0), 0.7, 900e3, 1500, true), 0) << "still water only mirrors";
+  EXPECT_NEAR(last, std::pow(10.0, -3.0), 1e-9);
+}
+
+/// A sonar under the surface that looks up into it.
+constexpr double depth_m = 2, nose_up_rad = 0.25;
+
+TEST(SeaSurface, DiffuseEchoIsMuSquareSine) {
+  for (const double lambert_db : {-35.0, -15.0}) {
+    Sounding s(sea("lambert_db: " + std::to_string(lambert_db)), without_elevation_pattern(p900()), native_rows(10, 0.0254));
+    s.request.switches.expected_power = true;
+    s.request.switches.specular = true;
+    s.ping_from({0, 0, -depth_m}, {0, -nose_up_rad, 0});
+    // The mirror image of a seabed: same height, tilted the other way.
+    const reference::SeabedLevel from_above(s.mode(), s.medium(), s.envelope_hz(), lambert_db, depth_m, nose_up_rad);
+    for (double r = 4.2; r < 9.5; r += 0.5) {
+      double sum = 0;
+      int n = 0;
+      for (int row = static_cast<int>(s.row_of_range(r)); row < s.row_of_range(r + 0.25); ++row)
+        for (int j = 240; j < 272; ++j, ++n)
+          sum += s.power(row, j) / power_from_db(from_above.db(s.range_of_row(row), s.beam_sine(j)));
+      record_oracle(8, "sea surface from below", 0, 10 * std::log10(sum / n), 0.3, "dB");
+    }
+  }
+}
+
+TEST(SeaSurface, BubblesTakeTheirShareOfThePath) {
+  SeaSurface surface{.present = true, .bubble_layer_m = 0.5f, .bubble_loss_db_per_m = 4};
+  const BubbleLayer layer(surface);
+  const auto loss_db = [&](double from, double to, double path) { return -20 * std::log10(layer.two_way(from, to, path)); };
+  EXPECT_NEAR(loss_db(-2, 0, 8), 2 * 4 * 8 * 0.25, 1e-6);
+  EXPECT_NEAR(loss_db(-2, -0.25, 7), 2 * 4 * 7 * 0.25 / 1.75, 1e-6);
+  EXPECT_NEAR(loss_db(-2, -5, 7), 0, 1e-9);
+  EXPECT_NEAR(loss_db(-0.2, -0.2, 3), 2 * 4 * 3, 1e-6);
+  EXPECT_NEAR(loss_db(-0.25, -5, 9.5), 2 * 4 * 0.5, 1e-6);
+  EXPECT_FALSE(BubbleLayer(SeaSurface{}).present());
+  surface.present = false;
+  EXPECT_FALSE(BubbleLayer(surface).present());
+
+  // In the picture: of a path from 2 m depth a quarter lies in the layer.
+  Sounding calm(sea("lambert_db: -15"), p900(), default_rows(10, 394));
+  Sounding bubbly(sea("lambert_db: -15, bubble_layer_m: 0.5, bubble_loss_db_per_m: 4"), p900(), default_rows(10, 394));
+  for (Sounding* s : {&calm, &bubbly}) {
+    s->request.switches.expected_power = true;
+    s->ping_from({0, 0, -depth_m}, {0, -nose_up_rad, 0});
+  }
+  for (const double r : {5.0, 7.0, 9.0}) {
+    double with = 0, without = 0;
+    for (int row = static_cast<int>(calm.row_of_range(r)) - 3; row < calm.row_of_range(r) + 3; ++row)
+      for (int j = 240; j < 272; ++j) with += bubbly.power(row, j), without += calm.power(row, j);
+    record_oracle(no_number, "bubbles under the sea surface, loss there and back", 2 * 4 * 0.25 * r,
+                  10 * std::log10(without / with), 0.3, "dB");
+  }
+}
+
+}  // namespace
+}  // namespace sonar::test
