@@ -39,7 +39,8 @@ Device::Device(DeviceContext& context, const SonarConfig& config, std::uint32_t 
       acceptor_(context.io),
       beacon_(context.io),
       beacon_timer_(context.io),
-      ping_timer_(context.io) {
+      ping_timer_(context.io),
+      answers_(context.io, [this](protocol::BytesView datagram) { return vendor_.answer(datagram, state_); }) {
   update_state(context.clock.now());
   use_initial_settings();
 }
@@ -50,6 +51,8 @@ Result<void> Device::open() {
   for (const protocol::Port& port : vendor_.ports()) {
     if (port.kind == protocol::Port::Kind::tcp_listen) {
       if (auto r = listen_tcp(acceptor_, {config_.bind_ip, port.number}); !r) return r;
+    } else if (port.kind == protocol::Port::Kind::udp_answer) {
+      if (auto r = answers_.open(config_, port.number); !r) return r;
     } else {
       beacon_period_ = port.period;
       for (const Endpoint& to : config_.status_to)
@@ -72,6 +75,7 @@ tcp::endpoint Device::data_endpoint() const {
 
 void Device::start() {
   keep_accepting();
+  answers_.start();
   if (beacon_period_.count() > 0) keep_announcing();
 }
 
@@ -81,6 +85,7 @@ void Device::stop() {
   acceptor_.close(ec);
   beacon_timer_.cancel();
   ping_timer_.cancel();
+  answers_.stop();
   pacer_.stop();
   beacon_.close(ec);
   for (tcp::socket& waiting : queue_) waiting.close(ec);
@@ -98,6 +103,7 @@ void Device::use_initial_settings() {
   asked_ = false;
   protocol::ChangeSettings initial = vendor_.initial_settings(state_);
   settings_ = initial.settings;
+  state_.request = initial.request;
   requests_[++settings_id_] = std::move(initial.request);
   oldest_wanted_id_ = settings_id_;
 }
@@ -109,6 +115,7 @@ bool Device::wants_pings() const {
 void Device::change_settings(Session& from, const protocol::ChangeSettings& change) {
   // Repeats arrive at ping rate from some drivers; only what the device does not already do is news.
   if (!asked_ || requests_[settings_id_] != change.request) {
+    state_.request = change.request;
     requests_[++settings_id_] = change.request;
     if (!busy_) requests_.erase(requests_.begin(), requests_.find(settings_id_));
     std::uint64_t unsaid = 0;
@@ -125,7 +132,8 @@ void Device::on_event(Session& from, const protocol::Event& event) {
   if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
     change_settings(from, *change);
   } else if (std::holds_alternative<protocol::RequestPing>(event)) {
-    pacer_.trigger(context_.clock.now());
+    const bool joins = std::get<protocol::RequestPing>(event).joins;
+    if (!busy_ || !joins) pacer_.trigger(context_.clock.now(), joins);
   } else if (const auto* store = std::get_if<protocol::StoreAddress>(&event)) {
     state_.stored_address = store->address;
   } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
@@ -202,7 +210,7 @@ void Device::ping(Time at) {
   request.settings_id = settings_id_;
   request.sonar_id = index_;
   request.seed = Seed(context_.config.seed);
-  request.blank = stale && on_stale == OnStale::blank;
+  request.blank = (stale && on_stale == OnStale::blank) || !settings_.transmit;
   request.switches = context_.config.engine.switches;
   busy_ = true;
   context_.simulator.submit(std::move(request), [this](Simulator::Outcome outcome) { on_ping(std::move(outcome)); });
@@ -225,7 +233,11 @@ void Device::on_ping(Simulator::Outcome outcome) {
     const auto bytes = vendor_.frame(*outcome.ping, state_, requests_[request.settings_id]);
     const auto number = static_cast<std::uint32_t>(request.number);
     const Time now = context_.clock.now();
-    for (const SessionPointer& s : sessions_) s->push_ping(bytes, number, now);
+    const protocol::Bytes made_with = requests_[request.settings_id];
+    std::vector<std::pair<SessionPointer, protocol::Event>> wishes;
+    for (const SessionPointer& s : sessions_)
+      for (protocol::Event& event : s->push_ping(bytes, number, made_with, now)) wishes.emplace_back(s, std::move(event));
+    for (const auto& [session, event] : wishes) on_event(*session, event);
     requests_.erase(requests_.begin(), requests_.find(std::min(settings_id_, request.settings_id)));
     if (figures_.pings == 1) context_.log.debug("first ping simulated", {{"sonar", config_.name}, {"ms", outcome.seconds * 1e3}});
   }

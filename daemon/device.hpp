@@ -15,6 +15,7 @@
 #include "daemon/asio.hpp"
 #include "daemon/clock.hpp"
 #include "daemon/config.hpp"
+#include "daemon/datagram_answers.hpp"
 #include "daemon/log.hpp"
 #include "daemon/pacer.hpp"
 #include "daemon/session.hpp"
@@ -113,6 +114,7 @@ class Device final : public SessionParent {
   tcp::acceptor acceptor_;
   udp::socket beacon_;
   asio::steady_timer beacon_timer_, ping_timer_;
+  DatagramAnswers answers_;
   std::chrono::milliseconds beacon_period_{0};
   std::vector<udp::endpoint> status_to_;
 

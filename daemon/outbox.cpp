@@ -12,7 +12,7 @@ bool Outbox::push_reply(Bytes reply) {
   return true;
 }
 
-void Outbox::push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number) {
+void Outbox::push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number, std::vector<Bytes> prefixes) {
   const auto full = [&] {
     return !pings_.empty() &&
            (pings_.size() >= static_cast<std::size_t>(rules_.depth) || ping_bytes_ + bytes->size() > most_ping_bytes);
@@ -27,7 +27,7 @@ void Outbox::push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number)
     ++pings_dropped_;
   }
   ping_bytes_ += bytes->size();
-  pings_.push_back({std::move(bytes), number});
+  pings_.push_back({std::move(bytes), number, std::move(prefixes)});
 }
 
 Outbox::Message Outbox::take() {
@@ -43,7 +43,7 @@ Outbox::Message Outbox::take() {
   auto reply = std::make_shared<const Bytes>(std::move(replies_.front()));
   replies_.pop_front();
   reply_bytes_ -= reply->size();
-  return {std::move(reply), 0};
+  return {std::move(reply), 0, {}};
 }
 
 void Outbox::written() {

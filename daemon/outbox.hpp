@@ -23,7 +23,8 @@ class Outbox {
   using Bytes = std::vector<std::byte>;
   struct Message {
     std::shared_ptr<const Bytes> bytes;
-    std::uint32_t ping = 0;  // its number; 0 = a reply
+    std::uint32_t ping = 0;       // its number; 0 = a reply
+    std::vector<Bytes> prefixes;  // of a ping: it is sent once for each, the prefix first; none = once, as it is
     explicit operator bool() const { return bytes != nullptr; }
   };
   static constexpr int deepest = 3;
@@ -35,7 +36,7 @@ class Outbox {
 
   /// False when replies pile up beyond their bound: the session must be closed.
   bool push_reply(Bytes reply);
-  void push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number);
+  void push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number, std::vector<Bytes> prefixes = {});
   /// The next message to write, whole: replies before pings. Empty while one is being written, or when there is nothing.
   Message take();
   /// The message last taken has been written to its end.

@@ -16,12 +16,13 @@ void Pacer::configure(const PingSettings& settings, Time now) {
   if (running_ && period == period_ && settings.triggered == triggered_) return;
   const Time quiet_until = has_fired_ ? last_tick_ + period_ : now;
   running_ = period.count() > 0;
+  trigger_waits_ = trigger_waits_ && running_ && triggered_ && settings.triggered;
   triggered_ = settings.triggered;
-  trigger_waits_ = false;
   if (running_) {
     period_ = period;
     start_ = std::max(now, quiet_until);
     index_ = 0;
+    trigger_at_ = std::max(trigger_at_, start_);
   }
 }
 
@@ -30,10 +31,10 @@ void Pacer::stop() {
   trigger_waits_ = false;
 }
 
-void Pacer::trigger(Time now) {
+void Pacer::trigger(Time now, bool joins) {
   if (!running_ || !triggered_) return;
   if (trigger_waits_) {
-    ++skipped_;
+    if (!joins) ++skipped_;
     return;
   }
   trigger_waits_ = true;

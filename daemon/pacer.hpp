@@ -17,12 +17,13 @@ std::chrono::nanoseconds ping_period(const PingSettings& settings);
 class Pacer {
  public:
   /// New settings. The grid goes on when period and trigger mode stay the same; otherwise it restarts at `now`, but not before
-  /// the sound of the last ping has come back.
+  /// the sound of the last ping has come back. A trigger that waits stays owed as long as pings are triggered.
   void configure(const PingSettings& settings, Time now);
   /// No pings until the next configure().
   void stop();
-  /// A trigger from the client; one is kept while the previous ping is still under way, more are counted as skipped.
-  void trigger(Time now);
+  /// A trigger from the client; one is kept while the previous ping is still under way, more are counted as skipped,
+  /// unless they join the one that waits.
+  void trigger(Time now, bool joins = false);
   /// When fire() wants to be called next; none in standby, when stopped or waiting for a trigger.
   std::optional<Time> next_tick() const;
   /// At or after next_tick(): true = ping now, stamped with last_tick(). `busy`: the previous ping is still being computed; its

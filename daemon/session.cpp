@@ -96,17 +96,27 @@ void Session::handle(protocol::Reaction reaction) {
   wake_watch_.cancel();
 }
 
-asio::awaitable<bool> Session::write_whole(std::shared_ptr<const protocol::Bytes> bytes) {
+asio::awaitable<bool> Session::write_whole(const Outbox::Message& message) {
+  if (message.prefixes.empty()) co_return co_await write_bytes(*message.bytes);
+  for (const protocol::Bytes& prefix : message.prefixes) {
+    if (!co_await write_bytes(prefix)) co_return false;
+    if (!co_await write_bytes(*message.bytes)) co_return false;
+  }
+  co_return true;
+}
+
+/// The bytes must live until it is done.
+asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
   std::size_t done = 0;
-  while (done < bytes->size()) {
+  while (done < bytes.size()) {
     error_code ec;
-    const std::size_t n = co_await socket_.async_write_some(asio::buffer(bytes->data() + done, bytes->size() - done), into(ec));
+    const std::size_t n = co_await socket_.async_write_some(asio::buffer(bytes.data() + done, bytes.size() - done), into(ec));
     if (over_) co_return false;
     if (ec) {
       over(reason(ec));
       co_return false;
     }
-    if (setup_.digest) digest_.add(std::span(*bytes).subspan(done, n));
+    if (setup_.digest) digest_.add(bytes.subspan(done, n));
     done += n;
     progress_at_ = Steady::now();
   }
@@ -121,7 +131,7 @@ asio::awaitable<void> Session::write() {
     if (message) {
       writing_ = true;
       progress_at_ = Steady::now();
-      if (!co_await write_whole(message.bytes)) co_return;
+      if (!co_await write_whole(message)) co_return;
       writing_ = false;
       outbox_.written();
       parent_.on_written(*this, message.ping);
@@ -166,11 +176,16 @@ void Session::tick(Time now) {
   handle(dialogue_->on_tick(now));
 }
 
-void Session::push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, std::uint32_t number, Time now) {
-  if (over_ || finishing_) return;
-  outbox_.push_ping(bytes, number);
-  dialogue_->on_ping_queued(now);
-  wake_writer_.cancel();
+std::vector<protocol::Event> Session::push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, std::uint32_t number,
+                                                protocol::BytesView made_with, Time now) {
+  if (over_ || finishing_) return {};
+  protocol::Delivery delivery = dialogue_->on_ping(made_with, bytes->size(), now);
+  if (!delivery.prefixes.empty()) {
+    const bool as_it_is = delivery.prefixes.size() == 1 && delivery.prefixes.front().empty();
+    outbox_.push_ping(bytes, number, as_it_is ? std::vector<protocol::Bytes>{} : std::move(delivery.prefixes));
+    wake_writer_.cancel();
+  }
+  return std::move(delivery.events);
 }
 
 void Session::finish(std::string why) {

@@ -46,7 +46,9 @@ class Session : public std::enable_shared_from_this<Session> {
           const Setup& setup);
 
   void start();
-  void push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, std::uint32_t number, Time now);
+  /// Offers a ping, made with the settings of that request. Returns what the client wants next, for the device.
+  std::vector<protocol::Event> push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, std::uint32_t number,
+                                         protocol::BytesView made_with, Time now);
   /// Stepped time: the keep-alives that are due at `now`.
   void tick(Time now);
   /// No more messages after the one being written; then FIN. Reset if the client does not take it in time.
@@ -67,7 +69,8 @@ class Session : public std::enable_shared_from_this<Session> {
   asio::awaitable<void> read();
   asio::awaitable<void> write();
   asio::awaitable<void> watch();
-  asio::awaitable<bool> write_whole(std::shared_ptr<const protocol::Bytes> bytes);
+  asio::awaitable<bool> write_whole(const Outbox::Message& message);
+  asio::awaitable<bool> write_bytes(protocol::BytesView bytes);
   void handle(protocol::Reaction reaction);
   Steady::time_point watch_until() const;
   void over(std::string why);

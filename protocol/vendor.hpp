@@ -53,6 +53,7 @@ struct DeviceState {
   Water water;  // at the device, as measured by its sensors
   double depth_m = 0;
   OptionValues options;   // complete: defaults filled in by check_options
+  Bytes request;          // ChangeSettings::request of the settings that hold now
   struct StoredAddress {  // what a client wrote; stored, never applied
     std::uint32_t ip = 0, netmask = 0;
     bool dhcp = false;
@@ -66,7 +67,9 @@ struct ChangeSettings {
   Bytes request;
   std::string summary;  // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
 };
-struct RequestPing {};  // one ping now (network trigger, BlueView)
+struct RequestPing {   // one ping now (network trigger, BlueView)
+  bool joins = false;  // a ping that is under way already will do
+};
 struct StoreAddress {
   DeviceState::StoredAddress address;
 };
@@ -82,6 +85,12 @@ struct Reaction {
   std::vector<Bytes> replies;  // whole messages, in order
 };
 
+/// How one client gets a ping of the device: a message for each prefix, the prefix and then the bytes that all clients share.
+struct Delivery {
+  std::vector<Bytes> prefixes;
+  std::vector<Event> events;  // what it wants next
+};
+
 class Dialogue {
  public:
   virtual ~Dialogue() = default;
@@ -92,10 +101,18 @@ class Dialogue {
   virtual Time next_tick() const = 0;
   /// A ping was put into this client's outbox: keep-alives only fill silence.
   virtual void on_ping_queued(Time now) = 0;
+  /// A ping is ready, made with the settings of that request; its shared bytes are so many. Most clients take every ping as it
+  /// is; where hosts ask for pings one by one, only those that asked get it. Calls on_ping_queued itself when anything is
+  /// delivered.
+  virtual Delivery on_ping(BytesView made_with, std::size_t shared_bytes, Time now) {
+    static_cast<void>(made_with), static_cast<void>(shared_bytes);
+    on_ping_queued(now);
+    return {{Bytes{}}, {}};
+  }
 };
 
 struct Port {
-  enum class Kind { tcp_listen, udp_broadcast } kind{};
+  enum class Kind { tcp_listen, udp_broadcast, udp_answer } kind{};  // answers datagrams, or sends them by itself
   std::uint16_t number = 0;
   std::chrono::milliseconds period{0};  // of beacons
 };
@@ -116,6 +133,11 @@ class Vendor {
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;
   /// Empty when the vendor has no beacon.
   virtual Bytes beacon(const DeviceState& device, Time now) const = 0;
+  /// To a datagram that came to a Port of kind udp_answer; empty = none.
+  virtual Bytes answer(BytesView datagram, const DeviceState& device) const {
+    static_cast<void>(datagram), static_cast<void>(device);
+    return {};
+  }
   /// The state must outlive the dialogue.
   virtual std::unique_ptr<Dialogue> converse(const DeviceState& device, Time now) const = 0;
   /// Once per ping, shared by all sessions. `request`: ChangeSettings::request of the settings the ping was made with.

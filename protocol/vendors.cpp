@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "protocol/blueview/blueview.hpp"
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/vendor.hpp"
 
@@ -83,7 +84,7 @@ Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& giv
 }
 
 std::span<const Vendor* const> vendors() {
-  static const std::array<const Vendor*, 1> all{&oculus::vendor()};
+  static const std::array<const Vendor*, 2> all{&oculus::vendor(), &blueview::vendor()};
   return all;
 }
 

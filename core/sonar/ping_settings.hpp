@@ -29,6 +29,7 @@ struct PingSettings {
   float device_sound_speed_mps = 1500;   // what the device believes
   float device_absorption_db_per_m = 0;  // one way, what its TVG believes
   bool triggered = false;                // one ping per request of the client
+  bool transmit = true;                  // false: it only listens, and hears noise
   SampleFormat format;
 };
 

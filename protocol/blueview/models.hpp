@@ -1,15 +1,27 @@
-// The Teledyne BlueView products as SonarModel rows, and the preset the benchmark runs. No protocol hangs on them yet.
+// The Teledyne BlueView products as SonarModel rows, one frequency mode a head, and what a head is set to when nobody asked for
+// anything. Which figures are verified and which are recalled is said beside each (docs/protocols/blueview-link.md, "Products").
 #pragma once
 
 #include <memory>
 #include <span>
+#include <string_view>
 
 #include "core/sonar/ping_settings.hpp"
 #include "core/sonar/sonar_model.hpp"
 
 namespace sonar::blueview {
 
+/// Of one head, beside its FrequencyMode.
+struct HeadPreset {
+  int beams = 512;
+  double bin_m = 0.0254;  // range resolution
+  double start_m = 2, stop_m = 10;
+  bool verified = false;  // figures with a source one can read; otherwise recalled from data sheets
+};
+
 std::span<const std::shared_ptr<const SonarModel>> models();
+/// Presets of the model's heads, as many as it has modes.
+std::span<const HeadPreset> head_presets(std::string_view profile);
 
 /// The preset of the performance table: 10 m in 394 rows of 25.4 mm, 512 beams, pulse 25.4 mm.
 PingSettings p900_90_preset();

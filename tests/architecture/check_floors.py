@@ -36,6 +36,7 @@ DEPENDENCIES = {
     r"yaml-cpp/": ["core/text/"],
     r"assimp/": ["core/scene/load_mesh.cpp"],
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp"],
+    r"zlib\.h": ["protocol/blueview/deflate.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],
     r"boost/asio\.hpp": ["daemon/asio.hpp"],
     r"spdlog/|fmt/": ["daemon/", "clients/"],

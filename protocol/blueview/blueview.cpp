@@ -1,0 +1,55 @@
+#include "protocol/blueview/blueview.hpp"
+
+#include "protocol/blueview/dialogue.hpp"
+#include "protocol/blueview/encode_ping.hpp"
+#include "protocol/blueview/frames.hpp"
+#include "protocol/blueview/head_settings.hpp"
+#include "protocol/blueview/models.hpp"
+#include "protocol/blueview/options.hpp"
+
+namespace sonar::blueview {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::array<protocol::Port, 2> port_table{
+    {{protocol::Port::Kind::tcp_listen, tcp_port, 0ms}, {protocol::Port::Kind::udp_answer, discovery_port, 0ms}}};
+
+class BlueViewVendor final : public protocol::Vendor {
+ public:
+  std::string_view name() const override { return "blueview"; }
+  std::span<const std::shared_ptr<const SonarModel>> models() const override { return blueview::models(); }
+  std::span<const protocol::Port> ports() const override { return port_table; }
+  std::span<const protocol::Option> options() const override { return blueview::options(); }
+  int default_max_clients() const override { return 8; }
+  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
+                                                  const protocol::OptionValues&) const override {
+    return model;
+  }
+
+  protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
+    const SonarSettings settings = initial_sonar_settings(device);
+    return {ping_settings(settings, device), bytes_of_settings(settings), "as it comes: " + describe(settings, device)};
+  }
+  bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
+  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
+  protocol::Bytes answer(protocol::BytesView datagram, const protocol::DeviceState& device) const override {
+    return answer_discovery(datagram, device);
+  }
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::DeviceState& device, Time now) const override {
+    return make_dialogue(device, now);
+  }
+  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device,
+                                               protocol::BytesView request) const override {
+    return std::make_shared<const protocol::Bytes>(encode_ping(ping, device, request));
+  }
+};
+
+}  // namespace
+
+const protocol::Vendor& vendor() {
+  static const BlueViewVendor only;
+  return only;
+}
+
+}  // namespace sonar::blueview

@@ -1,0 +1,227 @@
+#include "protocol/blueview/head_settings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "protocol/blueview/models.hpp"
+#include "protocol/blueview/options.hpp"
+
+namespace sonar::blueview {
+namespace {
+
+constexpr int most_bins = 2400;     // of a ping: coarser bins beyond
+constexpr float base_gain_db = 48;  // unknown: what a gain adjustment of 0 dB stands for
+constexpr float longest_interval_ms = 3600e3f;
+
+const FrequencyMode& mode_of(const protocol::DeviceState& device, int head) {
+  return device.model->modes[static_cast<std::size_t>(head)];
+}
+bool strict_range(const protocol::DeviceState& device) { return text_option(device.options, option_name::strict_range) == "on"; }
+
+std::optional<double> number_in(const Value& value) {
+  if (const auto* i = std::get_if<std::int32_t>(&value)) return *i;
+  if (const auto* f = std::get_if<float>(&value)) return std::isfinite(*f) ? std::optional<double>(*f) : std::nullopt;
+  return std::nullopt;
+}
+
+Applied refused(Code code, std::string text) { return {std::nullopt, {code, std::move(text)}}; }
+
+/// Start and stop together: a start beyond the stop would be no range.
+Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, float stop, bool strict, Key key) {
+  if (!std::isfinite(start) || !std::isfinite(stop)) return refused(Code::bad_parameter, "a range must be a finite number");
+  const bool fine = start >= mode.min_range_m && stop <= mode.max_range_m && start < stop;
+  char text[128];
+  std::snprintf(text, sizeof text, "range %g to %g m is not within %g to %g m", static_cast<double>(start),
+                static_cast<double>(stop), static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m));
+  if (!fine && strict) return refused(Code::bad_range, text);
+  const float shortest = std::max(0.1f, 0.01f * mode.max_range_m);
+  head.stop_m = std::clamp(stop, mode.min_range_m + shortest, mode.max_range_m);
+  head.start_m = std::clamp(start, 0.0f, head.stop_m - shortest);
+  if (key == Key::range) return {Value(FloatPair{head.start_m, head.stop_m}), {}};
+  return {Value(key == Key::start_range ? head.start_m : head.stop_m), {}};
+}
+
+template <class T>
+Applied keep(T& at, double value, double low, double high) {
+  at = static_cast<T>(std::clamp(value, low, high));
+  return {Value(at), {}};
+}
+
+Applied apply_number(HeadSettings& head, SonarSettings& all, Key key, double value) {
+  switch (key) {
+    case Key::sound_speed:
+      return keep(head.sound_speed_mps, value, 1000, 2000);
+    case Key::gain:
+      return keep(head.gain_db, value, -100, 100);
+    case Key::tvg:
+      return keep(head.tvg_db_per_m, value, -20, 20);
+    case Key::fluid:
+      return keep(head.fluid, value, 0, 2);
+    case Key::transmit:
+      return keep(head.transmit, value != 0 ? 1 : 0, 0, 1);
+    case Key::ping_interval:
+      return keep(head.ping_interval_ms, value, 0, static_cast<double>(longest_interval_ms));
+    case Key::dynamic_power:
+      return keep(head.dynamic_power, value != 0 ? 1 : 0, 0, 1);
+    case Key::source_level:
+      return keep(head.source_level_db, value, -300, 300);
+    case Key::local_clock:
+      return keep(all.local_clock, value != 0 ? 1 : 0, 0, 1);
+    default:
+      return refused(Code::bad_parameter, "unknown key " + std::to_string(static_cast<int>(key)));
+  }
+}
+
+bool is_range(Key key) { return key == Key::start_range || key == Key::stop_range || key == Key::range; }
+
+}  // namespace
+
+SonarSettings initial_sonar_settings(const protocol::DeviceState& device) {
+  SonarSettings all;
+  all.name = device.name;
+  for (const HeadPreset& preset : head_presets(device.model->profile)) {
+    HeadSettings head;
+    head.start_m = static_cast<float>(preset.start_m);
+    head.stop_m = static_cast<float>(preset.stop_m);
+    head.fluid = device.water.salinity_psu < 1 ? 1 : 0;
+    all.heads.push_back(head);
+  }
+  return all;
+}
+
+wire::Bytes bytes_of_settings(const SonarSettings& settings) {
+  wire::Bytes out;
+  wire::Writer write(out);
+  write("active_head", settings.active_head);
+  write("local_clock", settings.local_clock);
+  put_text(out, settings.name);
+  for (const HeadSettings& head : settings.heads) fields(write, head);
+  return out;
+}
+
+SonarSettings settings_from(wire::BytesView request, const protocol::DeviceState& device) {
+  SonarSettings initial = initial_sonar_settings(device), read = initial;
+  wire::Reader reader(request);
+  reader("active_head", read.active_head);
+  reader("local_clock", read.local_clock);
+  read.name = take_text(reader, "name");
+  for (HeadSettings& head : read.heads) fields(reader, head);
+  const bool whole = reader.ok() && reader.remaining() == 0 && read.active_head >= 0 &&
+                     read.active_head < static_cast<std::int32_t>(read.heads.size());
+  return whole ? read : initial;
+}
+
+Applied apply(SonarSettings& settings, int head_index, Key key, const Value& value, const protocol::DeviceState& device) {
+  if (head_index < 0 || head_index >= static_cast<int>(settings.heads.size()))
+    return refused(Code::no_head, "there is no head " + std::to_string(head_index));
+  HeadSettings& head = settings.heads[static_cast<std::size_t>(head_index)];
+  if (key == Key::name) {
+    const auto* text = std::get_if<std::string>(&value);
+    if (text == nullptr) return refused(Code::bad_parameter, "a name is a text");
+    settings.name = text->substr(0, 64);
+    return {Value(settings.name), {}};
+  }
+  if (is_range(key)) {
+    const auto* pair = std::get_if<FloatPair>(&value);
+    const auto number = number_in(value);
+    if (key == Key::range ? pair == nullptr : !number) return refused(Code::bad_parameter, "a range must be a finite number");
+    const float given = number ? static_cast<float>(*number) : 0;
+    const float start = pair ? pair->first : (key == Key::start_range ? given : head.start_m);
+    const float stop = pair ? pair->second : (key == Key::stop_range ? given : head.stop_m);
+    return apply_range(head, mode_of(device, head_index), start, stop, strict_range(device), key);
+  }
+  const auto number = number_in(value);
+  if (!number) return refused(Code::bad_parameter, "key " + std::to_string(static_cast<int>(key)) + " takes a finite number");
+  return apply_number(head, settings, key, *number);
+}
+
+std::optional<Value> read_back(const SonarSettings& settings, int head_index, Key key) {
+  if (head_index < 0 || head_index >= static_cast<int>(settings.heads.size())) return std::nullopt;
+  const HeadSettings& head = settings.heads[static_cast<std::size_t>(head_index)];
+  switch (key) {
+    case Key::start_range:
+      return head.start_m;
+    case Key::stop_range:
+      return head.stop_m;
+    case Key::range:
+      return FloatPair{head.start_m, head.stop_m};
+    case Key::sound_speed:
+      return head.sound_speed_mps;
+    case Key::gain:
+      return head.gain_db;
+    case Key::tvg:
+      return head.tvg_db_per_m;
+    case Key::fluid:
+      return head.fluid;
+    case Key::transmit:
+      return head.transmit;
+    case Key::ping_interval:
+      return head.ping_interval_ms;
+    case Key::dynamic_power:
+      return head.dynamic_power;
+    case Key::source_level:
+      return head.source_level_db;
+    case Key::name:
+      return settings.name;
+    case Key::local_clock:
+      return settings.local_clock;
+  }
+  return std::nullopt;
+}
+
+HeadGrid grid_of(const HeadSettings& head, double finest_bin_m) {
+  HeadGrid grid;
+  const double start = static_cast<double>(head.start_m), stop = static_cast<double>(head.stop_m);
+  grid.bin_m = std::max(finest_bin_m, (stop - start) / most_bins);
+  grid.bins = std::max(1, static_cast<int>(std::lround((stop - start) / grid.bin_m)));
+  // The first bin's centre lies half a bin beyond the start, wherever that falls on the grid from the sonar on.
+  const double rows_before = start / grid.bin_m;
+  grid.skipped = static_cast<int>(std::floor(rows_before + 0.5));
+  grid.row_centre = std::clamp(0.5 + rows_before - grid.skipped, 0.0, 1.0);
+  return grid;
+}
+
+PingSettings ping_settings(const SonarSettings& all, const protocol::DeviceState& device) {
+  const int index = all.active_head;
+  const HeadSettings& head = all.heads[static_cast<std::size_t>(index)];
+  const HeadPreset& preset = head_presets(device.model->profile)[static_cast<std::size_t>(index)];
+  const FrequencyMode& mode = mode_of(device, index);
+  const HeadGrid grid = grid_of(head, preset.bin_m);
+  PingSettings s;
+  s.mode = index;
+  s.beam_count = preset.beams;
+  s.range_bin_count = grid.skipped + grid.bins;
+  s.range_bin_m = grid.bin_m;
+  s.row_centre = grid.row_centre;
+  s.range_m = s.range_bin_count * grid.bin_m;
+  s.pulse_width_m = static_cast<float>(grid.bin_m);  // DS: the pulse is as long as the bin
+  s.rate_hz = head.ping_interval_ms > 0 ? std::min(1000.0f / static_cast<float>(head.ping_interval_ms), device.model->max_rate_hz)
+                                        : device.model->max_rate_hz;
+  s.triggered = true;
+  s.transmit = head.transmit != 0;
+  s.gain_db = base_gain_db + head.gain_db;
+  s.device_sound_speed_mps = static_cast<float>(head.sound_speed_mps);
+  Water believed = device.water;
+  if (head.fluid == 0) believed.salinity_psu = std::max(believed.salinity_psu, 30.0);
+  if (head.fluid == 1) believed.salinity_psu = 0;
+  // The slope knob comes on top of what absorption takes; TVG counts both ways.
+  s.device_absorption_db_per_m =
+      static_cast<float>(absorption_db_per_m(believed, device.depth_m, static_cast<double>(mode.centre_hz)) +
+                         0.5 * static_cast<double>(head.tvg_db_per_m));
+  s.format.bits = 16;  // unknown: BlueView images carry 16-bit samples
+  s.format.max_code = 65535;
+  return s;
+}
+
+std::string describe(const SonarSettings& all, const protocol::DeviceState& device) {
+  const HeadSettings& head = all.heads[static_cast<std::size_t>(all.active_head)];
+  char text[160];
+  std::snprintf(text, sizeof text, "head %d (%s), range %g to %g m, gain %g dB, tvg %g dB/m, sound speed %d m/s%s",
+                all.active_head, mode_of(device, all.active_head).name.c_str(), static_cast<double>(head.start_m),
+                static_cast<double>(head.stop_m), static_cast<double>(head.gain_db), static_cast<double>(head.tvg_db_per_m),
+                head.sound_speed_mps, head.transmit != 0 ? "" : ", transmitter off");
+  return text;
+}
+
+}  // namespace sonar::blueview

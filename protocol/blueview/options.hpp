@@ -1,0 +1,18 @@
+// What one may choose about an emulated BlueView sonar, by name, under `options:` of a sonar in the configuration.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::blueview {
+
+namespace option_name {
+inline constexpr std::string_view heads_base = "heads_base", strict_range = "strict_range", compression = "compression";
+}
+
+std::span<const protocol::Option> options();
+std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
+
+}  // namespace sonar::blueview
