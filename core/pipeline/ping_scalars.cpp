@@ -25,6 +25,19 @@ double PingScalars::doppler_samples(Vec3d from_sonar_m) const {
   return doppler_m_per_mps * dot(velocity, from_sonar_m) / length(from_sonar_m) * samples_per_m;
 }
 
+namespace {
+
+/// A sweep's echo that closes in at v is higher by df = 2 v f / c and lines up earlier by df T / B, nearer by (f / B) T v.
+double doppler_metres_per_mps(const PingPlan& plan) {
+  const Waveform& w = plan.mode.waveform;
+  if (w.shape != Waveform::Shape::lfm) return 0;  // other pulses only turn their phase
+  const double shift =
+      static_cast<double>(plan.mode.centre_hz) / sweep_bandwidth_hz(plan.pulse_shape.width_s()) * static_cast<double>(w.sweep_s);
+  return w.falling ? shift : -shift;
+}
+
+}  // namespace
+
 PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d scene_origin) {
   PingScalars s;
   const double depth = depth_from_z(request.sonar_in_world.position_m.z);
@@ -38,6 +51,8 @@ PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d
   s.max_range_m = (plan.samples + plan.sample_offset + plan.taps) / s.samples_per_m;
   s.turns_per_m = 2 * hz / s.sound_speed_mps;
   s.twist = request.sonar_moves;
+  if (request.switches.doppler) s.doppler_m_per_mps = doppler_metres_per_mps(plan);
+  if (s.doppler_m_per_mps != 0) s.max_range_m += std::abs(s.doppler_m_per_mps) * length(s.twist.velocity_mps);
   s.moves = request.switches.motion && (length(s.twist.velocity_mps) > 0 || length(s.twist.angular_rate_radps) > 0);
   if (s.moves) s.seen_at_s = request.settings.range_m / static_cast<double>(request.settings.device_sound_speed_mps);
   s.seen_from = s.moves ? carried_on(request.sonar_in_world, s.twist, s.seen_at_s) : request.sonar_in_world;

@@ -20,18 +20,14 @@ constexpr std::size_t most_samples = 65536;
 constexpr double worth_keeping = 1e-4;       // of a measured pulse's peak, in time and in frequency
 constexpr double finest_rate_per_row = 256;  // samples of a measured pulse to a sample of the grid
 constexpr int neighbours = 32;               // of a measured pulse, for a value between its samples
-constexpr double window_sharpness = 8.6;     // Kaiser's: ripple 1e-4 up to 0.8 of the band
-
-double bessel_i0(double x) {
-  double sum = 1, term = 1;
-  for (int k = 1; k < 60; ++k) sum += term *= x * x / (4.0 * k * k);
-  return sum;
-}
+constexpr double window_sharpness = 8.6;     // ripple 1e-4 up to 0.8 of the band
 
 double interpolation_weight(double x) {  // x in samples
   const double z = 2 * x / neighbours;
-  return std::fabs(z) >= 1 ? 0 : sinc(x) * bessel_i0(window_sharpness * std::sqrt(1 - z * z)) / bessel_i0(window_sharpness);
+  return std::fabs(z) >= 1 ? 0 : sinc(x) * std::exp(window_sharpness * (std::sqrt(1 - z * z) - 1));
 }
+
+double parzen(double x) { return x < 0.5 ? 1 - 6 * x * x * (1 - x) : 2 * (1 - x) * (1 - x) * (1 - x); }
 
 }  // namespace
 
@@ -158,11 +154,22 @@ std::complex<double> Pulse::correlation(double time_s) const {
     const double x = std::fabs(time_s) * scale_hz_;
     return x < 1 ? 1 - 1.5 * x * x + 0.75 * x * x * x : x < 2 ? 0.25 * (2 - x) * (2 - x) * (2 - x) : 0.0;
   }
-  const double rate = shape_ == Shape::lfm ? 4 * scale_hz_ : scale_hz_;
-  const int reach = static_cast<int>(std::ceil(reach_s_ * rate));
   Complex sum;
-  for (int k = -reach; k <= reach; ++k) sum += at(k / rate) * std::conj(at(k / rate - time_s));
-  return sum / rate / energy_width_s_;
+  if (shape_ == Shape::lfm) {
+    const double rate = 4 * scale_hz_;
+    const int reach = static_cast<int>(std::ceil(reach_s_ * rate));
+    for (int k = -reach; k <= reach; ++k) sum += at(k / rate) * std::conj(at(k / rate - time_s));
+    return sum / rate / energy_width_s_;
+  }
+  // Every sample is as far from its neighbours in the shifted pulse: one set of weights does.
+  const double shift = time_s * scale_hz_;
+  const int whole = static_cast<int>(std::floor(std::clamp(shift, -1e6, 1e6))), count = static_cast<int>(samples_.size());
+  for (int j = -neighbours / 2 + 1; j <= neighbours / 2; ++j) {
+    const double weight = interpolation_weight(j - (shift - whole));
+    for (int k = std::max(0, whole + j); k < std::min(count, count + whole + j); ++k)
+      sum += weight * samples_[static_cast<std::size_t>(k)] * std::conj(samples_[static_cast<std::size_t>(k - whole - j)]);
+  }
+  return sum / scale_hz_ / energy_width_s_;
 }
 
 std::string why_invalid(const Waveform& w, double sample_time_s) {
@@ -215,8 +222,8 @@ std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s) {
   const int order = std::min(wanted, longest);
   std::vector<double> r(static_cast<std::size_t>(order) + 1);
   for (int k = 0; k <= order; ++k) {
-    // Cut short, a correlation is one no more; under a triangle it still is.
-    const double window = wanted > longest ? 1.0 - static_cast<double>(k) / (order + 1) : 1.0;
+    // Cut short, a correlation is one no more; under a window that is itself one it still is.
+    const double window = wanted > longest ? parzen(static_cast<double>(k) / (order + 1)) : 1.0;
     r[static_cast<std::size_t>(k)] = window * pulse.correlation(k * sample_time_s).real();
   }
   r[0] += 1e-5;  // keeps the factorisation definite on fine grids, where the spectrum falls to nothing

@@ -77,6 +77,12 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<co
   return out;
 }
 
+/// Of a ray of the fixed fan, sonar axes.
+Vec3d direction_of(const FanHit& hit, double sine, bool conical) {
+  const double psi = static_cast<double>(hit.elevation_rad), across = std::sqrt(std::max(0.0, 1 - sine * sine));
+  return {across * std::cos(psi), conical ? sine : sine * std::cos(psi), (conical ? across : 1.0) * std::sin(psi)};
+}
+
 }  // namespace
 
 void Echoes::reserve(int capacity) {
@@ -167,15 +173,14 @@ void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPl
   const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
   const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
   for (const FanHit& hit : hits) {
-    const double r = static_cast<double>(hit.range_m);
-    const double at_sample = s.sample_of(r);
+    const double r = static_cast<double>(hit.range_m), sine = plan.columns.sine(hit.column);
+    const double at_sample = s.sample_of(r) + s.doppler_samples(direction_of(hit, sine, plan.switches.conical));
     if (at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) continue;
     const Object& object = scene.objects[hit.object];
     const double cosine = static_cast<double>(hit.cosine);
     const double strength =
         scattering_strength(scene.materials[object.mesh->material[hit.triangle]], cosine,
                             static_cast<double>(plan.mode.centre_hz), s.sound_speed_mps, plan.switches.specular);
-    const double sine = plan.columns.sine(hit.column);
     const double solid_angle =
         plan.columns.spacing * step_rad *
         (plan.switches.conical ? 1.0 : std::cos(static_cast<double>(hit.elevation_rad)) / std::sqrt(1 - sine * sine));
