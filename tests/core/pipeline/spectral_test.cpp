@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "core/base/geometry.hpp"
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "tests/oracles/record.hpp"
 
 namespace sonar::spectral {
 namespace {
@@ -57,6 +59,7 @@ TEST_F(SpectralWithTransform, FastSumKeepsTheErrorOfItsWidth) {
     for (const auto& w : widths) {
       const double error = relative_error(fast_sum(arrivals, grid, w.width), truth);
       EXPECT_LE(error, w.error) << w.width << " points, " << grid.count << " frequencies";
+      if (w.width == 6) test::record_below(18, "frequency sums, fast (6 points) against direct, relative L2", 1e-4, error, "");
     }
   }
 }
@@ -81,6 +84,30 @@ TEST_F(SpectralWithTransform, TransformsThereAndBackAgain) {
     for (Complex& v : y) v /= size;
     EXPECT_LT(relative_error(y, x), 1e-13);
   }
+}
+
+// Beams uniform in the sine: eq. (9) is a convolution over columns, which a transform carries out whole, without a band.
+TEST_F(SpectralWithTransform, Oracle19_CouplingByTransformAgainstDenseSum) {
+  const double spacing = 0.0018, aperture = aperture_in_wavelengths(Taper::taylor30, 0.00698);
+  const int beams = 512, margin = 12, columns = beams + 2 * margin, size = quick_size(2 * columns);
+  const auto weight = [&](int apart) { return directivity(Taper::taylor30, aperture, apart * spacing); };
+  std::vector<Complex> signal(static_cast<std::size_t>(size)), pattern(static_cast<std::size_t>(size)), dense;
+  const std::vector<Arrival> random = random_arrivals(columns, 1);
+  for (std::size_t k = 0; k < random.size(); ++k) signal[k] = random[k].amplitude;
+  for (int apart = 1 - columns; apart < columns; ++apart)
+    pattern[static_cast<std::size_t>((apart + size) % size)] = weight(apart);
+  for (int j = 0; j < beams; ++j) {
+    Complex sum;
+    for (int k = 0; k < columns; ++k) sum += weight(k - j - margin) * random[static_cast<std::size_t>(k)].amplitude;
+    dense.push_back(sum);
+  }
+  const Fft forward(size, Fft::Direction::forward), inverse(size, Fft::Direction::inverse);
+  forward.run(signal.data());
+  forward.run(pattern.data());
+  for (std::size_t i = 0; i < signal.size(); ++i) signal[i] *= pattern[i] / static_cast<double>(size);
+  inverse.run(signal.data());
+  const std::vector<Complex> got(signal.begin() + margin, signal.begin() + margin + beams);
+  test::record_below(19, "coupling by transform against the dense sum, relative L2", 1e-5, relative_error(got, dense), "");
 }
 
 TEST(Spectral, QuickSizesAreEvenAndSmooth) {

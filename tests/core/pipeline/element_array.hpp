@@ -1,0 +1,36 @@
+// A receive array element by element: every echo delayed to every element, shaded, focused and summed in double. The slow truth
+// behind eq. (9), which knows of an array only its far-field pattern (docs/acoustics.md, section 6).
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/sonar/sonar_model.hpp"
+#include "tests/core/pipeline/reference.hpp"
+
+namespace sonar::reference {
+
+/// A point that scatters: where, and its amplitude at the array's centre, carrier included.
+struct PlacedScatterer {
+  Vec3d in_sonar;
+  Complex amplitude;
+};
+
+class ElementArray {
+ public:
+  /// Elements along y, `pitch_wavelengths` apart, on the aperture that the pattern's azimuth width asks for, shaded by its taper.
+  ElementArray(const FrequencyMode& mode, double sound_speed_mps, double pitch_wavelengths = 0.5);
+  int elements() const { return static_cast<int>(place_m_.size()); }
+
+  using Envelope = std::function<Complex(double)>;  // p(t)
+  /// s_j[n] of beams focused on every range of the grid. [beams][samples]
+  std::vector<std::vector<Complex>> beams(std::span<const PlacedScatterer> scatterers, std::span<const double> beam_sines,
+                                          const Grid& grid, const Envelope& p, double reach_s) const;
+
+ private:
+  double turns_per_s_, sound_speed_mps_;
+  std::vector<double> place_m_, weight_;
+};
+
+}  // namespace sonar::reference
