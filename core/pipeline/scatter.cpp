@@ -109,9 +109,9 @@ std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const Pi
   return laws;
 }
 
-void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan,
-                   const PingScalars& scalars, Parallel& pool, std::vector<TileToSound>& tiles) {
-  const std::vector<LawTable> laws = laws_of(scene, plan, scalars);
+void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& cells, const Scene& scene,
+                   std::span<const LawTable> laws, const PingPlan& plan, const PingScalars& scalars, Parallel& pool,
+                   std::vector<TileToSound>& tiles) {
   const BubbleLayer bubbles(scene.sea_surface);
   tiles.resize(in_view.size());
   constexpr std::size_t batch = 256;

@@ -39,9 +39,10 @@ struct TileToSound {
 /// The scattering law of every material of the scene, as this ping hears it.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& scalars);
 
-/// Prepares the tiles in view, in parallel; the order is kept.
-void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& cells, const Scene& scene, const PingPlan& plan,
-                   const PingScalars& scalars, Parallel& pool, std::vector<TileToSound>& tiles);
+/// Prepares the tiles in view, in parallel; the order is kept. The tiles point into `laws` (laws_of), which must outlive them.
+void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& cells, const Scene& scene,
+                   std::span<const LawTable> laws, const PingPlan& plan, const PingScalars& scalars, Parallel& pool,
+                   std::vector<TileToSound>& tiles);
 
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen);
 

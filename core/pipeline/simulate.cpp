@@ -114,8 +114,10 @@ void PingUnderWay::find_echo_sources() {
   if (request_.blank) return;
   points_ = scatter_points(scene_, bodies_, plan_, scalars_);
   other_sonars_ = hear_other_sonars(scene_, plan_, scalars_, request_);
-  if (ray_is_scatterer()) return;
   Stopwatch watch(w_.now_s, w_.statistics);
+  if (request_.switches.specular) w_.mirror_echoes.find(scene_, bodies_, plan_, scalars_, points_);
+  watch.lap(Stage::specular);
+  if (ray_is_scatterer()) return;
   CellView view;
   view.sonar_in_world = scalars_.seen_from;
   view.bodies_in_world = bodies_;
@@ -125,7 +127,8 @@ void PingUnderWay::find_echo_sources() {
   view.levels = plan_.levels;
   const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
-  prepare_tiles(in_view, cells_, scene_.scene(), plan_, scalars_, pool_, w_.tiles);
+  w_.laws = laws_of(scene_.scene(), plan_, scalars_);
+  prepare_tiles(in_view, cells_, scene_.scene(), w_.laws, plan_, scalars_, pool_, w_.tiles);
   sort_tiles(w_.tiles, group_columns, groups(), w_.tiles_by_group);
   watch.lap(Stage::cull);
   w_.statistics.tiles = in_view.size();

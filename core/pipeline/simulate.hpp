@@ -15,6 +15,7 @@
 #include "core/pipeline/receive.hpp"
 #include "core/pipeline/scatter.hpp"
 #include "core/pipeline/spectral_columns.hpp"
+#include "core/pipeline/specular.hpp"
 #include "core/pipeline/synthesize.hpp"
 #include "core/pipeline/trace_fan.hpp"
 #include "core/pipeline/truth.hpp"
@@ -36,6 +37,8 @@ struct PreparedSettings {
 struct Workspace {
   std::vector<std::unique_ptr<PreparedSettings>> prepared;  // several sonars may take turns
   std::uint64_t pings = 0;
+  MirrorEchoes mirror_echoes;
+  std::vector<LawTable> laws;  // the tiles point into it
   std::vector<TileToSound> tiles;
   std::vector<std::vector<std::uint32_t>> tiles_by_group;
   ColumnSignals columns;
