@@ -23,9 +23,9 @@ struct EngineOptions {
   double (*now_s)() = nullptr;  // a clock for PingStatistics; core/ has none of its own
 };
 
-enum class Stage { specular, cull, build_cells, trace, scatter, synthesize, noise, couple, receive, stages };
+enum class Stage { specular, multipath, cull, build_cells, trace, scatter, synthesize, noise, couple, receive, stages };
 inline constexpr std::array<const char*, static_cast<std::size_t>(Stage::stages)> stage_names{
-    "specular", "cull", "build cells", "trace", "scatter", "synthesize", "noise", "couple", "receive"};
+    "specular", "multipath", "cull", "build cells", "trace", "scatter", "synthesize", "noise", "couple", "receive"};
 
 /// Counts and times of one ping, for the benchmark. Times stay 0 without a clock.
 struct PingStatistics {

@@ -80,6 +80,7 @@ class PingUnderWay {
   }
 
   void find_echo_sources();
+  void hear_by_mirrors();
   void sound_columns();
   Ping image();
 
@@ -118,6 +119,8 @@ void PingUnderWay::find_echo_sources() {
   if (request_.switches.specular) w_.mirror_echoes.find(scene_, bodies_, plan_, scalars_, points_);
   watch.lap(Stage::specular);
   if (ray_is_scatterer()) return;
+  if (request_.switches.multipath) hear_by_mirrors();
+  watch.lap(Stage::multipath);
   CellView view;
   view.sonar_in_world = scalars_.seen_from;
   view.bodies_in_world = bodies_;
@@ -135,6 +138,14 @@ void PingUnderWay::find_echo_sources() {
   w_.statistics.tiles_built = cells_.built_last_time();
   w_.statistics.cell_bytes = cells_.cached_bytes();
   for (const TileInView& t : in_view) w_.statistics.cells += static_cast<std::size_t>(t.tile->count);
+}
+
+/// What comes by way of flat mirrors waits in columns of its own.
+void PingUnderWay::hear_by_mirrors() {
+  const MultipathCounts counts =
+      sound_ghosts(scene_, cells_, bodies_, plan_, scalars_, kernels_, pool_, w_.multipath, points_);
+  w_.statistics.rays += counts.rays;
+  w_.statistics.echoes += counts.echoes;
 }
 
 /// Rays, echoes, pulses and noise, a group of columns at a time.
@@ -156,6 +167,7 @@ void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) 
       scatter_cells_of(first, last, mine, watch);
   }
   if (plan_.spectral) plan_.spectral->finish(first, last, mine.spectral, w_.columns);
+  if (request_.switches.multipath && !request_.blank && !ray_is_scatterer()) add_ghosts(w_.multipath, first, last, w_.columns);
   if (volume_.is_heard() && !request_.blank)
     volume_.add(ray_is_scatterer() ? nullptr : &mine.seen, prepared_.noise, request_.sonar_id,
                 static_cast<std::uint32_t>(request_.number), first, last, mine.volume, w_.columns);

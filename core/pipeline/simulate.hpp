@@ -9,6 +9,7 @@
 #include "core/base/parallel.hpp"
 #include "core/pipeline/couple.hpp"
 #include "core/pipeline/disturbances.hpp"
+#include "core/pipeline/multipath.hpp"
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/ping_plan.hpp"
@@ -41,6 +42,7 @@ struct Workspace {
   std::vector<LawTable> laws;  // the tiles point into it
   std::vector<TileToSound> tiles;
   std::vector<std::vector<std::uint32_t>> tiles_by_group;
+  MultipathWork multipath;
   ColumnSignals columns;
   std::vector<BeamTruth> first_hits;  // by column, when switches.keep_truth
   struct PerWorker {

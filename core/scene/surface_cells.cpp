@@ -186,8 +186,12 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
                 m[2][0] * q.x + m[2][1] * q.y + m[2][2] * q.z};
   const double range = length(p);
   if (range - radius > view.max_range_m) return;
-  if (std::abs(p.z) * fan_cosine_ - p.x * fan_sine_ > radius) return;
-  if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
+  if (view.may_see) {
+    if (!view.may_see(p, radius)) return;
+  } else {
+    if (std::abs(p.z) * fan_cosine_ - p.x * fan_sine_ > radius) return;
+    if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
+  }
 
   node.last_visited = now_;
   const double nearest = range - radius, farthest = range + radius;

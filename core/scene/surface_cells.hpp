@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -49,6 +50,8 @@ struct CellView {
   float max_sine = 1;             // |y / r| of the outermost column
   float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first
+  /// When set, stands for the bounds of the fan: whether a ball about a place in the sonar's axes may be wanted.
+  std::function<bool(Vec3d from_sonar_m, double radius_m)> may_see;
 };
 
 /// A tile in view and where the sonar is, seen from it.

@@ -1,0 +1,84 @@
+#include "core/pipeline/multipath_legs.hpp"
+
+#include <cmath>
+
+namespace sonar {
+namespace {
+
+constexpr double most_grazing_cosine = 0.17;  // faces that do not mirror at 10 degrees grazing are left out
+
+Pose object_in_world(const Scene& scene, const Object& object, std::span<const Pose> bodies) {
+  if (object.body < 0 || static_cast<std::size_t>(object.body) >= bodies.size()) return object.in_world;
+  return compose(bodies[static_cast<std::size_t>(object.body)], scene.in_body(object));
+}
+
+/// Mirroring of places: p - 2 (n . p + height) n.
+struct Image {
+  Rotation turn;
+  Vec3d shift_m;
+};
+Image image_in(const FlatMirror& m) {
+  const double n[3] = {m.normal.x, m.normal.y, m.normal.z};
+  Image image;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) image.turn.m[i][j] -= 2 * n[i] * n[j];
+  image.shift_m = (-2 * m.height_m) * m.normal;
+  return image;
+}
+
+const FlatMirror& at(const std::vector<FlatMirror>& mirrors, int i) { return mirrors[static_cast<std::size_t>(i)]; }
+
+}  // namespace
+
+std::vector<FlatMirror> mirrors_of(const FlatFaces& faces, const Scene& scene, std::span<const Pose> bodies, const PingPlan& plan,
+                                   const PingScalars& s) {
+  std::vector<FlatMirror> mirrors;
+  const double wave_number = 2 * pi * static_cast<double>(plan.mode.centre_hz) / s.sound_speed_mps;
+  for (std::size_t f = 0; f < faces.faces.size() && static_cast<int>(mirrors.size()) < most_mirrors; ++f) {
+    const FlatFace& face = faces.faces[f];
+    const Material& material = scene.materials[static_cast<std::size_t>(face.material)];
+    FlatMirror m;
+    m.face = static_cast<int>(f);
+    m.reflection = static_cast<double>(material.reflection);
+    const double kh = wave_number * static_cast<double>(material.roughness_m);
+    m.twice_kh_squared = 2 * kh * kh;
+    if (std::abs(m.reflectance(most_grazing_cosine)) <= least_reflectance) continue;
+    const Pose in_sonar =
+        compose(inverse(s.seen_from), object_in_world(scene, scene.objects[static_cast<std::size_t>(face.object)], bodies));
+    m.normal = rotate(in_sonar.orientation, face.normal);
+    m.height_m = -(face.offset_m + dot(m.normal, in_sonar.position_m));
+    if (m.height_m < 0) m.normal = -1.0 * m.normal, m.height_m = -m.height_m;
+    if (m.height_m < touching_m || m.height_m > 2 * s.max_range_m) continue;
+    mirrors.push_back(m);
+  }
+  return mirrors;
+}
+
+Leg leg_by(const std::vector<FlatMirror>& mirrors, int first, int second) {
+  Leg leg;
+  leg.first = first, leg.second = second;
+  if (first < 0) return leg;
+  const Image a = image_in(at(mirrors, first));
+  leg.turn = a.turn, leg.shift_m = a.shift_m;
+  if (second < 0) return leg;
+  const Image b = image_in(at(mirrors, second));
+  leg.turn = a.turn * b.turn;
+  leg.shift_m = a.turn * b.shift_m + a.shift_m;
+  leg.second_normal = a.turn * at(mirrors, second).normal;
+  leg.beyond_front = at(mirrors, second).height_of(a.shift_m) > 0;  // the sonar's own image in the first mirror lies at a.shift_m
+  return leg;
+}
+
+double reflectance_of(const Leg& leg, const std::vector<FlatMirror>& mirrors, Vec3d direction) {
+  if (leg.first < 0) return 1;
+  const double once = at(mirrors, leg.first).reflectance(dot(at(mirrors, leg.first).normal, direction));
+  return leg.second < 0 ? once : once * at(mirrors, leg.second).reflectance(dot(leg.second_normal, direction));
+}
+
+bool is_lit(const Leg& leg, const std::vector<FlatMirror>& mirrors, Vec3d place) {
+  if (leg.first < 0) return true;
+  const double height = at(mirrors, leg.second < 0 ? leg.first : leg.second).height_of(place);
+  return (leg.beyond_front ? height : -height) > touching_m;
+}
+
+}  // namespace sonar

@@ -1,0 +1,350 @@
+#include "core/pipeline/multipath_trace.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr double fan_edge_two_way = 0.01;   // 0.1 of one pattern
+constexpr int edge_depth = 4, deepest = 6;  // as in trace_fan
+constexpr float lift_m = 1e-4f;             // rays start so far off the mirror they come from
+
+/// Sixteen rays that mirrors send on.
+class ChainTracer {
+ public:
+  ChainTracer(const RayScene& scene, const PingScalars& scalars, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors)
+      : scene_(scene), faces_(faces), mirrors_(mirrors), origin_(scalars.position_in_scene) {
+    for (int i = 0; i < 9; ++i) turn_[i] = static_cast<float>(scalars.world_from_sonar.m[i / 3][i % 3]);
+    mirror_of_face_.assign(faces.faces.size(), BounceMap::no_mirror);
+    for (std::size_t m = 0; m < mirrors.size(); ++m) {
+      mirror_of_face_[static_cast<std::size_t>(mirrors[m].face)] = static_cast<std::uint8_t>(m);
+      normals_.push_back(to_float(scalars.world_from_sonar * mirrors[m].normal));
+    }
+  }
+
+  void clear() { count_ = 0; }
+  void add(Vec3 direction_in_sonar, float far_m) {
+    const auto i = static_cast<std::size_t>(count_++);
+    const Vec3 d = direction_in_sonar;
+    packet.origin_x[i] = origin_.x, packet.origin_y[i] = origin_.y, packet.origin_z[i] = origin_.z;
+    packet.direction_x[i] = turn_[0] * d.x + turn_[1] * d.y + turn_[2] * d.z;
+    packet.direction_y[i] = turn_[3] * d.x + turn_[4] * d.y + turn_[5] * d.z;
+    packet.direction_z[i] = turn_[6] * d.x + turn_[7] * d.y + turn_[8] * d.z;
+    packet.far[i] = far_[i] = far_m;
+    travelled[i] = 0;
+  }
+  int count() const { return count_; }
+  std::uint32_t all() const { return count_ == RayPacket::size ? 0xFFFFu : (1u << count_) - 1u; }
+
+  /// Follows the active rays to the next surface: `travelled` grows, or the ray's object says that it missed.
+  void go(std::uint32_t active, bool coherent) {
+    scene_.trace(packet, active, coherent);
+    for (std::size_t i = 0; i < RayPacket::size; ++i) {
+      if (!(active >> i & 1)) continue;
+      ++traced;
+      if (packet.object[i] != RayPacket::miss) travelled[i] += packet.far[i];
+    }
+  }
+
+  /// The mirror that a ray has just met, or no_mirror; and turns the ray round on it.
+  std::uint8_t bounce(std::size_t i) {
+    if (packet.object[i] == RayPacket::miss) return BounceMap::no_mirror;
+    const int face = faces_.face_of(packet.object[i], packet.triangle[i]);
+    if (face < 0) return BounceMap::no_mirror;
+    const std::uint8_t mirror = mirror_of_face_[static_cast<std::size_t>(face)];
+    if (mirror == BounceMap::no_mirror) return mirror;
+    const Vec3 n = normals_[mirror];
+    const Vec3 d{packet.direction_x[i], packet.direction_y[i], packet.direction_z[i]};
+    const float along = dot(n, d);
+    if (std::abs(mirrors_[mirror].reflectance(static_cast<double>(along))) <= least_reflectance) return BounceMap::no_mirror;
+    const float lift = along > 0 ? -lift_m : lift_m;
+    packet.origin_x[i] += packet.far[i] * d.x + lift * n.x;
+    packet.origin_y[i] += packet.far[i] * d.y + lift * n.y;
+    packet.origin_z[i] += packet.far[i] * d.z + lift * n.z;
+    packet.direction_x[i] = d.x - 2 * along * n.x;
+    packet.direction_y[i] = d.y - 2 * along * n.y;
+    packet.direction_z[i] = d.z - 2 * along * n.z;
+    packet.far[i] = far_[i] - travelled[i];
+    return packet.far[i] > 0 ? mirror : BounceMap::no_mirror;
+  }
+
+  RayPacket packet{};
+  float travelled[RayPacket::size] = {};
+  std::size_t traced = 0;
+
+ private:
+  const RayScene& scene_;
+  const FlatFaces& faces_;
+  const std::vector<FlatMirror>& mirrors_;
+  Vec3 origin_;
+  float turn_[9], far_[RayPacket::size] = {};
+  std::vector<std::uint8_t> mirror_of_face_;
+  std::vector<Vec3> normals_;  // of the mirrors, world axes
+  int count_ = 0;
+};
+
+/// A direction's chain of surfaces.
+struct Chain {
+  float elevation_rad = 0, tangent = 0, forward = 0;  // forward: x of the unit direction
+  std::uint32_t object[3] = {RayPacket::miss, RayPacket::miss, RayPacket::miss};
+  float range_m[3] = {}, inverse_x[3] = {};
+  std::uint8_t mirror[2] = {BounceMap::no_mirror, BounceMap::no_mirror};
+  std::int32_t next = -1;  // the sample above in the same column
+  bool edge_above = false;
+
+  int stages() const { return mirror[0] == BounceMap::no_mirror ? 1 : mirror[1] == BounceMap::no_mirror ? 2 : 3; }
+  bool meets_the_same(const Chain& b) const {
+    return std::equal(object, object + 3, b.object) && std::equal(mirror, mirror + 2, b.mirror);
+  }
+};
+
+/// Columns [first, last), at most a packet wide: samples refined where neighbours differ, then drawn into the map.
+class ColumnsTracer {
+ public:
+  ColumnsTracer(ChainTracer& rays, const PingPlan& plan, float far_m, int first, int last, BounceMap& map)
+      : rays_(rays),
+        plan_(plan),
+        map_(map),
+        far_m_(far_m),
+        tolerance_m_(static_cast<float>(plan.pulse_width_m)),
+        first_(first),
+        last_(last) {}
+
+  void run() {
+    trace_base();
+    for (std::int32_t e = 0; e + 1 < elevations(); ++e)
+      for (int k = 0; k < columns(); ++k) consider(k * elevations() + e, k * elevations() + e + 1, k, 0, open_);
+    for (int depth = 1; depth <= deepest && !open_.empty(); ++depth) halve_intervals();
+    for (int k = 0; k < columns(); ++k) draw(k);
+  }
+
+ private:
+  struct Interval {
+    std::int32_t below, above;
+    int column, depth;
+  };
+  int columns() const { return last_ - first_; }
+  std::int32_t elevations() const { return static_cast<std::int32_t>(map_.fan.elevation_rad.size()); }
+  Chain& at(std::int32_t i) { return samples_[static_cast<std::size_t>(i)]; }
+
+  void aim(float elevation_rad, int column, Chain& chain) {
+    const double u = plan_.columns.sine(first_ + column);
+    const auto along = static_cast<float>(u), across = static_cast<float>(std::sqrt(std::max(0.0, 1 - u * u)));
+    const float cosine = std::cos(elevation_rad), sine = std::sin(elevation_rad);
+    const bool conical = plan_.switches.conical;
+    chain.elevation_rad = elevation_rad;
+    chain.tangent = sine / cosine;
+    chain.forward = conical ? across * cosine : cosine;
+    rays_.add({across * cosine, conical ? along : along * cosine, conical ? across * sine : sine}, far_m_);
+  }
+  /// Follows the packet; its lanes are the samples `index`.
+  void follow(const std::array<std::int32_t, RayPacket::size>& index) {
+    std::uint32_t active = rays_.all();
+    for (std::size_t stage = 0; stage < 3 && active; ++stage) {
+      rays_.go(active, stage == 0);
+      for (std::size_t i = 0; i < RayPacket::size; ++i) {
+        if (!(active >> i & 1)) continue;
+        Chain& chain = at(index[i]);
+        chain.object[stage] = rays_.packet.object[i];
+        if (chain.object[stage] != RayPacket::miss) {
+          chain.range_m[stage] = rays_.travelled[i];
+          chain.inverse_x[stage] = 1.0f / std::max(rays_.travelled[i] * chain.forward, 1e-4f);
+        }
+        if (stage < 2) chain.mirror[stage] = rays_.bounce(i);
+        if (stage == 2 || chain.mirror[stage] == BounceMap::no_mirror) active &= ~(1u << i);
+      }
+    }
+  }
+
+  void trace_base() {
+    const std::int32_t n = elevations();
+    samples_.assign(static_cast<std::size_t>(columns()) * static_cast<std::size_t>(n), {});
+    std::array<std::int32_t, RayPacket::size> index{};
+    for (std::int32_t e = 0; e < n; ++e) {
+      rays_.clear();
+      for (int k = 0; k < columns(); ++k) {
+        const std::int32_t i = index[static_cast<std::size_t>(k)] = k * n + e;
+        aim(map_.fan.elevation_rad[static_cast<std::size_t>(e)], k, at(i));
+        at(i).next = e + 1 < n ? i + 1 : -1;
+      }
+      follow(index);
+    }
+  }
+
+  /// Whether an interval needs a look at its middle; what is left undecided becomes an edge.
+  void consider(std::int32_t below, std::int32_t above, int column, int depth, std::vector<Interval>& list) {
+    Chain &a = at(below), &b = at(above);
+    const bool same = a.meets_the_same(b);
+    bool far_apart = false;
+    for (int stage = 0; same && stage < a.stages(); ++stage)
+      far_apart = far_apart || std::abs(a.range_m[stage] - b.range_m[stage]) > tolerance_m_;
+    if (same && !far_apart) return;
+    if (depth < (same ? deepest : edge_depth)) list.push_back({below, above, column, depth});
+    if (!same || depth >= deepest) a.edge_above = true;
+  }
+
+  void halve_intervals() {
+    std::vector<Interval> halves;
+    std::array<std::int32_t, RayPacket::size> index{};
+    for (std::size_t from = 0; from < open_.size(); from += RayPacket::size) {
+      const std::size_t n = std::min<std::size_t>(RayPacket::size, open_.size() - from);
+      rays_.clear();
+      for (std::size_t i = 0; i < n; ++i) {
+        const Interval& v = open_[from + i];
+        const float middle = 0.5f * (at(v.below).elevation_rad + at(v.above).elevation_rad);
+        index[i] = static_cast<std::int32_t>(samples_.size());
+        samples_.emplace_back();
+        aim(middle, v.column, samples_.back());
+      }
+      follow(index);
+      for (std::size_t i = 0; i < n; ++i) insert(open_[from + i], index[i], halves);
+    }
+    open_ = std::move(halves);
+  }
+  void insert(const Interval& v, std::int32_t middle, std::vector<Interval>& halves) {
+    at(middle).next = v.above;
+    at(v.below).next = middle;
+    at(v.below).edge_above = false;
+    if (lies_between(at(v.below), at(middle), at(v.above))) return;
+    consider(v.below, middle, v.column, v.depth + 1, halves);
+    consider(middle, v.above, v.column, v.depth + 1, halves);
+  }
+  bool lies_between(const Chain& a, const Chain& m, const Chain& b) const {
+    if (!a.meets_the_same(m) || !b.meets_the_same(m)) return false;
+    const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
+    for (int stage = 0; stage < m.stages(); ++stage) {
+      if (m.object[stage] == RayPacket::miss) continue;
+      const float x = 1.0f / (a.inverse_x[stage] + part * (b.inverse_x[stage] - a.inverse_x[stage]));
+      if (std::abs(x / m.forward - m.range_m[stage]) > tolerance_m_) return false;
+    }
+    return true;
+  }
+
+  void draw(int k) {
+    const BounceFan& fan = map_.fan;
+    int bin = 0;
+    for (std::int32_t i = k * elevations(); at(i).next >= 0; i = at(i).next) {
+      const Chain &a = at(i), &b = at(at(i).next);
+      const float top = (b.tangent - fan.first_tangent) * fan.bins_per_tangent;
+      const int end = b.next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
+      for (; bin <= end; ++bin) {
+        const float tangent = fan.first_tangent + static_cast<float>(bin) / fan.bins_per_tangent;
+        draw_node(a, b, std::clamp((tangent - a.tangent) / (b.tangent - a.tangent), 0.0f, 1.0f), first_ + k, bin);
+      }
+    }
+  }
+  /// Linear between hits of one chain of surfaces; across edges the farther surface of the nearer chain of mirrors.
+  void draw_node(const Chain& a, const Chain& b, float part, int column, int bin) {
+    const std::size_t node =
+        static_cast<std::size_t>(column) * static_cast<std::size_t>(map_.fan.bins + 1) + static_cast<std::size_t>(bin);
+    const Chain& nearer = part < 0.5f ? a : b;
+    bool same_way = true;
+    for (std::size_t stage = 0; stage < 3; ++stage) {
+      float seen = nearer.inverse_x[stage];
+      if (same_way)
+        seen = a.edge_above ? std::min(a.inverse_x[stage], b.inverse_x[stage])
+                            : std::max(0.0f, a.inverse_x[stage] + part * (b.inverse_x[stage] - a.inverse_x[stage]));
+      map_.inverse_x[stage][node] = seen;
+      if (stage == 2) break;
+      map_.mirror[stage][node] = nearer.mirror[stage];
+      same_way = same_way && a.mirror[stage] == b.mirror[stage];
+    }
+  }
+
+  ChainTracer& rays_;
+  const PingPlan& plan_;
+  BounceMap& map_;
+  float far_m_, tolerance_m_;
+  int first_, last_;
+  std::vector<Chain> samples_;
+  std::vector<Interval> open_;
+};
+
+/// Which part of columns [first, last) of the map each way owns.
+void widen_windows(const BounceMap& map, int first, int last, std::vector<LegWindow>& windows) {
+  const int row = map.fan.bins + 1;
+  const auto number = [](std::uint8_t mirror) { return mirror == BounceMap::no_mirror ? -1 : static_cast<int>(mirror); };
+  for (int k = first; k < last; ++k)
+    for (int bin = 0; bin < row; ++bin) {
+      const auto node = static_cast<std::size_t>(k) * static_cast<std::size_t>(row) + static_cast<std::size_t>(bin);
+      const int a = number(map.mirror[0][node]), b = number(map.mirror[1][node]);
+      if (a < 0) continue;
+      for (const int second : {-1, b}) {
+        LegWindow& w = windows[BounceMap::index(a, second)];
+        w.first_column = std::min(w.first_column, k), w.last_column = std::max(w.last_column, k);
+        w.first_bin = std::min(w.first_bin, bin), w.last_bin = std::max(w.last_bin, bin);
+      }
+    }
+}
+
+}  // namespace
+
+BounceFan make_bounce_fan(const PingPlan& plan) {
+  BounceFan fan;
+  fan.half_angle_rad = plan.fan.half_angle_rad;
+  if (plan.mode.pattern.elevation_taper != Taper::unit)
+    fan.half_angle_rad = std::max(fan.half_angle_rad, std::min(elevation_reach_rad(plan.mode.pattern, fan_edge_two_way), 1.4));
+  const double tangent = std::tan(fan.half_angle_rad);
+  fan.bins_per_tangent = plan.fan.bins_per_tangent;
+  fan.bins = static_cast<int>(std::ceil(2 * tangent * static_cast<double>(fan.bins_per_tangent)));
+  fan.first_tangent = static_cast<float>(-tangent);
+  const double step = 2 * plan.fan.half_angle_rad / static_cast<double>(plan.fan.elevation_rad.size());
+  const int n = static_cast<int>(std::ceil(2 * fan.half_angle_rad / step)) + 1;
+  for (int e = 0; e < n; ++e) {
+    const double nudge = e == 0 || e == n - 1 ? 0 : 0.0137;  // off the edges between triangles, as in make_plan
+    fan.elevation_rad.push_back(static_cast<float>(fan.half_angle_rad * (2 * (e + nudge) / (n - 1) - 1)));
+  }
+  return fan;
+}
+
+std::size_t trace_bounces(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, const FlatFaces& faces,
+                          const std::vector<FlatMirror>& mirrors, Parallel& pool, BounceMap& map) {
+  map.fan = make_bounce_fan(plan);
+  map.columns = plan.columns.count;
+  const auto nodes = static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.fan.bins + 1);
+  for (auto& m : map.inverse_x) m.resize(nodes);
+  for (auto& m : map.mirror) m.resize(nodes);
+  const auto groups = static_cast<std::size_t>((map.columns + RayPacket::size - 1) / RayPacket::size);
+  std::vector<std::vector<LegWindow>> windows(groups);
+  std::vector<std::size_t> traced(groups);
+  pool.for_each(groups, [&](std::size_t g, int) {
+    ChainTracer rays(scene, scalars, faces, mirrors);
+    const int first = static_cast<int>(g) * RayPacket::size, last = std::min(first + RayPacket::size, map.columns);
+    ColumnsTracer(rays, plan, static_cast<float>(2 * scalars.max_range_m), first, last, map).run();
+    windows[g].resize(map.window.size());
+    widen_windows(map, first, last, windows[g]);
+    traced[g] = rays.traced;
+  });
+  map.window.fill({});
+  std::size_t sum = 0;
+  for (std::size_t g = 0; g < groups; ++g) {
+    sum += traced[g];
+    for (std::size_t i = 0; i < map.window.size(); ++i) {
+      LegWindow& w = map.window[i];
+      const LegWindow& part = windows[g][i];
+      w.first_column = std::min(w.first_column, part.first_column), w.last_column = std::max(w.last_column, part.last_column);
+      w.first_bin = std::min(w.first_bin, part.first_bin), w.last_bin = std::max(w.last_bin, part.last_bin);
+    }
+  }
+  return sum;
+}
+
+bool reaches(const RayScene& scene, const PingScalars& scalars, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors,
+             const Leg& leg, Vec3d place) {
+  const Vec3d image = leg.image_of(place);
+  const double range = length(image);
+  ChainTracer ray(scene, scalars, faces, mirrors);
+  ray.add(to_float((1 / range) * image), static_cast<float>(range * 0.9999));
+  for (const int wanted : {leg.first, leg.second}) {
+    ray.go(1u, false);
+    if (wanted < 0) return ray.packet.object[0] == RayPacket::miss;
+    if (ray.bounce(0) != static_cast<std::uint8_t>(wanted)) return false;
+  }
+  ray.go(1u, false);
+  return ray.packet.object[0] == RayPacket::miss;
+}
+
+}  // namespace sonar

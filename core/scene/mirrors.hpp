@@ -1,0 +1,35 @@
+// The flat faces of a scene, big enough to be mirrors for sound: sides of boxes and tanks, planes, the still sea surface.
+// Found once per scene from the triangles; the pipeline decides from frequency and material which of them mirror.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+
+/// Coplanar triangles of one object and one material: the points with dot(normal, p) = offset_m, object coordinates.
+struct FlatFace {
+  int object = 0, material = 0;
+  Vec3d normal;  // unit, either side
+  double offset_m = 0;
+  double area_m2 = 0;
+};
+
+struct FlatFaces {
+  std::vector<FlatFace> faces;  // largest first
+  /// [object][triangle]: index into `faces`, or -1. Empty for an object without any.
+  std::vector<std::vector<std::int32_t>> of_triangle;
+
+  int face_of(std::uint32_t object, std::uint32_t triangle) const {
+    const auto& of = of_triangle[object];
+    return of.empty() ? -1 : of[triangle];
+  }
+};
+
+/// Faces of at least 0.05 m^2 that are nowhere narrow and that do not curve on into their neighbours, as the facets of a round
+/// wall do. Materials that reflect less than `least_reflection` are passed over.
+FlatFaces find_flat_faces(const Scene& scene, double least_reflection);
+
+}  // namespace sonar

@@ -1,0 +1,207 @@
+// Ghosts of surfaces: the cells of what stands before a mirror, against closed forms and against scenes built from the images.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/scene/mirrors.hpp"
+#include "core/scene/primitives.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+#include "tests/oracles/record.hpp"
+
+namespace sonar::test {
+namespace {
+
+constexpr double silent_db = -80;
+
+Mesh sheet(double length_x_m, double length_y_m) {
+  return height_field(-length_x_m / 2, length_x_m / 2, -length_y_m / 2, length_y_m / 2, 5, [](double, double) { return 0.0; });
+}
+std::shared_ptr<Scene> with_mirrors(const SceneMaker& maker, std::size_t count, float reflection = -1) {
+  auto scene = std::make_shared<Scene>(*maker.make());
+  for (std::size_t m = 0; m < scene->materials.size(); ++m) {
+    scene->materials[m].reflection = m < count ? reflection : 0.0f;
+    scene->materials[m].roughness_m = 0;
+  }
+  return scene;
+}
+
+/// Sum of |s|^2 over beams [from, to) and the rows of a stretch of range.
+double energy(const Sounding& s, double from_m, double to_m, int first_beam, int last_beam) {
+  double sum = 0;
+  for (int n = static_cast<int>(s.row_of_range(from_m)); n <= static_cast<int>(s.row_of_range(to_m)); ++n)
+    for (int j = first_beam; j < last_beam; ++j) sum += s.power(n, j);
+  return sum;
+}
+
+TEST(MultipathCells, LevelOfTheGhostsOfALambertSphere) {
+  // A Lambert sphere seen by one way and lit by another, an angle b apart: (sin b + (pi - b) cos b) / pi of what it sends
+  // straight back. Amplitudes of the two ways round add.
+  const double sonar_depth = 1, depth = 1.5, distance = 8, radius = 0.04;
+  Sounding s(with_mirrors(SceneMaker().add(sheet(40, 40), silent_db).add(sphere(radius, 5), -20, {distance, 0, -depth}), 1),
+             silent(without_elevation_pattern(p900())), native_rows(12, 0.0254));
+  s.request.sonar_in_world.position_m = {0, 0, -sonar_depth};
+  s.request.switches.multipath = true;
+  s.request.switches.expected_power = true;
+  s.ping();
+  const double r = std::hypot(distance, depth - sonar_depth), mirrored = std::hypot(distance, depth + sonar_depth);
+  const auto energy_at = [&](double range) { return energy(s, range - 0.08, range + 0.08, 200, 312); };
+  const double apart = std::atan2(depth + sonar_depth, distance) - std::atan2(sonar_depth - depth, distance);
+  const double phase = (std::sin(apart) + (pi - apart) * std::cos(apart)) / pi;
+  const double direct = energy_at(r);
+  record_oracle(39, "ghost one way of a Lambert sphere over its direct echo, energy",
+                20 * std::log10(2 * r / mirrored) + 10 * std::log10(phase),
+                10 * std::log10(energy_at(0.5 * (r + mirrored)) / direct), 0.3, "dB");
+  record_oracle(39, "ghost both ways of a Lambert sphere over its direct echo, energy", 40 * std::log10(r / mirrored),
+                10 * std::log10(energy_at(mirrored) / direct), 0.3, "dB");
+}
+
+/// Something with corners and slopes, not symmetric in any way.
+SceneMaker& add_things(SceneMaker& maker, double wall_y, bool mirrored) {
+  const double side = mirrored ? -1 : 1;
+  const auto at = [&](double x, double y, double z) { return Vec3d{x, wall_y + side * y, z}; };
+  return maker.add(box({0.3, 0.1, 0.2}), -20, at(5, -1.2, 0.1), quat_from_rpy({0, 0, side * 0.5}))
+      .add(sphere(0.25, 4), -20, at(6, -2, -0.3))
+      .add(box({0.05, 0.4, 0.4}), -20, at(6.5, -1.4, 0), quat_from_rpy({0, 0, side * -0.2}));
+}
+
+TEST(MultipathCells, ViewInAMirrorIsThatOfTheMirroredScene) {
+  // A baffle hides the things from the sonar, which sees them in a side wall alone: as if they stood behind the wall.
+  const double wall_y = 2.5;
+  SceneMaker real, image;
+  real.add(sheet(40, 40), silent_db, {0, wall_y, 0}, quat_from_rpy({pi / 2, 0, 0}));
+  real.add(box({0.05, 1.5, 3}), silent_db, {2, -0.6, 0});
+  image.add(box({0.05, 1.5, 3}), silent_db, {2, -0.6, 0});
+  Sounding with(with_mirrors(add_things(real, wall_y, false), 1), p900(), native_rows(10, 0.0254));
+  Sounding plain(with_mirrors(add_things(image, wall_y, true), 0), p900(), native_rows(10, 0.0254));
+  for (Sounding* s : {&with, &plain}) {
+    s->request.switches.expected_power = true;
+    s->request.switches.multipath = true;
+    s->ping();
+  }
+  double largest = 0, wrong = 0, whole = 0;
+  for (int n = 0; n < with.rows(); ++n)
+    for (int j = 0; j < with.beams(); ++j) largest = std::max(largest, plain.power(n, j));
+  ASSERT_GT(largest, 0);
+  for (int n = 0; n < with.rows(); ++n)
+    for (int j = 0; j < with.beams(); ++j) {
+      whole += plain.power(n, j);
+      wrong += std::abs(with.power(n, j) - plain.power(n, j));
+    }
+  EXPECT_LT(wrong / whole, 0.08);  // cells are drawn anew in the mirrored objects, and shadows have edges
+  const double level_db = 10 * std::log10(energy(with, 4, 9, 0, 512) / energy(plain, 4, 9, 0, 512));
+  record_oracle(no_number, "energy of what is seen in a mirror alone over that of the mirrored scene", 0, level_db, 0.15, "dB");
+}
+
+TEST(MultipathCells, SpeckleOfTheTwoWaysRoundIsOne) {
+  // A narrow strip right ahead under a still surface: both ways round come from the same bearing and add in amplitude, whatever
+  // speckle the cells draw. Expected power must say the same as the mean over many draws (in power alone it would be 1.8 dB
+  // less).
+  SceneMaker maker;
+  maker.add(sheet(40, 40), silent_db).add(sheet(3, 0.04), -15, {6.5, 0, -1.35}, quat_from_rpy({0, -0.1, 0}));
+  PingSettings settings = native_rows(9, 0.0254);
+  settings.beam_count = 127;
+  Sounding s(with_mirrors(maker, 1), silent(without_elevation_pattern(p900())), settings);
+  s.request.sonar_in_world.position_m = {0, 0, -0.8};
+  s.request.switches.multipath = true;
+  const auto heard = [&] { return s.ping(), energy(s, 5, 8.6, 60, 67); };
+  s.request.switches.expected_power = true;
+  const double expected = heard();
+  s.request.switches.multipath = false;
+  EXPECT_GT(expected, 3 * heard());
+  s.request.switches.multipath = true;
+  s.request.switches.expected_power = false;
+  double mean = 0;
+  constexpr int draws = 40;
+  for (int draw = 0; draw < draws; ++draw) {
+    s.request.seed = Seed{static_cast<std::uint64_t>(draw) + 1};
+    mean += heard() / draws;
+  }
+  record_oracle(no_number, "coherent pairs of ghosts, mean over speckle against expected power", 0,
+                10 * std::log10(mean / expected), 0.3, "dB");
+}
+
+/// Six smooth walls, two things.
+std::shared_ptr<const Scene> tank() {
+  SceneMaker maker;
+  maker.add(make_box({6, 5, 3}, 5), -25).add(sphere(0.3, 4), -20, {1.5, 0.4, 0.2}).add(box({0.2, 0.3, 0.4}), -20, {1, -1, -0.6});
+  auto scene = with_mirrors(maker, 1, 0.7f);
+  scene->materials[0].roughness_m = 5e-5f;
+  return scene;
+}
+
+TEST(MultipathCells, SameBytesForAnyNumberOfThreads) {
+  std::vector<std::byte> samples[2];
+  std::vector<float> pressure[2];
+  for (const int threads : {1, 2}) {
+    Sounding s(tank(), p900(), default_rows(10, 360), {.threads = threads, .engine = {}});
+    s.request.switches.multipath = true;
+    s.request.switches.noise = true;
+    s.ping_from({-2, 0.3, 0.1});
+    const Ping& again = s.ping();
+    samples[threads - 1] = again.samples;
+    pressure[threads - 1] = again.pressure_upa;
+  }
+  EXPECT_EQ(samples[0], samples[1]);
+  EXPECT_EQ(pressure[0], pressure[1]);
+}
+
+TEST(MultipathCells, ATankRingsOnBehindItsWalls) {
+  Sounding on(tank(), p900(), default_rows(12, 400)), off(tank(), p900(), default_rows(12, 400));
+  on.request.switches.multipath = true;
+  for (Sounding* s : {&on, &off}) s->ping_from({-2, 0.3, 0.1});
+  // Beyond the farthest corner, 6.1 m away, nothing comes back but by way of the walls.
+  EXPECT_EQ(energy(off, 7, 11.5, 0, 512), 0);
+  EXPECT_GT(energy(on, 7, 11.5, 0, 512), 1e-4 * energy(on, 2, 6, 0, 512));
+  for (int n = 0; n < on.rows(); ++n)
+    for (int j = 0; j < on.beams(); ++j) ASSERT_TRUE(std::isfinite(on.pressure(n, j)));
+}
+
+TEST(MultipathCells, MovingMirrorsAreFoundWhereTheyAre) {
+  // The wall is a moving body: its ghosts follow.
+  SceneMaker maker;
+  maker.add_body(sheet(20, 20), silent_db, {{0, 3, 0}, quat_from_rpy({pi / 2, 0, 0})}).add_point({8, 1, 0}, -20);
+  Sounding s(with_mirrors(maker, 1), p900(), native_rows(12, 0.0254));
+  s.request.switches.multipath = true;
+  for (const double wall_y : {3.0, 2.2}) {
+    s.request.bodies_in_world = {{{0, wall_y, 0}, quat_from_rpy({pi / 2, 0, 0})}};
+    s.ping();
+    const double y = 2 * wall_y - 1, range = std::hypot(8, y);
+    // In the beam that looks at the image the way back alone is by the mirror, or both are: the former is louder.
+    const double by_one = 0.5 * (range + std::hypot(8, 1));
+    EXPECT_NEAR(s.loudest_row(s.beam_at(std::atan2(y, 8))), s.row_of_range(by_one), 1) << wall_y;
+  }
+}
+
+std::vector<FlatFace> faces_of(Mesh mesh) {
+  return find_flat_faces(*SceneMaker().add(std::move(mesh), -20, {3, -2, 1}, quat_from_rpy({0.3, 0.2, 1})).make(), 0.05).faces;
+}
+
+TEST(FlatFaces, SidesOfBoxesAndSheetsAreFaces) {
+  const std::vector<FlatFace> box_faces = faces_of(make_box({2, 1, 0.5}, 0.3));
+  ASSERT_EQ(box_faces.size(), 6u);
+  EXPECT_NEAR(box_faces[0].area_m2, 2, 1e-4);
+  EXPECT_NEAR(std::abs(box_faces[0].normal.z), 1, 1e-6);
+  EXPECT_NEAR(std::abs(box_faces[0].offset_m), 0.25, 1e-5);
+  EXPECT_NEAR(box_faces[5].area_m2, 0.5, 1e-4);
+  EXPECT_EQ(faces_of(make_plane(100, 60, 1)).size(), 1u);
+  const Mesh tilted = height_field(-3, 3, -3, 3, 0.1, [](double x, double y) { return 0.3712 * x - 0.1234 * y; });
+  ASSERT_EQ(faces_of(tilted).size(), 1u);
+  EXPECT_NEAR(faces_of(tilted)[0].area_m2, 36 * std::sqrt(1 + 0.3712 * 0.3712 + 0.1234 * 0.1234), 0.01);
+}
+
+TEST(FlatFaces, CurvedAndNarrowThingsHaveNone) {
+  EXPECT_TRUE(faces_of(make_sphere(1, 64)).empty());
+  EXPECT_TRUE(faces_of(height_field(-5, 5, -5, 5, 0.5, rough_relief(0.05, 32))).empty());
+  EXPECT_TRUE(faces_of(make_box({4, 0.05, 0.05}, 1)).empty());
+  EXPECT_EQ(faces_of(make_cylinder(1.17, 1.22, segments_for(1.17), Caps::bottom)).size(), 1u);  // a round tank: its floor alone
+}
+
+TEST(FlatFaces, WhatHardlyReflectsIsNoFace) {
+  auto scene = std::make_shared<Scene>(*SceneMaker().add(make_box({2, 2, 2}, 1), -20).make());
+  scene->materials[0].reflection = 0.04f;
+  EXPECT_TRUE(find_flat_faces(*scene, 0.05).faces.empty());
+}
+
+}  // namespace
+}  // namespace sonar::test
