@@ -13,19 +13,33 @@
 
 namespace sonar {
 
+/// Options of the engine and the model, the same for every command that pings. Empty = as the configuration says.
+struct EngineOptionsGiven {
+  std::string simd, mode;
+  std::optional<int> threads;
+  std::optional<std::uint64_t> seed;
+  std::optional<int> fixed_fan;
+  bool expected_power = false;                              // false: as the configuration says
+  std::array<std::string, named_switches.size()> switches;  // "on", "off", in the order of named_switches
+};
 struct RunCommand {
   std::string config;  // empty = search
   bool demo = false;
   std::uint64_t exit_after_pings = 0;
   bool digest = false;
   // Empty = as the configuration says.
-  std::string clock, simd, log_format, log_level, bind;
-  std::optional<int> threads;
-  std::optional<std::uint64_t> seed;
-  std::optional<int> fixed_fan;
-  bool expected_power = false;                              // false: as the configuration says
-  std::array<std::string, named_switches.size()> switches;  // "on", "off", in the order of named_switches
-  std::string mode;
+  std::string clock, log_format, log_level, bind;
+  EngineOptionsGiven engine;
+};
+struct RenderCommand {
+  std::string config;  // may be empty for the coverage report
+  std::string out;
+  std::optional<std::uint64_t> pings;  // nothing: one, or one for every line of a file of poses
+  std::vector<std::string> formats{"npy", "png"};
+  std::string sonar, poses, pose_frame, report, device = "cpu";
+  std::optional<double> rate_hz;
+  bool complex = false, quiet = false, overwrite = false, check_expectations = false;
+  EngineOptionsGiven engine;
 };
 struct CheckCommand {
   std::string config;
@@ -36,10 +50,11 @@ struct BenchCommand {
 struct Leave {  // help, version or a usage error, already printed
   int exit_code = 0;
 };
-using Command = std::variant<RunCommand, CheckCommand, BenchCommand, Leave>;
+using Command = std::variant<RunCommand, CheckCommand, RenderCommand, BenchCommand, Leave>;
 
 Command parse_command_line(int argc, char** argv);
 /// What was given on the command line, or stands for it in the environment, wins over the file.
 Result<void> override_config(Config& config, const RunCommand& command);
+void override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given);
 
 }  // namespace sonar

@@ -12,6 +12,7 @@
 #include "daemon/banner.hpp"
 #include "daemon/bench.hpp"
 #include "daemon/command_line.hpp"
+#include "daemon/render/render_command.hpp"
 
 namespace sonar {
 namespace {
@@ -112,6 +113,7 @@ int main(int argc, char** argv) {
     const sonar::Command command = sonar::parse_command_line(argc, argv);
     if (const auto* leave = std::get_if<sonar::Leave>(&command)) return leave->exit_code;
     if (const auto* check = std::get_if<sonar::CheckCommand>(&command)) return sonar::check(*check);
+    if (const auto* render = std::get_if<sonar::RenderCommand>(&command)) return sonar::render::run_render(*render);
     if (const auto* bench = std::get_if<sonar::BenchCommand>(&command)) return sonar::bench(*bench);
     return sonar::run(std::get<sonar::RunCommand>(command), begin);
   } catch (const std::bad_alloc&) {

@@ -1,0 +1,31 @@
+// How well a rendered bed is filled: every bin of a flat bed in expected power against the closed form of its level
+// (docs/acoustics.md, section 3), with the beams' patterns. The command's --report coverage, and a measure of expectations.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/render/render_job.hpp"
+
+namespace sonar::render {
+
+struct Coverage {
+  std::size_t bins = 0, good = 0;  // good: within 1 dB
+  double worst_db = 0;             // signed, of the bin farthest off
+  double mean_db = 0;              // of all bins' powers over their closed form
+  double percent() const { return bins == 0 ? 0 : 100.0 * static_cast<double>(good) / static_cast<double>(bins); }
+};
+
+/// The job with only what the closed form knows: expected power, no noise, mirrors, texture, volume or motion.
+RenderJob with_bed_only(RenderJob job);
+
+/// The ping must be of with_bed_only(job). Bins count from where the whole pulse lies on the bed, where the two-way pattern is
+/// above -20 dB. Errors: no level plane below the sonar, a sonar that rolls, flat beams.
+Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
+
+/// Every mode of every product over a level bed: at its stored range, or its longest if that is shorter, a fifth of the range
+/// above the bed and 0.25 rad nose down.
+std::vector<RenderJob> shipped_sonars_over_a_bed();
+
+}  // namespace sonar::render

@@ -1,0 +1,22 @@
+// Small formulas in render files: what a swept value makes of the scene, and what an expectation should come to.
+// + - * / ^, parentheses, pi, named values, and log10 ln exp sqrt abs sin cos tan asin acos atan deg rad.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+
+namespace sonar::render {
+
+using Values = std::map<std::string, double, std::less<>>;
+
+/// Angles in radians; deg() and rad() convert. A sentence for what cannot be read or is not a finite number.
+Result<double> evaluate(std::string_view formula, const Values& values);
+
+/// The text with every $name and $(formula) replaced by its number. Errors start with `name`:line.
+Result<std::string> substitute(std::string_view text, const Values& values, const std::string& name);
+
+}  // namespace sonar::render

@@ -1,0 +1,146 @@
+#include "daemon/render/render_command.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <stdexcept>
+#include <thread>
+
+#include "core/paper/paper_engine.hpp"
+#include "daemon/render/coverage.hpp"
+#include "daemon/render/render_pings.hpp"
+#include "daemon/start_engine.hpp"
+
+namespace sonar::render {
+namespace {
+
+constexpr int not_as_expected = 1;
+
+int complain(const Error& error) {
+  std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
+  return exit_code(error.kind);
+}
+
+int threads_of(const EngineConfig& engine) {
+  return engine.threads > 0 ? engine.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+/// A bar on a terminal, a line a second elsewhere.
+class ProgressLine {
+ public:
+  explicit ProgressLine(bool quiet) : quiet_(quiet) {}
+
+  void tell(const Progress& p) {
+    const auto now = Clock::now();
+    const bool last = p.done == p.all;
+    if (quiet_ || (!last && now - told_ < (terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(1000)))) return;
+    told_ = now;
+    const double taken_s = std::chrono::duration<double>(now - begin_).count();
+    const double rate = static_cast<double>(p.done - p.kept) / std::max(taken_s, 1e-3);
+    std::string bar;
+    if (terminal_) {
+      constexpr std::uint64_t width = 30;
+      const auto full = static_cast<std::size_t>(width * p.done / std::max<std::uint64_t>(p.all, 1));
+      bar = "\r[" + std::string(full, '#') + std::string(width - full, ' ') + "] ";
+    }
+    const std::string kept = p.kept > 0 ? ", " + std::to_string(p.kept) + " were there already" : "";
+    std::fprintf(stderr, "%s%llu of %llu pings, %.1f a second%s%s", bar.c_str(), static_cast<unsigned long long>(p.done),
+                 static_cast<unsigned long long>(p.all), rate, kept.c_str(), terminal_ && !last ? "" : "\n");
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  bool quiet_, terminal_ = ::isatty(STDERR_FILENO) == 1;
+  Clock::time_point begin_ = Clock::now(), told_ = begin_;
+};
+
+Result<RenderInput> input_of(const RenderCommand& command) {
+  auto input = load_render_input(command.config, command.sonar);
+  if (!input) return input;
+  for (RenderJob& job : input->jobs) override_engine(job.engine, job.seed, command.engine);
+  if (!command.poses.empty()) {
+    auto poses = load_poses(command.poses, command.pose_frame == "NED_FRD" ? PoseFrame::ned_frd : PoseFrame::enu_flu);
+    if (!poses) return tl::make_unexpected(poses.error());
+    for (RenderJob& job : input->jobs) job.path.poses = *poses;
+  }
+  return input;
+}
+
+Result<Coverage> coverage_of(const RenderJob& given, Parallel& pool) {
+  const RenderJob job = with_bed_only(given);
+  const auto make = [&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, {.simd = job.engine.simd}); };
+  const auto engine = start_engine(make, job.scene);
+  if (!engine) return tl::make_unexpected(engine.error());
+  PingRequest request = make_request(job, PingNumber{1}, 0);
+  request.switches.keep_pressure = true;
+  try {
+    return measure_coverage(job, (*engine)->run({&request, 1}).at(0));
+  } catch (const std::invalid_argument& refused) {
+    return failure(ErrorKind::config, job.name + ": " + refused.what());
+  }
+}
+
+int report_coverage(const std::vector<RenderJob>& jobs) {
+  Parallel pool(threads_of(jobs.front().engine));
+  std::printf("%-32s %5s %8s %6s %9s %9s %9s %9s\n", "sonar", "beams", "range m", "rows", "bins", "within 1dB", "worst dB",
+              "mean dB");
+  for (const RenderJob& job : jobs) {
+    const auto c = coverage_of(job, pool);
+    if (!c) return complain(c.error());
+    std::printf("%-32s %5d %8.2f %6d %9zu %8.3f %% %+9.2f %+9.3f\n", job.name.c_str(), job.settings.beam_count,
+                job.settings.range_m, job.settings.range_bin_count, c->bins, c->percent(), c->worst_db, c->mean_db);
+    std::fflush(stdout);
+  }
+  return 0;
+}
+
+int check(const RenderInput& input) {
+  if (input.jobs.front().expectations.empty())
+    return complain({ErrorKind::config, input.source + " expects nothing: it has no expect: list"});
+  const auto verdicts = check_expectations(input.source, input.jobs, threads_of(input.jobs.front().engine));
+  if (!verdicts) return complain(verdicts.error());
+  bool all_met = true;
+  for (const Verdict& v : *verdicts) {
+    all_met &= v.met;
+    std::printf("%s %s\n", v.met ? "as expected " : "NOT AS EXPECTED", v.sentence().c_str());
+  }
+  return all_met ? 0 : not_as_expected;
+}
+
+OutputOptions output_options(const RenderCommand& command) {
+  const auto wanted = [&](const char* format) {
+    return std::find(command.formats.begin(), command.formats.end(), format) != command.formats.end();
+  };
+  OutputOptions options;
+  options.folder = command.out;
+  options.npy = wanted("npy");
+  options.png = wanted("png");
+  options.raw = wanted("raw");
+  options.complex = command.complex;
+  options.overwrite = command.overwrite;
+  options.pings = command.pings;
+  options.rate_hz = command.rate_hz;
+  return options;
+}
+
+}  // namespace
+
+int run_render(const RenderCommand& command) {
+  if (command.config.empty()) {
+    std::vector<RenderJob> jobs = shipped_sonars_over_a_bed();
+    for (RenderJob& job : jobs) override_engine(job.engine, job.seed, command.engine);
+    return report_coverage(jobs);
+  }
+  const auto input = input_of(command);
+  if (!input) return complain(input.error());
+  if (!command.report.empty()) return report_coverage(input->jobs);
+  if (command.check_expectations) return check(*input);
+  ProgressLine line(command.quiet);
+  Parallel pool(threads_of(input->jobs.front().engine));
+  const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.tell(p); });
+  return done ? 0 : complain(done.error());
+}
+
+}  // namespace sonar::render

@@ -1,0 +1,34 @@
+#include "daemon/render/render_job.hpp"
+
+namespace sonar::render {
+
+PingSettings device_settings(const protocol::Profile& profile, const protocol::OptionValues& options, const Water& water,
+                             double depth_m) {
+  protocol::DeviceState device;
+  device.name = profile.model->name;
+  device.id = 1;
+  device.model = profile.model;
+  device.water = water;
+  device.depth_m = depth_m;
+  device.options = options;
+  return profile.vendor->initial_settings(device).settings;
+}
+
+PingRequest make_request(const RenderJob& job, PingNumber number, double time_s) {
+  PingRequest request;
+  request.model = job.model;
+  request.number = number;
+  request.fired_at = Time{} + nanoseconds_from(time_s);
+  request.vehicle_in_world = vehicle_at(job.path, time_s);
+  request.sonar_in_world = compose(request.vehicle_in_world, job.mount);
+  request.sonar_moves = sonar_twist_at(job.path, job.mount, time_s);
+  request.bodies_in_world = job.scene->bodies_in_world;
+  request.water = job.water;
+  request.settings = job.settings;
+  request.sonar_id = job.sonar_id;
+  request.seed = Seed{job.seed};
+  request.switches = job.engine.switches;
+  return request;
+}
+
+}  // namespace sonar::render

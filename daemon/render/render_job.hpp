@@ -1,0 +1,56 @@
+// What `sonard render` renders: one sonar over one scene with its settings and the way it travels; read from a configuration or
+// from a render file (docs/render.md), which may sweep values and say what it expects.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "core/sonar/ping.hpp"
+#include "daemon/config.hpp"
+#include "daemon/render/expectation.hpp"
+#include "daemon/render/formula.hpp"
+#include "daemon/render/vehicle_path.hpp"
+
+namespace sonar::render {
+
+struct RenderJob {
+  std::string name;
+  std::shared_ptr<const Scene> scene;
+  std::shared_ptr<const SonarModel> model;
+  std::string sonar_name;
+  std::uint32_t sonar_id = 0;  // keys the noise, as in the daemon
+  PingSettings settings;
+  Water water;
+  std::uint64_t seed = 1;
+  EngineConfig engine;
+  Pose mount;  // sonar in vehicle
+  VehiclePath path;
+  Values values;  // what the sweep set, and what `let` made of it
+  std::vector<Expectation> expectations;
+
+  const FrequencyMode& mode() const { return model->modes[static_cast<std::size_t>(settings.mode)]; }
+};
+
+struct RenderInput {
+  std::string source;           // the file
+  std::vector<RenderJob> jobs;  // one, or one for every step of the sweep
+  std::string text;             // all that the file and the scene's file say, for the digest of the inputs
+};
+
+/// A configuration (it has `world:`) or a render file. `sonar`: which of a configuration's several sonars.
+Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar = {});
+/// A render file from text; paths in it are relative to `folder`.
+Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder);
+
+/// Everything a ping of the job depends on.
+PingRequest make_request(const RenderJob& job, PingNumber number, double time_s);
+
+/// The settings a device of that profile starts with.
+PingSettings device_settings(const protocol::Profile& profile, const protocol::OptionValues& options, const Water& water,
+                             double depth_m);
+
+}  // namespace sonar::render

@@ -1,0 +1,19 @@
+// What stands beside a rendered ping: every parameter and the ground truth, as JSON; and the digest of the inputs that tells
+// whether a file that is there already is the one wanted.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "core/pipeline/ping_engine.hpp"
+#include "daemon/render/render_job.hpp"
+
+namespace sonar::render {
+
+nlohmann::json sidecar(const RenderJob& job, const Ping& ping, const PingEngine& engine, const std::string& digest);
+
+/// SHA-256 of what the pings depend on: the files' text, the scene as loaded, the sonar, switches, seed, poses and times.
+/// Threads and the number of pings do not count.
+std::string digest_of(const RenderInput& input, double rate_hz);
+
+}  // namespace sonar::render
