@@ -14,7 +14,7 @@ using Shape = Waveform::Shape;
 
 constexpr double gaussian_reach_widths = 3.99;  // p falls to 2e-10 at this many -3 dB widths
 constexpr double gaussian_band_over_b = 2.5;    // P falls to 2e-7 at half of this
-constexpr double band_of_tone = 64;             // in 1 / length: what is cut off holds 1e-4 of P's peak, 6e-4 of p in L2
+constexpr double band_of_tone = 32;             // in 1 / length: what is cut off holds 4e-4 of P's peak, 1e-3 of p in L2
 constexpr double band_of_sweep = 1.5;           // in bandwidths: its fade lets a trace out
 constexpr std::size_t most_samples = 65536;
 constexpr double worth_keeping = 1e-4;       // of a measured pulse's peak, in time and in frequency

@@ -6,7 +6,7 @@
 namespace sonar {
 namespace {
 
-constexpr int kernel_width = 8;
+constexpr int kernel_width = 6;
 
 /// Frequencies to a sample of the period: as many as the pulse's band needs.
 int per_sample(const Pulse& pulse, double sample_time_s) {

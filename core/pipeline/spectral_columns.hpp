@@ -17,7 +17,7 @@ struct SpectralScratch {
 /// The record is taken as one period of a longer one: padded by the pulse's reach on both sides, so that nothing that rings in
 /// from beyond either end comes out at the other. Its frequencies are the multiples of 1 / period inside the pulse's band, and
 /// since the samples are an even fraction of the period apart, folding the spectrum down to that many values makes the inverse
-/// transform land on the samples themselves. Errors: of FrequencySums at width 8, 1e-7.
+/// transform land on the samples themselves. Errors: of FrequencySums at width 6, 1e-5.
 class SpectralColumns {
  public:
   /// `taps`: samples that a pulse may reach, as PingPlan::taps. The pulse must not be real only by luck: see Pulse::is_real.
