@@ -32,6 +32,7 @@ std::shared_ptr<const Scene> read_map(text::Map root, const std::filesystem::pat
   materials.read(root.optional("materials").map());
   read_objects(root.required("objects"), shapes);
   read_sea_surface(root.optional("sea_surface"), shapes);
+  read_other_sonars(root.optional("other_sonars"), *scene);
   read_water_column(root.optional("water_column"), *scene);
   return scene;
 }

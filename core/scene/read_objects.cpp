@@ -1,6 +1,7 @@
 #include "core/scene/read_objects.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "core/scene/primitives.hpp"
@@ -127,6 +128,22 @@ Pose read_pose(const Node& node) { return node.present() ? pose_from(node.map())
 void read_objects(const Node& list, ShapeReader& shapes) {
   ObjectsReader reader(shapes);
   for (const Node& node : list.items(0, max_objects)) reader.read(node);
+}
+
+void read_other_sonars(const Node& list, Scene& scene) {
+  if (!list.present()) return;
+  constexpr std::size_t most = 16;
+  for (const Node& node : list.items(0, most)) {
+    Map keys = node.map();
+    OtherSonar other;
+    other.name = keys.optional("name").text_or("other sonar " + std::to_string(scene.other_sonars.size() + 1), 64);
+    const auto xyz = keys.required("xyz_m").numbers_or<3>({0, 0, 0}, a_place);
+    other.position_m = {xyz[0], xyz[1], xyz[2]};
+    other.level_upa = static_cast<float>(std::pow(10.0, keys.required("level_db").number(Range::between(0, 240)) / 20));
+    other.rate_hz = static_cast<float>(keys.optional("rate_hz").number_or(7, Range::between(0.01, 200)));
+    other.pulse_s = static_cast<float>(1e-3 * keys.optional("pulse_ms").number_or(0.1, Range::between(1e-3, 100)));
+    scene.other_sonars.push_back(std::move(other));
+  }
 }
 
 void read_sea_surface(const Node& node, ShapeReader& shapes) {

@@ -222,6 +222,22 @@ TEST(LoadScene, TheExampleOfTheDocumentationLoads) {
   EXPECT_EQ(scene->objects.size(), 6u);
 }
 
+TEST(LoadScene, OtherSonarsHaveAPlaceALevelAndARhythm) {
+  const auto scene = parsed(
+      "objects: []\nother_sonars:\n  - {name: rov, xyz_m: [9, 2, -3], level_db: 120, rate_hz: 12, pulse_ms: 0.4}\n"
+      "  - {xyz_m: [0, 0, 0], level_db: 60}\n");
+  ASSERT_EQ(scene->other_sonars.size(), 2u);
+  const OtherSonar& rov = scene->other_sonars[0];
+  EXPECT_EQ(rov.name, "rov");
+  EXPECT_EQ(rov.position_m.x, 9);
+  EXPECT_NEAR(rov.level_upa, 1e6f, 1);
+  EXPECT_EQ(rov.rate_hz, 12);
+  EXPECT_NEAR(rov.pulse_s, 4e-4f, 1e-9);
+  EXPECT_EQ(scene->other_sonars[1].name, "other sonar 2");
+  EXPECT_THAT(refusal("objects: []\nother_sonars: [{xyz_m: [0, 0, 0]}]"), HasSubstr("level_db"));
+  EXPECT_THAT(refusal("objects: []\nother_sonars: [{xyz_m: [0, 0, 0], level_db: 60, rate: 3}]"), HasSubstr("rate"));
+}
+
 TEST(LoadScene, AnEmptyListIsAnEmptyScene) { EXPECT_EQ(parsed("objects: []")->objects.size(), 0u); }
 
 TEST(LoadScene, MutationsEndInASceneOrASentence) {
