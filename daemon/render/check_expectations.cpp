@@ -118,7 +118,9 @@ Result<std::vector<Verdict>> check_expectations(const std::string& source, const
     for (std::size_t k = 0; k < steps.size(); ++k) {
       const bool last = k + 1 == steps.size();
       if (e.over != Over::each && !last) continue;
-      const auto expected = evaluate(jobs[k].expectations[i].value, steps[k].values);
+      Values known = steps[k].values;
+      for (const auto& [name, value] : steps.front().values) known["first_" + name] = value;
+      const auto expected = evaluate(jobs[k].expectations[i].value, known);
       if (!expected) return at_place(e, expected.error());
       Verdict v{jobs[k].expectations[i], source, 0, *expected, false};
       v.measured = e.over == Over::each    ? steps[k].measured[i]
