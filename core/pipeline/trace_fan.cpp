@@ -9,6 +9,9 @@ namespace {
 
 constexpr int edge_depth = 4;  // edges are found to 1/16 of a base interval
 constexpr int deepest = 6;     // a surface that still will not interpolate hides itself
+// A surface strays from the straight line between two hits by about a quarter of what its slopes promise; beyond a pulse width of
+// that a middle that happens to lie on the line proves nothing: the rays may fall in step with ripples.
+constexpr float slope_tolerance_in_pulses = 4;
 
 /// An elevation about the array axis, with what is derived from it once.
 struct Elevation {
@@ -106,6 +109,13 @@ class FanTracer {
     sample.object = filler_.packet.object[i];
     sample.range_m = hit ? filler_.packet.far[i] : 0;
     sample.inverse_x = hit ? 1.0f / std::max(sample.range_m * sample.forward, 1e-4f) : 0;
+    sample.normal = {filler_.packet.normal_x[i], filler_.packet.normal_y[i], filler_.packet.normal_z[i]};
+    sample.offset = sample.range_m * dot(sample.normal, direction(lane));
+  }
+
+  Vec3 direction(int lane) const {
+    const auto i = static_cast<std::size_t>(lane);
+    return {filler_.packet.direction_x[i], filler_.packet.direction_y[i], filler_.packet.direction_z[i]};
   }
 
   /// Elevation by elevation, sixteen neighbouring columns a packet: neighbours in a packet lie a fraction of a degree apart.
@@ -175,7 +185,7 @@ class FanTracer {
     at(middle).edge_above = false;
     at(v.below).next = middle;
     at(v.below).edge_above = false;
-    if (lies_between(at(v.below), at(middle), at(v.above))) return;
+    if (lies_between(at(v.below), at(middle), at(v.above)) && slopes_agree(at(v.below), at(v.above), at(middle), lane)) return;
     consider(v.below, middle, v.column, v.depth + 1, s_.halves);
     consider(middle, v.above, v.column, v.depth + 1, s_.halves);
   }
@@ -186,6 +196,14 @@ class FanTracer {
     const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
     const float expected_x = 1.0f / (a.inverse_x + part * (b.inverse_x - a.inverse_x));
     return std::abs(expected_x / m.forward - m.range_m) <= tolerance_m_;
+  }
+
+  /// Whether the planes through the two ends meet the middle's ray about where it hit.
+  bool slopes_agree(const Sample& a, const Sample& b, const Sample& middle, int lane) const {
+    const Vec3 along = direction(lane);
+    const float within = slope_tolerance_in_pulses * tolerance_m_;
+    return std::abs(a.offset / dot(a.normal, along) - middle.range_m) <= within &&
+           std::abs(b.offset / dot(b.normal, along) - middle.range_m) <= within;
   }
 
   /// Linear between hits of one surface, the farther value across edges.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/geometry.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/ping_scalars.hpp"
 #include "core/scene/ray_scene.hpp"
@@ -25,6 +26,8 @@ struct FanScratch {
     std::uint32_t object;
     std::int32_t next;  // the sample above in the same column, -1 = last
     bool edge_above;    // the interval up to `next` hides an edge: do not interpolate
+    Vec3 normal;        // of the facet, any length; the facet's plane is normal . p = offset, p from the sonar in world axes
+    float offset;
   };
   struct Interval {
     std::int32_t below, above;

@@ -107,16 +107,20 @@ std::function<double(double, double)> rough_relief(double rms_height_m, int wave
   };
 }
 
-std::uint16_t SceneMaker::add_material(double lambert_db) {
-  Material material;
+std::uint16_t SceneMaker::add_material(Material material) {
   material.name = "material " + std::to_string(scene_.materials.size());
-  material.lambert_db = static_cast<float>(lambert_db);
-  scene_.materials.push_back(material);
+  scene_.materials.push_back(std::move(material));
   return static_cast<std::uint16_t>(scene_.materials.size() - 1);
 }
 
 SceneMaker& SceneMaker::add(Mesh mesh, double lambert_db, Vec3d position_m, Quatd orientation) {
-  paint(mesh, add_material(lambert_db));
+  Material material;
+  material.lambert_db = static_cast<float>(lambert_db);
+  return add_of(std::move(mesh), material, position_m, orientation);
+}
+
+SceneMaker& SceneMaker::add_of(Mesh mesh, const Material& material, Vec3d position_m, Quatd orientation) {
+  paint(mesh, add_material(material));
   Object object;
   object.name = "object " + std::to_string(scene_.objects.size());
   object.mesh = std::make_shared<const Mesh>(std::move(mesh));

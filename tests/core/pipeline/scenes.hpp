@@ -24,12 +24,13 @@ std::function<double(double, double)> rough_relief(double rms_height_m, int wave
 class SceneMaker {
  public:
   SceneMaker& add(Mesh mesh, double lambert_db, Vec3d position_m = {}, Quatd orientation = {});
+  SceneMaker& add_of(Mesh mesh, const Material& material, Vec3d position_m = {}, Quatd orientation = {});
   SceneMaker& add_body(Mesh mesh, double lambert_db, Pose in_world);  // the next moving body
   SceneMaker& add_point(Vec3d position_m, double target_strength_db);
   std::shared_ptr<const Scene> make() const { return std::make_shared<const Scene>(scene_); }
 
  private:
-  std::uint16_t add_material(double lambert_db);
+  std::uint16_t add_material(Material material);
   Scene scene_;
 };
 
