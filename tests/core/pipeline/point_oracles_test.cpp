@@ -1,6 +1,7 @@
 // Oracles on point targets, through the whole engine: where they appear, how strong, how wide.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -9,6 +10,7 @@
 #include "core/pipeline/arithmetic/waveform.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
+#include "tests/oracles/record.hpp"
 
 namespace sonar::test {
 namespace {
@@ -53,8 +55,9 @@ TEST(PointOracles, Oracle01_RangeOfAPoint) {
     for (const double r : ranges) {
       const double row = s.row_of_range(r);
       const Peak peak = peak_near(s, row, settings.beam_count / 2);
-      EXPECT_NEAR(peak.offset, row, 0.1) << r;
-      EXPECT_NEAR(loudest_near(s, row, settings.beam_count / 2), row, 0.5 + 0.01) << r;  // the sample that holds the range
+      record_oracle(1, "peak by log-parabola, off its range", 0, peak.offset - row, 0.1, "rows");
+      // The sample that holds the range: half a row is where two samples are equally loud.
+      record_oracle(1, "loudest row, off its range", 0, loudest_near(s, row, settings.beam_count / 2) - row, 0.5 + 0.01, "rows");
     }
   }
 }
@@ -68,7 +71,7 @@ TEST(PointOracles, Oracle02_SoundSpeedMismatchScalesRange) {
     s.ping();
     for (const double r : {4.0, 9.0}) {
       const Peak peak = peak_near(s, s.row_of_range(r * 1500 / c), 256);
-      EXPECT_NEAR(s.range_of_row(peak.offset) / r / (1500 / c), 1, 1e-3) << c;
+      record_oracle(2, "seen over true range, over c_dev / c", 1, s.range_of_row(peak.offset) / r / (1500 / c), 1e-3, "");
     }
   }
 }
@@ -88,7 +91,7 @@ TEST(PointOracles, Oracle03_LevelOfAPoint) {
       const double alpha = 8.685889638 * s.medium().absorption_np_per_m;
       const double expected = static_cast<double>(c.mode.source_level_db) - 40 * std::log10(r) - 2 * alpha * r - 15;
       const Peak peak = peak_near(s, s.row_of_range(r), 256);
-      EXPECT_NEAR(20 * std::log10(peak.height), expected, 0.1) << c.mode.name << " " << r;
+      record_oracle(3, "peak over SL - 40 log r - 2 alpha r + TS", 0, 20 * std::log10(peak.height) - expected, 0.1, "dB");
     }
   }
 }
@@ -121,7 +124,7 @@ TEST(PointOracles, Oracle04_SlopeOfAPointWithoutAbsorption) {
   s.ping();
   for (const double l : log_r) level.push_back(20 * std::log10(peak_near(s, s.row_of_range(std::pow(10, l)), 256).height));
   for (std::size_t i = 1; i < level.size(); ++i) {
-    EXPECT_NEAR((level[i] - level[0]) / (log_r[i] - log_r[0]), -40, 0.2) << std::pow(10, log_r[i]);
+    record_oracle(4, "slope from 2 m", -40, (level[i] - level[0]) / (log_r[i] - log_r[0]), 0.2, "dB/decade");
   }
 }
 
@@ -141,7 +144,7 @@ TEST(PointOracles, Oracle14_WidthOfAPointAcrossBeams) {
       const double a = s.pressure(row, j), b = s.pressure(row, j + step), part = (a - half) / (a - b);
       return std::asin(s.beam_sine(j)) * (1 - part) + std::asin(s.beam_sine(j + step)) * part;
     };
-    EXPECT_NEAR((crossing(-1) - crossing(1)) / width, 1, 0.02) << mode.name;
+    record_oracle(14, "width across beams over the data sheet's", 1, (crossing(-1) - crossing(1)) / width, 0.02, "");
   }
 }
 
@@ -157,7 +160,7 @@ TEST(PointOracles, Oracle15_SideLobesOfAPointAcrossBeams) {
   for (int j = 0; j < s.beams(); ++j) {
     if (std::abs(s.beam_sine(j)) > 1.3 * width) highest = std::max(highest, s.pressure(row, j));  // beyond the first null
   }
-  EXPECT_NEAR(20 * std::log10(highest / s.pressure(row, top)), -30.3, 0.5);
+  record_oracle(15, "of a point across beams, Taylor", -30.3, 20 * std::log10(highest / s.pressure(row, top)), 0.5, "dB");
 }
 
 TEST(PointOracles, Oracle17_WidthOfAPointInRange) {
@@ -176,7 +179,7 @@ TEST(PointOracles, Oracle17_WidthOfAPointInRange) {
       const double a = s.pressure(n, 256), b = s.pressure(n + step, 256);
       return s.range_of_row(n + step * (a - half) / (a - b));
     };
-    EXPECT_NEAR((crossing(1) - crossing(-1)) / width, 1, 0.02) << width;
+    record_oracle(17, "width of a point over the pulse's", 1, (crossing(1) - crossing(-1)) / width, 0.02, "");
   }
 }
 
@@ -205,7 +208,7 @@ TEST(PointOracles, Oracle42_TvgFlattensAPoint) {
     for (const int row : rows) {
       const std::size_t i = 2 * (static_cast<std::size_t>(row) * 512 + 256);
       const int code = std::to_integer<int>(ping.samples[i]) + 256 * std::to_integer<int>(ping.samples[i + 1]);
-      EXPECT_NEAR(20 * std::log10(code / expected), 0, 0.2) << s.range_of_row(row);
+      record_oracle(42, "samples of points at 1 m to the greatest range, X = 40", 0, 20 * std::log10(code / expected), 0.2, "dB");
     }
   }
 }
@@ -215,13 +218,14 @@ TEST(PointOracles, Oracle43_EchoesBeyondTheRecordDoNotWrap) {
   Sounding s(SceneMaker().add_point(at(13, 0), 20).add_point(at(10.5, 0.2), 20).add_point(at(20, 0), 20).make(), p900(),
              settings);
   s.ping();
-  for (const float p : s.last().pressure_upa) ASSERT_EQ(p, 0.0f);
+  const auto loudest = [](const Ping& ping) { return static_cast<double>(*std::ranges::max_element(ping.pressure_upa)); };
+  record_oracle(43, "points at 1.05 to 2 R_max: greatest sample", 0, loudest(s.last()), 0, "uPa");
   // A surface out there does no harm either, with one ray a scatterer or with cells.
   for (const int fan : {0, 64}) {
     Sounding w(SceneMaker().add(wall(20, 20), -10, {13, 0, 0}).make(), p900(), settings);
     w.request.switches.fixed_fan = fan;
     w.ping();
-    for (const float p : w.last().pressure_upa) ASSERT_EQ(p, 0.0f);
+    record_oracle(43, "wall at 1.3 R_max: greatest sample", 0, loudest(w.last()), 0, "uPa");
   }
 }
 
@@ -232,15 +236,18 @@ TEST(PointOracles, Oracle46_ConicalShift) {
   mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(60));
   PingSettings many = settings;
   many.beam_count = 1024;
-  for (const double side : {1.0, -1.0}) {
-    Sounding s(SceneMaker().add_point(at(5, side * rad_from_deg(45), rad_from_deg(-20)), -15).make(), mode, many);
-    s.ping();
-    const int row = static_cast<int>(std::lround(s.row_of_range(5))), j = s.loudest_beam(row);
-    const Peak peak = log_parabola(s.pressure(row, j - 1), s.pressure(row, j), s.pressure(row, j + 1));
-    const double spacing_deg = 130.0 / 1024;
-    const double seen_deg =
-        deg_from_rad(std::asin(s.beam_sine(j))) - peak.offset * spacing_deg;  // beams run from port to starboard
-    EXPECT_NEAR(seen_deg, side * 41.6, 0.1);
+  for (const bool conical : {true, false}) {
+    for (const double side : {1.0, -1.0}) {
+      Sounding s(SceneMaker().add_point(at(5, side * rad_from_deg(45), rad_from_deg(-20)), -15).make(), mode, many);
+      s.request.switches.conical = conical;
+      s.ping();
+      const int row = static_cast<int>(std::lround(s.row_of_range(5))), j = s.loudest_beam(row);
+      const Peak peak = log_parabola(s.pressure(row, j - 1), s.pressure(row, j), s.pressure(row, j + 1));
+      const double spacing_deg = 130.0 / 1024;
+      const double seen_deg =
+          deg_from_rad(std::asin(s.beam_sine(j))) - peak.offset * spacing_deg;  // beams run from port to starboard
+      record_oracle(46, conical ? "conical beams" : "flat beams", conical ? 41.6 : 45, side * seen_deg, 0.1, "deg");
+    }
   }
 }
 

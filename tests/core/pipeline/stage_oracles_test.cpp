@@ -2,6 +2,7 @@
 // break a ping.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -17,6 +18,7 @@
 #include "core/pipeline/synthesize.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
+#include "tests/oracles/record.hpp"
 
 namespace sonar::test {
 namespace {
@@ -60,7 +62,7 @@ TEST(StageOracles, Oracle18_SynthesisAgainstDirectSum) {
         error += std::norm(got - truth[static_cast<std::size_t>(n)]), power += std::norm(truth[static_cast<std::size_t>(n)]);
         EXPECT_EQ(columns.first_sample(1)[2 * n], 0.0f);
       }
-      EXPECT_LE(std::sqrt(error / power), 1e-4) << kernels->name << ", " << plan.taps << " taps";
+      record_below(18, "error of 300 echoes, Gaussian pulse", 1e-4, std::sqrt(error / power), "");
     }
   }
 }
@@ -123,8 +125,9 @@ void check_coupling(const CouplingCase& c, const simd::Kernels& kernels) {
     }
   }
   // A panel of four beams listens to the union of their bands, so it may do better than the band, not worse.
-  EXPECT_LE(std::sqrt(error / power), 1.1 * std::sqrt(dropped / all) + 1e-5)
-      << kernels.name << " " << c.mode.name << " " << c.beams;
+  const bool whole = dropped == 0;
+  record_below(19, whole ? "nothing dropped: error" : "band: error over 1.1 of what was dropped + 1e-5", whole ? 1e-5 : 1,
+               std::sqrt(error / power) / (whole ? 1 : 1.1 * std::sqrt(dropped / all) + 1e-5), "");
   EXPECT_LE(dropped / all, 1e-4) << "the band drops more than -40 dB";
 }
 
@@ -222,6 +225,7 @@ TEST(StageOracles, Oracle41_SamplesUndoTheirRowGain) {
     ASSERT_EQ(ping.row_gain.size(), format.row_gains ? 400u : 0u);
     const double smallest_db = tvg_db(mode.receiver, s.range_of_row(0), 0.25);
     std::size_t unsaturated = 0;
+    double worst = 0;
     for (int row = 0; row < s.rows(); ++row) {
       const double row_db = tvg_db(mode.receiver, s.range_of_row(row), 0.25);
       const double gain = format.row_gains ? ping.row_gain[static_cast<std::size_t>(row)] : 1;
@@ -232,10 +236,12 @@ TEST(StageOracles, Oracle41_SamplesUndoTheirRowGain) {
         ASSERT_LE(code, format.max_code);
         if (code == format.max_code) continue;
         ++unsaturated;
-        ASSERT_NEAR(code / std::sqrt(gain), s.pressure(row, j) * scale, 0.5 / std::sqrt(gain) + 0.5) << row << " " << j;
+        const double off = std::abs(code / std::sqrt(gain) - s.pressure(row, j) * scale);
+        worst = std::max(worst, off / (0.5 / std::sqrt(gain) + 0.5));
       }
     }
     EXPECT_GT(unsaturated, 150000u);
+    record_oracle(41, "samples undone, error over 0.5/sqrt(gain) + 0.5 LSB", 0, worst, 1, "");
   }
 }
 
@@ -261,10 +267,9 @@ TEST(StageOracles, GammaAndThirtyTwoBits) {
 }
 
 void expect_finite(const Ping& ping) {
-  for (const float p : ping.pressure_upa) {
-    ASSERT_TRUE(std::isfinite(p));
-    ASSERT_GE(p, 0.0f);
-  }
+  double bad = 0;
+  for (const float p : ping.pressure_upa) bad += !(std::isfinite(p) && p >= 0);
+  record_oracle(44, "samples that are not finite, awkward places", 0, bad, 0, "");
 }
 
 TEST(StageOracles, Oracle44_AwkwardPlacesStayFinite) {
