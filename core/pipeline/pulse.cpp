@@ -19,6 +19,7 @@ constexpr double band_of_sweep = 1.5;           // in bandwidths: its fade lets 
 constexpr std::size_t most_samples = 65536;
 constexpr double worth_keeping = 1e-4;       // of a measured pulse's peak, in time and in frequency
 constexpr double finest_rate_per_row = 256;  // samples of a measured pulse to a sample of the grid
+constexpr double longest_in_rows = 8192;     // sample times of the grid that a measured pulse may last
 constexpr int neighbours = 32;               // of a measured pulse, for a value between its samples
 constexpr double window_sharpness = 8.6;     // ripple 1e-4 up to 0.8 of the band
 
@@ -183,6 +184,9 @@ std::string why_invalid(const Waveform& w, double sample_time_s) {
   if (w.sample_rate_hz * sample_time_s > finest_rate_per_row)
     return "the measured pulse has more than " + std::to_string(static_cast<int>(finest_rate_per_row)) +
            " samples to a sample of the picture: resample it to a few times its bandwidth";
+  if (static_cast<double>(w.samples.size()) / w.sample_rate_hz > longest_in_rows * sample_time_s)
+    return "the measured pulse is longer than " + std::to_string(static_cast<int>(longest_in_rows)) +
+           " samples of the picture: cut it where it has rung out";
   const float top = std::abs(w.samples[w.samples.size() / 2]);
   for (const std::complex<float>& s : w.samples)
     if (!std::isfinite(s.real()) || !std::isfinite(s.imag()) || std::abs(s) > top || !(top > 0))

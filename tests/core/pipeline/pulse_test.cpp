@@ -183,6 +183,7 @@ TEST(Pulse, WaveformsThatCannotBeUsedAreRefusedWithASentence) {
   refused([](Waveform& w) { w.sample_rate_hz = 0; });
   refused([](Waveform& w) { w.sample_rate_hz = std::numeric_limits<double>::infinity(); });
   refused([](Waveform& w) { w.sample_rate_hz = 1e9; });  // far finer than the rows
+  refused([](Waveform& w) { w.sample_rate_hz = 1; });    // longer than any record
   refused([](Waveform& w) { w.sweep_s = 0; });
 }
 
