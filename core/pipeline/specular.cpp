@@ -123,6 +123,13 @@ std::complex<double> visible_factor(const MirrorPoint& point, double wavelength_
   return mirror_factor(point, wavelength_m, window);
 }
 
+/// How far from straight ahead the columns hear; more when the sonar turns while the ping is under way.
+double widest_direction_rad(const PingPlan& plan) {
+  constexpr double while_turning_rad = 0.05;
+  const double sine = std::min(1.0, plan.columns.first_sine + plan.columns.spacing);
+  return std::acos(std::sqrt(1 - sine * sine) * std::cos(std::min(plan.widest_about_axis_rad(), pi / 2))) + while_turning_rad;
+}
+
 }  // namespace
 
 double coherent_reflection(const Material& m, double wavelength_m) {
@@ -175,6 +182,7 @@ void MirrorEchoes::find(const RayScene& rays, std::span<const Pose> bodies_in_wo
   MirrorQuery query;
   query.wavelength_m = s.sound_speed_mps / static_cast<double>(plan.mode.centre_hz);
   query.max_range_m = s.max_range_m;
+  query.widest_rad = widest_direction_rad(plan);
   reflection_.clear();
   for (const Material& m : scene.materials) reflection_.push_back(coherent_reflection(m, query.wavelength_m));
   if (std::all_of(reflection_.begin(), reflection_.end(), [](double c) { return c == 0; })) return;
@@ -188,7 +196,9 @@ void MirrorEchoes::find(const RayScene& rays, std::span<const Pose> bodies_in_wo
     const bool rides = object.body >= 0 && static_cast<std::size_t>(object.body) < bodies_in_world.size();
     const Pose in_world =
         rides ? compose(bodies_in_world[static_cast<std::size_t>(object.body)], scene.in_body(object)) : object.in_world;
-    query.sonar_m = transform(inverse(in_world), s.seen_from.position_m);
+    const Pose world_in_object = inverse(in_world);
+    query.sonar_m = transform(world_in_object, s.seen_from.position_m);
+    query.ahead = rotate(world_in_object.orientation, rotate(s.seen_from.orientation, Vec3d{1, 0, 0}));
     if (length(query.sonar_m - mesh.centre_m) - mesh.radius_m > query.max_range_m) continue;
     candidates(object, mesh, query);
     const Sight sight(rays, s, static_cast<std::uint32_t>(i), in_world);

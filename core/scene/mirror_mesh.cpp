@@ -77,6 +77,8 @@ void MirrorMesh::find_on_curves(const MirrorQuery& q, std::vector<MirrorPoint>& 
     const double distance = length(to_sonar), radius = static_cast<double>(node.radius);
     if (distance - radius > q.max_range_m) continue;
     if (distance > radius) {
+      const double off = std::acos(std::clamp(-dot(to_sonar, q.ahead) / distance, -1.0, 1.0));
+      if (off - std::asin(radius / distance) > q.widest_rad) continue;
       // Directions to the sonar fill a cone about to_sonar; those of the surface's edges may miss by a little more.
       const double beside = 2 * edge_units * fresnel_unit_m(q.wavelength_m, distance, 0) / distance;
       const double spread = std::asin(radius / distance) + static_cast<double>(node.angle_rad) + beside;
@@ -109,6 +111,8 @@ void MirrorMesh::solve(std::uint32_t index, const MirrorQuery& q, std::vector<Mi
   const Vec3d d1 = to_double(v[1]->normal) - n0, d2 = to_double(v[2]->normal) - n0;
   double a = 1.0 / 3, b = 1.0 / 3;
   double t = dot(q.sonar_m - (p0 + a * e1 + b * e2), n0 + a * d1 + b * d2);
+  const bool inner = triangle.across[0] >= 0 && triangle.across[1] >= 0 && triangle.across[2] >= 0;
+  const double hopeless = inner ? 3 : 1e3;  // triangle sides; beside an edge the foot may lie far out
   bool found = false;
   for (int i = 0; i < 12 && !found; ++i) {
     const Vec3d m = n0 + a * d1 + b * d2;
@@ -118,7 +122,8 @@ void MirrorMesh::solve(std::uint32_t index, const MirrorQuery& q, std::vector<Mi
     if (!(std::abs(det) > 1e-12 * length(c1) * length(c2) * length(m))) return;
     const double da = dot(cross(miss, c2), m) / det, db = dot(cross(c1, miss), m) / det, dt = dot(c12, miss) / det;
     a += da, b += db, t += dt;
-    if (!(std::abs(a) < 1e3 && std::abs(b) < 1e3)) return;
+    // The problem is nearly linear: what starts far outside does not come back.
+    if (!(std::abs(a - 0.5) < hopeless && std::abs(b - 0.5) < hopeless)) return;
     found = std::abs(da) + std::abs(db) < 1e-9;
   }
   if (!found) return;

@@ -53,6 +53,7 @@ MirrorMesh::Maker::Maker(MirrorMesh& out, const Mesh& mesh, const std::vector<bo
 
 void MirrorMesh::Maker::make() {
   join_edges();
+  triangle_now_.resize(facets_.size(), -1);
   std::vector<std::uint32_t> patch;
   for (std::uint32_t f = 0; f < facets_.size(); ++f) {
     if (facets_[f].patch != nobody) continue;
@@ -178,20 +179,21 @@ void MirrorMesh::Maker::add_face(const std::vector<std::uint32_t>& patch) {
 void MirrorMesh::Maker::add_curved(const std::vector<std::uint32_t>& patch) {
   const auto first_vertex = static_cast<std::uint32_t>(out_.vertices_.size());
   const auto first_triangle = static_cast<std::int32_t>(out_.triangles_.size());
-  std::unordered_map<std::uint32_t, std::uint32_t> local;
-  std::unordered_map<std::int32_t, std::int32_t> index;
-  for (const std::uint32_t f : patch)
-    index.emplace(static_cast<std::int32_t>(f), first_triangle + static_cast<std::int32_t>(index.size()));
+  vertex_now_.resize(place_.size(), nobody);
+  for (std::size_t i = 0; i < patch.size(); ++i) triangle_now_[patch[i]] = first_triangle + static_cast<std::int32_t>(i);
   for (const std::uint32_t f : patch) {
     MirrorMesh::Triangle triangle;
     triangle.material = facets_[f].material;
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t v = facets_[f].vertex[k];
-      const auto [at, is_new] = local.try_emplace(v, static_cast<std::uint32_t>(out_.vertices_.size()));
-      if (is_new) out_.vertices_.push_back({to_float(place_[v]), {}, {}});
-      triangle.vertex[k] = at->second;
-      const auto beyond = index.find(facets_[f].across[k]);
-      triangle.across[k] = beyond == index.end() ? -1 : beyond->second;
+      std::uint32_t& v = vertex_now_[facets_[f].vertex[k]];
+      if (v == nobody || v < first_vertex) {  // of another patch: every patch has its own normals
+        v = static_cast<std::uint32_t>(out_.vertices_.size());
+        out_.vertices_.push_back({to_float(place_[facets_[f].vertex[k]]), {}, {}});
+      }
+      triangle.vertex[k] = v;
+      const std::int32_t beyond = facets_[f].across[k];
+      const bool joined = beyond >= 0 && facets_[static_cast<std::size_t>(beyond)].patch == facets_[f].patch;
+      triangle.across[k] = joined ? triangle_now_[static_cast<std::size_t>(beyond)] : -1;
     }
     out_.triangles_.push_back(triangle);
   }
@@ -259,6 +261,10 @@ void MirrorMesh::Maker::set_bends(std::uint32_t first_vertex, std::uint32_t firs
 void MirrorMesh::Maker::plant() {
   std::vector<std::uint32_t> order(out_.triangles_.size());
   std::iota(order.begin(), order.end(), 0u);
+  for (const MirrorMesh::Triangle& t : out_.triangles_) {
+    const auto corner = [&](std::size_t k) { return out_.vertices_[t.vertex[k]].position; };
+    middle_.push_back(corner(0) + corner(1) + corner(2));
+  }
   branch(order, 0, static_cast<std::uint32_t>(order.size()));
   std::vector<std::int32_t> now(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) now[order[i]] = static_cast<std::int32_t>(i);
@@ -302,14 +308,7 @@ void MirrorMesh::Maker::branch(std::vector<std::uint32_t>& order, std::uint32_t 
   if (last - first > in_leaf) {
     const std::uint32_t middle = first + (last - first) / 2;
     const int k = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
-    const auto place = [&](std::uint32_t t) {
-      float sum = 0;
-      for (const std::uint32_t v : out_.triangles_[t].vertex) {
-        const Vec3 p = out_.vertices_[v].position;
-        sum += k == 0 ? p.x : k == 1 ? p.y : p.z;
-      }
-      return sum;
-    };
+    const auto place = [&](std::uint32_t t) { return k == 0 ? middle_[t].x : k == 1 ? middle_[t].y : middle_[t].z; };
     std::nth_element(order.begin() + first, order.begin() + middle, order.begin() + last, [&](std::uint32_t a, std::uint32_t b) {
       const float pa = place(a), pb = place(b);
       return pa != pb ? pa < pb : a < b;

@@ -36,6 +36,9 @@ class MirrorMesh::Maker {
   MirrorMesh& out_;
   std::vector<Vec3d> place_;  // welded vertices
   std::vector<Facet> facets_;
+  std::vector<std::uint32_t> vertex_now_;   // of place_: the vertex made of it last
+  std::vector<std::int32_t> triangle_now_;  // of facets_: the curved triangle made of it
+  std::vector<Vec3> middle_;                // of the curved triangles, times three
 };
 
 }  // namespace sonar

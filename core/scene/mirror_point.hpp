@@ -48,6 +48,9 @@ struct MirrorQuery {
   Vec3d sonar_m;  // in object coordinates
   double wavelength_m = 1e-3;
   double max_range_m = 0;
+  // Echoes from outside a cone about a direction are of no interest; by default there is no cone.
+  Vec3d ahead{1, 0, 0};
+  double widest_rad = 4;
 };
 
 /// Surfaces whose edge is farther from the foot than this many Fresnel units x sqrt(lambda rho) / 2 are not heard: below -33 dB.
