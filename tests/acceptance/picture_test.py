@@ -71,7 +71,8 @@ class Picture(unittest.TestCase):
             for beams in self.raw:
                 with self.subTest(behind=name, beams=beams):
                     figures = self.stats(beams, "--shadow", window(shadow, beams), "--surroundings", window(beside, beams))
-                    self.assertLess(figures["shadow"]["ratio"], 1 / 3, figures["shadow"])
+                    # With gamma 127, 0.4 is 16 dB: noise as strong as in the captured pings shows in a shadow at 5 m.
+                    self.assertLess(figures["shadow"]["ratio"], 0.4, figures["shadow"])
 
     def test_samples_use_their_range_without_burning_out(self):
         self.assertLess(self.figures["window"]["saturated_share"], 0.01)

@@ -36,7 +36,8 @@ TEST(Models, FamiliesAsInTheTable) {
     EXPECT_NEAR(deg_from_rad(mode.pattern.elevation_width_rad), row.elevation_deg, 1e-5) << row.profile;
     EXPECT_FLOAT_EQ(mode.min_range_m, static_cast<float>(row.min_range_m)) << row.profile;
     EXPECT_EQ(mode.source_level_db, 200) << row.profile;
-    EXPECT_EQ(mode.receiver.noise_figure_db, 10) << row.profile;
+    const bool fitted_to_the_capture = row.part_number == 1042 && row.mode == 1;
+    EXPECT_EQ(mode.receiver.noise_figure_db, fitted_to_the_capture ? 15 : 10) << row.profile;
   }
 }
 

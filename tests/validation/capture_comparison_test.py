@@ -1,0 +1,52 @@
+"""The comparison with the captured pings: its statistics on made pictures, and the fit of our profile where the recordings are."""
+import os
+import pathlib
+import random
+import unittest
+
+import capture_comparison as comparison
+
+SONARD = pathlib.Path(os.environ.get("SONARD_BUILD", "build/release")) / "daemon" / "sonard"
+
+
+def picture(seed, amid=60):
+    draw = random.Random(seed)
+    return bytes(min(254, max(0, int(draw.gauss(amid, 15)))) for _ in range(comparison.ROWS * comparison.BEAMS))
+
+
+class Statistics(unittest.TestCase):
+    def test_of_white_noise(self):
+        figures = comparison.statistics([picture(1), picture(2)])
+        self.assertAlmostEqual(figures["percentile 50"], 60, delta=1)
+        self.assertAlmostEqual(figures["mean"], 59.5, delta=0.3)
+        self.assertEqual(figures["saturated share, %"], 0)
+        for name in ("beams apart 1, correlation", "rows apart 1, correlation", "ping to ping, correlation"):
+            self.assertAlmostEqual(figures[name], 0, delta=0.02, msg=name)
+        self.assertAlmostEqual(figures["difference of pings, rows 20-119, sd"], 15 * 2 ** 0.5, delta=0.5)
+
+    def test_a_still_picture_is_like_itself(self):
+        one = picture(1)
+        figures = comparison.statistics([one, one])
+        self.assertAlmostEqual(figures["ping to ping, correlation"], 1)
+        self.assertEqual(figures["difference of pings, rows 20-119, sd"], 0)
+
+    def test_what_is_farther_off_gets_its_reason_or_is_told(self):
+        real, ours = {"mean": 10.0, "percentile 1": 4.0, "other": 1.0}, {"mean": 11.0, "percentile 1": 5.0, "other": 2.0}
+        text, within = comparison.table(real, ours)
+        self.assertEqual(within, 1)
+        self.assertIn(comparison.REASONS["percentile 1"], text)
+        self.assertIn("not explained", text)
+
+
+@unittest.skipUnless(os.environ.get("SONARD_CAPTURES"), "no recordings: SONARD_CAPTURES is not set")
+class BesideTheDevice(unittest.TestCase):
+    def test_every_statistic_is_near_or_explained(self):
+        real = comparison.statistics(comparison.images_of_capture(pathlib.Path(os.environ["SONARD_CAPTURES"])))
+        ours = comparison.statistics(comparison.images_of_render(SONARD.resolve(), comparison.SCENE))
+        text, within = comparison.table(real, ours)
+        self.assertNotIn("not explained", text)
+        self.assertGreaterEqual(within, 30, text)
+
+
+if __name__ == "__main__":
+    unittest.main()
