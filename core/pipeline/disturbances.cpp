@@ -73,7 +73,7 @@ std::vector<PulseHeard> hear_other_sonars(const RayScene& scene, const PingPlan&
   std::vector<PulseHeard> heard;
   if (!request.switches.interference || request.blank) return heard;
   const auto bits = static_cast<std::uint64_t>(request.seed);
-  const double per_sample = 2 * half_power_bt * plan.sample_spacing_m / static_cast<double>(plan.settings.pulse_width_m);
+  const double per_sample = 2 * half_power_bt * plan.sample_spacing_m / plan.pulse_width_m;
   const double samples_per_s = s.sound_speed_mps / 2 * s.samples_per_m;
   const double fired_s = seconds(request.fired_at.time_since_epoch());
   const std::vector<OtherSonar>& others = scene.scene().other_sonars;
