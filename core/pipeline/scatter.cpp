@@ -175,9 +175,11 @@ void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPl
   for (const FanHit& hit : hits) {
     const double r = static_cast<double>(hit.range_m), sine = plan.columns.sine(hit.column);
     const double at_sample = s.sample_of(r) + s.doppler_samples(direction_of(hit, sine, plan.switches.conical));
-    if (at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) continue;
-    const Object& object = scene.objects[hit.object];
     const double cosine = static_cast<double>(hit.cosine);
+    // Said so that what is not a number is left out, too.
+    if (!(at_sample > -plan.taps / 2 && at_sample < plan.samples + plan.taps / 2 - 1)) continue;
+    if (!(r >= nearest_scatterer_m && cosine >= 0 && cosine < 1.001)) continue;
+    const Object& object = scene.objects[hit.object];
     const double strength =
         scattering_strength(scene.materials[object.mesh->material[hit.triangle]], cosine,
                             static_cast<double>(plan.mode.centre_hz), s.sound_speed_mps, plan.switches.specular);

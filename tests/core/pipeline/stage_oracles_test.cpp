@@ -15,6 +15,7 @@
 #include "core/pipeline/arithmetic/waveform.hpp"
 #include "core/pipeline/couple.hpp"
 #include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/scatter.hpp"
 #include "core/pipeline/synthesize.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
@@ -305,6 +306,35 @@ TEST(StageOracles, Oracle44_AwkwardPlacesStayFinite) {
       }
     }
   }
+}
+
+TEST(StageOracles, Oracle44_AwkwardHitsGiveFiniteEchoes) {
+  const auto scene = SceneMaker().add(wall(5, 5), -20, {5, 0, 0}).make();
+  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  std::vector<FanHit> hits;
+  for (const float range : {5.0f, 0.0f, 1e-30f, -1.0f, nan, inf, -inf})
+    for (const float cosine : {1.0f, 0.0f, 1e-30f, nan, inf})
+      hits.push_back(
+          {.column = 40, .ray = 3, .range_m = range, .elevation_rad = 0.1f, .cosine = cosine, .object = 0, .triangle = 0});
+  double sound = 0, bad = 0;
+  for (const bool expected_power : {false, true}) {
+    for (const bool conical : {false, true}) {
+      PingRequest request = Sounding(scene, p900(), default_rows(10, 394)).request;
+      request.switches.expected_power = expected_power;
+      request.switches.conical = conical;
+      request.switches.fixed_fan = 32;
+      const PingPlan plan = make_plan(p900(), request.settings, request.switches);
+      Echoes echoes;
+      scatter_hits(hits, *scene, plan, make_scalars(plan, request, {}), Seed{1}, echoes);
+      for (int i = 0; i < echoes.count; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        bad += !(std::isfinite(echoes.sample[at]) && std::isfinite(echoes.re[at]) && std::isfinite(echoes.im[at]));
+        sound += echoes.re[at] != 0;
+      }
+    }
+  }
+  EXPECT_GE(sound, 4) << "the one good hit";
+  record_oracle(44, "echoes that are not finite, of NaN, infinite, zero-range and grazing hits", 0, bad, 0, "");
 }
 
 TEST(StageOracles, Oracle44_AwkwardSettingsAreRefusedWithASentence) {
