@@ -81,13 +81,17 @@ class Parser {
         return value;
     }
   }
-  double sign() { return take('-') ? -sign() : power(); }
+  double sign() {
+    if (++depth_ > deepest) return complain("is nested too deeply"), 0;
+    const double value = take('-') ? -sign() : power();
+    --depth_;
+    return value;
+  }
   double power() {
     const double base = atom();
     return take('^') ? std::pow(base, sign()) : base;
   }
   double atom() {
-    if (++depth_ > 50) return complain("is nested too deeply"), 0;
     double value = 0;
     skip_blanks();
     if (take('(')) {
@@ -100,7 +104,6 @@ class Parser {
     } else {
       complain("ends where a value should stand");
     }
-    --depth_;
     return value;
   }
   double number() {
@@ -138,6 +141,7 @@ class Parser {
     return 0;
   }
 
+  static constexpr int deepest = 50;
   std::string_view text_;
   const Values& values_;
   std::size_t at_ = 0;

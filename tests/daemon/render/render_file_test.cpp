@@ -1,0 +1,182 @@
+// Render files: what their keys reach, what they refuse, and that an expectation that is wrong fails.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "daemon/render/coverage.hpp"
+#include "daemon/render/npy.hpp"
+#include "daemon/render/render_job.hpp"
+#include "daemon/render/sidecar.hpp"
+
+namespace sonar::render {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+RenderInput parsed(const std::string& text) {
+  auto input = parse_render_file(text, "r.yaml", ".");
+  if (!input) throw std::runtime_error(input.error().text);
+  return *std::move(input);
+}
+std::string refusal(const std::string& text) {
+  const auto input = parse_render_file(text, "r.yaml", ".");
+  return input ? "accepted" : input.error().text;
+}
+
+const std::string point =
+    "scene: {objects: [{type: point, target_strength_db: -10, pose: {xyz_m: [4, 0, -10]}}]}\n"
+    "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10]}}\nengine: {noise: off}\n"
+    "water: {temperature_c: 10, salinity_psu: 0, sound_speed_mps: 1500}\n";
+
+TEST(RenderFile, KeysReachTheSonarAndItsSettings) {
+  const RenderInput input = parsed(point + R"(
+seed: 7
+sonar:
+  model: {centre_hz: 5e5, aperture_deg: 60, source_level_db: 190, azimuth_width_deg: 2, elevation_width_deg: 10,
+          azimuth_taper: unit, elevation_taper: unit, elevation_width_is: one_way, beam_spacing: uniform_in_angle,
+          waveform: {shape: lfm, falling: true}, receiver: {tvg_slope_db: 40, tvg_ceiling_db: inf, leak_upa: 5}}
+  ping: {range_m: 6, beams: 101, rows: 300, row_centre: 1, pulse_width_m: 0.03, gain_db: 3, bits: 8, gamma: 0.5, tvg: false,
+         device_sound_speed_mps: 1480}
+)");
+  ASSERT_EQ(input.jobs.size(), 1u);
+  const RenderJob& job = input.jobs[0];
+  const FrequencyMode& mode = job.mode();
+  EXPECT_EQ(job.seed, 7u);
+  EXPECT_EQ(mode.centre_hz, 5e5f);
+  EXPECT_NEAR(static_cast<double>(mode.horizontal_aperture_rad), pi / 3, 1e-6);
+  EXPECT_EQ(mode.source_level_db, 190);
+  EXPECT_EQ(mode.pattern.azimuth_taper, Taper::unit);
+  EXPECT_EQ(mode.pattern.elevation_taper, Taper::unit);
+  EXPECT_EQ(mode.pattern.elevation_width_is, ElevationWidthIs::one_way);
+  EXPECT_EQ(mode.beam_spacing, BeamSpacing::uniform_in_angle);
+  EXPECT_EQ(mode.waveform.shape, Waveform::Shape::lfm);
+  EXPECT_TRUE(mode.waveform.falling);
+  EXPECT_EQ(mode.receiver.tvg_slope_db, 40);
+  EXPECT_TRUE(std::isinf(mode.receiver.tvg_ceiling_db));
+  EXPECT_EQ(mode.receiver.leak_upa, 5);
+  const PingSettings& s = job.settings;
+  EXPECT_EQ(s.beam_count, 101);
+  EXPECT_EQ(s.range_bin_count, 300);
+  EXPECT_DOUBLE_EQ(s.range_bin_m, 0.02);
+  EXPECT_EQ(s.row_centre, 1);
+  EXPECT_EQ(s.pulse_width_m, 0.03f);
+  EXPECT_EQ(s.format.bits, 8);
+  EXPECT_EQ(s.format.max_code, 254u);
+  EXPECT_FALSE(s.tvg);
+  EXPECT_EQ(s.device_sound_speed_mps, 1480);
+  EXPECT_FALSE(job.engine.switches.noise);
+}
+
+TEST(RenderFile, AProfileStartsAsTheDeviceAndKeepsItsShares) {
+  const RenderJob whole = parsed(point + "sonar: {profile: oculus-m1200d, ping: {mode: HF}}\n").jobs.at(0);
+  const RenderJob half =
+      parsed(point + "sonar: {profile: oculus-m1200d, ping: {mode: 2, range_m: " + std::to_string(whole.settings.range_m / 2) +
+             "}}\n")
+          .jobs.at(0);
+  EXPECT_EQ(whole.mode().name, "HF");
+  EXPECT_EQ(half.mode().name, "HF");
+  EXPECT_EQ(half.settings.range_bin_count, whole.settings.range_bin_count);
+  EXPECT_NEAR(half.settings.range_bin_m, whole.settings.range_bin_m / 2, 1e-9);
+  EXPECT_NEAR(static_cast<double>(half.settings.pulse_width_m), static_cast<double>(whole.settings.pulse_width_m) / 2, 1e-6);
+}
+
+TEST(RenderFile, SweepsReadTheFileOnceAStep) {
+  const RenderInput input = parsed(R"(
+scene: {objects: [{type: point, target_strength_db: 0, pose: {xyz_m: [$r, 0, $(-2*r)]}}]}
+sonar: {ping: {range_m: $reach}}
+sweep: {r: [2, 3]}
+let: {reach: 2*r + 1}
+)");
+  ASSERT_EQ(input.jobs.size(), 2u);
+  EXPECT_EQ(input.jobs[1].scene->point_targets.at(0).position_m.x, 3);
+  EXPECT_EQ(input.jobs[1].scene->point_targets.at(0).position_m.z, -6);
+  EXPECT_EQ(input.jobs[0].settings.range_m, 5);
+  EXPECT_EQ(input.jobs[1].settings.range_m, 7);
+}
+
+TEST(RenderFile, RefusesWithAPlace) {
+  EXPECT_THAT(refusal(point + "sonar: {ping: {rnage_m: 4}}\n"), AllOf(HasSubstr("r.yaml:5"), HasSubstr("range_m")));
+  EXPECT_THAT(refusal(point + "sonar: {profile: oculus-m1300d}\n"), HasSubstr("oculus-m1200d"));
+  EXPECT_THAT(refusal(point + "sonar: {options: {pulse: native}}\n"), HasSubstr("which is not given"));
+  EXPECT_THAT(refusal("scene: no-such-scene.yaml\n"), HasSubstr("no such file"));
+  EXPECT_THAT(refusal("sonar: {}\n"), HasSubstr("scene"));
+  EXPECT_THAT(refusal(point + "sweep: {a: [1, 2], b: [1]}\n"), HasSubstr("equally long"));
+  EXPECT_THAT(refusal(point + "seed: $q\n"), HasSubstr("r.yaml:5: "));
+  EXPECT_THAT(refusal(point + "let: {a: 1/0}\n"), HasSubstr("finite"));
+  EXPECT_THAT(refusal(point + "expect: [{measure: peak_level_db, value: 1}]\n"), HasSubstr("within"));
+  EXPECT_THAT(refusal(point + "expect: [{measure: peak_level_db}]\n"), HasSubstr("at_least"));
+  EXPECT_THAT(refusal(point + "expect: [{measure: peek, at_most: 1}]\n"), HasSubstr("peak"));
+}
+
+std::vector<Verdict> judged(const std::string& expect) {
+  const RenderInput input = parsed(point + "sonar: {ping: {range_m: 6, beams: 65}}\nexpect: [" + expect + "]\n");
+  auto verdicts = check_expectations(input.source, input.jobs, 1);
+  if (!verdicts) throw std::runtime_error(verdicts.error().text);
+  return *std::move(verdicts);
+}
+
+TEST(Expectations, AreMetWhenTrueAndNotWhenWrong) {
+  const auto met = [](const std::string& expect) { return judged(expect).at(0).met; };
+  EXPECT_TRUE(met("{measure: peak_range_m, value: 4, within: 0.002}"));
+  EXPECT_FALSE(met("{measure: peak_range_m, value: 4.01, within: 0.002}"));
+  EXPECT_TRUE(met("{measure: peak_level_db, value: SL - 40*log10(4) - 8*alpha - 10, within: 0.1}"));
+  EXPECT_FALSE(met("{measure: peak_level_db, value: SL - 40*log10(4) - 8*alpha - 9.8, within: 0.1}"));
+  EXPECT_TRUE(met("{measure: peak_bearing_deg, value: 0, within: 0.01}"));
+  EXPECT_FALSE(met("{measure: peak_bearing_deg, value: 1, within: 0.01}"));
+  EXPECT_TRUE(met("{measure: mean_level_db, at_most: 180}"));
+  EXPECT_FALSE(met("{measure: mean_level_db, at_least: 180}"));
+  EXPECT_TRUE(met("{measure: peak_level_db, range_m: [3.9, 4.1], less: {range_m: [4.5, 5]}, at_least: 100}"));
+}
+
+TEST(Expectations, TellFileQuantityMeasuredAndExpected) {
+  EXPECT_THAT(
+      judged("{measure: peak_range_m, value: 5, within: 0.01, what: a point}").at(0).sentence(),
+      AllOf(HasSubstr("r.yaml:6"), HasSubstr("a point"), HasSubstr("peak_range_m 4"), HasSubstr("expected 5 within 0.01")));
+}
+
+TEST(Expectations, SlopesNeedASweep) {
+  EXPECT_THROW(judged("{measure: peak_level_db, over: slope, against: r, value: -40, within: 1}"), std::runtime_error);
+  EXPECT_THROW(judged("{measure: peak_level_db, value: nothing_known, within: 1}"), std::runtime_error);
+  EXPECT_THROW(judged("{measure: peak_level_db, range_m: [50, 60], value: 0, within: 1}"), std::runtime_error);
+  EXPECT_THROW(judged("{measure: coverage_percent, at_least: 99}"), std::runtime_error);  // no bed in the scene
+}
+
+TEST(Npy, HeadersAreAlignedAndTellTypeAndShape) {
+  const std::string header = npy_header("<f4", {437, 512});
+  EXPECT_EQ(header.size() % 64, 0u);
+  EXPECT_EQ(header.substr(1, 5), "NUMPY");
+  EXPECT_EQ(header.back(), '\n');
+  EXPECT_THAT(header, HasSubstr("{'descr': '<f4', 'fortran_order': False, 'shape': (437, 512), }"));
+  EXPECT_EQ(static_cast<unsigned char>(header[8]) + 256u * static_cast<unsigned char>(header[9]), header.size() - 10);
+}
+
+TEST(Digest, FollowsEverythingThatChangesAPing) {
+  const RenderInput input = parsed(point);
+  const std::string digest = digest_of(input, 0);
+  const auto changed = [&](auto&& change) {
+    RenderInput other = input;
+    change(other.jobs[0]);
+    return digest_of(other, 0) != digest;
+  };
+  EXPECT_EQ(digest_of(parsed(point), 0), digest);
+  EXPECT_NE(digest_of(input, 5), digest);
+  EXPECT_TRUE(changed([](RenderJob& j) { j.seed = 2; }));
+  EXPECT_TRUE(changed([](RenderJob& j) { j.engine.switches.volume = false; }));
+  EXPECT_TRUE(changed([](RenderJob& j) { j.settings.gain_db = 1; }));
+  EXPECT_TRUE(changed([](RenderJob& j) { j.path.poses.push_back({}); }));
+  EXPECT_TRUE(changed([](RenderJob& j) { j.water.ph = 7; }));
+  EXPECT_FALSE(changed([](RenderJob& j) { j.engine.threads = 3; }));
+}
+
+TEST(Coverage, KnowsWhatItCannotCompare) {
+  RenderJob job = shipped_sonars_over_a_bed().front();
+  Ping ping;
+  ping.request = make_request(job, PingNumber{1}, 0);
+  ping.request.sonar_in_world.orientation = quat_from_rpy({0.1, 0.2, 0});
+  EXPECT_FALSE(measure_coverage(job, ping));
+}
+
+}  // namespace
+}  // namespace sonar::render
