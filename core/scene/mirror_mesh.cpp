@@ -101,85 +101,88 @@ void MirrorMesh::find_on_curves(const MirrorQuery& q, std::vector<MirrorPoint>& 
   }
 }
 
-// The place p0 + a e1 + b e2 of the triangle whose interpolated normal, t long, ends in the sonar.
-void MirrorMesh::solve(std::uint32_t index, const MirrorQuery& q, std::vector<MirrorPoint>& out) const {
-  const Triangle& triangle = triangles_[index];
-  const Vertex* v[3];
-  for (std::size_t k = 0; k < 3; ++k) v[k] = &vertices_[triangle.vertex[k]];
-  const Vec3d p0 = to_double(v[0]->position), n0 = to_double(v[0]->normal);
-  const Vec3d e1 = to_double(v[1]->position) - p0, e2 = to_double(v[2]->position) - p0;
-  const Vec3d d1 = to_double(v[1]->normal) - n0, d2 = to_double(v[2]->normal) - n0;
+// The place p0 + a e1 + b e2 of the triangle whose interpolated normal, t long, ends in the sonar: Newton's method.
+std::optional<MirrorMesh::Foot> MirrorMesh::foot_on(const Triangle& triangle, Vec3d sonar_m) const {
+  const Vertex &v0 = vertices_[triangle.vertex[0]], &v1 = vertices_[triangle.vertex[1]], &v2 = vertices_[triangle.vertex[2]];
+  const Vec3d p0 = to_double(v0.position), e1 = to_double(v1.position) - p0, e2 = to_double(v2.position) - p0;
+  const Vec3d n0 = to_double(v0.normal), d1 = to_double(v1.normal) - n0, d2 = to_double(v2.normal) - n0;
   double a = 1.0 / 3, b = 1.0 / 3;
-  double t = dot(q.sonar_m - (p0 + a * e1 + b * e2), n0 + a * d1 + b * d2);
+  double t = dot(sonar_m - (p0 + a * e1 + b * e2), n0 + a * d1 + b * d2);
   const bool inner = triangle.across[0] >= 0 && triangle.across[1] >= 0 && triangle.across[2] >= 0;
   const double hopeless = inner ? 3 : 1e3;  // triangle sides; beside an edge the foot may lie far out
-  bool found = false;
-  for (int i = 0; i < 12 && !found; ++i) {
+  for (int i = 0; i < 12; ++i) {
     const Vec3d m = n0 + a * d1 + b * d2;
-    const Vec3d miss = q.sonar_m - (p0 + a * e1 + b * e2 + t * m);
+    const Vec3d miss = sonar_m - (p0 + a * e1 + b * e2 + t * m);
     const Vec3d c1 = e1 + t * d1, c2 = e2 + t * d2, c12 = cross(c1, c2);
     const double det = dot(c12, m);
-    if (!(std::abs(det) > 1e-12 * length(c1) * length(c2) * length(m))) return;
+    if (!(std::abs(det) > 1e-12 * length(c1) * length(c2) * length(m))) return {};
     const double da = dot(cross(miss, c2), m) / det, db = dot(cross(c1, miss), m) / det, dt = dot(c12, miss) / det;
     a += da, b += db, t += dt;
     // The problem is nearly linear: what starts far outside does not come back.
-    if (!(std::abs(a - 0.5) < hopeless && std::abs(b - 0.5) < hopeless)) return;
-    found = std::abs(da) + std::abs(db) < 1e-9;
+    if (!(std::abs(a - 0.5) < hopeless && std::abs(b - 0.5) < hopeless)) return {};
+    if (std::abs(da) + std::abs(db) < 1e-9) {
+      const Vec3d normal = n0 + a * d1 + b * d2;
+      return Foot{{1 - a - b, a, b}, unit(normal), t * length(normal)};
+    }
   }
-  if (!found) return;
+  return {};
+}
 
-  // Beside the triangle it only counts where the surface ends there; then it is heard from the edge.
-  const std::array<double, 3> weight{1 - a - b, a, b};
-  std::array<double, 3> held{};
-  double sum = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (weight[k] < -bary_slack && triangle.across[k] >= 0) return;
-    held[k] = std::max(weight[k], 0.0);
-    sum += held[k];
-  }
-  Vec3d normal = n0 + a * d1 + b * d2;
-  t *= length(normal);
-  normal = (t > 0 ? 1.0 : -1.0) * unit(normal);
-  MirrorPoint p;
-  p.range_m = std::abs(t);
-  if (p.range_m < 1e-3 || p.range_m > q.max_range_m) return;
-  p.normal = normal;
-  p.foot_m = q.sonar_m - p.range_m * normal;
-  // The curve bulges over its facets: half of what the planes at the corners rise above the place, to second order.
-  double bulge = 0;
-  for (std::size_t k = 0; k < 3; ++k)
-    bulge += 0.5 * held[k] / sum * dot(to_double(v[k]->position) - p.foot_m, to_double(v[k]->normal));
-  if (sum <= 1 + bary_slack) {
-    p.range_m -= t > 0 ? bulge : -bulge;
-    p.foot_m = q.sonar_m - p.range_m * normal;
-  }
-  p.material = triangle.material;
-
-  // Principal directions and curvatures, from the tensor interpolated on the triangle.
+// Principal directions and curvatures, from the tensor at the vertices; `weight` sums to one, `side` is -1 on the back.
+void MirrorMesh::bend_at(const Triangle& triangle, const std::array<double, 3>& weight, double side, MirrorPoint& p) const {
   double s[6] = {};
-  Vec3d entry;
-  for (std::size_t k = 0; k < 3; ++k) {
-    for (std::size_t i = 0; i < 6; ++i) s[i] += held[k] / sum * static_cast<double>(v[k]->bend[i]);
-    entry = entry + held[k] / sum * to_double(v[k]->position);
-  }
-  const double side = t > 0 ? 1 : -1;
-  const Vec3d u1 = unit(std::abs(normal.z) < 0.9 ? cross(normal, Vec3d{0, 0, 1}) : cross(normal, Vec3d{1, 0, 0}));
-  const Vec3d u2 = cross(normal, u1);
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t i = 0; i < 6; ++i) s[i] += weight[k] * static_cast<double>(vertices_[triangle.vertex[k]].bend[i]);
   const auto bend = [&](Vec3d x, Vec3d y) {
     const Vec3d sy{s[0] * y.x + s[1] * y.y + s[2] * y.z, s[1] * y.x + s[3] * y.y + s[4] * y.z,
                    s[2] * y.x + s[4] * y.y + s[5] * y.z};
     return side * dot(x, sy);
   };
-  const double h11 = bend(u1, u1), h12 = bend(u1, u2), h22 = bend(u2, u2);
-  const double turn = 0.5 * std::atan2(2 * h12, h11 - h22);
+  const Vec3d u1 = unit(cross(p.normal, std::abs(p.normal.z) < 0.9 ? Vec3d{0, 0, 1} : Vec3d{1, 0, 0}));
+  const Vec3d u2 = cross(p.normal, u1);
+  const double turn = 0.5 * std::atan2(2 * bend(u1, u2), bend(u1, u1) - bend(u2, u2));
   p.along[0] = std::cos(turn) * u1 + std::sin(turn) * u2;
-  p.along[1] = cross(normal, p.along[0]);
+  p.along[1] = cross(p.normal, p.along[0]);
   p.curvature = {bend(p.along[0], p.along[0]), bend(p.along[1], p.along[1])};
+}
 
+void MirrorMesh::solve(std::uint32_t index, const MirrorQuery& q, std::vector<MirrorPoint>& out) const {
+  const Triangle& triangle = triangles_[index];
+  const std::optional<Foot> foot = foot_on(triangle, q.sonar_m);
+  if (!foot) return;
+  // Beside the triangle it only counts where the surface ends there; then it is heard from the edge.
+  std::array<double, 3> held{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (foot->weight[k] < -bary_slack && triangle.across[k] >= 0) return;
+    held[k] = std::max(foot->weight[k], 0.0);
+  }
+  const double sum = held[0] + held[1] + held[2];
+  const bool inside = sum <= 1 + bary_slack;
+  const double side = foot->height_m > 0 ? 1 : -1;
+  MirrorPoint p;
+  p.range_m = std::abs(foot->height_m);
+  if (p.range_m < 1e-3 || p.range_m > q.max_range_m) return;
+  p.normal = side * foot->normal;
+  p.foot_m = q.sonar_m - p.range_m * p.normal;
+  p.material = triangle.material;
+  // The curve bulges over its facets: half of what the planes at the corners rise above the place, to second order.
+  double bulge = 0;
+  Vec3d entry;
+  for (std::size_t k = 0; k < 3; ++k) {
+    held[k] /= sum;
+    const Vertex& v = vertices_[triangle.vertex[k]];
+    bulge += 0.5 * held[k] * dot(to_double(v.position) - p.foot_m, to_double(v.normal));
+    entry = entry + held[k] * to_double(v.position);
+  }
   const Vec3d beside = entry - p.foot_m;
+  if (inside) {
+    p.range_m -= side * bulge;
+    p.foot_m = q.sonar_m - p.range_m * p.normal;
+  }
+  bend_at(triangle, held, side, p);
   for (std::size_t k = 0; k < 2; ++k) {
     const double unit_m = fresnel_unit_m(q.wavelength_m, p.range_m, p.curvature[k]);
-    const double gap = sum > 1 + bary_slack ? dot(beside, p.along[k]) : 0;
+    const double gap = inside ? 0 : dot(beside, p.along[k]);
     if (std::abs(gap) > edge_units * unit_m) return;
     p.from[k] = gap - walk(index, entry, -1.0 * p.along[k], p, k, unit_m);
     p.to[k] = gap + walk(index, entry, p.along[k], p, k, unit_m);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/scene/mirror_point.hpp"
@@ -50,14 +51,18 @@ class MirrorMesh {
     std::uint32_t first = 0, count = 0;  // triangles of a leaf
     std::uint32_t second_child = 0;      // the first child follows its parent; 0 in a leaf
   };
-  struct Corner {
-    double weight[3];
-    Vec3d place;
+  /// Where a triangle's interpolated normal meets the sonar.
+  struct Foot {
+    std::array<double, 3> weight{};  // of the vertices; negative beside the triangle
+    Vec3d normal;                    // the mesh's side
+    double height_m = 0;             // of the sonar along it
   };
   class Maker;
 
   void find_on_faces(const MirrorQuery& query, std::vector<MirrorPoint>& out) const;
   void find_on_curves(const MirrorQuery& query, std::vector<MirrorPoint>& out) const;
+  std::optional<Foot> foot_on(const Triangle& triangle, Vec3d sonar_m) const;
+  void bend_at(const Triangle& triangle, const std::array<double, 3>& weight, double side, MirrorPoint& point) const;
   void solve(std::uint32_t triangle, const MirrorQuery& query, std::vector<MirrorPoint>& out) const;
   double walk(std::uint32_t triangle, Vec3d from, Vec3d direction, const MirrorPoint& point, std::size_t axis,
               double unit_m) const;
