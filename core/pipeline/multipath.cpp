@@ -13,19 +13,29 @@ std::vector<Leg> legs_that_see(const std::vector<FlatMirror>& mirrors, const Bou
   const int n = static_cast<int>(mirrors.size());
   for (int a = 0; a < n; ++a)
     for (int b = -1; b < n; ++b)
-      if (const Leg leg = leg_by(mirrors, a, b); !map.window_of(leg).empty()) legs.push_back(leg);
+      if (const Leg leg = leg_by(mirrors, a, b); a != b && !map.owns_nothing(leg)) legs.push_back(leg);
   return legs;
 }
 
-/// Cells wherever a way may reach, by their distance from the sonar itself.
+/// Cells wherever a way by mirrors may reach; their sizes follow the ways' lengths, reach[0] being the straight one.
 CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pose> bodies, const std::vector<LegReach>& reach) {
   CellView view;
   view.sonar_in_world = s.seen_from;
   view.bodies_in_world = bodies;
   view.max_range_m = static_cast<float>(s.max_range_m);
   view.levels = plan.levels;
-  view.may_see = [&reach](Vec3d from_sonar_m, double radius_m) {
-    return std::any_of(reach.begin(), reach.end(), [&](const LegReach& r) { return r.may_see(from_sonar_m, radius_m); });
+  view.seen_between = [&reach](Vec3d from_sonar_m, double radius_m) {
+    std::optional<DistanceSpan> all;
+    const auto join = [&](const LegReach& r) {
+      const std::optional<DistanceSpan> one = r.seen_between(from_sonar_m, radius_m);
+      if (!one) return;
+      if (!all) all = one;
+      all->nearest_m = std::min(all->nearest_m, one->nearest_m);
+      all->farthest_m = std::max(all->farthest_m, one->farthest_m);
+    };
+    for (std::size_t l = 1; l < reach.size(); ++l) join(reach[l]);
+    if (all) join(reach[0]);
+    return all;
   };
   return view;
 }
@@ -95,6 +105,7 @@ MultipathCounts sound_ghosts(const RayScene& scene, SurfaceCells& cells, std::sp
     work.faces_found = true;
   }
   Ways& ways = work.ways;
+  ways.bubbles = BubbleLayer(scene.scene().sea_surface);
   ways.mirrors = mirrors_of(work.faces, scene.scene(), bodies, plan, s);
   MultipathCounts counts;
   if (ways.mirrors.empty()) return counts;
@@ -104,7 +115,7 @@ MultipathCounts sound_ghosts(const RayScene& scene, SurfaceCells& cells, std::sp
   if (ways.legs.size() == 1) return counts;
 
   std::vector<LegReach> reach;
-  for (std::size_t l = 1; l < ways.legs.size(); ++l) reach.emplace_back(ways.legs[l], ways, plan, s);
+  for (const Leg& leg : ways.legs) reach.emplace_back(leg, ways, plan, s);
   const CellView view = view_of(plan, s, bodies, reach);
   const std::vector<TileInView>& tiles = cells.in_view(view, pool);
   const std::vector<LawTable> laws = laws_of(scene.scene(), plan, s);

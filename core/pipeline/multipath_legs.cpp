@@ -16,6 +16,7 @@ Pose object_in_world(const Scene& scene, const Object& object, std::span<const P
 struct Image {
   Rotation turn;
   Vec3d shift_m;
+  Vec3d of(Vec3d p) const { return turn * p + shift_m; }
 };
 Image image_in(const FlatMirror& m) {
   const double n[3] = {m.normal.x, m.normal.y, m.normal.z};
@@ -79,6 +80,28 @@ bool is_lit(const Leg& leg, const std::vector<FlatMirror>& mirrors, Vec3d place)
   if (leg.first < 0) return true;
   const double height = at(mirrors, leg.second < 0 ? leg.first : leg.second).height_of(place);
   return (leg.beyond_front ? height : -height) > touching_m;
+}
+
+double bubble_factor(const BubbleLayer& bubbles, const Leg& leg, const std::vector<FlatMirror>& mirrors, Vec3d place,
+                     const PingScalars& s) {
+  if (!bubbles.present()) return 1;
+  // Backwards from the place: where the line from the sonar's last image to it meets each mirror.
+  std::vector<Vec3d> bends{place};
+  for (const int mirror : {leg.second, leg.first}) {
+    if (mirror < 0) continue;
+    const Vec3d end = bends.back();
+    const bool two_left = mirror == leg.second;
+    const Vec3d source = two_left ? image_in(at(mirrors, leg.second)).of(image_in(at(mirrors, leg.first)).of({}))
+                                  : image_in(at(mirrors, leg.first)).of({});
+    const double from = at(mirrors, mirror).height_of(source), to = at(mirrors, mirror).height_of(end);
+    bends.push_back(source + (from / (from - to)) * (end - source));
+  }
+  bends.push_back({});
+  double factor = 1;
+  const auto height = [&s](Vec3d p) { return s.seen_from.position_m.z + (s.world_from_sonar * p).z; };
+  for (std::size_t i = 0; i + 1 < bends.size(); ++i)
+    factor *= std::sqrt(bubbles.two_way(height(bends[i]), height(bends[i + 1]), length(bends[i] - bends[i + 1])));
+  return factor;
 }
 
 }  // namespace sonar

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/pipeline/bubbles.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/ping_scalars.hpp"
 #include "core/scene/mirrors.hpp"
@@ -52,5 +53,9 @@ Leg leg_by(const std::vector<FlatMirror>& mirrors, int first, int second = -1);
 double reflectance_of(const Leg& leg, const std::vector<FlatMirror>& mirrors, Vec3d direction);
 /// Whether a place lies where the way can come from its last mirror: off the mirror itself, on the side that is lit.
 bool is_lit(const Leg& leg, const std::vector<FlatMirror>& mirrors, Vec3d place);
+
+/// Pressure factor of a layer of bubbles over one way to a place, bend by bend.
+double bubble_factor(const BubbleLayer& bubbles, const Leg& leg, const std::vector<FlatMirror>& mirrors, Vec3d place,
+                     const PingScalars& scalars);
 
 }  // namespace sonar

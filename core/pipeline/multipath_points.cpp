@@ -58,7 +58,7 @@ class PointGhosts {
     if (std::abs(direction.psi_rad) > ways_.map.fan.half_angle_rad || !(column >= 0) || column >= plan_.columns.count) return {};
     if (!reaches(scene_, s_, faces_, ways_.mirrors, leg, place)) return {};
     const double size = reflectance_of(leg, ways_.mirrors, (1 / r) * p) * std::exp(-s_.absorption_np_per_m * r) / r *
-                        static_cast<double>(pattern_(static_cast<float>(std::sin(direction.psi_rad))));
+                        static_cast<double>(pattern_(static_cast<float>(std::pow(std::sin(direction.psi_rad), 2))));
     const double half_turns = 0.5 * r * s_.turns_per_m;
     return PointArrival{r, direction.u, static_cast<double>(plan_.columns.transmit[static_cast<std::size_t>(column)]),
                         s_.doppler_samples(p), size * std::polar(1.0, -2 * pi * (half_turns - std::floor(half_turns)))};

@@ -18,6 +18,11 @@ void store(Vec3d v, float (&to)[3]) {
   to[0] = static_cast<float>(v.x), to[1] = static_cast<float>(v.y), to[2] = static_cast<float>(v.z);
 }
 
+/// Without the care that the library's product takes of infinities.
+std::complex<float> times(std::complex<float> a, std::complex<float> b) {
+  return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
+}
+
 /// Root of the scattering strength over that of mu, at a cosine of incidence.
 float law_root(const LawTable& law, float cosine) {
   if (law.root.empty()) return cosine;
@@ -38,39 +43,60 @@ float cross_fade(const CellLevel& level, float r) {
 }  // namespace
 
 LegReach::LegReach(const Leg& leg, const Ways& ways, const PingPlan& plan, const PingScalars& s)
-    : leg_(leg), ways_(ways), conical_(plan.switches.conical), longest_m_(2 * s.max_range_m) {
-  const LegWindow& w = ways.map.window_of(leg);
+    : leg_(leg), ways_(ways), plan_(plan), longest_m_(2 * s.max_range_m) {
   const auto angle = [&](int bin) {
     return std::atan(static_cast<double>(ways.map.fan.first_tangent + static_cast<float>(bin) / ways.map.fan.bins_per_tangent));
   };
-  high_sine_ = plan.columns.sine(w.first_column - 1), low_sine_ = plan.columns.sine(w.last_column + 1);
-  low_rad_ = angle(w.first_bin - 1), high_rad_ = angle(w.last_bin + 1);
+  for (std::size_t block = 0; block < ways.map.windows.size(); ++block) {
+    const LegWindow& w = ways.map.window(block, leg);
+    spans_.push_back(w.empty() ? Span{} : Span{angle(w.first_bin - 1), angle(w.last_bin + 1)});
+  }
 }
 
-bool LegReach::may_see(Vec3d place, double radius) const {
+std::optional<DistanceSpan> LegReach::seen_between(Vec3d place, double radius) const {
   const Vec3d image = leg_.image_of(place);
   const double r = length(image);
-  if (r + length(place) - 2 * radius > longest_m_) return false;
-  const FlatMirror& last = ways_.mirrors[static_cast<std::size_t>(leg_.second < 0 ? leg_.first : leg_.second)];
-  if ((leg_.beyond_front ? last.height_of(place) : -last.height_of(place)) < -radius) return false;
+  if (r + length(place) - 2 * radius > longest_m_) return {};
+  if (leg_.first >= 0) {
+    const FlatMirror& last = ways_.mirrors[static_cast<std::size_t>(leg_.second < 0 ? leg_.first : leg_.second)];
+    if ((leg_.beyond_front ? last.height_of(place) : -last.height_of(place)) < -radius) return {};
+  }
+  const bool conical = plan_.switches.conical;
   const double flat = std::sqrt(image.x * image.x + image.y * image.y);
-  const double from_axis = conical_ ? r : flat;
+  const double from_axis = conical ? r : flat, blocks = static_cast<double>(spans_.size());
+  double first_block = 0, last_block = blocks - 1;
   if (from_axis > 2 * radius) {
     const double sine = image.y / from_axis, spread = radius / (from_axis - radius);
-    if (sine - spread > high_sine_ || sine + spread < low_sine_) return false;
+    const auto block = [&](double u) {
+      return std::floor(((plan_.columns.first_sine - u) / plan_.columns.spacing + 0.5) / BounceMap::block_columns);
+    };
+    first_block = std::max(block(sine + spread + plan_.columns.spacing), first_block);
+    last_block = std::min(block(sine - spread - plan_.columns.spacing), last_block);
   }
-  const double across = conical_ ? std::sqrt(image.x * image.x + image.z * image.z) : r;
-  if (across <= radius) return true;
-  const double angle = std::atan2(image.z, conical_ ? image.x : flat), spread = std::asin(radius / across);
-  return angle - spread <= high_rad_ && angle + spread >= low_rad_;
+  const double across = conical ? std::sqrt(image.x * image.x + image.z * image.z) : r;
+  const bool anywhere = across <= radius;
+  const double angle = std::atan2(image.z, conical ? image.x : flat), spread = anywhere ? pi : std::asin(radius / across);
+  for (double b = first_block; b <= last_block; ++b) {
+    const Span& span = spans_[static_cast<std::size_t>(b)];
+    if (span.low_rad <= span.high_rad && angle - spread <= span.high_rad && angle + spread >= span.low_rad)
+      return DistanceSpan{r - radius, r + radius};
+  }
+  return {};
 }
 
 OneWayPattern::OneWayPattern(const BeamPattern& pattern)
     : aperture_(pattern.elevation_taper == Taper::unit ? 0.0f : static_cast<float>(elevation_aperture_in_wavelengths(pattern))) {}
 
-float OneWayPattern::operator()(float sine) const {
-  const float a = static_cast<float>(pi) * aperture_ * sine;
-  return std::abs(a) < 1e-2f ? 1 - a * a / 6 : std::sin(a) / a;
+float OneWayPattern::operator()(float squared_sine) const {
+  const float a = static_cast<float>(pi) * aperture_, x = a * a * squared_sine;  // x < 9: inside the first zero
+  float p = -1.0f / 1.307674368e12f;                                             // sin(a) / a, powers of x
+  p = p * x + 1.0f / 6227020800.0f;
+  p = p * x - 1.0f / 39916800.0f;
+  p = p * x + 1.0f / 362880.0f;
+  p = p * x - 1.0f / 5040.0f;
+  p = p * x + 1.0f / 120.0f;
+  p = p * x - 1.0f / 6.0f;
+  return p * x + 1;
 }
 
 GhostScatterer::GhostScatterer(const Ways& ways, const std::vector<LegReach>& reach, const SurfaceCells& cells,
@@ -83,7 +109,12 @@ GhostScatterer::GhostScatterer(const Ways& ways, const std::vector<LegReach>& re
       beam_correlation_(beam_correlation),
       plan_(plan),
       s_(scalars),
-      pattern_(plan.mode.pattern) {}
+      pattern_(plan.mode.pattern),
+      first_edge_sine_(static_cast<float>(plan.columns.first_sine + plan.columns.spacing / 2)),
+      columns_per_sine_(static_cast<float>(1 / plan.columns.spacing)),
+      tolerance_m_(depth_tolerance_in_pulses * static_cast<float>(plan.pulse_width_m)),
+      absorption_np_per_m_(static_cast<float>(scalars.absorption_np_per_m)),
+      half_turns_per_m_(static_cast<float>(0.5 * scalars.turns_per_m)) {}
 
 GhostScatterer::Way GhostScatterer::look_at(const TileInView& tile, const Leg& leg) const {
   Way way{};
@@ -99,10 +130,20 @@ GhostScatterer::Way GhostScatterer::look_at(const TileInView& tile, const Leg& l
   way.sample_shift = static_cast<float>(s_.doppler_samples(at.from_sonar_m));
   way.half_turns = static_cast<float>(fraction(0.5 * range * s_.turns_per_m));
   way.amplitude = static_cast<float>(std::exp(-s_.absorption_np_per_m * range));
+  if (ways_.bubbles.present())
+    way.amplitude *= static_cast<float>(bubble_factor(ways_.bubbles, leg, ways_.mirrors, tile_middle_, s_));
+  way.reflection = 1;
   if (leg.first >= 0) {
+    const FlatMirror& first = ways_.mirrors[static_cast<std::size_t>(leg.first)];
+    way.reflection = static_cast<float>(first.reflection);
+    store(std::sqrt(first.twice_kh_squared) * first.normal, way.rough_normal[0]);
     const FlatMirror& last = ways_.mirrors[static_cast<std::size_t>(leg.second < 0 ? leg.first : leg.second)];
     const double side = leg.beyond_front ? 1 : -1;
     store(transposed(sonar_from_object) * (side * last.normal), way.lit_normal);
+    if (leg.second >= 0) {
+      way.reflection *= static_cast<float>(last.reflection);
+      store(std::sqrt(last.twice_kh_squared) * leg.second_normal, way.rough_normal[1]);
+    }
     way.lit_height = static_cast<float>(side * last.height_of(tile.from_sonar_m) - touching_m);
   }
   return way;
@@ -110,10 +151,15 @@ GhostScatterer::Way GhostScatterer::look_at(const TileInView& tile, const Leg& l
 
 void GhostScatterer::sound(const TileInView& tile, std::vector<Echoes>& by_group) {
   tile_ways_.clear();
+  const auto along = [&tile, middle = tile.tile->count / 2](CellTile::Column c) {
+    return static_cast<double>(tile.tile->position_unit_m) * tile.tile->column(c)[middle];
+  };
+  tile_middle_ = tile.from_sonar_m +
+                 cells_.sonar_from_object(tile.object) * Vec3d{along(CellTile::x), along(CellTile::y), along(CellTile::z)};
   const double radius = static_cast<double>(tile.tile->half_edge_m) * 1.7320508;
   tile_ways_.push_back(look_at(tile, ways_.legs[0]));
   for (std::size_t l = 1; l < ways_.legs.size(); ++l)
-    if (reach_[l - 1].may_see(tile.from_sonar_m, radius)) tile_ways_.push_back(look_at(tile, ways_.legs[l]));
+    if (reach_[l].seen_between(tile.from_sonar_m, radius)) tile_ways_.push_back(look_at(tile, ways_.legs[l]));
   if (tile_ways_.size() == 1) return;
 
   const CellTile& t = *tile.tile;
@@ -144,38 +190,41 @@ void GhostScatterer::sound_cell(const Cell& cell, const LawTable& law, const Cel
     range_m = std::sqrt(std::max(w.range_m * w.range_m + e, 1e-6f));
     return e / (w.range_m + range_m);
   };
-  float straight_m = 0;
-  const float straight_offset = offset_of(tile_ways_[0], straight_m);
-  const float fade = cross_fade(level, straight_m);  // all ways share the cells that the distance calls for
-  if (fade <= 0) return;
   arrivals_.clear();
   Arrival arrival{};
+  float range_m = 0;
   for (std::size_t w = 1; w < tile_ways_.size(); ++w) {
     const Way& way = tile_ways_[w];
     if (cell.x * way.lit_normal[0] + cell.y * way.lit_normal[1] + cell.z * way.lit_normal[2] + way.lit_height <= 0) continue;
-    float range_m = 0;
     const float offset = offset_of(way, range_m);
     if (arrive(way, cell, range_m, offset, law, arrival)) arrivals_.push_back(arrival);
   }
   if (arrivals_.empty()) return;
-  direct_ = arrive(tile_ways_[0], cell, straight_m, straight_offset, law, arrival);
+  const float offset = offset_of(tile_ways_[0], range_m);
+  direct_ = arrive(tile_ways_[0], cell, range_m, offset, law, arrival);
   if (direct_) arrivals_.insert(arrivals_.begin(), arrival);
-  pair_up(cell, fade, by_group);
+  // All ways share the cells that the shortest calls for: their echoes must be of the same scatterers.
+  float shortest_m = arrivals_[0].range_m;
+  for (const Arrival& a : arrivals_) shortest_m = std::min(shortest_m, a.range_m);
+  const float fade = cross_fade(level, shortest_m);
+  if (fade > 0) pair_up(cell, fade, by_group);
 }
 
 bool GhostScatterer::is_visible(const Leg& leg, int column, float bin, float nearness) const {
   const BounceMap& map = ways_.map;
-  const std::size_t below =
-      static_cast<std::size_t>(column) * static_cast<std::size_t>(map.fan.bins + 1) + static_cast<std::size_t>(bin);
-  const float part = bin - std::floor(bin);
-  const std::size_t nearest = part < 0.5f ? below : below + 1, other = part < 0.5f ? below + 1 : below;
-  const auto belongs = [&](std::size_t node) {
-    return (leg.first < 0 || map.mirror[0][node] == leg.first) && (leg.second < 0 || map.mirror[1][node] == leg.second);
+  const auto whole = static_cast<int>(bin);
+  const BounceMap::Node* below = map.nodes.data() + static_cast<std::ptrdiff_t>(column) * (map.fan.bins + 1) + whole;
+  const float part = bin - static_cast<float>(whole);
+  const bool up = part >= 0.5f;
+  const BounceMap::Node &nearest = below[up ? 1 : 0], &other = below[up ? 0 : 1];
+  const auto belongs = [&leg](const BounceMap::Node& node) {
+    return (leg.first < 0 || node.mirror[0] == leg.first) && (leg.second < 0 || node.mirror[1] == leg.second);
   };
   if (!belongs(nearest)) return false;
-  const std::vector<float>& depth = map.inverse_x[leg.first < 0 ? 0 : leg.second < 0 ? 1 : 2];
-  const float share = part < 0.5f ? part : 1 - part;  // of the other node
-  const float seen = belongs(other) ? depth[nearest] + share * (depth[other] - depth[nearest]) : depth[nearest];
+  const int stage = leg.first < 0 ? 0 : leg.second < 0 ? 1 : 2;
+  const float share = up ? 1 - part : part;  // of the other node
+  const float at_nearest = nearest.inverse_x[stage];
+  const float seen = belongs(other) ? at_nearest + share * (other.inverse_x[stage] - at_nearest) : at_nearest;
   return nearness >= seen;
 }
 
@@ -186,30 +235,30 @@ bool GhostScatterer::arrive(const Way& w, const Cell& cell, float r, float offse
   const float z = w.from_sonar[2] + w.turn[6] * cell.x + w.turn[7] * cell.y + w.turn[8] * cell.z;
   const float h = plan_.switches.conical ? x : std::sqrt(x * x + y * y);
   out.sine = y / (plan_.switches.conical ? r : h);
-  const float column =
-      (static_cast<float>(plan_.columns.first_sine) - out.sine) / static_cast<float>(plan_.columns.spacing) + 0.5f;
+  const float column = (first_edge_sine_ - out.sine) * columns_per_sine_;
   if (!(column >= 0) || column >= static_cast<float>(plan_.columns.count)) return false;
   const BounceFan& fan = ways_.map.fan;
   const float bin = (z / h - fan.first_tangent) * fan.bins_per_tangent;
   if (!(bin >= 0) || bin >= static_cast<float>(fan.bins)) return false;
   out.column = static_cast<int>(column);
-  const float tolerance_m = depth_tolerance_in_pulses * static_cast<float>(plan_.pulse_width_m);
-  if (!is_visible(*w.leg, out.column, bin, (1 + tolerance_m / r) / h)) return false;
+  const float inverse_r = 1 / r;
+  if (!is_visible(*w.leg, out.column, bin, (1 + tolerance_m_ * inverse_r) / h)) return false;
 
   const float* q = w.from_sonar_object;
   const float along = cell.normal[0] * (q[0] + cell.x) + cell.normal[1] * (q[1] + cell.y) + cell.normal[2] * (q[2] + cell.z);
-  const Vec3d direction = (1.0 / static_cast<double>(r)) * Vec3d{x, y, z};
   out.range_m = r;
   out.sample_shift = w.sample_shift;
   out.front = along > 0;
   out.transmit = plan_.columns.transmit[static_cast<std::size_t>(out.column)];
-  const float mirrors = static_cast<float>(reflectance_of(*w.leg, ways_.mirrors, direction));
-  const float loss = w.amplitude * std::exp(-static_cast<float>(s_.absorption_np_per_m) * offset);
-  out.size =
-      mirrors * loss * pattern_(z / std::sqrt(h * h + z * z)) * std::sqrt(law_root(law, std::min(std::abs(along) / r, 1.0f))) / r;
-  const float turns = w.half_turns + 0.5f * static_cast<float>(s_.turns_per_m) * offset;
-  out.carried = std::polar(std::abs(out.size), static_cast<float>(-2 * pi) * (turns - std::floor(turns)));
-  if (out.size < 0) out.carried = -out.carried;
+  // Rc exp(-2 k^2 h^2 cos^2) of each mirror, and absorption.
+  const auto rough = [&](const float(&n)[3]) { return (n[0] * x + n[1] * y + n[2] * z) * inverse_r; };
+  const float first = rough(w.rough_normal[0]), second = rough(w.rough_normal[1]);
+  const float loss = std::exp(-first * first - second * second - absorption_np_per_m_ * offset);
+  out.size = w.reflection * w.amplitude * loss * pattern_(z * z / (h * h + z * z)) *
+             std::sqrt(law_root(law, std::min(std::abs(along) * inverse_r, 1.0f))) * inverse_r;
+  const float turns = w.half_turns + half_turns_per_m_ * offset;
+  const float phase = static_cast<float>(-2 * pi) * (turns - static_cast<float>(static_cast<int>(turns)));
+  out.carried = {out.size * std::cos(phase), out.size * std::sin(phase)};
   return true;
 }
 
@@ -230,7 +279,7 @@ void GhostScatterer::pair_up(const Cell& cell, float fade, std::vector<Echoes>& 
         add(sample, amplitude * (plan_.expected_power ? lit * lit : lit), back.column, by_group);
       };
       if (!plan_.expected_power) {
-        const std::complex<float> amplitude = std::sqrt(fade) * cell.weight * a.carried * b.carried;
+        const std::complex<float> amplitude = times(times(std::sqrt(fade) * cell.weight, a.carried), b.carried);
         heard(a, b, amplitude);
         if (i != j) heard(b, a, amplitude);
         continue;
@@ -249,7 +298,12 @@ void GhostScatterer::pair_up(const Cell& cell, float fade, std::vector<Echoes>& 
 }
 
 void GhostScatterer::add(float sample, std::complex<float> amplitude, int column, std::vector<Echoes>& by_group) const {
-  by_group[static_cast<std::size_t>(column / group_columns)].add(sample, amplitude, column);
+  Echoes& echoes = by_group[static_cast<std::size_t>(column / group_columns)];
+  if (echoes.count == echoes.capacity()) echoes.reserve(std::max(1024, 2 * echoes.count));
+  const auto i = static_cast<std::size_t>(echoes.count++);
+  echoes.sample[i] = sample;
+  echoes.re[i] = amplitude.real(), echoes.im[i] = amplitude.imag();
+  echoes.column[i] = column;
 }
 
 float GhostScatterer::beam_correlation(const Arrival& a, const Arrival& b) const {

@@ -16,26 +16,31 @@ struct Ways {
   std::vector<FlatMirror> mirrors;
   std::vector<Leg> legs;  // those that own a part of the map; [0] is the straight one
   BounceMap map;
+  BubbleLayer bubbles;
 };
 
-/// Whether a ball about a place in the axes of PingScalars::seen_from can be seen by a way, with a delay within the record.
+/// By how long a way a ball about a place in the axes of PingScalars::seen_from can be seen, with a delay within the record.
 class LegReach {
  public:
   LegReach(const Leg& leg, const Ways& ways, const PingPlan& plan, const PingScalars& scalars);
-  bool may_see(Vec3d place, double radius_m) const;
+  std::optional<DistanceSpan> seen_between(Vec3d place, double radius_m) const;
 
  private:
   const Leg& leg_;
   const Ways& ways_;
-  bool conical_;
-  double longest_m_, low_sine_, high_sine_, low_rad_, high_rad_;  // out and back together; edges of the leg's window
+  struct Span {
+    double low_rad = 1, high_rad = -1;  // elevations; empty at first
+  };
+  const PingPlan& plan_;
+  double longest_m_;         // out and back together
+  std::vector<Span> spans_;  // of the leg's windows, per block of columns
 };
 
 /// Amplitude of one pattern, transmitter's or receiver's, at an elevation.
 class OneWayPattern {
  public:
   explicit OneWayPattern(const BeamPattern& pattern);
-  float operator()(float sine) const;
+  float operator()(float squared_sine) const;
 
  private:
   float aperture_ = 0;  // wavelengths, 0 = no pattern
@@ -56,7 +61,8 @@ class GhostScatterer {
     const Leg* leg;
     float from_sonar_object[3], from_sonar[3], turn[9];  // of the tile's image, as in simd::TileSeen
     float range_m, sample_shift, half_turns, amplitude;
-    float lit_normal[3], lit_height;  // object axes; places with dot + height above 0 are lit by the last mirror
+    float reflection, rough_normal[2][3];  // product of the mirrors' Rc; their normals times sqrt(2) k h, sonar axes
+    float lit_normal[3], lit_height;       // object axes; places with dot + height above 0 are lit by the last mirror
   };
   struct Arrival {                      // one cell by one way
     float range_m, sample_shift, size;  // size: pressure per source, root of the scattering law included
@@ -87,6 +93,8 @@ class GhostScatterer {
   const PingPlan& plan_;
   const PingScalars& s_;
   OneWayPattern pattern_;
+  float first_edge_sine_, columns_per_sine_, tolerance_m_, absorption_np_per_m_, half_turns_per_m_;
+  Vec3d tile_middle_;  // one of its cells, in the axes of PingScalars::seen_from
   std::vector<Way> tile_ways_;
   std::vector<Arrival> arrivals_;
   bool direct_ = false;  // whether arrivals_[0] is the straight way

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 
@@ -247,9 +248,9 @@ class ColumnsTracer {
       if (same_way)
         seen = a.edge_above ? std::min(a.inverse_x[stage], b.inverse_x[stage])
                             : std::max(0.0f, a.inverse_x[stage] + part * (b.inverse_x[stage] - a.inverse_x[stage]));
-      map_.inverse_x[stage][node] = seen;
+      map_.nodes[node].inverse_x[stage] = seen;
       if (stage == 2) break;
-      map_.mirror[stage][node] = nearer.mirror[stage];
+      map_.nodes[node].mirror[stage] = nearer.mirror[stage];
       same_way = same_way && a.mirror[stage] == b.mirror[stage];
     }
   }
@@ -263,18 +264,20 @@ class ColumnsTracer {
   std::vector<Interval> open_;
 };
 
-/// Which part of columns [first, last) of the map each way owns.
-void widen_windows(const BounceMap& map, int first, int last, std::vector<LegWindow>& windows) {
-  const int row = map.fan.bins + 1;
+/// Which part of a block of columns each way owns.
+void find_windows(std::size_t block, BounceMap& map) {
+  auto& windows = map.windows[block];
+  windows.fill({});
+  windows[BounceMap::index_of(-1, -1)] = {0, map.fan.bins};  // the straight way has no mirror to keep within
+  const int row = map.fan.bins + 1, first = static_cast<int>(block) * BounceMap::block_columns;
   const auto number = [](std::uint8_t mirror) { return mirror == BounceMap::no_mirror ? -1 : static_cast<int>(mirror); };
-  for (int k = first; k < last; ++k)
+  for (int k = first; k < std::min(first + BounceMap::block_columns, map.columns); ++k)
     for (int bin = 0; bin < row; ++bin) {
       const auto node = static_cast<std::size_t>(k) * static_cast<std::size_t>(row) + static_cast<std::size_t>(bin);
-      const int a = number(map.mirror[0][node]), b = number(map.mirror[1][node]);
+      const int a = number(map.nodes[node].mirror[0]), b = number(map.nodes[node].mirror[1]);
       if (a < 0) continue;
       for (const int second : {-1, b}) {
-        LegWindow& w = windows[BounceMap::index(a, second)];
-        w.first_column = std::min(w.first_column, k), w.last_column = std::max(w.last_column, k);
+        LegWindow& w = windows[BounceMap::index_of(a, second)];
         w.first_bin = std::min(w.first_bin, bin), w.last_bin = std::max(w.last_bin, bin);
       }
     }
@@ -305,31 +308,25 @@ std::size_t trace_bounces(const RayScene& scene, const PingPlan& plan, const Pin
   map.fan = make_bounce_fan(plan);
   map.columns = plan.columns.count;
   const auto nodes = static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.fan.bins + 1);
-  for (auto& m : map.inverse_x) m.resize(nodes);
-  for (auto& m : map.mirror) m.resize(nodes);
-  const auto groups = static_cast<std::size_t>((map.columns + RayPacket::size - 1) / RayPacket::size);
-  std::vector<std::vector<LegWindow>> windows(groups);
-  std::vector<std::size_t> traced(groups);
-  pool.for_each(groups, [&](std::size_t g, int) {
+  map.nodes.resize(nodes);
+  const auto blocks = static_cast<std::size_t>((map.columns + BounceMap::block_columns - 1) / BounceMap::block_columns);
+  map.windows.resize(blocks);
+  std::vector<std::size_t> traced(blocks);
+  pool.for_each(blocks, [&](std::size_t block, int) {
     ChainTracer rays(scene, scalars, faces, mirrors);
-    const int first = static_cast<int>(g) * RayPacket::size, last = std::min(first + RayPacket::size, map.columns);
+    const int first = static_cast<int>(block) * BounceMap::block_columns;
+    const int last = std::min(first + BounceMap::block_columns, map.columns);
     ColumnsTracer(rays, plan, static_cast<float>(2 * scalars.max_range_m), first, last, map).run();
-    windows[g].resize(map.window.size());
-    widen_windows(map, first, last, windows[g]);
-    traced[g] = rays.traced;
+    find_windows(block, map);
+    traced[block] = rays.traced;
   });
-  map.window.fill({});
-  std::size_t sum = 0;
-  for (std::size_t g = 0; g < groups; ++g) {
-    sum += traced[g];
-    for (std::size_t i = 0; i < map.window.size(); ++i) {
-      LegWindow& w = map.window[i];
-      const LegWindow& part = windows[g][i];
-      w.first_column = std::min(w.first_column, part.first_column), w.last_column = std::max(w.last_column, part.last_column);
-      w.first_bin = std::min(w.first_bin, part.first_bin), w.last_bin = std::max(w.last_bin, part.last_bin);
-    }
-  }
-  return sum;
+  return std::accumulate(traced.begin(), traced.end(), std::size_t{0});
+}
+
+bool BounceMap::owns_nothing(const Leg& leg) const {
+  for (std::size_t block = 0; block < windows.size(); ++block)
+    if (!window(block, leg).empty()) return false;
+  return true;
 }
 
 bool reaches(const RayScene& scene, const PingScalars& scalars, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors,

@@ -23,26 +23,30 @@ struct BounceFan {
 };
 BounceFan make_bounce_fan(const PingPlan& plan);
 
-/// Part of the map that a way owns; empty when it owns nothing.
+/// Part of a block of columns that a way owns; empty when it owns nothing.
 struct LegWindow {
-  int first_column = std::numeric_limits<int>::max(), last_column = -1;  // inclusive
-  int first_bin = std::numeric_limits<int>::max(), last_bin = -1;
-  bool empty() const { return last_column < first_column; }
+  int first_bin = std::numeric_limits<int>::max(), last_bin = -1;  // inclusive
+  bool empty() const { return last_bin < first_bin; }
 };
 
-/// Per column, over the tangent of elevation, after 0, 1 and 2 bounces: 1 / x of the surface met, x along the unfolded way (see
-/// DepthMap), 0 = none; and the mirror that surface is.
+/// Per column, over the tangent of elevation.
 struct BounceMap {
   static constexpr std::uint8_t no_mirror = 0xFF;
-  static constexpr int mirror_room = most_mirrors + 1;
+  struct Node {
+    float inverse_x[3];      // after 0, 1, 2 bounces: 1 / x of the surface met, x along the unfolded way (DepthMap), 0 = none
+    std::uint8_t mirror[2];  // which the first and the second of them are, or no_mirror
+  };
   BounceFan fan;
   int columns = 0;
-  std::array<std::vector<float>, 3> inverse_x;                            // [columns][bins + 1]
-  std::array<std::vector<std::uint8_t>, 2> mirror;                        // [columns][bins + 1]
-  std::array<LegWindow, (most_mirrors + 1) * (most_mirrors + 1)> window;  // [first + 1][second + 1] of a leg
+  std::vector<Node> nodes;  // [columns][bins + 1]
+  static constexpr int block_columns = RayPacket::size;
+  std::vector<std::array<LegWindow, (most_mirrors + 1) * (most_mirrors + 1)>> windows;  // per block of columns, by index_of
 
-  const LegWindow& window_of(const Leg& leg) const { return window[index(leg.first, leg.second)]; }
-  static std::size_t index(int first, int second) { return static_cast<std::size_t>((first + 1) * mirror_room + second + 1); }
+  static std::size_t index_of(int first, int second) {
+    return static_cast<std::size_t>((first + 1) * (most_mirrors + 1) + second + 1);
+  }
+  const LegWindow& window(std::size_t block, const Leg& leg) const { return windows[block][index_of(leg.first, leg.second)]; }
+  bool owns_nothing(const Leg& leg) const;
 };
 
 /// Returns the number of rays.

@@ -186,18 +186,20 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
                 m[2][0] * q.x + m[2][1] * q.y + m[2][2] * q.z};
   const double range = length(p);
   if (range - radius > view.max_range_m) return;
-  if (view.may_see) {
-    if (!view.may_see(p, radius)) return;
+  DistanceSpan seen{range - radius, range + radius};
+  if (view.seen_between) {
+    const std::optional<DistanceSpan> span = view.seen_between(p, radius);
+    if (!span) return;
+    seen = *span;
   } else {
     if (std::abs(p.z) * fan_cosine_ - p.x * fan_sine_ > radius) return;
     if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
   }
 
   node.last_visited = now_;
-  const double nearest = range - radius, farthest = range + radius;
   bool finer = node.address.level < view.levels.front().level;
   for (const CellLevel& level : view.levels) {
-    const bool overlaps = nearest < level.fade_out_to_m && farthest >= level.fade_in_from_m;
+    const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
     if (!overlaps) continue;
     if (level.level == node.address.level) {
       wanted_.push_back(&node);

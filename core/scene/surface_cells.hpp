@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -42,6 +43,10 @@ struct CellLevel {
   float fade_in_from_m = 0, full_from_m = 0, full_to_m = 0, fade_out_to_m = 0;
 };
 
+struct DistanceSpan {
+  double nearest_m = 0, farthest_m = 0;
+};
+
 /// What a ping looks at: outer bounds only, in the sonar's frame.
 struct CellView {
   Pose sonar_in_world;
@@ -50,8 +55,9 @@ struct CellView {
   float max_sine = 1;             // |y / r| of the outermost column
   float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first
-  /// When set, stands for the bounds of the fan: whether a ball about a place in the sonar's axes may be wanted.
-  std::function<bool(Vec3d from_sonar_m, double radius_m)> may_see;
+  /// When set, stands for the bounds of the fan: between which distances a ball about a place in the sonar's axes is seen, which
+  /// mirrors can make farther than it is; nothing when it is not.
+  std::function<std::optional<DistanceSpan>(Vec3d from_sonar_m, double radius_m)> seen_between;
 };
 
 /// A tile in view and where the sonar is, seen from it.

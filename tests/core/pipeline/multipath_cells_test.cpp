@@ -134,7 +134,7 @@ TEST(MultipathCells, SameBytesForAnyNumberOfThreads) {
   std::vector<std::byte> samples[2];
   std::vector<float> pressure[2];
   for (const int threads : {1, 2}) {
-    Sounding s(tank(), p900(), default_rows(10, 360), {.threads = threads, .engine = {}});
+    Sounding s(tank(), p900(), default_rows(8, 120), {.threads = threads, .engine = {}});
     s.request.switches.multipath = true;
     s.request.switches.noise = true;
     s.ping_from({-2, 0.3, 0.1});
@@ -147,7 +147,7 @@ TEST(MultipathCells, SameBytesForAnyNumberOfThreads) {
 }
 
 TEST(MultipathCells, ATankRingsOnBehindItsWalls) {
-  Sounding on(tank(), p900(), default_rows(12, 400)), off(tank(), p900(), default_rows(12, 400));
+  Sounding on(tank(), p900(), default_rows(12, 200)), off(tank(), p900(), default_rows(12, 200));
   on.request.switches.multipath = true;
   for (Sounding* s : {&on, &off}) s->ping_from({-2, 0.3, 0.1});
   // Beyond the farthest corner, 6.1 m away, nothing comes back but by way of the walls.
