@@ -168,7 +168,6 @@ Result<std::vector<double>> firing_times(const RenderJob& job, const OutputOptio
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, Parallel& pool,
                               const std::function<void(const Progress&)>& told) {
   const std::string digest = digest_of(input, o.rate_hz.value_or(0));
-  if (const auto claimed = claim_folder(input, o, digest); !claimed) return tl::make_unexpected(claimed.error());
   Progress progress;
   std::vector<std::vector<double>> times;
   for (const RenderJob& job : input.jobs) {
@@ -177,6 +176,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
     progress.all += of_job->size();
     times.push_back(*std::move(of_job));
   }
+  if (const auto claimed = claim_folder(input, o, digest); !claimed) return tl::make_unexpected(claimed.error());
   for (std::size_t j = 0; j < input.jobs.size(); ++j) {
     const RenderJob& job = input.jobs[j];
     std::unique_ptr<PingEngine> engine;  // not before it is needed: a finished folder costs no scene

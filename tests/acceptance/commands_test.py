@@ -22,7 +22,7 @@ sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
 
 class Help(unittest.TestCase):
     def test_every_command_explains_itself(self):
-        for command in [(SONARD,), (SONARD, "run"), (SONARD, "check"), (SONARCTL,), (SONARCTL, "listen"), (SONARCTL, "view"),
+        for command in [(SONARD,), (SONARD, "run"), (SONARD, "check"), (SONARD, "render"), (SONARCTL,), (SONARCTL, "listen"), (SONARCTL, "view"),
                         (SONARCTL, "stats"), (SONARCTL, "pose"), (SONARCTL, "pose", "circle")]:
             with self.subTest(command=command):
                 result = run(*command, "--help")

@@ -1,0 +1,181 @@
+"""sonard render as a user runs it: arrays that another language reads, runs that go on where they stopped, plain refusals."""
+import ast
+import json
+import math
+import os
+import pathlib
+import re
+import struct
+import tempfile
+import unittest
+
+from running_sonard import ROOT, SONARD, run
+
+CONFIG = f"""\
+world: {{scene: {ROOT}/scenes/l-targets.yaml}}
+vehicles: [{{name: rov}}]
+sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
+"""
+
+
+def read_npy(path):
+    """Shape, type and numbers of an array, by the format's description."""
+    data = path.read_bytes()
+    assert data[:8] == b"\x93NUMPY\x01\x00", data[:8]
+    (length,) = struct.unpack_from("<H", data, 8)
+    header = ast.literal_eval(data[10:10 + length].decode("latin-1"))
+    assert not header["fortran_order"]
+    code = {"<f4": "f", "<c8": "ff", "|u1": "B", "<u2": "H", "<u4": "I"}[header["descr"]]
+    count = math.prod(header["shape"])
+    values = struct.unpack_from("<" + str(count * len(code)) + code[0], data, 10 + length)
+    assert len(data) == 10 + length + struct.calcsize("<" + code) * count
+    return header["shape"], header["descr"], values
+
+
+class Render(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.path = pathlib.Path(self.folder.name)
+        self.out = self.path / "out"
+        self.config = self.path / "sonard.yaml"
+        self.config.write_text(CONFIG, encoding="utf-8")
+
+    def render(self, *more, out=None, config=None):
+        return run(SONARD, "render", config or self.config, "--out", out or self.out, *more)
+
+    def expect(self, result, code, *words):
+        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+        for word in words:
+            self.assertIn(word, result.stderr)
+        if code:
+            self.assertEqual(len(result.stderr.strip().splitlines()), 1, result.stderr)
+
+    def test_arrays_and_the_sidecar_agree(self):
+        self.expect(self.render("--format", "npy,png,raw", "--complex", "--noise", "off"), 0)
+        side = json.loads((self.out / "000001.json").read_text(encoding="utf-8"))
+        rows, beams = side["settings"]["rows"], side["settings"]["beams"]
+        shape, kind, pressure = read_npy(self.out / "000001_pressure.npy")
+        self.assertEqual((shape, kind), ((rows, beams), "<f4"))
+        shape, kind, signal = read_npy(self.out / "000001_beams.npy")
+        self.assertEqual((shape, kind), ((rows, beams), "<c8"))
+        shape, kind, samples = read_npy(self.out / "000001_samples.npy")
+        self.assertEqual((shape, kind), ((rows, beams), "|u1"))
+        self.assertEqual(bytes(samples), (self.out / "000001_samples.raw").read_bytes())
+        self.assertTrue((self.out / "000001.png").read_bytes().startswith(b"\x89PNG"))
+        loudest = max(range(len(pressure)), key=pressure.__getitem__)
+        self.assertAlmostEqual(math.hypot(signal[2 * loudest], signal[2 * loudest + 1]) / pressure[loudest], 1, places=4)
+
+        # The loudest echo is one of the targets, where the sidecar's own axes put it; the first hit of that beam agrees.
+        azimuth = side["beam_azimuth_rad"][loudest % beams]
+        true_over_believed = side["water"]["true_sound_speed_mps"] / side["settings"]["device_sound_speed_mps"]
+        distance = (side["row_0_m"] + loudest // beams * side["row_spacing_m"]) * true_over_believed
+        targets = {"A": (4, 20), "B": (4, -10), "C": (7, 8)}
+        near = [n for n, (r, deg) in targets.items()
+                if abs(distance - r) < 0.15 and abs(math.degrees(azimuth) - deg) < 2]
+        self.assertEqual(len(near), 1, (distance, math.degrees(azimuth)))
+        self.assertEqual(side["truth"]["object_name"][loudest % beams], near[0])
+        self.assertAlmostEqual(side["truth"]["first_hit_m"][loudest % beams], distance, delta=0.15)
+        self.assertIn(None, side["truth"]["object"])
+        self.assertEqual(len(side["truth"]["first_hit_m"]), beams)
+
+    def test_the_sidecar_tells_every_parameter(self):
+        self.expect(self.render("--format", "raw", "--seed", "5", "--volume", "off"), 0)
+        side = json.loads((self.out / "000001.json").read_text(encoding="utf-8"))
+        for key in ["sonard", "inputs", "ping", "time_s", "scene", "sonar", "sonar_name", "settings", "beam_azimuth_rad", "row_0_m",
+                    "row_spacing_m", "water", "sonar_in_world", "vehicle_in_world", "twist", "seed", "switches", "engine", "counts",
+                    "truth"]:
+            self.assertIn(key, side)
+        self.assertEqual(side["seed"], 5)
+        self.assertFalse(side["switches"]["volume"])
+        self.assertTrue(side["switches"]["noise"])
+        self.assertEqual(side["sonar"]["model"], "Oculus M1200d")
+        self.assertTrue(1400 < side["water"]["true_sound_speed_mps"] < 1550)
+        self.assertTrue(0 < side["water"]["absorption_db_per_m"] < 3)
+        self.assertGreater(side["counts"]["rays"], 10000)
+        self.assertFalse((self.out / "000001_pressure.npy").exists())
+
+    def test_goes_on_where_it_stopped(self):
+        self.expect(self.render("--pings", "2", "--format", "npy"), 0)
+        first = self.out / "000001_pressure.npy"
+        before = first.stat().st_mtime_ns, first.read_bytes()
+        (self.out / "000002.json").unlink()  # broken off before the second was whole
+        result = self.render("--pings", "3", "--format", "npy")
+        self.expect(result, 0, "3 of 3 pings", "1 were there already")
+        self.assertEqual((first.stat().st_mtime_ns, first.read_bytes()), before)
+        self.assertTrue((self.out / "000003.json").exists())
+        self.assertEqual([p.name for p in self.out.iterdir() if p.suffix == ".tmp"], [])
+
+    def test_a_folder_belongs_to_one_set_of_inputs(self):
+        self.expect(self.render("--pings", "2", "--format", "npy", "--quiet"), 0)
+        self.expect(self.render("--seed", "9"), 64, "other inputs", "--overwrite")
+        self.expect(self.render("--noise", "off"), 64, "other inputs")
+        self.expect(self.render("--seed", "9", "--overwrite", "--quiet", "--format", "npy"), 0)
+        self.assertFalse((self.out / "000002.json").exists())
+        self.assertEqual(json.loads((self.out / "000001.json").read_text(encoding="utf-8"))["seed"], 9)
+
+    def test_threads_change_no_byte(self):
+        for threads in (1, 2):
+            self.expect(self.render("--threads", str(threads), "--format", "npy,raw", out=self.path / str(threads)), 0)
+        for name in ["000001_pressure.npy", "000001_samples.raw"]:
+            self.assertEqual((self.path / "1" / name).read_bytes(), (self.path / "2" / name).read_bytes())
+
+    def test_poses_from_a_file(self):
+        poses = self.path / "poses.csv"
+        poses.write_text("t_s,x_m,y_m,z_m,yaw_deg\n0,0,0,0,0\n1,0.5,0,0,10\n2,1,0,0,20\n", encoding="utf-8")
+        self.expect(self.render("--poses", poses, "--format", "raw"), 0, "3 of 3 pings")
+        side = json.loads((self.out / "000002.json").read_text(encoding="utf-8"))
+        self.assertEqual(side["time_s"], 1)
+        self.assertAlmostEqual(side["sonar_in_world"]["xyz_m"][0], 0.5)
+        self.assertAlmostEqual(side["twist"]["velocity_mps"][0], 0.5, places=6)
+        self.assertAlmostEqual(side["twist"]["angular_rate_radps"][2], math.radians(10), places=6)
+        other = self.path / "other"
+        self.expect(self.render("--poses", poses, "--format", "raw", "--pings", "4", out=other), 64, "enough for 3")
+        self.expect(self.render("--poses", poses, "--format", "raw", "--rate", "2", out=other), 0, "5 of 5 pings")
+        poses.write_text("t,x,y,z\n0,0,0\n", encoding="utf-8")
+        self.expect(self.render("--poses", poses, out=self.path / "third"), 65, "poses.csv:2: 3 values")
+
+    def test_mistakes_are_one_sentence(self):
+        self.expect(self.render(config=self.path / "none.yaml"), 66, "none.yaml")
+        self.expect(self.render("--sonar", "back"), 64, "front")
+        self.expect(self.render("--complex", "--expected-power"), 64, "--complex")
+        self.expect(run(SONARD, "render", self.config), 64, "--out")
+        (self.path / "file").write_text("", encoding="utf-8")
+        self.expect(self.render(out=self.path / "file" / "out"), 74, "cannot make the folder")
+        if pathlib.Path("/dev/full").exists():
+            folder = self.path / "full"
+            folder.mkdir()
+            os.symlink("/dev/full", folder / "render.json.tmp")
+            self.expect(self.render(out=folder), 74, "No space left")
+
+    def test_expectations_decide_the_exit_code(self):
+        good = pathlib.Path(ROOT) / "tests/oracles/46-conical.yaml"
+        self.assertEqual(run(SONARD, "render", good, "--check-expectations").returncode, 0)
+        wrong = self.path / "wrong.yaml"
+        wrong.write_text(re.sub(r"value: [^,]*,", "value: 40,", good.read_text(encoding="utf-8")), encoding="utf-8")
+        result = run(SONARD, "render", wrong, "--check-expectations")
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn("NOT AS EXPECTED", result.stdout)
+        self.assertIn("wrong.yaml", result.stdout)
+        self.assertIn("expected 40", result.stdout)
+
+    def test_the_manuals_example_is_true(self):
+        page = (pathlib.Path(ROOT) / "docs/render.md").read_text(encoding="utf-8")
+        example = self.path / "example.yaml"
+        example.write_text(re.search(r"```yaml\n(.*?)```", page, re.S).group(1), encoding="utf-8")
+        result = run(SONARD, "render", example, "--check-expectations")
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+
+    def test_coverage_of_a_bed(self):
+        bed = self.path / "bed.yaml"
+        bed.write_text("scene: {objects: [{type: plane, material: sand, size_m: [40, 40], pose: {xyz_m: [0, 0, -12]}}]}\n"
+                       "sonar: {profile: oculus-m1200d}\n"
+                       "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10], rpy_deg: [0, 14, 0]}}\n", encoding="utf-8")
+        result = run(SONARD, "render", bed, "--report", "coverage")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertGreaterEqual(float(re.search(r"([\d.]+) %", result.stdout).group(1)), 99)
+        self.expect(run(SONARD, "render", self.config, "--report", "coverage"), 65, "plane")
+
+
+if __name__ == "__main__":
+    unittest.main()
