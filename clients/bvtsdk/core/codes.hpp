@@ -1,0 +1,54 @@
+// The SDK's return codes that we produce: public constants of its interface, the same in 3.x and 4.x.
+// Inside the core a function that can fail returns one of them; the facades pass them on as they are.
+#pragma once
+
+namespace sonar::bvt {
+
+enum Code : int {
+  success = 0,
+  failed = 1,
+  memory_alloc = 2,
+  file_open = 3,
+  file_read = 4,
+  file_write = 5,
+  bad_parameter = 6,
+  invalid_ptr = 7,
+  file_create = 8,
+  file_not_open = 10,
+  not_implemented = 13,
+  timeout = 18,
+  buffer_too_small = 19,
+  file_header_bad = 1003,
+  file_too_new = 1004,
+  lookup_host = 1014,
+  connection_timed_out = 1015,
+  socket_read_timeout = 1017,
+  socket_write_timeout = 1018,
+  socket_closed = 1020,
+  socket_write = 1021,
+  socket_read = 1022,
+  index_out_of_bounds = 1064,
+  socket_not_connected = 1065,
+  no_temp = 2008,
+  no_head = 2010,
+  ping_number_too_large = 4002,
+  ping_number_too_small = 4003,
+  bad_range = 4009,
+  no_ping_signal = 4011,
+  read_only_file = 4012,
+  no_video_frame = 4014,
+  bad_ping = 5001,
+  bad_color_map = 5002,
+  bad_head = 5003,
+  bad_image_type = 5004,
+  invalid_image_size = 5008,
+  invalid_resolution = 5010,
+  load_color_map = 9001,
+  bad_packet_type = 14001,
+  net_not_connected = 14003,
+  bad_packet_version = 14004,
+  nav_no_data = 16000,
+  trigger_not_present = 18000,
+};
+
+}  // namespace sonar::bvt

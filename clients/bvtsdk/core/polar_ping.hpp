@@ -1,0 +1,81 @@
+// One ping as the link delivers it: polar samples, what they mean, and where the vehicle was. Images, range lists and
+// recordings are all made from this.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/bvtsdk/core/bytes.hpp"
+
+namespace sonar::bvt {
+
+/// Bits of NavData::present; the fields follow in this order on the link.
+enum NavField : std::uint16_t {
+  nav_time = 1 << 0,
+  nav_latitude = 1 << 1,
+  nav_longitude = 1 << 2,
+  nav_depth = 1 << 3,
+  nav_altitude = 1 << 4,
+  nav_pitch = 1 << 5,
+  nav_roll = 1 << 6,
+  nav_heading = 1 << 7,
+  nav_heading_velocity = 1 << 8,
+  nav_course = 1 << 9,
+  nav_text = 1 << 10,
+};
+
+/// A field means nothing unless its bit of `present` is set.
+struct NavData {
+  std::uint16_t present = 0;
+  double time_s = 0;  // since 1970 UTC
+  double latitude_deg = 0, longitude_deg = 0;
+  float depth_m = 0, altitude_m = 0;
+  float pitch_deg = 0;    // bow up
+  float roll_deg = 0;     // port up
+  float heading_deg = 0;  // clockwise from true north
+  float heading_velocity_mps = 0;
+  float course_deg = 0;
+  std::string text;
+
+  bool has(NavField field) const { return (present & field) != 0; }
+};
+
+/// Sample k of beam j is samples[j * bins + k]: it covers start_m + k bin_m ... start_m + (k + 1) bin_m and looks at
+/// fov_min_deg + (j + 1/2) (fov_max_deg - fov_min_deg) / beams, clockwise from ahead. 65535 is full scale.
+/// A decoded ping is finite throughout, 0 <= start_m < stop_m, bin_m > 0, sound_speed_mps > 0 and
+/// -180 <= fov_min_deg < fov_max_deg <= 180.
+struct PolarPing {
+  std::int32_t head = 0;
+  std::uint32_t number = 0;
+  double time_s = 0;  // since 1970 UTC
+  std::int32_t time_zone_s = 0;
+  float start_m = 0, stop_m = 0;
+  std::int32_t sound_speed_mps = 1500;
+  float fov_min_deg = 0, fov_max_deg = 0;
+  float bin_m = 0;
+  int beams = 0, bins = 0;  // 0 of either: a ping without a signal (4011)
+  NavData nav;              // present == 0: none
+  std::vector<std::uint16_t> samples;
+
+  bool has_signal() const { return !samples.empty(); }
+  double bearing_deg(double beam) const {
+    return static_cast<double>(fov_min_deg) + (beam + 0.5) * static_cast<double>(fov_max_deg - fov_min_deg) / beams;
+  }
+  double range_m(double bin) const { return static_cast<double>(start_m) + (bin + 0.5) * static_cast<double>(bin_m); }
+};
+
+/// The payload of PING_DATA. Nothing when it is none, and `why` then says in one sentence what is wrong. Allocates no more
+/// than the payload can hold, and never more than 64 MiB.
+std::optional<PolarPing> decode_ping(BytesView payload, std::string* why = nullptr);
+
+/// The opposite: samples as they are, or as a zlib stream.
+Bytes encode_ping(const PolarPing& ping, bool deflate = false);
+
+/// The bitmap and the values, as in PING_DATA and NAV_DATA; unset bits and what the link does not know are left out.
+void put_nav(Bytes& out, const NavData& nav);
+/// The opposite; `reader.ok()` tells whether it was whole. Values that are no numbers count as absent.
+NavData take_nav(Reader& reader);
+
+}  // namespace sonar::bvt
