@@ -112,7 +112,7 @@ TEST(MultipathCells, SpeckleOfTheTwoWaysRoundIsOne) {
   s.request.switches.multipath = true;
   s.request.switches.expected_power = false;
   double mean = 0;
-  constexpr int draws = 40;
+  constexpr int draws = 20;
   for (int draw = 0; draw < draws; ++draw) {
     s.request.seed = Seed{static_cast<std::uint64_t>(draw) + 1};
     mean += heard() / draws;
