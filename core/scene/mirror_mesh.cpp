@@ -10,7 +10,7 @@ constexpr double bary_slack = 1e-6;     // normals are continuous across edges: 
 constexpr double edge_units = 4;        // of a curved surface's edge, in Fresnel units: how far beside it its echo is looked for
 constexpr double twins_in_units = 0.5;  // mirror points nearer to each other than this are one
 constexpr double walk_units = 16;       // beyond this an edge is not heard in the echo
-constexpr double trusted_units = 3.5;   // where the surface leaves its osculating arc farther out than this, nobody notices
+constexpr double trusted_units = 2;     // where the surface leaves its osculating arc farther out than this, nobody notices
 
 Vec3d unit(Vec3d v) {
   const double l = length(v);
@@ -191,12 +191,12 @@ void MirrorMesh::solve(std::uint32_t index, const MirrorQuery& q, std::vector<Mi
 }
 
 // How far the surface reaches from a place on a triangle in a direction: to its edge, or for ever where the edge is too far to
-// matter. Where it bends unlike its osculating arc by an eighth of a wave, what follows adds nothing.
+// matter. Where it bends unlike its osculating arc by a quarter of a wave, what follows adds nothing.
 double MirrorMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, const MirrorPoint& point, std::size_t axis,
                         double unit_m) const {
   constexpr double for_ever = std::numeric_limits<double>::infinity();
   const Vec3d cut = cross(point.normal, direction);  // the walk stays in the plane of normal and direction
-  const double eighth_of_wave = 0.5 * unit_m * unit_m * std::abs(bending(point.range_m, point.curvature[axis])) / point.range_m;
+  const double quarter_of_wave = unit_m * unit_m * std::abs(bending(point.range_m, point.curvature[axis])) / point.range_m;
   double walked = 0, risen = 0;
   std::int32_t came_from = -1;
   for (int step = 0; step < 4096; ++step) {
@@ -233,7 +233,7 @@ double MirrorMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, const 
     risen += std::abs(over - std::tan(std::clamp(point.curvature[axis] * walked, -1.0, 1.0))) * leave;
     if (walked > walk_units * unit_m) return for_ever;
     if (triangle.across[through] < 0) return walked;
-    if (risen > eighth_of_wave && walked > unit_m) return walked > trusted_units * unit_m ? for_ever : walked;
+    if (risen > quarter_of_wave && walked > unit_m) return walked > trusted_units * unit_m ? for_ever : walked;
     came_from = static_cast<std::int32_t>(index);
     index = static_cast<std::uint32_t>(triangle.across[through]);
   }
