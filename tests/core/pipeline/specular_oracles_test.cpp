@@ -249,6 +249,15 @@ TEST_P(BothWays, MovesWithItsBody) {
   }
 }
 
+TEST(SpecularOracles, MeshOfASphereFromEverySide) {
+  for (int i = 0; i < 10; ++i) {
+    Mirror sphere = sphere_mirror(0.25);
+    sphere.in_world = {{3.25, 0, 0}, quat_from_rpy({0.61 * i, 0.37 * i, 1.13 * i})};
+    MirrorSounding s(world_of({sphere}, true), p900(), native_rows(12, 0.0254));
+    EXPECT_NEAR(db(s.strength_per_m(3)), db(1 / (6 * (1 + 3 / 0.25))), 0.5) << i;
+  }
+}
+
 TEST(SpecularOracles, CapsuleAndTorusFromFacets) {
   // Shapes without a closed form in the engine: radii a (half sphere end-on), and a with R + a (torus seen in its plane).
   Mirror capsule{.mesh = make_capsule(0.3, 0.8, segments_for(0.3))};
