@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "core/pipeline/spectral.hpp"
 #include "core/scene/mirrors.hpp"
 #include "core/scene/primitives.hpp"
 #include "tests/core/pipeline/scenes.hpp"
@@ -153,8 +154,34 @@ TEST(MultipathCells, ATankRingsOnBehindItsWalls) {
   // Beyond the farthest corner, 6.1 m away, nothing comes back but by way of the walls.
   EXPECT_EQ(energy(off, 7, 11.5, 0, 512), 0);
   EXPECT_GT(energy(on, 7, 11.5, 0, 512), 1e-4 * energy(on, 2, 6, 0, 512));
+  const double by_cones = energy(on, 2, 11.5, 0, 512);
   for (int n = 0; n < on.rows(); ++n)
     for (int j = 0; j < on.beams(); ++j) ASSERT_TRUE(std::isfinite(on.pressure(n, j)));
+  on.request.switches.conical = false;  // flat beams sort the same echoes otherwise
+  on.ping();
+  EXPECT_NEAR(10 * std::log10(energy(on, 2, 11.5, 0, 512) / by_cones), 0, 1);
+}
+
+TEST(MultipathCells, PulsesByWayOfTheSpectrumSoundTheSame) {
+  if (!spectral::have_transform) GTEST_SKIP() << "built without FFTW";
+  SceneMaker maker;
+  maker.add(sheet(40, 40), silent_db).add(sphere(0.2, 4), -20, {5, 0.5, -1.2});
+  Sounding s(with_mirrors(maker, 1), p900(), default_rows(8, 120));
+  s.request.sonar_in_world.position_m = {0, 0, -0.8};
+  s.request.switches.multipath = true;
+  const std::vector<float> in_time = s.ping().pressure_upa;
+  auto model = std::make_shared<SonarModel>(*s.request.model);
+  model->modes[0].waveform.exact = true;
+  model->modes[0].name += " exact";
+  s.request.model = model;
+  const std::vector<float> by_spectrum = s.ping().pressure_upa;
+  double wrong = 0, whole = 0;
+  for (std::size_t i = 0; i < in_time.size(); ++i) {
+    wrong += std::pow(static_cast<double>(by_spectrum[i] - in_time[i]), 2);
+    whole += std::pow(static_cast<double>(in_time[i]), 2);
+  }
+  EXPECT_GT(whole, 0);
+  EXPECT_LT(std::sqrt(wrong / whole), 1e-3);
 }
 
 TEST(MultipathCells, MovingMirrorsAreFoundWhereTheyAre) {
