@@ -1,0 +1,54 @@
+"""Text of the validation page and of the files it renders: tables, chapters with their marks, steps of a sweep. Nothing but text."""
+
+import re
+
+
+def table(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def mark(name):
+    return f"<!-- chapter: {name} -->"
+
+
+def chapters_of(text):
+    """Name -> what stands between its mark and the next one, of a page written before."""
+    parts = re.split(r"^<!-- chapter: ([\w-]+) -->\n", text, flags=re.M)
+    return dict(zip(parts[1::2], parts[2::2]))
+
+
+def with_seeds(text, count):
+    """A render file's text with its sweep made longer: every step `count` times, each time with another seed."""
+    lines = text.splitlines()
+    out, inside, steps = [], False, 1
+    for line in lines:
+        if line.startswith("sweep:"):
+            inside = True
+        elif inside and line.startswith("  ") and ":" in line:
+            key, values = line.split("#")[0].split(":", 1)
+            items = [v.strip() for v in values.strip().strip("[]").split(",")]
+            steps = len(items)
+            line = f"{key}: [{', '.join(v for v in items for _ in range(count))}]"
+        elif inside and line.strip():
+            inside = False
+            out.append(f"  seed: [{', '.join(str(s + 1) for _ in range(steps) for s in range(count))}]")
+            out.append("seed: $seed")
+        out.append(line)
+    return "\n".join(out) + "\n"
+
+
+def with_step(text, step):
+    """A render file's text with one step of its sweep."""
+    lines, inside = [], False
+    for line in text.splitlines():
+        if line.startswith("sweep:"):
+            inside = True
+        elif inside and line.startswith("  ") and ":" in line:
+            key, values = line.split("#")[0].split(":", 1)
+            line = f"{key}: [{values.strip().strip('[]').split(',')[step].strip()}]"
+        elif inside and line.strip():
+            inside = False
+        lines.append(line)
+    return "\n".join(lines) + "\n"
