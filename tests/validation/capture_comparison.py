@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Truth against a real device: three captured pings of an M1200d beside the same scene rendered, in one table and one picture.
 
-Statistics are made with the standard library alone, matplotlib draws. Writes capture.md and capture.png into --out-dir and prints
-the chapter. The captures stay where they are: tests and this script read them from the folder that SONARD_CAPTURES names.
+Statistics are made with the standard library alone, matplotlib draws. Writes capture.png into --out-dir and prints the chapter.
+The captures stay where they are: tests and this script read them from the folder that SONARD_CAPTURES names.
 """
 import argparse
 import math
@@ -201,7 +201,6 @@ def main():
         raise RuntimeError("no recordings: give --captures, or set SONARD_CAPTURES")
     options.folder.mkdir(parents=True, exist_ok=True)
     text = chapter(options.program.resolve(), pathlib.Path(options.captures), options.folder)
-    (options.folder / "capture.md").write_text(text, encoding="utf-8")
     print(text, end="")
 
 
