@@ -1,0 +1,78 @@
+// From magnitudes to colours: the maps, their files, the mapping, and pictures on disk.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/bvtsdk/core/imaging.hpp"
+
+namespace sonar::bvt {
+
+inline constexpr int colour_map_entries = 4096;
+inline constexpr std::array<std::string_view, 6> colour_map_names{"jet", "bone", "hot", "copper", "cool", "green"};
+
+struct Colour {
+  std::uint8_t blue = 0, green = 0, red = 0;
+};
+using ColourMap = std::vector<Colour>;  // 4096 entries, the weakest first; empty = none loaded
+
+/// One of colour_map_names from its formula; empty for other names.
+ColourMap make_colour_map(std::string_view name);
+/// Raw file, no header: 4096 x B, G, R (verified on public files). file_open, or load_color_map for any other size.
+Code load_colour_map(const std::string& path, ColourMap& map);
+Code save_colour_map(const std::string& path, const ColourMap& map);
+
+/// Order of the bytes of a colour pixel in memory. Clients hand them to OpenCV as BGRA (inferred).
+enum class PixelOrder { bgra, rgba };
+/// BVE_PIXEL=bgra or rgba; bgra when it says neither.
+PixelOrder pixel_order_from_environment();
+
+struct ColourImage : ImageGeometry {
+  std::vector<std::uint32_t> pixels;  // four bytes in memory in the mapper's order, alpha 255
+};
+
+/// Entry = 4095 clamp((v - bottom) / (top - bottom), 0, 1)^(1 / gamma), rounded (chosen).
+class ColourMapper {
+ public:
+  explicit ColourMapper(PixelOrder order = pixel_order_from_environment()) : order_(order) {}
+
+  /// Codes of load_colour_map; the map in use stays when it fails.
+  Code load(const std::string& path);
+  void use(ColourMap map);
+
+  /// bad_parameter unless 0 <= bottom < top <= 65535, and in auto mode (verified: refused).
+  Code set_thresholds(int top, int bottom);
+  /// bad_parameter unless 0 < gamma <= 100.
+  Code set_gamma(float gamma);
+  /// Automatic top: the 99.5th percentile of the pixels that are not 0, at least lowest_auto_top (chosen).
+  void set_auto_mode(bool on);
+  int top() const { return top_; }  // in auto mode that of the last image
+  int bottom() const { return bottom_; }
+  float gamma() const { return gamma_; }
+  bool auto_mode() const { return auto_mode_; }
+
+  /// bad_color_map when none is loaded; memory_alloc.
+  Code map(const MagImage& magnitudes, ColourImage& colours);
+
+  static constexpr int lowest_auto_top = 4096;
+
+ private:
+  void build_table();
+
+  PixelOrder order_;
+  ColourMap map_;
+  int top_ = 65535, bottom_ = 0;
+  float gamma_ = 1;
+  bool auto_mode_ = false;
+  std::vector<std::uint32_t> table_;  // a pixel for each magnitude; empty = to be built
+};
+
+/// P5, 16 bits, big-endian. file_create, or file_write.
+Code save_pgm(const std::string& path, const MagImage& image);
+/// P6, 8 bits a colour.
+Code save_ppm(const std::string& path, const ColourImage& image, PixelOrder order = pixel_order_from_environment());
+
+}  // namespace sonar::bvt

@@ -1,0 +1,82 @@
+// Images from polar pings: the library forms them, not the sonar, exactly as with the real SDK. Geometry first, then pixels.
+// Marks in this folder: verified = seen in public client code; inferred = concluded from it; chosen = ours, nothing to be
+// faithful to.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/polar_ping.hpp"
+
+namespace sonar::bvt {
+
+enum class ImageType { xy = 0, r_theta = 1 };
+
+/// Rows of an image (chosen): low 256, medium 512, high 1000; automatic as many as the ping has bins, 200 to 1000, and with
+/// XY no more than make a million pixels, because a client keeps whole images on its stack. Off: as automatic.
+enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
+
+/// The lowest set flag wins (verified values; chosen: applied to the finished image).
+enum FilterFlags : int { no_filter = 0, mean_3x3 = 2, mean_9x2 = 16 };
+
+struct ImageSettings {
+  ImageRes resolution = ImageRes::automatic;
+  /// Wishes; 0 = none. A size wins over a range resolution, that over `resolution` (chosen).
+  float range_resolution_m = 0;                   // metres per row; at most a million pixels are made for it
+  int requested_height = 0, requested_width = 0;  // XY keeps the height and adjusts the width (verified); a width alone sets both
+  int r_theta_width = 0;                          // columns; wins over requested_width
+  int filter_flags = no_filter;
+  float noise_threshold = 0;         // fraction of full scale below which samples become 0
+  float clipping_threshold = 0;      // fraction of full scale above which samples are cut to it; 0 = off
+  int sound_speed_override_mps = 0;  // 0 = the ping's; ranges are scaled by override / ping's
+};
+
+/// What an image says about its pixels. Row-major (verified), angles clockwise from ahead in degrees (verified).
+struct ImageGeometry {
+  ImageType type = ImageType::xy;
+  int height = 0, width = 0;
+  double range_resolution_m = 0;       // per row; XY: pixels are square
+  double bearing_resolution_deg = 0;   // per column; 0 in XY
+  int origin_row = 0, origin_col = 0;  // the sonar, usually outside the image
+  float fov_min_deg = 0, fov_max_deg = 0;
+  double start_m = 0, stop_m = 0;  // of what is shown, sound speed override applied
+
+  /// Any row and column, also outside the image: clients ask one past the end (verified). R-Theta labels a column by its
+  /// left edge (verified), XY a pixel by its centre (chosen).
+  double pixel_range_m(int row, int col) const;
+  double pixel_bearing_deg(int row, int col) const;
+  std::size_t pixel_count() const { return static_cast<std::size_t>(height) * static_cast<std::size_t>(width); }
+};
+
+struct MagImage : ImageGeometry {
+  std::vector<std::uint16_t> pixels;  // 65535 = full scale (verified)
+};
+
+/// Size and scale of the image a ping would give. bad_parameter for negative wishes or more than 32 million pixels
+/// (invalid_image_size), no_ping_signal for a ping without samples.
+Code plan_image(const PolarPing& ping, ImageType type, const ImageSettings& settings, ImageGeometry& geometry);
+
+/// Makes images; remembers the lookup tables of the last few XY geometries. One Imager may serve several threads.
+class Imager {
+ public:
+  Imager();
+  ~Imager();
+  Imager(const Imager&) = delete;
+  Imager& operator=(const Imager&) = delete;
+
+  /// Codes of plan_image, or memory_alloc. On failure `image` is empty.
+  Code make(const PolarPing& ping, ImageType type, const ImageSettings& settings, MagImage& image);
+
+ private:
+  struct Table;
+  std::shared_ptr<const Table> table_for(const ImageGeometry& geometry, int beams, int bins, double bin_m);
+
+  std::mutex mutex_;
+  std::array<std::shared_ptr<const Table>, 4> recent_;  // latest first
+};
+
+}  // namespace sonar::bvt

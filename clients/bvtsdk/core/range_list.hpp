@@ -1,0 +1,43 @@
+// One range a bearing: the range profile of 4.x and the range data of 3.x are both this list.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/polar_ping.hpp"
+
+namespace sonar::bvt {
+
+/// What a bearing without an echo above the threshold holds. Clients take anything above 999 as none (verified).
+inline constexpr float no_range_m = 1000;
+
+struct RangeListSettings {
+  enum class Policy { strongest = 1, nearest = 2 };
+  Policy policy = Policy::strongest;  // chosen default
+  std::uint16_t threshold = 0;        // an echo is stronger than this; unknown: the vendor's default
+  float start_range_m = 0;            // nearer samples do not count
+  float noise_threshold = 0;          // as in ImageSettings
+  int sound_speed_override_mps = 0;   // as in ImageSettings
+};
+
+/// Entry i belongs to beam i, from left to right. Bearings are left-referenced (verified for columns of R-Theta images,
+/// inferred here): entry i says fov_min + i * resolution, its beam looks half a step further right.
+struct RangeList {
+  std::vector<float> range_m, bearing_deg;
+  std::vector<std::uint16_t> intensity;  // 0 where there is no range
+  float fov_min_deg = 0, fov_max_deg = 0;
+  double range_resolution_m = 0, bearing_resolution_deg = 0;
+
+  int count() const { return static_cast<int>(range_m.size()); }
+  bool valid(int i) const { return range_m[static_cast<std::size_t>(i)] < 999; }
+  int valid_count() const;
+  /// Metres; unknown: the vendor's axes. Chosen as in XY images: x to starboard, y ahead, z 0; all 0 where there is no range.
+  float x_m(int i) const;
+  float y_m(int i) const;
+};
+
+/// no_ping_signal for a ping without samples; memory_alloc. On failure the list is empty.
+Code make_range_list(const PolarPing& ping, const RangeListSettings& settings, RangeList& list);
+
+}  // namespace sonar::bvt

@@ -1,0 +1,112 @@
+// Recordings in our own format, BVER: pings, navigation and event marks as frames of the link, so that FILE mode plays back
+// what NET mode saw. The vendor's .son files are proprietary and are refused.
+//
+// File: "BVER", u16 version = 1, u16 0; then frames (frame.hpp), each followed by the CRC-32 of its header and payload:
+// HELLO_OK first, then PING_DATA, NAV_DATA (u16 bitmap, values, f64 time) and EVENT_MARK (f64 time, text key, text) in the order
+// they came. A closed file ends with an index frame: u32 entries, per entry u16 type, i32 head, f64 time, u64 offset of the
+// frame, and at last the u64 offset of the index frame itself. Without it the file is scanned up to the last whole frame.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/frame.hpp"
+#include "clients/bvtsdk/core/polar_ping.hpp"
+
+namespace sonar::bvt {
+
+struct EventMark {
+  double time_s = 0;  // since 1970 UTC
+  std::string key, text;
+};
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, CloseFile>;
+
+/// Where a frame lies.
+struct FramePlace {
+  FrameType type{};
+  std::int32_t head = 0;  // pings only
+  double time_s = 0;
+  std::uint64_t offset = 0;
+};
+
+/// Not for several threads at once.
+class RecordingWriter {
+ public:
+  /// Makes or overwrites the file. `hello`: payload of HELLO_OK, opaque here. file_create, file_write.
+  Code create(const std::string& path, BytesView hello);
+  /// Whole frames reach the file at once, so that it can be read while it grows. file_not_open, file_write.
+  /// `head` replaces the ping's.
+  Code put_ping(std::int32_t head, const PolarPing& ping);
+  Code put_nav(const NavData& nav, double time_s);
+  Code put_event(const EventMark& mark);
+  /// Appends the index and closes. The destructor closes too.
+  Code close();
+  ~RecordingWriter();
+  RecordingWriter() = default;
+  RecordingWriter(const RecordingWriter&) = delete;
+  RecordingWriter& operator=(const RecordingWriter&) = delete;
+
+  bool is_open() const { return file_ != nullptr; }
+  std::uint64_t size_bytes() const { return size_; }
+  int count(FrameType type) const;
+  int ping_count(std::int32_t head) const;
+
+ private:
+  Code put_frame(FrameType type, BytesView payload, std::int32_t head, double time_s);
+
+  File file_;
+  std::uint64_t size_ = 0;
+  std::vector<FramePlace> places_;
+};
+
+/// Not for several threads at once.
+class RecordingReader {
+ public:
+  /// file_open; file_header_bad for anything but a recording of ours, a vendor's .son among them; file_too_new. `why` is
+  /// a line for the log.
+  Code open(const std::string& path, std::string* why = nullptr);
+  Code open(File file, std::string* why = nullptr);
+
+  const Bytes& hello() const { return hello_; }  // payload of HELLO_OK
+  std::uint64_t size_bytes() const { return size_; }
+  /// False when the last writer never closed the file, or its end is damaged.
+  bool has_index() const { return has_index_; }
+
+  /// Frames in the order they came.
+  int ping_count(std::int32_t head) const { return static_cast<int>(places(FrameType::ping_data, head).size()); }
+  int nav_count() const { return static_cast<int>(places(FrameType::nav_data).size()); }
+  int event_count() const { return static_cast<int>(places(FrameType::event_mark).size()); }
+  /// ping_number_too_small, ping_number_too_large, file_read, bad_ping.
+  Code read_ping(std::int32_t head, int n, PolarPing& ping);
+  /// index_out_of_bounds, file_read. `time_s`: when it was recorded.
+  Code read_nav(int n, NavData& nav, double& time_s);
+  Code read_event(int n, EventMark& mark);
+
+ private:
+  struct Lane {  // the frames of one type, pings of one head
+    FrameType type{};
+    std::int32_t head = 0;
+    std::vector<std::uint64_t> offsets;
+  };
+  const std::vector<std::uint64_t>& places(FrameType type, std::int32_t head = 0) const;
+  void add(const FramePlace& place);
+  bool read_frame(std::uint64_t offset, FrameHeader& header, Bytes& payload);
+  bool read_index();
+  void scan(std::uint64_t from);
+
+  File file_;
+  std::uint64_t size_ = 0;
+  bool has_index_ = false;
+  Bytes hello_;
+  std::vector<Lane> lanes_;
+};
+
+}  // namespace sonar::bvt
