@@ -65,6 +65,13 @@ class ClosedForm {
     if (!has_pattern_) return std::abs(psi) < unit_reach_rad_ ? 1 : 0;
     return std::abs(psi) < pi / 2 ? elevation_two_way(aperture_, psi) : 0;
   }
+  /// Whether the whole footprint of a bin lies where the beams see the bed: pulse and beam to either side.
+  bool holds(double range_m, double sine, double pulse_m, double beam_sine) const {
+    for (const double r : {range_m - pulse_m, range_m, range_m + pulse_m})
+      for (const double u : {sine - beam_sine, sine, sine + beam_sine})
+        if (!(pattern(r, u) > least_pattern)) return false;
+    return true;
+  }
   double power(double range_m, double sine) const {
     const double oblique = range_m / std::sqrt(range_m * range_m * (1 - sine * sine) - bed_.height_m * bed_.height_m);
     const double strength = scattering_strength(*bed_.material, bed_.height_m / range_m, static_cast<double>(mode_.centre_hz),
@@ -105,14 +112,14 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
   const ClosedForm expected(job, ping, *bed);
   const PingSettings& s = job.settings;
   const double pulse_m = static_cast<double>(s.pulse_width_m);
+  const double beam_sine = 2 * std::sin(static_cast<double>(job.mode().pattern.azimuth_width_rad) / 2);
   Coverage coverage;
   double ratios = 0;
   for (int j = 0; j < s.beam_count; ++j) {
     const double sine = std::sin(static_cast<double>(ping.beam_azimuth_rad[static_cast<std::size_t>(j)]));
     for (int row = 0; row < s.range_bin_count; ++row) {
       const double r = expected.true_range_m((row + s.row_centre) * s.range_bin_m);
-      const double before = expected.pattern(r - 2 * pulse_m, sine), here = expected.pattern(r, sine);
-      if (!(before > least_pattern && here > least_pattern && expected.pattern(r + 2 * pulse_m, sine) > least_pattern)) continue;
+      if (!expected.holds(r, sine, 2 * pulse_m, beam_sine)) continue;
       const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(s.beam_count) + static_cast<std::size_t>(j);
       const double pressure = static_cast<double>(ping.pressure_upa[at]);
       const double ratio = pressure * pressure / expected.power(r, sine);

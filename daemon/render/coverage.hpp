@@ -20,8 +20,9 @@ struct Coverage {
 /// The job with only what the closed form knows: expected power, no noise, mirrors, texture, volume or motion.
 RenderJob with_bed_only(RenderJob job);
 
-/// The ping must be of with_bed_only(job). Bins count from where the whole pulse lies on the bed, where the two-way pattern is
-/// above -20 dB. Errors: no level plane below the sonar, a sonar that rolls, flat beams.
+/// The ping must be of with_bed_only(job). Bins count whose whole footprint, two pulses and a beam to either side, lies on the
+/// bed where the two-way pattern is above -20 dB: the closed form takes the pattern as even over the footprint. Errors: no level
+/// plane below the sonar, a sonar that rolls, flat beams.
 Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
 
 /// Every mode of every product over a level bed: at its stored range, or its longest if that is shorter, a fifth of the range

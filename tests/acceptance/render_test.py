@@ -176,6 +176,14 @@ class Render(unittest.TestCase):
         self.assertGreaterEqual(float(re.search(r"([\d.]+) %", result.stdout).group(1)), 99)
         self.expect(run(SONARD, "render", self.config, "--report", "coverage"), 65, "plane")
 
+    def test_every_sonar_fills_a_bed_wholly(self):
+        result = run(SONARD, "render", "--report", "coverage", patience_s=600)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        shares = re.findall(r"^(\S+ .*\S) +\d+ +[\d.]+ +\d+ +\d+ +([\d.]+) %", result.stdout, re.M)
+        self.assertGreater(len(shares), 15, result.stdout)
+        for sonar, share in shares:
+            self.assertEqual(float(share), 100, sonar)
+
 
 if __name__ == "__main__":
     unittest.main()
