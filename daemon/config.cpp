@@ -191,6 +191,9 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   Config config;
   config.source = name;
   Map root = document.root();
+  if (root.has("scene") && !root.has("world"))
+    return failure(ErrorKind::config,
+                   name + ": this is a render file, not a configuration: sonard render " + name + " --out DIR (docs/render.md)");
   read_world(root.required("world").map(), config, directory);
   read_vehicles(root.required("vehicles"), config);
   std::size_t index = 0;

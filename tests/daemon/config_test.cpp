@@ -265,5 +265,12 @@ TEST(Rebind, RefusesWhatCannotServe) {
   EXPECT_EQ(refusal("192.168.2.5", "192.168.2.4"), "accepted") << "its own";
 }
 
+TEST(Config, PointsRenderFilesToTheirCommand) {
+  const auto config = parse_config("scene: demo.yaml\nsonar: {}\n", "r.yaml", {});
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().kind, ErrorKind::config);
+  EXPECT_THAT(config.error().text, ::testing::HasSubstr("sonard render r.yaml"));
+}
+
 }  // namespace
 }  // namespace sonar
