@@ -27,6 +27,7 @@ FLOORS = {
     "protocol/blueview": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     "clients": ["core/base/", "core/image/", "core/sonar/", "protocol/", "clients/"],
+    "clients/bvtsdk": ["clients/bvtsdk/"],  # loaded into foreign processes: nothing of the house comes along
     "tests": [""],
 }
 # Header of a dependency -> the only files that may include it (tests may include anything).
@@ -55,8 +56,8 @@ FORBIDDEN = [
      "time comes in as an argument; only daemon/ and clients/ read clocks"),
     ("log", r"core/|protocol/", None, r"\bstd::(cout|cerr|clog)\b|\b(f|v|vf)?printf\s*\(|\bf?puts\s*\(|\bperror\s*\(",
      "only daemon/ and clients/ print or log"),
-    ("thread", r"core/|protocol/|cuda/|clients/", r"core/base/parallel\.", r"\bstd::(j?thread|async)\b|\bpthread_create\b",
-     "compute threads live in core/base/parallel.* only"),
+    ("thread", r"core/|protocol/|cuda/|clients/", r"core/base/parallel\.|clients/bvtsdk/core/link\.", r"\bstd::(j?thread|async)\b|\bpthread_create\b",
+     "compute threads live in core/base/parallel.* only, the keep-alive thread of a link in its own file"),
     ("socket", r"core/|protocol/", None, r"#\s*include\s*<(sys/socket|netinet/|arpa/|poll|netdb)", "only daemon/ and clients/ touch sockets"),
     ("mutex", r"daemon/|protocol/", None, r"\bstd::(mutex|shared_mutex|recursive_mutex|condition_variable)\b",
      "work crosses threads by value and asio::post"),

@@ -88,6 +88,7 @@ class Reader {
   }
   BytesView rest() { return block(left()); }
 
+  void fail() { ok_ = false; }
   std::size_t left() const { return bytes_.size - at_; }
   bool ok() const { return ok_; }
 

@@ -73,9 +73,9 @@ std::optional<PolarPing> decode_ping(BytesView payload, std::string* why = nullp
 /// The opposite: samples as they are, or as a zlib stream.
 Bytes encode_ping(const PolarPing& ping, bool deflate = false);
 
-/// The bitmap and the values, as in PING_DATA and NAV_DATA; unset bits and what the link does not know are left out.
+/// The bitmap and the values, as in PING_DATA and NAV_DATA; bits the link does not know are left out.
 void put_nav(Bytes& out, const NavData& nav);
-/// The opposite; `reader.ok()` tells whether it was whole. Values that are no numbers count as absent.
+/// The opposite; `reader.ok()` tells whether it was whole and held known fields only. Values that are no numbers count as absent.
 NavData take_nav(Reader& reader);
 
 }  // namespace sonar::bvt

@@ -1,0 +1,176 @@
+#include "clients/bvtsdk/core/polar_ping.hpp"
+
+#include <zlib.h>
+
+#include <cmath>
+
+#include "clients/bvtsdk/core/frame.hpp"
+
+namespace sonar::bvt {
+namespace {
+
+constexpr std::uint8_t format_u16 = 1;
+enum Compression : std::uint8_t { plain = 0, deflate_stream = 1 };
+constexpr std::size_t deflate_at_best = 1032;  // zlib's own bound: no stream grows by more than this
+
+/// Calls visit(bit, value) for each number in the order of the link.
+template <class Nav, class Visit>
+void numbers_of(Nav& nav, const Visit& visit) {
+  visit(nav_time, nav.time_s);
+  visit(nav_latitude, nav.latitude_deg);
+  visit(nav_longitude, nav.longitude_deg);
+  visit(nav_depth, nav.depth_m);
+  visit(nav_altitude, nav.altitude_m);
+  visit(nav_pitch, nav.pitch_deg);
+  visit(nav_roll, nav.roll_deg);
+  visit(nav_heading, nav.heading_deg);
+  visit(nav_heading_velocity, nav.heading_velocity_mps);
+  visit(nav_course, nav.course_deg);
+}
+constexpr std::uint16_t known_fields = 2 * nav_text - 1;
+
+/// What is wrong with the fixed fields; empty when nothing is.
+std::string complaint(const PolarPing& p) {
+  if (!std::isfinite(p.time_s)) return "its time is not a number";
+  if (!(p.start_m >= 0 && p.stop_m > p.start_m && p.stop_m <= 1e6f)) return "its ranges are not 0 <= start < stop";
+  if (!(p.bin_m > 0 && p.bin_m <= 1e6f)) return "its range bin is not a length";
+  if (p.sound_speed_mps <= 0 || p.sound_speed_mps > 100000) return "its sound speed is not one";
+  if (!(p.fov_min_deg >= -180 && p.fov_max_deg > p.fov_min_deg && p.fov_max_deg <= 180)) return "its sector is not one";
+  return {};
+}
+
+/// Little-endian pairs of bytes; gcc makes a copy of it on little-endian machines.
+void samples_from(BytesView bytes, std::vector<std::uint16_t>& samples) {
+  samples.resize(bytes.size / 2);
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    samples[i] = static_cast<std::uint16_t>(bytes.data[2 * i] | bytes.data[2 * i + 1] << 8);
+}
+
+/// Exactly `size` bytes or nothing: a stream that wants to give more is cut off there and refused.
+Bytes inflated(BytesView body, std::size_t size) {
+  if (size > deflate_at_best * body.size + 64) return {};
+  Bytes out(size);
+  z_stream stream{};
+  if (inflateInit(&stream) != Z_OK) return {};
+  stream.next_in = const_cast<Bytef*>(body.data);  // zlib does not write through it
+  stream.avail_in = static_cast<uInt>(body.size);
+  stream.next_out = out.data();
+  stream.avail_out = static_cast<uInt>(size);
+  const int end = inflate(&stream, Z_FINISH);
+  const bool whole = end == Z_STREAM_END && stream.avail_out == 0 && stream.avail_in == 0;
+  inflateEnd(&stream);
+  if (!whole) out.clear();
+  return out;
+}
+
+Bytes deflated(BytesView body) {
+  Bytes out(compressBound(static_cast<uLong>(body.size)));
+  auto size = static_cast<uLongf>(out.size());
+  if (compress2(out.data(), &size, body.data, static_cast<uLong>(body.size), Z_BEST_SPEED) != Z_OK) return {};
+  out.resize(size);
+  return out;
+}
+
+}  // namespace
+
+void put_nav(Bytes& out, const NavData& nav) {
+  const auto present = static_cast<std::uint16_t>(nav.present & known_fields);
+  put(out, present);
+  numbers_of(nav, [&](NavField bit, const auto& value) {
+    if (present & bit) put(out, value);
+  });
+  if (present & nav_text) put_text(out, nav.text);
+}
+
+NavData take_nav(Reader& reader) {
+  NavData nav;
+  const auto sent = reader.take<std::uint16_t>();
+  if (sent & ~known_fields) reader.fail();
+  nav.present = sent;
+  numbers_of(nav, [&](NavField bit, auto& value) {
+    if ((sent & bit) == 0) return;
+    value = reader.take<std::decay_t<decltype(value)>>();
+    if (std::isfinite(value)) return;
+    value = 0;
+    nav.present = static_cast<std::uint16_t>(nav.present & ~bit);
+  });
+  if (sent & nav_text) nav.text = reader.text();
+  if (!reader.ok()) nav = NavData{};
+  return nav;
+}
+
+std::optional<PolarPing> decode_ping(BytesView payload, std::string* why) {
+  const auto refuse = [&](const std::string& what) {
+    if (why) *why = "a ping came that is none: " + what;
+    return std::nullopt;
+  };
+  Reader reader(payload);
+  PolarPing p;
+  p.head = reader.take<std::int32_t>();
+  p.number = reader.take<std::uint32_t>();
+  p.time_s = reader.take<double>();
+  p.time_zone_s = reader.take<std::int32_t>();
+  p.start_m = reader.take<float>();
+  p.stop_m = reader.take<float>();
+  p.sound_speed_mps = reader.take<std::int32_t>();
+  p.fov_min_deg = reader.take<float>();
+  p.fov_max_deg = reader.take<float>();
+  p.bin_m = reader.take<float>();
+  p.beams = reader.take<std::uint16_t>();
+  p.bins = reader.take<std::uint16_t>();
+  const auto format = reader.take<std::uint8_t>();
+  const auto compression = reader.take<std::uint8_t>();
+  p.nav = take_nav(reader);
+  const std::size_t size = reader.take<std::uint32_t>();
+  if (!reader.ok()) return refuse("it ends early or has navigation fields nobody knows");
+  const BytesView body = reader.rest();
+  if (const std::string what = complaint(p); !what.empty()) return refuse(what);
+  if (format != format_u16) return refuse("its samples have format " + std::to_string(format) + ", only 1 is known");
+  const std::size_t expected = 2 * static_cast<std::size_t>(p.beams) * static_cast<std::size_t>(p.bins);
+  if (size != expected || size > longest_payload)
+    return refuse(std::to_string(size) + " bytes of samples for " + std::to_string(p.beams) + " x " + std::to_string(p.bins));
+  if (compression == plain) {
+    if (body.size != size) return refuse(std::to_string(body.size) + " bytes follow, " + std::to_string(size) + " are announced");
+    samples_from(body, p.samples);
+  } else if (compression == deflate_stream) {
+    const Bytes samples = inflated(body, size);
+    if (samples.size() != size || size == 0) return refuse("its zlib stream does not hold what is announced");
+    samples_from(samples, p.samples);
+  } else {
+    return refuse("it is compressed in a way nobody knows");
+  }
+  return p;
+}
+
+Bytes encode_ping(const PolarPing& ping, bool deflate) {
+  Bytes samples;
+  samples.resize(2 * ping.samples.size());
+  for (std::size_t i = 0; i < ping.samples.size(); ++i) {
+    samples[2 * i] = static_cast<std::uint8_t>(ping.samples[i]);
+    samples[2 * i + 1] = static_cast<std::uint8_t>(ping.samples[i] >> 8);
+  }
+  const Bytes packed = deflate && !samples.empty() ? deflated(samples) : Bytes{};
+  const Bytes& body = packed.empty() ? samples : packed;
+  Bytes out;
+  out.reserve(256 + ping.nav.text.size() + body.size());
+  put(out, ping.head);
+  put(out, ping.number);
+  put(out, ping.time_s);
+  put(out, ping.time_zone_s);
+  put(out, ping.start_m);
+  put(out, ping.stop_m);
+  put(out, ping.sound_speed_mps);
+  put(out, ping.fov_min_deg);
+  put(out, ping.fov_max_deg);
+  put(out, ping.bin_m);
+  put(out, static_cast<std::uint16_t>(ping.beams));
+  put(out, static_cast<std::uint16_t>(ping.bins));
+  put(out, format_u16);
+  put(out, static_cast<std::uint8_t>(packed.empty() ? plain : deflate_stream));
+  put_nav(out, ping.nav);
+  put(out, static_cast<std::uint32_t>(samples.size()));
+  out.insert(out.end(), body.begin(), body.end());
+  return out;
+}
+
+}  // namespace sonar::bvt
