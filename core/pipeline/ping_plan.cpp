@@ -242,8 +242,8 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   lay_out_samples(p);
   p.fan = make_fan(mode, settings, p.pulse_width_m);
   p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
-  // The mean over speckle hides no chance in where cells lie: half the cell leaves an eighth of a decibel of it.
-  const double cell_scale = p.expected_power ? 0.5 : 1.0;
+  // The mean over speckle hides no chance in where cells lie: smaller cells leave a tenth of a decibel of it.
+  const double cell_scale = p.expected_power ? 0.4 : 1.0;
   p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * static_cast<double>(mode.pattern.azimuth_width_rad),
                               settings.range_m * 1.1);
   p.noise_filter = make_noise_filter(p.pulse_shape, p.sample_time_s);
