@@ -71,7 +71,8 @@ Coverage coverage_of(const FrequencyMode& mode, const PingSettings& settings, do
 
 void record_coverage(const std::string& what, const Coverage& c, int samples_at_least) {
   EXPECT_GT(c.samples, samples_at_least) << what;
-  record_at_least(32, "share within 1 dB, " + what, 0.9999, c.share(), "");  // one sample in 180,000 is off
+  record_at_least(32, "share within 1 dB, " + what, 0.9999, c.share(),
+                  "");  // one sample in 180,000 is off, at the edge of the fan
 }
 
 TEST(CoverageOracles, Oracle32_FlatBedIsFilled) {
