@@ -151,6 +151,7 @@ struct RayScene::Impl {
     }
     for (Group& group : groups) {
       rtcSetSceneBuildQuality(group.scene.handle, RTC_BUILD_QUALITY_HIGH);
+      rtcSetSceneFlags(group.scene.handle, RTC_SCENE_FLAG_ROBUST);  // a ray along the edge of two triangles must not slip through
       rtcCommitScene(group.scene.handle);
       device.check();
     }
@@ -165,7 +166,7 @@ struct RayScene::Impl {
   void make_top() {
     top = SceneHandle(device);
     rtcSetSceneBuildQuality(top.handle, RTC_BUILD_QUALITY_LOW);
-    rtcSetSceneFlags(top.handle, RTC_SCENE_FLAG_DYNAMIC);
+    rtcSetSceneFlags(top.handle, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_ROBUST));
     for (std::size_t i = 0; i < groups.size(); ++i) {
       RTCGeometry instance = rtcNewGeometry(device.handle, RTC_GEOMETRY_TYPE_INSTANCE);
       rtcSetGeometryInstancedScene(instance, groups[i].scene.handle);
