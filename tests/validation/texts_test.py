@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The texts behind docs/validation.md, and that its render files can be rendered. Needs neither matplotlib nor numpy."""
 
+import json
 import os
 import pathlib
 import subprocess
@@ -48,6 +49,18 @@ class RenderFiles(unittest.TestCase):
                                            "--fixed-fan", "4", "--expected-power"], capture_output=True, text=True, check=False)
                     self.assertEqual(done.returncode, 0, done.stderr)
                     self.assertTrue(pathlib.Path(out, "000001_pressure.npy").is_file())
+
+    def test_the_benchmark_times_the_comparison_modes(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder, "bench.json")
+            done = subprocess.run([SONARD, "bench", "--case", "P1", "--scene", "local-search", "--pings", "1", "--mode", "paper",
+                                   "--fixed-fan", "8", "--frequency-sum", "direct", "--json", file],
+                                  capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            result = json.loads(file.read_text(encoding="utf-8"))["results"][0]
+            self.assertEqual(result["mode"], "paper")
+            self.assertEqual(result["rays"], 8 * 512)
+            self.assertGreater(result["thread_ms"]["synthesize"], 0)
 
 
 if __name__ == "__main__":
