@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/polar_lookup.hpp"
 #include "clients/bvtsdk/core/polar_ping.hpp"
 
 namespace sonar::bvt {
@@ -56,27 +57,21 @@ struct MagImage : ImageGeometry {
   std::vector<std::uint16_t> pixels;  // 65535 = full scale (verified)
 };
 
-/// Size and scale of the image a ping would give. bad_parameter for negative wishes or more than 32 million pixels
-/// (invalid_image_size), no_ping_signal for a ping without samples.
+/// Size and scale of the image a ping would give. no_ping_signal for a ping without samples, bad_parameter for negative
+/// wishes, invalid_image_size for more than 32 million pixels.
 Code plan_image(const PolarPing& ping, ImageType type, const ImageSettings& settings, ImageGeometry& geometry);
 
 /// Makes images; remembers the lookup tables of the last few XY geometries. One Imager may serve several threads.
 class Imager {
  public:
-  Imager();
-  ~Imager();
-  Imager(const Imager&) = delete;
-  Imager& operator=(const Imager&) = delete;
-
   /// Codes of plan_image, or memory_alloc. On failure `image` is empty.
   Code make(const PolarPing& ping, ImageType type, const ImageSettings& settings, MagImage& image);
 
  private:
-  struct Table;
-  std::shared_ptr<const Table> table_for(const ImageGeometry& geometry, int beams, int bins, double bin_m);
+  std::shared_ptr<const PolarLookup> lookup_for(const PolarLookup::Key& key);
 
   std::mutex mutex_;
-  std::array<std::shared_ptr<const Table>, 4> recent_;  // latest first
+  std::array<std::shared_ptr<const PolarLookup>, 4> recent_;  // latest first
 };
 
 }  // namespace sonar::bvt

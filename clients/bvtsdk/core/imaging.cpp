@@ -1,0 +1,208 @@
+#include "clients/bvtsdk/core/imaging.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+
+#include "clients/bvtsdk/core/image_filter.hpp"
+#include "clients/bvtsdk/core/sample_grid.hpp"
+
+namespace sonar::bvt {
+namespace {
+
+constexpr double degrees = 57.29577951308232;
+constexpr double most_pixels = 32e6;  // of any image
+constexpr double polite_pixels =
+    1e6;  // of one nobody asked the size of: clients keep 4 bytes a pixel on an 8 MB stack (verified)
+
+int to_int(double x) {
+  constexpr double limit = std::numeric_limits<int>::max();
+  return static_cast<int>(std::lround(std::clamp(x, -limit, limit)));
+}
+
+/// Ranges of a ping as the image shows them.
+struct Extent {
+  double start_m, stop_m, bin_m;
+};
+Extent extent_of(const PolarPing& ping, int sound_speed_override_mps) {
+  const double scale = range_scale(ping, sound_speed_override_mps);
+  return {scale * static_cast<double>(ping.start_m), scale * static_cast<double>(ping.stop_m),
+          scale * static_cast<double>(ping.bin_m)};
+}
+
+/// Rows where no size was asked for; `shown_m` of range lie in them, `columns_per_row` tells the width.
+int rows_by_resolution(const Extent& extent, const ImageSettings& settings, double shown_m, double columns_per_row,
+                       double fixed_columns) {
+  double rows = 0;
+  if (settings.range_resolution_m > 0) {
+    rows = shown_m / static_cast<double>(settings.range_resolution_m);
+  } else {
+    switch (settings.resolution) {
+      case ImageRes::low:
+        return 256;
+      case ImageRes::medium:
+        return 512;
+      case ImageRes::high:
+        return 1000;
+      case ImageRes::off:
+      case ImageRes::automatic:
+        break;
+    }
+    rows = std::clamp(std::round((extent.stop_m - extent.start_m) / extent.bin_m), 200.0, 1000.0);
+  }
+  const double polite = fixed_columns > 0 ? polite_pixels / fixed_columns : std::sqrt(polite_pixels / columns_per_row);
+  return std::max(1, to_int(std::min(std::round(rows), std::floor(polite))));
+}
+
+void plan_xy(const Extent& extent, const ImageSettings& settings, ImageGeometry& g) {
+  const double half_deg = std::max(std::abs(static_cast<double>(g.fov_min_deg)), std::abs(static_cast<double>(g.fov_max_deg)));
+  const double sine = std::sin(std::min(half_deg, 90.0) / degrees);
+  if (settings.requested_height > 0)
+    g.height = settings.requested_height;
+  else if (settings.requested_width > 0)
+    g.height = std::max(1, to_int(std::min(settings.requested_width / (2 * sine), most_pixels)));
+  else
+    g.height = rows_by_resolution(extent, settings, extent.stop_m, 2 * sine, 0);
+  g.range_resolution_m = extent.stop_m / g.height;
+  g.width = 2 * std::max(1, to_int(std::ceil(g.height * sine - 1e-9)));
+  g.origin_row = g.height;
+  g.origin_col = g.width / 2;
+}
+
+void plan_r_theta(const Extent& extent, const ImageSettings& settings, int beams, ImageGeometry& g) {
+  const double shown_m = extent.stop_m - extent.start_m;
+  g.width = settings.r_theta_width > 0 ? settings.r_theta_width : settings.requested_width > 0 ? settings.requested_width : beams;
+  g.height = settings.requested_height > 0 ? settings.requested_height
+                                           : rows_by_resolution(extent, settings, shown_m, 0, static_cast<double>(g.width));
+  g.range_resolution_m = shown_m / g.height;
+  g.bearing_resolution_deg = (static_cast<double>(g.fov_max_deg) - static_cast<double>(g.fov_min_deg)) / g.width;
+  g.origin_row = to_int(g.height + std::round(extent.start_m / g.range_resolution_m));
+  g.origin_col = to_int(std::round(-static_cast<double>(g.fov_min_deg) / g.bearing_resolution_deg));
+}
+
+/// Row 0 is the far end (inferred from one client that turns the image over). A pixel shows the strongest of the samples it
+/// covers, or the one its centre lies in where it covers none whole (chosen): no echo falls between the rows.
+void fill_r_theta(const PolarGrid& grid, const Extent& extent, MagImage& image) {
+  struct Bins {
+    int from, to;
+  };
+  std::vector<Bins> bins_of_row(static_cast<std::size_t>(image.height));
+  for (int row = 0; row < image.height; ++row) {
+    const double far = (image.height - row) * image.range_resolution_m / extent.bin_m;
+    const double near = (image.height - row - 1) * image.range_resolution_m / extent.bin_m;
+    Bins bins{to_int(std::round(near)), to_int(std::round(far))};
+    if (bins.from >= bins.to) bins = {to_int(std::floor((near + far) / 2)), to_int(std::floor((near + far) / 2)) + 1};
+    bins_of_row[static_cast<std::size_t>(row)] = {std::min(bins.from, grid.bins), std::min(bins.to, grid.bins)};
+  }
+  constexpr int block = 16;  // columns at once, so that a row is written in runs
+  const auto width = static_cast<std::size_t>(image.width);
+  for (int first = 0; first < image.width; first += block)
+    for (int row = 0; row < image.height; ++row) {
+      const Bins bins = bins_of_row[static_cast<std::size_t>(row)];
+      std::uint16_t* const pixels = image.pixels.data() + static_cast<std::size_t>(row) * width;
+      for (int col = first; col < std::min(first + block, image.width); ++col) {
+        const auto beam_at = [&](int c) { return static_cast<int>(static_cast<std::int64_t>(c) * grid.beams / image.width); };
+        const int from = beam_at(col), to = std::max(from + 1, beam_at(col + 1));
+        std::uint16_t strongest = 0;
+        for (int beam = from; beam < to; ++beam) {
+          const std::uint16_t* const samples =
+              grid.samples + static_cast<std::size_t>(beam) * static_cast<std::size_t>(grid.bins);
+          for (int bin = bins.from; bin < bins.to; ++bin) strongest = std::max(strongest, samples[bin]);
+        }
+        pixels[col] = strongest;
+      }
+    }
+}
+
+}  // namespace
+
+double ImageGeometry::pixel_range_m(int row, int col) const {
+  if (type == ImageType::r_theta) return std::max(0.0, stop_m - (row + 0.5) * range_resolution_m);
+  return std::hypot((col + 0.5 - 0.5 * width) * range_resolution_m, (height - row - 0.5) * range_resolution_m);
+}
+
+double ImageGeometry::pixel_bearing_deg(int row, int col) const {
+  if (type == ImageType::r_theta) return static_cast<double>(fov_min_deg) + col * bearing_resolution_deg;
+  return degrees * std::atan2((col + 0.5 - 0.5 * width) * range_resolution_m, (height - row - 0.5) * range_resolution_m);
+}
+
+Code plan_image(const PolarPing& ping, ImageType type, const ImageSettings& settings, ImageGeometry& geometry) {
+  geometry = {};
+  if (!ping.has_signal()) return no_ping_signal;
+  if (settings.requested_height < 0 || settings.requested_width < 0 || settings.r_theta_width < 0 ||
+      !(settings.range_resolution_m >= 0) || settings.sound_speed_override_mps < 0)
+    return bad_parameter;
+  const Extent extent = extent_of(ping, settings.sound_speed_override_mps);
+  ImageGeometry g;
+  g.type = type;
+  g.fov_min_deg = ping.fov_min_deg;
+  g.fov_max_deg = ping.fov_max_deg;
+  g.start_m = extent.start_m;
+  g.stop_m = extent.stop_m;
+  if (settings.requested_height > most_pixels || settings.requested_width > most_pixels || settings.r_theta_width > most_pixels)
+    return invalid_image_size;
+  if (type == ImageType::xy)
+    plan_xy(extent, settings, g);
+  else
+    plan_r_theta(extent, settings, ping.beams, g);
+  if (static_cast<double>(g.height) * static_cast<double>(g.width) > most_pixels) return invalid_image_size;
+  geometry = g;
+  return success;
+}
+
+std::shared_ptr<const PolarLookup> Imager::lookup_for(const PolarLookup::Key& key) {
+  const auto find = [&]() -> std::shared_ptr<const PolarLookup> {
+    const auto found = std::find_if(recent_.begin(), recent_.end(), [&](const auto& l) { return l && l->key() == key; });
+    if (found == recent_.end()) return nullptr;
+    std::rotate(recent_.begin(), found, found + 1);
+    return recent_.front();
+  };
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (auto known = find()) return known;
+  }
+  auto made = std::make_shared<const PolarLookup>(key);  // outside the lock: others need not wait for it
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::rotate(recent_.begin(), recent_.end() - 1, recent_.end());
+  return recent_.front() = std::move(made);
+}
+
+Code Imager::make(const PolarPing& ping, ImageType type, const ImageSettings& settings, MagImage& image) {
+  image = {};
+  ImageGeometry geometry;
+  const Code planned = plan_image(ping, type, settings, geometry);
+  if (planned != success) return planned;
+  try {
+    static_cast<ImageGeometry&>(image) = geometry;
+    image.pixels.assign(geometry.pixel_count(), 0);
+    Extent extent = extent_of(ping, settings.sound_speed_override_mps);
+    // XY rows coarser than two bins: the strongest of the bins in a row is shown (chosen), or echoes would be missed.
+    const int pooled =
+        type == ImageType::xy ? std::max(1, to_int(std::floor(image.range_resolution_m / extent.bin_m + 1e-9))) : 1;
+    const SampleGrid grid(ping, settings.noise_threshold, settings.clipping_threshold, pooled);
+    extent.bin_m *= grid.pooled();
+    if (type == ImageType::r_theta) {
+      fill_r_theta(grid.view(), extent, image);
+    } else {
+      const PolarLookup::Key key{image.height,
+                                 image.width,
+                                 image.range_resolution_m,
+                                 extent.start_m,
+                                 extent.stop_m,
+                                 extent.bin_m,
+                                 static_cast<double>(image.fov_min_deg),
+                                 static_cast<double>(image.fov_max_deg),
+                                 grid.view().beams,
+                                 grid.view().bins};
+      lookup_for(key)->apply(grid.view(), image.pixels.data());
+    }
+    filter_image(settings.filter_flags, image);
+  } catch (const std::bad_alloc&) {
+    image = {};
+    return memory_alloc;
+  }
+  return success;
+}
+
+}  // namespace sonar::bvt

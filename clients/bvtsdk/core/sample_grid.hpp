@@ -1,0 +1,35 @@
+// A ping's samples made ready for imaging: thresholds applied, bins pooled, at least two beams of two bins.
+// Where nothing of that is needed they are read in place.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "clients/bvtsdk/core/polar_lookup.hpp"
+#include "clients/bvtsdk/core/polar_ping.hpp"
+
+namespace sonar::bvt {
+
+/// Ranges are multiplied by it: override / the ping's sound speed, 1 without an override (0).
+double range_scale(const PolarPing& ping, int sound_speed_override_mps);
+/// The least sample that is not set to 0 by a noise threshold in fractions of full scale.
+std::uint16_t lowest_heard(float noise_threshold);
+
+class SampleGrid {
+ public:
+  /// The ping has samples and outlives this. `pool`: how many bins become one, the strongest of them. May throw bad_alloc.
+  SampleGrid(const PolarPing& ping, float noise_threshold, float clipping_threshold, int pool);
+  SampleGrid(const SampleGrid&) = delete;
+  SampleGrid& operator=(const SampleGrid&) = delete;
+
+  const PolarGrid& view() const { return view_; }
+  /// Of a ping with a single beam or bin the view has two equal ones; with a single bin it is half as long.
+  double pooled() const { return pooled_; }
+
+ private:
+  PolarGrid view_;
+  double pooled_ = 1;
+  std::vector<std::uint16_t> made_;
+};
+
+}  // namespace sonar::bvt
