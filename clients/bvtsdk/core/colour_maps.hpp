@@ -31,7 +31,8 @@ enum class PixelOrder { bgra, rgba };
 PixelOrder pixel_order_from_environment();
 
 struct ColourImage : ImageGeometry {
-  std::vector<std::uint32_t> pixels;  // four bytes in memory in the mapper's order, alpha 255
+  PixelOrder order = PixelOrder::bgra;
+  std::vector<std::uint32_t> pixels;  // four bytes in memory in that order, alpha 255
 };
 
 /// Entry = 4095 clamp((v - bottom) / (top - bottom), 0, 1)^(1 / gamma), rounded (chosen).
@@ -73,6 +74,6 @@ class ColourMapper {
 /// P5, 16 bits, big-endian. file_create, or file_write.
 Code save_pgm(const std::string& path, const MagImage& image);
 /// P6, 8 bits a colour.
-Code save_ppm(const std::string& path, const ColourImage& image, PixelOrder order = pixel_order_from_environment());
+Code save_ppm(const std::string& path, const ColourImage& image);
 
 }  // namespace sonar::bvt
