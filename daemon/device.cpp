@@ -230,15 +230,15 @@ void Device::on_ping(Simulator::Outcome outcome) {
     context_.on_failure("sonar " + config_.name + ": the ping engine failed: " + outcome.failure);
   } else if (const PingRequest& request = outcome.ping->request;
              !stopping_ && !sessions_.empty() && request.settings_id >= oldest_wanted_id_) {
-    const auto bytes = vendor_.frame(*outcome.ping, state_, requests_[request.settings_id]);
+    const protocol::Bytes made_with = requests_[request.settings_id];
+    requests_.erase(requests_.begin(), requests_.lower_bound(request.settings_id));
+    const auto bytes = vendor_.frame(*outcome.ping, state_, made_with);
     const auto number = static_cast<std::uint32_t>(request.number);
     const Time now = context_.clock.now();
-    const protocol::Bytes made_with = requests_[request.settings_id];
     std::vector<std::pair<SessionPointer, protocol::Event>> wishes;
     for (const SessionPointer& s : sessions_)
       for (protocol::Event& event : s->push_ping(bytes, number, made_with, now)) wishes.emplace_back(s, std::move(event));
     for (const auto& [session, event] : wishes) on_event(*session, event);
-    requests_.erase(requests_.begin(), requests_.find(std::min(settings_id_, request.settings_id)));
     if (figures_.pings == 1) context_.log.debug("first ping simulated", {{"sonar", config_.name}, {"ms", outcome.seconds * 1e3}});
   }
   context_.on_change();

@@ -124,6 +124,30 @@ class BlueViewLink(unittest.TestCase):
         print(f"4 hosts, {pings_each} pings each: {shared} pings computed, {pings_each / took:.1f} a second and host")
 
 
+class TwoHeads(unittest.TestCase):
+    def test_hosts_of_different_heads_take_turns_and_each_ping_is_of_its_own_settings(self):
+        ranges, pings_each, seen, failures = {0: (1, 6), 1: (1, 3)}, 12, {}, []
+
+        def work(address, head):
+            try:
+                with Host(address).greet() as host:
+                    host.set_numbers(RANGE, *ranges[head], head=head)
+                    seen[head] = [(p.head, p.start, round(p.stop, 1), p.beams)
+                                  for p in (host.ping(head=head) for _ in range(pings_each))]
+            except Exception as e:  # pylint: disable=broad-except
+                failures.append(e)
+
+        with Sonard(scene="l-targets.yaml", profile="blueview-m900-2250-130",
+                    pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}") as daemon:
+            hosts = [threading.Thread(target=work, args=(daemon.address, head)) for head in ranges]
+            for h in hosts:
+                h.start()
+            for h in hosts:
+                h.join(120)
+        self.assertFalse(failures)
+        self.assertEqual(seen, {head: [(head, *ranges[head], beams)] * pings_each for head, beams in ((0, 768), (1, 256))})
+
+
 class Deflate(unittest.TestCase):
     def test_packed_samples_are_the_same(self):
         images = []
