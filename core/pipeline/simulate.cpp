@@ -173,7 +173,7 @@ void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) 
                 static_cast<std::uint32_t>(request_.number), first, last, mine.volume, w_.columns);
   finish_columns(plan_, request_.switches.noise ? &prepared_.noise : nullptr, request_.sonar_id,
                  static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
-  if (leak_.is_heard())
+  if (leak_.is_heard() && !request_.blank)
     leak_.add(plan_, prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
   watch.lap(Stage::noise);
 }

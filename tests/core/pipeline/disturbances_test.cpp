@@ -96,6 +96,18 @@ TEST(Leak, IsSilentWhenOffOrNotGiven) {
   EXPECT_EQ(mean_row_power(s, 0), 0);
 }
 
+TEST(Leak, IsNotInABlankPing) {
+  Sounding s(SceneMaker().make(), oculus_high(), default_rows(2, 700));
+  give_receiver(s, leaking());
+  s.request.blank = true;  // no scene, noise only; also how a transmitter that is switched off is pinged
+  s.ping();
+  EXPECT_EQ(mean_row_power(s, 0), 0);
+  s.request.switches.noise = true;
+  const std::vector<float> noise = s.ping().pressure_upa;
+  s.request.switches.leak = false;
+  EXPECT_EQ(noise, s.ping().pressure_upa);
+}
+
 TEST(Leak, IsHeardThoughTheNoiseIsOffAndDoesNotChangeTheNoise) {
   Sounding s(SceneMaker().make(), oculus_high(), default_rows(2, 700));
   s.request.switches.noise = true;
