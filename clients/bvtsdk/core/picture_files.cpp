@@ -1,20 +1,14 @@
 // Colour map files and pictures: the file side of colour_maps.hpp.
-#include <cstdio>
 #include <cstring>
-#include <memory>
 
 #include "clients/bvtsdk/core/bytes.hpp"
 #include "clients/bvtsdk/core/colour_maps.hpp"
+#include "clients/bvtsdk/core/file.hpp"
 
 namespace sonar::bvt {
 namespace {
 
 constexpr std::size_t map_bytes = 3 * static_cast<std::size_t>(colour_map_entries);
-
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-using File = std::unique_ptr<std::FILE, CloseFile>;
 
 Code save(const std::string& path, const std::string& header, const Bytes& body) {
   File file(std::fopen(path.c_str(), "wb"));

@@ -8,12 +8,11 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/file.hpp"
 #include "clients/bvtsdk/core/frame.hpp"
 #include "clients/bvtsdk/core/polar_ping.hpp"
 
@@ -23,11 +22,6 @@ struct EventMark {
   double time_s = 0;  // since 1970 UTC
   std::string key, text;
 };
-
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-using File = std::unique_ptr<std::FILE, CloseFile>;
 
 /// Where a frame lies.
 struct FramePlace {
