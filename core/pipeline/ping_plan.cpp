@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <string>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
@@ -267,31 +266,6 @@ bool serves(const PingPlan& plan, const PingRequest& r) {
          a.device_sound_speed_mps == b.device_sound_speed_mps && a.device_absorption_db_per_m == b.device_absorption_db_per_m &&
          a.format.bits == b.format.bits && a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma &&
          a.format.row_gains == b.format.row_gains && plan.switches == r.switches;
-}
-
-std::string why_invalid(const PingRequest& r) {
-  const PingSettings& s = r.settings;
-  if (!r.model) return "the request names no sonar model";
-  if (s.mode < 0 || s.mode >= static_cast<int>(r.model->modes.size()))
-    return "mode " + std::to_string(s.mode) + " does not exist in " + r.model->name;
-  if (s.beam_count < 1 || s.beam_count > 2048) return "beam_count " + std::to_string(s.beam_count) + " is not in 1..2048";
-  if (s.range_bin_count < 1 || s.range_bin_count > 65535)
-    return "range_bin_count " + std::to_string(s.range_bin_count) + " is not in 1..65535";
-  if (s.samples_per_row < 1 || s.samples_per_row > 64)
-    return "samples_per_row " + std::to_string(s.samples_per_row) + " is not in 1..64";
-  const auto positive = [](auto x) { return x > 0 && std::isfinite(x); };
-  if (!positive(s.range_bin_m) || !positive(s.pulse_width_m) || !positive(s.range_m) || !positive(s.device_sound_speed_mps))
-    return "range, row spacing, pulse width and sound speed must be positive and finite";
-  if (!(s.row_centre >= 0 && s.row_centre <= 1)) return "row_centre must be from 0 to 1";
-  if (!std::isfinite(s.gain_db) || !std::isfinite(s.device_absorption_db_per_m)) return "gain and absorption must be finite";
-  const Waveform& waveform = r.model->modes[static_cast<std::size_t>(s.mode)].waveform;
-  const double sample_time_s = 2 * s.range_bin_m / s.samples_per_row / static_cast<double>(s.device_sound_speed_mps);
-  if (std::string why = why_invalid(waveform, sample_time_s); !why.empty()) return why;
-  if (s.format.bits != 8 && s.format.bits != 16 && s.format.bits != 32) return "samples have 8, 16 or 32 bits";
-  if (!positive(s.format.gamma)) return "gamma must be positive and finite";
-  if (!is_finite(r.sonar_in_world.position_m) || !is_finite(r.sonar_in_world.orientation))
-    return "the sonar's pose is not finite";
-  return {};
 }
 
 }  // namespace sonar

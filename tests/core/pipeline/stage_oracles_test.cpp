@@ -358,6 +358,41 @@ TEST(StageOracles, Oracle44_AwkwardSettingsAreRefusedWithASentence) {
   refused([&](PingRequest& r) { r.settings.format.gamma = nan; });
   refused([&](PingRequest& r) { r.settings.format.bits = 12; });
   refused([&](PingRequest& r) { r.model = nullptr; });
+  refused([&](PingRequest& r) { r.sonar_moves.velocity_mps.y = std::numeric_limits<double>::quiet_NaN(); });
+  refused([&](PingRequest& r) { r.sonar_moves.angular_rate_radps.z = std::numeric_limits<double>::infinity(); });
+  refused([&](PingRequest& r) { r.sonar_moves.velocity_mps.x = 1e6; });
+  refused([&](PingRequest& r) { r.bodies_in_world = {{}, {{0, std::numeric_limits<double>::quiet_NaN(), 0}, {}}}; });
+  refused([&](PingRequest& r) { r.settings.format.max_code = 0; });
+  refused([&](PingRequest& r) { r.settings.format.bits = 8; });  // with max_code 65535
+  refused([&](PingRequest& r) { r.switches.fixed_fan = -1; });
+  refused([&](PingRequest& r) { r.switches.fixed_fan = std::numeric_limits<int>::max(); });
+}
+
+// What would ask for more memory than any machine has is refused, too; what is merely large is not.
+TEST(StageOracles, Oracle44_PicturesBeyondAllMemoryAreRefusedWithASentence) {
+  Sounding s(SceneMaker().make(), p900(), default_rows(10, 394));
+  const auto why = [&](auto&& change, bool exact = false) {
+    PingRequest r = s.request;
+    if (exact) {
+      auto model = std::make_shared<SonarModel>(*r.model);
+      model->modes[0].waveform.exact = true;
+      r.model = std::move(model);
+    }
+    change(r.settings);
+    return why_invalid(r);
+  };
+  const auto huge = [](PingSettings& p) { p.beam_count = 2048, p.range_bin_count = 65535, p.samples_per_row = 64; };
+  const auto long_pulse = [](PingSettings& p) { p.pulse_width_m = 100, p.range_bin_m = 1e-4; };
+  const auto short_pulse = [](PingSettings& p) { p.pulse_width_m = 1e-5f, p.range_bin_m = 0.1; };
+  const auto large = [](PingSettings& p) { p.beam_count = 512, p.range_bin_count = 720, p.samples_per_row = 32; };
+  const auto long_record = [](PingSettings& p) { p.range_bin_count = 65535; };
+  EXPECT_NE(why(huge), "");
+  EXPECT_NE(why(long_pulse), "");
+  EXPECT_NE(why(short_pulse, true), "");
+  EXPECT_EQ(why(short_pulse), "");
+  EXPECT_EQ(why(large), "");
+  EXPECT_EQ(why(long_record), "");
+  EXPECT_EQ(why(long_record, true), "");
 }
 
 // A ping is a pure function of its request: nothing of an earlier ping may show in a later one.

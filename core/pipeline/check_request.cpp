@@ -1,0 +1,80 @@
+// Which requests can be simulated: the sentence that refuses the others (why_invalid, core/pipeline/ping_plan.hpp). Asked by
+// every engine before a ping.
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/pipeline/ping_plan.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr double longest_pulse_in_samples = 1000;
+constexpr double shortest_exact_pulse_in_samples = 0.25;  // by way of the spectrum; tabulated ones may be as short as they like
+constexpr double most_column_samples = 1 << 29;           // of all columns, 4 GiB
+constexpr double most_frequencies = 1 << 20;              // of a column by way of the spectrum
+constexpr double tone_band_in_pulses = 20, other_band_in_pulses = 3;  // in 1 / width, at least Pulse::band_hz
+constexpr int most_fixed_rays = 100000;
+
+/// Pulses and buffers that no picture needs and no memory holds.
+std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings& s) {
+  const double samples = static_cast<double>(s.range_bin_count) * s.samples_per_row;
+  const double pulse = static_cast<double>(s.pulse_width_m) / (s.range_bin_m / s.samples_per_row);  // in samples
+  const bool measured = mode.waveform.shape == Waveform::Shape::measured;  // has a width, and limits, of its own
+  if (!measured && pulse > longest_pulse_in_samples)
+    return "the pulse is longer than 1000 samples of the picture: choose longer rows or a shorter pulse";
+  if (!measured && mode.waveform.exact && pulse < shortest_exact_pulse_in_samples)
+    return "an exact pulse must be at least a quarter of a sample of the picture long: choose shorter rows or a longer pulse";
+  const double band = mode.waveform.shape == Waveform::Shape::cw ? tone_band_in_pulses : other_band_in_pulses;
+  if (!measured && mode.waveform.exact && samples * std::max(1.0, band / pulse) > most_frequencies)
+    return "an exact pulse so short on so many samples needs too much memory: choose fewer rows or a longer pulse";
+  if (samples * make_columns(mode, s.beam_count).count > most_column_samples)
+    return "so many beams, rows and samples a row need too much memory: choose fewer of them";
+  return {};
+}
+
+std::string why_impossible_motion(const PingRequest& r) {
+  if (!is_finite(r.sonar_in_world.position_m) || !is_finite(r.sonar_in_world.orientation))
+    return "the sonar's pose is not finite";
+  if (!is_finite(r.sonar_moves.velocity_mps) || !is_finite(r.sonar_moves.angular_rate_radps))
+    return "the sonar's motion is not finite";
+  if (length(r.sonar_moves.velocity_mps) >= static_cast<double>(r.settings.device_sound_speed_mps))
+    return "the sonar moves faster than sound";
+  for (std::size_t b = 0; b < r.bodies_in_world.size(); ++b)
+    if (!is_finite(r.bodies_in_world[b].position_m) || !is_finite(r.bodies_in_world[b].orientation))
+      return "the pose of moving body " + std::to_string(b) + " is not finite";
+  return {};
+}
+
+}  // namespace
+
+std::string why_invalid(const PingRequest& r) {
+  const PingSettings& s = r.settings;
+  if (!r.model) return "the request names no sonar model";
+  if (s.mode < 0 || s.mode >= static_cast<int>(r.model->modes.size()))
+    return "mode " + std::to_string(s.mode) + " does not exist in " + r.model->name;
+  if (s.beam_count < 1 || s.beam_count > 2048) return "beam_count " + std::to_string(s.beam_count) + " is not in 1..2048";
+  if (s.range_bin_count < 1 || s.range_bin_count > 65535)
+    return "range_bin_count " + std::to_string(s.range_bin_count) + " is not in 1..65535";
+  if (s.samples_per_row < 1 || s.samples_per_row > 64)
+    return "samples_per_row " + std::to_string(s.samples_per_row) + " is not in 1..64";
+  const auto positive = [](auto x) { return x > 0 && std::isfinite(x); };
+  if (!positive(s.range_bin_m) || !positive(s.pulse_width_m) || !positive(s.range_m) || !positive(s.device_sound_speed_mps))
+    return "range, row spacing, pulse width and sound speed must be positive and finite";
+  if (!(s.row_centre >= 0 && s.row_centre <= 1)) return "row_centre must be from 0 to 1";
+  if (!std::isfinite(s.gain_db) || !std::isfinite(s.device_absorption_db_per_m)) return "gain and absorption must be finite";
+  const Waveform& waveform = r.model->modes[static_cast<std::size_t>(s.mode)].waveform;
+  const double sample_time_s = 2 * s.range_bin_m / s.samples_per_row / static_cast<double>(s.device_sound_speed_mps);
+  if (std::string why = why_invalid(waveform, sample_time_s); !why.empty()) return why;
+  if (s.format.bits != 8 && s.format.bits != 16 && s.format.bits != 32) return "samples have 8, 16 or 32 bits";
+  if (!positive(s.format.gamma)) return "gamma must be positive and finite";
+  if (s.format.max_code < 1 || s.format.max_code > 0xFFFFFFFFu >> (32 - s.format.bits))
+    return "max_code " + std::to_string(s.format.max_code) + " does not fit samples of " + std::to_string(s.format.bits) +
+           " bits";
+  if (r.switches.fixed_fan < 0 || r.switches.fixed_fan > most_fixed_rays)
+    return "fixed_fan " + std::to_string(r.switches.fixed_fan) + " is not in 0..100000";
+  if (std::string why = why_out_of_proportion(r.model->modes[static_cast<std::size_t>(s.mode)], s); !why.empty()) return why;
+  return why_impossible_motion(r);
+}
+
+}  // namespace sonar
