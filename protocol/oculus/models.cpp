@@ -15,7 +15,8 @@ namespace {
 // our choice.
 
 /// unknown: fitted. The pressure that reaches full scale at TVG 0 dB and gain 0 dB, so that the demo scene at gain 50, gamma 127
-/// has an 8-bit median of 30 to 60; of the others by the same brightness at half their range. The one place to tune it.
+/// has an 8-bit median of 30 to 60; of the others by the same brightness at half their range. Not by the captured M1200d pings:
+/// at their gain of 50 % a scene like theirs comes out 47 dB too weak (docs/acoustics.md, section 9). The one place to tune it.
 namespace fitted_full_scale_upa {
 constexpr float m370s = 2.2e10f, c550d_low = 1.9e10f, c550d_high = 1.4e10f, m750d_low = 2e10f, m750d_high = 1.5e10f;
 constexpr float m1200d_low = 1.5e10f, m1200d_high = 3.5e10f, m3000d_low = 1.4e10f, m3000d_high = 3.3e10f;
