@@ -69,6 +69,7 @@ class Planted(unittest.TestCase):
                 ("core/scene/a.cpp", 'printf("loaded");', "log"),
                 ("core/pipeline/a.cpp", "std::thread worker(f);", "thread"),
                 ("cuda/a.cpp", "std::async(f);", "thread"),
+                ("clients/bvtsdk/core/sonar.cpp", "std::thread worker(f);", "thread"),
                 ("protocol/oculus/a.cpp", "#include <sys/socket.h>", "socket"),
                 ("daemon/a.cpp", "std::mutex guard;", "mutex"),
                 ("core/scene/a.cpp", "std::mt19937 engine;", "global random"),
@@ -119,6 +120,8 @@ class Innocent(unittest.TestCase):
             "daemon/asio.hpp": "#pragma once\n#include <utility>\n#include <boost/asio.hpp>\n",
             "daemon/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
             "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/oculus/decode.hpp"\n',
+            "clients/bvtsdk/abi4/include/bvt_sdk.h": '#pragma once\n#include "bvt_sdk_classes.h"\n',
+            "clients/bvtsdk/core/link.cpp": "#include <thread>\nstd::thread reader(f);\n",
             "tests/core/a.cpp": '#include <Eigen/Dense>\n#include "daemon/world.hpp"\nstd::thread t; // steady_clock\n',
             PAGE: "see https://example.org/work/home and scenes/demo.yaml, /etc/sonard/sonard.yaml\n",
         }), [])

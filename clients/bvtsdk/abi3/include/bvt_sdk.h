@@ -1,0 +1,250 @@
+/* Our own C and C++ interface to sonars of the BlueView kind, compatible with the 3.x generation of the vendor's SDK; not the
+ * vendor's header. Hosts include only this, as C99 or C++98, and link libbvtsdk.so.3. */
+#pragma once
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define BVT_API __attribute__((visibility("default")))
+
+/* Handles. They are numbers, not addresses: never look behind them. Null is allowed wherever something is destroyed. */
+typedef struct BVTOpaqueSonar* BVTSonar;
+typedef struct BVTOpaqueHead* BVTHead;
+typedef struct BVTOpaquePing* BVTPing;
+typedef struct BVTOpaqueMagImage* BVTMagImage;
+typedef struct BVTOpaqueColorImage* BVTColorImage;
+typedef struct BVTOpaqueColorMapper* BVTColorMapper;
+typedef struct BVTOpaqueNavData* BVTNavData;
+typedef struct BVTOpaqueSonarDiscoveryAgent* BVTSonarDiscoveryAgent;
+typedef struct BVTOpaqueRangeData* BVTRangeData;
+
+/* 0 is success. BVTError_GetName and BVTError_GetString explain the others. */
+typedef int RetVal;
+enum {
+  BVT_SUCCESS = 0,
+  BVT_FAILED = 1,
+  BVT_MEMORY_ALLOC = 2,
+  BVT_FILE_OPEN = 3,
+  BVT_FILE_READ = 4,
+  BVT_FILE_WRITE = 5,
+  BVT_BAD_PARAMETER = 6,
+  BVT_INVALID_PTR = 7,
+  BVT_FILE_CREATE = 8,
+  BVT_FILE_NOTOPEN = 10,
+  BVT_NOT_IMPLEMENTED = 13,
+  BVT_TIMEOUT = 18,
+  BVT_BUFFER_TOO_SMALL = 19,
+  BVT_FILE_HEADER_BAD = 1003,
+  BVT_FILE_TOO_NEW = 1004,
+  BVT_LOOKUP_HOST = 1014,
+  BVT_CONNECTION_TIMEDOUT = 1015,
+  BVT_SOCKET_READ_TIMEOUT = 1017,
+  BVT_SOCKET_WRITE_TIMEOUT = 1018,
+  BVT_SOCKET_CLOSED = 1020,
+  BVT_SOCKET_WRITE = 1021,
+  BVT_SOCKET_READ = 1022,
+  BVT_INDEX_OUTOFBOUNDS = 1064,
+  BVT_SOCKET_NOT_CONNECTED = 1065,
+  BVT_NO_TEMP = 2008,
+  BVT_NO_HEAD = 2010,
+  BVT_PING_NUM_TOO_LARGE = 4002,
+  BVT_PING_NUM_TOO_SMALL = 4003,
+  BVT_BAD_RANGE = 4009,
+  BVT_NO_PING_SIGNAL = 4011,
+  BVT_READONLY_FILE = 4012,
+  BVT_NO_VIDEO_FRAME = 4014,
+  BVT_BAD_PING = 5001,
+  BVT_BAD_COLOR_MAP = 5002,
+  BVT_BAD_HEAD = 5003,
+  BVT_BAD_IMAGE_TYPE = 5004,
+  BVT_INVALID_IMG_SIZE = 5008,
+  BVT_INVALID_RESOLUTION = 5010,
+  BVT_PV_LOAD_COLORMAP = 9001,
+  BVT_NET_BAD_PACKET_TYPE = 14001,
+  BVT_NET_NOT_CONNECTED = 14003,
+  BVT_NET_BAD_PACKET_VER = 14004,
+  BVT_NAV_NO_DATA = 16000,
+  BVT_TRIGGER_NOT_PRESENT = 18000
+};
+
+/* Rows of an image: 256, 512, 1000, or as many as the ping has bins. */
+enum {
+  BVTHEAD_RES_OFF = 0,
+  BVTHEAD_RES_LOW = 1,
+  BVTHEAD_RES_MED = 2,
+  BVTHEAD_RES_MEDIUM = 2,
+  BVTHEAD_RES_HIGH = 3,
+  BVTHEAD_RES_AUTO = 4
+};
+
+/* Cartesian, or rows of equal range and columns of equal bearing. */
+enum { BVTHEAD_IMAGE_XY = 0, BVTHEAD_IMAGE_RTHETA = 1 };
+
+/* What the sonar is in. */
+enum { BVTHEAD_FLUID_SALTWATER = 0, BVTHEAD_FLUID_FRESHWATER = 1, BVTHEAD_FLUID_OTHER = 2 };
+
+/* Sonar: a live one, a recording that is played, or one that is being written. Heads belong to it. */
+BVT_API BVTSonar BVTSonar_Create(void);
+BVT_API void BVTSonar_Destroy(BVTSonar self);
+BVT_API RetVal BVTSonar_Open(BVTSonar self, const char* type, const char* parameter); /* "NET", host; "FILE", path */
+BVT_API RetVal BVTSonar_CreateFile(BVTSonar self, const char* file_name, BVTSonar source, const char* ignored);
+BVT_API RetVal BVTSonar_GetHead(BVTSonar self, int number, BVTHead* out);
+BVT_API int BVTSonar_GetHeadCount(BVTSonar self);
+BVT_API float BVTSonar_GetTemperature(BVTSonar self);
+BVT_API int BVTSonar_GetFileSize(BVTSonar self);
+BVT_API RetVal BVTSonar_GetSonarName(BVTSonar self, char* buffer, int buffer_size);
+BVT_API RetVal BVTSonar_GetSerialNumber(BVTSonar self, char* buffer, int buffer_size);
+BVT_API RetVal BVTSonar_GetSonarTypeAsString(BVTSonar self, char* buffer, int buffer_size);
+
+/* Head: ranges in metres. GetPing ignores the number on a live sonar, transmits and waits; in a file a negative one means the
+ * next. */
+BVT_API RetVal BVTHead_SetRange(BVTHead self, float start_m, float stop_m);
+BVT_API float BVTHead_GetStartRange(BVTHead self);
+BVT_API float BVTHead_GetStopRange(BVTHead self);
+BVT_API float BVTHead_GetMinimumRange(BVTHead self);
+BVT_API float BVTHead_GetMaximumRange(BVTHead self);
+BVT_API RetVal BVTHead_SetSoundSpeed(BVTHead self, int metres_per_second);
+BVT_API int BVTHead_GetSoundSpeed(BVTHead self);
+BVT_API RetVal BVTHead_SetGainAdjustment(BVTHead self, float db);
+BVT_API float BVTHead_GetGainAdjustment(BVTHead self);
+BVT_API RetVal BVTHead_SetTVGSlope(BVTHead self, float db_per_m);
+BVT_API float BVTHead_GetTVGSlope(BVTHead self);
+BVT_API RetVal BVTHead_SetFluidType(BVTHead self, int type);
+BVT_API int BVTHead_GetFluidType(BVTHead self);
+BVT_API RetVal BVTHead_SetImageFilterFlags(BVTHead self, int flags);
+BVT_API int BVTHead_GetImageFilterFlags(BVTHead self);
+BVT_API RetVal BVTHead_SetMountType(BVTHead self, int type);
+BVT_API int BVTHead_GetMountType(BVTHead self);
+BVT_API int BVTHead_GetCenterFreq(BVTHead self);
+BVT_API int BVTHead_GetPingCount(BVTHead self);
+BVT_API int BVTHead_GetImageProcessingMethod(BVTHead self);
+BVT_API RetVal BVTHead_SetTxEnable(BVTHead self, int on);
+BVT_API RetVal BVTHead_GetHeadName(BVTHead self, char* buffer, int buffer_size);
+BVT_API RetVal BVTHead_GetPing(BVTHead self, int number, BVTPing* out);
+BVT_API RetVal BVTHead_PutPing(BVTHead self, BVTPing ping);
+BVT_API RetVal BVTHead_SetImageRes(BVTHead self, int resolution);
+BVT_API RetVal BVTHead_SetImageType(BVTHead self, int type);
+BVT_API RetVal BVTHead_SetImageReqSize(BVTHead self, int height, int width);
+BVT_API RetVal BVTHead_SetRangeResolution(BVTHead self, float metres);
+BVT_API RetVal BVTHead_SetRangeDataThreshold(BVTHead self, unsigned short threshold);
+
+/* Ping: seconds since 1970 UTC; may be used and destroyed in another thread. */
+BVT_API void BVTPing_Destroy(BVTPing self);
+BVT_API RetVal BVTPing_GetImage(BVTPing self, BVTMagImage* out);
+BVT_API RetVal BVTPing_GetImageXY(BVTPing self, BVTMagImage* out);
+BVT_API RetVal BVTPing_GetImageRTheta(BVTPing self, BVTMagImage* out);
+BVT_API RetVal BVTPing_GetRangeData(BVTPing self, BVTRangeData* out); /* belongs to the ping */
+BVT_API double BVTPing_GetTimestamp(BVTPing self);
+BVT_API int BVTPing_GetTimeZoneOffset(BVTPing self);
+BVT_API int BVTPing_GetPingNumber(BVTPing self);
+BVT_API RetVal BVTPing_PutNavData(BVTPing self, BVTNavData nav);
+BVT_API RetVal BVTPing_GetNavDataCopy(BVTPing self, BVTNavData* out);
+
+/* MagImage: 16 bits a pixel, row after row, 65535 is full scale; angles in degrees clockwise from ahead. */
+BVT_API void BVTMagImage_Destroy(BVTMagImage self);
+BVT_API int BVTMagImage_GetHeight(BVTMagImage self);
+BVT_API int BVTMagImage_GetWidth(BVTMagImage self);
+BVT_API unsigned short* BVTMagImage_GetBits(BVTMagImage self);
+BVT_API unsigned short* BVTMagImage_GetRow(BVTMagImage self, int row);
+BVT_API unsigned short BVTMagImage_GetPixel(BVTMagImage self, int row, int col);
+BVT_API double BVTMagImage_GetRangeResolution(BVTMagImage self);
+BVT_API double BVTMagImage_GetBearingResolution(BVTMagImage self);
+BVT_API int BVTMagImage_GetOriginRow(BVTMagImage self);
+BVT_API int BVTMagImage_GetOriginCol(BVTMagImage self);
+BVT_API double BVTMagImage_GetFOVMinAngle(BVTMagImage self);
+BVT_API double BVTMagImage_GetFOVMaxAngle(BVTMagImage self);
+BVT_API double BVTMagImage_GetPixelRange(BVTMagImage self, int row, int col);
+BVT_API double BVTMagImage_GetPixelRelativeBearing(BVTMagImage self, int row, int col);
+BVT_API RetVal BVTMagImage_CopyBits(BVTMagImage self, unsigned short* buffer, unsigned int pixels);
+BVT_API RetVal BVTMagImage_SavePGM(BVTMagImage self, const char* file_name);
+
+/* ColorImage: 32 bits a pixel, in memory blue, green, red, 255. */
+BVT_API void BVTColorImage_Destroy(BVTColorImage self);
+BVT_API int BVTColorImage_GetHeight(BVTColorImage self);
+BVT_API int BVTColorImage_GetWidth(BVTColorImage self);
+BVT_API unsigned int* BVTColorImage_GetBits(BVTColorImage self);
+BVT_API unsigned int* BVTColorImage_GetRow(BVTColorImage self, int row);
+BVT_API unsigned int BVTColorImage_GetPixel(BVTColorImage self, int row, int col);
+BVT_API double BVTColorImage_GetRangeResolution(BVTColorImage self);
+BVT_API double BVTColorImage_GetBearingResolution(BVTColorImage self);
+BVT_API int BVTColorImage_GetOriginRow(BVTColorImage self);
+BVT_API int BVTColorImage_GetOriginCol(BVTColorImage self);
+BVT_API double BVTColorImage_GetFOVMinAngle(BVTColorImage self);
+BVT_API double BVTColorImage_GetFOVMaxAngle(BVTColorImage self);
+BVT_API double BVTColorImage_GetPixelRange(BVTColorImage self, int row, int col);
+BVT_API double BVTColorImage_GetPixelRelativeBearing(BVTColorImage self, int row, int col);
+BVT_API RetVal BVTColorImage_CopyBits(BVTColorImage self, unsigned int* buffer, unsigned int pixels);
+BVT_API RetVal BVTColorImage_SavePPM(BVTColorImage self, const char* file_name);
+
+/* ColorMapper: magnitudes to colours through a map of 4096 entries. */
+BVT_API BVTColorMapper BVTColorMapper_Create(void);
+BVT_API void BVTColorMapper_Destroy(BVTColorMapper self);
+BVT_API RetVal BVTColorMapper_Load(BVTColorMapper self, const char* file_name);
+BVT_API RetVal BVTColorMapper_MapImage(BVTColorMapper self, BVTMagImage image, BVTColorImage* out);
+BVT_API RetVal BVTColorMapper_SetThresholds(BVTColorMapper self, int top, int bottom);
+BVT_API int BVTColorMapper_GetTopThreshold(BVTColorMapper self);
+BVT_API int BVTColorMapper_GetBottomThreshold(BVTColorMapper self);
+BVT_API RetVal BVTColorMapper_SetGamma(BVTColorMapper self, float gamma);
+BVT_API float BVTColorMapper_GetGamma(BVTColorMapper self);
+BVT_API RetVal BVTColorMapper_SetAutoMode(BVTColorMapper self, int on);
+BVT_API int BVTColorMapper_GetAutoMode(BVTColorMapper self);
+
+/* RangeData: one range a bearing, left to right; metres and degrees clockwise from ahead. Above 999: no echo. */
+BVT_API int BVTRangeData_GetCount(BVTRangeData self);
+BVT_API float BVTRangeData_GetRangeValue(BVTRangeData self, int i);
+BVT_API float BVTRangeData_GetBearingValue(BVTRangeData self, int i);
+BVT_API unsigned short BVTRangeData_GetIntensityValue(BVTRangeData self, int i);
+BVT_API float BVTRangeData_GetFOVMinAngle(BVTRangeData self);
+BVT_API float BVTRangeData_GetFOVMaxAngle(BVTRangeData self);
+BVT_API double BVTRangeData_GetRangeResolution(BVTRangeData self);
+BVT_API double BVTRangeData_GetBearingResolution(BVTRangeData self);
+BVT_API RetVal BVTRangeData_CopyRangeValues(BVTRangeData self, float* buffer, int count);
+
+/* NavData: where the vehicle is. A value that was not set answers BVT_NAV_NO_DATA. */
+BVT_API BVTNavData BVTNavData_Create(void);
+BVT_API void BVTNavData_Destroy(BVTNavData self);
+BVT_API RetVal BVTNavData_SetLatitude(BVTNavData self, double value); /* degrees, north positive */
+BVT_API RetVal BVTNavData_GetLatitude(BVTNavData self, double* out);
+BVT_API RetVal BVTNavData_SetLongitude(BVTNavData self, double value); /* degrees, east positive */
+BVT_API RetVal BVTNavData_GetLongitude(BVTNavData self, double* out);
+BVT_API RetVal BVTNavData_SetDepth(BVTNavData self, float value); /* m */
+BVT_API RetVal BVTNavData_GetDepth(BVTNavData self, float* out);
+BVT_API RetVal BVTNavData_SetAltitude(BVTNavData self, float value); /* m above the bottom */
+BVT_API RetVal BVTNavData_GetAltitude(BVTNavData self, float* out);
+BVT_API RetVal BVTNavData_SetPitchAngle(BVTNavData self, float value); /* degrees, bow up */
+BVT_API RetVal BVTNavData_GetPitchAngle(BVTNavData self, float* out);
+BVT_API RetVal BVTNavData_SetRollAngle(BVTNavData self, float value); /* degrees, port up */
+BVT_API RetVal BVTNavData_GetRollAngle(BVTNavData self, float* out);
+BVT_API RetVal BVTNavData_SetHeading(BVTNavData self, float value); /* degrees clockwise from true north */
+BVT_API RetVal BVTNavData_GetHeading(BVTNavData self, float* out);
+BVT_API RetVal BVTNavData_SetHeadingVelocity(BVTNavData self, float value); /* m/s */
+BVT_API RetVal BVTNavData_GetHeadingVelocity(BVTNavData self, float* out);
+BVT_API RetVal BVTNavData_SetCourseOverGround(BVTNavData self, float value); /* degrees */
+BVT_API RetVal BVTNavData_GetCourseOverGround(BVTNavData self, float* out);
+BVT_API RetVal BVTNavData_SetUserNavString(BVTNavData self, const char* text); /* at most 80 bytes */
+BVT_API RetVal BVTNavData_GetUserNavString(BVTNavData self, char* buffer, int buffer_size);
+
+/* SonarDiscoveryAgent: finds sonars; give them a moment between Start and counting. */
+BVT_API BVTSonarDiscoveryAgent BVTSonarDiscoveryAgent_Create(void);
+BVT_API void BVTSonarDiscoveryAgent_Destroy(BVTSonarDiscoveryAgent self);
+BVT_API RetVal BVTSonarDiscoveryAgent_Start(BVTSonarDiscoveryAgent self);
+BVT_API RetVal BVTSonarDiscoveryAgent_Stop(BVTSonarDiscoveryAgent self);
+BVT_API int BVTSonarDiscoveryAgent_GetSonarCount(BVTSonarDiscoveryAgent self);
+BVT_API RetVal BVTSonarDiscoveryAgent_GetSonarInfo(BVTSonarDiscoveryAgent self, int i, char* buffer,
+                                                   int buffer_size); /* its IPv4 address */
+
+/* Errors, version, log. */
+BVT_API const char* BVTError_GetString(RetVal code);
+BVT_API const char* BVTError_GetName(RetVal code);
+BVT_API int BVTSDK_MajorVersion(void);
+BVT_API int BVTSDK_MinorVersion(void);
+BVT_API int BVTSDK_BuildNumber(void);
+BVT_API RetVal BVTLogger_SetLevel(int level);           /* -1 none, 0 critical, 1 warning, 2 status */
+BVT_API RetVal BVTLogger_SetTarget(const char* target); /* "stdout", "stderr", "null", or a file */
+
+#ifdef __cplusplus
+}
+
+#include "bvt_sdk_classes.h"
+#endif

@@ -1,0 +1,43 @@
+// What a sonar says of itself when it is greeted: HELLO_OK of the link, and the first frame of every recording.
+// docs/protocols/blueview-link.md describes it.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/bvtsdk/core/bytes.hpp"
+
+namespace sonar::bvt {
+
+struct HeadDescription {
+  std::int32_t id = 0;
+  std::string name;
+  float min_range_m = 0, max_range_m = 0;
+  float start_m = 0, stop_m = 0;
+  std::int32_t centre_hz = 0;
+  float fov_min_deg = 0, fov_max_deg = 0;
+  std::uint16_t beams = 0;
+  std::int32_t sound_speed_mps = 1500;
+  float gain_db = 0;
+  float tvg_db_per_m = 0;
+  std::int32_t fluid = 0;  // 0 salt, 1 fresh, 2 other
+};
+
+struct SonarDescription {
+  std::uint16_t version = 1;
+  std::string model, name, serial, firmware;
+  float temperature_c = 0;
+  std::uint32_t capabilities = 0;  // bit 0: head numbers are strict
+  std::vector<HeadDescription> heads;
+
+  bool strict_heads() const { return (capabilities & 1) != 0; }
+  /// The head a host means by a number: its own, or 0 and 1 alike where there is one head and numbers are not strict.
+  const HeadDescription* head(int number) const;
+};
+
+/// The payload of HELLO_OK; nothing when it is none.
+std::optional<SonarDescription> decode_description(BytesView payload);
+Bytes encode_description(const SonarDescription& sonar);
+
+}  // namespace sonar::bvt

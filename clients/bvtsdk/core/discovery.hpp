@@ -1,0 +1,32 @@
+// Finding sonars: "BVE?" datagrams out, "BVE!" datagrams back (docs/protocols/blueview-link.md, "Discovery").
+// Needs no thread: answers wait in the socket until somebody counts them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/socket.hpp"
+
+namespace sonar::bvt {
+
+class DiscoveryAgent {
+ public:
+  /// Forgets what was found and asks again: by broadcast, this host itself, and every address in the environment variable
+  /// BVE_DISCOVERY (separated by commas or spaces). failed without a socket.
+  Code start();
+  /// Takes the last answers.
+  void stop();
+  /// IPv4 addresses in the order they answered; asks once more when the last time was over a second ago.
+  const std::vector<std::string>& sonars();
+
+ private:
+  void ask();
+  void take_answers();
+
+  Descriptor socket_;
+  Deadline last_asked_{};
+  std::vector<std::string> found_;
+};
+
+}  // namespace sonar::bvt

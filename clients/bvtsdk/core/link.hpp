@@ -1,0 +1,84 @@
+// The host's end of BVE1: one TCP connection to a sonar, requests and their replies, keep-alive.
+// docs/protocols/blueview-link.md describes it. Any number of threads may ask at once; replies find who asked.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/description.hpp"
+#include "clients/bvtsdk/core/frame.hpp"
+#include "clients/bvtsdk/core/socket.hpp"
+
+namespace sonar::bvt {
+
+/// How long things may take. Tests shorten them.
+struct Patience {
+  std::chrono::milliseconds connect{5000};    // name, connection and greeting, each
+  std::chrono::milliseconds request{5000};    // a reply that needs no ping
+  std::chrono::milliseconds silence{2000};    // of ours, then we send a keep-alive
+  std::chrono::milliseconds lifeless{10000};  // nothing at all from the sonar: it is gone
+};
+
+class Link {
+ public:
+  /// `endpoint` is "host" or "host:port"; the port is else that of the environment variable BVE_PORT, else 14750.
+  /// bad_parameter, lookup_host, connection_timed_out (refused, unreachable, or silent), bad_packet_type (something else lives
+  /// there), bad_packet_version.
+  static Code open(const std::string& endpoint, int abi, std::unique_ptr<Link>& link, SonarDescription& sonar,
+                   const Patience& patience = {});
+  /// Closes, and waits for the reader to end.
+  ~Link();
+  Link(const Link&) = delete;
+  Link& operator=(const Link&) = delete;
+
+  /// Sends a request and waits for its reply; the sonar's own code when it refuses, socket_read_timeout when none comes in
+  /// time, and what ended the link (socket_closed, socket_read_timeout, ...) when it is lost, now and ever after.
+  int ask(FrameType request, const Bytes& payload, Bytes& answer, std::chrono::milliseconds patience);
+  int ask(FrameType request, const Bytes& payload, Bytes& answer) { return ask(request, payload, answer, patience_.request); }
+
+  bool connected() const { return lost_ == success; }
+  /// Whoever waits is told socket_closed. From any thread.
+  void close() { lose(socket_closed); }
+
+ private:
+  struct Waiter {
+    FrameType request{};
+    bool answered = false;
+    int code = success;
+    Bytes answer;
+  };
+  struct Forget;
+  Link(Descriptor socket, const Patience& patience);
+  void read_until_lost();
+  void receive();
+  void deliver(const FrameHeader& header, Bytes payload);
+  Code send(FrameType type, std::uint32_t id, const Bytes& payload);
+  void keep_alive();
+  void lose(Code why);
+
+  const Patience patience_;
+  Descriptor socket_;
+  std::atomic<Code> lost_{success};
+
+  std::mutex waiting_mutex_;
+  std::condition_variable answered_;
+  std::map<std::uint32_t, Waiter*> waiting_;
+  std::uint32_t last_id_ = 0;
+
+  std::mutex send_mutex_;
+  Deadline last_sent_;
+
+  // Of the reader alone.
+  Deadline last_heard_;
+  Bytes received_;
+  std::thread reader_;  // last: it uses all of the above
+};
+
+}  // namespace sonar::bvt

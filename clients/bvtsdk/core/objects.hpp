@@ -1,0 +1,62 @@
+// What the small handles stand for: pings, images, range lists, navigation, generators, mappers, discovery agents.
+// Sonars and heads have files of their own. The facades lock an object's mutex around each call on it.
+#pragma once
+
+#include "clients/bvtsdk/core/colour_maps.hpp"
+#include "clients/bvtsdk/core/discovery.hpp"
+#include "clients/bvtsdk/core/handles.hpp"
+#include "clients/bvtsdk/core/imaging.hpp"
+#include "clients/bvtsdk/core/range_list.hpp"
+
+namespace sonar::bvt {
+
+struct NavObject : Object {
+  NavData nav;
+};
+
+struct MagImageObject : Object {
+  MagImage image;
+};
+
+struct ColourImageObject : Object {
+  ColourImage image;
+};
+
+struct RangeListObject : Object {
+  RangeList list;
+};
+
+struct ColourMapperObject : Object {
+  ColourMapper mapper;
+};
+
+struct DiscoveryObject : Object {
+  DiscoveryAgent agent;
+};
+
+/// What a head was told about images when it pinged; BVTPing_GetImage and its like go by that.
+struct HeadImaging {
+  ImageType type = ImageType::xy;
+  ImageSettings image;
+  RangeListSettings ranges;
+};
+
+struct PingObject : Object {
+  PolarPing polar;
+  HeadImaging imaging;
+  std::shared_ptr<Imager> imager;  // the head's: it remembers its tables
+  void* range_data = nullptr;      // 3.x: belongs to the ping and dies with it
+  ~PingObject() override {
+    if (range_data) handles().remove<RangeListObject>(range_data);
+  }
+};
+
+/// 4.x.
+struct ImageGeneratorObject : Object {
+  bool has_head = false;
+  ImageSettings image;
+  RangeListSettings ranges;
+  Imager imager;
+};
+
+}  // namespace sonar::bvt

@@ -1,0 +1,127 @@
+#include "clients/bvtsdk/core/sonar.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar::bvt {
+namespace {
+
+using std::chrono::milliseconds;
+
+// A sonar answers a ping request within this and the time that sound and ping interval take.
+constexpr milliseconds ping_patience{20000};
+constexpr std::size_t longest_mark_key = 80, longest_mark_text = 512;
+
+double seconds_since_1970() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
+
+}  // namespace
+
+Head::Head(std::shared_ptr<Source> source, const HeadDescription& description) : now(description), source_(std::move(source)) {
+  if (now.name.empty()) now.name = "Head";
+}
+
+int Head::set_range(float start_m, float stop_m) {
+  if (!std::isfinite(start_m) || !std::isfinite(stop_m)) return bad_parameter;
+  RangeLimits limits{start_m, stop_m};
+  const int code = source_->set(now.id, limits);
+  if (code != success) return code;
+  now.start_m = limits.start_m;
+  now.stop_m = limits.stop_m;
+  return success;
+}
+
+int Head::set_start(float start_m) {
+  const int code = set(Key::start, start_m, now.start_m);
+  RangeLimits limits{now.start_m, now.stop_m};
+  if (code == success && source_->get(now.id, limits) == success) now.stop_m = limits.stop_m;  // it may have been moved too
+  return code;
+}
+
+int Head::set_stop(float stop_m) {
+  const int code = set(Key::stop, stop_m, now.stop_m);
+  RangeLimits limits{now.start_m, now.stop_m};
+  if (code == success && source_->get(now.id, limits) == success) now.start_m = limits.start_m;
+  return code;
+}
+
+int Head::set(Key key, int value, std::int32_t& kept) {
+  std::int32_t applied = value;
+  const int code = source_->set(now.id, key, applied);
+  if (code == success) kept = applied;
+  return code;
+}
+
+int Head::set(Key key, float value, float& kept) {
+  if (!std::isfinite(value)) return bad_parameter;
+  float applied = value;
+  const int code = source_->set(now.id, key, applied);
+  if (code == success) kept = applied;
+  return code;
+}
+
+int Head::get_ping(int n, std::shared_ptr<PingObject>& ping) {
+  const double travel_s = 2 * static_cast<double>(now.stop_m) / std::max(now.sound_speed_mps, 1);
+  const milliseconds patience = ping_patience + 2 * milliseconds(std::clamp(ping_interval_ms, 0, 600000)) +
+                                milliseconds(static_cast<int>(2000 * std::clamp(travel_s, 0.0, 600.0)));
+  auto fresh = std::make_shared<PingObject>();
+  const int code = source_->get_ping(now.id, n, patience, fresh->polar);
+  if (code != success) return code;
+  fresh->imaging = imaging;
+  fresh->imager = imager_;
+  ping = std::move(fresh);
+  return success;
+}
+
+int Sonar::open(const std::string& type, const std::string& parameter, int abi) {
+  reset();
+  std::shared_ptr<Source> source;
+  int code = bad_parameter;
+  if (type == "NET") code = open_live(parameter, abi, source);
+  if (type == "FILE") code = open_recording(parameter, source);
+  if (code == success) use(std::move(source));
+  return code;
+}
+
+int Sonar::create_file(const std::string& path, const SonarDescription& of) {
+  reset();
+  std::shared_ptr<Source> source;
+  const int code = create_recording(path, of, source);
+  if (code == success) use(std::move(source));
+  return code;
+}
+
+void Sonar::use(std::shared_ptr<Source> source) {
+  source_ = std::move(source);
+  for (const HeadDescription& h : source_->sonar().heads) heads_.push_back(std::make_shared<Head>(source_, h));
+}
+
+void Sonar::reset() {
+  for (const std::shared_ptr<Head>& h : heads_)
+    if (h->borrowed) handles().remove<Head>(h->borrowed);
+  heads_.clear();
+  if (source_) source_->close();
+  source_.reset();
+}
+
+int Sonar::head(int number, std::shared_ptr<Head>& head) const {
+  if (!source_) return net_not_connected;
+  const HeadDescription* meant = source_->sonar().head(number);
+  if (!meant) return no_head;
+  for (const std::shared_ptr<Head>& h : heads_)
+    if (h->now.id == meant->id) head = h;
+  return success;
+}
+
+int Sonar::put_event(const std::string& key, const std::string& text) {
+  if (key.size() > longest_mark_key || text.size() > longest_mark_text) return bad_parameter;
+  return source_ ? source_->put_event({seconds_since_1970(), key, text}) : read_only_file;
+}
+
+int Sonar::set_local_clock(int on) {
+  std::int32_t applied = on != 0;
+  const int code = source_ && !heads_.empty() ? source_->set(heads_.front()->now.id, Key::local_clock, applied) : success;
+  if (code == success) local_clock_ = applied;
+  return code;
+}
+
+}  // namespace sonar::bvt

@@ -1,0 +1,73 @@
+// Where a sonar's pings come from or go to: a live link, a recording that is played, or one that is being written.
+// Sonar and Head stand on this; any thread may call.
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/description.hpp"
+#include "clients/bvtsdk/core/link.hpp"
+#include "clients/bvtsdk/core/polar_ping.hpp"
+#include "clients/bvtsdk/core/recording.hpp"
+
+namespace sonar::bvt {
+
+/// What SET and GET name; docs/protocols/blueview-link.md lists units.
+enum class Key : std::uint16_t {
+  start = 1,
+  stop = 2,
+  range = 3,
+  sound_speed = 4,
+  gain = 5,
+  tvg = 6,
+  fluid = 7,
+  transmit = 8,
+  ping_interval = 9,
+  dynamic_power = 10,
+  local_clock = 13,
+};
+
+struct RangeLimits {
+  float start_m = 0, stop_m = 0;
+};
+
+class Source {
+ public:
+  explicit Source(SonarDescription sonar) : sonar_(std::move(sonar)) {}
+  virtual ~Source() = default;
+  const SonarDescription& sonar() const { return sonar_; }
+
+  virtual bool is_file() const { return true; }
+  virtual bool connected() const { return false; }
+  /// `value` becomes what holds afterwards, which may be a nearer one. Recordings take any.
+  virtual int set(int /*head*/, Key, std::int32_t& /*value*/) { return success; }
+  virtual int set(int /*head*/, Key, float& /*value*/) { return success; }
+  virtual int set(int /*head*/, RangeLimits&) { return success; }
+  virtual int get(int /*head*/, RangeLimits&) { return success; }
+
+  /// n < 0: the next one. Live: always a new one, whatever n says; `patience` on top of the sonar's own time.
+  virtual int get_ping(int /*head*/, int /*n*/, std::chrono::milliseconds /*patience*/, PolarPing&) { return not_implemented; }
+  virtual int put_ping(int /*head*/, const PolarPing&) { return read_only_file; }
+  virtual int put_event(const EventMark&) { return read_only_file; }
+  virtual int ping_count(int /*head*/) const { return 1; }
+  virtual int ping_count() const { return 0; }  // of a recording, all heads
+  virtual int nav_count() const { return 0; }
+  virtual int kilobytes() const { return 0; }  // of a recording
+  virtual void close() {}
+
+ private:
+  const SonarDescription sonar_;
+};
+
+/// Codes as Link::open.
+Code open_live(const std::string& endpoint, int abi, std::shared_ptr<Source>& source);
+/// Codes as RecordingReader::open.
+Code open_recording(const std::string& path, std::shared_ptr<Source>& source);
+/// Codes as RecordingWriter::create. The recording describes itself as that sonar.
+Code create_recording(const std::string& path, const SonarDescription& sonar, std::shared_ptr<Source>& source);
+
+}  // namespace sonar::bvt

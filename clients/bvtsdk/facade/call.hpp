@@ -1,0 +1,140 @@
+// What every C function of the facades does around its one line of work: find the object behind the handle, lock it, write
+// every out-parameter whatever happens, and let no exception out.
+#pragma once
+
+#include <cstring>
+#include <new>
+
+#include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/log.hpp"
+#include "clients/bvtsdk/core/sonar.hpp"
+
+namespace sonar::bvt::facade {
+
+template <class F>
+int guarded(F work) noexcept {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return memory_alloc;
+  } catch (...) {
+    return failed;
+  }
+}
+
+/// The code of `work(object)`, done under the object's lock; invalid_ptr when the handle is none of a T.
+template <class T, class F>
+int on(const void* handle, F work) noexcept {
+  return guarded([&]() -> int {
+    const std::shared_ptr<T> object = handles().find<T>(handle);
+    if (!object) return invalid_ptr;
+    const std::lock_guard lock(object->mutex);
+    return work(*object);
+  });
+}
+
+/// Getter of 4.x: *out = work(object); 0 when it fails.
+template <class T, class V, class F>
+int get(const void* handle, V* out, F work) noexcept {
+  if (!out) return invalid_ptr;
+  *out = V{};
+  return on<T>(handle, [&](T& object) -> int {
+    *out = static_cast<V>(work(object));
+    return success;
+  });
+}
+
+/// Getter that may refuse: the code of work(object, value).
+template <class T, class V, class F>
+int try_get(const void* handle, V* out, F work) noexcept {
+  if (!out) return invalid_ptr;
+  *out = V{};
+  V value{};
+  const int code = on<T>(handle, [&](T& object) -> int { return work(object, value); });
+  if (code == success) *out = value;
+  return code;
+}
+
+/// Getter of 3.x, which cannot refuse: `otherwise` for a bad handle.
+template <class T, class V, class F>
+V value(const void* handle, V otherwise, F work) noexcept {
+  V result = otherwise;
+  on<T>(handle, [&](T& object) -> int {
+    result = static_cast<V>(work(object));
+    return success;
+  });
+  return result;
+}
+
+/// Hands a new object to the host. H is one of the interface's handle types.
+template <class H>
+int give(std::shared_ptr<Object> object, H* out) {
+  void* handle = handles().add(std::move(object));
+  *out = static_cast<H>(handle);
+  return handle ? success : memory_alloc;
+}
+
+/// Makes an object with work(T of the handle, new object of type N) and hands it out; *out is null when that fails.
+template <class T, class N, class H, class F>
+int make(const void* handle, H* out, F work) noexcept {
+  if (!out) return invalid_ptr;
+  *out = nullptr;
+  return on<T>(handle, [&](T& object) -> int {
+    const auto fresh = std::make_shared<N>();
+    const int code = work(object, *fresh);
+    return code == success ? give(fresh, out) : code;
+  });
+}
+
+/// Null when out of memory.
+template <class N, class H>
+H create() noexcept {
+  H handle = nullptr;
+  guarded([&] { return give(std::make_shared<N>(), &handle); });
+  return handle;
+}
+
+/// Nothing happens for null or a stale handle. Objects go with the last thread that still works on them.
+template <class T>
+void destroy(const void* handle) noexcept {
+  guarded([&]() -> int {
+    handles().remove<T>(handle);
+    return success;
+  });
+}
+
+/// NUL-terminated into the host's buffer; empty there and buffer_too_small when it does not fit.
+inline int copy_text(const std::string& text, char* buffer, int size) {
+  if (!buffer || size <= 0) return bad_parameter;
+  buffer[0] = '\0';
+  if (text.size() >= static_cast<std::size_t>(size)) return buffer_too_small;
+  std::memcpy(buffer, text.c_str(), text.size() + 1);
+  return success;
+}
+
+/// As copy_text, of work(object) -> text; the buffer is emptied first.
+template <class T, class F>
+int get_text(const void* handle, char* buffer, int size, F work) noexcept {
+  if (buffer && size > 0) buffer[0] = '\0';
+  return on<T>(handle, [&](T& object) -> int { return copy_text(work(object), buffer, size); });
+}
+
+/// All values into the host's buffer, or none and buffer_too_small.
+template <class V, class N>
+int copy_values(const std::vector<V>& values, V* buffer, N size) {
+  if (!buffer) return invalid_ptr;
+  if (size < N{} || static_cast<std::size_t>(size) < values.size()) return buffer_too_small;
+  if (!values.empty()) std::memcpy(buffer, values.data(), values.size() * sizeof(V));
+  return success;
+}
+
+inline std::string text_or_empty(const char* text) { return text ? text : ""; }
+
+inline bool inside(const ImageGeometry& image, int row, int col) {
+  return row >= 0 && col >= 0 && row < image.height && col < image.width;
+}
+inline std::size_t place(const ImageGeometry& image, int row, int col) {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(col);
+}
+
+}  // namespace sonar::bvt::facade
