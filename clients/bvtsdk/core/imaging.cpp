@@ -88,12 +88,14 @@ void fill_r_theta(const PolarGrid& grid, const Extent& extent, MagImage& image) 
     int from, to;
   };
   std::vector<Bins> bins_of_row(static_cast<std::size_t>(image.height));
+  const auto bin_at = [&](double x) { return static_cast<int>(std::clamp(x, 0.0, static_cast<double>(grid.bins))); };
   for (int row = 0; row < image.height; ++row) {
     const double far = (image.height - row) * image.range_resolution_m / extent.bin_m;
     const double near = (image.height - row - 1) * image.range_resolution_m / extent.bin_m;
-    Bins bins{to_int(std::round(near)), to_int(std::round(far))};
-    if (bins.from >= bins.to) bins = {to_int(std::floor((near + far) / 2)), to_int(std::floor((near + far) / 2)) + 1};
-    bins_of_row[static_cast<std::size_t>(row)] = {std::min(bins.from, grid.bins), std::min(bins.to, grid.bins)};
+    const double centre = std::floor((near + far) / 2);
+    Bins bins{bin_at(std::round(near)), bin_at(std::round(far))};
+    if (bins.from >= bins.to) bins = {bin_at(centre), bin_at(centre + 1)};
+    bins_of_row[static_cast<std::size_t>(row)] = bins;
   }
   constexpr int block = 16;  // columns at once, so that a row is written in runs
   const auto width = static_cast<std::size_t>(image.width);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <thread>
 
 #include "tests/clients/bvtsdk/made_ping.hpp"
 
@@ -293,4 +294,35 @@ TEST(Imager, GivesTheSameImageFromARememberedTable) {
     ASSERT_EQ(imager.make(ping, ImageType::xy, {}, again), success);
     EXPECT_EQ(again.pixels, first.pixels);
   }
+}
+
+TEST(Imager, ServesSeveralThreads) {
+  Imager imager;
+  const PolarPing ping = make_ping_with_target(4, 5, 60000, 64, 200);
+  const auto image_in_rows = [&](int rows) {
+    ImageSettings settings;
+    settings.requested_height = rows;
+    MagImage image;
+    EXPECT_EQ(imager.make(ping, ImageType::xy, settings, image), success);
+    return image.pixels;
+  };
+  std::vector<std::vector<std::uint16_t>> expected;
+  for (int rows = 100; rows < 106; ++rows) expected.push_back(image_in_rows(rows));
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 3; ++t)
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < 30; ++i) {
+        const int which = (i + 2 * t) % 6;
+        EXPECT_EQ(image_in_rows(100 + which), expected[static_cast<std::size_t>(which)]);
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST(Image, SurvivesBinsFarShorterThanItsRows) {
+  PolarPing ping = make_ping(4, 6, 1, 0.5f, [](int, int) { return 9; });
+  ping.bin_m = 1e-38f;
+  ImageSettings settings;
+  settings.requested_height = 10;
+  for (const ImageType type : {ImageType::xy, ImageType::r_theta}) EXPECT_EQ(image_of(ping, type, settings).height, 10);
 }
