@@ -1,0 +1,58 @@
+/* 4.x, C: opens, takes a head, now and then pings, and closes, a thousand times; neither descriptors, threads nor memory may
+ * grow. usage: c4_open_close_cycles ADDRESS CYCLES */
+#include <dirent.h>
+#include <string.h>
+
+#include "tests/clients/bvtsdk/programs/expect.h"
+
+static int entries_of(const char* folder) {
+  DIR* dir = opendir(folder);
+  int n = 0;
+  EXPECT(dir);
+  while (readdir(dir)) ++n;
+  closedir(dir);
+  return n;
+}
+
+static long resident_kib(void) {
+  char line[200];
+  long kib = 0;
+  FILE* f = fopen("/proc/self/status", "r");
+  EXPECT(f);
+  while (fgets(line, sizeof line, f))
+    if (strncmp(line, "VmRSS:", 6) == 0) kib = atol(line + 6);
+  fclose(f);
+  return kib;
+}
+
+int main(int count, char** arguments) {
+  int i, cycles, descriptors = 0, threads = 0;
+  long kib = 0;
+  EXPECT(count == 3);
+  cycles = atoi(arguments[2]);
+  for (i = 0; i < cycles; ++i) {
+    BVTSonar sonar = BVTSonar_Create();
+    BVTHead head = NULL;
+    EXPECT_OK(BVTSonar_Open(sonar, "NET", arguments[1]));
+    EXPECT_OK(BVTSonar_GetHead(sonar, 0, &head));
+    if (i % 50 == 0) {
+      BVTPing ping = NULL;
+      EXPECT_OK(BVTHead_SetRange(head, 1, 3));
+      EXPECT_OK(BVTHead_GetPing(head, -1, &ping));
+      BVTPing_Destroy(ping);
+    }
+    BVTHead_Destroy(head);
+    BVTSonar_Destroy(sonar);
+    if (i == cycles / 5) { /* warm */
+      descriptors = entries_of("/proc/self/fd");
+      threads = entries_of("/proc/self/task");
+      kib = resident_kib();
+    }
+  }
+  printf("%d cycles: descriptors %d to %d, threads %d to %d, resident %ld to %ld KiB\n", cycles, descriptors,
+         entries_of("/proc/self/fd"), threads, entries_of("/proc/self/task"), kib, resident_kib());
+  EXPECT(entries_of("/proc/self/fd") == descriptors);
+  EXPECT(entries_of("/proc/self/task") == threads);
+  EXPECT(resident_kib() < kib + 4096);
+  return 0;
+}
