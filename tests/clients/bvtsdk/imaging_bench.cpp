@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "clients/bvtsdk/core/colour_maps.hpp"
 #include "clients/bvtsdk/core/imaging.hpp"
 #include "clients/bvtsdk/core/range_list.hpp"
 #include "tests/clients/bvtsdk/made_ping.hpp"
@@ -55,7 +56,13 @@ int main() {
   settings.filter_flags = no_filter;
   report("R-Theta, automatic", [&] { imager.make(ping, ImageType::r_theta, settings, image); });
   std::printf("  %d x %d pixels\n", image.width, image.height);
+  ColourMapper mapper;
+  mapper.use(make_colour_map("jet"));
+  ColourImage colours;
+  report("colours of that", [&] { mapper.map(image, colours); });
   RangeList list;
   report("range list", [&] { make_range_list(ping, {}, list); });
+  const Bytes payload = encode_ping(ping);
+  report("decoding the ping", [&] { decode_ping(payload); });
   return 0;
 }
