@@ -11,6 +11,9 @@
 #include "core/paper/paper_engine.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "daemon/bench_cases.hpp"
+#include "daemon/bench_parts.hpp"
+#include "daemon/effective_switches.hpp"
+#include "daemon/engine_options.hpp"
 #include "daemon/scene_file.hpp"
 #include "daemon/start_engine.hpp"
 
@@ -23,15 +26,19 @@ struct BenchOptions {
   std::vector<std::string> cases, scenes;
   std::vector<int> threads;
   int pings = 100;
-  std::string simd = "auto";
-  std::string mode = "canonical", frequency_sum = "fast";
-  int fixed_fan = 0;
+  std::vector<std::string> given_parts;
+  std::string frequency_sum = "fast";
+  EngineOptionsGiven model;
+  EngineConfig engine;     // what `model` made of the defaults
+  std::uint64_t seed = 1;  // as well
   std::string scene_folder;
   std::string json_file;
 };
 
 struct Figures {
-  std::string case_name, description, scene, engine, mode;
+  std::string case_name, description, scene, engine;
+  Switches switches;
+  std::vector<std::string> parts_had;
   int threads = 0, pings = 0;
   double cold_ms = 0, min_ms = 0, median_ms = 0, p90_ms = 0;
   std::array<double, static_cast<std::size_t>(Stage::stages)> stage_ms{};  // mean a ping, summed over threads
@@ -49,21 +56,16 @@ std::string processor() {
   return "unknown processor";
 }
 
-SimdLevel level_of(const std::string& name) {
-  if (name == "portable") return SimdLevel::portable;
-  if (name == "avx2") return SimdLevel::avx2;
-  if (name == "avx512") return SimdLevel::avx512;
-  return SimdLevel::automatic;
-}
-
-Mode mode_of(const std::string& name) {
-  return name == "paper" ? Mode::paper : name == "raster" ? Mode::raster : Mode::canonical;
+const char* name_of(Mode mode) {
+  constexpr const char* names[] = {"canonical", "paper", "raster"};
+  return names[static_cast<int>(mode)];
 }
 
 Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene, PingEngine& engine, int threads,
                 const BenchOptions& options) {
+  const auto model = with_parts(c.profile.model, options.given_parts);
   protocol::DeviceState device;
-  device.model = c.profile.model;
+  device.model = model;
   device.id = 1;
   if (c.profile.vendor)
     if (auto values = protocol::check_options(*c.profile.vendor, {})) device.options = *values;
@@ -74,7 +76,8 @@ Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene,
   f.description = c.description;
   f.scene = where.name;
   f.engine = engine.description();
-  f.mode = options.mode;
+  f.switches = effective_switches(options.engine.switches);
+  f.parts_had = parts_had(scene, c.profile.model->modes[static_cast<std::size_t>(c.settings.mode)]);
   f.threads = threads;
   f.pings = options.pings;
   f.scene_triangles = scene.triangle_count();
@@ -82,12 +85,11 @@ Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene,
   const int warm_up = std::max(3, options.pings / 10);
   for (int k = 0; k < options.pings + warm_up; ++k) {
     PingRequest r;
-    r.model = c.profile.model;
+    r.model = model;
     r.number = PingNumber{static_cast<std::uint32_t>(k)};
     r.settings = c.settings;
-    r.seed = Seed{1};
-    r.switches.mode = mode_of(options.mode);
-    r.switches.fixed_fan = options.fixed_fan;
+    r.seed = Seed{options.seed};
+    r.switches = options.engine.switches;
     r.sonar_in_world = r.vehicle_in_world = bench_pose(c, where, k / 40.0);
     const double begin = now_s();
     const auto pings = engine.run({&r, 1});
@@ -124,11 +126,15 @@ nlohmann::json json_of(const Figures& f) {
   nlohmann::json stages;
   for (std::size_t s = 0; s < f.stage_ms.size(); ++s) stages[stage_names[s]] = f.stage_ms[s];
   stages["frame"] = f.frame_ms;
+  nlohmann::json switches{{"expected_power", f.switches.expected_power}, {"fixed_fan", f.switches.fixed_fan}};
+  for (const NamedSwitch& part : named_switches) switches[part.name] = f.switches.*part.is_on;
   return {{"case", f.case_name},
           {"description", f.description},
           {"scene", f.scene},
           {"engine", f.engine},
-          {"mode", f.mode},
+          {"mode", name_of(f.switches.mode)},
+          {"switches", switches},
+          {"parts_had", f.parts_had},
           {"threads", f.threads},
           {"pings", f.pings},
           {"cold_ms", f.cold_ms},
@@ -163,6 +169,8 @@ int complain(const Error& error) {
 }
 
 int bench(const BenchOptions& options) {
+  const std::string note = note_of_parts_left_out(options.engine.switches);
+  if (!note.empty()) std::printf("%s\n", note.c_str());
   nlohmann::json all{{"processor", processor()}, {"results", nlohmann::json::array()}};
   std::printf("%s\n", processor().c_str());
   for (const BenchScene& where : bench_scenes()) {
@@ -173,18 +181,19 @@ int bench(const BenchOptions& options) {
                    scene_folders(options.scene_folder).c_str());
       return exit_code(ErrorKind::missing_file);
     }
-    const auto scene = load_scene(*file);
-    if (!scene) return complain(scene.error());
+    const auto loaded = load_scene(*file);
+    if (!loaded) return complain(loaded.error());
+    const auto scene = with_parts(*loaded, options.given_parts);
     for (const BenchCase& c : bench_cases()) {
       if (!wanted(options.cases, c)) continue;
       for (const int threads : options.threads) {
         Parallel pool(threads);
-        const EngineOptions engine_options{.simd = level_of(options.simd), .now_s = now_s};
+        const EngineOptions engine_options{.simd = options.engine.simd, .now_s = now_s};
         const auto sum = options.frequency_sum == "direct" ? paper::FrequencySum::direct : paper::FrequencySum::fast;
         const auto engine = start_engine(
-            [&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, engine_options, sum); }, *scene);
+            [&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, engine_options, sum); }, scene);
         if (!engine) return complain(engine.error());
-        const Figures f = measure(c, where, **scene, **engine, threads, options);
+        const Figures f = measure(c, where, **loaded, **engine, threads, options);
         print(f);
         all["results"].push_back(json_of(f));
       }
@@ -209,29 +218,26 @@ int run_bench(int argc, char** argv) {
       "--threads 2 --json out.json",
       "sonard bench"};
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  cli.add_option("--case", options.cases, "Case to run (may repeat; default all)")->check(CLI::IsMember(names_of(bench_cases())));
-  cli.add_option("--scene", options.scenes, "Scene to run it over (may repeat; default all)")
-      ->check(CLI::IsMember(names_of(bench_scenes())));
-  cli.add_option("--threads", options.threads, "Threads (may repeat; default all processors)")->check(CLI::Range(1, 256));
-  cli.add_option("--pings", options.pings, "Pings to time")->check(CLI::Range(1, 100000))->capture_default_str();
-  cli.add_option("--simd", options.simd, "Instruction set")
-      ->check(CLI::IsMember({"auto", "portable", "avx2", "avx512"}))
+  cli.add_option("--case", options.cases, "case to run (may repeat; default all)")->check(one_of(names_of(bench_cases())));
+  cli.add_option("--scene", options.scenes, "scene to run it over (may repeat; default all)")
+      ->check(one_of(names_of(bench_scenes())));
+  cli.add_option("--threads", options.threads, "threads (may repeat; default all processors)")->check(CLI::Range(1, 256));
+  cli.add_option("--pings", options.pings, "pings to time")->check(CLI::Range(1, 100000))->capture_default_str();
+  cli.add_option("--give", options.given_parts,
+                 "give scene and sonar what this part of the model needs, where they lack it (may repeat; default none)")
+      ->check(one_of(parts_to_give()));
+  cli.add_option("--frequency-sum", options.frequency_sum, "of the modes paper and raster: by a transform, or term by term")
+      ->check(one_of({"fast", "direct"}))
       ->capture_default_str();
-  cli.add_option("--mode", options.mode, "What makes scatterers of the scene (docs/acoustics.md, section 8)")
-      ->check(CLI::IsMember({"canonical", "paper", "raster"}))
-      ->capture_default_str();
-  cli.add_option("--fixed-fan", options.fixed_fan, "N rays a column, each a scatterer; 0 = as the mode has it")
-      ->check(CLI::Range(0, 100000));
-  cli.add_option("--frequency-sum", options.frequency_sum, "Of the modes paper and raster: by a transform, or term by term")
-      ->check(CLI::IsMember({"fast", "direct"}))
-      ->capture_default_str();
-  cli.add_option("--scenes-dir", options.scene_folder, "Folder to look for the scene files in first; else the shipped ones");
-  cli.add_option("--json", options.json_file, "Also write the figures to this file");
+  cli.add_option("--scenes-dir", options.scene_folder, "folder to look for the scene files in first; else the shipped ones");
+  cli.add_option("--json", options.json_file, "also write the figures to this file");
+  add_model_options(cli, options.model);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return cli.exit(e) == 0 ? 0 : exit_code(ErrorKind::usage);
   }
+  if (const auto r = override_engine(options.engine, options.seed, options.model); !r) return complain(r.error());
   if (options.threads.empty()) options.threads.push_back(processors);
   return bench(options);
 }

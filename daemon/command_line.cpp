@@ -10,43 +10,23 @@ namespace {
 
 constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the names of the files
 
-void add_engine_options(CLI::App& app, EngineOptionsGiven& given) {
-  app.add_option("--threads", given.threads, "compute threads, 0 = all cores")
-      ->check(CLI::Range(0, 256))
-      ->envname("SONARD_THREADS");
-  app.add_option("--seed", given.seed, "seed of speckle and noise")->envname("SONARD_SEED");
-  app.add_option("--simd", given.simd, "instruction set of the hot loops")
-      ->check(CLI::IsMember({"auto", "portable", "avx2", "avx512"}))
-      ->envname("SONARD_SIMD");
-  app.add_flag("--expected-power", given.expected_power, "mean echo power instead of speckle");
-  for (std::size_t i = 0; i < named_switches.size(); ++i)
-    app.add_option(std::string("--") + named_switches[i].name, given.switches[i],
-                   named_switches[i].meaning + std::string(": on or off"))
-        ->check(CLI::IsMember({"on", "off"}))
-        ->group("Parts of the model");
-  app.add_option("--mode", given.mode, "canonical, or paper and raster: Choi 2025 as printed, for comparison")
-      ->check(CLI::IsMember({"canonical", "paper", "raster"}))
-      ->group("Parts of the model");
-  app.add_option("--fixed-fan", given.fixed_fan, "rays a column with one scatterer each, no surface cells; 0 = as usual")
-      ->check(CLI::Range(0, most_fixed_rays));
-}
-
 void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("config", run.config, "configuration file; without one sonard looks in the usual places, then runs the demo");
   app.add_flag("--demo", run.demo, "run the built-in demo, whatever files there are");
-  app.add_option("--clock", run.clock, "realtime, or stepped: a tick when every client has taken the last ping")
-      ->check(CLI::IsMember({"realtime", "stepped"}))
+  app.add_option("--clock", run.clock,
+                 "realtime, or stepped: a tick when every client has taken the last ping (default realtime)")
+      ->check(one_of({"realtime", "stepped"}))
       ->envname("SONARD_CLOCK");
   add_engine_options(app, run.engine);
   app.add_option("--bind", run.bind, "address of the first sonar instead of its bind_ip and advertise_ip")
       ->envname("SONARD_BIND");
   app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings");
   app.add_flag("--digest", run.digest, "print the SHA-256 of every client's byte stream at the end");
-  app.add_option("--log-format", run.log_format, "text or json")
-      ->check(CLI::IsMember({"text", "json"}))
+  app.add_option("--log-format", run.log_format, "text or json (default text)")
+      ->check(one_of({"text", "json"}))
       ->envname("SONARD_LOG_FORMAT");
-  app.add_option("--log-level", run.log_level, "debug, info, warning or error")
-      ->check(CLI::IsMember({"debug", "info", "warning", "error"}))
+  app.add_option("--log-level", run.log_level, "debug, info, warning or error (default info)")
+      ->check(one_of({"debug", "info", "warning", "error"}))
       ->envname("SONARD_LOG_LEVEL");
 }
 
@@ -55,24 +35,24 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
   app.add_option("--out", render.out, "folder for the files; made when it is not there");
   app.add_option("--pings", render.pings, "pings to render (1; with --poses: one for every line)")
       ->check(CLI::Range(std::uint64_t{1}, most_rendered_pings));
-  app.add_option("--format", render.formats, "npy, png, raw: any of them, comma between")
+  app.add_option("--format", render.formats, "npy, png, raw: any of them, comma between (default npy,png)")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->check(CLI::IsMember({"npy", "png", "raw"}));
+      ->check(one_of({"npy", "png", "raw"}));
   app.add_flag("--complex", render.complex, "also the complex beam signal, before magnitude and gain (npy)");
   app.add_option("--sonar", render.sonar, "which sonar of the configuration, when it has several");
   app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, or TUM");
   app.add_option("--pose-frame", render.pose_frame, "of that file, when it does not say so itself; default ENU_FLU")
-      ->check(CLI::IsMember({"ENU_FLU", "NED_FRD"}));
+      ->check(one_of({"ENU_FLU", "NED_FRD"}));
   app.add_option("--rate", render.rate_hz, "pings a second (as the sonar is set; with --poses: at every line)")
       ->check(CLI::Range(0.001, 10000.0));
   app.add_option("--report", render.report,
                  "coverage: every bin of a plane bed against the closed form; without a configuration "
                  "for every sonar there is")
-      ->check(CLI::IsMember({"coverage"}));
+      ->check(one_of({"coverage"}));
   app.add_flag("--check-expectations", render.check_expectations,
                "measure what the render file expects; exit code 1 if it is not so");
-  app.add_option("--engine", render.device, "what computes: cpu")->check(CLI::IsMember({"cpu"}));
+  app.add_option("--engine", render.device, "what computes (default cpu)")->check(one_of({"cpu"}));
   app.add_flag("--overwrite", render.overwrite, "replace the pings of other inputs in the folder");
   app.add_flag("--quiet", render.quiet, "no progress");
   add_engine_options(app, render.engine);
@@ -128,25 +108,9 @@ Command parse_command_line(int argc, char** argv) {
   return run;
 }
 
-void override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given) {
-  if (given.threads) engine.threads = *given.threads;
-  if (given.seed) seed = *given.seed;
-  if (given.simd == "auto") engine.simd = SimdLevel::automatic;
-  if (given.simd == "portable") engine.simd = SimdLevel::portable;
-  if (given.simd == "avx2") engine.simd = SimdLevel::avx2;
-  if (given.simd == "avx512") engine.simd = SimdLevel::avx512;
-  if (given.expected_power) engine.switches.expected_power = true;
-  for (std::size_t i = 0; i < named_switches.size(); ++i)
-    if (!given.switches[i].empty()) engine.switches.*named_switches[i].is_on = given.switches[i] == "on";
-  if (given.mode == "canonical") engine.switches.mode = Mode::canonical;
-  if (given.mode == "paper") engine.switches.mode = Mode::paper;
-  if (given.mode == "raster") engine.switches.mode = Mode::raster;
-  if (given.fixed_fan) engine.switches.fixed_fan = *given.fixed_fan;
-}
-
 Result<void> override_config(Config& config, const RunCommand& command) {
   if (!command.clock.empty()) config.clock = command.clock == "stepped" ? ClockMode::stepped : ClockMode::realtime;
-  override_engine(config.engine, config.seed, command.engine);
+  if (const auto r = override_engine(config.engine, config.seed, command.engine); !r) return r;
   if (!command.log_format.empty()) config.log.json = command.log_format == "json";
   if (command.log_level == "debug") config.log.level = LogLevel::debug;
   if (command.log_level == "info") config.log.level = LogLevel::info;

@@ -1,7 +1,6 @@
-// What the user typed. CLI11 is included by command_line.cpp only: it is slow to compile.
+// What the user typed, command by command. CLI11 is included by few .cpp files only: it is slow to compile.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -10,18 +9,10 @@
 
 #include "core/base/result.hpp"
 #include "daemon/config.hpp"
+#include "daemon/engine_options.hpp"
 
 namespace sonar {
 
-/// Options of the engine and the model, the same for every command that pings. Empty = as the configuration says.
-struct EngineOptionsGiven {
-  std::string simd, mode;
-  std::optional<int> threads;
-  std::optional<std::uint64_t> seed;
-  std::optional<int> fixed_fan;
-  bool expected_power = false;                              // false: as the configuration says
-  std::array<std::string, named_switches.size()> switches;  // "on", "off", in the order of named_switches
-};
 struct RunCommand {
   std::string config;  // empty = search
   bool demo = false;
@@ -55,6 +46,5 @@ using Command = std::variant<RunCommand, CheckCommand, RenderCommand, BenchComma
 Command parse_command_line(int argc, char** argv);
 /// What was given on the command line, or stands for it in the environment, wins over the file.
 Result<void> override_config(Config& config, const RunCommand& command);
-void override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given);
 
 }  // namespace sonar

@@ -1,5 +1,7 @@
 #include "daemon/config_parts.hpp"
 
+#include "daemon/effective_switches.hpp"
+
 namespace sonar {
 namespace {
 
@@ -90,13 +92,16 @@ EngineConfig read_engine(const Node& node) {
                                                                       {"avx2", SimdLevel::avx2},
                                                                       {"avx512", SimdLevel::avx512}});
   engine.switches.expected_power = map.optional("expected_power").boolean_or(false);
-  for (const NamedSwitch& part : named_switches) {
-    bool& is_on = engine.switches.*part.is_on;
-    is_on = map.optional(part.name).choice_or<bool>(is_on, {{"on", true}, {"off", false}});
-  }
   engine.switches.mode = map.optional("mode").choice_or(
       Mode::canonical, {{"canonical", Mode::canonical}, {"paper", Mode::paper}, {"raster", Mode::raster}});
   engine.switches.fixed_fan = static_cast<int>(map.optional("fixed_fan").integer_or(0, 0, most_fixed_rays));
+  for (const NamedSwitch& part : named_switches) {
+    bool& is_on = engine.switches.*part.is_on;
+    const Node given = map.optional(part.name);
+    is_on = given.choice_or<bool>(is_on, {{"on", true}, {"off", false}});
+    const std::string why = why_without_effect(engine.switches, part);
+    if (given.present() && is_on && !why.empty()) given.fail("has no effect: " + why + "; leave one of them away");
+  }
   return engine;
 }
 

@@ -12,6 +12,7 @@
 #include "daemon/banner.hpp"
 #include "daemon/bench.hpp"
 #include "daemon/command_line.hpp"
+#include "daemon/effective_switches.hpp"
 #include "daemon/render/render_command.hpp"
 
 namespace sonar {
@@ -64,6 +65,7 @@ int run(const RunCommand& command, Steady::time_point begin) {
 
   Log log(config.log);
   for (const std::string& note : (*scene)->notes) log.info(note);
+  if (const std::string note = note_of_parts_left_out(config.engine.switches); !note.empty()) log.info(note);
   Parallel pool(compute_threads(config.engine), compute_niceness);  // outlives the engine inside App
   const EngineOptions engine_options{config.engine.simd};
   auto engine =

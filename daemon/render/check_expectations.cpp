@@ -3,11 +3,10 @@
 #include <stdexcept>
 
 #include "core/paper/paper_engine.hpp"
-#include "core/pipeline/arithmetic/beam_pattern.hpp"
-#include "core/pipeline/arithmetic/waveform.hpp"
 #include "daemon/render/coverage.hpp"
 #include "daemon/render/expectation.hpp"
 #include "daemon/render/render_job.hpp"
+#include "daemon/render/resolution_cell.hpp"
 #include "daemon/start_engine.hpp"
 
 namespace sonar::render {
@@ -19,7 +18,7 @@ Values known_values(const RenderJob& job, const PingRequest& request) {
   const PingSettings& s = job.settings;
   const double depth_m = depth_from_z(request.sonar_in_world.position_m.z);
   const double c = true_sound_speed_mps(job.water, depth_m), c_dev = static_cast<double>(s.device_sound_speed_mps);
-  const double envelope_hz = envelope_parameter_hz(c_dev, static_cast<double>(s.pulse_width_m));
+  const ResolutionCell cell = cell_of(job);
   Values v = job.values;
   v["SL"] = static_cast<double>(mode.source_level_db);
   v["f"] = static_cast<double>(mode.centre_hz);
@@ -27,13 +26,10 @@ Values known_values(const RenderJob& job, const PingRequest& request) {
   v["c_dev"] = c_dev;
   v["lambda"] = c / static_cast<double>(mode.centre_hz);
   v["alpha"] = absorption_db_per_m(job.water, depth_m, static_cast<double>(mode.centre_hz));
-  v["pulse"] = static_cast<double>(s.pulse_width_m);
+  v["pulse"] = cell.pulse_width_m;
   v["row"] = s.range_bin_m;
-  v["tau_eff"] = energy_width_s(envelope_hz);
-  const Taper taper = mode.pattern.azimuth_taper;
-  if (taper != Taper::unit)
-    v["theta_eff"] =
-        effective_beam_width_u(taper, aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad)));
+  v["tau_eff"] = cell.energy_s;
+  if (cell.beam_u > 0) v["theta_eff"] = cell.beam_u;
   return v;
 }
 

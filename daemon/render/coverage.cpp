@@ -6,9 +6,9 @@
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
-#include "core/pipeline/arithmetic/waveform.hpp"
 #include "core/pipeline/scattering_law.hpp"
 #include "core/scene/primitives.hpp"
+#include "daemon/render/resolution_cell.hpp"
 #include "daemon/render/sonar_keys.hpp"
 
 namespace sonar::render {
@@ -40,16 +40,11 @@ class ClosedForm {
   ClosedForm(const RenderJob& job, const Ping& ping, const Bed& bed)
       : mode_(job.mode()), bed_(bed), tilt_rad_(rpy_from_quat(ping.request.sonar_in_world.orientation).pitch_rad) {
     const double depth_m = depth_from_z(ping.request.sonar_in_world.position_m.z);
-    const PingSettings& s = job.settings;
     sound_speed_mps_ = true_sound_speed_mps(job.water, depth_m);
-    true_over_device_ = sound_speed_mps_ / static_cast<double>(s.device_sound_speed_mps);
+    true_over_device_ = sound_speed_mps_ / static_cast<double>(job.settings.device_sound_speed_mps);
     absorption_ = nepers_from_db(absorption_db_per_m(job.water, depth_m, static_cast<double>(mode_.centre_hz)));
-    const Taper taper = mode_.pattern.azimuth_taper;
-    const double theta =
-        effective_beam_width_u(taper, aperture_in_wavelengths(taper, static_cast<double>(mode_.pattern.azimuth_width_rad)));
-    const double envelope_hz =
-        envelope_parameter_hz(static_cast<double>(s.device_sound_speed_mps), static_cast<double>(s.pulse_width_m));
-    area_per_m2_ = theta * 0.5 * sound_speed_mps_ * energy_width_s(envelope_hz);
+    const ResolutionCell cell = cell_of(job);
+    area_per_m2_ = cell.beam_u * 0.5 * sound_speed_mps_ * cell.energy_s;
     has_pattern_ = mode_.pattern.elevation_taper != Taper::unit;
     aperture_ = has_pattern_ ? elevation_aperture_in_wavelengths(mode_.pattern) : 0;
     unit_reach_rad_ = static_cast<double>(mode_.pattern.elevation_width_rad) * 1.1;  // the fan reaches 1.15 widths
@@ -109,9 +104,13 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
     return failure(ErrorKind::bad_data, "coverage is known for a sonar without roll; level it");
   if (!job.engine.switches.conical)
     return failure(ErrorKind::bad_data, "coverage is known for conical beams; leave --conical off away");
+  if (job.engine.switches.mode != Mode::canonical)
+    return failure(ErrorKind::bad_data, "coverage is known for the canonical model; leave --mode paper or raster away");
+  if (job.mode().pattern.azimuth_taper == Taper::unit)
+    return failure(ErrorKind::bad_data, "coverage is known for beams with a width; azimuth_taper unit has none");
   const ClosedForm expected(job, ping, *bed);
   const PingSettings& s = job.settings;
-  const double pulse_m = static_cast<double>(s.pulse_width_m);
+  const double pulse_m = cell_of(job).pulse_width_m;
   const double beam_sine = 2 * std::sin(static_cast<double>(job.mode().pattern.azimuth_width_rad) / 2);
   Coverage coverage;
   double ratios = 0;

@@ -17,12 +17,13 @@ struct Coverage {
   double percent() const { return bins == 0 ? 0 : 100.0 * static_cast<double>(good) / static_cast<double>(bins); }
 };
 
-/// The job with only what the closed form knows: expected power, no noise, mirrors, texture, volume or motion.
+/// The job with only what the closed form knows: expected power, no noise, mirrors, texture, volume or motion. Expected power has
+/// smaller surface cells than a picture (0.4 of them each way): coverage judges those, not the picture's.
 RenderJob with_bed_only(RenderJob job);
 
 /// The ping must be of with_bed_only(job). Bins count whose whole footprint, two pulses and a beam to either side, lies on the
 /// bed where the two-way pattern is above -20 dB: the closed form takes the pattern as even over the footprint. Errors: no level
-/// plane below the sonar, a sonar that rolls, flat beams.
+/// plane below the sonar, a sonar that rolls, flat beams, the comparison modes, beams without a width.
 Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
 
 /// Every mode of every product over a level bed: at its stored range, or its longest if that is shorter, a fifth of the range

@@ -1,10 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/pipeline/arithmetic/beam_pattern.hpp"
-#include "core/pipeline/arithmetic/waveform.hpp"
 #include "daemon/render/coverage.hpp"
 #include "daemon/render/expectation.hpp"
+#include "daemon/render/resolution_cell.hpp"
 
 namespace sonar::render {
 namespace {
@@ -52,14 +51,9 @@ class Picture {
 
   /// The sum of E|s|^2 over rows and beams counts every echo theta_eff tau_eff times.
   double strength() const {
-    const FrequencyMode& mode = job_.mode();
-    const Taper taper = mode.pattern.azimuth_taper;
-    const double theta =
-        effective_beam_width_u(taper, aperture_in_wavelengths(taper, static_cast<double>(mode.pattern.azimuth_width_rad)));
-    const double envelope_hz =
-        envelope_parameter_hz(static_cast<double>(s_.device_sound_speed_mps), static_cast<double>(s_.pulse_width_m));
-    const double source_upa = amplitude_from_db(static_cast<double>(mode.source_level_db));
-    return sum_of_power() * row_s() * (sine(0) - sine(1)) / (theta * energy_width_s(envelope_hz) * source_upa * source_upa);
+    const ResolutionCell cell = cell_of(job_);
+    const double source_upa = amplitude_from_db(static_cast<double>(job_.mode().source_level_db));
+    return sum_of_power() * row_s() * (sine(0) - sine(1)) / (cell.beam_u * cell.energy_s * source_upa * source_upa);
   }
 
  private:
@@ -92,6 +86,8 @@ Result<double> measure_in(Measure what, const Window& window, const RenderJob& j
     return what == Measure::coverage_percent ? coverage->percent() : std::abs(coverage->worst_db);
   }
   const Picture picture(job, ping, window);
+  if (what == Measure::strength_db && job.mode().pattern.azimuth_taper == Taper::unit)
+    return failure(ErrorKind::bad_data, "strength_db needs beams with a width; azimuth_taper unit has none");
   if (picture.empty()) return failure(ErrorKind::bad_data, "no row or no beam of the picture lies in the window");
   switch (what) {
     case Measure::peak_level_db:

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "core/paper/paper_engine.hpp"
+#include "daemon/effective_switches.hpp"
 #include "daemon/render/coverage.hpp"
 #include "daemon/render/render_pings.hpp"
 #include "daemon/start_engine.hpp"
@@ -59,7 +60,8 @@ class ProgressLine {
 Result<RenderInput> input_of(const RenderCommand& command) {
   auto input = load_render_input(command.config, command.sonar);
   if (!input) return input;
-  for (RenderJob& job : input->jobs) override_engine(job.engine, job.seed, command.engine);
+  for (RenderJob& job : input->jobs)
+    if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return tl::make_unexpected(r.error());
   if (!command.poses.empty()) {
     auto poses = load_poses(command.poses, command.pose_frame == "NED_FRD" ? PoseFrame::ned_frd : PoseFrame::enu_flu);
     if (!poses) return tl::make_unexpected(poses.error());
@@ -130,13 +132,16 @@ OutputOptions output_options(const RenderCommand& command) {
 int run_render(const RenderCommand& command) {
   if (command.config.empty()) {
     std::vector<RenderJob> jobs = shipped_sonars_over_a_bed();
-    for (RenderJob& job : jobs) override_engine(job.engine, job.seed, command.engine);
+    for (RenderJob& job : jobs)
+      if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return complain(r.error());
     return report_coverage(jobs);
   }
   const auto input = input_of(command);
   if (!input) return complain(input.error());
   if (!command.report.empty()) return report_coverage(input->jobs);
   if (command.check_expectations) return check(*input);
+  const std::string note = note_of_parts_left_out(input->jobs.front().engine.switches);
+  if (!note.empty() && !command.quiet) std::fprintf(stderr, "sonard: %s\n", note.c_str());
   ProgressLine line(command.quiet);
   Parallel pool(threads_of(input->jobs.front().engine));
   const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.tell(p); });

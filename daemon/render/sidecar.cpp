@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/effective_switches.hpp"
 #include "daemon/render/sonar_version.hpp"
 #include "daemon/sha256.hpp"
 
@@ -160,7 +161,7 @@ json sidecar(const RenderJob& job, const Ping& ping, const PingEngine& engine, c
            {{"velocity_mps", json_of(r.sonar_moves.velocity_mps)},
             {"angular_rate_radps", json_of(r.sonar_moves.angular_rate_radps)}}},
           {"seed", static_cast<std::uint64_t>(r.seed)},
-          {"switches", json_of(r.switches)},
+          {"switches", json_of(effective_switches(r.switches))},
           {"engine", engine.description()},
           {"counts", {{"rays", count.rays}, {"echoes", count.echoes}, {"tiles", count.tiles}, {"cells", count.cells}}},
           {"truth", truth_of(ping, *job.scene)}};

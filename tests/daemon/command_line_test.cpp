@@ -34,10 +34,41 @@ int usage_error(const std::vector<std::string>& words) {
 }
 
 TEST(CommandLine, SwitchesOfTheModelReachTheEngine) {
-  const Switches given = overridden({"run", "x.yaml", "--expected-power", "--noise", "off", "--fixed-fan", "16"}).engine.switches;
-  EXPECT_TRUE(given.expected_power);
-  EXPECT_FALSE(given.noise);
-  EXPECT_EQ(given.fixed_fan, 16);
+  const Switches given = overridden({"run", "x.yaml", "--expected-power", "--fixed-fan", "16"}).engine.switches;
+  Switches expected;
+  expected.expected_power = true;
+  expected.fixed_fan = 16;
+  EXPECT_EQ(given, expected);
+}
+
+TEST(CommandLine, EveryNamedPartIsSwitchedByItsNameAndNothingElse) {
+  for (const NamedSwitch& part : named_switches)
+    for (const bool on : {true, false}) {
+      SCOPED_TRACE(part.name);
+      // The file says the opposite, so that only this option can have done it.
+      const std::string file = std::string("{") + part.name + (on ? ": off}" : ": on}");
+      Switches expected;
+      expected.*part.is_on = on;
+      EXPECT_EQ(overridden({"run", "x.yaml", std::string("--") + part.name, on ? "on" : "off"}, file).engine.switches, expected);
+    }
+}
+
+TEST(CommandLine, TheModeReachesTheEngine) {
+  EXPECT_EQ(overridden({"--mode", "paper"}).engine.switches.mode, Mode::paper);
+  EXPECT_EQ(overridden({"--mode", "raster"}).engine.switches.mode, Mode::raster);
+  EXPECT_EQ(overridden({"--mode", "canonical"}, "{mode: paper}").engine.switches.mode, Mode::canonical);
+}
+
+TEST(CommandLine, PartsThatTheModeLeavesOutAreNotSwitchedOn) {
+  for (const NamedSwitch& part : named_switches) {
+    const std::string option = std::string("--") + part.name;
+    EXPECT_THROW(overridden({"--mode", "paper", option, "on"}), std::runtime_error) << option;
+    EXPECT_THROW(overridden({option, "on"}, "{mode: raster}"), std::runtime_error) << option;
+    EXPECT_NO_THROW(overridden({"--mode", "paper", option, "off"})) << option;
+  }
+  EXPECT_THROW(overridden({"--fixed-fan", "8", "--multipath", "on"}), std::runtime_error);
+  EXPECT_NO_THROW(overridden({"--fixed-fan", "8", "--specular", "on"}));
+  EXPECT_NO_THROW(overridden({"--mode", "paper"}, "{specular: on}"));  // the file's own wish is told, not refused
 }
 
 TEST(CommandLine, SwitchesWinOverTheFileOnlyWhenGiven) {
@@ -72,6 +103,7 @@ TEST(CommandLine, AddressesThatCannotServeAreRefused) {
 TEST(CommandLine, WrongValuesAreUsageErrors) {
   EXPECT_EQ(usage_error({"run", "--noise", "maybe"}), 64);
   EXPECT_EQ(usage_error({"run", "--fixed-fan", "-1"}), 64);
+  EXPECT_EQ(usage_error({"run", "--mode", "raser"}), 64);
   EXPECT_EQ(usage_error({"run", "--expected-pwoer"}), 64);
 }
 

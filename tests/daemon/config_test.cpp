@@ -55,6 +55,37 @@ TEST(Config, DefaultsAreTheManuals) {
   EXPECT_TRUE(c->engine.switches.noise);
 }
 
+constexpr const char* least =
+    "world: {scene: s.yaml}\nvehicles: [{name: rov}]\n"
+    "sonars: [{name: a, profile: oculus-m1200d, bind_ip: 127.0.0.2}]\nengine: ";
+
+TEST(Config, EveryPartOfTheModelIsSwitchedByItsNameAndNothingElse) {
+  for (const NamedSwitch& part : named_switches)
+    for (const bool on : {true, false}) {
+      const auto c = parse(std::string(least) + "{" + part.name + (on ? ": on}" : ": off}"));
+      ASSERT_TRUE(c) << c.error().text;
+      Switches expected;
+      expected.*part.is_on = on;
+      EXPECT_EQ(c->engine.switches, expected) << part.name;
+    }
+  const auto c = parse(std::string(least) + "{mode: raster, fixed_fan: 5}");
+  ASSERT_TRUE(c) << c.error().text;
+  EXPECT_EQ(c->engine.switches.mode, Mode::raster);
+  EXPECT_EQ(c->engine.switches.fixed_fan, 5);
+}
+
+TEST(Config, PartsThatTakeNoEffectTogetherAreRefused) {
+  const auto refusal = [](const std::string& engine) {
+    const auto c = parse(least + engine);
+    return c ? std::string("accepted") : c.error().text;
+  };
+  EXPECT_NE(refusal("{fixed_fan: 8, multipath: on}").find("a fixed fan leaves out multipath"), std::string::npos);
+  EXPECT_NE(refusal("{mode: paper, noise: on}").find("mode paper leaves out noise"), std::string::npos);
+  EXPECT_NE(refusal("{leak: on, mode: raster}").find("mode raster leaves out leak"), std::string::npos);
+  EXPECT_EQ(refusal("{mode: paper, noise: off}"), "accepted");
+  EXPECT_EQ(refusal("{fixed_fan: 8, specular: on}"), "accepted");
+}
+
 TEST(Config, EveryKeyIsRead) {
   const auto c = parse(R"(
 world:

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
+#include "core/paper/paper_engine.hpp"
 #include "daemon/render/coverage.hpp"
 #include "daemon/render/npy.hpp"
 #include "daemon/render/render_job.hpp"
+#include "daemon/render/resolution_cell.hpp"
 #include "daemon/render/sidecar.hpp"
 
 namespace sonar::render {
@@ -170,12 +173,90 @@ TEST(Digest, FollowsEverythingThatChangesAPing) {
   EXPECT_FALSE(changed([](RenderJob& j) { j.engine.threads = 3; }));
 }
 
+TEST(ResolutionCell, FollowsThePulseInUse) {
+  RenderJob job = parsed(point + "sonar: {ping: {pulse_width_m: 0.03, device_sound_speed_mps: 1500}}\n").jobs.at(0);
+  const auto energy_per_width = [&](const std::string& waveform) {
+    const RenderJob other =
+        parsed(point + "sonar: {ping: {pulse_width_m: 0.03, device_sound_speed_mps: 1500}, model: {waveform: " + waveform +
+               "}}\n")
+            .jobs.at(0);
+    const ResolutionCell cell = cell_of(other);
+    return cell.energy_s / (2 * cell.pulse_width_m / 1500);
+  };
+  // Integral of |p|^2 over its -3 dB width: Gaussian sqrt(pi / (4 ln 2)); triangle (2 / 3) / (2 - sqrt 2).
+  EXPECT_NEAR(energy_per_width("{shape: gaussian}"), std::sqrt(pi / (4 * std::log(2.0))), 1e-6);
+  EXPECT_NEAR(energy_per_width("{shape: cw}"), 2.0 / 3 / (2 - std::sqrt(2.0)), 1e-3);
+  EXPECT_NEAR(cell_of(job).pulse_width_m, 0.03, 1e-9);
+  // A measured triangle, 20 samples at 100 kHz from foot to peak: the width is its own, not the settings'.
+  std::string samples;
+  for (int n = -20; n <= 20; ++n) samples += (n > -20 ? ", [" : "[") + std::to_string(1 - std::abs(n) / 20.0) + ", 0]";
+  const RenderJob measured =
+      parsed(point +
+             "sonar: {ping: {pulse_width_m: 0.03, device_sound_speed_mps: 1500}, model: {waveform: {shape: measured, "
+             "sample_rate_hz: 1e5, samples: [" +
+             samples + "]}}}\n")
+          .jobs.at(0);
+  EXPECT_NEAR(cell_of(measured).pulse_width_m, 750 * 2e-4 * (2 - std::sqrt(2.0)), 1e-3);
+  EXPECT_NEAR(cell_of(measured).energy_s, 2e-4 * 2 / 3, 1e-6);
+  EXPECT_NEAR(cell_of(measured).beam_u, cell_of(job).beam_u, 1e-12);
+}
+
+/// Coverage of a level bed at 10 m by the plain sonar.
+Coverage coverage_with(const std::string& waveform) {
+  const RenderJob job =
+      with_bed_only(parsed("scene: {objects: [{type: plane, material: sand, size_m: [40, 40], pose: {xyz_m: [0, 0, -12]}}]}\n"
+                           "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10], rpy_deg: [0, 14, 0]}}\n"
+                           "sonar: {ping: {range_m: 8, beams: 65}, model: {waveform: " +
+                           waveform + "}}\n")
+                        .jobs.at(0));
+  Parallel pool(2);
+  PingRequest request = make_request(job, PingNumber{1}, 0);
+  request.switches.keep_pressure = true;
+  const auto coverage = measure_coverage(job, make_engine(job.scene, pool, {})->run({&request, 1}).at(0));
+  if (!coverage) throw std::runtime_error(coverage.error().text);
+  return *coverage;
+}
+
+TEST(Coverage, TakesTheEnergyOfThePulseInUse) {
+  for (const char* shape : {"{shape: gaussian}", "{shape: cw}", "{shape: lfm}"}) {
+    const Coverage c = coverage_with(shape);
+    EXPECT_GT(c.bins, 1000u) << shape;
+    EXPECT_NEAR(c.mean_db, 0, 0.05) << shape;
+    EXPECT_GE(c.percent(), 99.9) << shape;
+  }
+}
+
 TEST(Coverage, KnowsWhatItCannotCompare) {
   RenderJob job = shipped_sonars_over_a_bed().front();
   Ping ping;
   ping.request = make_request(job, PingNumber{1}, 0);
   ping.request.sonar_in_world.orientation = quat_from_rpy({0.1, 0.2, 0});
-  EXPECT_FALSE(measure_coverage(job, ping));
+  EXPECT_THAT(measure_coverage(job, ping).error().text, HasSubstr("roll"));
+  ping.request.sonar_in_world.orientation = {};
+  job.engine.switches.mode = Mode::paper;
+  EXPECT_THAT(measure_coverage(job, ping).error().text, HasSubstr("canonical"));
+  job.engine.switches = {};
+  job.engine.switches.conical = false;
+  EXPECT_THAT(measure_coverage(job, ping).error().text, HasSubstr("conical"));
+}
+
+TEST(Sidecar, TellsTheSwitchesThatTookEffect) {
+  RenderInput input = parsed(point + "sonar: {ping: {range_m: 6, beams: 65}}\n");
+  RenderJob& job = input.jobs.at(0);
+  Parallel pool(1);
+  const auto switches_told = [&](const std::string& part) {
+    const auto engine = make_engine(job.scene, pool, {});
+    const PingRequest request = make_request(job, PingNumber{1}, 0);
+    return sidecar(job, engine->run({&request, 1}).at(0), *engine, "")["switches"][part].get<bool>();
+  };
+  EXPECT_TRUE(switches_told("specular"));
+  job.engine.switches.multipath = true;
+  EXPECT_TRUE(switches_told("multipath"));
+  job.engine.switches.fixed_fan = 8;
+  EXPECT_FALSE(switches_told("multipath"));
+  EXPECT_TRUE(switches_told("specular"));
+  job.engine.switches.mode = Mode::paper;
+  for (const NamedSwitch& part : named_switches) EXPECT_FALSE(switches_told(part.name)) << part.name;
 }
 
 }  // namespace

@@ -1,0 +1,24 @@
+// What parts of the model need of a scene and a sonar to be heard at all, and typical figures for benchmarks of scenes and
+// sonars that lack it: so that the cost of every part can be measured over every scene.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "core/sonar/sonar_model.hpp"
+
+namespace sonar {
+
+/// Names of the switched parts that can be given: texture, volume, crosstalk, leak.
+std::vector<std::string> parts_to_give();
+
+/// Only what is missing is added.
+std::shared_ptr<const Scene> with_parts(std::shared_ptr<const Scene> scene, const std::vector<std::string>& parts);
+std::shared_ptr<const SonarModel> with_parts(std::shared_ptr<const SonarModel> model, const std::vector<std::string>& parts);
+
+/// Which of parts_to_give() the scene and the sonar have of their own.
+std::vector<std::string> parts_had(const Scene& scene, const FrequencyMode& mode);
+
+}  // namespace sonar

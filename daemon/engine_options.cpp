@@ -1,0 +1,77 @@
+#include "daemon/engine_options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include "core/text/nearest.hpp"
+#include "daemon/effective_switches.hpp"
+
+namespace sonar {
+
+CLI::Validator one_of(std::vector<std::string> names) {
+  std::string described;
+  for (const std::string& name : names) described += (described.empty() ? "" : "|") + name;
+  const auto refusal = [names = std::move(names)](std::string& given) -> std::string {
+    if (std::find(names.begin(), names.end(), given) != names.end()) return {};
+    const std::vector<std::string_view> candidates(names.begin(), names.end());
+    return "there is no \"" + given + "\"" + text::suggestion(given, candidates, "give one of");
+  };
+  return CLI::Validator(refusal, described, "one of");
+}
+
+void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
+  constexpr const char* parts = "Parts of the model (a configuration may say otherwise than these defaults)";
+  const Switches defaults;
+  app.add_option("--seed", given.seed, "seed of speckle and noise (default 1)")->envname("SONARD_SEED");
+  app.add_option("--simd", given.simd, "instruction set of the hot loops (default auto)")
+      ->check(one_of({"auto", "portable", "avx2", "avx512"}))
+      ->envname("SONARD_SIMD");
+  app.add_option("--mode", given.mode,
+                 "the model of sonard, or for comparison Choi 2025 as printed (paper, raster); default canonical")
+      ->check(one_of({"canonical", "paper", "raster"}))
+      ->group(parts);
+  app.add_option("--fixed-fan", given.fixed_fan,
+                 "rays a column with one scatterer each, no surface cells; default 0: as the mode has it")
+      ->check(CLI::Range(0, most_fixed_rays))
+      ->group(parts);
+  app.add_flag("--expected-power", given.expected_power, "mean echo power instead of speckle")->group(parts);
+  for (std::size_t i = 0; i < named_switches.size(); ++i) {
+    const NamedSwitch& part = named_switches[i];
+    app.add_option(std::string("--") + part.name, given.switches[i],
+                   std::string(part.meaning) + " (default " + (defaults.*part.is_on ? "on)" : "off)"))
+        ->check(one_of({"on", "off"}))
+        ->group(parts);
+  }
+}
+
+void add_engine_options(CLI::App& app, EngineOptionsGiven& given) {
+  app.add_option("--threads", given.threads, "compute threads (default 0: all cores)")
+      ->check(CLI::Range(0, 256))
+      ->envname("SONARD_THREADS");
+  add_model_options(app, given);
+}
+
+Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given) {
+  if (given.threads) engine.threads = *given.threads;
+  if (given.seed) seed = *given.seed;
+  if (given.simd == "auto") engine.simd = SimdLevel::automatic;
+  if (given.simd == "portable") engine.simd = SimdLevel::portable;
+  if (given.simd == "avx2") engine.simd = SimdLevel::avx2;
+  if (given.simd == "avx512") engine.simd = SimdLevel::avx512;
+  if (given.expected_power) engine.switches.expected_power = true;
+  if (given.mode == "canonical") engine.switches.mode = Mode::canonical;
+  if (given.mode == "paper") engine.switches.mode = Mode::paper;
+  if (given.mode == "raster") engine.switches.mode = Mode::raster;
+  if (given.fixed_fan) engine.switches.fixed_fan = *given.fixed_fan;
+  for (std::size_t i = 0; i < named_switches.size(); ++i) {
+    if (given.switches[i].empty()) continue;
+    const NamedSwitch& part = named_switches[i];
+    engine.switches.*part.is_on = given.switches[i] == "on";
+    const std::string why = why_without_effect(engine.switches, part);
+    if (engine.switches.*part.is_on && !why.empty())
+      return failure(ErrorKind::usage, std::string("--") + part.name + " on has no effect: " + why + "; leave one of them away");
+  }
+  return {};
+}
+
+}  // namespace sonar
