@@ -5,13 +5,13 @@
 #include <numeric>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/fan_refinement.hpp"
 
 namespace sonar {
 namespace {
 
-constexpr double fan_edge_two_way = 0.01;   // 0.1 of one pattern
-constexpr int edge_depth = 4, deepest = 6;  // as in trace_fan
-constexpr float lift_m = 1e-4f;             // rays start so far off the mirror they come from
+constexpr double fan_edge_two_way = 0.01;  // 0.1 of one pattern
+constexpr float lift_m = 1e-4f;            // rays start so far off the mirror they come from
 
 /// Sixteen rays that mirrors send on.
 class ChainTracer {
@@ -88,45 +88,28 @@ class ChainTracer {
 };
 
 /// A direction's chain of surfaces.
-struct Chain {
-  float elevation_rad = 0, tangent = 0, forward = 0;  // forward: x of the unit direction
-  std::uint32_t object[3] = {RayPacket::miss, RayPacket::miss, RayPacket::miss};
-  float range_m[3] = {}, inverse_x[3] = {};
+struct Chain : FanSample {
+  SurfaceMet met[3];
   std::uint8_t mirror[2] = {BounceMap::no_mirror, BounceMap::no_mirror};
-  std::int32_t next = -1;  // the sample above in the same column
-  bool edge_above = false;
 
   int stages() const { return mirror[0] == BounceMap::no_mirror ? 1 : mirror[1] == BounceMap::no_mirror ? 2 : 3; }
-  bool meets_the_same(const Chain& b) const {
-    return std::equal(object, object + 3, b.object) && std::equal(mirror, mirror + 2, b.mirror);
-  }
+  const SurfaceMet& met_at(int stage) const { return met[stage]; }
+  bool same_way(const Chain& b) const { return std::equal(mirror, mirror + 2, b.mirror); }
 };
 
 /// Columns [first, last), at most a packet wide: samples refined where neighbours differ, then drawn into the map.
 class ColumnsTracer {
  public:
   ColumnsTracer(ChainTracer& rays, const PingPlan& plan, float far_m, int first, int last, BounceMap& map)
-      : rays_(rays),
-        plan_(plan),
-        map_(map),
-        far_m_(far_m),
-        tolerance_m_(static_cast<float>(plan.pulse_width_m)),
-        first_(first),
-        last_(last) {}
+      : rays_(rays), plan_(plan), map_(map), far_m_(far_m), first_(first), last_(last) {}
 
   void run() {
     trace_base();
-    for (std::int32_t e = 0; e + 1 < elevations(); ++e)
-      for (int k = 0; k < columns(); ++k) consider(k * elevations() + e, k * elevations() + e + 1, k, 0, open_);
-    for (int depth = 1; depth <= deepest && !open_.empty(); ++depth) halve_intervals();
+    refine();
     for (int k = 0; k < columns(); ++k) draw(k);
   }
 
  private:
-  struct Interval {
-    std::int32_t below, above;
-    int column, depth;
-  };
   int columns() const { return last_ - first_; }
   std::int32_t elevations() const { return static_cast<std::int32_t>(map_.fan.elevation_rad.size()); }
   Chain& at(std::int32_t i) { return samples_[static_cast<std::size_t>(i)]; }
@@ -149,11 +132,8 @@ class ColumnsTracer {
       for (std::size_t i = 0; i < RayPacket::size; ++i) {
         if (!(active >> i & 1)) continue;
         Chain& chain = at(index[i]);
-        chain.object[stage] = rays_.packet.object[i];
-        if (chain.object[stage] != RayPacket::miss) {
-          chain.range_m[stage] = rays_.travelled[i];
-          chain.inverse_x[stage] = 1.0f / std::max(rays_.travelled[i] * chain.forward, 1e-4f);
-        }
+        chain.met[stage] = SurfaceMet::by(rays_.packet, i, rays_.travelled[i], chain.forward);
+        direction_[stage][i] = SurfaceMet::direction(rays_.packet, i);
         if (stage < 2) chain.mirror[stage] = rays_.bounce(i);
         if (stage == 2 || chain.mirror[stage] == BounceMap::no_mirror) active &= ~(1u << i);
       }
@@ -175,53 +155,21 @@ class ColumnsTracer {
     }
   }
 
-  /// Whether an interval needs a look at its middle; what is left undecided becomes an edge.
-  void consider(std::int32_t below, std::int32_t above, int column, int depth, std::vector<Interval>& list) {
-    Chain &a = at(below), &b = at(above);
-    const bool same = a.meets_the_same(b);
-    bool far_apart = false;
-    for (int stage = 0; same && stage < a.stages(); ++stage)
-      far_apart = far_apart || std::abs(a.range_m[stage] - b.range_m[stage]) > tolerance_m_;
-    if (same && !far_apart) return;
-    if (depth < (same ? deepest : edge_depth)) list.push_back({below, above, column, depth});
-    if (!same || depth >= deepest) a.edge_above = true;
-  }
-
-  void halve_intervals() {
-    std::vector<Interval> halves;
-    std::array<std::int32_t, RayPacket::size> index{};
-    for (std::size_t from = 0; from < open_.size(); from += RayPacket::size) {
-      const std::size_t n = std::min<std::size_t>(RayPacket::size, open_.size() - from);
+  void refine() {
+    FanRefinement<Chain> refinement(samples_, open_, halves_, static_cast<float>(plan_.pulse_width_m));
+    for (std::int32_t e = 0; e + 1 < elevations(); ++e)
+      for (int k = 0; k < columns(); ++k) refinement.consider_base(k * elevations() + e, k * elevations() + e + 1, k);
+    const auto trace = [&](std::span<const FanInterval> intervals) {
+      std::array<std::int32_t, RayPacket::size> index{};
       rays_.clear();
-      for (std::size_t i = 0; i < n; ++i) {
-        const Interval& v = open_[from + i];
-        const float middle = 0.5f * (at(v.below).elevation_rad + at(v.above).elevation_rad);
+      for (std::size_t i = 0; i < intervals.size(); ++i) {
         index[i] = static_cast<std::int32_t>(samples_.size());
-        samples_.emplace_back();
-        aim(middle, v.column, samples_.back());
+        const float middle = refinement.middle_rad(intervals[i]);
+        aim(middle, intervals[i].column, samples_.emplace_back());
       }
       follow(index);
-      for (std::size_t i = 0; i < n; ++i) insert(open_[from + i], index[i], halves);
-    }
-    open_ = std::move(halves);
-  }
-  void insert(const Interval& v, std::int32_t middle, std::vector<Interval>& halves) {
-    at(middle).next = v.above;
-    at(v.below).next = middle;
-    at(v.below).edge_above = false;
-    if (lies_between(at(v.below), at(middle), at(v.above))) return;
-    consider(v.below, middle, v.column, v.depth + 1, halves);
-    consider(middle, v.above, v.column, v.depth + 1, halves);
-  }
-  bool lies_between(const Chain& a, const Chain& m, const Chain& b) const {
-    if (!a.meets_the_same(m) || !b.meets_the_same(m)) return false;
-    const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
-    for (int stage = 0; stage < m.stages(); ++stage) {
-      if (m.object[stage] == RayPacket::miss) continue;
-      const float x = 1.0f / (a.inverse_x[stage] + part * (b.inverse_x[stage] - a.inverse_x[stage]));
-      if (std::abs(x / m.forward - m.range_m[stage]) > tolerance_m_) return false;
-    }
-    return true;
+    };
+    refinement.run(trace, [this](std::size_t lane, int stage) { return direction_[static_cast<std::size_t>(stage)][lane]; });
   }
 
   void draw(int k) {
@@ -244,10 +192,10 @@ class ColumnsTracer {
     const Chain& nearer = part < 0.5f ? a : b;
     bool same_way = true;
     for (std::size_t stage = 0; stage < 3; ++stage) {
-      float seen = nearer.inverse_x[stage];
+      float seen = nearer.met[stage].inverse_x;
       if (same_way)
-        seen = a.edge_above ? std::min(a.inverse_x[stage], b.inverse_x[stage])
-                            : std::max(0.0f, a.inverse_x[stage] + part * (b.inverse_x[stage] - a.inverse_x[stage]));
+        seen = a.edge_above ? std::min(a.met[stage].inverse_x, b.met[stage].inverse_x)
+                            : std::max(0.0f, a.met[stage].inverse_x + part * (b.met[stage].inverse_x - a.met[stage].inverse_x));
       map_.nodes[node].inverse_x[stage] = seen;
       if (stage == 2) break;
       map_.nodes[node].mirror[stage] = nearer.mirror[stage];
@@ -258,10 +206,11 @@ class ColumnsTracer {
   ChainTracer& rays_;
   const PingPlan& plan_;
   BounceMap& map_;
-  float far_m_, tolerance_m_;
+  float far_m_;
   int first_, last_;
   std::vector<Chain> samples_;
-  std::vector<Interval> open_;
+  std::vector<FanInterval> open_, halves_;
+  std::array<std::array<Vec3, RayPacket::size>, 3> direction_;  // of the packet's rays at each stage
 };
 
 /// Which part of a block of columns each way owns.

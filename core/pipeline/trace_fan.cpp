@@ -7,12 +7,6 @@
 namespace sonar {
 namespace {
 
-constexpr int edge_depth = 4;  // edges are found to 1/16 of a base interval
-constexpr int deepest = 6;     // a surface that still will not interpolate hides itself
-// A surface strays from the straight line between two hits by about a quarter of what its slopes promise; beyond a pulse width of
-// that a middle that happens to lie on the line proves nothing: the rays may fall in step with ripples.
-constexpr float slope_tolerance_in_pulses = 4;
-
 /// An elevation about the array axis, with what is derived from it once.
 struct Elevation {
   float angle_rad, cosine, sine;
@@ -85,15 +79,13 @@ class FanTracer {
 
   std::size_t run(DepthMap& seen) {
     trace_base();
-    open_intervals();
-    for (int depth = 1; depth <= deepest && !s_.open.empty(); ++depth) halve_intervals();
+    refine();
     draw(seen);
     return filler_.traced;
   }
 
  private:
   using Sample = FanScratch::Sample;
-  using Interval = FanScratch::Interval;
 
   ColumnSine column(int k) const { return columns_[static_cast<std::size_t>(k)]; }
   Sample& at(std::int32_t i) { return s_.samples[static_cast<std::size_t>(i)]; }
@@ -101,21 +93,11 @@ class FanTracer {
 
   /// Turns a lane of the packet into the sample it was traced for.
   void take(int lane, Elevation e, ColumnSine column, Sample& sample) const {
-    const auto i = static_cast<std::size_t>(lane);
-    const bool hit = filler_.packet.object[i] != RayPacket::miss;
     sample.elevation_rad = e.angle_rad;
     sample.forward = plan_.switches.conical ? column.across * e.cosine : e.cosine;
     sample.tangent = e.sine / e.cosine;
-    sample.object = filler_.packet.object[i];
-    sample.range_m = hit ? filler_.packet.far[i] : 0;
-    sample.inverse_x = hit ? 1.0f / std::max(sample.range_m * sample.forward, 1e-4f) : 0;
-    sample.normal = {filler_.packet.normal_x[i], filler_.packet.normal_y[i], filler_.packet.normal_z[i]};
-    sample.offset = sample.range_m * dot(sample.normal, direction(lane));
-  }
-
-  Vec3 direction(int lane) const {
     const auto i = static_cast<std::size_t>(lane);
-    return {filler_.packet.direction_x[i], filler_.packet.direction_y[i], filler_.packet.direction_z[i]};
+    sample.met = SurfaceMet::by(filler_.packet, i, filler_.packet.far[i], sample.forward);
   }
 
   /// Elevation by elevation, sixteen neighbouring columns a packet: neighbours in a packet lie a fraction of a degree apart.
@@ -139,71 +121,23 @@ class FanTracer {
     }
   }
 
-  /// Whether an interval needs a look at its middle; what is left undecided becomes an edge.
-  void consider(std::int32_t below, std::int32_t above, std::int32_t column, int depth, std::vector<Interval>& list) {
-    Sample &a = at(below), &b = at(above);
-    if (a.object != b.object) {
-      a.edge_above = true;
-      if (depth < edge_depth) list.push_back({below, above, column, depth});
-    } else if (a.object != RayPacket::miss && std::abs(a.range_m - b.range_m) > tolerance_m_) {
-      if (depth < deepest)
-        list.push_back({below, above, column, depth});
-      else
-        a.edge_above = true;
-    }
-  }
-
-  void open_intervals() {
-    s_.open.clear();
+  void refine() {
+    FanRefinement<Sample> refinement(s_.samples, s_.open, s_.halves, tolerance_m_);
     const int n = elevations();
     for (int e = 0; e + 1 < n; ++e)
-      for (int k = 0; k < last_ - first_; ++k) consider(k * n + e, k * n + e + 1, k, 0, s_.open);
-  }
-
-  void halve_intervals() {
-    s_.halves.clear();
+      for (int k = 0; k < last_ - first_; ++k) refinement.consider_base(k * n + e, k * n + e + 1, k);
     std::array<Elevation, RayPacket::size> middle;
-    for (std::size_t from = 0; from < s_.open.size(); from += RayPacket::size) {
-      const std::size_t n = std::min<std::size_t>(RayPacket::size, s_.open.size() - from);
+    const auto trace = [&](std::span<const FanInterval> intervals) {
       filler_.clear();
-      for (std::size_t i = 0; i < n; ++i) {
-        const Interval& v = s_.open[from + i];
-        middle[i] = elevation_at(0.5f * (at(v.below).elevation_rad + at(v.above).elevation_rad));
-        filler_.add(column(v.column), middle[i]);
+      for (std::size_t i = 0; i < intervals.size(); ++i) {
+        middle[i] = elevation_at(refinement.middle_rad(intervals[i]));
+        filler_.add(column(intervals[i].column), middle[i]);
       }
       filler_.trace(scene_);
-      for (std::size_t i = 0; i < n; ++i) insert(s_.open[from + i], middle[i], static_cast<int>(i));
-    }
-    std::swap(s_.open, s_.halves);
-  }
-
-  void insert(const Interval& v, Elevation elevation, int lane) {
-    const auto middle = static_cast<std::int32_t>(s_.samples.size());
-    s_.samples.emplace_back();
-    take(lane, elevation, column(v.column), at(middle));
-    at(middle).next = v.above;
-    at(middle).edge_above = false;
-    at(v.below).next = middle;
-    at(v.below).edge_above = false;
-    if (lies_between(at(v.below), at(middle), at(v.above)) && slopes_agree(at(v.below), at(v.above), at(middle), lane)) return;
-    consider(v.below, middle, v.column, v.depth + 1, s_.halves);
-    consider(middle, v.above, v.column, v.depth + 1, s_.halves);
-  }
-
-  /// On a plane 1 / x is linear in the tangent; a middle that agrees to a pulse width needs no further look.
-  bool lies_between(const Sample& a, const Sample& m, const Sample& b) const {
-    if (a.object != b.object || m.object != a.object) return false;
-    const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
-    const float expected_x = 1.0f / (a.inverse_x + part * (b.inverse_x - a.inverse_x));
-    return std::abs(expected_x / m.forward - m.range_m) <= tolerance_m_;
-  }
-
-  /// Whether the planes through the two ends meet the middle's ray about where it hit.
-  bool slopes_agree(const Sample& a, const Sample& b, const Sample& middle, int lane) const {
-    const Vec3 along = direction(lane);
-    const float within = slope_tolerance_in_pulses * tolerance_m_;
-    return std::abs(a.offset / dot(a.normal, along) - middle.range_m) <= within &&
-           std::abs(b.offset / dot(b.normal, along) - middle.range_m) <= within;
+      for (std::size_t i = 0; i < intervals.size(); ++i)
+        take(static_cast<int>(i), middle[i], column(intervals[i].column), s_.samples.emplace_back());
+    };
+    refinement.run(trace, [this](std::size_t lane, int) { return SurfaceMet::direction(filler_.packet, lane); });
   }
 
   /// Linear between hits of one surface, the farther value across edges.
@@ -221,11 +155,11 @@ class FanTracer {
         const Sample &a = at(i), &b = at(at(i).next);
         const float top = (b.tangent - fan.first_tangent) * fan.bins_per_tangent;
         const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
-        const float farther = std::min(a.inverse_x, b.inverse_x);
-        const float per_tangent = (b.inverse_x - a.inverse_x) / (b.tangent - a.tangent);
+        const float inverse_a = a.met.inverse_x, inverse_b = b.met.inverse_x, farther = std::min(inverse_a, inverse_b);
+        const float per_tangent = (inverse_b - inverse_a) / (b.tangent - a.tangent);
         for (; bin <= end; ++bin) {
           const float tangent = fan.first_tangent + static_cast<float>(bin) / fan.bins_per_tangent;
-          map[bin] = a.edge_above ? farther : std::max(0.0f, a.inverse_x + per_tangent * (tangent - a.tangent));
+          map[bin] = a.edge_above ? farther : std::max(0.0f, inverse_a + per_tangent * (tangent - a.tangent));
         }
       }
     }

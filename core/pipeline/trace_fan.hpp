@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/base/geometry.hpp"
+#include "core/pipeline/fan_refinement.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/ping_scalars.hpp"
 #include "core/scene/ray_scene.hpp"
@@ -21,21 +21,14 @@ struct DepthMap {
 
 /// Buffers of trace_fan that live from ping to ping; one per worker.
 struct FanScratch {
-  struct Sample {
-    float elevation_rad, tangent, forward, inverse_x, range_m;  // forward: x of the unit direction
-    std::uint32_t object;
-    std::int32_t next;  // the sample above in the same column, -1 = last
-    bool edge_above;    // the interval up to `next` hides an edge: do not interpolate
-    Vec3 normal;        // of the facet, any length; the facet's plane is normal . p = offset, p from the sonar in world axes
-    float offset;
-  };
-  struct Interval {
-    std::int32_t below, above;
-    std::int32_t column;
-    int depth;
+  struct Sample : FanSample {
+    SurfaceMet met;
+    int stages() const { return 1; }
+    const SurfaceMet& met_at(int) const { return met; }
+    bool same_way(const Sample&) const { return true; }
   };
   std::vector<Sample> samples;
-  std::vector<Interval> open, halves;
+  std::vector<FanInterval> open, halves;
 };
 
 /// Traces columns [first, last). Returns the number of rays.

@@ -29,7 +29,7 @@ void note_first_hits(const FanScratch& fan, const PingPlan& plan, int first, int
     BeamTruth& nearest = by_column[static_cast<std::size_t>(k)];
     for (std::int32_t i = (k - first) * elevations; i >= 0; i = fan.samples[static_cast<std::size_t>(i)].next) {
       const FanScratch::Sample& s = fan.samples[static_cast<std::size_t>(i)];
-      if (s.object != RayPacket::miss && std::abs(s.elevation_rad) <= widest) note(s.range_m, s.object, nearest);
+      if (s.met.object != RayPacket::miss && std::abs(s.elevation_rad) <= widest) note(s.met.range_m, s.met.object, nearest);
     }
   }
 }

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "core/pipeline/spectral.hpp"
 #include "core/scene/mirrors.hpp"
@@ -92,6 +94,37 @@ TEST(MultipathCells, ViewInAMirrorIsThatOfTheMirroredScene) {
   EXPECT_LT(wrong / whole, 0.08);  // cells are drawn anew in the mirrored objects, and shadows have edges
   const double level_db = 10 * std::log10(energy(with, 4, 9, 0, 512) / energy(plain, 4, 9, 0, 512));
   record_oracle(no_number, "energy of what is seen in a mirror alone over that of the mirrored scene", 0, level_db, 0.15, "dB");
+}
+
+TEST(MultipathCells, ARippledBedHasNoDarkBandsInAMirror) {
+  // Rays fall in step with ripples; a bed that is seen in a ceiling alone must be as evenly lit as one that is seen straight on.
+  const double ceiling_z = 0.5, bed_z = -1, image_z = 2 * ceiling_z - bed_z;
+  const auto ripples = [](double x) { return 0.01 * std::sin(2 * pi * x / 0.55); };
+  SceneMaker real, image;
+  real.add(sheet(40, 40), silent_db, {0, 0, ceiling_z});
+  real.add(height_field(2, 11, -2, 2, 0.02, [&](double x, double) { return bed_z + ripples(x); }), -20);
+  image.add(height_field(2, 11, -2, 2, 0.02, [&](double x, double) { return image_z - ripples(x); }), -20);
+  FrequencyMode mode = p900();
+  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(8));
+  PingSettings settings = native_rows(10, 0.0254);
+  settings.beam_count = 48;
+  std::vector<std::unique_ptr<Sounding>> both;
+  for (SceneMaker* maker : {&real, &image}) {
+    maker->add(box({0.02, 2, 1}), silent_db, {1, 0, -0.95});  // hides the bed itself
+    both.push_back(std::make_unique<Sounding>(with_mirrors(*maker, maker == &real ? 1 : 0), mode, settings));
+    both.back()->request.switches.expected_power = true;
+    both.back()->request.switches.multipath = true;
+    both.back()->ping_from({}, {0, -0.25, 0});
+  }
+  const Sounding &with = *both[0], &plain = *both[1];
+  int close = 0, all = 0;
+  for (int n = static_cast<int>(with.row_of_range(4.5)); n < static_cast<int>(with.row_of_range(9.5)); ++n)
+    for (int j = 4; j < 44; ++j, ++all) {
+      const double seen = with.power(n, j), expected = plain.power(n, j);
+      ASSERT_GT(expected, 0);
+      close += std::abs(10 * std::log10(seen / expected)) < 1;
+    }
+  EXPECT_GT(close, 0.99 * all);  // 0.95 where rays may fall in step
 }
 
 TEST(MultipathCells, SpeckleOfTheTwoWaysRoundIsOne) {

@@ -1,0 +1,151 @@
+// How fans of rays are refined: a column's interval between two directions is halved until both ends see one surface that
+// interpolates, or an edge. One rule for what is seen directly (trace_fan) and by way of mirrors (multipath_trace).
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+#include "core/scene/ray_scene.hpp"
+
+namespace sonar {
+
+/// What a ray met at one stage of its way. Ranges run along the whole way, unfolded where mirrors bend it.
+struct SurfaceMet {
+  std::uint32_t object = RayPacket::miss;
+  float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = nothing met
+  Vec3 normal;                       // of the facet, any length, world axes as seen along the last leg of the way
+  float offset = 0;                  // the facet's plane is normal . p = offset, p from the sonar's last image
+
+  /// Of a ray that has come `range_m` along the whole way; `forward`: x of the unit direction it left in.
+  static SurfaceMet by(const RayPacket& rays, std::size_t lane, float range_m, float forward) {
+    SurfaceMet met;
+    met.object = rays.object[lane];
+    const bool hit = met.object != RayPacket::miss;
+    met.range_m = hit ? range_m : 0;
+    met.inverse_x = hit ? 1.0f / std::max(met.range_m * forward, 1e-4f) : 0;
+    met.normal = {rays.normal_x[lane], rays.normal_y[lane], rays.normal_z[lane]};
+    met.offset = met.range_m * dot(met.normal, direction(rays, lane));
+    return met;
+  }
+  static Vec3 direction(const RayPacket& rays, std::size_t lane) {
+    return {rays.direction_x[lane], rays.direction_y[lane], rays.direction_z[lane]};
+  }
+};
+
+/// One direction of a column; those who trace add what it met, one surface a stage.
+struct FanSample {
+  float elevation_rad = 0, tangent = 0, forward = 0;  // forward: x of the unit direction
+  std::int32_t next = -1;                             // the sample above in the same column, -1 = last
+  bool edge_above = false;                            // the interval up to `next` hides an edge: do not interpolate
+};
+
+/// Between two samples of a column, to be looked at in the middle.
+struct FanInterval {
+  std::int32_t below, above;
+  std::int32_t column;
+  int depth;
+};
+
+/// Sample: a FanSample with `int stages() const`, `const SurfaceMet& met_at(int stage) const` and `bool same_way(b) const`:
+/// whether both met the same number of surfaces by the same mirrors.
+template <class Sample>
+class FanRefinement {
+ public:
+  /// The buffers live with the caller, from ping to ping.
+  FanRefinement(std::vector<Sample>& samples, std::vector<FanInterval>& open, std::vector<FanInterval>& halves,
+                float pulse_width_m)
+      : samples_(samples), open_(open), halves_(halves), tolerance_m_(pulse_width_m) {
+    open_.clear();
+  }
+
+  /// Opens the interval between two neighbours if it needs a look at its middle.
+  void consider_base(std::int32_t below, std::int32_t above, std::int32_t column) { consider(below, above, column, 0, open_); }
+
+  /// trace(intervals): one packet, which appends the samples of their middles in order. direction(lane, stage): of those rays.
+  template <class Trace, class Direction>
+  void run(const Trace& trace, const Direction& direction) {
+    for (int depth = 1; depth <= deepest && !open_.empty(); ++depth) {
+      halves_.clear();
+      for (std::size_t from = 0; from < open_.size(); from += RayPacket::size) {
+        const std::size_t n = std::min<std::size_t>(RayPacket::size, open_.size() - from);
+        const auto first = static_cast<std::int32_t>(samples_.size());
+        trace(std::span<const FanInterval>(open_).subspan(from, n));
+        for (std::size_t i = 0; i < n; ++i)
+          insert(open_[from + i], first + static_cast<std::int32_t>(i), [&](int stage) { return direction(i, stage); });
+      }
+      std::swap(open_, halves_);
+    }
+  }
+  float middle_rad(const FanInterval& v) { return 0.5f * (at(v.below).elevation_rad + at(v.above).elevation_rad); }
+
+ private:
+  static constexpr int edge_depth = 4;  // edges are found to 1/16 of a base interval
+  static constexpr int deepest = 6;     // a surface that still will not interpolate hides itself
+  // A surface strays from the straight line between two hits by about a quarter of what its slopes promise; beyond a pulse width
+  // of that a middle that happens to lie on the line proves nothing: the rays may fall in step with ripples.
+  static constexpr float slope_tolerance_in_pulses = 4;
+
+  Sample& at(std::int32_t i) { return samples_[static_cast<std::size_t>(i)]; }
+
+  static bool meet_the_same(const Sample& a, const Sample& b) {
+    if (!a.same_way(b)) return false;
+    for (int stage = 0; stage < a.stages(); ++stage)
+      if (a.met_at(stage).object != b.met_at(stage).object) return false;
+    return true;
+  }
+
+  /// Whether an interval needs a look at its middle; what is left undecided becomes an edge.
+  void consider(std::int32_t below, std::int32_t above, std::int32_t column, int depth, std::vector<FanInterval>& list) {
+    Sample &a = at(below), &b = at(above);
+    const bool same = meet_the_same(a, b);
+    if (same && !far_apart(a, b)) return;
+    if (depth < (same ? deepest : edge_depth)) list.push_back({below, above, column, depth});
+    if (!same || depth >= deepest) a.edge_above = true;
+  }
+  bool far_apart(const Sample& a, const Sample& b) const {
+    for (int stage = 0; stage < a.stages(); ++stage)
+      if (std::abs(a.met_at(stage).range_m - b.met_at(stage).range_m) > tolerance_m_) return true;
+    return false;
+  }
+
+  template <class Direction>
+  void insert(const FanInterval& v, std::int32_t middle, const Direction& direction) {
+    at(middle).next = v.above;
+    at(middle).edge_above = false;
+    at(v.below).next = middle;
+    at(v.below).edge_above = false;
+    if (interpolates(at(v.below), at(middle), at(v.above), direction)) return;
+    consider(v.below, middle, v.column, v.depth + 1, halves_);
+    consider(middle, v.above, v.column, v.depth + 1, halves_);
+  }
+
+  template <class Direction>
+  bool interpolates(const Sample& a, const Sample& m, const Sample& b, const Direction& direction) const {
+    if (!meet_the_same(a, m) || !meet_the_same(a, b)) return false;
+    const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
+    for (int stage = 0; stage < m.stages(); ++stage) {
+      const SurfaceMet &below = a.met_at(stage), &middle = m.met_at(stage), &above = b.met_at(stage);
+      if (middle.object == RayPacket::miss) continue;
+      const float expected_x = 1.0f / (below.inverse_x + part * (above.inverse_x - below.inverse_x));
+      if (std::abs(expected_x / m.forward - middle.range_m) > tolerance_m_) return false;
+      const Vec3 along = direction(stage);
+      if (!(plane_is_near(below, along, middle) && plane_is_near(above, along, middle))) return false;
+    }
+    return true;
+  }
+  /// Whether the plane through one end meets the middle's ray about where it hit.
+  bool plane_is_near(const SurfaceMet& end, Vec3 along, const SurfaceMet& middle) const {
+    return std::abs(end.offset / dot(end.normal, along) - middle.range_m) <= slope_tolerance_in_pulses * tolerance_m_;
+  }
+
+  std::vector<Sample>& samples_;
+  std::vector<FanInterval>&open_, &halves_;
+  float tolerance_m_;
+};
+
+}  // namespace sonar
