@@ -56,7 +56,7 @@ TEST(Config, DefaultsAreTheManuals) {
 }
 
 constexpr const char* least =
-    "world: {scene: s.yaml}\nvehicles: [{name: rov}]\n"
+    "world: {scene: demo.yaml}\nvehicles: [{name: rov}]\n"
     "sonars: [{name: a, profile: oculus-m1200d, bind_ip: 127.0.0.2}]\nengine: ";
 
 TEST(Config, EveryPartOfTheModelIsSwitchedByItsNameAndNothingElse) {

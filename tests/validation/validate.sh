@@ -1,14 +1,16 @@
 #!/usr/bin/env bash
-# Makes docs/validation.md and its pictures anew: builds sonard, renders the experiments, under ten minutes on two cores.
-# usage: tests/validation/validate.sh [--only CHAPTER ...]     chapters: tank two-cylinders local-search differences cost capture oracles
-# The table of oracles is that of the last ./test.sh; the captured ping needs SONARD_CAPTURES. What has no data keeps its chapter.
+# Makes docs/validation.md and its pictures anew: builds sonard, renders the experiments, under fifteen minutes on two cores.
+# usage: tests/validation/validate.sh [--partial] [--only CHAPTER ...]
+# Chapters: tank two-cylinders local-search differences coverage cost parts capture oracles. Costs want a machine that does nothing else.
+# The table of oracles is that of the last ./test.sh, whole, or --partial says that part of it will do; the captured ping needs
+# SONARD_CAPTURES. What has no data keeps its chapter.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
 . tests/tools/setup.sh
 
 case "${1:-}" in
-  -h | --help) sed -n '2,4s/^# //p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,6s/^# //p' "$0"; exit 0 ;;
 esac
 
 # A Python that lies in front of the system's does not see the system's packages.

@@ -1,0 +1,30 @@
+"""The table of the oracles of a test run, for the validation page: the whole run, or it says what is missing."""
+
+import pathlib
+import subprocess
+import sys
+
+SCRIPT = pathlib.Path(__file__).resolve().parents[1] / "oracles" / "oracle_table.py"
+
+
+def chapter(folder, partial=False):
+    """The table of a test run, or None without one. A run that is not whole is refused, or with `partial` named in the chapter."""
+    if folder is None or not any(pathlib.Path(folder).glob("*.jsonl")):
+        return None
+    done = subprocess.run([sys.executable, str(SCRIPT), str(folder), "--markdown"], capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 1) or not done.stdout.strip():
+        raise RuntimeError(f"oracle_table.py failed: {done.stderr.strip()}")
+    faults = done.stderr.strip().splitlines()
+    if done.returncode == 1 and not partial:
+        raise RuntimeError("the table of oracles is not whole; run ./test.sh without a choice of tests, or give --partial:\n" +
+                           "\n".join(faults))
+    warning = f"**Not a whole run:** {faults[-1]}.\n\n" if done.returncode == 1 else ""
+    return INTRODUCTION + warning + done.stdout.strip() + "\n"
+
+
+INTRODUCTION = """## Oracles
+
+Closed forms that the engine is held to by its tests (`./test.sh`); of many measurements of one kind the worst is shown. This table
+is of the last test run before the page was made.
+
+"""
