@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "core/scene/noise.hpp"
+#include "core/scene/relief_noise.hpp"
 
 namespace sonar {
 namespace {

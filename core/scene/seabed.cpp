@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/scene/noise.hpp"
+#include "core/scene/relief_noise.hpp"
 #include "core/scene/terrain.hpp"
 
 namespace sonar {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "core/scene/noise.hpp"
+#include "core/scene/relief_noise.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/temporary_files.hpp"
 

@@ -1,4 +1,4 @@
-#include "core/scene/noise.hpp"
+#include "core/scene/relief_noise.hpp"
 
 #include <algorithm>
 
