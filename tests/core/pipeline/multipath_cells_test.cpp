@@ -99,7 +99,7 @@ TEST(MultipathCells, ViewInAMirrorIsThatOfTheMirroredScene) {
 TEST(MultipathCells, ARippledBedHasNoDarkBandsInAMirror) {
   // Rays fall in step with ripples; a bed that is seen in a ceiling alone must be as evenly lit as one that is seen straight on.
   const double ceiling_z = 0.5, bed_z = -1, image_z = 2 * ceiling_z - bed_z;
-  const auto ripples = [](double x) { return 0.01 * std::sin(2 * pi * x / 0.55); };
+  const auto ripples = [](double x) { return -0.01 * std::sin(2 * pi * x / 0.55); };
   SceneMaker real, image;
   real.add(sheet(40, 40), silent_db, {0, 0, ceiling_z});
   real.add(height_field(2, 11, -2, 2, 0.02, [&](double x, double) { return bed_z + ripples(x); }), -20);
