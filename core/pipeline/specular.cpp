@@ -15,6 +15,7 @@ constexpr double least_factor = 0.01;   // of eq. 7's K_vis
 constexpr double sight_slack_m = 5e-3;  // facets stand off the true surface, touching things overlap
 constexpr double bent_slack = 0.1;      // the same, in radii of curvature
 constexpr double most_bent_slack_m = 0.2;
+constexpr std::size_t most_surfaces_of_a_mesh = 4;
 
 /// Looks from the sonar at places of one object.
 class Sight {
@@ -168,12 +169,15 @@ void MirrorEchoes::candidates(const Object& object, PreparedMesh& mesh, const Mi
     for (MirrorPoint& p : points_) p.material = mesh.materials.front();
     return;
   }
-  bool missing = !mesh.surface;
-  mesh.wanted.resize(reflection_.size());
-  for (const std::uint16_t m : mesh.materials)
-    if (reflection_[m] != 0 && !mesh.wanted[m]) mesh.wanted[m] = missing = true;
-  if (missing) mesh.surface = std::make_unique<MirrorMesh>(*mesh.mesh, mesh.wanted);
-  mesh.surface->find(query, points_);
+  mirrors_.assign(reflection_.size(), false);
+  for (const std::uint16_t m : mesh.materials) mirrors_[m] = reflection_[m] != 0;
+  auto at = std::find_if(mesh.surfaces.begin(), mesh.surfaces.end(),
+                         [this](const PreparedMesh::Surface& s) { return s.mirrors == mirrors_; });
+  if (at == mesh.surfaces.end()) {
+    if (mesh.surfaces.size() >= most_surfaces_of_a_mesh) mesh.surfaces.erase(mesh.surfaces.begin());
+    at = mesh.surfaces.insert(mesh.surfaces.end(), {mirrors_, std::make_unique<const MirrorMesh>(*mesh.mesh, mirrors_)});
+  }
+  at->mesh->find(query, points_);
 }
 
 void MirrorEchoes::find(const RayScene& rays, std::span<const Pose> bodies_in_world, const PingPlan& plan, const PingScalars& s,
@@ -193,9 +197,7 @@ void MirrorEchoes::find(const RayScene& rays, std::span<const Pose> bodies_in_wo
     if (!object.visible || object.mesh->triangles.empty()) continue;
     PreparedMesh& mesh = prepared(i, object.mesh);
     if (std::all_of(mesh.materials.begin(), mesh.materials.end(), [&](std::uint16_t m) { return reflection_[m] == 0; })) continue;
-    const bool rides = object.body >= 0 && static_cast<std::size_t>(object.body) < bodies_in_world.size();
-    const Pose in_world =
-        rides ? compose(bodies_in_world[static_cast<std::size_t>(object.body)], scene.in_body(object)) : object.in_world;
+    const Pose in_world = scene.in_world(object, bodies_in_world);
     const Pose world_in_object = inverse(in_world);
     query.sonar_m = transform(world_in_object, s.seen_from.position_m);
     query.ahead = rotate(world_in_object.orientation, rotate(s.seen_from.orientation, Vec3d{1, 0, 0}));
@@ -212,8 +214,7 @@ void MirrorEchoes::find(const RayScene& rays, std::span<const Pose> bodies_in_wo
       const double bends = bending(point.range_m, point.curvature[0]) * bending(point.range_m, point.curvature[1]);
       const double strength = reflection * r * r / (2 * point.range_m * std::sqrt(std::abs(bends)));
       const double beside_turns = (r - point.range_m) * s.turns_per_m;
-      std::optional<PointEcho> echo =
-          point_echo(heard_from, std::polar(1.0, 2 * pi * (beside_turns - std::floor(beside_turns))), plan, s);
+      std::optional<PointEcho> echo = point_echo(heard_from, std::polar(1.0, 2 * pi * fraction_of_turn(beside_turns)), plan, s);
       if (!echo) continue;
       const std::complex<double> factor = visible_factor(point, query.wavelength_m, sight);
       if (std::abs(factor) < least_factor) continue;

@@ -32,8 +32,13 @@ class MirrorEchoes {
     std::vector<std::uint16_t> materials;  // used by it
     Vec3d centre_m;
     double radius_m = 0;
-    std::vector<bool> wanted;  // what `surface` was made for
-    std::unique_ptr<MirrorMesh> surface;
+    /// As far as it mirrors, which depends on the frequency: one for every set of its materials that does, or a ping would depend
+    /// on those before it.
+    struct Surface {
+      std::vector<bool> mirrors;  // by material
+      std::unique_ptr<const MirrorMesh> mesh;
+    };
+    std::vector<Surface> surfaces;  // oldest first
   };
   PreparedMesh& prepared(std::size_t object, const std::shared_ptr<const Mesh>& mesh);
   void candidates(const Object& object, PreparedMesh& mesh, const MirrorQuery& query);
@@ -41,6 +46,7 @@ class MirrorEchoes {
   std::vector<PreparedMesh> meshes_;  // in the order in which they were met
   std::vector<std::size_t> mesh_of_;  // object to place in meshes_
   std::vector<double> reflection_;    // per material, this ping
+  std::vector<bool> mirrors_;         // those of a mesh that do
   std::vector<MirrorPoint> points_;
 };
 

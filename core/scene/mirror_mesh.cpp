@@ -92,11 +92,13 @@ void MirrorMesh::find_on_curves(const MirrorQuery& q, std::vector<MirrorPoint>& 
     }
     for (std::uint32_t t = node.first; t < node.first + node.count; ++t) solve(t, q, out);
   }
-  // Two triangles may both claim a point on the edge between them.
+  // Two triangles may both claim a point on the edge between them. Where two materials meet, each has its own half of the echo.
   for (std::size_t i = first; i < out.size(); ++i) {
     const double apart = twins_in_units * std::min(fresnel_unit_m(q.wavelength_m, out[i].range_m, out[i].curvature[0]),
                                                    fresnel_unit_m(q.wavelength_m, out[i].range_m, out[i].curvature[1]));
-    const auto twin = [&](const MirrorPoint& other) { return length(other.foot_m - out[i].foot_m) < apart; };
+    const auto twin = [&](const MirrorPoint& other) {
+      return other.material == out[i].material && length(other.foot_m - out[i].foot_m) < apart;
+    };
     out.erase(std::remove_if(out.begin() + static_cast<std::ptrdiff_t>(i) + 1, out.end(), twin), out.end());
   }
 }

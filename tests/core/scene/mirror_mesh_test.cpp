@@ -118,6 +118,26 @@ TEST(MirrorMesh, UnwantedMaterialsAreLeftOut) {
   EXPECT_EQ(MirrorMesh(mesh, {}).faces(), 0u);
 }
 
+// Which of them mirrors is for the frequency to say: none may be taken for a repetition of the other.
+TEST(MirrorMesh, SurfacesOfTwoMaterialsAreNeverOne) {
+  Mesh mesh = make_sphere(0.5, segments_for(0.5));
+  const Mesh coat = make_sphere(0.5002, segments_for(0.5));
+  const auto n = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), coat.vertices.begin(), coat.vertices.end());
+  for (const auto& t : coat.triangles) {
+    mesh.triangles.push_back({t[0] + n, t[1] + n, t[2] + n});
+    mesh.material.push_back(1);
+  }
+  const auto near_points = [&](const std::vector<bool>& wanted) {
+    std::vector<MirrorPoint> points;
+    MirrorMesh(mesh, wanted).find({{2, 0.3, 0.1}, 1e-3, 2}, points);
+    return points.size();
+  };
+  EXPECT_EQ(near_points({true, false}), 1u);
+  EXPECT_EQ(near_points({false, true}), 1u);
+  EXPECT_EQ(near_points({true, true}), 2u);
+}
+
 TEST(MirrorMesh, SmallAngleIsACurveLargeAngleAnEdge) {
   EXPECT_EQ(MirrorMesh(make_cylinder(0.3, 1, 36, Caps::none), all_materials).faces(), 0u);
   EXPECT_EQ(MirrorMesh(make_cylinder(0.3, 1, 8, Caps::none), all_materials).faces(), 8u);
