@@ -1,5 +1,6 @@
 #include "core/pipeline/multipath_legs.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace sonar {
@@ -94,7 +95,9 @@ double bubble_factor(const BubbleLayer& bubbles, const Leg& leg, const std::vect
     const Vec3d source = two_left ? image_in(at(mirrors, leg.second)).of(image_in(at(mirrors, leg.first)).of({}))
                                   : image_in(at(mirrors, leg.first)).of({});
     const double from = at(mirrors, mirror).height_of(source), to = at(mirrors, mirror).height_of(end);
-    bends.push_back(source + (from / (from - to)) * (end - source));
+    // A place on the dark side has no such line; tiles that reach through the mirror may be represented by one.
+    const double part = from == to ? 0.5 : std::clamp(from / (from - to), 0.0, 1.0);
+    bends.push_back(source + part * (end - source));
   }
   bends.push_back({});
   double factor = 1;

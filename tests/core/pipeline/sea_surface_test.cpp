@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/pipeline/bubbles.hpp"
+#include "core/pipeline/multipath_legs.hpp"
 #include "core/pipeline/scattering_law.hpp"
 #include "core/scene/load_scene.hpp"
 #include "tests/core/pipeline/scenes.hpp"
@@ -90,6 +91,19 @@ TEST(SeaSurface, DiffuseEchoIsMuSquareSine) {
           sum += s.power(row, j) / power_from_db(from_above.db(s.range_of_row(row), s.beam_sine(j)));
       record_oracle(8, "sea surface from below", 0, 10 * std::log10(sum / n), 0.3, "dB");
     }
+  }
+}
+
+// The middle of a tile that reaches through a mirror may lie where no way by it leads: still a factor, never not a number.
+TEST(Bubbles, OfAPlaceBehindTheMirrorAreStillAFactor) {
+  const std::vector<FlatMirror> mirrors{{.face = 0, .normal = {0, 0, -1}, .height_m = 1, .reflection = -1}};
+  const BubbleLayer bubbles(SeaSurface{.present = true, .bubble_layer_m = 0.5f, .bubble_loss_db_per_m = 4});
+  PingScalars s;
+  s.seen_from.position_m.z = -1;
+  const auto factor = [&](double z) { return bubble_factor(bubbles, leg_by(mirrors, 0), mirrors, {3, 0, z}, s); };
+  for (const double z : {-2.0, 0.0, 0.999, 1.0, 1.5, 2.0, 2.5, 40.0}) {
+    EXPECT_GT(factor(z), 0) << z;
+    EXPECT_LT(factor(z), 1) << z;
   }
 }
 
