@@ -20,17 +20,6 @@ constexpr double widest_offset = 0.2;  // of b: how far off our carrier another 
 
 double unit_uniform(std::uint32_t bits) { return static_cast<double>(bits) / 4294967296.0; }
 
-bool hidden(const RayScene& scene, Vec3d from, Vec3d place) {
-  RayPacket ray{};
-  const double distance = length(place - from);
-  const Vec3 o = to_float(from - scene.origin()), d = to_float((1 / distance) * (place - from));
-  ray.origin_x[0] = o.x, ray.origin_y[0] = o.y, ray.origin_z[0] = o.z;
-  ray.direction_x[0] = d.x, ray.direction_y[0] = d.y, ray.direction_z[0] = d.z;
-  ray.far[0] = static_cast<float>(distance) * 0.9999f;
-  scene.trace(ray, 1u, false);
-  return ray.object[0] != RayPacket::miss;
-}
-
 /// The Gaussian filter's step response, 0 to 1; `x` in b t.
 double rise(double x) { return 0.5 * (1 + std::erf(x)); }
 
@@ -81,7 +70,7 @@ std::vector<PulseHeard> hear_other_sonars(const RayScene& scene, const PingPlan&
     const OtherSonar& other = others[i];
     const double range_m = length(other.position_m - request.sonar_in_world.position_m);
     if (!(other.rate_hz > 0) || !(other.level_upa > 0) || range_m < nearest_scatterer_m) continue;
-    if (hidden(scene, request.sonar_in_world.position_m, other.position_m)) continue;
+    if (is_hidden(scene, request.sonar_in_world.position_m, other.position_m)) continue;
     const Random4 draw = philox(static_cast<std::uint32_t>(i), request.sonar_id, 0, other_sonar_key,
                                 static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32));
     const double rate_hz = static_cast<double>(other.rate_hz), travel_s = range_m / s.sound_speed_mps;

@@ -8,11 +8,6 @@ namespace {
 
 constexpr double most_grazing_cosine = 0.17;  // faces that do not mirror at 10 degrees grazing are left out
 
-Pose object_in_world(const Scene& scene, const Object& object, std::span<const Pose> bodies) {
-  if (object.body < 0 || static_cast<std::size_t>(object.body) >= bodies.size()) return object.in_world;
-  return compose(bodies[static_cast<std::size_t>(object.body)], scene.in_body(object));
-}
-
 /// Mirroring of places: p - 2 (n . p + height) n.
 struct Image {
   Rotation turn;
@@ -46,7 +41,7 @@ std::vector<FlatMirror> mirrors_of(const FlatFaces& faces, const Scene& scene, s
     m.twice_kh_squared = 2 * kh * kh;
     if (std::abs(m.reflectance(most_grazing_cosine)) <= least_reflectance) continue;
     const Pose in_sonar =
-        compose(inverse(s.seen_from), object_in_world(scene, scene.objects[static_cast<std::size_t>(face.object)], bodies));
+        compose(inverse(s.seen_from), scene.in_world(scene.objects[static_cast<std::size_t>(face.object)], bodies));
     m.normal = rotate(in_sonar.orientation, face.normal);
     m.height_m = -(face.offset_m + dot(m.normal, in_sonar.position_m));
     if (m.height_m < 0) m.normal = -1.0 * m.normal, m.height_m = -m.height_m;

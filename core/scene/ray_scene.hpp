@@ -45,4 +45,7 @@ class RayScene {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Whether anything stands between two places of the world; what lies at the far one itself does not count.
+bool is_hidden(const RayScene& scene, Vec3d from, Vec3d place);
+
 }  // namespace sonar

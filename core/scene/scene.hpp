@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -114,10 +115,23 @@ struct Scene {
     if (object.body < 0) return object.in_world;
     return compose(inverse(bodies_in_world.at(static_cast<std::size_t>(object.body))), object.in_world);
   }
+  /// Where an object, or a point, is while the bodies are there; bodies that are not given stay where the scene put them.
+  Pose in_world(const Object& object, std::span<const Pose> bodies) const {
+    return rides(object.body, bodies) ? compose(bodies[static_cast<std::size_t>(object.body)], in_body(object)) : object.in_world;
+  }
+  Vec3d in_world(const PointTarget& point, std::span<const Pose> bodies) const {
+    return rides(point.body, bodies) ? transform(bodies[static_cast<std::size_t>(point.body)], point.position_m)
+                                     : point.position_m;
+  }
   std::size_t triangle_count() const {
     std::size_t n = 0;
     for (const Object& o : objects) n += o.mesh->triangles.size();
     return n;
+  }
+
+ private:
+  static bool rides(int body, std::span<const Pose> bodies) {
+    return body >= 0 && static_cast<std::size_t>(body) < bodies.size();
   }
 };
 

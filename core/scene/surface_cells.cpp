@@ -228,10 +228,7 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
     if (sheet->object != object) {
       object = sheet->object;
       const Object& o = scene_->objects[static_cast<std::size_t>(object)];
-      const bool moves = o.body >= 0 && static_cast<std::size_t>(o.body) < view.bodies_in_world.size();
-      const Pose object_in_world =
-          moves ? compose(view.bodies_in_world[static_cast<std::size_t>(o.body)], scene_->in_body(o)) : o.in_world;
-      sonar_in_object = compose(inverse(object_in_world), view.sonar_in_world);
+      sonar_in_object = compose(inverse(scene_->in_world(o, view.bodies_in_world)), view.sonar_in_world);
       rotations_[static_cast<std::size_t>(object)] = rotation_from(conjugate(sonar_in_object.orientation));
     }
     for (auto& root : sheet->roots) visit(*sheet, *root, view, sonar_in_object, rotations_[static_cast<std::size_t>(object)]);
