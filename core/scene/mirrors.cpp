@@ -6,6 +6,8 @@
 #include <map>
 #include <unordered_map>
 
+#include "core/scene/mirror_mesh.hpp"
+
 namespace sonar {
 namespace {
 
@@ -13,7 +15,6 @@ constexpr double least_area_m2 = 0.05;
 constexpr double least_width_m = 0.1;        // area / greatest extent: a mirror is many Fresnel zones wide
 constexpr double same_plane_m = 2e-4;        // an eighth of a wavelength at 1 MHz
 constexpr double same_normal = 1 - 1e-6;     // cosine
-constexpr double gentle_bend = 0.9;          // cosine; facets that meet at less than 25 degrees approximate a curve
 constexpr double most_gentle_border = 0.25;  // of a face's border
 
 using Triangles = std::vector<std::uint32_t>;
@@ -130,6 +131,7 @@ class Edges {
 
 /// Whether the face is a facet of something curved: its neighbours go on at a slight angle.
 bool curves_on(const Mesh& mesh, const Edges& edges, const Candidate& c) {
+  const double gentle_bend = std::cos(smooth_edge_rad);
   double border_m = 0, gentle_m = 0;
   for (const std::uint32_t t : c.triangles)
     for (std::size_t i = 0; i < 3; ++i) {
