@@ -13,7 +13,8 @@
 
 namespace sonar {
 
-/// Columns of constant direction sine u = y / r (cones about the array axis), falling from port to starboard like the beams.
+/// Columns of constant direction sine u = y / r, cones about the array axis (flat beams: sine of azimuth), falling from port to
+/// starboard like the beams.
 struct Columns {
   int count = 0;
   double first_sine = 0;        // centre of column 0
@@ -27,7 +28,7 @@ struct Fan {
   double half_angle_rad = 0;
   float first_tangent = 0, bins_per_tangent = 0;
   int bins = 0;
-  std::vector<float> elevation_rad;  // the base fan, falling... rising from below to above
+  std::vector<float> elevation_rad;  // the base fan, from below to above
 };
 
 /// Weights of four neighbouring beams over the columns they share.

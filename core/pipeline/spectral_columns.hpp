@@ -20,7 +20,7 @@ struct SpectralScratch {
 /// transform land on the samples themselves. Errors: of FrequencySums at width 6, 1e-5.
 class SpectralColumns {
  public:
-  /// `taps`: samples that a pulse may reach, as PingPlan::taps. The pulse must not be real only by luck: see Pulse::is_real.
+  /// `taps`: samples that a pulse may reach, as PingPlan::taps. For any pulse; real ones are cheaper in time.
   SpectralColumns(const Pulse& pulse, double sample_time_s, int samples, int taps);
 
   int period_samples() const { return period_; }

@@ -13,7 +13,7 @@
 
 namespace sonar {
 
-/// Buffers of add_volume that live from ping to ping; one per worker.
+/// Buffers of Volume::add that live from ping to ping; one per worker.
 struct VolumeScratch {
   std::vector<double> blocked;     // by sample: how much of the fan ends there
   std::vector<float> rms, grains;  // by sample; grains are complex

@@ -55,7 +55,7 @@ struct EchoArrays {
   std::int32_t* column;  // absolute column
 };
 
-/// Gaussian (or other) pulse on the sample grid: row `f` holds `taps` values and then `taps` differences to the next row.
+/// A real pulse on the sample grid: row `f` holds `taps` values and then `taps` differences to the next row.
 struct PulseRows {
   const float* rows;
   int taps, steps;
