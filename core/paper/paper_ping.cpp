@@ -14,8 +14,6 @@ namespace {
 constexpr std::uint32_t speckle_key = 0x50323521;  // keeps these draws apart from all others
 constexpr double width_constant = 0.884;           // P25's code, for sinc patterns: -3 dB width times aperture
 
-double fraction(double x) { return x - std::floor(x); }
-
 /// The comparison modes know no motion within the ping.
 PingScalars still_scalars(const PingPlan& plan, PingRequest request, Vec3d origin) {
   request.switches.motion = false;
@@ -43,7 +41,7 @@ bool add_echo(double range_m, double elevation_rad, double cross_section_m2, Com
     echoes.push_back({turns, {amplitude * amplitude, 0}});
   else
     echoes.push_back({turns, spectral::Complex(static_cast<double>(xi.re), static_cast<double>(xi.im)) *
-                                 std::polar(amplitude, -2 * pi * fraction(range_m * s.turns_per_m))});
+                                 std::polar(amplitude, -2 * pi * fraction_of_turn(range_m * s.turns_per_m))});
   return true;
 }
 
@@ -58,9 +56,7 @@ std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p
   const std::vector<Pose>& bodies = request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world;
   std::vector<PointInView> points;
   for (const PointTarget& target : scene.scene().point_targets) {
-    const bool rides = target.body >= 0 && static_cast<std::size_t>(target.body) < bodies.size();
-    const Vec3d in_world =
-        rides ? transform(bodies[static_cast<std::size_t>(target.body)], target.position_m) : target.position_m;
+    const Vec3d in_world = scene.scene().in_world(target, bodies);
     const Vec3d at = transform(inverse(s.seen_from), in_world);
     const double range = length(at), azimuth = std::atan2(at.y, at.x), elevation = std::asin(at.z / std::max(range, 1e-9));
     int nearest = 0;
@@ -71,13 +67,7 @@ std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p
     const double row = ((p.fan.perspective ? at.z / at.x : elevation) - p.fan.first_row) / p.fan.row_step;
     if (at.x <= 0 || off(nearest) > p.fan.column_width[static_cast<std::size_t>(nearest)] || row < -0.5 || row > p.fan.rows - 0.5)
       continue;
-    RayPacket ray{};
-    const Vec3 along = to_float((1 / range) * (in_world - s.seen_from.position_m));
-    ray.origin_x[0] = s.position_in_scene.x, ray.origin_y[0] = s.position_in_scene.y, ray.origin_z[0] = s.position_in_scene.z;
-    ray.direction_x[0] = along.x, ray.direction_y[0] = along.y, ray.direction_z[0] = along.z;
-    ray.far[0] = static_cast<float>(range) * 0.9999f;
-    scene.trace(ray, 1u, false);
-    if (ray.object[0] == RayPacket::miss)
+    if (!is_hidden(scene, s.seen_from.position_m, in_world))
       points.push_back({nearest, range, elevation, std::pow(10.0, 0.1 * static_cast<double>(target.target_strength_db))});
   }
   return points;

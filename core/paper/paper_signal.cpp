@@ -7,8 +7,7 @@ namespace sonar::paper {
 namespace {
 
 using spectral::Complex;
-
-Complex turned(double turns) { return std::polar(1.0, 2 * pi * (turns - std::floor(turns))); }
+using spectral::turned;
 
 constexpr std::size_t largest_power_table = std::size_t{1} << 22;  // values
 constexpr int most_steps = 64;

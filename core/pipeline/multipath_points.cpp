@@ -59,9 +59,8 @@ class PointGhosts {
     if (!reaches(scene_, s_, faces_, ways_.mirrors, leg, place)) return {};
     const double size = reflectance_of(leg, ways_.mirrors, (1 / r) * p) * std::exp(-s_.absorption_np_per_m * r) / r *
                         static_cast<double>(pattern_(static_cast<float>(std::pow(std::sin(direction.psi_rad), 2))));
-    const double half_turns = 0.5 * r * s_.turns_per_m;
     return PointArrival{r, direction.u, static_cast<double>(plan_.columns.transmit[static_cast<std::size_t>(column)]),
-                        s_.doppler_samples(p), size * std::polar(1.0, -2 * pi * (half_turns - std::floor(half_turns)))};
+                        s_.doppler_samples(p), size * std::polar(1.0, -2 * pi * fraction_of_turn(0.5 * r * s_.turns_per_m))};
   }
 
   const RayScene& scene_;
@@ -81,9 +80,7 @@ void ghosts_of_points(const RayScene& scene, std::span<const Pose> bodies, const
   const PointGhosts ghosts(scene, faces, ways, plan, s);
   const Pose world_in_sonar = inverse(s.seen_from);
   for (const PointTarget& target : scene.scene().point_targets) {
-    const bool rides = target.body >= 0 && static_cast<std::size_t>(target.body) < bodies.size();
-    const Vec3d in_world =
-        rides ? transform(bodies[static_cast<std::size_t>(target.body)], target.position_m) : target.position_m;
+    const Vec3d in_world = scene.scene().in_world(target, bodies);
     ghosts.add(transform(world_in_sonar, in_world), amplitude_from_db(static_cast<double>(target.target_strength_db)), points);
   }
 }

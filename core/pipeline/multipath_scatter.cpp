@@ -13,7 +13,6 @@ namespace {
 constexpr float depth_tolerance_in_pulses = 1.5f;  // as for direct echoes, scatter.cpp
 constexpr float least_transmit = 1e-3f;            // columns lit by less are not received from
 
-double fraction(double turns) { return turns - std::floor(turns); }
 void store(Vec3d v, float (&to)[3]) {
   to[0] = static_cast<float>(v.x), to[1] = static_cast<float>(v.y), to[2] = static_cast<float>(v.z);
 }
@@ -128,7 +127,7 @@ GhostScatterer::Way GhostScatterer::look_at(const TileInView& tile, const Leg& l
   for (int i = 0; i < 9; ++i) way.turn[i] = static_cast<float>(turn.m[i / 3][i % 3]);
   way.range_m = static_cast<float>(range);
   way.sample_shift = static_cast<float>(s_.doppler_samples(at.from_sonar_m));
-  way.half_turns = static_cast<float>(fraction(0.5 * range * s_.turns_per_m));
+  way.half_turns = static_cast<float>(fraction_of_turn(0.5 * range * s_.turns_per_m));
   way.amplitude = static_cast<float>(std::exp(-s_.absorption_np_per_m * range));
   if (ways_.bubbles.present())
     way.amplitude *= static_cast<float>(bubble_factor(ways_.bubbles, leg, ways_.mirrors, tile_middle_, s_));

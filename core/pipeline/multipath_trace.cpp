@@ -122,7 +122,7 @@ class ColumnsTracer {
     chain.elevation_rad = elevation_rad;
     chain.tangent = sine / cosine;
     chain.forward = conical ? across * cosine : cosine;
-    rays_.add({across * cosine, conical ? along : along * cosine, conical ? across * sine : sine}, far_m_);
+    rays_.add(ray_in_sonar(conical, along, across, cosine, sine), far_m_);
   }
   /// Follows the packet; its lanes are the samples `index`.
   void follow(const std::array<std::int32_t, RayPacket::size>& index) {

@@ -15,8 +15,6 @@ namespace {
 constexpr float depth_tolerance_in_pulses = 1.5f;   // docs/acoustics.md, section 3: covers the straight lines between rays
 constexpr std::uint32_t fixed_fan_key = 0x66616eu;  // keeps these draws apart from the cells'
 
-double fraction(double turns) { return turns - std::floor(turns); }
-
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
 /// Of a cell in the midst of the tile, from its centre: on the surface, which the centre need not be. Object axes.
@@ -44,7 +42,7 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<co
   seen.from_sonar[0] = p.x, seen.from_sonar[1] = p.y, seen.from_sonar[2] = p.z;
   for (int i = 0; i < 9; ++i) seen.turn[i] = static_cast<float>(sonar_from_object.m[i / 3][i % 3]);
   seen.range_m = static_cast<float>(range);
-  seen.phase_turns = static_cast<float>(fraction(range * s.turns_per_m));
+  seen.phase_turns = static_cast<float>(fraction_of_turn(range * s.turns_per_m));
   seen.sample_shift = static_cast<float>(s.doppler_samples(at.from_sonar_m));
   const LawTable& law = laws[static_cast<std::size_t>(tile.material)];
   seen.law = law.table();
@@ -78,9 +76,9 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<co
 }
 
 /// Of a ray of the fixed fan, sonar axes.
-Vec3d direction_of(const FanHit& hit, double sine, bool conical) {
-  const double psi = static_cast<double>(hit.elevation_rad), across = std::sqrt(std::max(0.0, 1 - sine * sine));
-  return {across * std::cos(psi), conical ? sine : sine * std::cos(psi), (conical ? across : 1.0) * std::sin(psi)};
+Vec3d direction_of_hit(const FanHit& hit, double sine, bool conical) {
+  const ConicalDirection d{sine, static_cast<double>(hit.elevation_rad)};
+  return conical ? sonar_from_conical(d) : sonar_from_flat(d);
 }
 
 }  // namespace
@@ -174,7 +172,7 @@ void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPl
   const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
   for (const FanHit& hit : hits) {
     const double r = static_cast<double>(hit.range_m), sine = plan.columns.sine(hit.column);
-    const double at_sample = s.sample_of(r) + s.doppler_samples(direction_of(hit, sine, plan.switches.conical));
+    const double at_sample = s.sample_of(r) + s.doppler_samples(direction_of_hit(hit, sine, plan.switches.conical));
     const double cosine = static_cast<double>(hit.cosine);
     // Said so that what is not a number is left out, too.
     if (!(at_sample > -plan.taps / 2 && at_sample < plan.samples + plan.taps / 2 - 1)) continue;
@@ -196,7 +194,7 @@ void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPl
     const Random4 draw = philox(hit.object, static_cast<std::uint32_t>(hit.column), static_cast<std::uint32_t>(hit.ray),
                                 fixed_fan_key, static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32));
     const ComplexNormal xi = complex_normal(draw.v[0], draw.v[1]);
-    const double phase = -2 * pi * fraction(r * s.turns_per_m);
+    const double phase = -2 * pi * fraction_of_turn(r * s.turns_per_m);
     const std::complex<double> a = std::complex<double>(xi.re, xi.im) * std::polar(amplitude, phase);
     echoes.add(static_cast<float>(at_sample), std::complex<float>(a), hit.column);
   }
@@ -207,24 +205,13 @@ std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pos
   std::vector<PointEcho> points;
   const Pose world_in_sonar = inverse(s.seen_from);
   for (const PointTarget& target : scene.scene().point_targets) {
-    const Vec3d local = target.position_m;
-    const bool rides = target.body >= 0 && static_cast<std::size_t>(target.body) < bodies_in_world.size();
-    const Vec3d in_world = rides ? transform(bodies_in_world[static_cast<std::size_t>(target.body)], local) : local;
+    const Vec3d in_world = scene.scene().in_world(target, bodies_in_world);
     const Vec3d seen = transform(world_in_sonar, in_world);
-    const double r_seen = length(seen);
-    if (r_seen < nearest_scatterer_m || seen.x <= 0) continue;
+    if (length(seen) < nearest_scatterer_m || seen.x <= 0) continue;
     const double strength = amplitude_from_db(static_cast<double>(target.target_strength_db));
     const std::optional<PointEcho> echo = point_echo(seen, strength, plan, s);
     if (!echo) continue;
-
-    RayPacket ray{};
-    const Vec3d along = (1 / r_seen) * (in_world - s.seen_from.position_m);
-    ray.origin_x[0] = s.position_in_scene.x, ray.origin_y[0] = s.position_in_scene.y, ray.origin_z[0] = s.position_in_scene.z;
-    const Vec3 d = to_float(along);
-    ray.direction_x[0] = d.x, ray.direction_y[0] = d.y, ray.direction_z[0] = d.z;
-    ray.far[0] = static_cast<float>(r_seen) * 0.9999f;
-    scene.trace(ray, 1u, false);
-    if (ray.object[0] == RayPacket::miss) points.push_back(*echo);
+    if (!is_hidden(scene, s.seen_from.position_m, in_world)) points.push_back(*echo);
   }
   return points;
 }
@@ -241,7 +228,7 @@ std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> str
   const double transmit = static_cast<double>(plan.columns.transmit[static_cast<std::size_t>(column)]);
   const double amplitude = s.source_upa * two_way_transmission(r, s.absorption_np_per_m) *
                            elevation_two_way(plan.mode.pattern, direction.psi_rad) * transmit;
-  return PointEcho{direction.u, at_sample, strength_m * std::polar(amplitude, -2 * pi * fraction(r * s.turns_per_m))};
+  return PointEcho{direction.u, at_sample, strength_m * std::polar(amplitude, -2 * pi * fraction_of_turn(r * s.turns_per_m))};
 }
 
 }  // namespace sonar

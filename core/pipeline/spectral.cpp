@@ -28,8 +28,6 @@ double kernel_transform(int width, double f) {
   return sum * pi / steps * width / 2;
 }
 
-Complex turned(double turns) { return std::polar(1.0, 2 * pi * (turns - std::floor(turns))); }
-
 }  // namespace
 
 std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid) {

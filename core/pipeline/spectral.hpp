@@ -3,12 +3,17 @@
 // (docs/acoustics.md, section 4).
 #pragma once
 
+#include <complex>
 #include <span>
 #include <vector>
 
+#include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/spectral_transform.hpp"
 
 namespace sonar::spectral {
+
+/// e^{i 2 pi turns}, exact however many turns.
+inline Complex turned(double turns) { return std::polar(1.0, 2 * pi * fraction_of_turn(turns)); }
 
 /// Frequencies first_hz + m step_hz, m in [0, count).
 struct FrequencyGrid {

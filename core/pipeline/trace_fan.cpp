@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+
 namespace sonar {
 namespace {
 
@@ -36,8 +38,7 @@ class PacketFiller {
 
   void add(ColumnSine column, Elevation e) {
     const auto i = static_cast<std::size_t>(count_++);
-    const float x = column.across * e.cosine, y = conical_ ? column.along : column.along * e.cosine;
-    const float z = conical_ ? column.across * e.sine : e.sine;
+    const auto [x, y, z] = ray_in_sonar(conical_, column.along, column.across, e.cosine, e.sine);
     packet.direction_x[i] = m_[0] * x + m_[1] * y + m_[2] * z;
     packet.direction_y[i] = m_[3] * x + m_[4] * y + m_[5] * z;
     packet.direction_z[i] = m_[6] * x + m_[7] * y + m_[8] * z;

@@ -83,9 +83,6 @@ SONAR_HD inline double width_factor(Taper taper) {
 SONAR_HD inline double aperture_in_wavelengths(Taper taper, double width_rad) {
   return width_factor(taper) / (2 * std::sin(0.5 * width_rad));
 }
-SONAR_HD inline double lambda_over_aperture(Taper taper, double width_rad) {
-  return 1 / aperture_in_wavelengths(taper, width_rad);
-}
 
 /// Signed receive amplitude W of eq. (9): `du` = difference of the direction sines of source and beam axis.
 SONAR_HD inline double directivity(Taper taper, double aperture_wavelengths, double du) {
@@ -152,9 +149,18 @@ SONAR_HD inline ConicalDirection flat_from_sonar(Vec3d direction_in_sonar) {
   const double h = std::sqrt(direction_in_sonar.x * direction_in_sonar.x + direction_in_sonar.y * direction_in_sonar.y);
   return {direction_in_sonar.y / h, std::atan2(direction_in_sonar.z, h)};
 }
+/// Their inverses, unit vectors.
 SONAR_HD inline Vec3d sonar_from_conical(const ConicalDirection& d) {
-  const double across = std::sqrt(1 - d.u * d.u);
+  const double across = std::sqrt(std::fmax(0.0, 1 - d.u * d.u));
   return {across * std::cos(d.psi_rad), d.u, across * std::sin(d.psi_rad)};
+}
+SONAR_HD inline Vec3d sonar_from_flat(const ConicalDirection& d) {
+  const double across = std::sqrt(std::fmax(0.0, 1 - d.u * d.u));
+  return {across * std::cos(d.psi_rad), d.u * std::cos(d.psi_rad), std::sin(d.psi_rad)};
+}
+/// The same for rays, which decide shadows only, from sines and cosines that are at hand: u, sqrt(1 - u^2), of psi.
+SONAR_HD constexpr Vec3 ray_in_sonar(bool conical, float u, float across, float cosine, float sine) {
+  return {across * cosine, conical ? u : u * cosine, conical ? across * sine : sine};
 }
 
 }  // namespace sonar

@@ -21,18 +21,10 @@ SONAR_HD inline double lambert_coefficient(double lambert_db) { return std::pow(
 
 /// Lambert's sigma_b = mu cos^2(incidence) per unit surface area.
 SONAR_HD inline double lambert_per_area(double mu, double cosine) { return mu * cosine * cosine; }
-/// Cross-section [m^2] of a piece of surface of known area (a cell).
-SONAR_HD inline double cell_cross_section_m2(double mu, double cosine, double area_m2) {
-  return lambert_per_area(mu, cosine) * area_m2;
-}
 /// Surface area [m^2] seen in a solid angle at range r.
 SONAR_HD inline double footprint_area_m2(double cosine, double range_m, double solid_angle_sr) {
   const double c = std::fabs(cosine);
   return range_m * range_m * solid_angle_sr / (c > cosine_floor ? c : cosine_floor);
-}
-/// Cross-section [m^2] of what a solid angle sees: eq. (5), mu cos r^2 dOmega away from grazing.
-SONAR_HD inline double lambert_cross_section_m2(double mu, double cosine, double range_m, double solid_angle_sr) {
-  return cell_cross_section_m2(mu, cosine, footprint_area_m2(cosine, range_m, solid_angle_sr));
 }
 
 /// Amplitude absorption [Np/m] from dB/m: 1 Np = 8.686 dB.
@@ -44,11 +36,8 @@ SONAR_HD inline double two_way_transmission(double range_m, double alpha_np_per_
   return std::exp(-2 * alpha_np_per_m * range_m) / (range_m * range_m);
 }
 
-/// Carrier phase of an echo from range r in turns, folded to [0, 1): the echo is multiplied by exp(-i 2 pi turns).
+/// A phase in turns, folded to [0, 1): an echo is multiplied by exp(-i 2 pi turns), turns = 2 f r / c.
 /// In double: a float range alone costs 1e-3 of the signal at 900 kHz (docs/acoustics.md, section 1).
-SONAR_HD inline double carrier_turns(double centre_hz, double sound_speed_mps, double range_m) {
-  const double turns = 2 * centre_hz * range_m / sound_speed_mps;
-  return turns - std::floor(turns);
-}
+SONAR_HD inline double fraction_of_turn(double turns) { return turns - std::floor(turns); }
 
 }  // namespace sonar

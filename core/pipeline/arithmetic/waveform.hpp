@@ -19,8 +19,6 @@ inline constexpr double half_power_bt = 0.58870501125773734;
 SONAR_HD inline double envelope_parameter_hz(double sound_speed_mps, double pulse_width_m) {
   return half_power_bt * sound_speed_mps / pulse_width_m;
 }
-/// The inverse: -3 dB intensity width in range [m].
-SONAR_HD inline double pulse_range_width_m(double sound_speed_mps, double b_hz) { return half_power_bt * sound_speed_mps / b_hz; }
 
 /// p(t), p(0) = 1.
 SONAR_HD inline double envelope(double b_hz, double time_s) {

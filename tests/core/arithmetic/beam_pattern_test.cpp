@@ -38,7 +38,7 @@ TEST(BeamPattern, WidthFactorsOfTheTable) {
   EXPECT_NEAR(width_factor(Taper::taylor30), 1.125, 0.001);
   EXPECT_NEAR(width_factor(Taper::hamming), 1.31, 0.01);
   EXPECT_NEAR(width_factor(Taper::hann), 1.44, 0.001);
-  EXPECT_NEAR(lambda_over_aperture(Taper::uniform, 0.01), 0.01 / 0.886, 1e-5);
+  EXPECT_NEAR(aperture_in_wavelengths(Taper::uniform, 0.01), 88.6, 0.1);
 }
 
 TEST(BeamPattern, Oracle15_HighestSideLobe) {
@@ -125,6 +125,14 @@ TEST(BeamPattern, Oracle46_ConicalShiftOfAnElevatedPoint) {
     const ConicalDirection c = conical_from_sonar(7.0 * direction);
     EXPECT_NEAR(deg_from_rad(std::asin(c.u)), seen_deg, 0.1);
     EXPECT_NEAR(length(sonar_from_conical(c) - direction), 0, 1e-12);
+    EXPECT_NEAR(length(sonar_from_flat(flat_from_sonar(7.0 * direction)) - direction), 0, 1e-12);
+    const auto rounded = [](double x) { return static_cast<float>(x); };
+    for (const bool conical : {true, false}) {
+      const ConicalDirection d = conical ? c : flat_from_sonar(direction);
+      const Vec3 ray = ray_in_sonar(conical, rounded(d.u), rounded(std::sqrt(1 - d.u * d.u)), rounded(std::cos(d.psi_rad)),
+                                    rounded(std::sin(d.psi_rad)));
+      EXPECT_NEAR(length(to_double(ray) - direction), 0, 1e-6);
+    }
   }
 }
 

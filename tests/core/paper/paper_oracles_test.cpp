@@ -80,7 +80,7 @@ TEST(PaperOracles, Oracle09_SphereInPaperMode) {
     double printed = 0, lambert = 0;
     for (const paper::PaperHit& hit : hits) {
       printed += paper::printed_cross_section_m2(mu, hit.cosine, hit.range_m, hit.solid_angle_sr);
-      lambert += lambert_cross_section_m2(mu, hit.cosine, hit.range_m, hit.solid_angle_sr);
+      lambert += lambert_per_area(mu, hit.cosine) * footprint_area_m2(hit.cosine, hit.range_m, hit.solid_angle_sr);
     }
     const char* name = which == Mode::paper ? "paper" : "raster";
     record_oracle(9, std::string(name) + " mode: sum of eq. (2) over (pi / 2) mu a^2, far sphere, 108 rays across", 0,

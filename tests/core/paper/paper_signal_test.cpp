@@ -178,7 +178,8 @@ TEST(PaperFan, GridIsUniformOnAnImagePlaneAndCoversItsSolidAngle) {
 TEST(PaperCrossSection, IsLambertsTimesAnotherCosine) {
   for (const double degrees : {0.0, 30.0, 60.0, 80.0}) {
     const double cosine = std::cos(rad_from_deg(degrees));
-    EXPECT_NEAR(printed_cross_section_m2(0.1, cosine, 3, 1e-4) / lambert_cross_section_m2(0.1, cosine, 3, 1e-4), cosine, 1e-12);
+    const double lambert = lambert_per_area(0.1, cosine) * footprint_area_m2(cosine, 3, 1e-4);
+    EXPECT_NEAR(printed_cross_section_m2(0.1, cosine, 3, 1e-4) / lambert, cosine, 1e-12);
   }
 }
 

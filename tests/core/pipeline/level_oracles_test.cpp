@@ -232,7 +232,7 @@ TEST(LevelOracles, Oracle33_ShadowBehindABox) {
     for (double y = -2.5; y < 4.5; y += step) {
       if (hidden({x, y, 0})) continue;
       const Vec3d in_sonar = rotate(conjugate(world_from_sonar), Vec3d{x, y, -height});
-      const double sigma = cell_cross_section_m2(mu, height / length(in_sonar), step * step);
+      const double sigma = lambert_per_area(mu, height / length(in_sonar)) * step * step;
       points.push_back(reference::scatterer_at(s.mode(), s.medium(), in_sonar, sigma, 1));
     }
   }

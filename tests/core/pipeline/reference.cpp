@@ -27,7 +27,7 @@ Scatterer scatterer_at(const FrequencyMode& mode, const Medium& medium, Vec3d in
   const ConicalDirection d = conical_from_sonar(in_sonar);
   const double amplitude = medium.source_upa * std::sqrt(sigma_m2) * two_way_transmission(r, medium.absorption_np_per_m) *
                            elevation_two_way(mode.pattern, d.psi_rad);
-  const double turns = carrier_turns(static_cast<double>(mode.centre_hz), medium.sound_speed_mps, r);
+  const double turns = fraction_of_turn(2 * static_cast<double>(mode.centre_hz) * r / medium.sound_speed_mps);
   return {r, d.u, xi * std::polar(amplitude, -2 * pi * turns)};
 }
 
@@ -134,7 +134,7 @@ double sphere_echo_per_m2(double mu, double radius_m, double distance_m) {
   for (double t = dt / 2; t < std::acos(a / d); t += dt) {  // t: angle at the centre, up to the tangent cone
     const double r2 = d * d + a * a - 2 * a * d * std::cos(t);
     const double cosine = (d * std::cos(t) - a) / std::sqrt(r2);
-    sum += cell_cross_section_m2(mu, cosine, 2 * pi * a * a * std::sin(t) * dt) / (r2 * r2);
+    sum += lambert_per_area(mu, cosine) * 2 * pi * a * a * std::sin(t) * dt / (r2 * r2);
   }
   return sum;
 }

@@ -73,7 +73,7 @@ TEST(Reference, SeabedClosedFormAgainstPoints) {
       for (double y = across - 0.6; y <= across + 0.6; y += step) {
         const double range = std::sqrt(x * x + y * y + height * height);
         const Vec3d in_sonar{x * std::cos(tilt) + height * std::sin(tilt), y, x * std::sin(tilt) - height * std::cos(tilt)};
-        points.push_back(scatterer_at(mode, medium, in_sonar, cell_cross_section_m2(mu, height / range, step * step), 1));
+        points.push_back(scatterer_at(mode, medium, in_sonar, lambert_per_area(mu, height / range) * step * step, 1));
       }
     }
     const double got = expected_power(points, std::span(&sine, 1), mode.pattern, grid)[0][0];
@@ -92,7 +92,7 @@ TEST(Reference, WallEnergyClosedFormAgainstPoints) {
   for (double y = -6; y <= 6; y += step) {
     for (double z = -std::tan(half_fan) * d; z <= std::tan(half_fan) * d; z += step) {
       const double r = std::sqrt(d * d + y * y + z * z);
-      const Scatterer s = scatterer_at(mode, {}, {d, y, z}, cell_cross_section_m2(mu, d / r, step * step), 1);
+      const Scatterer s = scatterer_at(mode, {}, {d, y, z}, lambert_per_area(mu, d / r) * step * step, 1);
       sum += std::norm(s.amplitude * directivity(Taper::taylor30, aperture, s.sine)) * energy_width_s(b);
     }
   }

@@ -38,6 +38,25 @@ double looked_up(const LawTable& law, double cosine) {
   return law.mu * root * root;
 }
 
+// Oracle 9 for d -> infinity, by the law that pings run: integrating mu cos^2 dA over the lit half of a sphere gives
+// (2 pi / 3) mu a^2.
+TEST(ScatteringLaw, Oracle09_LambertSphereFromAfar) {
+  Material rough;
+  rough.lambert_db = -13;
+  rough.roughness_m = 0.01f;
+  const double a = 0.25, mu = lambert_coefficient(-13), dt = 1e-4;
+  const LawTable law = make_law(rough, 900e3, 1500, true);
+  double by_ray = 0, by_cell = 0;
+  for (double t = 0.5 * dt; t < 0.5 * pi; t += dt) {
+    const double area = 2 * pi * a * a * std::sin(t) * dt;
+    by_ray += scattering_strength(rough, std::cos(t), 900e3, 1500, true) * area;
+    by_cell += looked_up(law, std::cos(t)) * area;
+  }
+  const double whole = 2 * pi / 3 * mu * a * a;
+  record_oracle(9, "scattering law, from afar, over (2 pi / 3) mu a^2", 0, db(by_ray / whole), 0.05, "dB");
+  record_oracle(9, "the kernels' law, from afar, over (2 pi / 3) mu a^2", 0, db(by_cell / whole), 0.05, "dB");
+}
+
 TEST(ScatteringLaw, GsabIsTheSumOfItsThreeTerms) {
   const Material m = gsab(-9, 6, -27, 3, -20, 25);
   for (const double deg : {0.0, 3.0, 10.0, 30.0, 60.0, 85.0}) {

@@ -126,7 +126,7 @@ struct BruteForce {
         const Vec3d steep{-(z(x + h, y) - z(x - h, y)) / (2 * h), -(z(x, y + h) - z(x, y - h)) / (2 * h), 1};
         const double cosine = -dot(steep, to) / (length(steep) * length(to));
         if (cosine <= 0 || !sees(p)) continue;
-        const double sigma = cell_cross_section_m2(mu, cosine, step_m * step_m * length(steep));
+        const double sigma = lambert_per_area(mu, cosine) * step_m * step_m * length(steep);
         points.push_back(reference::scatterer_at(s.mode(), s.medium(), rotate(conjugate(world_from_sonar), to), sigma, 1));
       }
     }
