@@ -39,6 +39,9 @@ class Sequences(unittest.TestCase):
     def test_c4_logger_thread(self):
         self.program("c4_logger_thread", self.daemon.address, self.file("log.son"))
 
+    def test_c4_shared_between_threads(self):
+        self.program("c4_shared_between_threads", self.daemon.address)
+
     def test_c4_open_close_cycles(self):
         self.program("c4_open_close_cycles", self.daemon.address, 1000)
 

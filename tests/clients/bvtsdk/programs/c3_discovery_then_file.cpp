@@ -125,6 +125,8 @@ int main(int count, char** arguments) {
     check_image(ping, arguments[2], recording + ".ppm");
     BVTPing_Destroy(ping);
   }
+  EXPECT_CODE(BVTSonar_Open(sonar, "FILE", (recording + ".ppm").c_str()), BVT_FILE_HEADER_BAD);  // as a vendor's .son is
+  EXPECT_CODE(BVTSonar_Open(sonar, "FILE", (recording + ".lost").c_str()), BVT_FILE_OPEN);
   BVTSonar_Destroy(sonar);
   EXPECT_CODE(BVTHead_SetRange(head, 1, 9), BVT_INVALID_PTR);
   return 0;
