@@ -32,8 +32,8 @@ def chapter(sonard, folder):
 INTRODUCTION = """## Coverage
 
 Every mode of every sonar, at the range it starts with, over a level bed: how many bins of the bed lie within 1 dB of the closed
-form of its level. By `sonard render --report coverage` ([how it is measured](render.md#coverage)). This is expected power, the
-mean over speckle, whose surface cells are smaller than a picture's, 0.4 of them each way. It shows that rays, patterns, pulse and
-gain leave no holes and no error; what a picture's own, larger cells leave is told in [section 3 of the model's page](acoustics.md).
+form of its level. By `sonard render --report coverage` (how it is measured: docs/render.md). This is expected power, the mean over
+speckle, whose surface cells are smaller than a picture's, 0.4 of them each way. It shows that rays, patterns, pulse and gain leave
+no holes and no error; what a picture's own, larger cells leave is told in docs/acoustics.md, section 3.
 
 """
