@@ -95,6 +95,17 @@ class Render(unittest.TestCase):
         self.assertGreater(side["counts"]["rays"], 10000)
         self.assertFalse((self.out / "000001_pressure.npy").exists())
 
+    def test_switches_without_effect_are_refused_or_told(self):
+        self.expect(self.render("--mode", "paper", "--noise", "on"), 64, "--noise on has no effect", "mode paper")
+        self.expect(self.render("--fixed-fan", "8", "--multipath", "on"), 64, "a fixed fan leaves out multipath")
+        self.expect(run(SONARD, "render", "--report", "coverage", "--mode", "raster"), 65, "canonical")
+        self.expect(self.render("--mode", "paper", "--fixed-fan", "8", "--format", "raw"), 0, "mode paper leaves out noise, specular")
+        side = json.loads((self.out / "000001.json").read_text(encoding="utf-8"))
+        self.assertEqual(side["switches"]["mode"], "paper")
+        self.assertEqual([k for k, v in side["switches"].items() if v is True], [])
+        self.config.write_text(CONFIG + "engine: {fixed_fan: 8, multipath: on}\n", encoding="utf-8")
+        self.expect(self.render(), 78, "sonard.yaml:4", "multipath", "a fixed fan leaves out multipath")
+
     def test_goes_on_where_it_stopped(self):
         self.expect(self.render("--pings", "2", "--format", "npy"), 0)
         first = self.out / "000001_pressure.npy"
