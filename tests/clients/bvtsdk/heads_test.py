@@ -1,0 +1,72 @@
+"""Sonars with two heads, with strict head numbers and strict ranges, and with packed pings, through the 4.x library."""
+import ctypes
+import unittest
+
+from prefixes import Sonard, prefix
+
+SUCCESS, NO_HEAD, BAD_RANGE = 0, 2010, 4009
+
+
+class Heads(unittest.TestCase):
+    def sonar(self, profile, options):
+        daemon = Sonard(scene="l-targets.yaml", profile=profile, pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}",
+                        mount="{frame: FLU, xyz_m: [0, 0, 0]}\n    options: {" + options + "}")
+        self.enterContext(daemon)
+        self.sdk = ctypes.CDLL(prefix(4) / "lib/libbvtsdk.so.4")
+        sonar = self.sdk.BVTSonar_Create()  # an int will do: see ctypes_truncation_test.py
+        self.addCleanup(self.sdk.BVTSonar_Destroy, sonar)
+        self.assertEqual(self.sdk.BVTSonar_Open(sonar, b"NET", daemon.address.encode()), SUCCESS)
+        return sonar
+
+    def head(self, sonar, number):
+        """Code and handle."""
+        out = ctypes.c_longlong()
+        return self.sdk.BVTSonar_GetHead(sonar, number, ctypes.byref(out)), out.value
+
+    def number(self, function, head, kind):
+        out = kind()
+        self.assertEqual(function(head, ctypes.byref(out)), SUCCESS)
+        return out.value
+
+    def ping_works(self, head):
+        ping = ctypes.c_longlong()
+        self.assertEqual(self.sdk.BVTHead_GetPing(head, -1, ctypes.byref(ping)), SUCCESS)
+        self.sdk.BVTPing_Destroy(ping.value)
+
+    def set_range(self, head, start, stop):
+        return self.sdk.BVTHead_SetRange(head, ctypes.c_float(start), ctypes.c_float(stop))
+
+    def test_two_heads_have_their_own_frequencies_and_ranges(self):
+        sonar = self.sonar("blueview-m900-2250-130", "compression: deflate")
+        self.assertEqual(self.number(self.sdk.BVTSonar_GetHeadCount, sonar, ctypes.c_int), 2)
+        for number, hertz, longest in ((0, 900000, 100), (1, 2250000, 10)):
+            code, head = self.head(sonar, number)
+            self.assertEqual(code, SUCCESS)
+            self.assertEqual(self.number(self.sdk.BVTHead_GetCenterFreq, head, ctypes.c_int), hertz)
+            self.assertEqual(self.set_range(head, 0, 500), SUCCESS)  # moved into what the head can do
+            self.assertEqual(self.number(self.sdk.BVTHead_GetStopRange, head, ctypes.c_float), longest)
+            self.set_range(head, 1, 5)
+            self.ping_works(head)
+        self.assertEqual(self.head(sonar, 2), (NO_HEAD, 0))
+
+    def test_strict_numbers_and_ranges(self):
+        sonar = self.sonar("blueview-p900-90", "heads_base: strict, strict_range: on")
+        self.assertEqual(self.head(sonar, 1), (NO_HEAD, 0))
+        code, head = self.head(sonar, 0)
+        self.assertEqual(code, SUCCESS)
+        self.assertEqual(self.set_range(head, 1, 5), SUCCESS)
+        self.assertEqual(self.set_range(head, 0, 500), BAD_RANGE)
+        self.assertEqual(self.number(self.sdk.BVTHead_GetStopRange, head, ctypes.c_float), 5)
+        self.ping_works(head)
+
+    def test_one_head_may_be_numbered_from_one(self):
+        sonar = self.sonar("blueview-p900-90", "heads_base: 1")
+        for number in (0, 1):
+            code, head = self.head(sonar, number)
+            self.assertEqual(code, SUCCESS)
+            self.assertEqual(self.set_range(head, 1, 5), SUCCESS)
+            self.ping_works(head)
+
+
+if __name__ == "__main__":
+    unittest.main()
