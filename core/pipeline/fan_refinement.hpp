@@ -81,7 +81,15 @@ class FanRefinement {
       std::swap(open_, halves_);
     }
   }
-  float middle_rad(const FanInterval& v) { return 0.5f * (at(v.below).elevation_rad + at(v.above).elevation_rad); }
+  /// The middle where an edge is looked for. Within one surface a place near it that is another in every column: rays in even
+  /// steps can fall in step with ripples, and then every column at once would take crests alone for a plain.
+  float middle_rad(const FanInterval& v) {
+    const float below = at(v.below).elevation_rad, above = at(v.above).elevation_rad;
+    if (!meet_the_same(at(v.below), at(v.above))) return 0.5f * (below + above);
+    const float turns = golden_turn * static_cast<float>(v.column) + 0.5f * static_cast<float>(v.depth);
+    const float part = 0.5f + widest_skew * (2 * (turns - std::floor(turns)) - 1);
+    return below + part * (above - below);
+  }
 
  private:
   static constexpr int edge_depth = 4;  // edges are found to 1/16 of a base interval
@@ -89,6 +97,8 @@ class FanRefinement {
   // A surface strays from the straight line between two hits by about a quarter of what its slopes promise; beyond a pulse width
   // of that a middle that happens to lie on the line proves nothing: the rays may fall in step with ripples.
   static constexpr float slope_tolerance_in_pulses = 4;
+  static constexpr float golden_turn = 0.61803399f;  // its multiples fill a turn evenly
+  static constexpr float widest_skew = 0.15f;        // of an interval, to either side of its middle
 
   Sample& at(std::int32_t i) { return samples_[static_cast<std::size_t>(i)]; }
 
