@@ -3,7 +3,7 @@
 #include <array>
 #include <system_error>
 
-#include "core/scene/built_in_scenes.hpp"
+#include "core/scene/files/built_in_scenes.hpp"
 
 namespace sonar {
 namespace {

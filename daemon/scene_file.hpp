@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "core/scene/load_scene.hpp"
+#include "core/scene/files/load_scene.hpp"
 
 namespace sonar {
 

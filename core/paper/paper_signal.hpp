@@ -11,7 +11,7 @@
 #include "core/base/parallel.hpp"
 #include "core/paper/paper_fan.hpp"
 #include "core/pipeline/couple.hpp"
-#include "core/pipeline/spectral.hpp"
+#include "core/pipeline/pulses/spectral.hpp"
 
 namespace sonar::paper {
 

@@ -7,7 +7,7 @@
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/pipeline/spectral_columns.hpp"
+#include "core/pipeline/pulses/spectral_columns.hpp"
 
 namespace sonar {
 namespace {
@@ -262,10 +262,10 @@ bool serves(const PingPlan& plan, const PingRequest& r) {
   return plan.mode.name == r.model->modes[static_cast<std::size_t>(b.mode)].name && a.mode == b.mode &&
          a.beam_count == b.beam_count && a.range_bin_count == b.range_bin_count && a.range_m == b.range_m &&
          a.range_bin_m == b.range_bin_m && a.row_centre == b.row_centre && a.pulse_width_m == b.pulse_width_m &&
-         a.samples_per_row == b.samples_per_row && a.tvg == b.tvg &&
-         a.device_sound_speed_mps == b.device_sound_speed_mps && a.device_absorption_db_per_m == b.device_absorption_db_per_m &&
-         a.format.bits == b.format.bits && a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma &&
-         a.format.row_gains == b.format.row_gains && plan.switches == r.switches;
+         a.samples_per_row == b.samples_per_row && a.tvg == b.tvg && a.device_sound_speed_mps == b.device_sound_speed_mps &&
+         a.device_absorption_db_per_m == b.device_absorption_db_per_m && a.format.bits == b.format.bits &&
+         a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma && a.format.row_gains == b.format.row_gains &&
+         plan.switches == r.switches;
 }
 
 }  // namespace sonar

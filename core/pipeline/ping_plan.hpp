@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "core/pipeline/pulse.hpp"
+#include "core/pipeline/pulses/pulse.hpp"
 #include "core/pipeline/simd/kernels.hpp"
-#include "core/scene/surface_cells.hpp"
+#include "core/scene/cells/surface_cells.hpp"
 #include "core/sonar/ping.hpp"
 
 namespace sonar {

@@ -7,7 +7,7 @@
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/bubbles.hpp"
-#include "core/scene/cell_lattice.hpp"
+#include "core/scene/cells/cell_lattice.hpp"
 
 namespace sonar {
 namespace {

@@ -12,8 +12,8 @@
 #include "core/pipeline/scattering_law.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/pipeline/trace_fan.hpp"
+#include "core/scene/cells/surface_cells.hpp"
 #include "core/scene/ray_scene.hpp"
-#include "core/scene/surface_cells.hpp"
 
 namespace sonar {
 

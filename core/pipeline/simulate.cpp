@@ -142,8 +142,7 @@ void PingUnderWay::find_echo_sources() {
 
 /// What comes by way of flat mirrors waits in columns of its own.
 void PingUnderWay::hear_by_mirrors() {
-  const MultipathCounts counts =
-      sound_ghosts(scene_, cells_, bodies_, plan_, scalars_, kernels_, pool_, w_.multipath, points_);
+  const MultipathCounts counts = sound_ghosts(scene_, cells_, bodies_, plan_, scalars_, kernels_, pool_, w_.multipath, points_);
   w_.statistics.rays += counts.rays;
   w_.statistics.echoes += counts.echoes;
 }

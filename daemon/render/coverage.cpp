@@ -7,7 +7,7 @@
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/scattering_law.hpp"
-#include "core/scene/primitives.hpp"
+#include "core/scene/shapes/primitives.hpp"
 #include "daemon/render/resolution_cell.hpp"
 #include "daemon/render/sonar_keys.hpp"
 

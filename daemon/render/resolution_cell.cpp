@@ -1,7 +1,7 @@
 #include "daemon/render/resolution_cell.hpp"
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
-#include "core/pipeline/pulse.hpp"
+#include "core/pipeline/pulses/pulse.hpp"
 
 namespace sonar::render {
 

@@ -35,9 +35,9 @@ INSTALLED = r"clients/bvtsdk/abi\d/include/"
 # Header of a dependency -> the only files that may include it (tests may include anything).
 DEPENDENCIES = {
     r"embree[34]?/": ["core/scene/embree_scene.cpp"],
-    r"fftw": ["core/pipeline/spectral_transform.cpp"],
+    r"fftw": ["core/pipeline/pulses/spectral_transform.cpp"],
     r"yaml-cpp/": ["core/text/"],
-    r"assimp/": ["core/scene/load_mesh.cpp"],
+    r"assimp/": ["core/scene/files/load_mesh.cpp"],
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp"],
     r"zlib\.h": ["protocol/blueview/deflate.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],

@@ -112,7 +112,7 @@ class Innocent(unittest.TestCase):
         self.assertEqual(found_in({
             "core/base/parallel.cpp": "#include <thread>\nstd::thread worker(f);\n",
             "core/scene/embree_scene.cpp": '#include <embree3/rtcore.h>\n#include "core/scene/ray_scene.hpp"\n',
-            "core/scene/load_mesh.cpp": "#include <assimp/scene.h>\n",
+            "core/scene/files/load_mesh.cpp": "#include <assimp/scene.h>\n",
             "core/text/strict_yaml.cpp": "#include <yaml-cpp/parser.h>\n",
             "protocol/control/control.cpp": '#include "control.pb.h"\n',
             "protocol/oculus/a.cpp": "// reinterpret_cast is not for us\nchar t[9]; int n = std::snprintf(t, 9, \"%d\", 1);\n",

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "core/scene/built_in_scenes.hpp"
+#include "core/scene/files/built_in_scenes.hpp"
 #include "daemon/config.hpp"
 
 namespace sonar {

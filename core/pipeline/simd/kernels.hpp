@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "core/pipeline/ping_engine.hpp"
-#include "core/scene/surface_cells.hpp"
+#include "core/scene/cells/surface_cells.hpp"
 
 namespace sonar::simd {
 

@@ -223,8 +223,8 @@ __attribute__((noinline)) void sound_cells(const TileSeen& s, const GroupView& g
 inline void power_of_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
   for (int i = 0; i < n; ++i) {
     const float r = c.range[i];
-    const float amplitude =
-        s.area_amplitude * c.cosine[i] * elevation_pattern(g.elevation, c.sine2[i]) * std::exp(-g.decay_per_m * c.offset[i]) / (r * r);
+    const float amplitude = s.area_amplitude * c.cosine[i] * elevation_pattern(g.elevation, c.sine2[i]) *
+                            std::exp(-g.decay_per_m * c.offset[i]) / (r * r);
     out.re[i] = amplitude * amplitude * cross_fade(s, r) * c.weight_re[i];
     out.im[i] = 0;
     out.sample[i] = c.sample[i];

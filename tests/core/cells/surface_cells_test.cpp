@@ -1,4 +1,4 @@
-#include "core/scene/surface_cells.hpp"
+#include "core/scene/cells/surface_cells.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/base/random.hpp"
-#include "core/scene/cell_lattice.hpp"
+#include "core/scene/cells/cell_lattice.hpp"
 
 namespace sonar {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/scene/load_scene.hpp"
+#include "core/scene/files/load_scene.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/couple.hpp"
-#include "core/pipeline/pulse.hpp"
+#include "core/pipeline/pulses/pulse.hpp"
 #include "tests/core/pipeline/element_array.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"

@@ -12,8 +12,8 @@
 
 #include "core/base/parallel.hpp"
 #include "core/pipeline/ping_engine.hpp"
-#include "core/pipeline/spectral_transform.hpp"
-#include "core/scene/load_scene.hpp"
+#include "core/pipeline/pulses/spectral_transform.hpp"
+#include "core/scene/files/load_scene.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 
 namespace sonar::test {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/scene/primitives.hpp"
+#include "core/scene/shapes/primitives.hpp"
 
 namespace sonar::test {
 

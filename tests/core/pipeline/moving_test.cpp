@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/scene/load_scene.hpp"
+#include "core/scene/files/load_scene.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 

@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "core/pipeline/spectral.hpp"
-#include "core/scene/mirrors.hpp"
-#include "core/scene/primitives.hpp"
+#include "core/pipeline/pulses/spectral.hpp"
+#include "core/scene/mirrors/mirrors.hpp"
+#include "core/scene/shapes/primitives.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/pipeline/pulse.hpp"
+#include "core/pipeline/pulses/pulse.hpp"
 
 namespace sonar {
 namespace {

@@ -1,5 +1,5 @@
 // Pulses of every shape: widths, side lobes and integrals against sums, the tables made of them, and what is refused.
-#include "core/pipeline/pulse.hpp"
+#include "core/pipeline/pulses/pulse.hpp"
 
 #include <gtest/gtest.h>
 

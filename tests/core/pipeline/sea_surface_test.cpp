@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "core/pipeline/bubbles.hpp"
-#include "core/pipeline/multipath_legs.hpp"
+#include "core/pipeline/multipath/multipath_legs.hpp"
 #include "core/pipeline/scattering_law.hpp"
-#include "core/scene/load_scene.hpp"
+#include "core/scene/files/load_scene.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"

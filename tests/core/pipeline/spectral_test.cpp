@@ -1,5 +1,5 @@
 // The sums over frequencies: the definition against closed forms, and the fast way against the definition.
-#include "core/pipeline/spectral.hpp"
+#include "core/pipeline/pulses/spectral.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "core/scene/primitives.hpp"
+#include "core/scene/shapes/primitives.hpp"
 #include "tests/core/pipeline/mirror_worlds.hpp"
 #include "tests/oracles/record.hpp"
 

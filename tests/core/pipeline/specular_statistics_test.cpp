@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/pipeline/scattering_law.hpp"
-#include "core/pipeline/specular.hpp"
+#include "core/pipeline/specular/specular.hpp"
 #include "tests/core/pipeline/mirror_worlds.hpp"
 #include "tests/oracles/record.hpp"
 

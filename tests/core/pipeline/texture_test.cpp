@@ -1,5 +1,5 @@
 // Texture: the Gamma field alone, in the surface cells, and what it makes of echoes (docs/acoustics.md, section 3).
-#include "core/scene/texture.hpp"
+#include "core/scene/cells/texture.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/scene/surface_cells.hpp"
+#include "core/scene/cells/surface_cells.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"

@@ -1,5 +1,5 @@
 // Mesh files: every format, axes and scale, far offsets, and the many ways a file can be wrong.
-#include "core/scene/load_mesh.hpp"
+#include "core/scene/files/load_mesh.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // The scene format: what it means, what it refuses and with which sentence, and that no mutation of it can crash the loader.
-#include "core/scene/load_scene.hpp"
+#include "core/scene/files/load_scene.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

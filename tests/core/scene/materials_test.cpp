@@ -4,7 +4,7 @@
 
 #include <map>
 
-#include "core/scene/load_scene.hpp"
+#include "core/scene/files/load_scene.hpp"
 
 namespace sonar {
 namespace {

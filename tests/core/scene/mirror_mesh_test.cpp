@@ -1,5 +1,5 @@
 // Mirror points of meshes beside those of the true surfaces they were made from.
-#include "core/scene/mirror_mesh.hpp"
+#include "core/scene/mirrors/mirror_mesh.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <random>
 
-#include "core/scene/mirror_primitives.hpp"
-#include "core/scene/primitives.hpp"
+#include "core/scene/mirrors/mirror_primitives.hpp"
+#include "core/scene/shapes/primitives.hpp"
 
 namespace sonar {
 namespace {

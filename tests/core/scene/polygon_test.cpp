@@ -1,4 +1,4 @@
-#include "core/scene/polygon.hpp"
+#include "core/scene/shapes/polygon.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "core/scene/primitives.hpp"
+#include "core/scene/shapes/primitives.hpp"
 
 #include <gtest/gtest.h>
 

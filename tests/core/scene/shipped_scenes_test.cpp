@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <set>
 
-#include "core/scene/load_scene.hpp"
+#include "core/scene/files/load_scene.hpp"
 #include "core/scene/ray_scene.hpp"
 #include "tests/core/scene/scene_testing.hpp"
 

@@ -1,5 +1,5 @@
 // Ground: made from a seed, read from ESRI grids and PNG images; far coordinates, holes, and files that are wrong.
-#include "core/scene/terrain.hpp"
+#include "core/scene/shapes/terrain.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "core/scene/relief_noise.hpp"
+#include "core/scene/shapes/relief_noise.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/temporary_files.hpp"
 

@@ -1,0 +1,66 @@
+// The pulse of one ping: what the receiver makes of one point echo, as a function of time and of frequency, whatever its shape
+// (docs/acoustics.md, section 4); and the tables that synthesis and noise are made with.
+#pragma once
+
+#include <complex>
+#include <string>
+#include <vector>
+
+#include "core/pipeline/pulses/spectral.hpp"
+#include "core/sonar/waveform.hpp"
+
+namespace sonar {
+
+class Pulse {
+ public:
+  Pulse() = default;
+  /// `width_s`: -3 dB width of |p|^2 in delay, 2 / c times the one in range. A measured pulse has its own.
+  Pulse(const Waveform& waveform, double width_s);
+
+  Waveform::Shape shape() const { return shape_; }
+  bool is_real() const { return shape_ != Waveform::Shape::measured; }
+  /// p(t), p(0) = 1. A measured pulse between its samples: by 32 neighbours, exact to 1e-4 up to 0.8 of the band they carry.
+  std::complex<double> at(double time_s) const;
+  /// P(nu) = integral of p(t) e^{-i 2 pi nu t} dt [s].
+  std::vector<std::complex<double>> spectrum_s(const spectral::FrequencyGrid& grid) const;
+
+  double width_s() const { return width_s_; }
+  /// p is nothing (Gaussian: below 2e-10) farther out than this.
+  double reach_s() const { return reach_s_; }
+  /// P is nothing outside a band so wide about zero: below 1e-6 of its peak; of a tone, whose corners take
+  /// any band, 4e-4; of a measured pulse 1e-4.
+  double band_hz() const { return band_hz_; }
+  /// tau_eff = integral of |p|^2 dt.
+  double energy_width_s() const { return energy_width_s_; }
+  /// B_n = integral of |P|^2 d nu over the largest |P|^2.
+  double noise_bandwidth_hz() const { return noise_bandwidth_hz_; }
+  /// Correlation of noise shaped by p: integral of p(t') p*(t' - t) dt' / tau_eff.
+  std::complex<double> correlation(double time_s) const;
+
+ private:
+  void take_samples(const Waveform& waveform);
+  void integrate();
+
+  Waveform::Shape shape_ = Waveform::Shape::gaussian;
+  double scale_hz_ = 1;  // Gaussian b, 1 / the tone's length, the sweep's bandwidth, the sample rate
+  double width_s_ = 1, reach_s_ = 1, band_hz_ = 1, energy_width_s_ = 1, noise_bandwidth_hz_ = 1;
+  std::vector<std::complex<double>> samples_;  // measured: what is worth keeping; the peak is samples_[middle_]
+  int middle_ = 0;
+};
+
+/// The sentence that says why such a pulse cannot be used on a grid of this sample time; empty when it can.
+std::string why_invalid(const Waveform& waveform, double sample_time_s);
+
+/// The sweep's bandwidth for a -3 dB width of the compressed pulse in delay.
+double sweep_bandwidth_hz(double width_s);
+
+/// simd::PulseRows of the real part of p, or of |p|^2, on a grid of this sample time.
+std::vector<float> make_pulse_rows(const Pulse& pulse, double sample_time_s, int taps, int steps, bool squared);
+/// How many taps such rows need: a multiple of 8.
+int taps_of(const Pulse& pulse, double sample_time_s);
+
+/// Real taps h with sum_n h_n h_{n+k} = Re correlation(k sample times), h_n h_n summing to 1: white noise filtered by h has the
+/// pulse's correlation on this grid. (Of a complex pulse that is the mean of its spectrum and the mirrored one.)
+std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s);
+
+}  // namespace sonar

@@ -1,0 +1,85 @@
+#include "core/pipeline/pulses/spectral.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::spectral {
+namespace {
+
+constexpr int oversampling = 2;
+constexpr double sharpness_per_width = 2.3;
+constexpr int restart_every = 256;  // a phase turned on step by step forgets itself slowly
+
+double kernel(double x) {  // |x| <= 1 over its half width, times the width: see sharpness_per_width
+  return std::sqrt(std::max(0.0, 1 - x * x)) - 1;
+}
+
+/// Integral of the kernel times cos(2 pi f z) over z in [-width / 2, width / 2], z in grid points.
+double kernel_transform(int width, double f) {
+  // x = sin t makes the integrand smooth at its ends, where the midpoint rule is then as good as any.
+  const int steps = 20 * width + 60;
+  double sum = 0;
+  for (int i = 0; i < steps; ++i) {
+    const double t = pi * ((i + 0.5) / steps - 0.5), x = std::sin(t);
+    sum += std::exp(sharpness_per_width * width * kernel(x)) * std::cos(pi * f * width * x) * std::cos(t);
+  }
+  return sum * pi / steps * width / 2;
+}
+
+}  // namespace
+
+std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid) {
+  std::vector<Complex> sums(static_cast<std::size_t>(grid.count));
+  for (const Arrival& a : arrivals) {
+    const Complex step = turned(-grid.step_hz * a.delay_s);
+    Complex now;
+    for (int m = 0; m < grid.count; ++m) {
+      if (m % restart_every == 0) now = a.amplitude * turned(-(grid.first_hz + m * grid.step_hz) * a.delay_s);
+      sums[static_cast<std::size_t>(m)] += now;
+      now *= step;
+    }
+  }
+  return sums;
+}
+
+std::vector<Complex> fast_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid, int width) {
+  const FrequencySums fast(grid.count, width);
+  std::vector<Complex> fine(static_cast<std::size_t>(fast.grid_points())), sums(static_cast<std::size_t>(grid.count));
+  const double middle_hz = grid.first_hz + (grid.count / 2) * grid.step_hz;
+  for (const Arrival& a : arrivals) fast.add(grid.step_hz * a.delay_s, a.amplitude * turned(-middle_hz * a.delay_s), fine.data());
+  fast.transform(fine.data(), sums.data());
+  return sums;
+}
+
+FrequencySums::FrequencySums(int count, int width)
+    : count_(count),
+      width_(width),
+      points_(quick_size(std::max(oversampling * count, 2 * width))),
+      forward_(points_, Fft::Direction::forward) {
+  for (int m = 0; m < count; ++m)
+    correction_.push_back(1 / kernel_transform(width, static_cast<double>(m - count / 2) / points_));
+}
+
+void FrequencySums::add(double turns, Complex amplitude, Complex* grid) const {
+  const double place = (turns - std::floor(turns)) * points_;  // may round up to points_: the wrap below knows
+  const double first = std::ceil(place - 0.5 * width_);
+  int at = static_cast<int>(first);
+  if (at < 0) at += points_;
+  for (int k = 0; k < width_; ++k) {
+    const double x = (first + k - place) * 2 / width_;
+    if (at >= points_) at -= points_;
+    grid[at++] += std::exp(sharpness_per_width * width_ * kernel(x)) * amplitude;
+  }
+}
+
+void FrequencySums::transform(Complex* grid, Complex* sums) const {
+  forward_.run(grid);
+  for (int m = 0; m < count_; ++m) {
+    const int frequency = m - count_ / 2;
+    sums[m] = correction_[static_cast<std::size_t>(m)] * grid[frequency < 0 ? frequency + points_ : frequency];
+  }
+}
+
+}  // namespace sonar::spectral

@@ -1,0 +1,68 @@
+#include "core/pipeline/pulses/spectral_columns.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar {
+namespace {
+
+constexpr int kernel_width = 6;
+
+/// Frequencies to a sample of the period: as many as the pulse's band needs.
+int per_sample(const Pulse& pulse, double sample_time_s) {
+  return std::max(1, static_cast<int>(std::ceil(pulse.band_hz() * sample_time_s)));
+}
+
+}  // namespace
+
+// An echo half a pulse before the record rings in from there; one half a pulse beyond its end rings out of it as far again. A
+// pulse's length of padding keeps the two apart.
+SpectralColumns::SpectralColumns(const Pulse& pulse, double sample_time_s, int samples, int taps)
+    : samples_(samples),
+      period_(spectral::quick_size(samples + taps + 2)),
+      sums_(period_ * per_sample(pulse, sample_time_s), kernel_width),
+      inverse_(period_, spectral::Fft::Direction::inverse) {
+  const double period_s = period_ * sample_time_s;
+  const int count = sums_.count();
+  response_ = pulse.spectrum_s({-(count / 2) / period_s, 1 / period_s, count});
+  for (spectral::Complex& r : response_) r /= period_s;
+}
+
+void SpectralColumns::begin(int columns, SpectralScratch& scratch) const {
+  scratch.grids.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(sums_.grid_points()), 0.0);
+  scratch.sums.resize(static_cast<std::size_t>(sums_.count()));
+}
+
+void SpectralColumns::add(Echoes& echoes, int first_column, SpectralScratch& scratch) const {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(echoes.count); ++i) {
+    const auto column = static_cast<std::size_t>(echoes.column[i] - first_column);
+    const spectral::Complex amplitude(static_cast<double>(echoes.re[i]), static_cast<double>(echoes.im[i]));
+    sums_.add(static_cast<double>(echoes.sample[i]) / period_, amplitude,
+              scratch.grids.data() + column * static_cast<std::size_t>(sums_.grid_points()));
+  }
+  echoes.count = 0;
+}
+
+void SpectralColumns::finish(int first, int last, SpectralScratch& scratch, ColumnSignals& signals) const {
+  const int count = sums_.count();
+  for (int k = first; k < last; ++k) {
+    spectral::Complex* grid = scratch.grids.data() + static_cast<std::ptrdiff_t>(k - first) * sums_.grid_points();
+    sums_.transform(grid, scratch.sums.data());
+    scratch.folded.assign(static_cast<std::size_t>(period_), 0.0);
+    // count is a whole number of periods: frequency m - count / 2 falls on the place of its rest.
+    int place = (period_ - count / 2 % period_) % period_;
+    for (int m = 0; m < count; ++m) {
+      const auto i = static_cast<std::size_t>(m);
+      scratch.folded[static_cast<std::size_t>(place)] += scratch.sums[i] * response_[i];
+      if (++place == period_) place = 0;
+    }
+    inverse_.run(scratch.folded.data());
+    float* to = signals.column(k) + 2 * signals.lead;
+    for (int n = 0; n < samples_; ++n) {
+      to[2 * n] += static_cast<float>(scratch.folded[static_cast<std::size_t>(n)].real());
+      to[2 * n + 1] += static_cast<float>(scratch.folded[static_cast<std::size_t>(n)].imag());
+    }
+  }
+}
+
+}  // namespace sonar

@@ -1,0 +1,272 @@
+#include "core/scene/cells/surface_cells.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <map>
+#include <tuple>
+
+#include "core/scene/cells/cell_lattice.hpp"
+#include "core/scene/cells/cell_tile.hpp"
+#include "core/scene/cells/texture.hpp"
+
+namespace sonar {
+
+/// A cube of the lattice: the triangles that may own points in it, the tile of its level once wanted, the eight cubes inside.
+struct SurfaceCells::Node {
+  TileAddress address;
+  std::vector<std::uint32_t> triangles;
+  std::array<std::unique_ptr<Node>, 8> children;  // null where no triangle goes
+  bool divided = false;
+  bool built = false;
+  CellTile tile;
+  std::uint64_t last_visited = 0;
+
+  std::size_t own_bytes() const { return sizeof(Node) + triangles.capacity() * sizeof(std::uint32_t) + tile.bytes(); }
+};
+
+/// The triangles of one object that share material, dominant axis and side of the normal: one lattice.
+class SurfaceCells::Sheet {
+ public:
+  int object = 0, material = 0, axis = 0;
+  bool negative_side = false;
+  std::shared_ptr<const Mesh> mesh;
+  std::vector<std::unique_ptr<Node>> roots;
+
+  void plant(const std::vector<std::uint32_t>& triangles);
+  /// Returns the bytes that the new cubes take.
+  std::size_t divide(Node& node) const;
+  /// Forgets all cubes below `node` that were last visited before `then`; returns the bytes that frees.
+  static std::size_t forget_below(Node& node, std::uint64_t then);
+};
+
+namespace {
+
+constexpr int most_roots_along_an_axis = 16;
+
+struct Cube {
+  double u, v, w, half;
+};
+Cube cube_of(const TileAddress& a) {
+  const double e = lattice::tile_edge_m(a.level);
+  return {(a.i + 0.5) * e, (a.j + 0.5) * e, (a.k + 0.5) * e, e / 2};
+}
+bool may_touch(const lattice::Facet& f, const TileAddress& a) {
+  const Cube c = cube_of(a);
+  return lattice::may_touch(f, c.u, c.v, c.w, c.half);
+}
+
+/// The finest level at which few enough cubes cover the triangles.
+int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles) {
+  Vec3 lo = mesh.vertices[mesh.triangles[triangles.front()][0]], hi = lo;
+  for (const std::uint32_t t : triangles)
+    for (const std::uint32_t index : mesh.triangles[t]) {
+      const Vec3 p = mesh.vertices[index];
+      lo = {std::min(lo.x, p.x), std::min(lo.y, p.y), std::min(lo.z, p.z)};
+      hi = {std::max(hi.x, p.x), std::max(hi.y, p.y), std::max(hi.z, p.z)};
+    }
+  const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+  int level = 4;
+  while (lattice::tile_edge_m(level) * most_roots_along_an_axis < extent) --level;
+  return level;
+}
+
+}  // namespace
+
+void SurfaceCells::Sheet::plant(const std::vector<std::uint32_t>& triangles) {
+  const int level = root_level(*mesh, triangles);
+  const double e = lattice::tile_edge_m(level);
+  std::map<std::tuple<std::int32_t, std::int32_t, std::int32_t>, std::unique_ptr<Node>> planted;
+  const auto index = [&](double x) { return static_cast<std::int32_t>(std::floor(x / e)); };
+  for (const std::uint32_t t : triangles) {
+    const lattice::Facet f = lattice::facet_of(*mesh, t, axis);
+    const auto [u_lo, u_hi] = std::minmax({f.u[0], f.u[1], f.u[2]});
+    const auto [v_lo, v_hi] = std::minmax({f.v[0], f.v[1], f.v[2]});
+    const auto [w_lo, w_hi] = std::minmax({f.w[0], f.w[1], f.w[2]});
+    const double slack = e * 1e-6;
+    for (std::int32_t i = index(u_lo - slack); i <= index(u_hi + slack); ++i)
+      for (std::int32_t j = index(v_lo - slack); j <= index(v_hi + slack); ++j)
+        for (std::int32_t k = index(w_lo - slack); k <= index(w_hi + slack); ++k) {
+          const TileAddress a{object, material, axis, negative_side, level, i, j, k};
+          if (!may_touch(f, a)) continue;
+          auto& node = planted[{i, j, k}];
+          if (!node) {
+            node = std::make_unique<Node>();
+            node->address = a;
+          }
+          node->triangles.push_back(t);
+        }
+  }
+  for (auto& [where, node] : planted) roots.push_back(std::move(node));
+}
+
+std::size_t SurfaceCells::Sheet::divide(Node& node) const {
+  node.divided = true;
+  std::array<TileAddress, 8> inside;
+  for (int c = 0; c < 8; ++c) {
+    TileAddress& a = inside[static_cast<std::size_t>(c)] = node.address;
+    ++a.level;
+    a.i = a.i * 2 + (c & 1);
+    a.j = a.j * 2 + (c >> 1 & 1);
+    a.k = a.k * 2 + (c >> 2 & 1);
+  }
+  for (const std::uint32_t t : node.triangles) {
+    const lattice::Facet f = lattice::facet_of(*mesh, t, axis);
+    for (std::size_t c = 0; c < 8; ++c) {
+      if (!may_touch(f, inside[c])) continue;
+      if (!node.children[c]) {
+        node.children[c] = std::make_unique<Node>();
+        node.children[c]->address = inside[c];
+      }
+      node.children[c]->triangles.push_back(t);
+    }
+  }
+  std::size_t bytes = 0;
+  for (const auto& child : node.children)
+    if (child) bytes += child->own_bytes();
+  return bytes;
+}
+
+std::size_t SurfaceCells::Sheet::forget_below(Node& node, std::uint64_t then) {
+  std::size_t freed = 0;
+  bool stale = node.divided;
+  for (const auto& child : node.children) {
+    if (!child) continue;
+    freed += forget_below(*child, then);
+    stale = stale && child->last_visited < then;
+  }
+  if (!stale) return freed;  // cubes come and go eight at a time, so that `divided` stays true or false
+  for (auto& child : node.children) {
+    if (!child) continue;
+    freed += child->own_bytes();
+    child.reset();
+  }
+  node.divided = false;
+  return freed;
+}
+
+SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, bool textured)
+    : scene_(std::move(scene)), seed_(seed), textured_(textured), cache_bytes_(cache_bytes) {
+  for (const Material& m : scene_->materials) {
+    const bool has = m.texture.shape > 0;
+    has_texture_ = has_texture_ || has;
+    textures_.push_back(has && textured ? std::make_unique<TextureField>(m.texture, m.texture_seed, seed) : nullptr);
+  }
+  for (std::size_t o = 0; o < scene_->objects.size(); ++o) {
+    const Object& object = scene_->objects[o];
+    if (!object.visible) continue;
+    std::map<std::tuple<int, int, bool>, std::vector<std::uint32_t>> sorted;  // material, axis, side
+    for (std::uint32_t t = 0; t < object.mesh->triangles.size(); ++t) {
+      const Vec3d n = lattice::normal_of(*object.mesh, t);
+      const int axis = lattice::dominant_axis(n);
+      const double along = axis == 0 ? n.x : axis == 1 ? n.y : n.z;
+      if (along == 0) continue;  // no area
+      sorted[{object.mesh->material[t], axis, along < 0}].push_back(t);
+    }
+    for (const auto& [key, triangles] : sorted) {
+      auto sheet = std::make_unique<Sheet>();
+      sheet->object = static_cast<int>(o);
+      std::tie(sheet->material, sheet->axis, sheet->negative_side) = key;
+      sheet->mesh = object.mesh;
+      sheet->plant(triangles);
+      sheets_.push_back(std::move(sheet));
+    }
+  }
+}
+
+SurfaceCells::~SurfaceCells() = default;
+
+void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& turn) {
+  const Cube cube = cube_of(node.address);
+  const Vec3d centre = lattice::from_permuted(cube.u, cube.v, cube.w, sheet.axis);
+  const double radius = cube.half * 1.7320508075688772 * 1.0001;
+  const Vec3d q = centre - sonar_in_object.position_m;
+  const auto& m = turn.m;
+  const Vec3d p{m[0][0] * q.x + m[0][1] * q.y + m[0][2] * q.z, m[1][0] * q.x + m[1][1] * q.y + m[1][2] * q.z,
+                m[2][0] * q.x + m[2][1] * q.y + m[2][2] * q.z};
+  const double range = length(p);
+  if (range - radius > view.max_range_m) return;
+  DistanceSpan seen{range - radius, range + radius};
+  if (view.seen_between) {
+    const std::optional<DistanceSpan> span = view.seen_between(p, radius);
+    if (!span) return;
+    seen = *span;
+  } else {
+    if (std::abs(p.z) * fan_cosine_ - p.x * fan_sine_ > radius) return;
+    if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
+  }
+
+  node.last_visited = now_;
+  bool finer = node.address.level < view.levels.front().level;
+  for (const CellLevel& level : view.levels) {
+    const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
+    if (!overlaps) continue;
+    if (level.level == node.address.level) {
+      wanted_.push_back(&node);
+      in_view_.push_back({&node.tile, &level, q, p, sheet.object});
+    } else if (level.level > node.address.level) {
+      finer = true;
+    }
+  }
+  if (!finer) return;
+  if (!node.divided) cached_bytes_ += sheet.divide(node);
+  for (auto& child : node.children)
+    if (child) visit(sheet, *child, view, sonar_in_object, turn);
+}
+
+const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
+  assert(!view.levels.empty());
+  ++now_;
+  fan_cosine_ = std::cos(static_cast<double>(view.max_elevation_rad));
+  fan_sine_ = std::sin(static_cast<double>(view.max_elevation_rad));
+  in_view_.clear();
+  wanted_.clear();
+  rotations_.resize(scene_->objects.size());
+  int object = -1;
+  Pose sonar_in_object;
+  for (auto& sheet : sheets_) {
+    if (sheet->object != object) {
+      object = sheet->object;
+      const Object& o = scene_->objects[static_cast<std::size_t>(object)];
+      sonar_in_object = compose(inverse(scene_->in_world(o, view.bodies_in_world)), view.sonar_in_world);
+      rotations_[static_cast<std::size_t>(object)] = rotation_from(conjugate(sonar_in_object.orientation));
+    }
+    for (auto& root : sheet->roots) visit(*sheet, *root, view, sonar_in_object, rotations_[static_cast<std::size_t>(object)]);
+  }
+
+  std::vector<Node*> missing;
+  for (Node* node : wanted_)
+    if (!node->built) missing.push_back(node);
+  pool.for_each(missing.size(), [&](std::size_t n, int) {
+    Node& node = *missing[n];
+    const TileAddress& a = node.address;
+    const auto material = static_cast<std::size_t>(a.material);
+    node.tile = build_tile(a, *scene_->objects[static_cast<std::size_t>(a.object)].mesh, node.triangles,
+                           scene_->materials[material].texture_seed, seed_, textures_[material].get());
+    node.built = true;
+  });
+  built_ = missing.size();
+  for (const Node* node : missing) cached_bytes_ += node->tile.bytes();
+  keep_within_budget();
+
+  std::erase_if(in_view_, [](const TileInView& t) { return t.tile->count == 0; });
+  return in_view_;
+}
+
+/// Forgets what was not looked at for longest; it comes back identical when wanted again.
+void SurfaceCells::keep_within_budget() {
+  for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {
+    if (age >= now_) continue;
+    for (auto& sheet : sheets_)
+      for (auto& root : sheet->roots) {
+        cached_bytes_ -= Sheet::forget_below(*root, now_ - age + 1);
+        if (root->built && root->last_visited <= now_ - age) {
+          cached_bytes_ -= root->tile.bytes();
+          root->tile = CellTile{};
+          root->built = false;
+        }
+      }
+  }
+}
+
+}  // namespace sonar

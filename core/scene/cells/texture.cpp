@@ -1,0 +1,129 @@
+#include "core/scene/cells/texture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/random.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::uint32_t texture_key = 0x74657874u;  // keeps these draws apart from the cells'
+constexpr int quantiles = 256;
+constexpr double widest_normal = 5;
+constexpr double weakest = 1e-4;  // -40 dB; nearer to nothing a cell could not be told from an empty one
+constexpr int remembered_along = 16, remembered_up = 8;
+
+struct IncompleteGamma {
+  double lower, upper;
+};
+/// P(a, x) and Q(a, x) = 1 - P, regularised: series below a + 1, continued fraction (Lentz) above.
+IncompleteGamma incomplete_gamma(double a, double x, double log_gamma_a) {
+  const double front = std::exp(a * std::log(x) - x - log_gamma_a);
+  if (x < a + 1) {
+    double term = 1 / a, sum = term;
+    for (int n = 1; n < 500 && term > sum * 1e-14; ++n) sum += term *= x / (a + n);
+    return {front * sum, 1 - front * sum};
+  }
+  constexpr double tiny = 1e-300;
+  double b = x + 1 - a, c = 1 / tiny, d = 1 / b, h = d;
+  for (int n = 1; n < 500; ++n) {
+    const double an = -n * (n - a);
+    b += 2;
+    d = an * d + b;
+    d = 1 / (std::abs(d) < tiny ? tiny : d);
+    c = b + an / c;
+    if (std::abs(c) < tiny) c = tiny;
+    const double step = d * c;
+    h *= step;
+    if (std::abs(step - 1) < 1e-14) break;
+  }
+  return {1 - front * h, front * h};
+}
+
+/// The Gamma variable of shape nu and mean 1 that as much lies below as lies below a standard normal.
+double gamma_at_normal(double nu, double log_gamma_nu, double normal) {
+  const double below = 0.5 * std::erfc(-normal / std::sqrt(2.0)), above = 0.5 * std::erfc(normal / std::sqrt(2.0));
+  double low = std::log(weakest * nu), high = std::log(nu + 40 * std::sqrt(nu) + 60);
+  for (int i = 0; i < 48; ++i) {
+    const double middle = 0.5 * (low + high);
+    const IncompleteGamma at = incomplete_gamma(nu, std::exp(middle), log_gamma_nu);
+    const bool too_small = normal < 0 ? at.lower < below : at.upper > above;
+    (too_small ? low : high) = middle;
+  }
+  return std::exp(0.5 * (low + high)) / nu;
+}
+
+/// Quadratic B-spline: the three lattice points about x and their weights, scaled so that their squares add to one.
+struct Blend {
+  std::int32_t first;
+  float weight[3];
+};
+Blend blend_at(double x) {
+  const double nearest = std::floor(x + 0.5), t = x - nearest;
+  const double w[3] = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
+  const double scale = 1 / std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+  return {static_cast<std::int32_t>(nearest) - 1,
+          {static_cast<float>(w[0] * scale), static_cast<float>(w[1] * scale), static_cast<float>(w[2] * scale)}};
+}
+
+}  // namespace
+
+TextureField::TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed)
+    : lattice_m_(static_cast<double>(texture.correlation_m)) {
+  const auto bits = static_cast<std::uint64_t>(seed);
+  key_lo_ = static_cast<std::uint32_t>(bits);
+  key_hi_ = static_cast<std::uint32_t>(bits >> 32) ^ texture_seed;
+  const double nu = static_cast<double>(texture.shape), log_gamma_nu = std::lgamma(nu);
+  double mean = 0, weight = 0;
+  std::vector<double> values;
+  for (int i = 0; i <= quantiles; ++i) {
+    const double normal = widest_normal * (2.0 * i / quantiles - 1), density = std::exp(-0.5 * normal * normal);
+    values.push_back(gamma_at_normal(nu, log_gamma_nu, normal));
+    mean += density * values.back();
+    weight += density;
+  }
+  for (const double v : values) roots_.push_back(static_cast<float>(std::sqrt(v * weight / mean)));
+  roots_.push_back(roots_.back());
+}
+
+float TextureField::normal_at(int object, std::int32_t i, std::int32_t j, std::int32_t k) const {
+  const Random4 draw = philox(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(k),
+                              texture_key ^ static_cast<std::uint32_t>(object), key_lo_, key_hi_);
+  return 1.41421356f * complex_normal(draw.v[0], draw.v[1]).re;
+}
+
+float TextureField::root_of(float normal) const {
+  constexpr float per_normal = static_cast<float>(quantiles / (2 * widest_normal));
+  const float at = std::clamp((normal + static_cast<float>(widest_normal)) * per_normal, 0.0f, static_cast<float>(quantiles));
+  const auto i = static_cast<std::size_t>(at);
+  return roots_[i] + (at - static_cast<float>(i)) * (roots_[i + 1] - roots_[i]);
+}
+
+TexturePatch::TexturePatch(const TextureField& field, int object)
+    : field_(field),
+      object_(object),
+      points_(remembered_along * remembered_along * remembered_up, Point{std::numeric_limits<std::int32_t>::min(), 0, 0, 0}) {}
+
+float TexturePatch::normal_at(std::int32_t i, std::int32_t j, std::int32_t k) {
+  const auto slot = [](std::int32_t x, int size) { return static_cast<std::size_t>(x & (size - 1)); };
+  Point& p = points_[(slot(k, remembered_up) * remembered_along + slot(j, remembered_along)) * remembered_along +
+                     slot(i, remembered_along)];
+  if (p.i != i || p.j != j || p.k != k) p = {i, j, k, field_.normal_at(object_, i, j, k)};
+  return p.normal;
+}
+
+float TexturePatch::root_at(Vec3d place_m) {
+  const double per_m = 1 / field_.lattice_m();
+  const Blend x = blend_at(place_m.x * per_m), y = blend_at(place_m.y * per_m), z = blend_at(place_m.z * per_m);
+  float sum = 0;
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 3; ++j) {
+      const float across = z.weight[k] * y.weight[j];
+      for (int i = 0; i < 3; ++i) sum += across * x.weight[i] * normal_at(x.first + i, y.first + j, z.first + k);
+    }
+  return field_.root_of(sum);
+}
+
+}  // namespace sonar

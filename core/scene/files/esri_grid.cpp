@@ -1,0 +1,137 @@
+// ESRI ASCII grids: six header lines, then rows of heights from north to south.
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "core/scene/shapes/terrain.hpp"
+#include "core/text/decimal.hpp"
+
+namespace sonar {
+namespace {
+
+// Words of a file with their line numbers, read through one block of memory.
+class Words {
+ public:
+  explicit Words(std::string text) : text_(std::move(text)) {}
+  std::string_view next() {
+    while (at_ < text_.size() && is_space(text_[at_])) line_ += text_[at_++] == '\n';
+    const std::size_t from = at_;
+    while (at_ < text_.size() && !is_space(text_[at_])) ++at_;
+    return std::string_view(text_).substr(from, at_ - from);
+  }
+  std::size_t line() const { return line_; }
+  void rewind(std::string_view word) { at_ -= word.size(); }
+
+ private:
+  static bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+  std::string text_;
+  std::size_t at_ = 0, line_ = 1;
+};
+
+std::string lower(std::string_view s) {
+  std::string out(s);
+  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return out;
+}
+
+// Grids written by programs carry forms like "-9999.0", "1e-3", "007"; only the last is odd, and it is harmless here.
+std::optional<double> height_number(std::string_view s) {
+  if (const auto v = text::parse_decimal(s)) return v;
+  std::size_t sign = s.starts_with('-') || s.starts_with('+') ? 1 : 0, zeros = sign;
+  while (zeros + 1 < s.size() && s[zeros] == '0' && s[zeros + 1] >= '0' && s[zeros + 1] <= '9') ++zeros;
+  if (zeros == sign) return std::nullopt;
+  return text::parse_decimal(std::string(s.substr(0, sign)) + std::string(s.substr(zeros)));
+}
+
+struct Header {
+  double columns = 0, rows = 0, x = 0, y = 0, cell = 0, no_data = -9999;
+  bool centred = false;  // xllcenter rather than xllcorner
+};
+
+Result<Header> read_header(Words& words) {
+  std::map<std::string, double> found;
+  const auto bad = [&](std::string what) {
+    return failure(ErrorKind::bad_data, "line " + std::to_string(words.line()) + ": " + std::move(what));
+  };
+  while (true) {
+    const std::string_view word = words.next();
+    if (word.empty() || height_number(word)) {
+      words.rewind(word);
+      break;
+    }
+    const std::string key = lower(word.substr(0, 20));
+    static constexpr std::array<const char*, 8> keys{"ncols",     "nrows",     "xllcorner", "yllcorner",
+                                                     "xllcenter", "yllcenter", "cellsize",  "nodata_value"};
+    if (std::none_of(keys.begin(), keys.end(), [&](const char* k) { return key == k; })) {
+      return bad("\"" + key + "\" is not a header word of an ESRI ASCII grid");
+    }
+    const std::string_view value = words.next();
+    const auto number = height_number(value);
+    if (!number) return bad(key + " needs a number");
+    found[key] = *number;
+  }
+  for (const char* key : {"ncols", "nrows", "cellsize"}) {
+    if (!found.contains(key)) return bad(std::string(key) + " is missing in the header");
+  }
+  Header h{.columns = found["ncols"], .rows = found["nrows"], .x = 0, .y = 0, .cell = found["cellsize"]};
+  h.centred = found.contains("xllcenter") || found.contains("yllcenter");
+  h.x = h.centred ? found["xllcenter"] : found["xllcorner"];
+  h.y = h.centred ? found["yllcenter"] : found["yllcorner"];
+  if (found.contains("nodata_value")) h.no_data = found["nodata_value"];
+  const bool whole = h.columns == std::floor(h.columns) && h.rows == std::floor(h.rows);
+  if (!whole || h.columns < 2 || h.rows < 2 || h.columns * h.rows > static_cast<double>(max_mesh_triangles) / 2) {
+    return bad("ncols and nrows must be whole numbers from 2, at most 10 million cells together");
+  }
+  if (!(h.cell > 1e-6 && h.cell < 1e5)) return bad("cellsize must be between 1e-6 and 1e5 m");
+  if (std::abs(h.x) > 1e8 || std::abs(h.y) > 1e8) return bad("the corner is farther than 1e8 m away");
+  return h;
+}
+
+}  // namespace
+
+Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, double z_scale) {
+  const auto bad = [&](std::string what) { return failure(ErrorKind::bad_data, file.string() + ": " + std::move(what)); };
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + std::strerror(errno));
+  std::string text;
+  std::array<char, 1 << 16> chunk{};
+  while (in.read(chunk.data(), chunk.size()), in.gcount() > 0) {
+    text.append(chunk.data(), static_cast<std::size_t>(in.gcount()));
+    if (text.size() > std::size_t{512} << 20) return bad("larger than 512 MiB; cut it or use a coarser grid");
+  }
+  Words words(std::move(text));
+  const auto header = read_header(words);
+  if (!header) return bad(header.error().text);
+  const auto columns = static_cast<std::size_t>(header->columns), rows = static_cast<std::size_t>(header->rows);
+  HeightGrid grid;
+  const double first = header->centred ? 0 : 0.5;  // a corner is half a cell from the first height
+  for (std::size_t i = 0; i < columns; ++i) grid.x_m.push_back(header->x + (static_cast<double>(i) + first) * header->cell);
+  for (std::size_t j = 0; j < rows; ++j) grid.y_m.push_back(header->y + (static_cast<double>(j) + first) * header->cell);
+  grid.z_m.resize(columns * rows);
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t i = 0; i < columns; ++i) {
+      const std::string_view word = words.next();
+      const std::string where = "line " + std::to_string(words.line()) + ": ";
+      if (word.empty()) {
+        return bad(where + "the grid ends after " + std::to_string(row * columns + i) + " of " + std::to_string(rows * columns) +
+                   " heights");
+      }
+      const auto z = height_number(word);
+      if (!z) return bad(where + "\"" + std::string(word.substr(0, 40)) + "\" is not a height");
+      const bool no_data = *z == header->no_data;
+      if (!no_data && std::abs(*z) > 1e7)
+        return bad(where + "the height " + std::string(word.substr(0, 40)) + " is beyond 1e7 m");
+      grid.z_m[(rows - 1 - row) * columns + i] =
+          no_data ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(*z * z_scale);
+    }
+  }
+  if (!words.next().empty()) return bad("more heights than ncols x nrows");
+  return grid;
+}
+
+}  // namespace sonar

@@ -1,0 +1,120 @@
+// The only file that knows Assimp. Local files at load time only, never bytes from a network.
+#include "core/scene/files/load_mesh.hpp"
+
+#include <assimp/config.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <fstream>
+
+#include "core/scene/shapes/polygon.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::uintmax_t max_file_bytes = std::uintmax_t{2} << 30;
+
+std::string extension_of(const std::filesystem::path& file) {
+  std::string e = file.extension().string();
+  for (char& c : e) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return e;
+}
+
+Vec3d z_up_from_y_up(Vec3d p) { return {p.x, -p.z, p.y}; }
+
+std::string first_line(std::string s) {
+  std::replace(s.begin(), s.end(), '\r', '\n');
+  return s.substr(0, std::min<std::size_t>(s.find('\n'), 200));
+}
+
+// Assimp 5.2 never comes back from a PLY header that does not end.
+bool has_ply_header(const std::filesystem::path& file) {
+  std::string head(64 << 10, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  const std::size_t end = head.find("end_header");
+  return head.starts_with("ply") && end != std::string::npos && head.find('\n', end) != std::string::npos;
+}
+
+struct Corners {
+  std::vector<Vec3d> at;
+  std::vector<std::uint16_t> material;
+};
+
+// Node transforms in double: far offsets in a node must not cost the vertices their millimetres.
+void gather(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>& parent, int depth, Corners& out) {
+  if (depth > 200) return;
+  const aiMatrix4x4t<double> here = parent * aiMatrix4x4t<double>(node.mTransformation);
+  for (unsigned m = 0; m < node.mNumMeshes; ++m) {
+    const aiMesh& mesh = *scene.mMeshes[node.mMeshes[m]];
+    for (unsigned f = 0; f < mesh.mNumFaces && out.at.size() <= 3 * max_mesh_triangles; ++f) {
+      const aiFace& face = mesh.mFaces[f];
+      if (face.mNumIndices < 3) continue;  // points and lines
+      std::vector<Vec3d> polygon;
+      for (unsigned k = 0; k < face.mNumIndices; ++k) {
+        if (face.mIndices[k] >= mesh.mNumVertices) return;
+        const aiVector3D& p = mesh.mVertices[face.mIndices[k]];
+        const aiVector3t<double> v = here * aiVector3t<double>(p.x, p.y, p.z);
+        polygon.push_back({v.x, v.y, v.z});
+      }
+      for (const auto& triangle : triangulate(polygon)) {
+        for (const std::uint32_t k : triangle) out.at.push_back(polygon[k]);
+        out.material.push_back(static_cast<std::uint16_t>(std::min(mesh.mMaterialIndex, 65535u)));
+      }
+    }
+  }
+  for (unsigned c = 0; c < node.mNumChildren; ++c) gather(scene, *node.mChildren[c], here, depth + 1, out);
+}
+
+}  // namespace
+
+Result<LoadedMesh> load_mesh(const MeshFile& request) {
+  const std::string name = request.file.filename().string();
+  const auto bad = [&](std::string what) { return failure(ErrorKind::bad_data, name + ": " + std::move(what)); };
+  const bool on_disk = request.in_memory.empty();
+  std::error_code error;
+  if (on_disk && !std::filesystem::is_regular_file(request.file, error)) {
+    return failure(ErrorKind::missing_file,
+                   "no mesh file at " + request.file.string() + "; paths are relative to the scene file");
+  }
+  if (on_disk && std::filesystem::file_size(request.file, error) > max_file_bytes)
+    return bad("is larger than 2 GiB; simplify it");
+  const std::string extension = extension_of(request.file);
+  static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
+  if (std::find(known.begin(), known.end(), extension) == known.end()) {
+    return bad("unknown mesh format; use OBJ, STL, PLY, glTF, GLB or DAE");
+  }
+  if (on_disk && extension == ".ply" && !has_ply_header(request.file))
+    return bad("cannot be read: not a PLY file with a whole header");
+
+  Assimp::Importer importer;
+  const bool dae = extension == ".dae";
+  const bool y_up_by_default = extension == ".gltf" || extension == ".glb" || dae;  // Assimp turns a tagged DAE to y up
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());
+  const aiScene* scene =  // without its post-processing, which asserts on odd files
+      on_disk ? importer.ReadFile(request.file.string(), 0)
+              : importer.ReadFileFromMemory(request.in_memory.data(), request.in_memory.size(), 0, extension.c_str() + 1);
+  if (!scene || !scene->mRootNode) return bad("cannot be read: " + first_line(importer.GetErrorString()));
+
+  Corners corners;
+  gather(*scene, *scene->mRootNode, aiMatrix4x4t<double>(), 0, corners);
+  const bool y_up = request.up ? *request.up == UpAxis::y : y_up_by_default;
+  for (Vec3d& p : corners.at) p = request.scale * (y_up ? z_up_from_y_up(p) : p);
+  auto cleaned = clean_mesh(corners.at, corners.material);
+  if (!cleaned) return bad(cleaned.error().text);
+  LoadedMesh out;
+  out.centred = std::move(*cleaned);
+  for (unsigned i = 0; i < scene->mNumMaterials; ++i) {
+    aiString label;
+    scene->mMaterials[i]->Get(AI_MATKEY_NAME, label);
+    out.material_names.emplace_back(label.C_Str());
+  }
+  for (std::uint16_t& m : out.centred.mesh.material) {
+    if (m >= out.material_names.size()) return bad("uses a material that it does not define");
+  }
+  return out;
+}
+
+}  // namespace sonar

@@ -1,0 +1,37 @@
+// Reads mesh files (OBJ, STL, PLY, glTF/GLB, DAE) into checked triangles about their own middle. Used by the scene loader only.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/scene/shapes/terrain.hpp"
+
+namespace sonar {
+
+enum class UpAxis { y, z };
+
+struct MeshFile {
+  std::filesystem::path file;
+  double scale = 1;              // file units to metres
+  std::optional<UpAxis> up;      // which file axis is up; unset: y for glTF/GLB, its own tag for DAE, z otherwise
+  std::string_view in_memory{};  // the contents, when `file` only names them and says the format
+};
+
+struct LoadedMesh {
+  CentredMesh centred;                      // Mesh::material indexes material_names
+  std::vector<std::string> material_names;  // as the file calls them; may be empty strings
+};
+
+/// Refused with one sentence: missing, unknown format, unreadable, empty, not finite, beyond 1e7 m, more than 20 million
+/// triangles, no triangle with an area. y up becomes z up by (x, y, z) -> (x, -z, y).
+Result<LoadedMesh> load_mesh(const MeshFile& request);
+
+/// Shared checks of all meshes: finite, within 1e7 m; drops triangles without area and merges equal vertices, recentres.
+/// `positions` are triangle corners, three a triangle. Errors lack the file name.
+Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material,
+                               std::size_t most = max_mesh_triangles);
+
+}  // namespace sonar

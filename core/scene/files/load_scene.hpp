@@ -1,0 +1,28 @@
+// Reads a scene file (YAML) and everything it names into a Scene, validated. The format is described in docs/scenes.md.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+namespace text {
+class Map;
+}
+
+/// Errors: file:line:col: key.path: what, and the nearest valid name.
+Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& file);
+/// The same from text; `name` starts the errors, paths in the scene are relative to `folder`.
+Result<std::shared_ptr<const Scene>> parse_scene(std::string_view text, const std::string& name,
+                                                 const std::filesystem::path& folder);
+/// One of built_in_scenes (core/scene/files/built_in_scenes.hpp); reads no files.
+Result<std::shared_ptr<const Scene>> load_built_in_scene(std::string_view name);
+
+/// The scene that stands in a map of a larger document, whose finish() then tells what was wrong with it. Never null.
+std::shared_ptr<const Scene> read_scene(text::Map map, const std::filesystem::path& folder, const std::string& name);
+
+}  // namespace sonar

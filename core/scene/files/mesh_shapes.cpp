@@ -1,0 +1,89 @@
+// Mesh files named by a scene: reading them once, and giving every part of them a material.
+#include <algorithm>
+#include <cstdio>
+
+#include "core/scene/files/load_mesh.hpp"
+#include "core/scene/files/shapes.hpp"
+#include "core/text/nearest.hpp"
+
+namespace sonar {
+
+using text::Map;
+using text::Node;
+
+// `materials: {name in file: ours}` first, then `material`, then a material of ours with the same name.
+std::vector<std::uint16_t> ShapeReader::assign_materials(const std::vector<std::string>& names, const std::vector<bool>& used,
+                                                         Map& keys) {
+  std::vector<std::uint16_t> out(names.size(), 0);
+  std::vector<bool> known(names.size(), false);
+  if (const Node node = keys.optional("materials")) {
+    Map chosen = node.map();
+    std::vector<std::string_view> valid(names.begin(), names.end());
+    for (const auto& [name, material] : chosen.entries()) {
+      const auto at = std::find(names.begin(), names.end(), name);
+      if (at == names.end()) {
+        material.fail("the mesh has no material of this name" + text::suggestion(name, valid, "its materials"));
+        continue;
+      }
+      const std::uint16_t index = materials.named(material);
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        if (names[i] == name) out[i] = index, known[i] = true;
+      }
+    }
+  }
+  const Node rest = keys.optional("material");
+  const std::uint16_t rest_index = materials.named(rest);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (known[i] || !used[i]) continue;
+    if (rest.present()) {
+      out[i] = rest_index;
+    } else if (const auto same = materials.find(names[i])) {
+      out[i] = *same;
+    } else {
+      rest.fail("needed, because the mesh's material \"" + names[i].substr(0, 64) +
+                "\" is not a known one; set material or materials");
+    }
+  }
+  return out;
+}
+
+Shape ShapeReader::read_mesh_file(Map& keys) {
+  const Node file = keys.required("file");
+  const std::string name = file.text(1024);
+  MeshFile request;
+  request.file = folder / name;
+  for (const BuiltInFile& f : in_memory)
+    if (f.name == name) request.in_memory = f.contents;
+  request.scale = keys.optional("scale").number_or(1, text::Range::between(1e-9, 1e9));
+  if (const Node up = keys.optional("up")) request.up = up.choice<UpAxis>({{"y", UpAxis::y}, {"z", UpAxis::z}});
+
+  std::string key = request.file.lexically_normal().string();
+  std::array<char, 64> shaped{};
+  std::snprintf(shaped.data(), shaped.size(), "|%.17g|%d", request.scale, request.up ? static_cast<int>(*request.up) : -1);
+  key += shaped.data();
+  const bool first_time = !meshes.contains(key);
+  if (first_time) {
+    if (name.empty()) return keys.optional("material"), keys.optional("materials"), Shape{};
+    auto loaded = load_mesh(request);
+    if (!loaded) return keys.optional("material"), keys.optional("materials"), file.fail(loaded.error().text), Shape{};
+    if (loaded->centred.left_out > 0) {
+      scene.notes.push_back(name + ": " + std::to_string(loaded->centred.left_out) + " triangles without area left out");
+    }
+    meshes.emplace(key, std::move(*loaded));
+  }
+  const LoadedMesh& loaded = meshes.at(key);
+  std::vector<bool> used(loaded.material_names.size(), false);
+  for (const std::uint16_t m : loaded.centred.mesh.material) used[m] = true;
+  const std::vector<std::uint16_t> assigned = assign_materials(loaded.material_names, used, keys);
+  for (std::size_t i = 0; i < assigned.size(); ++i) key.append("|").append(used[i] ? std::to_string(assigned[i]) : "");
+
+  const auto [place, is_new] = files.try_emplace(key);
+  if (is_new) {
+    Mesh mesh = loaded.centred.mesh;
+    for (std::uint16_t& m : mesh.material) m = assigned[m];
+    place->second = Shape{std::make_shared<const Mesh>(std::move(mesh)), loaded.centred.centre_m};
+  }
+  return place->second;
+}
+
+}  // namespace sonar

@@ -1,0 +1,102 @@
+// Grey PNG images as heights; the only file of the scene that knows libpng.
+#include <png.h>
+
+#include <csetjmp>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include "core/scene/shapes/terrain.hpp"
+
+namespace sonar {
+namespace {
+
+struct Picture {
+  std::size_t columns = 0, rows = 0;
+  std::vector<std::uint16_t> grey;
+  std::string error;
+};
+
+void on_error(png_structp png, png_const_charp message) {
+  static_cast<Picture*>(png_get_error_ptr(png))->error = message;
+  png_longjmp(png, 1);
+}
+void on_warning(png_structp, png_const_charp) {}
+
+void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<png_byte>& row) {
+  png_read_info(png, info);
+  const std::size_t columns = png_get_image_width(png, info), rows = png_get_image_height(png, info);
+  const bool grey = (png_get_color_type(png, info) & ~PNG_COLOR_MASK_ALPHA) == PNG_COLOR_TYPE_GRAY;
+  if (!grey) png_error(png, "not a grey image; heights need one channel of 8 or 16 bits");
+  if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) png_error(png, "interlaced; save it without interlacing");
+  if (columns < 2 || rows < 2) png_error(png, "smaller than 2 x 2 pixels");
+  if (columns * rows > max_mesh_triangles / 2) png_error(png, "more than 10 million pixels; use a coarser image");
+  if (png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
+  png_set_strip_alpha(png);
+  png_read_update_info(png, info);
+  const bool wide = png_get_bit_depth(png, info) == 16;
+  row.resize(png_get_rowbytes(png, info));
+  picture.columns = columns;
+  picture.rows = rows;
+  picture.grey.resize(columns * rows);
+  for (std::size_t j = 0; j < rows; ++j) {
+    png_read_row(png, row.data(), nullptr);
+    for (std::size_t i = 0; i < columns; ++i) {
+      const unsigned v = wide ? (unsigned{row[2 * i]} << 8 | row[2 * i + 1]) : row[i] * 257u;
+      picture.grey[j * columns + i] = static_cast<std::uint16_t>(v);
+    }
+  }
+  png_read_end(png, nullptr);
+}
+
+// libpng leaves by longjmp: everything with a destructor lives in the caller.
+bool read_picture(std::FILE* file, Picture& picture, std::vector<png_byte>& row) {
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &picture, on_error, on_warning);
+  png_infop info = png ? png_create_info_struct(png) : nullptr;
+  if (!info) {
+    png_destroy_read_struct(&png, nullptr, nullptr);
+    picture.error = "not enough memory";
+    return false;
+  }
+  if (setjmp(png_jmpbuf(png))) {
+    png_destroy_read_struct(&png, &info, nullptr);
+    return false;
+  }
+  png_set_user_limits(png, 65536, 65536);
+  png_init_io(png, file);
+  read_rows(png, info, picture, row);
+  png_destroy_read_struct(&png, &info, nullptr);
+  return true;
+}
+
+}  // namespace
+
+Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double size_x_m, double size_y_m, double low_m,
+                                    double high_m) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(file.c_str(), "rb"), std::fclose);
+  if (!in) return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + std::strerror(errno));
+  Picture picture;
+  std::vector<png_byte> row;
+  if (!read_picture(in.get(), picture, row)) {
+    return failure(ErrorKind::bad_data, file.string() + ": not usable as heights: " + picture.error);
+  }
+  HeightGrid grid;
+  const auto axis = [](std::size_t n, double size) {
+    std::vector<double> at;
+    for (std::size_t i = 0; i < n; ++i) at.push_back(size * (static_cast<double>(i) / static_cast<double>(n - 1) - 0.5));
+    return at;
+  };
+  grid.x_m = axis(picture.columns, size_x_m);
+  grid.y_m = axis(picture.rows, size_y_m);
+  grid.z_m.resize(picture.grey.size());
+  for (std::size_t j = 0; j < picture.rows; ++j) {
+    for (std::size_t i = 0; i < picture.columns; ++i) {
+      const double v = picture.grey[(picture.rows - 1 - j) * picture.columns + i] / 65535.0;
+      grid.z_m[j * picture.columns + i] = static_cast<float>(low_m + v * (high_m - low_m));
+    }
+  }
+  return grid;
+}
+
+}  // namespace sonar

@@ -1,0 +1,164 @@
+#include "core/scene/files/shapes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/scene/shapes/primitives.hpp"
+
+namespace sonar {
+namespace {
+
+using text::Map;
+using text::Node;
+using text::Range;
+
+const Range a_size{.min = 1e-4, .max = 1e5};
+
+Shape with_material(Mesh mesh, std::uint16_t material, const Primitive& primitive = {}) {
+  std::fill(mesh.material.begin(), mesh.material.end(), material);
+  return Shape{std::make_shared<const Mesh>(std::move(mesh)), {}, primitive};
+}
+
+Shape from_grid(const Result<HeightGrid>& grid, std::uint16_t material, const Node& at, bool centred) {
+  if (!grid) return at.fail(grid.error().text), Shape{};
+  auto made = mesh_from_grid(*grid);
+  if (!made) return at.fail(made.error().text), Shape{};
+  Shape shape = with_material(std::move(made->mesh), material);
+  shape.centre_m = made->centre_m;
+  if (centred) shape.centre_m.x = shape.centre_m.y = 0;
+  return shape;
+}
+
+double in_rad(const Node& node, double fallback_deg) {
+  return rad_from_deg(node.number_or(fallback_deg, Range::between(-360, 360)));
+}
+
+std::array<double, 2> one_or_two(const Node& node, std::array<double, 2> fallback, Range range) {
+  if (!node.is_sequence() && node.present()) {
+    const double both = node.number(range);
+    return {both, both};
+  }
+  return node.numbers_or<2>(fallback, range);
+}
+
+SeabedShape read_seabed(Map& keys) {
+  SeabedShape s;
+  const auto size = keys.required("size_m").numbers<2>(a_size);
+  s.size_x_m = size[0], s.size_y_m = size[1];
+  const auto fine = keys.optional("fine_size_m").numbers_or<2>(size, a_size);
+  s.fine_x_m = fine[0], s.fine_y_m = fine[1];
+  const auto spacing = one_or_two(keys.optional("spacing_m"), {0.2, 0.2}, Range::between(1e-3, 1e3));
+  s.spacing_x_m = spacing[0], s.spacing_y_m = spacing[1];
+  s.seed = static_cast<std::uint32_t>(keys.optional("seed").unsigned_integer_or(1, 0xFFFFFFFFu));
+  s.relief_m = keys.optional("relief_m").number_or(0.1, Range::between(0, 1000));
+  s.wavelength_m = keys.optional("wavelength_m").number_or(4, Range::between(1e-2, 1e5));
+  s.octaves = static_cast<int>(keys.optional("octaves").integer_or(5, 0, 16));
+  s.persistence = keys.optional("persistence").number_or(0.5, Range::between(0, 1));
+  s.slope = keys.optional("slope").numbers_or<2>({0, 0}, Range::between(-10, 10));
+  if (const Node node = keys.optional("ripples")) {
+    Map ripples = node.map();
+    s.ripples.wavelength_m = ripples.required("wavelength_m").number(Range::between(1e-2, 1e3));
+    s.ripples.height_m = ripples.required("height_m").number(Range::between(0, 100));
+    s.ripples.direction_rad = in_rad(ripples.optional("direction_deg"), 0);
+    s.ripples.bend = ripples.optional("bend").number_or(s.ripples.bend, Range::between(0, 2));
+  }
+  return s;
+}
+
+}  // namespace
+
+const std::vector<std::string_view>& ShapeReader::types() {
+  static const std::vector<std::string_view> names{"plane", "box",  "sphere", "cylinder",  "capsule", "cone",
+                                                   "torus", "rock", "mesh",   "heightmap", "seabed"};
+  return names;
+}
+
+Shape ShapeReader::read(std::string_view type, Map& keys) {
+  if (type == "mesh") return read_mesh_file(keys);
+  if (type == "heightmap" || type == "seabed") return read_ground(type, keys);
+  return read_primitive(type, keys);
+}
+
+Shape ShapeReader::read_primitive(std::string_view type, Map& keys) {
+  const std::uint16_t material = materials.named(keys.required("material"));
+  const auto size_of = [&](const char* key) { return std::max(keys.required(key).number(a_size), a_size.min); };
+  const auto segments = [&](double radius_m) {
+    return static_cast<int>(std::max<std::int64_t>(keys.optional("segments").integer_or(segments_for(radius_m), 8, 2048), 8));
+  };
+  const auto patch = [&] { return std::max(keys.optional("patch_m").number_or(1, Range::between(0.01, 1e5)), 0.01); };
+  const auto three = [&](const char* key) {
+    const auto v = keys.required(key).numbers<3>(a_size);
+    return Vec3d{std::max(v[0], a_size.min), std::max(v[1], a_size.min), std::max(v[2], a_size.min)};
+  };
+  const auto done = [&](Mesh mesh, const Primitive& primitive = {}) {
+    return with_material(std::move(mesh), material, primitive);
+  };
+  if (type == "plane") {
+    const auto size = keys.required("size_m").numbers<2>(a_size);
+    const Vec3d sheet{std::max(size[0], a_size.min), std::max(size[1], a_size.min), 0};
+    return done(make_plane(sheet.x, sheet.y, patch()), {.kind = Primitive::Kind::plane, .size_m = sheet});
+  }
+  if (type == "box") {
+    const Vec3d edges = three("size_m");
+    return done(make_box(edges, patch()), {.kind = Primitive::Kind::box, .size_m = edges});
+  }
+  if (type == "rock") {
+    const Vec3d size = three("size_m");
+    const double bumpiness = keys.optional("bumpiness").number_or(0.2, Range::between(0, 0.5));
+    const auto seed = static_cast<std::uint32_t>(keys.optional("seed").unsigned_integer_or(1, 0xFFFFFFFFu));
+    const int n = static_cast<int>(std::max<std::int64_t>(keys.optional("segments").integer_or(40, 8, 512), 8));
+    return done(make_rock(0.5 * size, bumpiness, seed, n));
+  }
+  const double radius = size_of("radius_m");
+  if (type == "sphere") return done(make_sphere(radius, segments(radius)), {.kind = Primitive::Kind::sphere, .radius_m = radius});
+  if (type == "torus") {
+    const double tube = size_of("tube_radius_m");
+    if (tube >= radius) keys.required("tube_radius_m").fail("must be smaller than radius_m");
+    return done(make_torus(std::max(radius, 1.001 * tube), tube, segments(radius + tube)));
+  }
+  const double length = size_of("length_m");
+  if (type == "cylinder") {
+    const Caps caps =
+        keys.optional("caps").choice_or(Caps::both, {{"both", Caps::both}, {"bottom", Caps::bottom}, {"none", Caps::none}});
+    return done(
+        make_cylinder(radius, length, segments(radius), caps),
+        {.kind = Primitive::Kind::cylinder, .radius_m = radius, .size_m = {0, 0, length}, .inside = caps == Caps::bottom});
+  }
+  if (type == "capsule") return done(make_capsule(radius, length, segments(radius)));
+  const double top = keys.optional("top_radius_m").number_or(0, Range::between(0, 1e5));
+  return done(make_cone(radius, top, length, segments(std::max(radius, top))));
+}
+
+Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
+  const std::uint16_t material = materials.named(keys.required("material"));
+  if (type == "seabed") {
+    const SeabedShape shape = read_seabed(keys);
+    const Node size = keys.optional("size_m");
+    if (shape.size_x_m <= 0 || shape.size_y_m <= 0 || shape.spacing_x_m <= 0 || shape.spacing_y_m <= 0)
+      return {};  // said already
+    if (seabed_triangles(shape) > max_mesh_triangles) {
+      return size.fail("makes more than 20 million triangles; raise spacing_m or set fine_size_m"), Shape{};
+    }
+    return from_grid(make_seabed(shape), material, size, false);
+  }
+  const Node file = keys.required("file");
+  const std::filesystem::path path = folder / file.text(1024);
+  const std::string extension = path.extension().string();
+  if (extension == ".png") {
+    const auto size = keys.required("size_m").numbers<2>(a_size);
+    const auto height = keys.required("height_m").numbers<2>(Range::between(-1e5, 1e5));
+    if (size[0] <= 0 || size[1] <= 0) return {};
+    return from_grid(read_png_heights(path, size[0], size[1], height[0], height[1]), material, file, false);
+  }
+  if (extension == ".asc") {
+    const double z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000));
+    const bool centred = keys.optional("centred").boolean_or(false);
+    return from_grid(read_esri_heights(path, z_scale), material, file, centred);
+  }
+  if (file.present() && !path.filename().empty())
+    file.fail("unknown height format; use a grey .png or an ESRI ASCII grid (.asc)");
+  return {};
+}
+
+}  // namespace sonar

@@ -1,0 +1,46 @@
+// From an object's keys to its mesh: primitives, made ground, height files and mesh files. Internal to the scene loader.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/scene/files/built_in_scenes.hpp"
+#include "core/scene/files/load_mesh.hpp"
+#include "core/scene/files/materials.hpp"
+#include "core/scene/scene.hpp"
+#include "core/scene/shapes/terrain.hpp"
+#include "core/text/strict_yaml.hpp"
+
+namespace sonar {
+
+struct Shape {
+  std::shared_ptr<const Mesh> mesh;  // null after an error
+  Vec3d centre_m;                    // where the mesh's own zero lies in the object's frame
+  Primitive primitive = {};          // the true surface, of shapes that have one
+};
+
+struct ShapeReader {
+  Scene& scene;
+  MaterialTable& materials;
+  std::filesystem::path folder;                   // paths in the scene are relative to it
+  std::span<const BuiltInFile> in_memory = {};    // of a built-in scene: its mesh files, which are then not looked for on disk
+  std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
+  std::map<std::string, Shape> files = {};        // the same with their materials: objects that agree share one
+
+  /// Names that `type` may have here, without "point".
+  static const std::vector<std::string_view>& types();
+  /// Reads the keys of that type, `material` among them.
+  Shape read(std::string_view type, text::Map& keys);
+
+ private:
+  Shape read_primitive(std::string_view type, text::Map& keys);
+  Shape read_ground(std::string_view type, text::Map& keys);
+  Shape read_mesh_file(text::Map& keys);
+  std::vector<std::uint16_t> assign_materials(const std::vector<std::string>& names, const std::vector<bool>& used,
+                                              text::Map& keys);
+};
+
+}  // namespace sonar
