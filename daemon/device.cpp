@@ -132,8 +132,10 @@ void Device::on_event(Session& from, const protocol::Event& event) {
   if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
     change_settings(from, *change);
   } else if (std::holds_alternative<protocol::RequestPing>(event)) {
+    // The ping under way will do only if it was fired with the settings that hold now.
     const bool joins = std::get<protocol::RequestPing>(event).joins;
-    if (!busy_ || !joins) pacer_.trigger(context_.clock.now(), joins);
+    const bool served = joins && busy_ && under_way_settings_id_ == settings_id_;
+    if (!served) pacer_.trigger(context_.clock.now(), joins);
   } else if (const auto* store = std::get_if<protocol::StoreAddress>(&event)) {
     state_.stored_address = store->address;
   } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
@@ -207,7 +209,7 @@ void Device::ping(Time at) {
   request.water = context_.config.water;
   request.settings = settings_;
   request.settings.gain_db = gain_assist_.gain_db(settings_, at);
-  request.settings_id = settings_id_;
+  request.settings_id = under_way_settings_id_ = settings_id_;
   request.sonar_id = index_;
   request.seed = Seed(context_.config.seed);
   request.blank = (stale && on_stale == OnStale::blank) || !settings_.transmit;

@@ -127,6 +127,7 @@ class Device final : public SessionParent {
   PingSettings settings_;
   GainAssist gain_assist_;
   std::uint64_t settings_id_ = 0;
+  std::uint64_t under_way_settings_id_ = 0;            // of the ping that is being made
   std::uint64_t oldest_wanted_id_ = 0;                 // pings of settings before it belong to clients that have gone
   std::map<std::uint64_t, protocol::Bytes> requests_;  // settings_id -> the client's own bytes, echoed in its pings
   bool asked_ = false;                                 // a client that is still connected has sent settings

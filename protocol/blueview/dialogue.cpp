@@ -76,9 +76,13 @@ class BlueViewDialogue final : public protocol::Dialogue {
 
   protocol::Delivery on_ping(protocol::BytesView made_with, std::size_t shared_bytes, Time now) override {
     protocol::Delivery delivery;
-    const int head = settings_from(made_with, device_).active_head;
+    const SonarSettings fired_with = settings_from(made_with, device_);
+    const int head = fired_with.active_head;
+    const HeadSettings& fired = fired_with.heads[static_cast<std::size_t>(head)];
+    const HeadSettings now_set = settings_from(device_.request, device_).heads[static_cast<std::size_t>(head)];
     for (auto it = waiting_.begin(); it != waiting_.end();) {
-      if (it->head != head) {
+      // A ping fired before the host set what it then asked a ping of is not the one it means.
+      if (it->head != head || (fired != it->asked_with && fired != now_set)) {
         ++it;
         continue;
       }
@@ -89,7 +93,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
       delivery.prefixes.push_back(make_header(FrameType::ping_data, 0, shared_bytes));
       subscription_->wanted = false;
     }
-    if (!waiting_.empty()) {  // for another head: that one is next
+    if (!waiting_.empty()) {  // for another head, or with other settings: that one is next
       Reaction reaction;
       settings_ = settings_from(device_.request, device_);
       ask_for_ping(waiting_.front().head, reaction);
@@ -104,6 +108,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     std::uint32_t request_id = 0;
     int head = 0;
     Time until{};
+    HeadSettings asked_with;
   };
   struct Subscription {
     int head = 0;
@@ -254,7 +259,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const std::chrono::milliseconds wait(std::min(timeout_ms == 0 ? longest_wait_ms : timeout_ms, longest_wait_ms));
     Time until = now + wait;
     if (!waiting_.empty()) until = std::max(until, waiting_.back().until);  // answers go out in the order of the questions
-    waiting_.push_back({frame.header.request_id, head, until});
+    waiting_.push_back({frame.header.request_id, head, until, settings_.heads[static_cast<std::size_t>(head)]});
     ask_for_ping(head, reaction);
   }
 

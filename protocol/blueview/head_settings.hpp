@@ -25,6 +25,7 @@ struct HeadSettings {
   std::int32_t ping_interval_ms = 0;  // 0 = as fast as asked
   std::int32_t dynamic_power = 0;
   float source_level_db = 0;  // kept and read back; no effect
+  bool operator==(const HeadSettings&) const = default;
 };
 template <class V, wire::Like<HeadSettings> M>
 constexpr void fields(V& visit, M& m) {

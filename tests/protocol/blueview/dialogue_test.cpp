@@ -50,7 +50,7 @@ TEST(BlueViewDialogue, HelloTellsWhatTheSonarIs) {
   std::uint32_t capabilities = 9;
   std::uint8_t heads = 0;
   reader("proto", version);
-  EXPECT_EQ(take_text(reader, "model"), "BlueView M900-2250-130");
+  EXPECT_EQ(take_text(reader, "model"), "M900-2250-130");
   EXPECT_EQ(take_text(reader, "name"), "front");
   EXPECT_EQ(take_text(reader, "serial"), "7001");
   take_text(reader, "firmware");
@@ -121,6 +121,21 @@ TEST(BlueViewDialogue, APingGoesToThoseWhoAskedAndOnlyOnce) {
   EXPECT_EQ(id_of(second.prefixes[0]), 22u);
   EXPECT_TRUE(quiet.ready().prefixes.empty());
   EXPECT_TRUE(one.ready().prefixes.empty()) << "answered already";
+}
+
+TEST(BlueViewDialogue, APingFiredWithOlderSettingsIsNotTheOneAskedFor) {
+  auto device = test::device();
+  Host host(device);
+  host.say(test::hello());
+  const wire::Bytes before = device.request;
+  host.say(test::set(2, 0, Key::transmit, std::int32_t{0}));
+  host.say(test::ping(3));
+  const auto stale = host.dialogue->on_ping(before, 10, at_s(0));
+  EXPECT_TRUE(stale.prefixes.empty());
+  EXPECT_FALSE(stale.events.empty()) << "it asks again";
+  const auto fresh = host.ready();
+  ASSERT_EQ(fresh.prefixes.size(), 1u);
+  EXPECT_EQ(id_of(fresh.prefixes[0]), 3u);
 }
 
 TEST(BlueViewDialogue, TriggersOfTwoHeadsAreServedOneAfterTheOther) {
