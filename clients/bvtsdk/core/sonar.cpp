@@ -60,7 +60,7 @@ int Head::set(Key key, float value, float& kept) {
 }
 
 int Head::get_ping(int n, std::shared_ptr<PingObject>& ping) {
-  const double travel_s = 2 * static_cast<double>(now.stop_m) / std::max(now.sound_speed_mps, 1);
+  const double travel_s = std::isfinite(now.stop_m) ? 2 * static_cast<double>(now.stop_m) / std::max(now.sound_speed_mps, 1) : 0;
   const milliseconds patience = ping_patience + 2 * milliseconds(std::clamp(ping_interval_ms, 0, 600000)) +
                                 milliseconds(static_cast<int>(2000 * std::clamp(travel_s, 0.0, 600.0)));
   auto fresh = std::make_shared<PingObject>();

@@ -37,7 +37,7 @@ class Package(unittest.TestCase):
                               capture_output=True, text=True, check=False, timeout=120)
 
     def test_headers_are_clean_in_every_language(self):
-        for abi, languages in ((3, ["c99", "c11", "c++98", "c++11", "c++17"]), (4, ["c99", "c11", "c++11", "c++17", "c++20"])):
+        for abi, languages in ((3, ["c99", "c11", "c++98", "c++11", "c++17"]), (4, ["c99", "c11", "c++98", "c++11", "c++17", "c++20"])):
             for language in languages:
                 with self.subTest(abi=abi, language=language):
                     c = "++" not in language

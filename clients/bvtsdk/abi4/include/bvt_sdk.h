@@ -312,5 +312,7 @@ BVT_API RetVal BVTLogger_SetTarget(const char* target); /* "stdout", "stderr", "
 #ifdef __cplusplus
 }
 
+#if __cplusplus >= 201103L
 #include "bvt_sdk_classes.h"
+#endif
 #endif
