@@ -63,7 +63,7 @@ std::string complaint(const RenderCommand& render) {
   const bool writes = render.report.empty() && !render.check_expectations;
   if (render.config.empty() && render.report.empty()) return "sonard render needs a configuration or render file";
   if (writes && render.out.empty()) return "say where the files go: --out DIR";
-  if (!writes && !render.out.empty()) return "--report and --check-expectations write no files: leave --out away";
+  if (!writes && !render.out.empty()) return "--report and --check-expectations write no files: leave out --out";
   if (!render.pose_frame.empty() && render.poses.empty()) return "--pose-frame is about --poses FILE, which is not given";
   return {};
 }
@@ -84,7 +84,10 @@ Command parse_command_line(int argc, char** argv) {
   const bool bare = argc < 2 || std::find(words.begin(), words.end(), argv[1]) == words.end();
   if (bare) {
     add_run_options(app, run);
-    app.footer("Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, bench; each has --help.");
+    app.footer(
+        "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, bench; each has --help.\n"
+        "Oculus sonars are wire-compatible. BlueView sonars are compatible with the vendor's SDK by libraries of our own, not on "
+        "the wire. Not affiliated with either vendor.");
   } else {
     app.require_subcommand(1);
     add_run_options(*app.add_subcommand("run", "serve the sonars of a configuration"), run);

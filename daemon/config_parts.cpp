@@ -100,7 +100,7 @@ EngineConfig read_engine(const Node& node) {
     const Node given = map.optional(part.name);
     is_on = given.choice_or<bool>(is_on, {{"on", true}, {"off", false}});
     const std::string why = why_without_effect(engine.switches, part);
-    if (given.present() && is_on && !why.empty()) given.fail("has no effect: " + why + "; leave one of them away");
+    if (given.present() && is_on && !why.empty()) given.fail("has no effect: " + why + "; leave out one of them");
   }
   return engine;
 }

@@ -69,7 +69,7 @@ Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const En
     engine.switches.*part.is_on = given.switches[i] == "on";
     const std::string why = why_without_effect(engine.switches, part);
     if (engine.switches.*part.is_on && !why.empty())
-      return failure(ErrorKind::usage, std::string("--") + part.name + " on has no effect: " + why + "; leave one of them away");
+      return failure(ErrorKind::usage, std::string("--") + part.name + " on has no effect: " + why + "; leave out one of them");
   }
   return {};
 }

@@ -103,9 +103,9 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
   if (std::abs(rotate(sonar.orientation, Vec3d{0, 1, 0}).z) > level_tolerance)
     return failure(ErrorKind::bad_data, "coverage is known for a sonar without roll; level it");
   if (!job.engine.switches.conical)
-    return failure(ErrorKind::bad_data, "coverage is known for conical beams; leave --conical off away");
+    return failure(ErrorKind::bad_data, "coverage is known for conical beams; leave out --conical off");
   if (job.engine.switches.mode != Mode::canonical)
-    return failure(ErrorKind::bad_data, "coverage is known for the canonical model; leave --mode paper or raster away");
+    return failure(ErrorKind::bad_data, "coverage is known for the canonical model; leave out --mode paper or raster");
   if (job.mode().pattern.azimuth_taper == Taper::unit)
     return failure(ErrorKind::bad_data, "coverage is known for beams with a width; azimuth_taper unit has none");
   const ClosedForm expected(job, ping, *bed);

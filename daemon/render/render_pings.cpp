@@ -125,7 +125,7 @@ Result<void> write_ping(const RenderJob& job, const Ping& ping, const PingEngine
   const std::string stem = (o.folder / number_text(number)).string();
   if (o.complex && ping.beam_signal_upa.empty())
     return failure(ErrorKind::usage,
-                   "there is no complex beam signal in expected power and in the comparison modes; leave --complex away");
+                   "there is no complex beam signal in expected power and in the comparison modes; leave out --complex");
   Result<void> done;
   const auto put = [&](bool wanted, const char* end, const std::string& header, std::span<const std::byte> data) {
     if (wanted && done) done = write_file(stem + end, {bytes_of(header), data});

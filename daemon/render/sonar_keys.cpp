@@ -88,7 +88,10 @@ void read_model(Map keys, FrequencyMode& mode) {
 
 int read_mode(const Node& node, const SonarModel& model, int fallback) {
   if (!node.present()) return fallback;
-  if (text::parse_integer(node.text(64))) return static_cast<int>(node.integer(1, static_cast<int>(model.modes.size()))) - 1;
+  if (text::parse_integer(node.text(64))) {
+    const int modes = static_cast<int>(model.modes.size());
+    return std::clamp(static_cast<int>(node.integer(1, modes)), 1, modes) - 1;  // what is outside has been said by then
+  }
   std::vector<std::string_view> names;
   for (const FrequencyMode& mode : model.modes) names.push_back(mode.name);
   return static_cast<int>(node.choice_index(std::move(names)));

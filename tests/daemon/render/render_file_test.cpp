@@ -103,6 +103,8 @@ TEST(RenderFile, RefusesWithAPlace) {
   EXPECT_THAT(refusal(point + "sonar: {ping: {rnage_m: 4}}\n"), AllOf(HasSubstr("r.yaml:5"), HasSubstr("range_m")));
   EXPECT_THAT(refusal(point + "sonar: {profile: oculus-m1300d}\n"), HasSubstr("oculus-m1200d"));
   EXPECT_THAT(refusal(point + "sonar: {options: {pulse: native}}\n"), HasSubstr("which is not given"));
+  for (const char* mode : {"0", "3", "-1"})
+    EXPECT_THAT(refusal(point + "sonar: {profile: oculus-m1200d, ping: {mode: " + mode + "}}\n"), HasSubstr("ping.mode")) << mode;
   EXPECT_THAT(refusal("scene: no-such-scene.yaml\n"), HasSubstr("no such file"));
   EXPECT_THAT(refusal("sonar: {}\n"), HasSubstr("scene"));
   EXPECT_THAT(refusal(point + "sweep: {a: [1, 2], b: [1]}\n"), HasSubstr("equally long"));
