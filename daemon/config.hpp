@@ -2,6 +2,7 @@
 // Nothing else in the daemon reads settings from anywhere.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -69,9 +70,27 @@ struct PoseConfig {
   OnStale on_stale = OnStale::hold;
   double max_jump_m = 50;
 };
+/// Who may steer the daemon, and where they ask (docs/control.md).
+struct ControlConfig {
+  PoseListener stream{true, {{127, 0, 0, 1}, 14770}};  // TCP: the control stream
+  PoseListener http{true, {{127, 0, 0, 1}, 8088}};
+  bool http_given = false;           // by the file: then it must be free; the default gives way with a warning
+  std::filesystem::path token_file;  // empty = none; needed when a listener is not on loopback
+  std::vector<std::string> hosts;    // names that HTTP's Host and Origin may have, beside addresses and localhost
+};
+/// What strangers may cost us.
+struct LimitConfig {
+  int clients = 256;                           // of all sonars together; 16 of one: SonarConfig::max_clients
+  int control_clients = 32;                    // of the stream, and of HTTP
+  std::size_t input_bytes_per_s = 1u << 20;    // of one client; more is read more slowly
+  std::chrono::milliseconds stall{10000};      // a client that takes no byte for so long is reset
+  std::chrono::milliseconds dead_peer{15000};  // one whose computer answers nothing
+  int spare_descriptors = 32;                  // never given to clients
+};
 inline constexpr int most_fixed_rays = 100000;  // a column
 struct EngineConfig {
-  int threads = 0;  // 0 = all cores
+  int threads = 0;      // 0 = all cores
+  int io_priority = 0;  // 1 to 99: the I/O thread is scheduled in real time (SCHED_FIFO); 0 = as usual
   SimdLevel simd = SimdLevel::automatic;
   Switches switches;
 };
@@ -84,6 +103,8 @@ struct Config {
   std::vector<VehicleConfig> vehicles;
   std::vector<SonarConfig> sonars;
   PoseConfig poses;
+  ControlConfig control;
+  LimitConfig limits;
   EngineConfig engine;
   ClockMode clock = ClockMode::realtime;
   LogOptions log;

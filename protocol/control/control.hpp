@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "protocol/control/operations.hpp"
 #include "protocol/control/pose_sample.hpp"
 
 namespace sonar::control {
@@ -23,19 +25,23 @@ inline constexpr std::size_t largest_datagram = 1200;
 struct Hello {
   std::uint32_t protocol_version = control::protocol_version;
   std::string name;
+  std::string token;  // what the client knows of control.token_file
 };
 struct Unsupported {  // a request this version does not know
 };
 struct Request {
   std::uint64_t id = 0;
-  std::variant<Unsupported, Hello, PoseSample> op;
+  std::variant<Unsupported, Hello, PoseSample, GetStatus, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
+               Subscribe>
+      op;
 };
-enum class StatusCode { ok, refused, unsupported };
+enum class StatusCode { ok, refused, unsupported, failed };
 struct Response {
   std::uint64_t id = 0;
   StatusCode code = StatusCode::ok;
   std::string text;
-  bool hello = false;  // carries our Hello
+  bool hello = false;                                      // carries our Hello
+  std::variant<std::monostate, DaemonStatus, Event> body;  // of GetStatus; what was subscribed to
 };
 
 /// One datagram: a PoseUpdate. Refused with one sentence when malformed (see checked()).
@@ -52,5 +58,15 @@ Bytes encode_response(const Response& response);
 Bytes encode_pose_datagram(const PoseSample& sample);
 Bytes encode_request(const Request& request);
 Result<Response> decode_response(BytesView message);
+
+// ---- the same in protobuf's JSON mapping, for HTTP and for people
+
+/// `op` is the name of a member of Request.op ("sonar", "set_object"), `json` its message. Refused with one sentence: not JSON,
+/// an unknown key, a wrong type, and whatever decode_request refuses.
+Result<Request> request_from_json(std::string_view op, std::string_view json);
+/// One line, no newline; numbers that are 0 and empty lists are written too.
+std::string json_of(const Response& response);
+std::string json_of(const DaemonStatus& status);
+std::string json_of(const Event& event);
 
 }  // namespace sonar::control

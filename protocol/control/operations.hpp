@@ -1,0 +1,127 @@
+// What can be asked of a running daemon beside poses, as plain structs: the requests of control.proto, checked and in the house's
+// frames (world ENU, body FLU, SI). protocol/control makes them from protobuf and JSON; daemon/operations.hpp carries them out.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+#include "protocol/control/pose_sample.hpp"
+
+namespace sonar::control {
+
+struct GetStatus {};
+
+/// What is not given stays as it is. Finite numbers only; whether the product can do it, the daemon says.
+struct SetSonar {
+  std::string sonar;  // empty = the only one there is
+  std::optional<double> range_m, rate_hz, gain_percent;
+  std::optional<std::uint32_t> mode, beams;
+  std::optional<bool> transmit;
+  std::optional<Pose> mount;  // sonar in vehicle, FLU
+};
+struct SetEnvironment {
+  std::optional<double> temperature_c, salinity_psu, ph, sound_speed_mps;
+};
+struct LoadScene {
+  std::string path;
+};
+struct AddObject {
+  std::string name, like, material;
+  Pose in_world;
+  bool moving = false;
+};
+struct RemoveObject {
+  std::string object;
+};
+struct SetObject {
+  std::string object;
+  std::optional<bool> visible;
+  std::optional<Pose> in_world;
+};
+struct Subscribe {
+  bool pings = false, clients = false, poses = false, scene = false;
+};
+
+/// What the daemon does for whoever may ask; Hello and Subscribe are the connection's own business.
+using Operation = std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject>;
+
+// ---- answers
+
+struct ClientStatus {
+  std::string address;
+  std::uint64_t pings_written = 0, pings_dropped = 0, bytes_written = 0;
+  double connected_s = 0;
+};
+struct SonarFigures {
+  std::uint64_t pings = 0, refused = 0, served = 0, dropped = 0, skipped_ticks = 0, clients = 0, refused_clients = 0;
+  double simulation_ms = 0, latency_ms_p50 = 0, latency_ms_p99 = 0, late_ms_p99 = 0;
+};
+struct SonarStatus {
+  std::string name, profile, listens, advertised;
+  std::vector<std::string> status_to;
+  bool pinging = false, transmits = true;
+  double range_m = 0, rate_hz = 0, gain_db = 0, frequency_hz = 0;
+  std::uint32_t beams = 0, rows = 0;
+  Pose in_world;
+  std::vector<ClientStatus> clients;
+  SonarFigures figures;
+};
+struct VehicleStatus {
+  std::string name, source;
+  bool stale = false;
+  Pose in_world;
+};
+struct ObjectStatus {
+  std::string name, material;
+  bool moving = false, visible = true;
+  std::uint32_t triangles = 0;
+  Pose in_world;
+};
+struct PoseFigures {
+  std::uint64_t accepted = 0, refused = 0, late = 0, replaced = 0, over_rate = 0;
+};
+struct DaemonStatus {
+  std::string version, config, scene, clock, engine;
+  std::uint64_t seed = 0;
+  double uptime_s = 0, resident_mb = 0;
+  std::vector<SonarStatus> sonars;
+  std::vector<VehicleStatus> vehicles;
+  std::vector<ObjectStatus> objects;
+  PoseFigures poses;
+  SetEnvironment environment;  // complete
+};
+
+// ---- events
+
+struct PingEvent {
+  std::string sonar;
+  std::uint32_t number = 0;
+  std::int64_t fired_at_ns = 0;
+  Pose sonar_in_world;
+  double range_m = 0;
+  std::uint32_t beams = 0, rows = 0, clients = 0;
+  double simulation_ms = 0;
+};
+struct ClientEvent {
+  std::string sonar, client;
+  bool connected = false;
+  std::string why;
+};
+struct PoseEvent {
+  std::string vehicle;
+  bool stale = false;
+  std::string text;
+};
+struct SceneEvent {
+  std::string scene, text;
+};
+struct Event {
+  std::variant<PingEvent, ClientEvent, PoseEvent, SceneEvent> what;
+  std::uint64_t unsent = 0;  // events this subscriber was too slow for, before this one
+};
+
+}  // namespace sonar::control
