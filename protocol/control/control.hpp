@@ -25,7 +25,7 @@ inline constexpr std::size_t largest_datagram = 1200;
 struct Hello {
   std::uint32_t protocol_version = control::protocol_version;
   std::string name;
-  std::string token;  // what the client knows of control.token_file
+  std::string token = {};  // what the client knows of control.token_file
 };
 struct Unsupported {  // a request this version does not know
 };
@@ -40,8 +40,8 @@ struct Response {
   std::uint64_t id = 0;
   StatusCode code = StatusCode::ok;
   std::string text;
-  bool hello = false;                                      // carries our Hello
-  std::variant<std::monostate, DaemonStatus, Event> body;  // of GetStatus; what was subscribed to
+  bool hello = false;                                           // carries our Hello
+  std::variant<std::monostate, DaemonStatus, Event> body = {};  // of GetStatus; what was subscribed to
 };
 
 /// One datagram: a PoseUpdate. Refused with one sentence when malformed (see checked()).
