@@ -49,7 +49,9 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                  stop("the engine failed");
                }},
       signals_(io_),
-      house_timer_(io_) {
+      house_timer_(io_),
+      notify_(
+          io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {
   for (std::size_t i = 0; i < config_.sonars.size(); ++i)
     devices_.emplace_back(context_, config_.sonars[i], static_cast<std::uint32_t>(i));
 }
@@ -71,8 +73,17 @@ int App::run() {
   for (Device& d : devices_) d.start();
   asio::co_spawn(
       io_, [this] { return keep_house(); }, asio::detached);
+  notify_.ready(status_line());
   io_.run();
   return exit_code_;
+}
+
+/// What `systemctl status` shows.
+std::string App::status_line() const {
+  std::string line = "Serving";
+  for (const Device& d : devices_)
+    line += (&d == &devices_.front() ? " " : ", ") + d.config().name + " on " + text_of(d.config().bind_ip);
+  return line;
 }
 
 void App::wait_for_signal() {
@@ -95,6 +106,7 @@ void App::request_stop() {
 void App::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
   log_.info("stopping: " + why);
+  notify_.stopping();
   pose_server_.stop();
   house_timer_.cancel();
   for (Device& d : devices_) d.stop();

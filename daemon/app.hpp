@@ -14,6 +14,7 @@
 #include "daemon/config.hpp"
 #include "daemon/device.hpp"
 #include "daemon/log.hpp"
+#include "daemon/notify.hpp"
 #include "daemon/pose_server.hpp"
 #include "daemon/simulator.hpp"
 #include "daemon/start_engine.hpp"
@@ -26,6 +27,7 @@ struct AppOptions {
   bool digest = false;                           // SHA-256 of every client's stream
   std::chrono::milliseconds stall_limit{10000};  // a client that takes no byte for so long is reset
   bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP does nothing yet
+  NotifyPlace service_manager;  // is told when we are ready, stop, and that we are alive
 };
 
 class App {
@@ -54,6 +56,7 @@ class App {
   void step_time();
   bool enough_served() const;
   void wait_for_signal();
+  std::string status_line() const;
   asio::awaitable<void> keep_house();
 
   Config config_;
@@ -69,6 +72,7 @@ class App {
   std::deque<Device> devices_;
   asio::signal_set signals_;
   asio::steady_timer house_timer_;
+  Notify notify_;
   bool look_posted_ = false, stopping_ = false;
   int exit_code_ = 0;
 };

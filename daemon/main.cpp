@@ -76,6 +76,7 @@ int run(const RunCommand& command, Steady::time_point begin) {
   options.exit_after_pings = command.exit_after_pings;
   options.digest = command.digest;
   options.handle_signals = true;
+  options.service_manager = notify_place_from_environment();
   App app(std::move(config), *scene, make_engine, options, log);
   const double scene_ms = 1e3 * seconds_since(scene_begin);
   if (const auto r = app.open(); !r) return complain(r.error());

@@ -20,6 +20,7 @@ Simulator::Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, i
 Simulator::~Simulator() { thread_.join(); }
 
 void Simulator::submit(PingRequest request, Done done) {
+  if (waiting_++ == 0) begun_ = std::chrono::steady_clock::now();
   auto work = asio::make_work_guard(io_);
   asio::post(thread_, [this, work = std::move(work), request = std::move(request), done = std::move(done)]() mutable {
     Outcome outcome;
@@ -37,8 +38,16 @@ void Simulator::submit(PingRequest request, Done done) {
       outcome.failure = e.what();
     }
     outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    asio::post(io_, [outcome = std::move(outcome), done = std::move(done)]() mutable { done(std::move(outcome)); });
+    asio::post(io_, [this, outcome = std::move(outcome), done = std::move(done)]() mutable {
+      --waiting_;
+      begun_ = std::chrono::steady_clock::now();
+      done(std::move(outcome));
+    });
   });
+}
+
+std::chrono::nanoseconds Simulator::under_way_for() const {
+  return waiting_ == 0 ? std::chrono::nanoseconds{0} : std::chrono::steady_clock::now() - begun_;
 }
 
 }  // namespace sonar

@@ -2,6 +2,7 @@
 // Requests go over by value, finished pings come back on the I/O thread; nothing else is shared.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
@@ -31,10 +32,14 @@ class Simulator {
   /// I/O thread. `done` is called there; the I/O thread stays alive until it was.
   void submit(PingRequest request, Done done);
   const PingEngine& engine() const { return *engine_; }
+  /// I/O thread: for how long the engine has been at its present ping; 0 = it waits for work.
+  std::chrono::nanoseconds under_way_for() const;
 
  private:
   asio::io_context& io_;
   std::unique_ptr<PingEngine> engine_;
+  std::size_t waiting_ = 0;                        // requests without an answer; I/O thread, as the next
+  std::chrono::steady_clock::time_point begun_{};  // when the engine took up the oldest of them
   asio::thread_pool thread_{1};
 };
 
