@@ -1,0 +1,21 @@
+// Keeps what a reliability test measured beside its bound: one JSON file a figure, in the folder that SONARD_RELIABILITY names.
+// reliability_table.py makes docs/reliability.md of them; the items it knows are listed there.
+#pragma once
+
+#include <string>
+
+namespace sonar::test {
+
+struct ReliabilityFigure {
+  std::string item;    // a key of ITEMS in reliability_table.py
+  std::string figure;  // what was measured, with units: "0.02 % of 57600"
+  std::string bound;   // what was promised: "at most 0.5 %"
+  bool passed = false;
+  std::string command;  // what a reader runs to measure it again, from the root of the tree
+};
+
+/// Writes the figure to FOLDER/ITEM.json, with date and machine, in place of an older one. Without SONARD_RELIABILITY, nothing.
+/// False when the file cannot be written.
+bool record_reliability(const ReliabilityFigure& figure);
+
+}  // namespace sonar::test

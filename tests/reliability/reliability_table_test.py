@@ -1,0 +1,72 @@
+"""The generated page shows every item: measured, missed or not run; unknown and malformed records are faults."""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import reliability_table
+from record import record
+
+HERE = pathlib.Path(__file__).resolve().parent
+
+
+def table(folder, *options):
+    done = subprocess.run([sys.executable, str(HERE / "reliability_table.py"), folder, *options], capture_output=True, text=True,
+                          timeout=60, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+class Table(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        os.environ["SONARD_RELIABILITY"] = self.folder.name
+        self.addCleanup(os.environ.pop, "SONARD_RELIABILITY")
+
+    def test_what_is_missing_was_not_run(self):
+        code, page, said = table(self.folder.name)
+        self.assertEqual(code, 0)
+        rows = [line for line in page.splitlines() if "| not run |" in line]
+        self.assertEqual(len(rows), sum(len(r) for r in reliability_table.items().values()))
+        self.assertIn("load-dropped", said)
+        self.assertEqual(table(self.folder.name, "--strict")[0], 1)
+
+    def test_what_was_measured_is_shown_with_its_machine(self):
+        self.assertTrue(record("load-dropped", "0.02 % of 57,600 | 3", "at most 0.5 %", True, "build/x --only load"))
+        code, page, _ = table(self.folder.name)
+        self.assertEqual(code, 0)
+        row = next(line for line in page.splitlines() if "0.02 %" in line)
+        self.assertIn("| yes |", row)
+        self.assertIn("57,600 \\| 3", row)
+        self.assertIn("`build/x --only load`", row)
+        self.assertIn("Machines: 1: ", page)
+
+    def test_a_missed_bound_is_a_fault(self):
+        record("load-dropped", "1.2 %", "at most 0.5 %", False, "x")
+        code, page, said = table(self.folder.name)
+        self.assertEqual(code, 1)
+        self.assertIn("**NO**", page)
+        self.assertIn("load-dropped: 1.2 %", said)
+
+    def test_unknown_and_malformed_records_are_faults(self):
+        record("load-droped", "0", "0", True, "x")
+        code, _, said = table(self.folder.name)
+        self.assertEqual(code, 1)
+        self.assertIn("unknown item load-droped", said)
+        pathlib.Path(self.folder.name, "cut.json").write_text(json.dumps({"item": "cycles"}), encoding="utf-8")
+        code, _, said = table(self.folder.name)
+        self.assertEqual(code, 2)
+        self.assertIn("without bound, command", said)
+
+    def test_without_a_folder_nothing_is_written(self):
+        del os.environ["SONARD_RELIABILITY"]
+        self.assertFalse(record("load-dropped", "1.2 %", "at most 0.5 %", False, "x"))
+        self.assertEqual(list(pathlib.Path(self.folder.name).iterdir()), [])
+        os.environ["SONARD_RELIABILITY"] = self.folder.name
+
+
+if __name__ == "__main__":
+    unittest.main()
