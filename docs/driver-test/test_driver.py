@@ -1,0 +1,144 @@
+"""A driver's tests against sonard: copy this file into your driver's repository and change DRIVER and read_ping.
+
+    DRIVER    the command that starts your driver on ADDRESS and prints one line a ping; here the sixty lines of tiny_driver.py
+    SONARD    the daemon's program (default: the one in the PATH)
+    ADDRESS   of the emulated sonar (default 127.0.0.2); poses and control listen on it too, so that runs do not meet
+
+Run it with: python3 -m unittest test_driver.py
+"""
+import json
+import os
+import pathlib
+import shlex
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import urllib.request
+
+HERE = pathlib.Path(__file__).resolve().parent
+SONARD = os.environ.get("SONARD", "sonard")
+ADDRESS = os.environ.get("ADDRESS", "127.0.0.2")
+DRIVER = os.environ.get("DRIVER", f"{sys.executable} {HERE / 'tiny_driver.py'} {ADDRESS}")
+
+# Three spheres of which no two swap under any mirror image: an image that is mirrored or turned cannot pass.
+CONFIG = f"""
+world: {{scene: l-targets.yaml, seed: 1}}
+vehicles: [{{name: rov, initial_pose: {{frame: ENU_FLU, xyz_m: [0, 0, 0]}}}}]
+sonars: [{{name: front, profile: oculus-m1200d, bind_ip: {ADDRESS}}}]
+poses: {{protobuf: "{ADDRESS}:14770", json: "{ADDRESS}:14771"}}
+control: {{stream: "{ADDRESS}:14770", http: "{ADDRESS}:8088"}}
+"""
+NEAR_TO_PORT, NEAR_TO_STARBOARD, FAR_TO_PORT = (3.9, -20), (3.9, 10), (6.9, -8)  # range m, bearing deg, starboard positive
+
+
+def read_ping(line):
+    """A line that your driver prints for a ping: number, and the range and bearing of bright places."""
+    return json.loads(line)
+
+
+class Sonar:
+    """The emulated device: power on, power off."""
+
+    def __init__(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.config = pathlib.Path(self.folder.name) / "sonard.yaml"
+        self.config.write_text(CONFIG, encoding="utf-8")
+        self.process = None
+
+    def power_on(self):
+        self.process = subprocess.Popen([SONARD, "run", str(self.config)], stdin=subprocess.DEVNULL)
+        deadline = time.monotonic() + 30
+        while time.monotonic() < deadline:  # it answers as soon as drivers can connect
+            try:
+                with urllib.request.urlopen(f"http://{ADDRESS}:8088/healthz", timeout=1):
+                    return
+            except OSError:
+                if self.process.poll() is not None:
+                    raise AssertionError(f"sonard ended with code {self.process.returncode}") from None
+                time.sleep(0.05)
+        raise AssertionError("sonard is not ready after 30 s")
+
+    def power_off(self):
+        """As by a switch: no goodbye."""
+        self.process.kill()
+        self.process.wait()
+
+    def tell(self, operation, **message):
+        """One request of docs/control.md: tell("sonar", transmit=False)."""
+        request = urllib.request.Request(f"http://{ADDRESS}:8088/api/v1/{operation}", json.dumps(message).encode(),
+                                         {"Content-Type": "application/json"})
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return json.load(answer)
+
+
+class Driver:
+    """The program under test, and the pings it has published so far."""
+
+    def __init__(self):
+        self.pings = []  # (time of arrival, ping)
+        self.process = subprocess.Popen(shlex.split(DRIVER), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.pings.append((time.monotonic(), read_ping(line)))
+
+    def wait_for_pings(self, count, patience_s):
+        """The next `count` pings from now on."""
+        begin, deadline = len(self.pings), time.monotonic() + patience_s
+        while len(self.pings) < begin + count:
+            if time.monotonic() > deadline:
+                raise AssertionError(f"{len(self.pings) - begin} of {count} pings within {patience_s} s")
+            time.sleep(0.02)
+        return [ping for _, ping in self.pings[begin:begin + count]]
+
+    def stop(self):
+        self.process.terminate()
+        self.process.wait(10)
+        self.reader.join(10)
+        self.process.stdout.close()
+
+
+class DriverTest(unittest.TestCase):
+    def setUp(self):
+        self.sonar = Sonar()
+        self.addCleanup(self.sonar.folder.cleanup)
+        self.sonar.power_on()
+        self.addCleanup(self.sonar.power_off)
+        self.driver = Driver()
+        self.addCleanup(self.driver.stop)
+
+    def expect_echo(self, ping, place):
+        near = [e for e in ping["bright"] if abs(e[0] - place[0]) < 0.2 and abs(e[1] - place[1]) < 2]
+        self.assertTrue(near, f"nothing at {place[0]} m, {place[1]} deg; bright were {ping['bright']}")
+
+    def test_left_is_left_and_near_is_near(self):
+        ping = self.driver.wait_for_pings(3, 30)[-1]
+        for place in (NEAR_TO_PORT, NEAR_TO_STARBOARD, FAR_TO_PORT):
+            self.expect_echo(ping, place)
+
+    def test_numbers_go_up_by_one(self):
+        numbers = [ping["number"] for ping in self.driver.wait_for_pings(20, 30)]
+        self.assertEqual(numbers, list(range(numbers[0], numbers[0] + 20)))
+
+    def test_it_is_back_after_a_power_cut(self):
+        self.driver.wait_for_pings(3, 30)
+        self.sonar.power_off()
+        time.sleep(4)
+        self.sonar.power_on()
+        self.driver.wait_for_pings(3, 15)
+
+    def test_a_transmitter_that_fails_shows_no_echo(self):
+        self.driver.wait_for_pings(3, 30)
+        self.sonar.tell("sonar", sonar="front", transmit=False)
+        time.sleep(1)
+        ping = self.driver.wait_for_pings(3, 10)[-1]
+        self.assertFalse([e for e in ping["bright"] if abs(e[0] - 3.9) < 0.2 and abs(e[1] + 20) < 2])
+
+
+if __name__ == "__main__":
+    unittest.main()
