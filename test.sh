@@ -14,6 +14,7 @@ case "${1:-}" in
 esac
 
 setup_and_build || exit
+need_packages "${test_packages[@]}" || echo "going on without: the tests that need them are skipped"
 if [ -n "$long" ]; then
   tests/tools/long_checks.sh || exit
 fi

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "tests/protocol/oculus/json_of.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
 namespace sonar::oculus::testing {
@@ -10,38 +11,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// Fills a JSON object from a message, by the vendor's names.
-class ToJson : public wire::Visitor<ToJson> {
- public:
-  Json object = Json::object();
-
- private:
-  friend class wire::Visitor<ToJson>;
-  template <class T>
-  static Json plain(const T& value) {
-    if constexpr (std::is_enum_v<T>) {
-      return static_cast<std::underlying_type_t<T>>(value);
-    } else {
-      return value;
-    }
-  }
-  template <wire::Scalar T>
-  void scalar(std::string_view name, const T& value) {
-    object[std::string(name)] = plain(value);
-  }
-  template <class A>
-  void array(std::string_view name, A& values) {
-    for (const auto& value : values) object[std::string(name)].push_back(plain(value));
-  }
-  template <class M>
-  void nested(std::string_view name, M& message) {
-    ToJson inner;
-    fields(inner, message);
-    object[std::string(name)] = inner.object;
-  }
-};
-
-/// The way back; every name must be there.
+/// Fills a message from a JSON object: the opposite of ToJson. Every name must be there.
 class FromJson : public wire::Visitor<FromJson> {
  public:
   explicit FromJson(const Json& object) : object_(object) {}
@@ -92,9 +62,7 @@ void expect_pair(const std::string& name) {
   wire::Reader reader(bytes);
   fields(reader, read);
   EXPECT_TRUE(reader.ok()) << name;
-  ToJson decoded;
-  fields(decoded, read);
-  EXPECT_EQ(decoded.object, json) << name;
+  EXPECT_EQ(json_of(read), json) << name;
 
   M made{};
   FromJson from(json);
