@@ -21,6 +21,7 @@ using BytesView = std::span<const std::byte>;
 
 inline constexpr std::uint32_t protocol_version = 1;
 inline constexpr std::size_t largest_datagram = 1200;
+inline constexpr std::size_t largest_json = std::size_t{1} << 20;
 
 struct Hello {
   std::uint32_t protocol_version = control::protocol_version;
@@ -64,9 +65,11 @@ Result<Response> decode_response(BytesView message);
 /// `op` is the name of a member of Request.op ("sonar", "set_object"), `json` its message. Refused with one sentence: not JSON,
 /// an unknown key, a wrong type, and whatever decode_request refuses.
 Result<Request> request_from_json(std::string_view op, std::string_view json);
-/// One line, no newline; numbers that are 0 and empty lists are written too.
+/// One line, no newline; names as in control.proto, numbers that are 0 and empty lists too. 64-bit numbers are strings, as
+/// protobuf's mapping has it.
 std::string json_of(const Response& response);
 std::string json_of(const DaemonStatus& status);
 std::string json_of(const Event& event);
+std::string json_of(StatusCode code, const std::string& text);  // {"code":"REFUSED","text":"..."}
 
 }  // namespace sonar::control

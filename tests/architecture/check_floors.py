@@ -26,7 +26,8 @@ FLOORS = {
     "protocol/oculus": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
     "protocol/blueview": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
-    "clients": ["core/base/", "core/image/", "core/sonar/", "protocol/", "clients/"],
+    "clients": ["core/base/", "core/image/", "core/sonar/", "core/text/", "protocol/", "clients/"],
+    "clients/scene_tools": ["core/base/", "core/scene/", "core/text/", "clients/scene_tools/"],  # docs/decisions/0013-scene-tools.md
     "clients/bvtsdk": ["clients/bvtsdk/"],  # loaded into foreign processes: nothing of the house comes along
     "tests": [""],
 }
@@ -38,12 +39,13 @@ DEPENDENCIES = {
     r"fftw": ["core/pipeline/pulses/spectral_transform.cpp"],
     r"yaml-cpp/": ["core/text/"],
     r"assimp/": ["core/scene/files/load_mesh.cpp"],
+    r"tinyxml2\.h": ["clients/scene_tools/xml_file.cpp"],
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp"],
     r"zlib\.h": ["protocol/blueview/deflate.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],
     r"boost/asio\.hpp": ["daemon/asio.hpp"],
     r"spdlog/|fmt/": ["daemon/", "clients/"],
-    r"google/protobuf|.*\.pb\.h": ["protocol/control/control.cpp"],
+    r"google/protobuf|.*\.pb\.h": ["protocol/control/"],
     r"nlohmann/": ["protocol/control/", "daemon/", "clients/"],
     r"CLI/": ["daemon/", "clients/"],
     r"cuda|nv[a-z]+\.h": ["cuda/"],

@@ -1,0 +1,122 @@
+// The control protocol's messages as JSON text. Text from outside is read twice: by our own strict reader, which bounds depth and
+// refuses what is no JSON or said twice, and then by protobuf's, which knows the messages.
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "protocol/control/messages.hpp"
+
+namespace sonar::control {
+namespace {
+
+using google::protobuf::Message;
+constexpr std::size_t deepest_nesting = 16;
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
+
+std::string in_quotes(const std::string& name) { return '"' + name.substr(0, 64) + '"'; }
+
+/// protobuf's reader also takes names without quotes, 'text' and trailing commas, and the last of two equal keys.
+class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  std::string why;  // empty = it is JSON
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool start_object(std::size_t) override { return enter(); }
+  bool key(string_t& name) override {
+    if (keys_.back().insert(name).second) return true;
+    why = in_quotes(name) + " is said twice";
+    return false;
+  }
+  bool end_object() override { return leave(); }
+  bool start_array(std::size_t) override { return enter(); }
+  bool end_array() override { return leave(); }
+  bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception&) override {
+    why = "not JSON: wrong at character " + std::to_string(position);
+    return false;
+  }
+
+ private:
+  bool enter() {
+    keys_.emplace_back();
+    if (keys_.size() <= deepest_nesting) return true;
+    why = "nested deeper than " + std::to_string(deepest_nesting) + " levels";
+    return false;
+  }
+  bool leave() {
+    keys_.pop_back();
+    return true;
+  }
+  std::vector<std::set<std::string>> keys_;  // of each open object
+};
+
+/// protobuf's own words: "(sonar.rang): Cannot find field." or "rang: Cannot find field."
+std::string sentence_from(const std::string& words) {
+  constexpr std::string_view unknown = ": Cannot find field.";
+  const auto at = words.find(unknown);
+  if (at == std::string::npos) return words;
+  std::string key = words.substr(0, at);
+  if (const auto space = key.rfind(' '); space != std::string::npos) key.erase(0, space + 1);
+  return in_quotes(key) + ": unknown key";
+}
+
+std::string json_from(Message& message) {
+  repair_texts(message);
+  google::protobuf::util::JsonPrintOptions options;
+  options.always_print_primitive_fields = true;
+  options.preserve_proto_field_names = true;
+  std::string out;
+  if (!google::protobuf::util::MessageToJsonString(message, &out, options).ok()) return "{}";  // never: we made it
+  return out;
+}
+
+}  // namespace
+
+Result<Request> request_from_json(std::string_view op, std::string_view json) {
+  keep_protobuf_quiet();
+  v1::Request message;
+  const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
+  if (field == nullptr || field->containing_oneof() == nullptr) return refused("no such request");
+  if (json.size() > largest_json) return refused("longer than 1 MiB");
+  StrictReader reader;
+  if (!nlohmann::json::sax_parse(json, &reader)) return refused(reader.why);
+  if (json.find_first_not_of(" \t\r\n") == std::string_view::npos || json[json.find_first_not_of(" \t\r\n")] != '{')
+    return refused("not a JSON object: write {...}");
+  const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()},
+                                                                  message.GetReflection()->MutableMessage(&message, field));
+  if (!status.ok()) return refused(sentence_from(std::string(status.message())));
+  auto request = from(message);
+  if (!request) return refused(request.error().why);
+  return *std::move(request);
+}
+
+std::string json_of(const Response& response) {
+  v1::Response message;
+  fill(message, response);
+  return json_from(message);
+}
+std::string json_of(const DaemonStatus& status) {
+  v1::DaemonStatus message;
+  fill(message, status);
+  return json_from(message);
+}
+std::string json_of(const Event& event) {
+  v1::Event message;
+  fill(message, event);
+  return json_from(message);
+}
+std::string json_of(StatusCode code, const std::string& text) {
+  v1::Status message;
+  fill(message, code, text);
+  return json_from(message);
+}
+
+}  // namespace sonar::control

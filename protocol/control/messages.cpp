@@ -1,0 +1,130 @@
+#include "protocol/control/messages.hpp"
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/stubs/logging.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <vector>
+
+namespace sonar::control {
+namespace {
+
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::Reflection;
+
+constexpr double largest_norm_error = 1e-3;  // as of poses
+
+/// Wrappers such as DoubleValue are the value to whoever reads the name.
+std::string joined(const std::string& path, const FieldDescriptor& field) {
+  if (field.containing_type()->full_name().starts_with("google.protobuf.")) return path;
+  return path.empty() ? field.name() : path + "." + field.name();
+}
+
+using Judge = std::function<bool(const Message&, const FieldDescriptor*)>;  // null: of the message as a whole
+/// Path of the first part that `bad` says so of.
+std::optional<std::string> find_first(const Message& message, const std::string& path, const Judge& bad) {
+  if (bad(message, nullptr)) return path;
+  std::vector<const FieldDescriptor*> given;
+  const Reflection& fields = *message.GetReflection();
+  fields.ListFields(message, &given);
+  for (const FieldDescriptor* field : given) {
+    const std::string name = joined(path, *field);
+    if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) {
+      if (bad(message, field)) return name;
+      continue;
+    }
+    if (!field->is_repeated()) {
+      if (auto found = find_first(fields.GetMessage(message, field), name, bad)) return found;
+      continue;
+    }
+    for (int i = 0; i < fields.FieldSize(message, field); ++i)
+      if (auto found = find_first(fields.GetRepeatedMessage(message, field, i), name + "[" + std::to_string(i) + "]", bad))
+        return found;
+  }
+  return std::nullopt;
+}
+
+/// Length of the well-formed character that starts `rest`; 0 = none (Unicode 15, table 3-7).
+std::size_t utf8_length(std::string_view rest) {
+  const auto at = [&](std::size_t i) { return i < rest.size() ? static_cast<unsigned char>(rest[i]) : 0u; };
+  const auto follows = [&](std::size_t i, unsigned low = 0x80, unsigned high = 0xbf) { return at(i) >= low && at(i) <= high; };
+  const unsigned lead = at(0);
+  if (lead < 0x80) return 1;
+  if (lead >= 0xc2 && lead <= 0xdf) return follows(1) ? 2 : 0;
+  if (lead >= 0xe0 && lead <= 0xef)
+    return follows(1, lead == 0xe0 ? 0xa0 : 0x80, lead == 0xed ? 0x9f : 0xbf) && follows(2) ? 3 : 0;
+  if (lead >= 0xf0 && lead <= 0xf4)
+    return follows(1, lead == 0xf0 ? 0x90 : 0x80, lead == 0xf4 ? 0x8f : 0xbf) && follows(2) && follows(3) ? 4 : 0;
+  return 0;
+}
+
+std::string repaired(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t n = utf8_length(text);
+    n == 0 ? out += '?' : out.append(text.substr(0, n));
+    text.remove_prefix(std::max<std::size_t>(n, 1));
+  }
+  return out;
+}
+
+void repair_text(Message& message, const FieldDescriptor& field) {
+  const Reflection& fields = *message.GetReflection();
+  if (field.is_repeated())
+    for (int i = 0; i < fields.FieldSize(message, &field); ++i)
+      fields.SetRepeatedString(&message, &field, i, repaired(fields.GetRepeatedString(message, &field, i)));
+  else
+    fields.SetString(&message, &field, repaired(fields.GetString(message, &field)));
+}
+
+}  // namespace
+
+void keep_protobuf_quiet() { [[maybe_unused]] static const auto previous = google::protobuf::SetLogHandler(nullptr); }
+
+bool parse(Message& message, BytesView bytes) {
+  keep_protobuf_quiet();
+  return bytes.size() <= static_cast<std::size_t>(std::numeric_limits<int>::max()) &&
+         message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+}
+
+Bytes serialized(const Message& message) {
+  Bytes out(message.ByteSizeLong());
+  message.SerializeToArray(out.data(), static_cast<int>(out.size()));
+  return out;
+}
+
+std::optional<std::string> first_unreal_number(const Message& message) {
+  return find_first(message, "", [](const Message& m, const FieldDescriptor* field) {
+    return field != nullptr && field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE &&
+           !std::isfinite(m.GetReflection()->GetDouble(m, field));  // none of our numbers are repeated
+  });
+}
+
+std::optional<std::string> first_bad_orientation(const Message& message) {
+  return find_first(message, "", [](const Message& m, const FieldDescriptor* field) {
+    if (field != nullptr || m.GetDescriptor() != v1::Quat::descriptor()) return false;
+    const auto& q = dynamic_cast<const v1::Quat&>(m);
+    const double norm = std::hypot(std::hypot(q.w(), q.x()), std::hypot(q.y(), q.z()));
+    return !(std::abs(norm - 1) <= largest_norm_error);
+  });
+}
+
+void repair_texts(Message& message) {
+  std::vector<const FieldDescriptor*> given;
+  const Reflection& fields = *message.GetReflection();
+  fields.ListFields(message, &given);
+  for (const FieldDescriptor* field : given) {
+    if (field->cpp_type() == FieldDescriptor::CPPTYPE_STRING) repair_text(message, *field);
+    if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) continue;
+    if (!field->is_repeated()) {
+      repair_texts(*fields.MutableMessage(&message, field));
+      continue;
+    }
+    for (int i = 0; i < fields.FieldSize(message, field); ++i) repair_texts(*fields.MutableRepeatedMessage(&message, field, i));
+  }
+}
+
+}  // namespace sonar::control

@@ -1,0 +1,217 @@
+// Requests between protobuf and plain structs: what a name, a number, a choice may be.
+#include <algorithm>
+
+#include "protocol/control/messages.hpp"
+
+namespace sonar::control {
+namespace {
+
+constexpr std::size_t longest_name = 256, longest_path = 4096;
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
+
+/// Names end up in log lines and answers.
+Result<std::string> checked_text(const std::string& text, const char* key, bool needed, std::size_t longest = longest_name) {
+  if (needed && text.empty()) return refused(std::string(key) + " is missing");
+  if (text.size() > longest) return refused(std::string(key) + " is longer than " + std::to_string(longest) + " bytes");
+  const bool control = std::any_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+  if (control) return refused(std::string(key) + " has control characters");
+  return text;
+}
+
+Result<Pose> placed(const v1::Placement& message) {
+  auto pose = from(message);
+  if (!pose) pose.error().text.insert(0, "at: ");
+  return pose;
+}
+
+Result<PoseSample> with_checked_name(Result<PoseSample> sample) {
+  if (!sample) return sample;
+  const char* key = sample->of == PoseSample::Of::object ? "object" : "vehicle";
+  if (const auto name = checked_text(sample->name, key, false); !name) return tl::make_unexpected(name.error());
+  return sample;
+}
+
+Result<SetSonar> from(const v1::SetSonar& m) {
+  SetSonar set;
+  const auto name = checked_text(m.sonar(), "sonar", false);
+  if (!name) return tl::make_unexpected(name.error());
+  set.sonar = *name;
+  if (m.has_range_m()) set.range_m = m.range_m().value();
+  if (m.has_rate_hz()) set.rate_hz = m.rate_hz().value();
+  if (m.has_gain_percent()) set.gain_percent = m.gain_percent().value();
+  if (m.has_mode()) set.mode = m.mode().value();
+  if (m.has_beams()) set.beams = m.beams().value();
+  if (m.has_transmit()) set.transmit = m.transmit().value();
+  if (m.has_mount()) {
+    const auto mount = control::from(m.mount());
+    if (!mount) return tl::make_unexpected(mount.error());
+    set.mount = *mount;
+  }
+  return set;
+}
+
+Result<SetEnvironment> from(const v1::SetEnvironment& m) { return control::from(m.environment()); }
+
+Result<LoadScene> from(const v1::LoadScene& m) {
+  const auto path = checked_text(m.path(), "path", true, longest_path);
+  if (!path) return tl::make_unexpected(path.error());
+  return LoadScene{*path};
+}
+
+Result<AddObject> from(const v1::AddObject& m) {
+  AddObject add;
+  for (const auto& [key, text, needed, to] :
+       {std::tuple{"name", &m.name(), true, &add.name}, std::tuple{"like", &m.like(), true, &add.like},
+        std::tuple{"material", &m.material(), false, &add.material}}) {
+    const auto good = checked_text(*text, key, needed);
+    if (!good) return tl::make_unexpected(good.error());
+    *to = *good;
+  }
+  if (!m.has_at()) return refused("at is missing: frame, position and orientation of the object");
+  const auto pose = placed(m.at());
+  if (!pose) return tl::make_unexpected(pose.error());
+  add.in_world = *pose;
+  add.moving = m.moving();
+  return add;
+}
+
+Result<RemoveObject> from(const v1::RemoveObject& m) {
+  const auto name = checked_text(m.object(), "object", true);
+  if (!name) return tl::make_unexpected(name.error());
+  return RemoveObject{*name};
+}
+
+Result<SetObject> from(const v1::SetObject& m) {
+  SetObject set;
+  const auto name = checked_text(m.object(), "object", true);
+  if (!name) return tl::make_unexpected(name.error());
+  set.object = *name;
+  if (m.has_visible()) set.visible = m.visible().value();
+  if (!m.has_at()) return set;
+  const auto pose = placed(m.at());
+  if (!pose) return tl::make_unexpected(pose.error());
+  set.in_world = *pose;
+  return set;
+}
+
+Result<Request> with_op(const v1::Request& message) {
+  Request request{message.id(), Unsupported{}};
+  std::string refusal;
+  const auto take = [&](auto op) {
+    if (op)
+      request.op = *std::move(op);
+    else
+      refusal = op.error().text;
+  };
+  switch (message.op_case()) {
+    case v1::Request::kHello:
+      request.op = Hello{message.hello().protocol_version(), message.hello().name(), message.hello().token()};
+      break;
+    case v1::Request::kStatus:
+      request.op = GetStatus{};
+      break;
+    case v1::Request::kLoad:
+      take(from(message.load()));
+      break;
+    case v1::Request::kSonar:
+      take(from(message.sonar()));
+      break;
+    case v1::Request::kEnvironment:
+      take(from(message.environment()));
+      break;
+    case v1::Request::kSubscribe:
+      request.op = Subscribe{message.subscribe().pings(), message.subscribe().clients(), message.subscribe().poses(),
+                             message.subscribe().scene()};
+      break;
+    case v1::Request::kPose:
+      take(with_checked_name(control::from(message.pose())));
+      break;
+    case v1::Request::kObject:
+      take(with_checked_name(control::from(message.object())));
+      break;
+    case v1::Request::kAddObject:
+      take(from(message.add_object()));
+      break;
+    case v1::Request::kRemoveObject:
+      take(from(message.remove_object()));
+      break;
+    case v1::Request::kSetObject:
+      take(from(message.set_object()));
+      break;
+    case v1::Request::OP_NOT_SET:
+      break;
+  }
+  if (!refusal.empty()) return refused(std::move(refusal));
+  return request;
+}
+
+struct Fill {
+  v1::Request& out;
+  void operator()(const Unsupported&) const {}
+  void operator()(const Hello& op) const {
+    out.mutable_hello()->set_protocol_version(op.protocol_version);
+    out.mutable_hello()->set_name(op.name);
+    out.mutable_hello()->set_token(op.token);
+  }
+  void operator()(const PoseSample& op) const {
+    if (op.of == PoseSample::Of::vehicle)
+      fill(*out.mutable_pose(), op);
+    else
+      fill(*out.mutable_object(), op);
+  }
+  void operator()(const GetStatus&) const { out.mutable_status(); }
+  void operator()(const SetSonar& op) const {
+    v1::SetSonar& m = *out.mutable_sonar();
+    m.set_sonar(op.sonar);
+    if (op.range_m) m.mutable_range_m()->set_value(*op.range_m);
+    if (op.rate_hz) m.mutable_rate_hz()->set_value(*op.rate_hz);
+    if (op.gain_percent) m.mutable_gain_percent()->set_value(*op.gain_percent);
+    if (op.mode) m.mutable_mode()->set_value(*op.mode);
+    if (op.beams) m.mutable_beams()->set_value(*op.beams);
+    if (op.transmit) m.mutable_transmit()->set_value(*op.transmit);
+    if (op.mount) fill(*m.mutable_mount(), *op.mount);
+  }
+  void operator()(const SetEnvironment& op) const { fill(*out.mutable_environment()->mutable_environment(), op); }
+  void operator()(const LoadScene& op) const { out.mutable_load()->set_path(op.path); }
+  void operator()(const AddObject& op) const {
+    v1::AddObject& m = *out.mutable_add_object();
+    m.set_name(op.name);
+    m.set_like(op.like);
+    m.set_material(op.material);
+    fill(*m.mutable_at(), op.in_world);
+    m.set_moving(op.moving);
+  }
+  void operator()(const RemoveObject& op) const { out.mutable_remove_object()->set_object(op.object); }
+  void operator()(const SetObject& op) const {
+    v1::SetObject& m = *out.mutable_set_object();
+    m.set_object(op.object);
+    if (op.visible) m.mutable_visible()->set_value(*op.visible);
+    if (op.in_world) fill(*m.mutable_at(), *op.in_world);
+  }
+  void operator()(const Subscribe& op) const {
+    v1::Subscribe& m = *out.mutable_subscribe();
+    m.set_pings(op.pings);
+    m.set_clients(op.clients);
+    m.set_poses(op.poses);
+    m.set_scene(op.scene);
+  }
+};
+
+}  // namespace
+
+tl::expected<Request, RefusedRequest> from(const v1::Request& message) {
+  const auto refused_here = [&](std::string why) { return tl::unexpected(RefusedRequest{message.id(), std::move(why)}); };
+  auto request = with_op(message);
+  if (!request) return refused_here(request.error().text);
+  if (const auto where = first_unreal_number(message)) return refused_here(*where + " is NaN or infinite");
+  return *std::move(request);
+}
+
+void fill(v1::Request& out, const Request& request) {
+  out.set_id(request.id);
+  std::visit(Fill{out}, request.op);
+  repair_texts(out);
+}
+
+}  // namespace sonar::control
