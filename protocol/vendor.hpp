@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -66,6 +67,11 @@ struct ChangeSettings {
   PingSettings settings;
   Bytes request;
   std::string summary;  // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
+};
+/// What somebody who is no client of the vendor's protocol wants of the sonar; what is not given stays as it is. Finite.
+struct Wish {
+  std::optional<double> range_m, rate_hz, gain_percent;  // rate 0 = standby; gain 0 to 100 of what a client can turn it
+  std::optional<std::uint32_t> mode, beams;              // mode: index into SonarModel::modes
 };
 struct RequestPing {   // one ping now (network trigger, BlueView)
   bool joins = false;  // a ping that is under way already will do
@@ -130,6 +136,9 @@ class Vendor {
                                                           const OptionValues& options) const = 0;
   /// What the device does before any client spoke (its stored configuration). `request` may be empty.
   virtual ChangeSettings initial_settings(const DeviceState& device) const = 0;
+  /// What a client of this vendor would have asked for who wants that and is content with the rest of what holds now
+  /// (DeviceState::request). Refused with a sentence that says what the product can do.
+  virtual Result<ChangeSettings> wished(const Wish& wish, const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;
   /// Empty when the vendor has no beacon.
   virtual Bytes beacon(const DeviceState& device, Time now) const = 0;

@@ -6,6 +6,7 @@
 #include "protocol/blueview/head_settings.hpp"
 #include "protocol/blueview/models.hpp"
 #include "protocol/blueview/options.hpp"
+#include "protocol/blueview/wish.hpp"
 
 namespace sonar::blueview {
 namespace {
@@ -30,6 +31,9 @@ class BlueViewVendor final : public protocol::Vendor {
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     const SonarSettings settings = initial_sonar_settings(device);
     return {ping_settings(settings, device), bytes_of_settings(settings), "as it comes: " + describe(settings, device)};
+  }
+  Result<protocol::ChangeSettings> wished(const protocol::Wish& wish, const protocol::DeviceState& device) const override {
+    return blueview::wished(wish, device);
   }
   bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
   protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }

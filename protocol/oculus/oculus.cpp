@@ -7,6 +7,7 @@
 #include "protocol/oculus/replies.hpp"
 #include "protocol/oculus/settings.hpp"
 #include "protocol/oculus/tune_model.hpp"
+#include "protocol/oculus/wish.hpp"
 
 namespace sonar::oculus {
 namespace {
@@ -32,6 +33,9 @@ class OculusVendor final : public protocol::Vendor {
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     const FireRequest fire = stored_fire();
     return {settle(fire, device).settings, make_fire(fire), "stored configuration: " + describe(fire)};
+  }
+  Result<protocol::ChangeSettings> wished(const protocol::Wish& wish, const protocol::DeviceState& device) const override {
+    return oculus::wished(wish, device);
   }
   bool pings_before_first_request(const protocol::DeviceState& device) const override {
     return text_option(device.options, option_name::before_first_fire) == "pings";
