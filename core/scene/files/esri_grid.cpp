@@ -1,4 +1,5 @@
 // ESRI ASCII grids: six header lines, then rows of heights from north to south.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -108,29 +109,27 @@ Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, double z
   const auto header = read_header(words);
   if (!header) return bad(header.error().text);
   const auto columns = static_cast<std::size_t>(header->columns), rows = static_cast<std::size_t>(header->rows);
-  HeightGrid grid;
+  HeightGrid grid;  // grows with what is there, not with what the header promises
+  for (std::size_t i = 0; i < rows * columns; ++i) {
+    const std::string_view word = words.next();
+    const std::string where = "line " + std::to_string(words.line()) + ": ";
+    if (word.empty()) {
+      return bad(where + "the grid ends after " + std::to_string(i) + " of " + std::to_string(rows * columns) + " heights");
+    }
+    const auto z = height_number(word);
+    if (!z) return bad(where + "\"" + std::string(word.substr(0, 40)) + "\" is not a height");
+    const bool no_data = *z == header->no_data;
+    if (!no_data && std::abs(*z) > 1e7) return bad(where + "the height " + std::string(word.substr(0, 40)) + " is beyond 1e7 m");
+    grid.z_m.push_back(no_data ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(*z * z_scale));
+  }
+  if (!words.next().empty()) return bad("more heights than ncols x nrows");
+
+  const auto row_at = [&](std::size_t row) { return grid.z_m.begin() + static_cast<std::ptrdiff_t>(row * columns); };
+  for (std::size_t row = 0; row < rows / 2; ++row)  // the file starts in the north, the grid in the south
+    std::swap_ranges(row_at(row), row_at(row + 1), row_at(rows - 1 - row));
   const double first = header->centred ? 0 : 0.5;  // a corner is half a cell from the first height
   for (std::size_t i = 0; i < columns; ++i) grid.x_m.push_back(header->x + (static_cast<double>(i) + first) * header->cell);
   for (std::size_t j = 0; j < rows; ++j) grid.y_m.push_back(header->y + (static_cast<double>(j) + first) * header->cell);
-  grid.z_m.resize(columns * rows);
-  for (std::size_t row = 0; row < rows; ++row) {
-    for (std::size_t i = 0; i < columns; ++i) {
-      const std::string_view word = words.next();
-      const std::string where = "line " + std::to_string(words.line()) + ": ";
-      if (word.empty()) {
-        return bad(where + "the grid ends after " + std::to_string(row * columns + i) + " of " + std::to_string(rows * columns) +
-                   " heights");
-      }
-      const auto z = height_number(word);
-      if (!z) return bad(where + "\"" + std::string(word.substr(0, 40)) + "\" is not a height");
-      const bool no_data = *z == header->no_data;
-      if (!no_data && std::abs(*z) > 1e7)
-        return bad(where + "the height " + std::string(word.substr(0, 40)) + " is beyond 1e7 m");
-      grid.z_m[(rows - 1 - row) * columns + i] =
-          no_data ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(*z * z_scale);
-    }
-  }
-  if (!words.next().empty()) return bad("more heights than ncols x nrows");
   return grid;
 }
 
