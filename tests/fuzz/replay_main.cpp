@@ -1,45 +1,106 @@
-// Runs a fuzz entry point over files named on the command line, or over made-up inputs when none is: random bytes of many
-// lengths and long runs of one byte. Stands in for libFuzzer's main in ordinary builds.
-#include <cstddef>
+// Stands in for libFuzzer's main in ordinary builds: runs a fuzz entry point over its seeds, and over inputs made from them and
+// from the dictionary, always the same ones. usage: NAME_fuzz [-runs=N] [-dict=FILE] [-only=NUMBER] [seed files and folders]
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <string>
+#include <string_view>
 #include <vector>
 
-#include "core/base/random.hpp"
+#include "tests/fuzz/mutator.hpp"
+
+#if defined(__SANITIZE_ADDRESS__)
+#include <sanitizer/common_interface_defs.h>
+#endif
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace {
 
-std::vector<std::uint8_t> random_bytes(std::uint32_t number) {
-  const sonar::Random4 shape = sonar::philox(number, 0, 0, 0, 1, 0);
-  std::vector<std::uint8_t> bytes(shape.v[0] % (1u << (shape.v[1] % 12)));
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    const sonar::Random4 draw = sonar::philox(number, static_cast<std::uint32_t>(i), 1, 0, 1, 0);
-    bytes[i] = static_cast<std::uint8_t>(draw.v[0] & (shape.v[2] % 3 == 0 ? 0x7Fu : 0xFFu));  // a third of them is text
+using sonar::fuzz::Input;
+
+Input contents_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) {
+    std::fprintf(stderr, "%s: cannot be opened\n", file.c_str());
+    std::exit(66);
   }
-  return bytes;
+  const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  return {text.begin(), text.end()};
+}
+
+void add_seeds(const std::filesystem::path& path, std::vector<Input>& seeds) {
+  if (!std::filesystem::is_directory(path)) return seeds.push_back(contents_of(path));
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(path)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());  // folders have no order
+  for (const auto& file : files) seeds.push_back(contents_of(file));
+}
+
+// ---- which input it was, when one ends the program
+
+char last_words[64];
+std::size_t last_words_size = 0;
+
+void announce(const char* what, std::uint32_t number) {
+  const int n = std::snprintf(last_words, sizeof last_words, "\nit was %s %u\n", what, number);
+  last_words_size = static_cast<std::size_t>(std::max(0, n));
+}
+void say_last_words() {
+  if (write(STDERR_FILENO, last_words, last_words_size) < 0) _exit(70);
+}
+void on_signal(int number) {
+  say_last_words();
+  signal(number, SIG_DFL);
+  raise(number);
+}
+
+void run(const Input& input) {
+  // Exactly as large as it is, so that a sanitizer sees one byte too many.
+  const Input exact(input);
+  LLVMFuzzerTestOneInput(exact.data(), exact.size());
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::uint32_t runs = 0, only = ~0u;
+  std::vector<Input> seeds, words;
   for (int i = 1; i < argc; ++i) {
-    std::ifstream file(argv[i], std::ios::binary);
-    const std::vector<char> text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    const std::vector<std::uint8_t> bytes(text.begin(), text.end());
-    LLVMFuzzerTestOneInput(bytes.data(), bytes.size());
+    const std::string_view argument = argv[i];
+    if (argument.starts_with("-runs=")) {
+      runs = static_cast<std::uint32_t>(std::strtoul(argv[i] + 6, nullptr, 10));
+    } else if (argument.starts_with("-only=")) {
+      only = static_cast<std::uint32_t>(std::strtoul(argv[i] + 6, nullptr, 10));
+    } else if (argument.starts_with("-dict=")) {
+      words = sonar::fuzz::dictionary_from(argv[i] + 6);
+      if (words.empty()) return std::fprintf(stderr, "%s: no words in this dictionary\n", argv[i] + 6), 65;
+    } else {
+      add_seeds(argument, seeds);
+    }
   }
-  if (argc > 1) return 0;
-  for (std::uint32_t number = 0; number < 2000; ++number) {
-    const std::vector<std::uint8_t> bytes = random_bytes(number);
-    LLVMFuzzerTestOneInput(bytes.data(), bytes.size());
+#if defined(__SANITIZE_ADDRESS__)
+  __sanitizer_set_death_callback(say_last_words);
+#else
+  for (const int number : {SIGSEGV, SIGFPE, SIGBUS, SIGILL}) signal(number, on_signal);
+#endif
+  signal(SIGABRT, on_signal);
+
+  for (std::uint32_t i = 0; i < seeds.size() && only == ~0u; ++i) {
+    announce("seed", i);
+    run(seeds[i]);
   }
-  for (int value = 0; value < 256; ++value) {
-    const std::vector<std::uint8_t> bytes(777, static_cast<std::uint8_t>(value));
-    LLVMFuzzerTestOneInput(bytes.data(), bytes.size());
+  for (std::uint32_t number = 0; number < runs; ++number) {
+    if (only != ~0u && number != only) continue;
+    announce("made-up input", number);
+    run(sonar::fuzz::made_up(number, seeds, words));
   }
-  std::puts("2256 made-up inputs survived");
+  std::printf("%zu seeds and %u made-up inputs survived\n", seeds.size(), only == ~0u ? runs : 1);
 }

@@ -1,0 +1,34 @@
+// What a sonar may answer to the BlueView libraries' greeting: the head of a frame, and the description that it carries. First
+// byte odd: a frame, else the bare description. What is accepted is written again as the same bytes.
+#include "clients/bvtsdk/core/description.hpp"
+#include "clients/bvtsdk/core/frame.hpp"
+#include "tests/fuzz/byte_script.hpp"
+
+using namespace sonar::bvt;
+using sonar::fuzz::require;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  BytesView payload(data + 1, size - 1);
+  FrameHeader header;
+  if (data[0] % 2 == 1) {
+    if (!take_header(payload, header)) return 0;
+    require(header.payload_size <= longest_payload);
+    Bytes again;
+    put_header(again, header);
+    require(again.size() == frame_header_size && std::memcmp(again.data(), payload.data, again.size()) == 0);
+    payload = {payload.data + frame_header_size, payload.size - frame_header_size};
+  }
+  // Exactly as large as it is, so that a sanitizer sees one byte too many.
+  const Bytes exact(payload.data, payload.data + payload.size);
+  const auto sonar = decode_description(exact);
+  if (!sonar) return 0;
+  require(sonar->heads.size() <= 255);
+  for (const int number : {-1, 0, 1, 2, 255}) {
+    const HeadDescription* head = sonar->head(number);
+    require(head == nullptr || head->id == number || (sonar->heads.size() == 1 && !sonar->strict_heads()));
+  }
+  const Bytes again = encode_description(*sonar);
+  require(again.size() <= exact.size() && std::memcmp(again.data(), exact.data(), again.size()) == 0);
+  return 0;
+}

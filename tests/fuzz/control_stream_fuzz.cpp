@@ -1,0 +1,59 @@
+// The control stream: lengths, requests, and what they ask. First byte = length of the pieces, the rest is the stream.
+// Whatever the pieces, the messages are the same; what is accepted is usable; every request can be answered.
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "protocol/control/control.hpp"
+#include "protocol/control/delimited.hpp"
+#include "tests/fuzz/byte_script.hpp"
+
+namespace {
+
+using namespace sonar;
+using fuzz::require;
+
+void answer(std::span<const std::byte> message) {
+  const auto request = control::decode_request(message);
+  control::Response response;
+  response.id = request ? request->id : request.error().id;
+  response.code = request ? control::StatusCode::ok : control::StatusCode::refused;
+  if (!request) {
+    require(!request.error().why.empty());
+    response.text = request.error().why;
+  } else if (const auto* sample = std::get_if<control::PoseSample>(&request->op)) {
+    require(is_finite(sample->pose.position_m) && is_finite(sample->pose.orientation));
+    require(std::abs(norm_squared(sample->pose.orientation) - 1) < 1e-9);
+  }
+  const auto back = control::decode_response(control::encode_response(response));
+  require(back && back->id == response.id && back->code == response.code);
+}
+
+/// The messages that come out, and whether the stream ended in an error.
+struct Taken {
+  std::vector<std::vector<std::byte>> messages;
+  bool broken = false;
+  bool operator==(const Taken&) const = default;
+};
+Taken take(std::span<const std::byte> stream, std::size_t piece) {
+  Taken taken;
+  control::DelimitedParser parser;
+  for (std::size_t at = 0; at < stream.size() && !taken.broken; at += piece) {
+    parser.feed(stream.subspan(at, std::min(piece, stream.size() - at)));
+    auto message = parser.next();
+    for (; message && *message; message = parser.next()) taken.messages.push_back(std::move(**message));
+    taken.broken = !message;
+  }
+  return taken;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const auto stream = std::as_bytes(std::span(data, size)).subspan(1);
+  const Taken whole = take(stream, std::max<std::size_t>(1, stream.size()));
+  require(whole == take(stream, data[0] + std::size_t{1}));
+  for (const auto& message : whole.messages) answer(message);
+  return 0;
+}

@@ -1,0 +1,35 @@
+// What every grid of heights must be, whoever read it, and that its mesh is sound.
+#pragma once
+
+#include <cmath>
+
+#include "core/scene/shapes/terrain.hpp"
+#include "tests/fuzz/byte_script.hpp"
+
+namespace sonar::fuzz {
+
+inline void check(const Mesh& mesh) {
+  require(!mesh.triangles.empty() && mesh.material.size() == mesh.triangles.size());
+  for (const Vec3& v : mesh.vertices) require(is_finite(to_double(v)));
+  for (const auto& t : mesh.triangles) {
+    for (const std::uint32_t i : t) require(i < mesh.vertices.size());
+    const Vec3d a = to_double(mesh.vertices[t[0]]), b = to_double(mesh.vertices[t[1]]), c = to_double(mesh.vertices[t[2]]);
+    require(length(cross(b - a, c - a)) > 0);
+  }
+}
+
+/// Grids of a few thousand heights are made into meshes too.
+inline void check(const HeightGrid& grid) {
+  require(grid.x_m.size() >= 2 && grid.y_m.size() >= 2 && grid.z_m.size() == grid.x_m.size() * grid.y_m.size());
+  require(2 * grid.z_m.size() <= max_mesh_triangles);
+  for (const auto* axis : {&grid.x_m, &grid.y_m})
+    for (std::size_t i = 0; i < axis->size(); ++i) require(std::isfinite((*axis)[i]) && (i == 0 || (*axis)[i] > (*axis)[i - 1]));
+  if (grid.z_m.size() > 4096) return;
+  for (const float z : grid.z_m) require(std::isnan(z) || std::abs(z) <= 1e7f);
+  const auto made = mesh_from_grid(grid);
+  if (!made) return require(!made.error().text.empty());
+  require(is_finite(made->centre_m));
+  check(made->mesh);
+}
+
+}  // namespace sonar::fuzz

@@ -1,0 +1,57 @@
+// Mesh files through the importer: Wavefront lines made from a script of bytes, with faces whose corners may be nowhere. What
+// comes out is a sound mesh, or a sentence that starts with the file's name. Slow: the importer makes itself anew for each file.
+#include <cstdio>
+#include <string>
+
+#include "tests/fuzz/mesh_script.hpp"
+
+namespace {
+
+using namespace sonar;
+using fuzz::coordinate;
+using fuzz::require;
+using fuzz::Script;
+
+std::string wavefront(Script& script) {
+  std::string text;
+  char line[128];
+  while (!script.ended() && text.size() < 8192) {
+    const std::uint8_t kind = script.byte();
+    if (kind % 8 < 5) {
+      const double x = coordinate(script), y = coordinate(script), z = coordinate(script);
+      std::snprintf(line, sizeof line, "v %.9g %.9g %.9g\n", x, y, z);
+      text += line;
+    } else if (kind % 8 < 7) {
+      text += 'f';
+      for (int k = 0; k < 1 + kind / 32; ++k) text.append(" ").append(std::to_string(static_cast<int>(script.byte()) - 40));
+      text += '\n';
+    } else {
+      static constexpr const char* others[]{"g a\n",    "o b\n",   "usemtl c\n", "vn 0 0 1\n",
+                                            "vt 0 1\n", "l 1 2\n", "p 1\n",      "s off\n"};
+      text += others[script.byte() % 8];
+    }
+  }
+  return text;
+}
+
+void import(Script& script) {
+  static constexpr double scales[]{1, 0.001, 1e6, 1e-6, -1};
+  const double scale = scales[script.byte() % 5];
+  const std::uint8_t up = script.byte() % 3;
+  const std::string text = wavefront(script);
+  if (text.empty()) return;
+  MeshFile request{.file = "m.obj", .scale = scale, .up = {}, .in_memory = text};
+  if (up > 0) request.up = up == 1 ? UpAxis::y : UpAxis::z;
+  const auto made = load_mesh(request);
+  if (!made) return require(made.error().text.starts_with("m.obj: "));
+  for (const std::uint16_t m : made->centred.mesh.material) require(m < made->material_names.size());
+  fuzz::check(made->centred, made->centred.mesh.triangles.size() + made->centred.left_out);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  Script script(data, size);
+  import(script);
+  return 0;
+}

@@ -1,0 +1,19 @@
+// Inputs made up for fuzz targets where libFuzzer is not: seeds, changed a little, and bytes from nowhere. A pure function of the
+// number, so that a failure can be run again.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace sonar::fuzz {
+
+using Input = std::vector<std::uint8_t>;
+
+/// Every tenth input, and all when there are no seeds, is from nowhere.
+Input made_up(std::uint32_t number, const std::vector<Input>& seeds, const std::vector<Input>& words);
+
+/// The words of a libFuzzer dictionary: lines of name="value" with \xAB, \\ and \" inside. Empty when it cannot be read.
+std::vector<Input> dictionary_from(const std::string& file);
+
+}  // namespace sonar::fuzz
