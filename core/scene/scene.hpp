@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -108,6 +109,7 @@ struct Scene {
   SeaSurface sea_surface;               // its mesh, if present, is one of the objects
   WaterColumn water_column;
   std::vector<OtherSonar> other_sonars;
+  std::optional<Vec3d> ray_origin;  // of a scene changed while it ran: as before (core/scene/ray_origin.hpp)
   std::vector<std::string> notes;  // what the loader did that its user should know, one sentence each
 
   /// Where an object sits in its body; in the world for a static one.
