@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "core/scene/ray_origin.hpp"
 #include "core/scene/ray_scene.hpp"
 
 #if SONAR_EMBREE_MAJOR >= 4
@@ -67,34 +68,6 @@ struct Group {
   std::vector<std::uint32_t> objects;
 };
 
-struct Bounds {
-  Vec3d low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  void add(Vec3d p) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  bool empty() const { return low.x > high.x; }
-  Vec3d centre() const { return 0.5 * (low + high); }
-};
-
-Vec3d centre_of(const Scene& scene) {
-  Bounds fixed, all;
-  for (const Object& object : scene.objects) {
-    if (!object.visible) continue;
-    Bounds local;
-    for (const Vec3 v : object.mesh->vertices) local.add(to_double(v));
-    if (local.empty()) continue;
-    for (int corner = 0; corner < 8; ++corner) {
-      const Vec3d p{corner & 1 ? local.high.x : local.low.x, corner & 2 ? local.high.y : local.low.y,
-                    corner & 4 ? local.high.z : local.low.z};
-      all.add(transform(object.in_world, p));
-      if (object.body < 0) fixed.add(transform(object.in_world, p));
-    }
-  }
-  if (!fixed.empty()) return fixed.centre();
-  return all.empty() ? Vec3d{} : all.centre();
-}
-
 void add_object(const Device& device, Group& group, const Mesh& mesh, const Pose& placed, std::uint32_t object) {
   RTCGeometry geometry = rtcNewGeometry(device.handle, RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
@@ -138,7 +111,7 @@ struct RayScene::Impl {
   RTCScene traced = nullptr;
 
   Impl(std::shared_ptr<const Scene> s, int build_threads)
-      : scene(std::move(s)), device(build_threads < 1 ? 1 : build_threads), origin(centre_of(*scene)) {
+      : scene(std::move(s)), device(build_threads < 1 ? 1 : build_threads), origin(ray_origin_of(*scene)) {
     const std::size_t bodies = scene->bodies_in_world.size();
     for (std::size_t i = 0; i <= bodies; ++i) groups.push_back(Group{SceneHandle(device), {}});
     for (std::size_t i = 0; i < scene->objects.size(); ++i) {
