@@ -7,6 +7,7 @@
 
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/fire_options.hpp"
+#include "clients/sonarctl/scene_command.hpp"
 
 namespace sonar::clients {
 
@@ -215,8 +216,11 @@ int run(int argc, char** argv) {
   CLI::App app("sonarctl: listen to, look at and steer sonars served by sonard");
   app.require_subcommand(1);
   app.footer("sonarctl COMMAND --help explains a command, with examples");
-  const std::vector<std::pair<std::string, Run>> commands{
-      {"listen", add_listen(app)}, {"view", add_view(app)}, {"stats", add_stats(app)}, {"pose", add_pose(app)}};
+  const std::vector<std::pair<std::string, Run>> commands{{"listen", add_listen(app)},
+                                                          {"view", add_view(app)},
+                                                          {"stats", add_stats(app)},
+                                                          {"pose", add_pose(app)},
+                                                          {"scene", add_scene(app)}};
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,0 +1,34 @@
+// `sonarctl scene import`: a Gazebo world or model, or a URDF, becomes a scene file of ours, with what the disk has to say:
+// meshes and heightmaps found and tried, materials chosen, the result written and checked.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "clients/scene_tools/imported_world.hpp"
+#include "core/base/result.hpp"
+
+namespace sonar::scene_tools {
+
+struct ImportOptions {
+  std::filesystem::path file, out;
+  std::vector<std::filesystem::path> model_folders;
+  ReadOptions read;
+  std::vector<std::string> materials;  // NAME for everything, MODEL=NAME for one model and what is in it
+  std::vector<std::string> moving;     // models by path
+  Vec3d offset_m = {};
+  bool check = true;  // try every mesh, and load the scene in the end as the daemon does
+  bool overwrite = false;
+};
+
+struct Imported {
+  std::size_t models = 0, shapes = 0, converted_meshes = 0;
+  std::vector<std::string> left_out;
+};
+
+/// Errors: file:line: what. Nothing is written unless everything was understood; a scene that does not load stays on disk for
+/// its error to be looked up.
+Result<Imported> import_scene(const ImportOptions& options);
+
+}  // namespace sonar::scene_tools

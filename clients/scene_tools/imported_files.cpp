@@ -1,0 +1,164 @@
+#include "clients/scene_tools/imported_files.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+
+#include "core/scene/files/load_mesh.hpp"
+#include "core/scene/shapes/terrain.hpp"
+
+namespace sonar::scene_tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string extension_of(const fs::path& file) {
+  std::string e = file.extension().string();
+  for (char& c : e) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
+  return e;
+}
+
+void append(std::string& out, double v) {
+  std::array<char, 32> text{};
+  out.append(text.data(), std::to_chars(text.data(), text.data() + text.size(), v).ptr);
+}
+
+MeshFile mesh_at(const fs::path& file) {
+  MeshFile request;
+  request.file = file;
+  return request;
+}
+
+/// The mesh with another scale for every axis, as an OBJ about its own origin.
+std::string stretched_obj(const CentredMesh& centred, Vec3d scale) {
+  std::string out = "# stretched by sonarctl scene import\n";
+  for (const Vec3& v : centred.mesh.vertices) {
+    const Vec3d p = to_double(v) + centred.centre_m;
+    out += "v ";
+    append(out, scale.x * p.x), out += ' ';
+    append(out, scale.y * p.y), out += ' ';
+    append(out, scale.z * p.z), out += '\n';
+  }
+  for (const auto& t : centred.mesh.triangles)
+    out += std::string("f ") + std::to_string(t[0] + 1) + " " + std::to_string(t[1] + 1) + " " + std::to_string(t[2] + 1) + "\n";
+  return out;
+}
+
+}  // namespace
+
+double collada_unit_m(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string head(64 << 10, '\0');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  const std::size_t tag = head.find("<unit");
+  if (tag == std::string::npos) return 1;
+  const std::string_view unit = std::string_view(head).substr(tag, std::min(head.find('>', tag), head.size()) - tag);
+  const std::size_t key = unit.find("meter");
+  const std::size_t begin = key == std::string_view::npos ? key : unit.find_first_of("\"'", key);
+  if (begin == std::string_view::npos) return 1;
+  const double meter = std::strtod(std::string(unit.substr(begin + 1, 32)).c_str(), nullptr);
+  return meter > 0 && meter <= 1e6 ? meter : 1;
+}
+
+FileResolver::FileResolver(const Library& library, fs::path scene, bool skip_missing, bool try_files, Findings& findings)
+    : library_(library), scene_(std::move(scene)), skip_missing_(skip_missing), try_files_(try_files), findings_(findings) {}
+
+bool FileResolver::resolve(PlacedShape& placed) {
+  const bool mesh = placed.shape.kind == Shape::Kind::mesh;
+  if (!mesh && placed.shape.kind != Shape::Kind::heightmap) return true;
+  const fs::path file = library_.find(placed.shape.uri, placed.at.in->path);
+  if (!file.empty()) return mesh ? resolve_mesh(placed, file) : resolve_heightmap(placed, file);
+  const std::string what = std::string(mesh ? "mesh " : "heightmap ") + plain(placed.shape.uri, 200);
+  if (skip_missing_)
+    findings_.leave_out(placed.at, what + ": not found");
+  else
+    findings_.fail(placed.at, what +
+                                  ": no such file here; give the folder that holds it with --model-path, or go on without it "
+                                  "with --skip-missing");
+  return false;
+}
+
+bool FileResolver::resolve_mesh(PlacedShape& placed, const fs::path& file) {
+  const std::string why = why_not(file);
+  if (!why.empty()) return findings_.leave_out(placed.at, std::string("mesh ") + plain(why, 300)), false;
+  Shape& shape = placed.shape;
+  const Vec3d s = shape.scale;
+  if (extension_of(file) == ".dae") shape.unit_m = collada_unit_m(file);
+  const bool even = s.x > 0 && std::abs(s.y - s.x) <= 1e-9 * s.x && std::abs(s.z - s.x) <= 1e-9 * s.x;
+  if (!even) return convert(placed, file);
+  shape.uri = path_to_write(file);
+  return true;
+}
+
+/// Formats are told by their names; the rest by the loader that the daemon uses.
+std::string FileResolver::why_not(const fs::path& file) {
+  static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
+  if (std::find(known.begin(), known.end(), extension_of(file)) == known.end())
+    return file.filename().string() + ": a scene reads OBJ, STL, PLY, glTF, GLB and DAE";
+  if (!try_files_) return {};
+  const auto [known_file, is_new] = tried_.try_emplace(file);
+  if (is_new)
+    if (const auto loaded = load_mesh(mesh_at(file)); !loaded) known_file->second = loaded.error().text;
+  return known_file->second;
+}
+
+bool FileResolver::convert(PlacedShape& placed, const fs::path& file) {
+  Shape& shape = placed.shape;
+  std::string key = file.string();
+  for (const double s : {shape.scale.x, shape.scale.y, shape.scale.z}) key += "|", append(key, s);
+  auto [known, is_new] = known_conversions_.try_emplace(key);
+  if (is_new) {
+    const auto loaded = load_mesh(mesh_at(file));
+    if (!loaded) return findings_.leave_out(placed.at, std::string("mesh ") + plain(loaded.error().text, 300)), false;
+    const std::string folder = scene_.stem().string() + "-meshes";
+    const std::string name = file.stem().string() + "-" + std::to_string(converted_.size() + 1) + ".obj";
+    converted_[scene_.parent_path() / folder / name] = stretched_obj(loaded->centred, shape.unit_m * shape.scale);
+    known->second = folder + "/" + name;
+  }
+  shape.uri = known->second;
+  shape.scale = {1, 1, 1};
+  shape.unit_m = 1;
+  return true;
+}
+
+bool FileResolver::resolve_heightmap(PlacedShape& placed, const fs::path& file) {
+  const std::string what = std::string("heightmap ") + plain(placed.shape.uri, 200) + ": ";
+  if (extension_of(file) != ".png")
+    return findings_.leave_out(placed.at, what + "a scene reads grey PNG, or ESRI ASCII grids (gdal_translate -of AAIGrid)"),
+           false;
+  if (try_files_) {
+    const Vec3d size = placed.shape.size_m;
+    const auto heights = read_png_heights(file, size.x, size.y, 0, size.z);
+    if (!heights) return findings_.leave_out(placed.at, what + plain(heights.error().text, 300)), false;
+  }
+  placed.shape.uri = path_to_write(file);
+  return true;
+}
+
+/// Relative to the scene, so that both can be moved together; absolute where they have nothing in common but the root.
+std::string FileResolver::path_to_write(const fs::path& file) const {
+  std::error_code error;
+  const fs::path target = fs::weakly_canonical(fs::absolute(file, error), error);
+  const fs::path folder = fs::weakly_canonical(fs::absolute(scene_, error).parent_path(), error);
+  const auto [in_target, in_folder] = std::mismatch(target.begin(), target.end(), folder.begin(), folder.end());
+  const bool apart = std::distance(target.begin(), in_target) < 2;
+  return apart ? target.string() : target.lexically_relative(folder).generic_string();
+}
+
+Result<void> FileResolver::write_converted() {
+  for (const auto& [path, text] : converted_) {
+    std::error_code error;
+    fs::create_directories(path.parent_path(), error);
+    std::ofstream out(path, std::ios::binary);
+    out << text;
+    if (!out.flush())
+      return failure(ErrorKind::io, path.string() + ": cannot be written; is the folder writable, the disk full?");
+  }
+  return {};
+}
+
+}  // namespace sonar::scene_tools

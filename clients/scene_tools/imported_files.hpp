@@ -1,0 +1,42 @@
+// Mesh and heightmap files that an imported world names: found, tried with the scene's own loader, and converted where a scene
+// cannot say what the world says. Internal to import_scene.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "clients/scene_tools/imported_world.hpp"
+
+namespace sonar::scene_tools {
+
+class FileResolver {
+ public:
+  FileResolver(const Library& library, std::filesystem::path scene, bool skip_missing, bool try_files, Findings& findings);
+  /// Sets what is to be written for a shape that lies in a file. False: left out, and listed.
+  bool resolve(PlacedShape& placed);
+  /// Writes the meshes that had to be converted into a folder beside the scene.
+  Result<void> write_converted();
+  std::size_t converted() const { return converted_.size(); }
+
+ private:
+  bool resolve_mesh(PlacedShape& placed, const std::filesystem::path& file);
+  bool resolve_heightmap(PlacedShape& placed, const std::filesystem::path& file);
+  std::string why_not(const std::filesystem::path& file);
+  bool convert(PlacedShape& placed, const std::filesystem::path& file);
+  std::string path_to_write(const std::filesystem::path& file) const;
+
+  const Library& library_;
+  std::filesystem::path scene_;
+  bool skip_missing_, try_files_;
+  Findings& findings_;
+  std::map<std::filesystem::path, std::string> tried_;      // why a mesh cannot be used; empty: it can
+  std::map<std::string, std::string> known_conversions_;    // by file and scale: the path to write
+  std::map<std::filesystem::path, std::string> converted_;  // file to write, its text
+};
+
+/// How long one unit of a COLLADA file is, by its own <unit meter="..">; 1 when it does not say.
+double collada_unit_m(const std::filesystem::path& file);
+
+}  // namespace sonar::scene_tools

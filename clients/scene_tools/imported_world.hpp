@@ -1,0 +1,66 @@
+// What a Gazebo or URDF file says that a scene of ours can hold: shapes placed in the world, and the models they belong to.
+// Filled by read_world, completed by import_scene (files found, materials chosen), written by scene_text.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "clients/scene_tools/xml_file.hpp"
+#include "core/base/geometry.hpp"
+
+namespace sonar::scene_tools {
+
+struct Shape {
+  enum class Kind { box, sphere, ellipsoid, cylinder, capsule, cone, plane, mesh, heightmap };
+  Kind kind = Kind::box;
+  Vec3d size_m = {};  // box: edges; ellipsoid: diameters; plane: x, y; heightmap: x, y, height of white above black
+  double radius_m = 0, length_m = 0;
+  std::string uri = {};     // mesh, heightmap: as the file has it; later the path to write
+  Vec3d scale = {1, 1, 1};  // mesh
+  double unit_m = 1;        // mesh: what the mesh file calls one, from the file itself
+};
+
+struct PlacedShape {
+  Shape shape;
+  Pose in_world;
+  std::size_t model = 0;              // index into ImportedWorld::models
+  std::string link = {}, label = {};  // of the visual or collision
+  std::string material = {};          // in: what the file calls its look; out: a material of ours
+  Place at = {};
+};
+
+struct ImportedModel {
+  std::string path;  // ship, ship/crane
+  Pose in_world;
+  bool is_static = false;
+  Place at = {};
+};
+
+struct ImportedWorld {
+  std::string name;
+  std::string format;  // "Gazebo SDF 1.9", "URDF"
+  std::vector<ImportedModel> models;
+  std::vector<PlacedShape> shapes;
+};
+
+/// Where a reader finds the files that its file names. `find` answers with an empty path when there is none.
+struct Library {
+  std::function<std::filesystem::path(std::string_view uri, const std::filesystem::path& from_file)> find;
+  std::function<Result<std::string>(const std::filesystem::path&)> read;
+};
+
+struct ReadOptions {
+  bool collisions = false;    // collision shapes instead of visual ones
+  bool skip_missing = false;  // models that are not found are left out instead of refused
+};
+
+inline constexpr std::size_t max_shapes = 20'000;
+
+/// The world of an SDF, world or URDF text, told by its root element; `path` begins the errors. Bounded in depth, models and
+/// shapes, whatever the text and whatever it includes.
+Result<ImportedWorld> read_world(std::string_view text, const std::filesystem::path& path, const Library& library,
+                                 const ReadOptions& options, Findings& findings);
+
+}  // namespace sonar::scene_tools

@@ -1,0 +1,174 @@
+#include "clients/scene_tools/read_parts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace sonar::scene_tools {
+namespace {
+
+constexpr double least_m = 1e-4, most_m = 1e5;  // of a length in a scene
+
+/// One element of geometry: `size` is <size>..</size> in SDF, size=".." in URDF.
+class GeometryReader {
+ public:
+  GeometryReader(const Element& element, Findings& findings) : element_(element), findings_(findings) {}
+
+  bool has(const char* key) const { return !text_of(key).empty(); }
+  std::string_view text_of(const char* key) const {
+    const std::string_view attribute = element_.attribute(key);
+    return attribute.empty() ? element_.child(key).text() : attribute;
+  }
+  std::vector<double> numbers(const char* key, std::size_t count) {
+    const Element child = element_.child(key);
+    return read_numbers(text_of(key), count, (child ? child : element_).place(), std::string(element_.name()) + " " + key,
+                        findings_);
+  }
+  double length(const char* key) { return checked(numbers(key, 1)[0], key); }
+  Vec3d lengths(const char* key) {
+    const auto v = numbers(key, 3);
+    return {checked(v[0], key), checked(v[1], key), checked(v[2], key)};
+  }
+  double checked(double v, const char* key) {
+    if (v > 0 && v <= most_m) return std::max(v, least_m);
+    if (why_not_.empty()) why_not_ = std::string(key) + " is not above 0 and at most 100 km";
+    return 1;
+  }
+  void refuse(std::string why) { why_not_ = std::move(why); }
+  /// The shape, unless a length was impossible: then it is listed.
+  std::optional<Shape> finish(const Shape& shape) {
+    if (findings_.failed()) return std::nullopt;
+    if (why_not_.empty()) return shape;
+    findings_.leave_out(element_.place(), std::string(element_.name()) + ": " + why_not_);
+    return std::nullopt;
+  }
+
+ private:
+  Element element_;
+  Findings& findings_;
+  std::string why_not_;
+};
+
+/// The shortest turn from z to `direction`.
+Quatd turned_to(Vec3d direction) {
+  const Vec3d n = (1 / length(direction)) * direction;
+  if (n.z < -1 + 1e-12) return {0, 1, 0, 0};
+  return normalized(Quatd{1 + n.z, -n.y, n.x, 0});
+}
+
+Shape read_plane(GeometryReader& in, Pose& offset) {
+  Shape shape{.kind = Shape::Kind::plane};
+  if (in.has("normal")) {
+    const auto n = in.numbers("normal", 3);
+    const Vec3d normal{n[0], n[1], n[2]};
+    if (length(normal) > 1e-9)
+      offset.orientation = turned_to(normal);
+    else
+      in.refuse("its normal has no length");
+  }
+  shape.size_m = {100, 100, 0};  // collision planes have no end
+  if (in.has("size")) {
+    const auto size = in.numbers("size", 2);
+    shape.size_m = {in.checked(size[0], "size"), in.checked(size[1], "size"), 0};
+  }
+  return shape;
+}
+
+Shape read_mesh(const Element& element, GeometryReader& in) {
+  Shape shape{.kind = Shape::Kind::mesh};
+  shape.uri = in.text_of(element.attribute("filename").empty() ? "uri" : "filename");
+  if (in.has("scale")) {
+    const auto s = in.numbers("scale", 3);
+    shape.scale = {s[0], s[1], s[2]};
+  }
+  const double least = std::min({std::abs(shape.scale.x), std::abs(shape.scale.y), std::abs(shape.scale.z)});
+  if (shape.uri.empty()) in.refuse("names no file");
+  if (!(least > 0)) in.refuse("its scale is 0");
+  if (element.child("submesh"))
+    in.refuse(std::string("only a part (submesh) of ") + plain(shape.uri, 200) + " is wanted; save it as a file of its own");
+  return shape;
+}
+
+Shape read_heightmap(GeometryReader& in, Pose& offset) {
+  Shape shape{.kind = Shape::Kind::heightmap, .size_m = {1, 1, 1}};
+  shape.uri = in.text_of("uri");
+  if (in.has("size"))
+    shape.size_m = in.lengths("size");
+  else
+    in.refuse("has no size");
+  if (in.has("pos")) {
+    const auto p = in.numbers("pos", 3);
+    offset.position_m = {p[0], p[1], p[2]};
+  }
+  if (shape.uri.empty()) in.refuse("names no file");
+  return shape;
+}
+
+}  // namespace
+
+std::string called(const Element& element) {
+  const std::string_view name = element.attribute("name");
+  return plain(element.name()) + (name.empty() ? std::string() : std::string(" \"") + plain(name) + "\"");
+}
+
+std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, Pose& offset) {
+  for (const Element& element : geometry.children()) {
+    GeometryReader in(element, findings);
+    const std::string_view kind = element.name();
+    const auto round = [&](Shape::Kind of) { return Shape{.kind = of, .radius_m = in.length("radius")}; };
+    const auto long_one = [&](Shape::Kind of) {
+      Shape shape = round(of);
+      shape.length_m = in.length("length");
+      return shape;
+    };
+    if (kind == "box") return in.finish({.kind = Shape::Kind::box, .size_m = in.lengths("size")});
+    if (kind == "sphere") return in.finish(round(Shape::Kind::sphere));
+    if (kind == "ellipsoid") {
+      const Vec3d d = 2.0 * in.lengths("radii");
+      return in.finish({.kind = Shape::Kind::ellipsoid,
+                        .size_m = {in.checked(d.x, "radii"), in.checked(d.y, "radii"), in.checked(d.z, "radii")}});
+    }
+    if (kind == "cylinder") return in.finish(long_one(Shape::Kind::cylinder));
+    if (kind == "capsule") return in.finish(long_one(Shape::Kind::capsule));
+    if (kind == "cone") return in.finish(long_one(Shape::Kind::cone));
+    if (kind == "plane") return in.finish(read_plane(in, offset));
+    if (kind == "mesh") return in.finish(read_mesh(element, in));
+    if (kind == "heightmap") return in.finish(read_heightmap(in, offset));
+    if (kind != "empty")
+      findings.leave_out(element.place(), std::string("geometry ") + plain(kind) + ": not a shape that a scene has");
+    return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+void add_shape(ImportedWorld& world, PlacedShape shape, Findings& findings) {
+  const Vec3d p = shape.in_world.position_m;
+  if (world.shapes.size() >= max_shapes)
+    return findings.fail(shape.at,
+                         std::string("more than ") + std::to_string(max_shapes) + " shapes; a scene has no more objects");
+  if (!is_finite(p) || !is_finite(shape.in_world.orientation) || length(p) > 1e7)
+    return findings.fail(shape.at, "stands farther than 10 000 km from the origin of the world");
+  world.shapes.push_back(std::move(shape));
+}
+
+Result<ImportedWorld> read_world(std::string_view text, const std::filesystem::path& path, const Library& library,
+                                 const ReadOptions& options, Findings& findings) {
+  auto file = parse_xml(text, path, path.filename().string());
+  if (!file) return tl::make_unexpected(file.error());
+  const Element root = (*file)->root();
+  Result<ImportedWorld> world;
+  if (root.name() == "sdf") {
+    world = read_sdf(*file, library, options, findings);
+  } else if (root.name() == "robot") {
+    world = read_urdf(**file, options, findings);
+  } else {
+    std::string what = "the file's element is neither <sdf> nor <robot> (URDF), but ";
+    what += plain(root.name());
+    if (root.name() == "gazebo") what += "; convert this old world with: gz sdf -p";
+    findings.fail(root.place(), what);
+  }
+  if (findings.failed()) return tl::make_unexpected(*findings.error());
+  return world;
+}
+
+}  // namespace sonar::scene_tools

@@ -1,0 +1,88 @@
+// What a sound scene may still have wrong with it: things that no loader can know, and that show only as an empty picture.
+#include <algorithm>
+#include <cmath>
+
+#include "clients/scene_tools/describe_scene.hpp"
+#include "clients/scene_tools/figures.hpp"
+
+namespace sonar::scene_tools {
+namespace {
+
+constexpr double far_m = 1000, huge_m = 200, tiny_m = 0.005, wide_m = 5;
+constexpr std::size_t many_triangles = 2'000'000;
+
+std::string list_of(const std::vector<std::string>& names) {
+  constexpr std::size_t most = 8;
+  std::string out;
+  for (std::size_t i = 0; i < std::min(most, names.size()); ++i) out += (i ? ", " : "") + names[i];
+  if (names.size() > most) out += std::string(" and ") + std::to_string(names.size() - most) + " more";
+  return out;
+}
+
+template <class Wanted>
+std::vector<std::string> names_where(const SceneDescription& scene, const Wanted& wanted) {
+  std::vector<std::string> names;
+  for (const DescribedObject& o : scene.objects)
+    if (wanted(o)) names.push_back(o.name);
+  return names;
+}
+
+double longest_m(const DescribedObject& o) {
+  const Vec3d size = o.own.size_m();
+  return std::max({size.x, size.y, size.z});
+}
+
+/// Something to see below: ground by its name, or anything that is wide both ways.
+bool is_ground(const DescribedObject& o) {
+  const Vec3d size = o.in_world.size_m();
+  return o.visible && o.kind != "sea surface" &&
+         (o.kind == "seabed" || o.kind == "heightmap" || o.kind == "plane" || (size.x >= wide_m && size.y >= wide_m));
+}
+
+void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
+  const auto say = [&](const DescribedObject& o, const char* guess) {
+    out.warnings.push_back(o.name + ": " + o.file + " is " + length_text(longest_m(o)) + " long; " + guess);
+  };
+  for (const DescribedObject& o : scene.objects) {
+    if (o.kind != "mesh") continue;
+    if (longest_m(o) > huge_m) say(o, "if the file is in centimetres or millimetres, set scale: 0.01 or 0.001");
+    if (longest_m(o) < tiny_m) say(o, "lengths are metres after scale: is scale too small?");
+  }
+}
+
+void remark_on_places(const SceneDescription& scene, Remarks& out) {
+  const auto far =
+      names_where(scene, [](const DescribedObject& o) { return !o.in_world.empty() && length(o.in_world.centre_m()) > far_m; });
+  if (!far.empty())
+    out.warnings.push_back(std::string("more than 1 km from the origin, where no sonar of ours hears them from: ") +
+                           list_of(far));
+  const auto above = names_where(
+      scene, [](const DescribedObject& o) { return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > 0; });
+  if (!above.empty()) out.warnings.push_back(std::string("wholly above z = 0, the water's surface: ") + list_of(above));
+  if (std::none_of(scene.objects.begin(), scene.objects.end(), is_ground))
+    out.warnings.push_back("no seabed: nothing is ground or 5 m wide both ways, so beams that miss the objects stay black");
+}
+
+}  // namespace
+
+Remarks remarks_on(const SceneDescription& scene) {
+  Remarks out;
+  if (scene.objects.empty()) {
+    out.warnings.push_back("nothing is in it: every ping will be noise");
+    return out;
+  }
+  remark_on_sizes(scene, out);
+  remark_on_places(scene, out);
+  if (!scene.unused_materials.empty())
+    out.warnings.push_back(std::string("materials that nothing uses: ") + list_of(scene.unused_materials));
+  if (scene.triangles > many_triangles)
+    out.warnings.push_back(grouped(scene.triangles) +
+                           " triangles: starting takes long; are the meshes finer than the sonar sees?");
+  const auto hidden = names_where(scene, [](const DescribedObject& o) { return !o.visible; });
+  if (!hidden.empty()) out.notes.push_back(std::string("not visible: ") + list_of(hidden));
+  if (!scene.moving.empty()) out.notes.push_back(std::string("moved by poses that name them: ") + list_of(scene.moving));
+  out.notes.insert(out.notes.end(), scene.notes.begin(), scene.notes.end());
+  return out;
+}
+
+}  // namespace sonar::scene_tools

@@ -1,0 +1,142 @@
+#include "clients/scene_tools/xml_file.hpp"
+
+#include <tinyxml2.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace sonar::scene_tools {
+namespace {
+
+constexpr std::string_view blanks = " \t\r\n\f\v";
+
+std::string_view trimmed(const char* text) {
+  if (text == nullptr) return {};
+  std::string_view view(text);
+  const std::size_t begin = view.find_first_not_of(blanks);
+  if (begin == std::string_view::npos) return {};
+  return view.substr(begin, view.find_last_not_of(blanks) - begin + 1);
+}
+
+std::size_t count_elements(const tinyxml2::XMLElement* first) {
+  std::size_t n = 0;
+  for (const tinyxml2::XMLElement* e = first; e != nullptr; e = e->NextSiblingElement())
+    n += 1 + count_elements(e->FirstChildElement());
+  return n;
+}
+
+/// Bytes of the UTF-8 character that `text` begins with; 0 when it is none.
+std::size_t character_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(0);
+  if (lead < 0x80) return 1;
+  const std::size_t length = lead >= 0xC2 && lead < 0xE0   ? 2
+                             : lead >= 0xE0 && lead < 0xF0 ? 3
+                             : lead >= 0xF0 && lead < 0xF5 ? 4
+                                                           : 0;
+  if (length == 0 || length > text.size()) return 0;
+  for (std::size_t i = 1; i < length; ++i)
+    if ((byte(i) & 0xC0u) != 0x80) return 0;
+  const bool too_long = (lead == 0xE0 && byte(1) < 0xA0) || (lead == 0xF0 && byte(1) < 0x90);
+  const bool no_character = (lead == 0xED && byte(1) >= 0xA0) || (lead == 0xF4 && byte(1) >= 0x90);
+  const bool control = lead == 0xC2 && byte(1) < 0xA0;
+  const bool line_end = lead == 0xE2 && byte(1) == 0x80 && (byte(2) == 0xA8 || byte(2) == 0xA9);
+  const bool no_text = lead == 0xEF && (byte(1) == 0xBB || byte(1) == 0xBF) && byte(2) >= 0xBE;
+  return too_long || no_character || control || line_end || no_text ? 0 : length;
+}
+
+}  // namespace
+
+std::string Place::text() const {
+  return in == nullptr ? std::string() : in->path.string() + ":" + std::to_string(std::max(line, 1));
+}
+std::string Place::short_text() const {
+  return in == nullptr ? std::string() : in->short_name + ":" + std::to_string(std::max(line, 1));
+}
+
+std::string_view Element::name() const { return xml_ ? std::string_view(xml_->Name()) : std::string_view(); }
+std::string_view Element::text() const { return xml_ ? trimmed(xml_->GetText()) : std::string_view(); }
+std::string_view Element::attribute(const char* name) const { return xml_ ? trimmed(xml_->Attribute(name)) : std::string_view(); }
+Element Element::child(const char* name) const { return {file_, xml_ ? xml_->FirstChildElement(name) : nullptr}; }
+std::vector<Element> Element::children(const char* name) const {
+  std::vector<Element> found;
+  for (const auto* e = xml_ ? xml_->FirstChildElement(name) : nullptr; e != nullptr; e = e->NextSiblingElement(name))
+    found.emplace_back(file_, e);
+  return found;
+}
+std::vector<Element> Element::children() const { return children(nullptr); }
+Place Element::place() const { return {file_, xml_ ? xml_->GetLineNum() : 0}; }
+
+Element XmlFile::root() const { return {this, document->RootElement()}; }
+
+Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const std::filesystem::path& path,
+                                                 std::string short_name) {
+  const auto bad = [&](int line, const std::string& what) {
+    return failure(ErrorKind::bad_data, path.string() + ":" + std::to_string(std::max(line, 1)) + ": " + what);
+  };
+  if (text.size() > max_xml_bytes) return bad(1, "is larger than 16 MiB; such files hold meshes elsewhere");
+  if (text.find('\0') != std::string_view::npos) return bad(1, "is not a text file");
+  auto document = std::make_shared<tinyxml2::XMLDocument>();
+  if (document->Parse(text.data(), text.size()) == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED)
+    return bad(document->ErrorLineNum(), "elements nest more than 100 deep");
+  if (document->ErrorID() == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) return bad(1, "is empty");
+  if (document->Error())
+    return bad(document->ErrorLineNum(), std::string("not well-formed XML here (") + document->ErrorName() + ")");
+  if (document->RootElement() == nullptr) return bad(1, "has no element; wanted <sdf> or <robot>");
+  auto file = std::make_shared<XmlFile>();
+  file->path = path;
+  file->short_name = std::move(short_name);
+  file->elements = count_elements(document->RootElement());
+  file->document = std::move(document);
+  return file;
+}
+
+void Findings::fail(const Place& at, const std::string& what) {
+  if (!error_) error_ = Error{ErrorKind::bad_data, at.text() + ": " + what};
+}
+void Findings::leave_out(const Place& at, const std::string& what) {
+  std::string line = at.short_text() + ": " + what;
+  constexpr std::size_t most = 1000;
+  if (left_out_.size() < most && seen_.insert(line).second) left_out_.push_back(std::move(line));
+}
+
+std::vector<double> read_numbers(std::string_view text, std::size_t count, const Place& at, std::string_view what,
+                                 Findings& findings) {
+  std::vector<double> numbers;
+  const std::string wanted = std::string(what) + ": ";
+  while (!text.empty() && numbers.size() <= count) {
+    const std::size_t begin = text.find_first_not_of(blanks);
+    if (begin == std::string_view::npos) break;
+    text.remove_prefix(begin);
+    const std::string_view word = text.substr(0, text.find_first_of(blanks));
+    text.remove_prefix(word.size());
+    const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
+    double value = 0;
+    const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (code != std::errc() || end != digits.data() + digits.size() || !std::isfinite(value) || std::abs(value) > 1e9) {
+      findings.fail(at, wanted + "\"" + plain(word) + "\" is not a number that a scene can hold");
+      return std::vector<double>(count, 0.0);
+    }
+    numbers.push_back(value);
+  }
+  if (numbers.size() == count) return numbers;
+  findings.fail(at, wanted + std::to_string(count) + (count == 1 ? " number is" : " numbers are") + " needed here, not " +
+                        (numbers.size() > count ? "more" : std::to_string(numbers.size())));
+  return std::vector<double>(count, 0.0);
+}
+
+std::string plain(std::string_view text, std::size_t most) {
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t length = character_length(text);
+    const bool kept = length > 1 || (length == 1 && text[0] >= ' ' && text[0] < 0x7F);
+    const std::size_t taken = std::max<std::size_t>(length, 1);
+    if (out.size() + taken > most) break;
+    out += kept ? std::string(text.substr(0, taken)) : "_";
+    text.remove_prefix(taken);
+  }
+  return out;
+}
+
+}  // namespace sonar::scene_tools
