@@ -100,11 +100,11 @@ std::optional<double> given_number(const protocol::OptionValues& values, std::st
 }
 
 std::string options_table() {
-  std::string text = "| option | values, default first | meaning |\n|---|---|---|\n";
+  std::string text;
   for (const protocol::Option& option : table()) {
-    text.append("| `").append(option.name).append("` | ");
-    if (option.allowed.empty()) text.append(option.default_value).append(", any ").append(protocol::numbers_of(option));
-    for (const std::string_view& value : option.allowed) text.append(&value == option.allowed.data() ? "" : ", ").append(value);
+    std::string values = option.allowed.empty() ? protocol::numbers_of(option) : std::string();
+    for (const std::string_view& value : option.allowed) values.append(values.empty() ? "" : ", ").append(value);
+    text.append("| `").append(option.name).append("` | ").append(values).append(" | ").append(option.default_value);
     text.append(" | ").append(option.meaning).append(" |\n");
   }
   return text;

@@ -33,7 +33,7 @@ double number_option(const protocol::OptionValues& values, std::string_view name
 /// For numbers that replace a product's own: nothing when that stands.
 std::optional<double> given_number(const protocol::OptionValues& values, std::string_view name);
 
-/// The table of README.md.
+/// Rows of the table in docs/protocols/oculus.md, section 7: name, values, default, meaning.
 std::string options_table();
 
 }  // namespace sonar::oculus
