@@ -1,15 +1,25 @@
 #include "daemon/scene_file.hpp"
 
-#include <array>
 #include <system_error>
+#include <vector>
 
 #include "core/scene/files/built_in_scenes.hpp"
 
 namespace sonar {
 namespace {
 
-const std::array<std::filesystem::path, 2>& shipped_folders() {
-  static const std::array<std::filesystem::path, 2> folders{SONARD_SCENES_SOURCE, SONARD_SCENES_INSTALLED};
+/// Where the program was put first, so that an unpacked or moved installation finds its own; then the tree it was built from.
+std::vector<std::filesystem::path> make_shipped_folders() {
+  std::error_code ec;
+  std::vector<std::filesystem::path> folders;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", ec);
+  if (!ec) folders.push_back((program.parent_path() / SONARD_SCENES_FROM_PROGRAM).lexically_normal());
+  for (const char* folder : {SONARD_SCENES_SOURCE, SONARD_SCENES_INSTALLED}) folders.emplace_back(folder);
+  std::erase_if(folders, [&](const std::filesystem::path& folder) { return !std::filesystem::is_directory(folder, ec); });
+  return folders;
+}
+const std::vector<std::filesystem::path>& shipped_folders() {
+  static const std::vector<std::filesystem::path> folders = make_shipped_folders();
   return folders;
 }
 
@@ -27,8 +37,9 @@ std::optional<SceneFile> find_scene(const std::filesystem::path& given, const st
 }
 
 std::string scene_folders(const std::filesystem::path& directory) {
-  return (directory.empty() ? std::string(".") : directory.string()) + ", " + shipped_folders()[0].string() + " and " +
-         shipped_folders()[1].string();
+  std::string text = directory.empty() ? "." : directory.string();
+  for (const auto& folder : shipped_folders()) text += (&folder == &shipped_folders().back() ? " and " : ", ") + folder.string();
+  return text;
 }
 
 }  // namespace sonar

@@ -1,0 +1,88 @@
+# What is installed beside the programs (unit, manual pages, documents), and the Debian packages made of it by `cpack -G DEB`.
+# Included last by the root CMakeLists.txt: by then it is known what there is. See docs/operations.md, "The package".
+include(GNUInstallDirs)
+set(documents ${CMAKE_INSTALL_DATADIR}/doc/sonard)
+set(made ${PROJECT_BINARY_DIR}/package)
+
+# ---- the tools and the unit
+install(TARGETS sonarctl RUNTIME COMPONENT sonard)
+install(FILES daemon/systemd/sonard.service DESTINATION lib/systemd/system COMPONENT sonard)
+
+# ---- manual pages, as packages carry them
+find_program(SONAR_GZIP gzip)
+foreach(page sonard.8 sonarctl.1 sonard.yaml.5)
+  string(REGEX MATCH "[0-9]$" section ${page})
+  if(SONAR_GZIP)
+    add_custom_command(OUTPUT ${made}/${page}.gz
+      COMMAND ${SONAR_GZIP} -9nc ${PROJECT_SOURCE_DIR}/docs/man/${page} > ${made}/${page}.gz
+      DEPENDS docs/man/${page})
+    list(APPEND pages ${made}/${page}.gz)
+    install(FILES ${made}/${page}.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man${section} COMPONENT sonard)
+  else()
+    install(FILES docs/man/${page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man${section} COMPONENT sonard)
+  endif()
+endforeach()
+
+# ---- documents: the licence as Debian wants it, the example configuration, the pages that errors and manuals point at
+if(SONAR_FFTW)
+  set(binaries_licence "GPL-3+")
+  set(binaries_comment " These binaries are linked with FFTW, which is under the GPL-2 or later, so they may be passed on only
+ under the terms of the GPL-3. The sources are under Apache-2.0; built with SONAR_FFTW=OFF, so are the binaries.")
+else()
+  set(binaries_licence "Apache-2.0")
+  set(binaries_comment " Built without FFTW.")
+endif()
+configure_file(daemon/debian/copyright.in ${made}/copyright @ONLY)
+install(FILES ${made}/copyright DESTINATION ${documents} COMPONENT sonard)
+install(FILES ${made}/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
+install(FILES docs/bvtsdk.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
+install(FILES scenes/sonard.yaml DESTINATION ${documents}/examples COMPONENT sonard)
+install(FILES README.md DESTINATION ${documents} COMPONENT sonard)
+install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT sonard
+  FILES_MATCHING PATTERN "*.md" PATTERN "man" EXCLUDE PATTERN "decisions" EXCLUDE PATTERN "validation" EXCLUDE PATTERN "driver-test" EXCLUDE)
+if(SONAR_GZIP)
+  add_custom_command(OUTPUT ${made}/CHANGELOG.md.gz
+    COMMAND ${SONAR_GZIP} -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md > ${made}/CHANGELOG.md.gz DEPENDS CHANGELOG.md)
+  install(FILES ${made}/CHANGELOG.md.gz DESTINATION ${documents} COMPONENT sonard)
+  install(FILES ${made}/CHANGELOG.md.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
+  add_custom_target(package_documents ALL DEPENDS ${pages} ${made}/CHANGELOG.md.gz)
+else()
+  install(FILES CHANGELOG.md DESTINATION ${documents} COMPONENT sonard)
+endif()
+
+# ---- the packages: one for the daemon and its tools, one for those who build BlueView drivers
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME sonard)
+set(CPACK_PACKAGE_VENDOR "sonard")
+set(CPACK_PACKAGE_CONTACT "sonard maintainers <maintainers@sonard.invalid>")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR})
+set(CPACK_STRIP_FILES ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
+  OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+set(CPACK_COMPONENTS_ALL sonard bvtsdk)
+set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_ENABLE_COMPONENT_DEPENDS OFF)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_DEBIAN_SONARD_PACKAGE_NAME sonard)
+set(CPACK_DEBIAN_SONARD_PACKAGE_SECTION net)
+set(CPACK_DEBIAN_SONARD_PACKAGE_CONTROL_EXTRA
+  "${PROJECT_SOURCE_DIR}/daemon/debian/postinst;${PROJECT_SOURCE_DIR}/daemon/debian/prerm;${PROJECT_SOURCE_DIR}/daemon/debian/postrm")
+set(CPACK_COMPONENT_SONARD_DESCRIPTION "emulates imaging sonars on the network, from a 3D scene
+sonard holds a 3D scene, takes the pose of a vehicle, computes what a
+multibeam sonar would hear, and serves it as a Blueprint Subsea Oculus:
+drivers written for the real device connect unchanged. With sonarctl, which
+listens to, looks at and steers sonars, and with a systemd unit, which is not
+started by the installation.")
+set(CPACK_DEBIAN_BVTSDK_PACKAGE_NAME sonard-bvtsdk)
+set(CPACK_DEBIAN_BVTSDK_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_BVTSDK_PACKAGE_SUGGESTS sonard)
+set(CPACK_COMPONENT_BVTSDK_DESCRIPTION "libraries with the interface of the BlueView SDK, for sonard
+Open drivers of BlueView sonars that are built with them run against sonard.
+They cannot talk to a real sonar. Each of the two interfaces, 3.x and 4.x, has
+a folder of its own, /usr/lib/sonard/bvt3 and bvt4: give it to CMake as
+CMAKE_PREFIX_PATH.")
+include(CPack)

@@ -1,0 +1,175 @@
+"""What `cpack -G DEB` and `cmake --install` make of the build: the right files in the right places, and a sonard that runs from
+wherever it was unpacked."""
+import gzip
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+from running_sonard import BUILD, ROOT, free_address, run
+
+WANTED = {
+    "sonard": ["usr/bin/sonard", "usr/bin/sonarctl", "usr/lib/systemd/system/sonard.service", "usr/share/man/man8/sonard.8.gz",
+               "usr/share/man/man1/sonarctl.1.gz", "usr/share/man/man5/sonard.yaml.5.gz", "usr/share/sonard/scenes/demo.yaml",
+               "usr/share/sonard/scenes/meshes/wreck.obj", "usr/share/doc/sonard/copyright", "usr/share/doc/sonard/CHANGELOG.md.gz",
+               "usr/share/doc/sonard/examples/sonard.yaml"],
+    "sonard-bvtsdk": ["usr/lib/sonard/bvt3/lib/libbvtsdk.so.3", "usr/lib/sonard/bvt4/lib/libbvtsdk.so.4",
+                      "usr/lib/sonard/bvt4/include/bvt_sdk.h", "usr/lib/sonard/bvt3/lib/pkgconfig/bvtsdk.pc",
+                      "usr/lib/sonard/bvt3/colormaps/jet.cmap", "usr/share/doc/sonard-bvtsdk/copyright"],
+}
+
+
+def why_not():
+    missing = [p for p in ("cpack", "dpkg-deb", "dpkg-shlibdeps", "gzip") if shutil.which(p) is None]
+    if missing:
+        return "not here: " + ", ".join(missing)
+    cache = (BUILD / "CMakeCache.txt").read_text(encoding="utf-8")
+    if "SONAR_SANITIZE:STRING=\n" not in cache:
+        return "an instrumented build is not for packages"
+    if not (BUILD / "bvt4/lib/libbvtsdk.so").exists() or not (BUILD / "package/sonard.8.gz").exists():
+        return f"{BUILD} is not built whole"
+    return None
+
+
+def fields(package):
+    """The control file as a dictionary; continuation lines joined."""
+    text = run("dpkg-deb", "-f", package).stdout
+    return dict(line.split(": ", 1) for line in text.replace("\n ", " ").splitlines() if ": " in line)
+
+
+def files_below(folder):
+    return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if not p.is_dir()}
+
+
+class Installed:
+    """What both ways of installing must bring; `self.root` holds usr or usr/local."""
+    prefix = "usr"
+
+    def program(self, name):
+        return self.root / self.prefix / "bin" / name
+
+    def test_the_programs_run_and_say_their_version(self):
+        result = run(self.program("sonard"), "--version")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stdout, r"^sonard \d+\.\d+\.\d+")
+
+    def test_shipped_scenes_are_found_beside_the_program(self):
+        with tempfile.TemporaryDirectory() as folder:
+            config = pathlib.Path(folder) / "my.yaml"
+            text = "world: {scene: SCENE}\nvehicles: [{name: rov}]\nsonars: [{name: a, profile: oculus-m1200d, bind_ip: ADDRESS}]\n"
+            config.write_text(text.replace("ADDRESS", free_address()).replace("SCENE", "tank-rod.yaml"), encoding="utf-8")
+            found = run(self.program("sonard"), "check", config)
+            self.assertEqual(found.returncode, 0, found.stderr)
+            config.write_text(text.replace("ADDRESS", free_address()).replace("SCENE", "nowhere.yaml"), encoding="utf-8")
+            error = run(self.program("sonard"), "check", config).stderr
+            looked = error.split("looked in ")[1]
+            first = looked.split(", ")[1].split(" and ")[0].strip()
+            self.assertEqual(pathlib.Path(first).resolve(), (self.root / self.prefix / "share/sonard/scenes").resolve(), error)
+
+    def test_the_example_configuration_is_valid(self):
+        example = self.root / self.prefix / "share/doc/sonard/examples/sonard.yaml"
+        result = run(self.program("sonard"), "check", example)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+
+@unittest.skipIf(why_not(), why_not())
+class Package(Installed, unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        made = pathlib.Path(cls.folder.name) / "made"
+        result = subprocess.run(["cpack", "-G", "DEB", "-B", str(made), "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip"], cwd=BUILD,
+                                stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300, check=False)
+        if result.returncode != 0:
+            raise AssertionError(result.stdout + result.stderr)
+        cls.packages = {name: next(made.glob(f"{name}_*.deb")) for name in WANTED}
+        cls.roots = {}
+        for name, package in cls.packages.items():
+            cls.roots[name] = pathlib.Path(cls.folder.name) / "root" / name
+            subprocess.run(["dpkg-deb", "-x", str(package), str(cls.roots[name])], check=True)
+        cls.root = cls.roots["sonard"]
+
+    def test_the_files_are_where_they_belong_and_nothing_else_is_there(self):
+        for name, wanted in WANTED.items():
+            there = files_below(self.roots[name])
+            self.assertEqual([w for w in wanted if w not in there], [], name)
+            allowed = ("usr/bin/", "usr/lib/systemd/", "usr/lib/sonard/", "usr/share/")
+            self.assertEqual([t for t in there if not t.startswith(allowed)], [], name)
+        self.assertFalse([t for t in files_below(self.root) if "bvtsdk.so" in t], "the libraries have their own package")
+
+    def test_nothing_is_a_configuration_file_and_nothing_starts_by_itself(self):
+        self.assertFalse((self.root / "etc").exists(), "without a configuration the service runs the demo")
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run(["dpkg-deb", "-e", str(self.packages["sonard"]), folder], check=True)
+            scripts = {p: (pathlib.Path(folder) / p).read_text(encoding="utf-8") for p in ("postinst", "prerm", "postrm")}
+            for name in scripts:
+                self.assertTrue(os.access(pathlib.Path(folder) / name, os.X_OK), name)
+                self.assertEqual(run("sh", "-n", pathlib.Path(folder) / name).returncode, 0, name)
+        self.assertIn("daemon-reload", scripts["postinst"])
+        for name in ("postinst", "postrm"):
+            self.assertNotRegex(scripts[name], r"systemctl (--now )?(enable|start|restart)")
+
+    def test_the_control_file_says_who_what_and_on_what_it_depends(self):
+        for name, package in self.packages.items():
+            control = fields(package)
+            self.assertEqual(control["Package"], name)
+            self.assertRegex(control["Version"], r"^\d+\.\d+\.\d+$")
+            self.assertIn("@", control["Maintainer"])
+            self.assertRegex(control["Depends"], r"\blibc6\b.*\blibstdc\+\+6\b")
+            self.assertGreater(len(control["Description"]), 100)
+        self.assertRegex(fields(self.packages["sonard"])["Depends"], r"\blibembree")
+        self.assertNotIn("embree", fields(self.packages["sonard-bvtsdk"])["Depends"])
+
+    def test_the_licence_of_the_binaries_is_told(self):
+        text = (self.root / "usr/share/doc/sonard/copyright").read_text(encoding="utf-8")
+        linked = run("readelf", "-d", self.program("sonard")).stdout if shutil.which("readelf") else ""
+        self.assertIn("Apache-2.0", text)
+        if "fftw" in linked:
+            self.assertRegex(text, r"Files: usr/bin/\*\nCopyright:.*\nLicense: GPL-3\+")
+
+    def test_the_manual_pages_are_pages(self):
+        for page in ("man8/sonard.8.gz", "man1/sonarctl.1.gz", "man5/sonard.yaml.5.gz"):
+            text = gzip.decompress((self.root / "usr/share/man" / page).read_bytes()).decode()
+            self.assertTrue(text.startswith(".Dd "), page)
+            if shutil.which("man"):
+                shown = subprocess.run(["man", "--warnings", "-l", "-"], input=text, capture_output=True, text=True, timeout=60,
+                                       env={**os.environ, "LC_ALL": "C.UTF-8", "MANWIDTH": "100"}, check=False)
+                self.assertEqual((shown.returncode, shown.stderr), (0, ""), page)
+
+    def test_the_programs_name_no_folder_they_were_built_in(self):
+        """Strings such as assertions would; the folder of the scenes in the source tree is meant to be there."""
+        data = self.program("sonard").read_bytes().replace(str(ROOT / "scenes").encode(), b"")
+        self.assertNotIn(str(BUILD).encode(), data)
+
+    def test_lintian_finds_no_error(self):
+        if shutil.which("lintian") is None:
+            self.skipTest("lintian is not here")
+        for name, package in self.packages.items():
+            result = run("lintian", "--fail-on", "error", "--allow-root", package)
+            self.assertEqual(result.returncode, 0, f"{name}: {result.stdout}")
+
+
+@unittest.skipIf(why_not(), why_not())
+class Destdir(Installed, unittest.TestCase):
+    prefix = "usr"
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.root = pathlib.Path(cls.folder.name)
+        result = subprocess.run(["cmake", "--install", str(BUILD), "--prefix", "/usr"], stdin=subprocess.DEVNULL, capture_output=True,
+                                text=True, timeout=300, check=False, env={**os.environ, "DESTDIR": str(cls.root)})
+        if result.returncode != 0:
+            raise AssertionError(result.stdout + result.stderr)
+
+    def test_it_installs_what_both_packages_hold(self):
+        there = files_below(self.root)
+        self.assertEqual([w for wanted in WANTED.values() for w in wanted if w not in there], [])
+
+
+if __name__ == "__main__":
+    unittest.main()
