@@ -21,6 +21,7 @@ from running_sonard import BUILD, ROOT, Sonard
 from tshark import messages, tshark, why_not
 
 GOLDEN = ROOT / "tests/protocol/oculus/golden"
+WHY_NOT = why_not()
 FLAGS = ["rangeInMetres", "samples16Bit", "rowGains", "simpleResult", "gainAssist", "lowPower", "beams512", "networkTrigger"]
 JUNK = b"\0S\0SO" + b"\xff" * 20 + b"S"  # half and whole ids; the last byte runs into the header behind it
 ASK_CONFIG = HEADER.pack(0x4F53, 0, 0, 0x55, 0, 12, 0) + bytes(12)
@@ -64,7 +65,7 @@ def dumped_values(line):
     return values
 
 
-@unittest.skipIf(why_not(), why_not())
+@unittest.skipIf(WHY_NOT, WHY_NOT)
 class Dissected(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
@@ -321,6 +322,12 @@ class Malformed(Dissected):
         capture.connect()
         capture.tcp("client", HEADER.pack(0x4F53, 0, 0, 0x15, 0, 4097, 0) + golden("fire_v0"))
         self.assertEqual([m.is_junk() for m in self.dissect(capture)], [True, False])
+
+    def test_junk_that_trickles_in_is_shown_once(self):
+        sent = [golden("dummy"), golden("ping_v1"), golden("dummy")]
+        found = self.dissect_stream(sent[0] + JUNK + JUNK.join(sent[1:]), [*[1] * 50, 2074, 20, *[1] * 20])
+        self.assertEqual(b"".join(m.raw("junk") for m in found if m.is_junk()), JUNK * 2)
+        self.expect_agreement([m for m in found if not m.is_junk()], sent, self.dump("device", JUNK.join(sent)))
 
     def test_random_damage(self):
         dice, stream = random.Random(11), b""
