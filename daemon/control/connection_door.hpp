@@ -1,0 +1,110 @@
+// The accepting half of both control servers: a listener, and places for connections that are given up by the most silent. What a
+// Connection does with its socket is its own business.
+#pragma once
+
+#include <string>
+
+#include "daemon/control/control_context.hpp"
+#include "daemon/listen.hpp"
+#include "daemon/places.hpp"
+
+namespace sonar {
+
+template <class Connection>
+class ConnectionDoor {
+ public:
+  /// `protocol` names it in the log: "control", "http".
+  ConnectionDoor(ControlContext& context, std::string protocol)
+      : context_(context),
+        protocol_(std::move(protocol)),
+        acceptor_(context.io),
+        places_(static_cast<std::size_t>(context.limits.control_clients)) {}
+
+  Result<void> open(Endpoint at) {
+    if (auto r = listen_tcp(acceptor_, at); !r) {
+      error_code ec;
+      acceptor_.close(ec);
+      return r;
+    }
+    at.port = acceptor_.local_endpoint().port();
+    at_ = at;
+    return {};
+  }
+  void start() {
+    if (acceptor_.is_open()) keep_accepting();
+  }
+  void stop() {
+    stopping_ = true;
+    error_code ec;
+    acceptor_.close(ec);
+    places_.close_all();
+  }
+  /// Port 0 = not listening.
+  Endpoint at() const { return at_; }
+
+ private:
+  static constexpr auto accept_pause = std::chrono::milliseconds(100);
+
+  void keep_accepting() {
+    asio::co_spawn(
+        context_.io, [this] { return accept(); },
+        [this](std::exception_ptr fault) {
+          if (!fault || stopping_) return;
+          say_fault(context_, fault, protocol_ + " connections");
+          keep_accepting();
+        });
+  }
+  asio::awaitable<void> accept() {
+    while (!stopping_) {
+      error_code ec;
+      tcp::socket socket = co_await acceptor_.async_accept(into(ec));
+      if (stopping_) co_return;
+      if (ec) {
+        asio::steady_timer pause(context_.io, accept_pause);
+        co_await pause.async_wait(into(ec));
+        continue;
+      }
+      admit(std::move(socket));
+    }
+  }
+  void admit(tcp::socket socket) {
+    error_code ec;
+    const auto peer = socket.remote_endpoint(ec);
+    if (ec) return;  // gone already
+    const std::string address = peer.address().to_string();
+    const Sender sender{protocol_ + " tcp " + address + ":" + std::to_string(peer.port()), protocol_ + " " + address};
+    const bool room = places_.make_room([this](const Connection& evicted) {
+      std::uint64_t unsaid = 0;
+      if (context_.notices.allows(LogLimiter::Clock::now(), unsaid))
+        context_.log.info("control connection closed: silent for longest, and its place was needed",
+                          {{"from", evicted.sender().id}});
+    });
+    if (!room) {
+      say_refused(context_, std::to_string(places_.most()) + " connections are open and busy already", sender.id);
+      return Connection::turn_away(std::move(socket));
+    }
+    end_when_silent(socket, context_.limits.dead_peer);
+    socket.set_option(tcp::no_delay(true), ec);
+    auto connection = std::make_shared<Connection>(context_, std::move(socket), sender);
+    places_.add(connection);
+    run(connection, connection->read());
+    run(connection, connection->write());
+  }
+  /// One of its coroutines. A fault of ours ends this connection and no other.
+  void run(const std::shared_ptr<Connection>& connection, asio::awaitable<void> part) {
+    asio::co_spawn(context_.io, std::move(part), [this, connection](std::exception_ptr fault) {
+      if (fault) say_fault(context_, fault, connection->sender().id);
+      if (fault) connection->close();
+      if (connection->over()) places_.remove(connection);
+    });
+  }
+
+  ControlContext& context_;
+  std::string protocol_;
+  tcp::acceptor acceptor_;
+  Places<Connection> places_;
+  Endpoint at_;
+  bool stopping_ = false;
+};
+
+}  // namespace sonar

@@ -1,0 +1,60 @@
+// What the connections of both control servers have in common: how long they may take, and what they are given to work with.
+#pragma once
+
+#include <chrono>
+
+#include "daemon/asio.hpp"
+#include "daemon/config.hpp"
+#include "daemon/control/token.hpp"
+#include "daemon/log.hpp"
+#include "daemon/operations.hpp"
+#include "daemon/pose_intake.hpp"
+
+namespace sonar {
+
+/// Of the whole server; outlives every connection.
+struct ControlContext {
+  asio::io_context& io;
+  const ControlConfig& config;
+  const LimitConfig& limits;
+  Operations& operations;
+  Events& events;
+  PoseIntake& poses;
+  Log& log;
+  Token token = {};
+  LogLimiter refusals = {}, notices = {}, faults = {};
+};
+
+inline constexpr std::chrono::seconds greeting_limit{10};    // for the Hello, or a whole HTTP request once it has begun
+inline constexpr std::chrono::seconds keep_alive_limit{60};  // between two HTTP requests
+inline constexpr std::chrono::minutes operation_limit{5};    // for a scene to load; HTTP waits for no more
+
+/// Says a line, but not for everybody who knocks.
+void say_refused(ControlContext& context, const std::string& why, const std::string& from);
+void say_fault(ControlContext& context, const std::exception_ptr& fault, const std::string& at);
+
+/// Closes a socket when something takes too long. One at a time; the next limit replaces the last.
+class Deadline : public std::enable_shared_from_this<Deadline> {
+ public:
+  using Steady = std::chrono::steady_clock;
+  explicit Deadline(tcp::socket& socket) : socket_(socket), timer_(socket.get_executor()) {}
+  void within(Steady::duration limit) {
+    timer_.expires_after(limit);
+    timer_.async_wait([weak = weak_from_this()](const error_code& ec) {
+      const auto self = weak.lock();
+      if (!self || ec || self->timer_.expiry() > Steady::now()) return;
+      self->passed_ = true;
+      error_code ignored;
+      self->socket_.close(ignored);
+    });
+  }
+  void none() { timer_.expires_at(Steady::time_point::max()); }  // cancels what waits
+  bool passed() const { return passed_; }
+
+ private:
+  tcp::socket& socket_;  // of the connection that owns this
+  asio::steady_timer timer_;
+  bool passed_ = false;
+};
+
+}  // namespace sonar

@@ -1,0 +1,104 @@
+#include "daemon/control/http_judge.hpp"
+
+namespace sonar {
+namespace {
+
+using control::StatusCode;
+using Kind = Route::Kind;
+
+HttpAnswer refused(unsigned status, const std::string& text) {
+  return answer_of(status, status == 404 || status == 405 ? StatusCode::unsupported : StatusCode::refused, text);
+}
+
+HttpAnswer wrong_method(const Route& route) {
+  HttpAnswer answer = refused(405, "this takes " + std::string(route.method));
+  answer.allow = route.method == "GET" ? "GET, HEAD" : "POST";
+  return answer;
+}
+
+/// What the body asks for. A name in the path stands for that in the message.
+Judgement operation_of(const Route& route, const std::string& body) {
+  const bool pose = route.op == "pose" || route.op == "object";
+  auto request = control::request_from_json(route.op, body, route.name);
+  if (!request) return {refused(400, request.error().text), pose ? request.error().text : ""};
+  return std::visit(
+      [&](auto op) -> Judgement {
+        if constexpr (std::is_constructible_v<control::Operation, decltype(op)>)
+          return {WantsOperation{std::move(op)}};
+        else
+          return {refused(404, "no such request")};
+      },
+      std::move(request->op));
+}
+
+/// Who asks, by which name, from which page. Empty answer = let through.
+std::optional<HttpAnswer> stopped_at_the_door(const HttpRequest& request, const HttpPolicy& policy) {
+  if (!request.has_host) return refused(400, "the Host header is missing");
+  if (!host_allowed(request.host, policy.reached, policy.hosts))
+    return refused(403, "Host is no name of this computer's that sonard knows: use its address, or name it in control.hosts");
+  if (request.has_origin && !origin_allowed(request.origin, policy.reached, policy.hosts))
+    return refused(403, "pages of other sites may not ask here (Origin)");
+  return std::nullopt;
+}
+
+}  // namespace
+
+HttpAnswer answer_of(unsigned status, StatusCode code, const std::string& text) {
+  return {status, control::json_of(code, text) + "\n"};
+}
+
+Judgement judge(const HttpRequest& request, const HttpPolicy& policy) {
+  if (auto answer = stopped_at_the_door(request, policy)) return {*std::move(answer)};
+  const auto target = parse_target(request.target);
+  if (!target) return {refused(400, "the target is not a path")};
+  const Route route = route_of(*target);
+  const bool authorised = policy.token.matches(bearer_token(request.authorization));
+  if (!authorised && route.kind != Kind::health)
+    return {refused(401, "this daemon wants a token: Authorization: Bearer ..., from its control.token_file")};
+  if (route.kind == Kind::unknown) return {refused(404, "nothing is here; GET / says what there is")};
+  const bool get = request.method == "GET" || request.method == "HEAD";
+  if (route.method == "GET" ? !get : request.method != route.method) return {wrong_method(route)};
+  switch (route.kind) {
+    case Kind::help:
+      return {WantsHelp{}};
+    case Kind::health:
+      return {WantsHealth{authorised}};
+    case Kind::metrics:
+      return {WantsMetrics{}};
+    case Kind::status:
+      return {WantsOperation{control::GetStatus{}}};
+    case Kind::events: {
+      auto wanted = subscription_of(*target);
+      if (!wanted) return {refused(400, wanted.error().text)};
+      return {*wanted};
+    }
+    default:
+      if (!is_json(request.content_type)) return {refused(415, "say Content-Type: application/json")};
+      return operation_of(route, request.body);
+  }
+}
+
+std::string help_text(const std::string& address) {
+  const std::string url = "http://" + address;
+  const std::string post = "  curl -s " + url + "/api/v1/";
+  const std::string json = " -H 'Content-Type: application/json' -d ";
+  return "sonard, control by HTTP (docs/control.md). With control.token_file add: -H \"Authorization: Bearer $(cat FILE)\"\n\n"
+         "  curl -s " +
+         url +
+         "/healthz\n"
+         "  curl -s " +
+         url +
+         "/metrics\n"
+         "  curl -s " +
+         url +
+         "/api/v1/status\n"
+         "  curl -sN '" +
+         url + "/api/v1/events?pings=1&clients=1&poses=1&scene=1'\n" + post + "sonars/NAME" + json +
+         "'{\"range_m\":5,\"gain_percent\":60}'\n" + post + "environment" + json + "'{\"environment\":{\"temperature_c\":4}}'\n" +
+         post + "pose" + json + "'{\"frame\":\"NED_FRD\",\"position\":{\"x\":0,\"y\":0,\"z\":3},\"orientation\":{\"w\":1}}'\n" +
+         post + "objects/NAME" + json + "'{\"visible\":false}'\n" + post + "load" + json +
+         "'{\"path\":\"demo.yaml\"}'\n\n"
+         "POST to /api/v1/ also: sonar, object, add_object, remove_object, set_object.\n";
+}
+
+}  // namespace sonar

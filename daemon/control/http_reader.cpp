@@ -1,0 +1,86 @@
+#include "daemon/control/http_reader.hpp"
+
+#include <utility>
+
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/string_body.hpp>
+
+namespace sonar {
+namespace {
+
+namespace http = boost::beast::http;
+constexpr std::size_t longest_unread = 64u << 10;  // chunk headers and trailers have no limit of Beast's
+
+std::string text_of(boost::beast::string_view view) { return {view.data(), view.size()}; }
+
+HttpRefusal refusal_of(const boost::beast::error_code& ec) {
+  if (ec == http::error::header_limit) return {431, "the header is longer than 8 KiB"};
+  if (ec == http::error::body_limit) return {413, "the body is longer than 1 MiB"};
+  if (ec == http::error::bad_version) return {505, "HTTP/1.0 and 1.1 are spoken here"};
+  return {400, "this is not an HTTP request: " + ec.message()};
+}
+
+tl::expected<std::optional<HttpRequest>, HttpRefusal> request_from(http::request<http::string_body> message) {
+  HttpRequest request;
+  request.method = text_of(message.method_string());
+  request.target = text_of(message.target());
+  request.http_1_0 = message.version() == 10;
+  if (message.count(http::field::host) > 1) return tl::unexpected(HttpRefusal{400, "more than one Host"});
+  request.has_host = message.count(http::field::host) == 1;
+  request.has_origin = message.count(http::field::origin) > 0;
+  request.host = text_of(message[http::field::host]);
+  request.origin = text_of(message[http::field::origin]);
+  request.authorization = text_of(message[http::field::authorization]);
+  request.content_type = text_of(message[http::field::content_type]);
+  request.keep_alive = message.keep_alive();
+  request.body = std::move(message.body());
+  return std::optional(std::move(request));
+}
+
+}  // namespace
+
+struct HttpReader::Parser {
+  http::request_parser<http::string_body> beast;
+  Parser() {
+    beast.eager(true);
+    beast.header_limit(longest_header);
+    beast.body_limit(longest_body);
+  }
+};
+
+HttpReader::HttpReader() : parser_(std::make_unique<Parser>()) {}
+HttpReader::~HttpReader() = default;
+
+void HttpReader::feed(std::span<const std::byte> received) {
+  for (const std::byte b : received) buffer_ += static_cast<char>(b);
+}
+
+bool HttpReader::begun() const { return !buffer_.empty() || parser_->beast.got_some(); }
+
+tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
+  while (!buffer_.empty() && !parser_->beast.is_done()) {
+    boost::beast::error_code ec;
+    const std::size_t used = parser_->beast.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), ec);
+    buffer_.erase(0, used);
+    if (ec == http::error::need_more) {
+      if (buffer_.size() > longest_unread) return tl::unexpected(HttpRefusal{400, "a chunk's header never ends"});
+      break;
+    }
+    if (ec) return tl::unexpected(refusal_of(ec));
+    if (used == 0) break;
+  }
+  if (!parser_->beast.is_done()) return std::optional<HttpRequest>{};
+  auto message = parser_->beast.release();
+  parser_ = std::make_unique<Parser>();
+  continued_ = false;
+  return request_from(std::move(message));
+}
+
+bool HttpReader::asks_to_continue() {
+  const auto& beast = parser_->beast;
+  if (continued_ || !beast.is_header_done() || beast.is_done()) return false;
+  const auto expects = beast.get()[http::field::expect];
+  return boost::beast::iequals(expects, "100-continue") && !std::exchange(continued_, true);
+}
+
+}  // namespace sonar

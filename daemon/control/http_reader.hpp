@@ -1,0 +1,46 @@
+// HTTP requests out of a stream of bytes, with limits on everything. Beast's parser without its I/O: any split of the stream
+// gives the same requests; the connection feeds it what it reads.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "core/base/result.hpp"
+
+namespace sonar {
+
+struct HttpRequest {
+  std::string method, target, host, origin, authorization, content_type, body;
+  bool http_1_0 = false, keep_alive = true;
+  bool has_host = false, has_origin = false;
+};
+struct HttpRefusal {
+  unsigned status = 400;
+  std::string why;
+};
+
+class HttpReader {
+ public:
+  static constexpr std::size_t longest_header = 8192, longest_body = std::size_t{1} << 20;
+
+  HttpReader();
+  ~HttpReader();
+  void feed(std::span<const std::byte> received);
+  /// The next whole request; nullopt = more bytes are needed; a refusal is final.
+  tl::expected<std::optional<HttpRequest>, HttpRefusal> next();
+  /// Once per request: its header is here, and it waits for "100 Continue" before it sends the body.
+  bool asks_to_continue();
+  /// Bytes of a request have come, but not all of it.
+  bool begun() const;
+
+ private:
+  struct Parser;
+  std::unique_ptr<Parser> parser_;
+  std::string buffer_;
+  bool continued_ = false;
+};
+
+}  // namespace sonar

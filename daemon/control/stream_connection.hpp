@@ -1,0 +1,59 @@
+// One client of the control stream: requests in, answers and events out. One coroutine reads, one writes; answers to what takes
+// time come when they come. Owned by the StreamServer's places and by its own coroutines.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <string>
+
+#include "daemon/control/control_context.hpp"
+#include "daemon/control/event_queue.hpp"
+#include "daemon/input_rate.hpp"
+#include "protocol/control/control.hpp"
+#include "protocol/control/delimited.hpp"
+
+namespace sonar {
+
+class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
+ public:
+  using Steady = std::chrono::steady_clock;
+  /// Requests that may be under way or answered but not yet read by the client; then it is read no further.
+  static constexpr std::size_t most_open_requests = 64;
+
+  StreamConnection(ControlContext& context, tcp::socket socket, Sender sender);
+
+  asio::awaitable<void> read();
+  asio::awaitable<void> write();
+  void close();
+  bool over() const { return !socket_.is_open(); }
+  /// There is no place for it.
+  static void turn_away(tcp::socket) {}
+  const Sender& sender() const { return sender_; }
+
+  Steady::time_point heard_at = Steady::now();  // or written to: a subscriber says nothing
+
+ private:
+  bool take(control::BytesView message);
+  bool greet(std::uint64_t id, const control::Hello& hello);
+  bool take_greeted(const control::Request& request);
+  void perform(std::uint64_t id, const control::Operation& operation);
+  void subscribe(const control::Subscribe& wanted);
+  void answer(const control::Response& response);
+  bool refuse_and_end(std::uint64_t id, const std::string& why);
+  asio::awaitable<bool> write_whole(control::Bytes bytes);
+
+  ControlContext& context_;
+  tcp::socket socket_;
+  Sender sender_;
+  std::shared_ptr<Deadline> greeting_, stall_;
+  asio::steady_timer wake_reader_, wake_writer_;
+  control::DelimitedParser parser_;
+  InputRate rate_;
+  std::deque<control::Bytes> answers_;  // framed
+  std::size_t under_way_ = 0;           // requests whose answer is not in answers_ yet
+  EventQueue events_;
+  Events::Token subscription_;
+  bool greeted_ = false, ending_ = false;  // ending: the last answer is being written
+};
+
+}  // namespace sonar

@@ -1,0 +1,45 @@
+// The connections of one listener, at most so many: when every place is taken, the connection that has been silent for longest
+// gives up its own to a newcomer, unless all are busy.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <list>
+#include <memory>
+
+namespace sonar {
+
+/// A Connection has a `heard_at` (steady clock) and a close(), after which its coroutines end by themselves.
+template <class Connection>
+class Places {
+ public:
+  using Pointer = std::shared_ptr<Connection>;
+  static constexpr auto silence_before_eviction = std::chrono::seconds(1);  // newcomers do not push out those who are busy
+
+  explicit Places(std::size_t most) : most_(most) {}
+  /// True when there is room for one more. `evicted` is told whom that costs its place.
+  template <class Evicted>
+  bool make_room(Evicted&& evicted) {
+    if (taken_.size() < most_) return true;
+    const auto longest = std::min_element(taken_.begin(), taken_.end(),
+                                          [](const Pointer& a, const Pointer& b) { return a->heard_at < b->heard_at; });
+    if (longest == taken_.end() || std::chrono::steady_clock::now() - (*longest)->heard_at < silence_before_eviction)
+      return false;
+    evicted(**longest);
+    (*longest)->close();
+    taken_.erase(longest);
+    return true;
+  }
+  void add(const Pointer& connection) { taken_.push_back(connection); }
+  void remove(const Pointer& connection) { taken_.remove(connection); }
+  void close_all() {
+    for (const Pointer& c : taken_) c->close();
+  }
+  std::size_t most() const { return most_; }
+
+ private:
+  std::size_t most_;
+  std::list<Pointer> taken_;
+};
+
+}  // namespace sonar
