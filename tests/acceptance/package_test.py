@@ -89,6 +89,7 @@ class Package(Installed, unittest.TestCase):
         cls.roots = {}
         for name, package in cls.packages.items():
             cls.roots[name] = pathlib.Path(cls.folder.name) / "root" / name
+            cls.roots[name].mkdir(parents=True)
             subprocess.run(["dpkg-deb", "-x", str(package), str(cls.roots[name])], check=True)
         cls.root = cls.roots["sonard"]
 

@@ -1,0 +1,86 @@
+"""Lints the container file by rules of our own, and with hadolint where it is found. The image itself is not built here."""
+import fnmatch
+import json
+import re
+import shutil
+import unittest
+
+from running_sonard import ROOT, run
+
+FILE = ROOT / "Containerfile"
+TEXT = FILE.read_text(encoding="utf-8")
+NOT_FOR_THE_BUILD = {"libgtest-dev", "libgmock-dev"}  # tests are left out
+
+
+def instructions():
+    """(word, rest) of each instruction, continued lines joined, comments left out."""
+    lines = [line for line in TEXT.splitlines() if not line.lstrip().startswith("#")]
+    joined = re.sub(r"\\\n\s*", " ", "\n".join(lines))
+    lines = [" ".join(line.split()) for line in joined.splitlines() if line.strip()]
+    return [(word, rest) for word, _, rest in (line.partition(" ") for line in lines)]
+
+
+def stages():
+    found = []
+    for word, rest in instructions():
+        if word == "FROM":
+            found.append([])
+        found[-1].append((word, rest))
+    return found
+
+
+def setup_packages():
+    text = (ROOT / "tests/tools/setup.sh").read_text(encoding="utf-8")
+    return set(re.search(r"^build_packages=\(\n(.*?)^\)", text, re.M | re.S).group(1).split())
+
+
+class Container(unittest.TestCase):
+    def test_only_known_instructions_and_no_shell_form_where_signals_must_arrive(self):
+        known = {"FROM", "RUN", "COPY", "USER", "WORKDIR", "STOPSIGNAL", "HEALTHCHECK", "ENTRYPOINT", "CMD"}
+        self.assertEqual([word for word, _ in instructions() if word not in known], [])
+        for word, rest in instructions():
+            if word in ("ENTRYPOINT", "CMD"):
+                self.assertIsInstance(json.loads(rest), list)
+            if word == "HEALTHCHECK":
+                self.assertIn("/healthz", "".join(json.loads(rest.partition(" CMD ")[2])))
+
+    def test_two_stages_on_the_release_we_build_on_and_the_last_does_not_run_as_root(self):
+        froms = [rest for word, rest in instructions() if word == "FROM"]
+        self.assertEqual(len(froms), 2)
+        for base in froms:
+            self.assertRegex(base, r"^docker\.io/library/debian:bookworm-slim\b")
+        last = stages()[-1]
+        words = [word for word, _ in last]
+        self.assertEqual([rest for word, rest in last if word == "USER"], ["sonard"])
+        self.assertNotIn("RUN", words[words.index("USER"):], "nothing is changed after root is left")
+        self.assertTrue(any(word == "COPY" and rest.startswith("--from=build ") for word, rest in last))
+        self.assertFalse(any(word == "COPY" and not rest.startswith("--from=build ") for word, rest in last))
+
+    def test_packages_are_installed_without_extras_and_their_lists_removed(self):
+        for word, rest in instructions():
+            if word == "RUN" and "apt-get install" in rest:
+                self.assertRegex(rest, r"apt-get update && apt-get install -y --no-install-recommends")
+                self.assertIn("/var/lib/apt/lists/*", rest)
+        self.assertNotRegex(TEXT, r"\bADD\b|\bsudo\b|curl|wget|:latest")
+
+    def test_the_build_stage_installs_what_setup_does(self):
+        first = next(rest for word, rest in stages()[0] if word == "RUN")
+        installed = set(re.search(r"--no-install-recommends (.*?) &&", first).group(1).split())
+        self.assertEqual(installed - {"dpkg-dev"}, setup_packages() - NOT_FOR_THE_BUILD)
+        self.assertIn("dpkg-dev", installed, "for the dependencies of the package")
+
+    def test_what_the_build_needs_is_not_ignored(self):
+        ignored = [line for line in (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines() if line and line[0] != "#"]
+        for needed in ("CMakeLists.txt", "core", "cuda", "protocol", "daemon", "clients", "scenes", "docs", "README.md", "CHANGELOG.md"):
+            self.assertTrue((ROOT / needed).exists())
+            self.assertFalse([pattern for pattern in ignored if fnmatch.fnmatch(needed, pattern)], needed)
+        self.assertIn("build", ignored)
+
+    @unittest.skipIf(shutil.which("hadolint") is None, "hadolint is not here")
+    def test_hadolint_finds_nothing(self):
+        result = run("hadolint", "--ignore", "DL3008", FILE)  # versions are the release's
+        self.assertEqual(result.returncode, 0, result.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

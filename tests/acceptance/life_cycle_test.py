@@ -1,0 +1,320 @@
+"""How sonard ends, comes back and bears what its surroundings do to it: signals, kill -9, full disks, closed outputs, being frozen.
+What is measured is kept for docs/reliability.md where SONARD_RELIABILITY names a folder. Times are asserted with room for a busy
+machine; the record says whether the promise itself was kept."""
+import fcntl
+import os
+import pathlib
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+from oculus_reader import Client, fire_message
+from running_sonard import ROOT, SONARCTL, SONARD, Sonard, free_address, run
+
+sys.path.insert(0, str(ROOT / "tests/reliability"))
+from record import record  # noqa: E402  the folder above
+
+COMMAND = "python3 tests/acceptance/life_cycle_test.py"
+ROOM = 5  # times a promised time, on a machine that does other things too
+FOUR_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 4}"  # keys of the sonar, by way of its mount
+F_SETPIPE_SZ = 1031
+
+
+class Reader(threading.Thread):
+    """A client that reads to the end; `ending` says how it came: FIN, reset, or stray bytes."""
+
+    def __init__(self, address, rate_hz=10):
+        super().__init__(daemon=True)
+        self.client, self.pings, self.arrived, self.ending = Client(address), [], [], None
+        self.client.send(fire_message(rate_hz=rate_hz))
+        self.start()
+
+    def run(self):
+        try:
+            while True:
+                self.client.socket.settimeout(60)
+                first = self.client.socket.recv(1, socket.MSG_PEEK)
+                if not first:
+                    self.ending = "FIN"
+                    break
+                kind, message = self.client.message()
+                if kind == 0x23:
+                    self.pings.append(int.from_bytes(message[53:57], "little"))
+                    self.arrived.append(time.monotonic())
+        except ConnectionError:
+            self.ending = "reset"
+        except (AssertionError, EOFError, OSError) as error:
+            self.ending = f"broken: {error!r}"
+        self.client.socket.close()
+
+    def wait_for(self, count, patience_s=60):
+        deadline = time.monotonic() + patience_s
+        while len(self.pings) < count and self.ending is None and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert len(self.pings) >= count, f"{len(self.pings)} of {count} pings; {self.ending}"
+
+    def lost(self):
+        """Numbers that are missing between the first ping and the last."""
+        return self.pings[-1] - self.pings[0] + 1 - len(self.pings)
+
+
+def deaf_client(address):
+    """Asks for pings and never reads; returned when the sonar can send it no more."""
+    deaf = socket.socket()
+    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    deaf.connect((address, 52100))
+    deaf.sendall(fire_message(rate_hz=40, flags=0x4B))
+    return deaf
+
+
+class Started:
+    """sonard with the standard streams of the test's choice."""
+
+    def __init__(self, case, wrap=None, **streams):
+        self.address = free_address()
+        folder = tempfile.TemporaryDirectory()
+        case.addCleanup(folder.cleanup)
+        self.config = pathlib.Path(folder.name) / "sonard.yaml"
+        self.config.write_text(
+            "world: {scene: demo.yaml}\nvehicles: [{name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}}]\n"
+            f"sonars: [{{name: front, profile: oculus-m1200d, bind_ip: {self.address}, status_to: [{self.address}]}}]\n"
+            f'poses: {{protobuf: "{self.address}:14770", json: "{self.address}:14771"}}\n',
+            encoding="utf-8")
+        self.command = [*(wrap or []), str(SONARD), "run", str(self.config)]
+        self.streams = streams
+        case.addCleanup(self.kill)
+        self.start()
+
+    def start(self):
+        self.process = subprocess.Popen(self.command, stdin=subprocess.DEVNULL, **self.streams)
+
+    def kill(self):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+
+    def stop(self):
+        self.process.terminate()
+        return self.process.wait(20)
+
+
+class Stop(unittest.TestCase):
+    def test_terminate_gives_readers_their_message_whole_and_resets_the_deaf(self):
+        with Sonard(mount=FOUR_CLIENTS) as daemon:
+            readers = [Reader(daemon.address, rate_hz=40) for _ in range(2)]
+            for reader in readers:
+                reader.wait_for(3)
+            deaf = deaf_client(daemon.address)
+            readers[0].wait_for(20)  # by now the deaf one's buffers are full
+            code, seconds = daemon.stop()
+            for reader in readers:
+                reader.join(20)
+            endings = [reader.ending for reader in readers]
+            record("stop-reading", ", ".join(endings), "FIN after a whole message", endings == ["FIN", "FIN"], COMMAND)
+            record("stop-time", f"{seconds:.2f} s", "within 2 s", code == 0 and seconds <= 2, COMMAND)
+            self.assertEqual(endings, ["FIN", "FIN"])
+            self.assertEqual(code, 0, daemon.log())
+            self.assertLess(seconds, 2 * ROOM)
+            deaf.settimeout(20)
+            with self.assertRaises(ConnectionResetError):
+                while deaf.recv(65536):
+                    pass
+            deaf.close()
+            self.assertIn("did not take its last message in time", daemon.log())
+
+    def test_a_second_terminate_ends_at_once(self):
+        with Sonard(mount=FOUR_CLIENTS) as daemon:
+            reader = Reader(daemon.address)
+            reader.wait_for(3)
+            deaf = deaf_client(daemon.address)
+            reader.wait_for(12)
+            daemon.process.terminate()
+            while "stopping" not in daemon.log():
+                time.sleep(0.01)
+            daemon.process.terminate()
+            self.assertEqual(daemon.process.wait(2 * ROOM), 128 + signal.SIGTERM)
+            deaf.close()
+
+    def test_killed_and_started_again_it_serves_on_the_same_address(self):
+        daemon = Started(self, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        reader = Reader(daemon.address)
+        reader.wait_for(2)
+        daemon.process.kill()
+        daemon.process.wait()
+        begin = time.monotonic()
+        daemon.start()
+        with Client(daemon.address, patience_s=60) as client:
+            client.send(fire_message())
+            client.ping()
+            seconds = time.monotonic() - begin
+        record("kill-restart", f"{seconds:.2f} s", "within 2.5 s", seconds <= 2.5, COMMAND)
+        self.assertLess(seconds, 2.5 * ROOM)
+        self.assertEqual(daemon.stop(), 0)
+
+
+class Undisturbed(unittest.TestCase):
+    """Whatever happens to its log, a client that reads loses no ping."""
+
+    def stream(self, daemon, pings=12):
+        reader = Reader(daemon.address)
+        reader.wait_for(pings)
+        self.provoke_log_lines(daemon.address)
+        reader.wait_for(2 * pings)
+        return reader
+
+    @staticmethod
+    def provoke_log_lines(address):
+        """A dozen clients too many are turned away, with a line of the log each until its limit."""
+        for _ in range(12):
+            try:
+                with socket.create_connection((address, 52100), timeout=20) as visitor:
+                    visitor.recv(1)
+            except ConnectionError:
+                pass
+
+    def judge(self, reader, item=None, code=0):
+        ending = reader.ending
+        good = reader.lost() == 0 and ending == "FIN" and code == 0
+        if item:
+            record(item, f"{reader.lost()} of {len(reader.pings)} pings lost", "no ping lost", good, COMMAND)
+        self.assertEqual((reader.lost(), ending, code), (0, "FIN", 0))
+
+    def test_a_full_disk_under_the_log(self):
+        with open("/dev/full", "wb") as full:
+            daemon = Started(self, stdout=full, stderr=full)
+        reader = self.stream(daemon)
+        code = daemon.stop()
+        reader.join(20)
+        self.judge(reader, "disk-full", code)
+
+    def test_closed_descriptors_are_not_given_to_sockets(self):
+        daemon = Started(self, wrap=["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh"])
+        reader = self.stream(daemon)
+        taken = [os.readlink(f"/proc/{daemon.process.pid}/fd/{fd}") for fd in range(3)]
+        self.assertEqual(taken, ["/dev/null"] * 3)
+        code = daemon.stop()
+        reader.join(20)
+        self.judge(reader, "closed-output", code)
+
+    def test_a_reader_of_the_log_that_goes_away(self):
+        daemon = Started(self, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        daemon.process.stderr.readline()  # as head -1
+        daemon.process.stderr.close()
+        reader = self.stream(daemon)
+        code = daemon.stop()
+        reader.join(20)
+        self.judge(reader, code=code)
+
+    def test_a_reader_of_the_log_that_stays_and_does_not_read(self):
+        ours, theirs = os.pipe()
+        fcntl.fcntl(theirs, F_SETPIPE_SZ, 4096)  # one page: full with the banner
+        daemon = Started(self, stdout=subprocess.DEVNULL, stderr=theirs)
+        os.close(theirs)
+        reader = self.stream(daemon)
+        drain = threading.Thread(target=lambda: [None for _ in iter(lambda: os.read(ours, 65536), b"")], daemon=True)
+        drain.start()
+        code = daemon.stop()
+        reader.join(20)
+        drain.join(20)
+        os.close(ours)
+        self.judge(reader, code=code)
+
+    def test_a_recording_on_a_full_disk_ends_with_a_sentence_and_the_sonar_goes_on(self):
+        with Sonard(mount=FOUR_CLIENTS) as daemon:
+            reader = Reader(daemon.address)
+            reader.wait_for(3)
+            result = daemon.ctl("listen", "--record", "/dev/full", "--pings", "3", "--seconds", "30", "--quiet")
+            self.assertEqual(result.returncode, 74, result.stdout + result.stderr)
+            self.assertRegex(result.stderr, "recording.*disk full")
+            reader.wait_for(len(reader.pings) + 3)
+            code, _ = daemon.stop()
+            reader.join(20)
+            self.judge(reader, code=code)
+
+    def test_a_render_on_a_full_disk_ends_with_a_sentence(self):
+        def small_disk():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+        with tempfile.TemporaryDirectory() as folder:
+            for kind in ("npy", "png", "raw"):
+                with self.subTest(format=kind):
+                    result = subprocess.run([str(SONARD), "render", str(ROOT / "scenes/sonard.yaml"), "--out", f"{folder}/{kind}",
+                                             "--format", kind, "--quiet"], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                            timeout=120, check=False, preexec_fn=small_disk, restore_signals=False)
+                    self.assertEqual(result.returncode, 74, result.stderr)
+                    self.assertRegex(result.stderr, rf"sonard: .*{kind}")
+
+
+class Frozen(unittest.TestCase):
+    def test_stop_and_continue_bring_no_burst_and_no_corruption(self):
+        rate_hz, frozen_s = 10, 3
+        with Sonard() as daemon:
+            reader = Reader(daemon.address, rate_hz=rate_hz)
+            reader.wait_for(10)
+            os.kill(daemon.process.pid, signal.SIGSTOP)
+            time.sleep(frozen_s)
+            before = len(reader.pings)
+            go_on = time.monotonic()
+            os.kill(daemon.process.pid, signal.SIGCONT)
+            reader.wait_for(before + 25)
+            daemon.stop()
+            reader.join(20)
+        burst = sum(1 for at in reader.arrived[before:] if at - go_on < 1)
+        # A second holds as many ticks as the rate says; one may have been under way, and one is due at once.
+        good = burst <= rate_hz + 2 and reader.ending == "FIN"
+        record("stop-continue", f"{burst} pings in the first second, ended by {reader.ending}", f"at most {rate_hz + 2}, whole", good, COMMAND)
+        self.assertEqual(reader.ending, "FIN")
+        self.assertEqual(reader.pings, sorted(set(reader.pings)), "numbers in order, none twice")
+        self.assertLessEqual(burst, rate_hz + 2)
+
+
+class ExitCodes(unittest.TestCase):
+    """Class of mistake, command, and what the one sentence must name."""
+
+    def test_every_class(self):
+        with tempfile.TemporaryDirectory() as folder:
+            here = pathlib.Path(folder)
+            (here / "bad.yaml").write_text("world: {scene: demo.yaml, seeed: 1}\nvehicles: [{name: rov}]\n"
+                                          "sonars: [{name: a, profile: oculus-m1200d, bind_ip: 127.0.0.2}]\n", encoding="utf-8")
+            (here / "scene.yaml").write_text("objects:\n  - {name: a, sphere: {radius_m: -1}}\n", encoding="utf-8")
+            (here / "on_scene.yaml").write_text(
+                f"world: {{scene: scene.yaml}}\nvehicles: [{{name: rov}}]\nsonars: [{{name: a, profile: oculus-m1200d, bind_ip: {free_address()}}}]\n",
+                encoding="utf-8")
+            (here / "file").write_text("", encoding="utf-8")
+            cases = [
+                (64, [SONARD, "--no-such-option"], ["--no-such-option"]),
+                (64, [SONARD, "chekc", "x.yaml"], ["chekc", 'did you mean "check"']),
+                (64, [SONARD, "run", "a.yaml", "b.yaml"], ["b.yaml"]),
+                (65, [SONARD, "check", here / "on_scene.yaml"], ["scene.yaml:2:"]),
+                (66, [SONARD, "run", here / "none.yaml"], ["none.yaml"]),
+                (69, [SONARD, "run", "--demo", "--bind", "192.0.2.7"], ["192.0.2.7", "ip addr add"]),
+                (74, [SONARD, "render", ROOT / "scenes/sonard.yaml", "--out", here / "file" / "x"], ["file"]),
+                (78, [SONARD, "check", here / "bad.yaml"], ["bad.yaml:1:", "seeed", 'did you mean "seed"']),
+                (0, [SONARD, "--version"], []),
+            ]
+            for code, command, words in cases:
+                with self.subTest(code=code, command=[str(c).replace(folder, ".") for c in command[1:]]):
+                    result = run(*command)
+                    self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+                    for word in words:
+                        self.assertIn(word, result.stderr)
+
+    def test_a_wrong_variable_is_named_as_the_user_set_it(self):
+        for variable, value in (("SONARD_THREADS", "abc"), ("SONARD_THREADS", "900"), ("SONARD_LOG_LEVEL", "loud"), ("SONARD_CLOCK", "x")):
+            for words in (["run", "--demo"], ["--demo"]):
+                with self.subTest(variable=variable, value=value, words=words):
+                    result = subprocess.run([str(SONARD), *words], env={**os.environ, variable: value}, stdin=subprocess.DEVNULL,
+                                            capture_output=True, text=True, timeout=60, check=False)
+                    self.assertEqual(result.returncode, 64, result.stderr)
+                    self.assertIn(variable, result.stderr)
+                    self.assertNotIn("--" + variable[7:].lower().replace("_", "-"), result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

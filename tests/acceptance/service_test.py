@@ -1,0 +1,135 @@
+"""The systemd unit: valid, at most 1.5 of exposure, and sonard needs none of what it forbids. No service manager is needed."""
+import ctypes
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from running_sonard import BUILD, ROOT, SONARCTL, SONARD, free_address, run
+
+sys.path.insert(0, str(ROOT / "tests/reliability"))
+from record import record  # noqa: E402  the folder above
+
+UNIT = ROOT / "daemon/systemd/sonard.service"
+MOST_EXPOSURE = 1.5
+PR_SET_MDWE, PR_MDWE_REFUSE_EXEC_GAIN = 65, 1
+NEEDS_SYSTEMD = unittest.skipIf(shutil.which("systemd-analyze") is None, "systemd-analyze is not here")
+
+
+def settings():
+    """Key -> values in their order; repeated keys add up."""
+    found = {}
+    for line in UNIT.read_text(encoding="utf-8").splitlines():
+        match = re.match(r"(\w+)=(.*)", line)
+        if match:
+            found.setdefault(match.group(1), []).append(match.group(2))
+    return found
+
+
+def calls_of(set_name, seen=()):
+    """The system calls of a set such as @system-service, sets within it followed."""
+    calls = set()
+    for line in run("systemd-analyze", "syscall-filter", set_name).stdout.splitlines():
+        name = line.strip()
+        if not name or name.startswith("#") or name == set_name:
+            continue
+        calls |= (calls_of(name, (*seen, set_name)) if name not in seen else set()) if name.startswith("@") else {name}
+    return calls
+
+
+class Unit(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.file = pathlib.Path(folder.name) / "sonard.service"
+        text = UNIT.read_text(encoding="utf-8")
+        self.assertIn("ExecStart=sonard run\n", text)
+        self.file.write_text(text.replace("ExecStart=sonard", f"ExecStart={SONARD.resolve()}"), encoding="utf-8")
+
+    @NEEDS_SYSTEMD
+    def test_it_is_valid(self):
+        result = run("systemd-analyze", "verify", "--man=no", self.file)
+        ours = [line for line in (result.stdout + result.stderr).splitlines() if "sonard" in line]
+        self.assertEqual((result.returncode, ours), (0, []))
+
+    @NEEDS_SYSTEMD
+    def test_its_exposure_is_at_most_one_and_a_half(self):
+        result = run("systemd-analyze", "security", "--offline=true", "--no-pager", self.file)
+        match = re.search(r"Overall exposure level for \S+: ([\d.]+)", result.stdout)
+        self.assertTrue(match, result.stdout + result.stderr)
+        exposure = float(match.group(1))
+        record("unit-exposure", f"{exposure:.1f}", f"at most {MOST_EXPOSURE}", exposure <= MOST_EXPOSURE,
+               "python3 tests/acceptance/service_test.py")
+        self.assertLessEqual(exposure, MOST_EXPOSURE, result.stdout)
+
+    def test_mistakes_are_not_tried_again_and_a_hangup_reloads(self):
+        there = settings()
+        self.assertEqual(there["RestartPreventExitStatus"], ["64 65 66 78"])
+        self.assertEqual((there["Type"], there["ExecReload"]), (["notify"], ["kill -HUP $MAINPID"]))
+        self.assertIn("WatchdogSec", there)
+
+    @NEEDS_SYSTEMD
+    @unittest.skipIf(shutil.which("strace") is None, "strace is not here")
+    def test_sonard_makes_no_system_call_that_the_unit_refuses(self):
+        """Twenty pings of the demo, a client included, counted by strace."""
+        if "SONAR_SANITIZE:STRING=\n" not in (BUILD / "CMakeCache.txt").read_text(encoding="utf-8"):
+            self.skipTest("sanitizers make calls of their own")
+        allowed = set()
+        for value in settings()["SystemCallFilter"]:
+            names = value.lstrip("~").split()
+            named = set().union(*(calls_of(n) if n.startswith("@") else {n} for n in names))
+            allowed = allowed - named if value.startswith("~") else allowed | named
+        self.assertIn("setpriority", allowed)
+        self.assertNotIn("chown", allowed)
+        with tempfile.TemporaryDirectory() as folder:
+            counts = pathlib.Path(folder) / "calls"
+            probe = run("strace", "-o", "/dev/null", "true")
+            if probe.returncode != 0:
+                self.skipTest(f"strace may not watch: {probe.stderr.strip()}")
+            picture = run("strace", "-f", "-qq", "-o", counts, SONARD, "render", ROOT / "scenes/sonard.yaml", "--out", folder, "--quiet")
+            self.assertEqual(picture.returncode, 0, picture.stderr)
+            served = self.serve_under_strace(pathlib.Path(folder))
+            text = counts.read_text(encoding="utf-8", errors="replace") + served
+        used = set(re.findall(r"^\d+ +(\w+)\(", text, re.M))
+        self.assertIn("accept4" if "accept4" in used else "accept", used, "the trace holds the serving")
+        self.assertEqual(sorted(used - allowed - {"execve"}), [])
+
+    def serve_under_strace(self, folder):
+        address, calls = free_address(), folder / "served"
+        config = folder / "sonard.yaml"
+        config.write_text("world: {scene: demo.yaml}\nvehicles: [{name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}}]\n"
+                          f"sonars: [{{name: a, profile: oculus-m1200d, bind_ip: {address}, status_to: [{address}]}}]\n"
+                          f'poses: {{protobuf: "{address}:14770", json: "{address}:14771"}}\n', encoding="utf-8")
+        with subprocess.Popen(["strace", "-f", "-qq", "-o", str(calls), str(SONARD), "run", str(config), "--exit-after-pings", "3"],
+                              stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+            listened = run(SONARCTL, "listen", address, "--pings", "3", "--wait", "60", "--seconds", "60", "--quiet")
+            process.stderr.read()
+        self.assertEqual((process.returncode, listened.returncode), (0, 0), listened.stderr)
+        return calls.read_text(encoding="utf-8", errors="replace")
+
+    def test_memory_that_is_written_is_never_executed(self):
+        """MemoryDenyWriteExecute= as the kernel's own switch has it: what Embree and the rest do must pass."""
+        libc = ctypes.CDLL(None, use_errno=True)
+        if not self.refuses_memory(libc):
+            self.skipTest("this kernel has no PR_SET_MDWE")
+        with tempfile.TemporaryDirectory() as folder:
+            result = subprocess.run([str(SONARD), "render", str(ROOT / "scenes/sonard.yaml"), "--out", folder, "--quiet"],
+                                    stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, check=False,
+                                    preexec_fn=lambda: libc.prctl(PR_SET_MDWE, PR_MDWE_REFUSE_EXEC_GAIN, 0, 0, 0))
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    @staticmethod
+    def refuses_memory(libc):
+        """Asked in a child: there is no way back."""
+        child = os.fork()
+        if child == 0:
+            os._exit(0 if libc.prctl(PR_SET_MDWE, PR_MDWE_REFUSE_EXEC_GAIN, 0, 0, 0) == 0 else 1)
+        return os.waitpid(child, 0)[1] == 0
+
+
+if __name__ == "__main__":
+    unittest.main()
