@@ -4,7 +4,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 
 #include "core/scene/files/load_mesh.hpp"
@@ -49,21 +48,6 @@ std::string stretched_obj(const CentredMesh& centred, Vec3d scale) {
 
 }  // namespace
 
-double collada_unit_m(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::string head(64 << 10, '\0');
-  in.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(in.gcount()));
-  const std::size_t tag = head.find("<unit");
-  if (tag == std::string::npos) return 1;
-  const std::string_view unit = std::string_view(head).substr(tag, std::min(head.find('>', tag), head.size()) - tag);
-  const std::size_t key = unit.find("meter");
-  const std::size_t begin = key == std::string_view::npos ? key : unit.find_first_of("\"'", key);
-  if (begin == std::string_view::npos) return 1;
-  const double meter = std::strtod(std::string(unit.substr(begin + 1, 32)).c_str(), nullptr);
-  return meter > 0 && meter <= 1e6 ? meter : 1;
-}
-
 FileResolver::FileResolver(const Library& library, fs::path scene, bool skip_missing, bool try_files, Findings& findings)
     : library_(library), scene_(std::move(scene)), skip_missing_(skip_missing), try_files_(try_files), findings_(findings) {}
 
@@ -87,7 +71,6 @@ bool FileResolver::resolve_mesh(PlacedShape& placed, const fs::path& file) {
   if (!why.empty()) return findings_.leave_out(placed.at, std::string("mesh ") + plain(why, 300)), false;
   Shape& shape = placed.shape;
   const Vec3d s = shape.scale;
-  if (extension_of(file) == ".dae") shape.unit_m = collada_unit_m(file);
   const bool even = s.x > 0 && std::abs(s.y - s.x) <= 1e-9 * s.x && std::abs(s.z - s.x) <= 1e-9 * s.x;
   if (!even) return convert(placed, file);
   shape.uri = path_to_write(file);
@@ -116,12 +99,11 @@ bool FileResolver::convert(PlacedShape& placed, const fs::path& file) {
     if (!loaded) return findings_.leave_out(placed.at, std::string("mesh ") + plain(loaded.error().text, 300)), false;
     const std::string folder = scene_.stem().string() + "-meshes";
     const std::string name = file.stem().string() + "-" + std::to_string(converted_.size() + 1) + ".obj";
-    converted_[scene_.parent_path() / folder / name] = stretched_obj(loaded->centred, shape.unit_m * shape.scale);
+    converted_[scene_.parent_path() / folder / name] = stretched_obj(loaded->centred, shape.scale);
     known->second = folder + "/" + name;
   }
   shape.uri = known->second;
   shape.scale = {1, 1, 1};
-  shape.unit_m = 1;
   return true;
 }
 

@@ -36,7 +36,4 @@ class FileResolver {
   std::map<std::filesystem::path, std::string> converted_;  // file to write, its text
 };
 
-/// How long one unit of a COLLADA file is, by its own <unit meter="..">; 1 when it does not say.
-double collada_unit_m(const std::filesystem::path& file);
-
 }  // namespace sonar::scene_tools

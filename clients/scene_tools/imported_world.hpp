@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,6 @@ struct Shape {
   double radius_m = 0, length_m = 0;
   std::string uri = {};     // mesh, heightmap: as the file has it; later the path to write
   Vec3d scale = {1, 1, 1};  // mesh
-  double unit_m = 1;        // mesh: what the mesh file calls one, from the file itself
 };
 
 struct PlacedShape {
@@ -43,6 +43,7 @@ struct ImportedWorld {
   std::string format;  // "Gazebo SDF 1.9", "URDF"
   std::vector<ImportedModel> models;
   std::vector<PlacedShape> shapes;
+  std::vector<std::shared_ptr<const XmlFile>> files;  // that the places above are in
 };
 
 /// Where a reader finds the files that its file names. `find` answers with an empty path when there is none.

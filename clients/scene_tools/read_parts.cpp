@@ -168,6 +168,7 @@ Result<ImportedWorld> read_world(std::string_view text, const std::filesystem::p
     findings.fail(root.place(), what);
   }
   if (findings.failed()) return tl::make_unexpected(*findings.error());
+  world->files.push_back(*file);
   return world;
 }
 

@@ -104,11 +104,13 @@ Result<ImportedWorld> read_sdf(std::shared_ptr<const XmlFile> file, const Librar
   for (std::size_t i = 1; i < worlds.size(); ++i)
     findings.leave_out(worlds[i].place(), called(worlds[i]) + ": only the first is read");
   const Element top = worlds.empty() ? root : worlds.front();
-  const auto tree = SdfTree(library, options, findings).build(top);
+  SdfTree tree(library, options, findings);
+  const auto root_model = tree.build(top);
   SdfReader reader(options, findings);
-  reader.read(*tree, {});
+  reader.read(*root_model, {});
   if (findings.failed()) return tl::make_unexpected(*findings.error());
   ImportedWorld world = reader.take();
+  world.files = tree.included_files();
   world.name = plain(top.attribute("name"));
   if (world.name.empty() && !world.models.empty()) world.name = plain(world.models.front().path);
   world.format = std::string("Gazebo SDF ") + plain(root.attribute("version"), 8);

@@ -45,6 +45,12 @@ std::unique_ptr<SdfModel> SdfTree::build(const Element& world) {
   return root;
 }
 
+std::vector<std::shared_ptr<const XmlFile>> SdfTree::included_files() const {
+  std::vector<std::shared_ptr<const XmlFile>> files;
+  for (const auto& [path, file] : files_) files.push_back(file);
+  return files;
+}
+
 void SdfTree::fill(SdfModel& model, int include_depth) {
   for (const Element& element : model.element.children()) {
     if (findings_.failed()) return;

@@ -40,12 +40,14 @@ struct SdfPose {
 };
 SdfPose read_sdf_pose(const Element& pose, Findings& findings);
 
-/// Builds the tree below <world> or, without one, below <sdf>. Bounded: 16 includes deep, 4096 models, 5 million elements.
+/// Builds the tree below <world> or, without one, below <sdf>. Bounded: 16 includes deep, 4096 models, 5 million elements. Keeps
+/// the files that the tree's elements are in.
 class SdfTree {
  public:
   SdfTree(const Library& library, const ReadOptions& options, Findings& findings)
       : library_(library), options_(options), findings_(findings) {}
   std::unique_ptr<SdfModel> build(const Element& world);
+  std::vector<std::shared_ptr<const XmlFile>> included_files() const;
 
  private:
   void fill(SdfModel& model, int include_depth);

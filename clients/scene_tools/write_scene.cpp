@@ -208,7 +208,7 @@ class SceneWriter {
         return ", type: plane" + material + ", size_m: [" + number(s.size_m.x) + ", " + number(s.size_m.y) + "]" +
                patch(std::max(s.size_m.x, s.size_m.y));
       case Shape::Kind::mesh: {
-        const double scale = s.scale.x * s.unit_m;
+        const double scale = s.scale.x;
         return ", type: mesh, file: " + yaml_text(s.uri) + material +
                (scale == 1 ? "" : std::string(", scale: ") + precise(scale));
       }

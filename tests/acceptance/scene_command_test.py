@@ -1,0 +1,100 @@
+"""sonarctl scene as a user runs it: a Gazebo world becomes a scene, and its box is heard where its poses put it."""
+import json
+import math
+import pathlib
+import tempfile
+import unittest
+
+from render_test import read_npy
+from running_sonard import ROOT, SONARCTL, SONARD, run
+
+WORLDS = ROOT / "tests/clients/scene_tools/worlds"
+
+CONFIG = """\
+world: {scene: quay.yaml}
+vehicles: [{name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -2]}}]
+sonars: [{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}]
+"""
+
+
+class SceneCommand(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.path = pathlib.Path(self.folder.name)
+        self.scene = self.path / "quay.yaml"
+
+    def ctl(self, *arguments, code=0):
+        result = run(SONARCTL, "scene", *arguments)
+        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+        if code:
+            self.assertEqual(len(result.stderr.strip().splitlines()), 1, result.stderr)
+        return result.stdout if code == 0 else result.stderr
+
+    def import_quay(self, *more):
+        return self.ctl("import", WORLDS / "quay.world", "--out", self.scene, *more)
+
+    def test_an_imported_box_is_heard_where_its_poses_put_it(self):
+        said = self.import_quay("--material", "left_rig=concrete")
+        for words in ["2 shapes of 3 models", 'light "sun"', 'sensor "eye"', 'plugin "winch"', "rig/rig.sdf:18", ": ok: 2 objects"]:
+            self.assertIn(words, said)
+        written = self.scene.read_text(encoding="utf-8")
+        self.assertIn('#   rig/rig.sdf:18: sensor "eye"', written)
+        self.assertIn("material: mud", written)
+        self.assertIn(": ok: 2 objects, 2 materials", self.ctl("check", self.scene, "--strict"))
+
+        (self.path / "sonard.yaml").write_text(CONFIG, encoding="utf-8")
+        rendered = run(SONARD, "render", self.path / "sonard.yaml", "--out", self.path / "out", "--format", "npy", "--noise", "off")
+        self.assertEqual(rendered.returncode, 0, rendered.stderr)
+        side = json.loads((self.path / "out/000001.json").read_text(encoding="utf-8"))
+        (rows, beams), _, pressure = read_npy(self.path / "out/000001_pressure.npy")
+        loudest = max(range(rows * beams), key=pressure.__getitem__)
+        true_over_believed = side["water"]["true_sound_speed_mps"] / side["settings"]["device_sound_speed_mps"]
+        distance = (side["row_0_m"] + loudest // beams * side["row_spacing_m"]) * true_over_believed
+        azimuth = math.degrees(side["beam_azimuth_rad"][loudest % beams])
+        self.assertAlmostEqual(distance, 4 - 0.25, delta=0.05)
+        self.assertAlmostEqual(azimuth, 15, delta=5)  # half of the plate is 4.6 degrees wide
+        middle = min(range(beams), key=lambda b: abs(math.degrees(side["beam_azimuth_rad"][b]) - 15))
+        self.assertAlmostEqual(side["truth"]["first_hit_m"][middle], 3.75, delta=0.01)
+        self.assertEqual(side["truth"]["object_name"][middle], "left_rig/arm")
+
+    def test_info_tells_the_same_to_people_and_programs(self):
+        self.import_quay()
+        table = self.ctl("info", self.scene)
+        self.assertIn("left_rig/arm", table)
+        self.assertIn("0.5 x 0.6 x 0.6", table)
+        told = json.loads(self.ctl("info", self.scene, "--json"))
+        box = next(o for o in told["objects"] if o["name"] == "left_rig/arm")
+        for found, wanted in zip(box["centre_m"], (3.863703, 1.035276, -2)):
+            self.assertAlmostEqual(found, wanted, places=5)
+        self.assertEqual(told["triangles"], sum(o["triangles"] for o in told["objects"]))
+        self.assertIn("demo", self.ctl("info", "demo.yaml"))
+
+    def test_a_urdf_moves_as_one(self):
+        self.ctl("import", WORLDS / "arm.urdf", "--out", self.scene, "--moving", "arm", "--material", "steel", "--offset", "0,0,-5")
+        told = json.loads(self.ctl("info", self.scene, "--json"))
+        self.assertEqual(told["moving"], ["arm"])
+        fore = next(o for o in told["objects"] if o["name"] == "arm/fore")
+        for found, wanted in zip(fore["centre_m"], (0.4, 0, -4.5)):
+            self.assertAlmostEqual(found, wanted, places=5)
+        self.assertEqual(fore["moves_with"], "arm")
+
+    def test_mistakes_are_one_sentence(self):
+        self.assertIn("none.yaml", self.ctl("check", self.path / "none.yaml", code=66))
+        self.scene.write_text("objects: [{type: bix}]\n", encoding="utf-8")
+        error = self.ctl("check", self.scene, code=65)
+        self.assertIn("quay.yaml:1:", error)
+        config = self.path / "sonard.yaml"
+        config.write_text(CONFIG, encoding="utf-8")
+        self.assertIn(error.split("quay.yaml:1:")[1].strip(), run(SONARD, "check", config).stderr)  # the daemon's own words
+        self.assertIn("--overwrite", self.ctl("import", WORLDS / "quay.world", "--out", self.scene, code=64))
+        world = self.path / "w.sdf"
+        world.write_text('<sdf version="1.9"><world name="w">\n<include><uri>model://gone</uri></include></world></sdf>', encoding="utf-8")
+        self.assertIn("w.sdf:2: include: no model model://gone", self.ctl("import", world, "--out", self.path / "o.yaml", code=65))
+        self.assertFalse((self.path / "o.yaml").exists())
+        self.ctl("import", world, "--out", self.path / "o.yaml", "--skip-missing")
+        self.assertIn("and --strict", self.ctl("check", self.path / "o.yaml", "--strict", code=65))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,122 @@
+#include "clients/scene_tools/describe_scene.hpp"
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/scene/files/load_scene.hpp"
+#include "tests/core/scene/temporary_files.hpp"
+
+namespace sonar::scene_tools {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
+
+constexpr const char* harbour = R"(
+materials:
+  silt: {like: mud, lambert_db: -30}
+  base: {lambert_db: -20}
+  made: {like: base, law: gsab}
+  spare: {lambert_db: -20}
+objects:
+  - {name: bed, type: plane, material: silt, size_m: [20, 20], pose: {xyz_m: [0, 0, -6]}}
+  - {name: pile, type: box, material: made, size_m: [1, 2, 4], instances: [{xyz_m: [5, 0, -3]}, {xyz_m: [6, 0, -3], rpy_deg: [0, 0, 90]}]}
+  - {name: diver, type: sphere, material: rubber, radius_m: 0.5, moving: true, pose: {xyz_m: [1, 2, -3]}}
+  - {name: lamp, type: point, target_strength_db: -30, attached_to: diver, pose: {xyz_m: [0, 0, -1]}}
+  - {name: ghost, type: sphere, material: rubber, radius_m: 0.5, visible: false, pose: {xyz_m: [1, 2, -3]}}
+sea_surface: {size_m: [20, 20]}
+)";
+
+struct Files : ::testing::Test {
+  sonar::testing::TemporaryFiles files;
+  Result<SceneDescription> describe(std::string_view text) { return describe_scene(files.write("s.yaml", text)); }
+  Remarks remarks(std::string_view text) {
+    const auto scene = describe(text);
+    if (!scene) ADD_FAILURE() << scene.error().text;
+    return scene ? remarks_on(*scene) : Remarks{};
+  }
+};
+
+using DescribeScene = Files;
+
+TEST_F(DescribeScene, ObjectsAndMaterials) {
+  const auto scene = describe(harbour);
+  ASSERT_TRUE(scene) << scene.error().text;
+  ASSERT_EQ(scene->objects.size(), 7u);
+  const DescribedObject& turned = scene->objects[2];
+  EXPECT_EQ(turned.name, "pile[1]");
+  EXPECT_EQ(turned.kind, "box");
+  EXPECT_THAT(turned.materials, ElementsAre("made"));
+  EXPECT_NEAR(turned.own.size_m().y, 2, 1e-6);
+  EXPECT_NEAR(turned.in_world.size_m().x, 2, 1e-6);
+  EXPECT_NEAR(turned.in_world.centre_m().x, 6, 1e-6);
+  EXPECT_EQ(scene->objects[3].moves_with, "diver");
+  EXPECT_EQ(scene->objects[5].kind, "sea surface");
+  const DescribedObject& lamp = scene->objects[6];
+  EXPECT_EQ(lamp.kind, "point");
+  EXPECT_EQ(lamp.in_world.centre_m().z, -4);
+  EXPECT_EQ(lamp.moves_with, "diver");
+  EXPECT_EQ(scene->materials.at(1).name, "made");
+  EXPECT_EQ(scene->materials[1].objects, 2u);
+  EXPECT_NEAR(scene->materials[1].strength_db, -7.89, 0.01);  // -8 and -24 dB together
+  EXPECT_THAT(scene->unused_materials, ElementsAre("spare"));
+  const std::string table = table_of(*scene);
+  EXPECT_THAT(table, HasSubstr("pile[0]"));
+  EXPECT_THAT(table, HasSubstr("20 x 20 x 0"));
+  EXPECT_THAT(table, HasSubstr("with diver"));
+  const auto json = nlohmann::json::parse(json_of(*scene));
+  EXPECT_EQ(json["objects"].size(), 7u);
+  EXPECT_EQ(json["objects"][3]["moves_with"], "diver");
+  EXPECT_EQ(json["triangles"], scene->triangles);
+  EXPECT_TRUE(json["volume_db"].is_null());
+}
+
+TEST_F(DescribeScene, RemarksOnASoundScene) {
+  const Remarks r = remarks(harbour);
+  EXPECT_THAT(r.warnings, ElementsAre("materials that nothing uses: spare"));
+  EXPECT_THAT(r.notes, ElementsAre("not visible: ghost", "moved by poses that name them: diver"));
+}
+
+TEST_F(DescribeScene, WarnsOfWhatLooksWrong) {
+  files.write(
+      "big.stl",
+      "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 300 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n");
+  const Remarks r = remarks(
+      "objects:\n  - {name: cm, type: mesh, file: big.stl, material: steel}\n"
+      "  - {name: mm, type: mesh, file: big.stl, material: steel, scale: 1e-05}\n"
+      "  - {name: gull, type: sphere, material: air, radius_m: 1, pose: {xyz_m: [0, 0, 3]}}\n"
+      "  - {name: far, type: sphere, material: air, radius_m: 1, pose: {xyz_m: [3000, 0, -3]}}\n");
+  EXPECT_THAT(r.warnings,
+              UnorderedElementsAre(HasSubstr("cm: big.stl is 300 m long; if the file is in centimetres"),
+                                   HasSubstr("mm: big.stl is 3 mm long"), HasSubstr("more than 1 km from the origin"),
+                                   HasSubstr("wholly above z = 0, the water's surface: gull"), HasSubstr("no seabed")));
+  EXPECT_THAT(remarks("objects: []").warnings, ElementsAre(HasSubstr("nothing is in it")));
+}
+
+TEST_F(DescribeScene, ErrorsAreTheLoadersOwn) {
+  const auto wrong = files.write("s.yaml", "objects: [{type: bix}]");
+  EXPECT_EQ(describe_scene(wrong).error().text, load_scene(wrong).error().text);
+  EXPECT_EQ(describe_scene(wrong).error().kind, ErrorKind::bad_data);
+  EXPECT_EQ(describe_scene(files.path("none.yaml")).error().kind, ErrorKind::missing_file);
+}
+
+TEST(DescribeShippedScenes, NothingIsWrongWithThem) {
+  for (const char* name : {"demo", "local-search", "tank-rod", "tank-two-cylinders"}) {
+    const auto scene = describe_scene(std::filesystem::path(SONARD_SOURCE_DIR "/scenes") / (std::string(name) + ".yaml"));
+    ASSERT_TRUE(scene) << scene.error().text;
+    const Remarks r = remarks_on(*scene);
+    if (std::string_view(name).starts_with("tank"))
+      EXPECT_THAT(r.warnings, ::testing::SizeIs(::testing::Le(1u))) << name;  // a tank's floor is narrower than a seabed
+    else
+      EXPECT_THAT(r.warnings, IsEmpty()) << name;
+  }
+  const auto built_in = describe_scene("demo.yaml");
+  ASSERT_TRUE(built_in) << built_in.error().text;
+  EXPECT_GT(built_in->triangles, 100000u);
+}
+
+}  // namespace
+}  // namespace sonar::scene_tools

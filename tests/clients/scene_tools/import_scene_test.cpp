@@ -1,0 +1,209 @@
+#include "clients/scene_tools/import_scene.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+
+#include "clients/scene_tools/describe_scene.hpp"
+#include "clients/scene_tools/resource_paths.hpp"
+#include "core/scene/files/load_scene.hpp"
+#include "tests/clients/scene_tools/reading.hpp"
+#include "tests/core/scene/temporary_files.hpp"
+
+namespace sonar::scene_tools {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr const char* triangle =
+    "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 2 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+
+struct ImportScene : ::testing::Test {
+  sonar::testing::TemporaryFiles files;
+  ImportOptions options;
+
+  ImportScene() {
+    options.out = files.path("out.yaml");
+    options.overwrite = true;
+  }
+  void write(const std::string& name, const std::string& text) {
+    std::filesystem::create_directories(files.path(name).parent_path());
+    files.write(name, text);
+  }
+  Result<Imported> run(const std::string& world, const char* name = "w.sdf") {
+    write(name, world);
+    options.file = files.path(name);
+    return import_scene(options);
+  }
+  std::string error(const std::string& world) {
+    const auto done = run(world);
+    return done ? "no error" : done.error().text;
+  }
+  std::string text() { return sonar::testing::TemporaryFiles::read(options.out); }
+  std::shared_ptr<const Scene> scene() {
+    auto loaded = load_scene(options.out);
+    EXPECT_TRUE(loaded) << loaded.error().text << "\n" << text();
+    return loaded ? *loaded : std::make_shared<Scene>();
+  }
+  /// A link with a mesh in it.
+  static std::string mesh(const std::string& uri, const std::string& scale = "1 1 1") {
+    return std::string("<link name='l'><visual name='v'><geometry><mesh><uri>") + uri + "</uri><scale>" + scale +
+           "</scale></mesh></geometry></visual></link>";
+  }
+};
+
+TEST_F(ImportScene, ModelsAreFoundBesideTheFileInGivenFoldersAndInTheEnvironment) {
+  const auto folder_of = [&](const std::string& name) {
+    write(name + "/model.sdf",
+          std::string("<sdf><model name='") + name.substr(name.rfind('/') + 1) + "'>" + link("l") + "</model></sdf>");
+  };
+  folder_of("models/near");
+  folder_of("elsewhere/given");
+  folder_of("third/gz");
+  write("elsewhere/versions/model.config",
+        "<model><sdf version='1.5'>old.sdf</sdf><sdf version='1.9'>new.sdf</sdf><sdf version='2.0'>gone.sdf</sdf></model>");
+  write("elsewhere/versions/old.sdf", "<sdf><model name='old'/></sdf>");
+  write("elsewhere/versions/new.sdf", std::string("<sdf><model name='new'>") + link("l") + "</model></sdf>");
+  options.model_folders = {files.path("elsewhere")};
+  setenv("GZ_SIM_RESOURCE_PATH", (std::string(":/no/such/folder:") + files.path("third").string()).c_str(), 1);
+  const auto done =
+      run(sdf("<include><uri>model://near</uri></include><include><uri>model://given</uri></include>"
+              "<include><uri>model://gz</uri></include><include><uri>model://versions</uri></include>"
+              "<include><uri>https://fuel.example/models/near</uri><name>copy</name></include>"));
+  unsetenv("GZ_SIM_RESOURCE_PATH");
+  ASSERT_TRUE(done) << done.error().text;
+  EXPECT_EQ(done->shapes, 5u);
+  const auto made = scene();
+  ASSERT_EQ(made->objects.size(), 5u);
+  EXPECT_EQ(made->objects[3].name, "new");
+  EXPECT_THAT(text(), HasSubstr("# near (near/model.sdf:1)"));
+}
+
+TEST_F(ImportScene, MeshesAreNamedByRelativePathsAndUnevenOnesConverted) {
+  write("pkg/meshes/a.stl", triangle);
+  write("pkg/urdf/r.urdf", "");
+  options.out = files.path("pkg/scenes/out.yaml");
+  std::filesystem::create_directories(files.path("pkg/scenes"));
+  const auto done =
+      run("<robot name='r'><link name='a'><visual><geometry><mesh filename='package://pkg/meshes/a.stl' scale='2 2 2'/>"
+          "</geometry></visual><visual><geometry><mesh filename='../meshes/a.stl' scale='1 -3 1'/></geometry></visual>"
+          "</link></robot>",
+          "pkg/urdf/r.urdf");
+  ASSERT_TRUE(done) << done.error().text;
+  EXPECT_EQ(done->converted_meshes, 1u);
+  EXPECT_THAT(text(), HasSubstr("file: \"../meshes/a.stl\", material: concrete, scale: 2,"));
+  EXPECT_THAT(text(), HasSubstr("file: out-meshes/a-1.obj"));
+  const auto described = describe_scene(options.out);
+  ASSERT_TRUE(described) << described.error().text;
+  EXPECT_NEAR(described->objects[0].in_world.size_m().x, 4, 1e-5);
+  EXPECT_NEAR(described->objects[1].in_world.low_m.y, -3, 1e-5);
+  EXPECT_NEAR(described->objects[1].in_world.size_m().x, 2, 1e-5);
+}
+
+TEST_F(ImportScene, FilesThatASceneCannotReadAreLeftOut) {
+  write("a.fbx", "?");
+  write("bad.stl", "solid nothing\nendsolid nothing\n");
+  write("h.tif", "?");
+  write("no.png", "not a picture");
+  const auto heightmap = [](const std::string& file) {
+    return std::string("<visual name='h'><geometry><heightmap><uri>") + file +
+           "</uri><size>10 10 2</size></heightmap></geometry></visual>";
+  };
+  const auto done = run(sdf(model("a", mesh("a.fbx")) + model("b", mesh("bad.stl")) +
+                            model("c", std::string("<link name='l'>") + heightmap("h.tif") + heightmap("no.png") + "</link>") +
+                            model("d", link("l"))));
+  ASSERT_TRUE(done) << done.error().text;
+  EXPECT_EQ(done->shapes, 1u);
+  EXPECT_THAT(done->left_out, ElementsAre(HasSubstr("a.fbx: a scene reads OBJ"), HasSubstr("bad.stl"), HasSubstr("h.tif"),
+                                          HasSubstr("no.png: ")));
+  EXPECT_THAT(text(), HasSubstr("#   w.sdf:3: mesh a.fbx: a scene reads OBJ, STL, PLY, glTF, GLB and DAE\n"));
+  EXPECT_THAT(error(sdf(model("a", mesh("gone.stl")))), HasSubstr("w.sdf:3: mesh gone.stl: no such file here"));
+  options.read.skip_missing = true;
+  EXPECT_EQ(error(sdf(model("a", mesh("gone.stl")))), "no error");
+}
+
+TEST_F(ImportScene, ColladaFilesBringTheirUnit) {
+  write("cm.dae", R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="9">0 0 0 200 0 0 0 100 0</float_array>
+<technique_common><accessor source="#a" count="3" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>)");
+  const auto done = run(sdf(model("m", mesh("cm.dae"))));
+  ASSERT_TRUE(done) << done.error().text;
+  const auto described = describe_scene(options.out);
+  ASSERT_TRUE(described) << described.error().text;
+  ASSERT_EQ(described->objects.size(), 1u) << text();
+  EXPECT_NEAR(described->objects[0].in_world.size_m().x, 2, 1e-5) << text();
+}
+
+TEST_F(ImportScene, MaterialsByArgumentByNameAndByGuess) {
+  const std::string world = sdf(model("sand_bed", link("l")) + model("m", link("l")) + model("ship", model("hull", link("l"))) +
+                                model("p",
+                                      "<link name='l'><visual name='v'><geometry><plane><size>5 5</size></plane></geometry>"
+                                      "<material><script><name>Gazebo/WoodFloor</name></script></material></visual></link>"));
+  const auto materials = [&] {
+    const auto done = run(world);
+    EXPECT_TRUE(done) << done.error().text;
+    std::vector<std::string> names;
+    const auto made = scene();
+    for (const Object& o : made->objects) names.push_back(made->materials.at(o.mesh->material.at(0)).name);
+    return names;
+  };
+  EXPECT_THAT(materials(), ElementsAre("sand", "concrete", "concrete", "wood"));
+  options.materials = {"ship=steel"};
+  EXPECT_THAT(materials(), ElementsAre("sand", "concrete", "steel", "wood"));
+  options.materials = {"ice", "ship=steel"};
+  EXPECT_THAT(materials(), ElementsAre("ice", "ice", "steel", "ice"));
+  options.materials = {"stel"};
+  EXPECT_THAT(error(world), HasSubstr("did you mean \"steel\"?"));
+  options.materials = {"shop=steel"};
+  EXPECT_THAT(error(world), HasSubstr("--material shop=steel: no model of that name"));
+}
+
+TEST_F(ImportScene, MovingModelsAreBodiesWhereTheModelStands) {
+  options.moving = {"rov"};
+  options.offset_m = {0, 0, -5};
+  const auto done =
+      run(sdf(model("rov", std::string("<pose>1 2 0 0 0 1.5707963267948966</pose>") + link("a", "<pose>1 0 0 0 0 0</pose>"))));
+  ASSERT_TRUE(done) << done.error().text;
+  const auto made = scene();
+  ASSERT_THAT(made->body_names, ElementsAre("rov"));
+  expect_near(made->bodies_in_world[0].position_m, {1, 2, -5});
+  ASSERT_EQ(made->objects.size(), 2u);
+  EXPECT_FALSE(made->objects[0].visible);
+  expect_near(made->objects[1].in_world.position_m, {1, 3, -5}, 1e-6);
+  options.moving = {"rof"};
+  EXPECT_THAT(error(sdf(model("rov", link("l")))), HasSubstr("--moving rof: no model of that name; did you mean \"rov\"?"));
+}
+
+TEST_F(ImportScene, AFileThatIsThereIsNotReplacedUnasked) {
+  options.overwrite = false;
+  EXPECT_EQ(error(sdf(model("m", link("l")))), "no error");
+  EXPECT_THAT(error(sdf(model("m", link("l")))), HasSubstr("--overwrite"));
+  options.out = files.path("no/such/folder.yaml");
+  EXPECT_THAT(error(sdf(model("m", link("l")))), HasSubstr("cannot be written"));
+  options.file = files.path("none.sdf");
+  EXPECT_EQ(import_scene(options).error().kind, ErrorKind::missing_file);
+}
+
+TEST_F(ImportScene, OddNamesAndSizesStillLoad) {
+  const auto done =
+      run(sdf(model("true", link("a: b # &quot;c&quot; \\")) + model("- 漁船 {x}", link("l")) +
+              model("flat",
+                    "<link name='l'><visual name='v'><geometry><box><size>1 1e-7 1</size></box></geometry></visual>"
+                    "<visual name='v'><geometry><box><size>1 0 1</size></box></geometry></visual>"
+                    "<visual name='v'><geometry><sphere><radius>90000</radius></sphere></geometry></visual></link>")));
+  ASSERT_TRUE(done) << done.error().text;
+  const auto made = scene();
+  ASSERT_EQ(made->objects.size(), 4u);
+  EXPECT_EQ(made->objects[0].name, "true");
+  EXPECT_EQ(made->objects[1].name, "- 漁船 {x}");
+  EXPECT_THAT(done->left_out, ElementsAre(HasSubstr("box: size is not above 0")));
+}
+
+}  // namespace
+}  // namespace sonar::scene_tools
