@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs the tests. usage: ./test.sh [--long] [ctest arguments...]
-#   --long   also a minute of each fuzz target and the thread sanitizer on the daemon
+#   --long   afterwards full fuzzing and all sanitizers (tests/tools/long_checks.sh), hours: before a release
 # Tests that read recordings of real devices take their folder from SONARD_CAPTURES and are skipped without it.
 set -u -o pipefail
 cd "$(dirname "$0")" || exit 70
@@ -15,8 +15,8 @@ esac
 
 setup_and_build || exit
 need_packages "${test_packages[@]}" || echo "going on without: the tests that need them are skipped"
-if [ -n "$long" ]; then
-  tests/tools/long_checks.sh || exit
+if [ -n "$long" ]; then  # tests that have figures for docs/reliability.md leave them there
+  export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
 fi
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"
 ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-2}" --output-on-failure --no-tests=error "$@" </dev/null
@@ -26,4 +26,9 @@ partial=()
 [ $# -eq 0 ] || partial=(--partial)
 say "the oracles of the acoustic model"
 python3 tests/oracles/oracle_table.py build/release/oracles "${partial[@]}" || [ $status -ne 0 ] || status=1
+if [ -n "$long" ]; then
+  before_long=$status
+  tests/tools/long_checks.sh || status=1
+  echo "tests: $([ "$before_long" -eq 0 ] && echo passed || echo "FAILED, see above")"
+fi
 exit $status

@@ -1,35 +1,33 @@
 #!/usr/bin/env bash
-# What takes too long for every run: each fuzz target for a while, and the daemon's tests under the thread sanitizer.
-# Run by ./test.sh --long, or alone. SONARD_FUZZ_SECONDS (60): time for each fuzz target.
+# What takes too long for every run, and is run before a release: full fuzzing, the whole functional suite under the address and
+# undefined-behaviour sanitizers, and what has threads under the thread sanitizer. Run by ./test.sh --long, or alone; two to four
+# hours on two cores. Every step is run, also after one that failed; a table ends it. usage: tests/tools/long_checks.sh [STEP...]
+#   SONARD_FUZZ_RUNS, SONARD_FUZZ_SECONDS   see tests/tools/fuzz.sh
+#   SONARD_RELIABILITY                      where figures are kept for docs/reliability.md (build/reliability)
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
 . tests/tools/setup.sh
+export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
 
-need_packages "${build_packages[@]}" clang-14 libclang-rt-14-dev || exit
+wished=("$@")
+rows=()
+failures=0
+step() {  # step NAME COMMAND...: runs it, when wished, and remembers how it ended
+  local name=$1 before=$SECONDS told=passed
+  shift
+  [ ${#wished[@]} -eq 0 ] || [[ " ${wished[*]} " == *" $name "* ]] || return 0
+  say "$name: $*"
+  "$@" || { told=FAILED failures=$((failures + 1)); }
+  rows+=("$(printf '%-10s %-7s %6d s   %s' "$name" "$told" $((SECONDS - before)) "$*")")
+}
 
-# What runs in more than one thread: the daemon over loopback, and the pool.
-threaded_tests=(daemon_loopback_test base_test)
+step tsan tests/tools/sanitized_tests.sh tsan
+step asan tests/tools/sanitized_tests.sh asan-all
+step fuzz tests/tools/fuzz.sh
 
-say "thread sanitizer: ${threaded_tests[*]}"
-configure tsan || exit
-build tsan "${threaded_tests[@]}" || exit
-for test in "${threaded_tests[@]}"; do
-  program=$(find build/tsan/tests -name "$test" -type f)
-  echo "-- $program"
-  TSAN_OPTIONS="halt_on_error=1 suppressions=$PWD/tests/tools/tsan.supp" "$program" --gtest_brief=1 || exit 1
-done
-
-say "fuzz targets, ${SONARD_FUZZ_SECONDS:-60} s each"
-configure fuzz || exit
-build fuzz fuzz_targets || exit
-for program in build/fuzz/tests/fuzz/*_fuzz; do
-  name=$(basename "$program")
-  echo "-- $name"
-  found=$(mktemp -d)
-  seeds=tests/fuzz/corpus/${name%_fuzz}
-  [ -d "$seeds" ] || seeds=
-  # shellcheck disable=SC2086 # no seeds, no argument
-  "$program" -max_total_time="${SONARD_FUZZ_SECONDS:-60}" -rss_limit_mb=2048 -verbosity=0 -print_final_stats=1 "$found" $seeds || exit 1
-  rm -rf "$found"
-done
+[ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are tsan, asan, fuzz" >&2; exit 64; }
+say "long checks"
+printf '%s\n' "${rows[@]}"
+echo "figures: $SONARD_RELIABILITY"
+[ $failures -eq 0 ]

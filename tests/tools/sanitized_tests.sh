@@ -1,27 +1,80 @@
 #!/usr/bin/env bash
-# Builds the tests of everything that reads foreign bytes or files, and of the daemon, with the address and undefined-behaviour
-# sanitizers, and runs them. usage: tests/tools/sanitized_tests.sh [targets...]; the default is the list below.
+# Builds tests with sanitizers and runs them. usage: tests/tools/sanitized_tests.sh [asan|asan-all|tsan] [targets...]
+#   asan      address and undefined behaviour: everything that reads foreign bytes or files, the daemon, the fuzz targets over their
+#             seeds and made-up inputs; the default, and what .ci/run does
+#   asan-all  the same over the whole functional suite, the shipped programs and the BlueView call sequences among it
+#   tsan      threads: protocol, control, daemon, clients, the BlueView call sequences, the pool, and the CPU pipeline over analytic
+#             rays in place of Embree
+# With targets only those test programs. Reports are in the output; the exit status is 1 when there was any.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
 . tests/tools/setup.sh
 
-# Paths under tests/ that run here; what only computes is left to the release build.
-wanted='^tests/(protocol|daemon|clients)/|^tests/core/text/|/core_load_scene_test|/core_shapes_test'
+kind=asan
+case "${1:-}" in
+  asan | asan-all | tsan) kind=$1; shift ;;
+  -h | --help) sed -n '2,8s/^# //p' "$0"; exit 0 ;;
+esac
+preset=${kind%-all}
 
-need_packages "${build_packages[@]}" && configure asan || exit
+# Paths under tests/ of what runs, and of what does not.
+left_out='^$'
+case $kind in
+  asan) wanted='^tests/(protocol|daemon|clients)/.*_test$|^tests/core/text/.*_test$|/core_load_scene_test$|/core_shapes_test$|^tests/fuzz/.*_fuzz$' ;;
+  asan-all)
+    wanted='^tests/.*(_test|_fuzz)$'
+    # What computes for long. The stages it sounds are run by the other tests of its folder; these repeat them over thousands of
+    # pings, or over every product, to measure a figure.
+    left_out='/(everything|coverage_oracles|statistics_oracles|specular_statistics|stage_oracles|texture|multipath_cells|truths)_test$'
+    ;;
+  tsan) wanted='^tests/(protocol|daemon|clients)/.*_test$|/base_test$|/analytic_rays_test$' ;;
+esac
+# Through ctest: the shipped programs. Rendering and determinism compute for long again.
+programs='^acceptance\.(commands|protocol|mirror|blueview_link|demo)$|^bvtsdk\.sequences$'
+[ "$kind" != tsan ] || programs='^bvtsdk\.sequences$'
+
+need_packages "${build_packages[@]}" && configure "$preset" || exit
 targets=("$@")
+more=()
 if [ ${#targets[@]} -eq 0 ]; then
-  mapfile -t targets < <(ninja -C build/asan -t targets all | sed -n 's/: CXX_EXECUTABLE_LINKER.*//p' | grep -E "$wanted" | grep '_test$')
+  mapfile -t targets < <(ninja -C "build/$preset" -t targets all | sed -n 's/: CXX_EXECUTABLE_LINKER.*//p' |
+    grep -E "$wanted" | grep -vE "$left_out")
+  [ "$kind" = asan ] || more=(sonard sonarctl bvtsdk_programs)
 fi
 [ ${#targets[@]} -gt 0 ] || { echo "no test program matches $wanted" >&2; exit 1; }
-build asan "${targets[@]}" || exit
+build "$preset" "${targets[@]}" "${more[@]}" || exit
 
-failed=0
-for target in "${targets[@]}"; do
-  program=$(find build/asan -path "*/${target##*/}" -type f -perm -u+x | head -n 1)
-  echo "-- ${target##*/}"
-  # Allocation limits of the parsers' tests: a refused huge length must not be a sanitizer's failure.
-  ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1 UBSAN_OPTIONS=print_stacktrace=1 "$program" --gtest_brief=1 || failed=1
+# A refused huge length must not be a sanitizer's failure. Suppressions: third-party libraries only, with their reasons.
+export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
+export UBSAN_OPTIONS=print_stacktrace=1
+export TSAN_OPTIONS="halt_on_error=1:second_deadlock_stack=1:suppressions=$PWD/tests/tools/tsan.supp"
+
+failed=()
+started=$SECONDS
+for i in "${!targets[@]}"; do
+  name=${targets[$i]##*/}
+  program=$(find "build/$preset" -name "$name" -type f -perm -u+x | head -n 1)
+  echo "-- [$((i + 1))/${#targets[@]}] $name"
+  case $name in
+    *_fuzz)
+      input=${name%_fuzz}
+      given=(-runs=20000)
+      [ "$input" != mesh_file ] || given=(-runs=200)  # the importer takes a hundred times as long as the rest
+      [ -f "tests/fuzz/dictionaries/$input.dict" ] && given+=("-dict=tests/fuzz/dictionaries/$input.dict")
+      [ -d "tests/fuzz/corpus/$input" ] && given+=("tests/fuzz/corpus/$input")
+      "$program" "${given[@]}" || failed+=("$name")
+      ;;
+    *) "$program" --gtest_brief=1 </dev/null || failed+=("$name") ;;
+  esac
 done
-exit $failed
+if [ ${#more[@]} -gt 0 ]; then
+  ctest --test-dir "build/$preset" -R "$programs" --output-on-failure --no-tests=error </dev/null || failed+=("programs")
+fi
+
+printf '\n%d programs under %s in %d s, failed: %s\n' ${#targets[@]} "$kind" $((SECONDS - started)) "${failed[*]:-none}"
+if [ ${#more[@]} -gt 0 ]; then
+  python3 tests/reliability/record.py "$preset" "${#targets[@]} test programs, ${#failed[@]} with a report" "no report" \
+    "$([ ${#failed[@]} -eq 0 ] && echo yes || echo no)" "tests/tools/sanitized_tests.sh $kind"
+fi
+[ ${#failed[@]} -eq 0 ]
