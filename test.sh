@@ -15,7 +15,7 @@ esac
 
 setup_and_build || exit
 need_packages "${test_packages[@]}" || echo "going on without: the tests that need them are skipped"
-if [ -n "$long" ]; then  # tests that have figures for docs/reliability.md leave them there
+if [ -n "$long" ]; then  # tests that measure what reliability_table.py shows leave it there
   export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
 fi
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"

@@ -3,7 +3,7 @@
 # undefined-behaviour sanitizers, and what has threads under the thread sanitizer. Run by ./test.sh --long, or alone; two to four
 # hours on two cores. Every step is run, also after one that failed; a table ends it. usage: tests/tools/long_checks.sh [STEP...]
 #   SONARD_FUZZ_RUNS, SONARD_FUZZ_SECONDS   see tests/tools/fuzz.sh
-#   SONARD_RELIABILITY                      where figures are kept for docs/reliability.md (build/reliability)
+#   SONARD_RELIABILITY                      where figures are kept (build/reliability)
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
