@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/random.hpp"
+#include "core/base/units.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/receive.hpp"
@@ -68,7 +69,7 @@ std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p
     if (at.x <= 0 || off(nearest) > p.fan.column_width[static_cast<std::size_t>(nearest)] || row < -0.5 || row > p.fan.rows - 0.5)
       continue;
     if (!is_hidden(scene, s.seen_from.position_m, in_world))
-      points.push_back({nearest, range, elevation, std::pow(10.0, 0.1 * static_cast<double>(target.target_strength_db))});
+      points.push_back({nearest, range, elevation, power_from_db(static_cast<double>(target.target_strength_db))});
   }
   return points;
 }

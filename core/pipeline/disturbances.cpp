@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/random.hpp"
+#include "core/base/units.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
@@ -32,7 +33,7 @@ Leak::Leak(const PingPlan& plan, const Switches& switches) {
   for (int n = 0; n < plan.samples; ++n) {
     const double down_db = static_cast<double>(law.leak_decay_db_per_m) * (n + plan.sample_offset) * plan.sample_spacing_m;
     if (down_db > forgotten_db) break;
-    rms_upa_.push_back(static_cast<float>(per_column * std::pow(10.0, -down_db / 20)));
+    rms_upa_.push_back(static_cast<float>(per_column * amplitude_from_db(-down_db)));
   }
 }
 
@@ -88,7 +89,7 @@ std::vector<PulseHeard> hear_other_sonars(const RayScene& scene, const PingPlan&
       const Pose now = s.moves ? carried_on(request.sonar_in_world, s.twist, at_s) : request.sonar_in_world;
       const Vec3d seen = transform(inverse(now), other.position_m);
       if (seen.x <= 0) continue;
-      const ConicalDirection from = plan.switches.conical ? conical_from_sonar(seen) : flat_from_sonar(seen);
+      const ConicalDirection from = plan.direction_of(seen);
       const double both_ways = elevation_two_way(plan.mode.pattern, from.psi_rad);  // two equal patterns; we only receive
       pulse.sine = from.u;
       pulse.amplitude_upa = static_cast<double>(other.level_upa) / range_m * std::exp(-s.absorption_np_per_m * range_m) *
@@ -136,7 +137,7 @@ void add_pulses(std::span<const PulseHeard> pulses, const PingPlan& plan, BeamSi
 Crosstalk::Crosstalk(const PingPlan& plan, const Switches& switches) {
   const double level_db = static_cast<double>(plan.mode.receiver.crosstalk_db);
   if (!switches.crosstalk || level_db < no_crosstalk_db) return;
-  amplitude_ = std::pow(10.0, level_db / 20);
+  amplitude_ = amplitude_from_db(level_db);
   // What all beams together make of a lone echo amid the sector: sum_j W_j, or in power sum_j W_j^2.
   const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
   const double middle = plan.beam_sine[plan.beam_sine.size() / 2];

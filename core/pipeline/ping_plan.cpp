@@ -221,6 +221,12 @@ std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_
   return levels;
 }
 
+std::optional<std::size_t> PingPlan::column_of(const ConicalDirection& direction, double half_angle_rad) const {
+  const double column = std::floor((columns.first_sine - direction.u) / columns.spacing + 0.5);
+  if (std::abs(direction.psi_rad) > half_angle_rad || !(column >= 0) || column >= columns.count) return {};
+  return static_cast<std::size_t>(column);
+}
+
 double PingPlan::widest_about_axis_rad() const {
   if (switches.conical) return fan.half_angle_rad;
   const double sine = std::min(columns.first_sine + columns.spacing, 0.9999);

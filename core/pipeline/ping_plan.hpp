@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/pulses/pulse.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/scene/cells/surface_cells.hpp"
@@ -78,6 +80,15 @@ struct PingPlan {
   std::vector<float> row_power_factor;  // per row: (gain * TVG / full scale)^2
   std::vector<std::uint32_t> row_gain;  // when settings.format.row_gains
 
+  /// How a place in the sonar's axes is heard: about the array's axis, or in flat beams.
+  ConicalDirection direction_of(Vec3d from_sonar) const {
+    return switches.conical ? conical_from_sonar(from_sonar) : flat_from_sonar(from_sonar);
+  }
+  /// None beside the fan, or further from its middle than that angle: mirrors are looked at in a wider one.
+  std::optional<std::size_t> column_of(const ConicalDirection& direction, double half_angle_rad) const;
+  /// How far behind the depth map a cell may lie and be seen: covers the straight lines between rays.
+  float depth_tolerance_m() const { return depth_tolerance_in_pulses * static_cast<float>(pulse_width_m); }
+  static constexpr float depth_tolerance_in_pulses = 1.5f;  // docs/acoustics.md, section 3
   /// Largest angle about the array's axis that the fan reaches: flat beams off the middle reach farther round it than they rise.
   double widest_about_axis_rad() const;
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }

@@ -12,18 +12,9 @@
 namespace sonar {
 namespace {
 
-constexpr float depth_tolerance_in_pulses = 1.5f;   // docs/acoustics.md, section 3: covers the straight lines between rays
 constexpr std::uint32_t fixed_fan_key = 0x66616eu;  // keeps these draws apart from the cells'
 
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
-
-/// Of a cell in the midst of the tile, from its centre: on the surface, which the centre need not be. Object axes.
-Vec3d middle_cell(const CellTile& tile) {
-  const int i = tile.count / 2;
-  const auto unit = static_cast<double>(tile.position_unit_m);
-  const auto along = [&](CellTile::Column c) { return unit * tile.column(c)[i]; };
-  return {along(CellTile::x), along(CellTile::y), along(CellTile::z)};
-}
 
 TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<const LawTable> laws, const BubbleLayer& bubbles,
                     const PingPlan& plan, const PingScalars& s) {
@@ -48,7 +39,7 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<co
   seen.law = law.table();
   double constant = s.source_upa * std::sqrt(law.mu) * std::exp(-2 * s.absorption_np_per_m * range);
   if (bubbles.present()) {
-    const Vec3d seen_at = t.from_sonar_m + seen_from_object * middle_cell(tile);
+    const Vec3d seen_at = t.from_sonar_m + seen_from_object * tile.middle_cell_m();
     const double sonar_z_m = s.seen_from.position_m.z;
     constant *= bubbles.two_way(sonar_z_m, sonar_z_m + (s.world_from_sonar * seen_at).z, length(seen_at));
   }
@@ -130,7 +121,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.bins_per_tangent = plan.fan.bins_per_tangent;
   g.bins = seen.bins;
   g.inverse_depth = seen.inverse_x.data();
-  g.depth_tolerance_m = depth_tolerance_in_pulses * static_cast<float>(plan.pulse_width_m);
+  g.depth_tolerance_m = plan.depth_tolerance_m();
   g.turns_per_m = static_cast<float>(s.turns_per_m);
   g.decay_per_m = static_cast<float>(2 * s.absorption_np_per_m);
   g.samples_per_m = static_cast<float>(s.samples_per_m);
@@ -222,10 +213,10 @@ std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> str
   const double r = length(p);
   const double at_sample = s.sample_of(r) + s.doppler_samples(p);
   if (r < nearest_scatterer_m || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) return {};
-  const ConicalDirection direction = plan.switches.conical ? conical_from_sonar(p) : flat_from_sonar(p);
-  const double column = std::floor((plan.columns.first_sine - direction.u) / plan.columns.spacing + 0.5);
-  if (std::abs(direction.psi_rad) > plan.fan.half_angle_rad || !(column >= 0) || column >= plan.columns.count) return {};
-  const double transmit = static_cast<double>(plan.columns.transmit[static_cast<std::size_t>(column)]);
+  const ConicalDirection direction = plan.direction_of(p);
+  const std::optional<std::size_t> column = plan.column_of(direction, plan.fan.half_angle_rad);
+  if (!column) return {};
+  const double transmit = static_cast<double>(plan.columns.transmit[*column]);
   const double amplitude = s.source_upa * two_way_transmission(r, s.absorption_np_per_m) *
                            elevation_two_way(plan.mode.pattern, direction.psi_rad) * transmit;
   return PointEcho{direction.u, at_sample, strength_m * std::polar(amplitude, -2 * pi * fraction_of_turn(r * s.turns_per_m))};

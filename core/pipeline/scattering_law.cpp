@@ -11,7 +11,7 @@ namespace {
 
 constexpr double largest_strength = 1 / pi;  // of backscatter; a trend may not carry a surface beyond what comes in
 
-double from_db(float db) { return std::pow(10.0, 0.1 * static_cast<double>(db)); }
+double from_db(float db) { return power_from_db(static_cast<double>(db)); }
 
 double gsab(const GsabLaw& g, double cosine) {
   const double a = std::acos(std::clamp(cosine, 0.0, 1.0));
@@ -30,7 +30,7 @@ double strongest(const Material& m) { return m.law == ScatteringLaw::gsab ? gsab
 double trend(const Material& m, double centre_hz) {
   if (m.trend_db_per_decade == 0) return 1;
   const double decades = std::log10(centre_hz / static_cast<double>(m.trend_reference_hz));
-  return std::min(std::pow(10.0, 0.1 * static_cast<double>(m.trend_db_per_decade) * decades), largest_strength / strongest(m));
+  return std::min(power_from_db(static_cast<double>(m.trend_db_per_decade) * decades), largest_strength / strongest(m));
 }
 
 double phase_roughness(const Material& m, double centre_hz, double sound_speed_mps) {

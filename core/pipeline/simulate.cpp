@@ -119,6 +119,7 @@ void PingUnderWay::find_echo_sources() {
   if (request_.switches.specular) w_.mirror_echoes.find(scene_, bodies_, plan_, scalars_, points_);
   watch.lap(Stage::specular);
   if (ray_is_scatterer()) return;
+  w_.laws = laws_of(scene_.scene(), plan_, scalars_);
   if (request_.switches.multipath) hear_by_mirrors();
   watch.lap(Stage::multipath);
   CellView view;
@@ -130,7 +131,6 @@ void PingUnderWay::find_echo_sources() {
   view.levels = plan_.levels;
   const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
-  w_.laws = laws_of(scene_.scene(), plan_, scalars_);
   prepare_tiles(in_view, cells_, scene_.scene(), w_.laws, plan_, scalars_, pool_, w_.tiles);
   sort_tiles(w_.tiles, group_columns, groups(), w_.tiles_by_group);
   watch.lap(Stage::cull);
@@ -142,7 +142,8 @@ void PingUnderWay::find_echo_sources() {
 
 /// What comes by way of flat mirrors waits in columns of its own.
 void PingUnderWay::hear_by_mirrors() {
-  const MultipathCounts counts = sound_ghosts(scene_, cells_, bodies_, plan_, scalars_, kernels_, pool_, w_.multipath, points_);
+  const MultipathCounts counts =
+      sound_ghosts(scene_, cells_, bodies_, w_.laws, plan_, scalars_, kernels_, pool_, w_.multipath, points_);
   w_.statistics.rays += counts.rays;
   w_.statistics.echoes += counts.echoes;
 }

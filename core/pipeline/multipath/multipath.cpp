@@ -96,9 +96,9 @@ class Rounds {
 
 }  // namespace
 
-MultipathCounts sound_ghosts(const RayScene& scene, SurfaceCells& cells, std::span<const Pose> bodies, const PingPlan& plan,
-                             const PingScalars& s, const simd::Kernels& kernels, Parallel& pool, MultipathWork& work,
-                             std::vector<PointEcho>& points) {
+MultipathCounts sound_ghosts(const RayScene& scene, SurfaceCells& cells, std::span<const Pose> bodies,
+                             const std::vector<LawTable>& laws, const PingPlan& plan, const PingScalars& s,
+                             const simd::Kernels& kernels, Parallel& pool, MultipathWork& work, std::vector<PointEcho>& points) {
   work.heard = false;
   if (!work.faces_found) {
     work.faces = find_flat_faces(scene.scene(), least_reflectance);
@@ -118,7 +118,6 @@ MultipathCounts sound_ghosts(const RayScene& scene, SurfaceCells& cells, std::sp
   for (const Leg& leg : ways.legs) reach.emplace_back(leg, ways, plan, s);
   const CellView view = view_of(plan, s, bodies, reach);
   const std::vector<TileInView>& tiles = cells.in_view(view, pool);
-  const std::vector<LawTable> laws = laws_of(scene.scene(), plan, s);
   const std::vector<float> correlation = plan.expected_power ? beam_correlation_over_columns(plan) : std::vector<float>{};
   std::vector<GhostScatterer> scatterers;
   for (int worker = 0; worker < pool.threads(); ++worker) scatterers.emplace_back(ways, reach, cells, laws, correlation, plan, s);

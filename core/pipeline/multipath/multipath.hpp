@@ -27,8 +27,8 @@ struct MultipathCounts {
 /// Fills `work.columns` (before the transmitter's pattern and noise) and appends the ghosts of point targets to `points`.
 /// Calls cells.in_view: results of earlier calls become invalid.
 MultipathCounts sound_ghosts(const RayScene& scene, SurfaceCells& cells, std::span<const Pose> bodies_in_world,
-                             const PingPlan& plan, const PingScalars& scalars, const simd::Kernels& kernels, Parallel& pool,
-                             MultipathWork& work, std::vector<PointEcho>& points);
+                             const std::vector<LawTable>& laws, const PingPlan& plan, const PingScalars& scalars,
+                             const simd::Kernels& kernels, Parallel& pool, MultipathWork& work, std::vector<PointEcho>& points);
 
 /// Adds columns [first, last) of what was heard to `signals`.
 void add_ghosts(const MultipathWork& work, int first, int last, ColumnSignals& signals);

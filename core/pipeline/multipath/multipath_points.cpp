@@ -53,14 +53,14 @@ class PointGhosts {
     const Vec3d p = s_.meet(image).from_sonar_m;
     const double r = length(p);
     if (r < nearest_scatterer_m || r + length(place) > 2 * s_.max_range_m || image.x <= 0) return {};
-    const ConicalDirection direction = plan_.switches.conical ? conical_from_sonar(p) : flat_from_sonar(p);
-    const double column = std::floor((plan_.columns.first_sine - direction.u) / plan_.columns.spacing + 0.5);
-    if (std::abs(direction.psi_rad) > ways_.map.fan.half_angle_rad || !(column >= 0) || column >= plan_.columns.count) return {};
+    const ConicalDirection direction = plan_.direction_of(p);
+    const std::optional<std::size_t> column = plan_.column_of(direction, ways_.map.fan.half_angle_rad);
+    if (!column) return {};
     if (!reaches(scene_, s_, faces_, ways_.mirrors, leg, place)) return {};
     const double size = reflectance_of(leg, ways_.mirrors, (1 / r) * p) * std::exp(-s_.absorption_np_per_m * r) / r *
                         static_cast<double>(pattern_(static_cast<float>(std::pow(std::sin(direction.psi_rad), 2))));
-    return PointArrival{r, direction.u, static_cast<double>(plan_.columns.transmit[static_cast<std::size_t>(column)]),
-                        s_.doppler_samples(p), size * std::polar(1.0, -2 * pi * fraction_of_turn(0.5 * r * s_.turns_per_m))};
+    return PointArrival{r, direction.u, static_cast<double>(plan_.columns.transmit[*column]), s_.doppler_samples(p),
+                        size * std::polar(1.0, -2 * pi * fraction_of_turn(0.5 * r * s_.turns_per_m))};
   }
 
   const RayScene& scene_;

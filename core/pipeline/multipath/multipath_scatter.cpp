@@ -10,8 +10,7 @@
 namespace sonar {
 namespace {
 
-constexpr float depth_tolerance_in_pulses = 1.5f;  // as for direct echoes, scatter.cpp
-constexpr float least_transmit = 1e-3f;            // columns lit by less are not received from
+constexpr float least_transmit = 1e-3f;  // columns lit by less are not received from
 
 void store(Vec3d v, float (&to)[3]) {
   to[0] = static_cast<float>(v.x), to[1] = static_cast<float>(v.y), to[2] = static_cast<float>(v.z);
@@ -111,7 +110,7 @@ GhostScatterer::GhostScatterer(const Ways& ways, const std::vector<LegReach>& re
       pattern_(plan.mode.pattern),
       first_edge_sine_(static_cast<float>(plan.columns.first_sine + plan.columns.spacing / 2)),
       columns_per_sine_(static_cast<float>(1 / plan.columns.spacing)),
-      tolerance_m_(depth_tolerance_in_pulses * static_cast<float>(plan.pulse_width_m)),
+      tolerance_m_(plan.depth_tolerance_m()),
       absorption_np_per_m_(static_cast<float>(scalars.absorption_np_per_m)),
       half_turns_per_m_(static_cast<float>(0.5 * scalars.turns_per_m)) {}
 
@@ -150,11 +149,7 @@ GhostScatterer::Way GhostScatterer::look_at(const TileInView& tile, const Leg& l
 
 void GhostScatterer::sound(const TileInView& tile, std::vector<Echoes>& by_group) {
   tile_ways_.clear();
-  const auto along = [&tile, middle = tile.tile->count / 2](CellTile::Column c) {
-    return static_cast<double>(tile.tile->position_unit_m) * tile.tile->column(c)[middle];
-  };
-  tile_middle_ = tile.from_sonar_m +
-                 cells_.sonar_from_object(tile.object) * Vec3d{along(CellTile::x), along(CellTile::y), along(CellTile::z)};
+  tile_middle_ = tile.from_sonar_m + cells_.sonar_from_object(tile.object) * tile.tile->middle_cell_m();
   const double radius = static_cast<double>(tile.tile->half_edge_m) * 1.7320508;
   tile_ways_.push_back(look_at(tile, ways_.legs[0]));
   for (std::size_t l = 1; l < ways_.legs.size(); ++l)

@@ -34,6 +34,11 @@ struct CellTile {
   static constexpr float normal_unit = 1.0f / 32767.0f;
   enum Column { x, y, z, normal_x, normal_y, normal_z, weight_re, weight_im, columns };
   const std::int16_t* column(Column c) const { return data.get() + static_cast<std::ptrdiff_t>(c) * stride; }
+  /// Of a cell in the midst of the tile, from its centre: on the surface, which the centre need not be. Object axes.
+  Vec3d middle_cell_m() const {
+    const auto along = [this, unit = static_cast<double>(position_unit_m)](Column c) { return unit * column(c)[count / 2]; };
+    return {along(x), along(y), along(z)};
+  }
   std::size_t bytes() const { return static_cast<std::size_t>(stride) * columns * sizeof(std::int16_t); }
 };
 

@@ -34,7 +34,7 @@ GsabLaw read_gsab(const text::Node& node, GsabLaw law) {
   law.f_rad = read_angle_rad(keys, "f_deg", law.f_rad);
   // All three terms are strongest at normal incidence.
   double sum = 0;
-  for (const float db : {law.a_db, law.c_db, law.e_db}) sum += std::pow(10.0, 0.1 * static_cast<double>(db));
+  for (const float db : {law.a_db, law.c_db, law.e_db}) sum += power_from_db(static_cast<double>(db));
   if (10 * std::log10(sum) > most_backscatter_db)
     node.fail("sends back more than 1/pi (-4.97 dB) at normal incidence, more than can come in; lower a_db, c_db or e_db");
   return law;
