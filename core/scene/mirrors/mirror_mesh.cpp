@@ -68,11 +68,11 @@ void MirrorMesh::find_on_faces(const MirrorQuery& q, std::vector<MirrorPoint>& o
 void MirrorMesh::find_on_curves(const MirrorQuery& q, std::vector<MirrorPoint>& out) const {
   if (nodes_.empty()) return;
   const std::size_t first = out.size();
-  std::vector<std::uint32_t> todo{0};
-  while (!todo.empty()) {
-    const std::uint32_t at = todo.back();
+  std::vector<std::uint32_t> to_visit{0};
+  while (!to_visit.empty()) {
+    const std::uint32_t at = to_visit.back();
     const Node& node = nodes_[at];
-    todo.pop_back();
+    to_visit.pop_back();
     const Vec3d to_sonar = q.sonar_m - to_double(node.centre);
     const double distance = length(to_sonar), radius = static_cast<double>(node.radius);
     if (distance - radius > q.max_range_m) continue;
@@ -86,8 +86,8 @@ void MirrorMesh::find_on_curves(const MirrorQuery& q, std::vector<MirrorPoint>& 
       if (spread < pi / 2 && between > spread) continue;
     }
     if (node.second_child != 0) {
-      todo.push_back(node.second_child);
-      todo.push_back(at + 1);
+      to_visit.push_back(node.second_child);
+      to_visit.push_back(at + 1);
       continue;
     }
     for (std::uint32_t t = node.first; t < node.first + node.count; ++t) solve(t, q, out);
