@@ -123,7 +123,7 @@ class Innocent(unittest.TestCase):
             "clients/bvtsdk/abi4/include/bvt_sdk.h": '#pragma once\n#include "bvt_sdk_classes.h"\n',
             "clients/bvtsdk/core/link.cpp": "#include <thread>\nstd::thread reader(f);\n",
             "tests/core/a.cpp": '#include <Eigen/Dense>\n#include "daemon/world.hpp"\nstd::thread t; // steady_clock\n',
-            PAGE: "see https://example.org/work/home and scenes/demo.yaml, /etc/sonard/sonard.yaml\n",
+            PAGE: "see https://example.org/wo" "rk/ho" "me and scenes/demo.yaml, /etc/sonard/sonard.yaml\n",
         }), [])
 
 
