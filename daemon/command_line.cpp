@@ -3,7 +3,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <string_view>
+
+#include "core/text/nearest.hpp"
 
 namespace sonar {
 namespace {
@@ -68,6 +72,32 @@ std::string complaint(const RenderCommand& render) {
   return {};
 }
 
+/// CLI11 names the option; of a value that came from the environment the user knows the variable.
+std::string name_the_source(const CLI::App& app, const CLI::Error& error, const std::vector<std::string_view>& words) {
+  std::string message = CLI::FailureMessage::simple(&app, error);
+  std::vector<const CLI::App*> apps{&app};
+  for (const CLI::App* command : app.get_subcommands()) apps.push_back(command);
+  for (const CLI::App* each : apps)
+    for (const CLI::Option* option : each->get_options()) {
+      const std::string name = option->get_name(), variable = option->get_envname();
+      const auto is_it = [&name](std::string_view word) { return word == name || word.substr(0, name.size() + 1) == name + "="; };
+      const std::size_t at = message.find(name + ":");
+      if (variable.empty() || at == std::string::npos || std::getenv(variable.c_str()) == nullptr) continue;
+      if (std::none_of(words.begin(), words.end(), is_it)) message.replace(at, name.size(), variable + " (environment)");
+    }
+  return message;
+}
+
+/// A first word that is no option, no command and nothing like a file; empty = it may be one of these.
+std::string unknown_command(std::string_view word) {
+  std::error_code ec;
+  const bool like_a_file = word.find_first_of("./") != std::string_view::npos || std::filesystem::exists(word, ec);
+  if (word.empty() || word[0] == '-' || like_a_file) return {};
+  constexpr std::array<std::string_view, 4> commands{"run", "check", "render", "bench"};
+  return "sonard: there is no command or file \"" + std::string(word) + "\"" +
+         text::suggestion(word, commands, "the commands are");
+}
+
 }  // namespace
 
 Command parse_command_line(int argc, char** argv) {
@@ -96,6 +126,12 @@ Command parse_command_line(int argc, char** argv) {
         ->required();
     add_render_options(*app.add_subcommand("render", "render pings into files, or check what they should hold"), render);
   }
+  if (const std::string wrong = bare && argc > 1 ? unknown_command(argv[1]) : ""; !wrong.empty()) {
+    std::fprintf(stderr, "%s; see sonard --help\n", wrong.c_str());
+    return Leave{exit_code(ErrorKind::usage)};
+  }
+  app.failure_message([typed = std::vector<std::string_view>(argv + 1, argv + std::max(argc, 1))](
+                          const CLI::App* a, const CLI::Error& e) { return name_the_source(*a, e, typed); });
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -4,9 +4,15 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "daemon/standard_streams.hpp"
 
 namespace sonar {
 namespace {
+
+constexpr std::size_t longest_line = 3900;  // what a pipe takes at once is 4096 bytes
 
 std::string json_string(std::string_view text) {
   std::string out = "\"";
@@ -66,6 +72,7 @@ spdlog::level::level_enum spdlog_level(LogLevel level) {
 
 struct Log::Sink {
   spdlog::logger logger{"sonard", std::make_shared<spdlog::sinks::stderr_color_sink_st>()};
+  std::uint64_t lost = 0;  // lines that nobody took; said with the next one that somebody does
 };
 
 Log::Log(LogOptions options) : options_(std::move(options)) {
@@ -83,8 +90,18 @@ void Log::write(LogLevel level, std::string_view phrase, const std::vector<LogFi
     options_.sink(level, text_line(phrase, fields));
     return;
   }
-  sink_->logger.log(spdlog_level(level),
-                    spdlog::string_view_t(options_.json ? json_members(phrase, fields) : text_line(phrase, fields)));
+  // Whoever reads the log must not hold up the clients.
+  if (sink_->lost > 0 && !standard_error_is_blocked()) {
+    const std::uint64_t lost = std::exchange(sink_->lost, 0);
+    write(LogLevel::warning, "log lines lost: nobody took them", {{"lines", lost}});
+  }
+  if (standard_error_is_blocked()) {
+    ++sink_->lost;
+    return;
+  }
+  std::string line = options_.json ? json_members(phrase, fields) : text_line(phrase, fields);
+  if (!options_.json && line.size() > longest_line) line.replace(longest_line, std::string::npos, "...");
+  sink_->logger.log(spdlog_level(level), spdlog::string_view_t(line));
 }
 
 bool LogLimiter::allows(Clock::time_point now, std::uint64_t& unsaid) {

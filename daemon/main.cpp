@@ -14,6 +14,7 @@
 #include "daemon/command_line.hpp"
 #include "daemon/effective_switches.hpp"
 #include "daemon/render/render_command.hpp"
+#include "daemon/standard_streams.hpp"
 
 namespace sonar {
 namespace {
@@ -111,6 +112,7 @@ int bench(const BenchCommand& command) {
 }  // namespace sonar
 
 int main(int argc, char** argv) {
+  sonar::open_closed_standard_streams();
   const auto begin = std::chrono::steady_clock::now();
   try {
     const sonar::Command command = sonar::parse_command_line(argc, argv);
