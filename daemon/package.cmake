@@ -40,15 +40,19 @@ install(FILES scenes/sonard.yaml DESTINATION ${documents}/examples COMPONENT son
 install(FILES README.md DESTINATION ${documents} COMPONENT sonard)
 install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT sonard
   FILES_MATCHING PATTERN "*.md" PATTERN "man" EXCLUDE PATTERN "decisions" EXCLUDE PATTERN "validation" EXCLUDE PATTERN "driver-test" EXCLUDE)
+configure_file(daemon/debian/changelog.in ${made}/changelog @ONLY)
 if(SONAR_GZIP)
   add_custom_command(OUTPUT ${made}/CHANGELOG.md.gz
     COMMAND ${SONAR_GZIP} -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md > ${made}/CHANGELOG.md.gz DEPENDS CHANGELOG.md)
-  install(FILES ${made}/CHANGELOG.md.gz DESTINATION ${documents} COMPONENT sonard)
-  install(FILES ${made}/CHANGELOG.md.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
-  add_custom_target(package_documents ALL DEPENDS ${pages} ${made}/CHANGELOG.md.gz)
+  add_custom_command(OUTPUT ${made}/changelog.gz
+    COMMAND ${SONAR_GZIP} -9nc ${made}/changelog > ${made}/changelog.gz DEPENDS ${made}/changelog)
+  set(changelogs ${made}/CHANGELOG.md.gz ${made}/changelog.gz)
+  add_custom_target(package_documents ALL DEPENDS ${pages} ${changelogs})
 else()
-  install(FILES CHANGELOG.md DESTINATION ${documents} COMPONENT sonard)
+  set(changelogs CHANGELOG.md ${made}/changelog)
 endif()
+install(FILES ${changelogs} DESTINATION ${documents} COMPONENT sonard)
+install(FILES ${changelogs} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
 
 # ---- the packages: one for the daemon and its tools, one for those who build BlueView drivers
 set(CPACK_GENERATOR DEB)
