@@ -10,7 +10,7 @@ build_packages=(
 
 # What only tests use: without it some are skipped, saying so.
 test_packages=(
-  tshark
+  tshark systemd dpkg-dev strace
 )
 
 say() { printf '\n== %s\n' "$*"; }
