@@ -32,11 +32,13 @@ double longest_m(const DescribedObject& o) {
   return std::max({size.x, size.y, size.z});
 }
 
-/// Something to see below: ground by its name, or anything that is wide both ways.
-bool is_ground(const DescribedObject& o) {
+/// Something to see below: ground by its name, anything that is wide both ways, or what all the rest stands in: a tank.
+bool is_ground(const DescribedObject& o, const SceneDescription& scene) {
+  const Vec3d all = scene.in_world.size_m();
   const Vec3d size = o.in_world.size_m();
   return o.visible && o.kind != "sea surface" &&
-         (o.kind == "seabed" || o.kind == "heightmap" || o.kind == "plane" || (size.x >= wide_m && size.y >= wide_m));
+         (o.kind == "seabed" || o.kind == "heightmap" || o.kind == "plane" || (size.x >= wide_m && size.y >= wide_m) ||
+          (scene.objects.size() > 1 && size.x >= 0.99 * all.x && size.y >= 0.99 * all.y));
 }
 
 void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
@@ -59,7 +61,7 @@ void remark_on_places(const SceneDescription& scene, Remarks& out) {
   const auto above = names_where(
       scene, [](const DescribedObject& o) { return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > 0; });
   if (!above.empty()) out.warnings.push_back(std::string("wholly above z = 0, the water's surface: ") + list_of(above));
-  if (std::none_of(scene.objects.begin(), scene.objects.end(), is_ground))
+  if (std::none_of(scene.objects.begin(), scene.objects.end(), [&](const DescribedObject& o) { return is_ground(o, scene); }))
     out.warnings.push_back("no seabed: nothing is ground or 5 m wide both ways, so beams that miss the objects stay black");
 }
 

@@ -36,10 +36,10 @@ class SceneCommand(unittest.TestCase):
 
     def test_an_imported_box_is_heard_where_its_poses_put_it(self):
         said = self.import_quay("--material", "left_rig=concrete")
-        for words in ["2 shapes of 3 models", 'light "sun"', 'sensor "eye"', 'plugin "winch"', "rig/rig.sdf:18", ": ok: 2 objects"]:
+        for words in ["2 shapes of 3 models", 'light "sun"', 'sensor "eye"', 'plugin "winch"', "rig/rig.sdf:16", ": ok: 2 objects"]:
             self.assertIn(words, said)
         written = self.scene.read_text(encoding="utf-8")
-        self.assertIn('#   rig/rig.sdf:18: sensor "eye"', written)
+        self.assertIn('#   rig/rig.sdf:16: sensor "eye"', written)
         self.assertIn("material: mud", written)
         self.assertIn(": ok: 2 objects, 2 materials", self.ctl("check", self.scene, "--strict"))
 
@@ -68,7 +68,7 @@ class SceneCommand(unittest.TestCase):
         for found, wanted in zip(box["centre_m"], (3.863703, 1.035276, -2)):
             self.assertAlmostEqual(found, wanted, places=5)
         self.assertEqual(told["triangles"], sum(o["triangles"] for o in told["objects"]))
-        self.assertIn("demo", self.ctl("info", "demo.yaml"))
+        self.assertIn("harbour: ", self.ctl("info", "demo.yaml"))
 
     def test_a_urdf_moves_as_one(self):
         self.ctl("import", WORLDS / "arm.urdf", "--out", self.scene, "--moving", "arm", "--material", "steel", "--offset", "0,0,-5")
