@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <csignal>
 
+#include "daemon/real_time.hpp"
+
 namespace sonar {
 namespace {
-
-constexpr int compute_niceness = 10;  // pacing and sockets come first
 
 World make_world(const Config& config, const Scene& scene, Time start) {
   PoseRules rules;
@@ -33,15 +33,16 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       clock_(config_.clock == ClockMode::stepped),
       world_(make_world(config_, *scene_, clock_.now())),
       simulator_(io_, make_engine(scene_), compute_niceness),
+      admission_(config_.limits, log_),
       pose_server_(io_, config_.poses, world_, clock_, log_, [this] { on_change(); }),
       context_{io_,
                clock_,
                world_,
                simulator_,
+               admission_,
                log_,
                config_,
                options_.digest,
-               options_.stall_limit,
                [this] { on_change(); },
                [this](const std::string& why) {
                  log_.error(why);
@@ -74,6 +75,8 @@ int App::run() {
   asio::co_spawn(
       io_, [this] { return keep_house(); }, asio::detached);
   notify_.ready(status_line());
+  if (const int priority = config_.engine.io_priority; priority > 0)
+    if (const std::string why = schedule_in_real_time(priority); !why.empty()) log_.warning(why);
   io_.run();
   return exit_code_;
 }

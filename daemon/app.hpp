@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "daemon/admission.hpp"
 #include "daemon/asio.hpp"
 #include "daemon/clock.hpp"
 #include "daemon/config.hpp"
@@ -23,11 +24,10 @@
 namespace sonar {
 
 struct AppOptions {
-  std::uint64_t exit_after_pings = 0;            // served, over all sonars; 0 = never
-  bool digest = false;                           // SHA-256 of every client's stream
-  std::chrono::milliseconds stall_limit{10000};  // a client that takes no byte for so long is reset
-  bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP does nothing yet
-  NotifyPlace service_manager;  // is told when we are ready, stop, and that we are alive
+  std::uint64_t exit_after_pings = 0;  // served, over all sonars; 0 = never
+  bool digest = false;                 // SHA-256 of every client's stream
+  bool handle_signals = false;         // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP does nothing yet
+  NotifyPlace service_manager;         // is told when we are ready, stop, and that we are alive
 };
 
 class App {
@@ -46,6 +46,7 @@ class App {
   const PingEngine& engine() const { return simulator_.engine(); }
   const PoseServer& poses() const { return pose_server_; }
   const std::deque<Device>& devices() const { return devices_; }
+  const Admission& admission() const { return admission_; }
   /// After run().
   const World& world() const { return world_; }
 
@@ -67,6 +68,7 @@ class App {
   Clock clock_;
   World world_;
   Simulator simulator_;
+  Admission admission_;
   PoseServer pose_server_;
   DeviceContext context_;
   std::deque<Device> devices_;

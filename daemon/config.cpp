@@ -200,6 +200,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   for (const Node& item : root.required("sonars").items(1, 64)) config.sonars.push_back(read_sonar(item.map(), config, index++));
   read_poses(root.optional("poses"), config.poses);
   config.engine = read_engine(root.optional("engine"));
+  config.limits = read_limits(root.optional("limits"));
   config.clock =
       root.optional("clock").choice_or(ClockMode::realtime, {{"realtime", ClockMode::realtime}, {"stepped", ClockMode::stepped}});
   read_log(root.optional("log"), config.log);

@@ -1,5 +1,7 @@
 #include "daemon/config_parts.hpp"
 
+#include <cmath>
+
 #include "daemon/effective_switches.hpp"
 
 namespace sonar {
@@ -86,6 +88,7 @@ EngineConfig read_engine(const Node& node) {
   if (!node.present()) return engine;
   Map map = node.map();
   engine.threads = static_cast<int>(map.optional("threads").integer_or(0, 0, 256));
+  engine.io_priority = static_cast<int>(map.optional("io_priority").integer_or(0, 0, 99));
   map.optional("quality").choice_or<int>(0, {{"default", 0}});
   engine.simd = map.optional("simd").choice_or(SimdLevel::automatic, {{"auto", SimdLevel::automatic},
                                                                       {"portable", SimdLevel::portable},
@@ -103,6 +106,27 @@ EngineConfig read_engine(const Node& node) {
     if (given.present() && is_on && !why.empty()) given.fail("has no effect: " + why + "; leave out one of them");
   }
   return engine;
+}
+
+LimitConfig read_limits(const Node& node) {
+  LimitConfig limits;
+  if (!node.present()) return limits;
+  Map map = node.map();
+  const auto whole = [&map](const char* key, auto& value, std::int64_t least, std::int64_t most) {
+    value = static_cast<std::remove_reference_t<decltype(value)>>(
+        map.optional(key).integer_or(static_cast<std::int64_t>(value), least, most));
+  };
+  const auto seconds = [&map](const char* key, std::chrono::milliseconds& value, double least) {
+    const double s = map.optional(key).number_or(std::chrono::duration<double>(value).count(), Range::between(least, 3600));
+    value = std::chrono::milliseconds(std::llround(1e3 * s));
+  };
+  whole("clients", limits.clients, 1, 65536);
+  whole("control_clients", limits.control_clients, 1, 1024);
+  whole("input_bytes_per_s", limits.input_bytes_per_s, 1024, std::int64_t{1} << 40);
+  seconds("stall_s", limits.stall, 0.1);
+  seconds("dead_peer_s", limits.dead_peer, 3);
+  whole("spare_descriptors", limits.spare_descriptors, 0, 65536);
+  return limits;
 }
 
 }  // namespace sonar

@@ -19,5 +19,6 @@ Water read_water(const text::Node& node);
 /// Complete: defaults filled in.
 protocol::OptionValues read_options(const text::Node& node, const protocol::Vendor& vendor);
 EngineConfig read_engine(const text::Node& node);
+LimitConfig read_limits(const text::Node& node);
 
 }  // namespace sonar

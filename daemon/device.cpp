@@ -88,7 +88,7 @@ void Device::stop() {
   answers_.stop();
   pacer_.stop();
   beacon_.close(ec);
-  for (tcp::socket& waiting : queue_) waiting.close(ec);
+  for (Waiting& waiting : queue_) waiting.socket.close(ec);
   queue_.clear();
   const auto sessions = sessions_;  // finish() may end one at once and change the list
   for (const SessionPointer& s : sessions) s->finish("sonard stops");
@@ -180,6 +180,8 @@ void Device::on_timer() {
 }
 
 void Device::step(Time now) {
+  if (const auto due = pacer_.next_tick(); due && now >= *due)
+    figures_.lateness.add(std::chrono::duration<double>(now - *due).count());
   if (pacer_.fire(now, busy_)) ping(pacer_.last_tick());
 }
 
@@ -196,7 +198,10 @@ void Device::update_state(Time now) {
 void Device::ping(Time at) {
   const bool stale = context_.world.is_stale(config_.vehicle, at);
   const OnStale on_stale = context_.config.poses.on_stale;
-  if (stale && on_stale == OnStale::stop) return;
+  if (stale && on_stale == OnStale::stop) {
+    ++figures_.skipped_stale;
+    return;
+  }
   update_state(at);
   PingRequest request;
   request.model = state_.model;
@@ -222,6 +227,7 @@ void Device::on_ping(Simulator::Outcome outcome) {
   busy_ = false;
   ++figures_.pings;
   figures_.simulation_s += outcome.seconds;
+  figures_.simulation.add(outcome.seconds);
   if (outcome.ping) gain_assist_.look_at(*outcome.ping);
   if (outcome.refused) {
     ++figures_.refused;
@@ -235,30 +241,16 @@ void Device::on_ping(Simulator::Outcome outcome) {
     const protocol::Bytes made_with = requests_[request.settings_id];
     requests_.erase(requests_.begin(), requests_.lower_bound(request.settings_id));
     const auto bytes = vendor_.frame(*outcome.ping, state_, made_with);
-    const auto number = static_cast<std::uint32_t>(request.number);
     const Time now = context_.clock.now();
     std::vector<std::pair<SessionPointer, protocol::Event>> wishes;
     for (const SessionPointer& s : sessions_)
-      for (protocol::Event& event : s->push_ping(bytes, number, made_with, now)) wishes.emplace_back(s, std::move(event));
+      for (protocol::Event& event : s->push_ping(bytes, request, made_with, now)) wishes.emplace_back(s, std::move(event));
     for (const auto& [session, event] : wishes) on_event(*session, event);
     if (figures_.pings == 1) context_.log.debug("first ping simulated", {{"sonar", config_.name}, {"ms", outcome.seconds * 1e3}});
+  } else {
+    ++figures_.unwanted;
   }
   context_.on_change();
-}
-
-void Device::on_written(Session&, std::uint32_t number) {
-  if (number > last_served_) {
-    last_served_ = number;
-    ++figures_.served;
-  }
-  context_.on_change();
-}
-
-DeviceFigures Device::figures() const {
-  DeviceFigures f = figures_;
-  f.skipped_ticks = pacer_.skipped_ticks();
-  for (const SessionPointer& s : sessions_) f.dropped += s->outbox().pings_dropped();
-  return f;
 }
 
 std::vector<StreamDigest> Device::digests() const {

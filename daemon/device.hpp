@@ -12,11 +12,13 @@
 
 #include "core/base/result.hpp"
 #include "core/sonar/gain_assist.hpp"
+#include "daemon/admission.hpp"
 #include "daemon/asio.hpp"
 #include "daemon/clock.hpp"
 #include "daemon/config.hpp"
 #include "daemon/datagram_answers.hpp"
 #include "daemon/log.hpp"
+#include "daemon/metrics.hpp"
 #include "daemon/pacer.hpp"
 #include "daemon/session.hpp"
 #include "daemon/simulator.hpp"
@@ -30,23 +32,14 @@ struct DeviceContext {
   Clock& clock;
   World& world;
   Simulator& simulator;
+  Admission& admission;
   Log& log;
   const Config& config;
   bool digest = false;
-  std::chrono::milliseconds stall_limit{10000};
   std::function<void()> on_change;                         // something stepped time or the end may have waited for
   std::function<void(const std::string& why)> on_failure;  // the engine failed: the daemon cannot go on
 };
 
-struct DeviceFigures {
-  std::uint64_t pings = 0;    // simulated
-  std::uint64_t refused = 0;  // of them by the engine: nothing came out
-  std::uint64_t served = 0;   // written whole to at least one client
-  std::uint64_t dropped = 0;  // whole pings a client was too slow for
-  std::uint64_t skipped_ticks = 0;
-  std::uint64_t clients = 0, refused_clients = 0;
-  double simulation_s = 0;  // wall time of all pings
-};
 struct StreamDigest {
   std::uint64_t client = 0, bytes = 0;
   std::string sha256;
@@ -79,7 +72,7 @@ class Device final : public SessionParent {
   PingSettings initial_settings() const { return vendor_.initial_settings(state_).settings; }
 
   void on_event(Session& from, const protocol::Event& event) override;
-  void on_written(Session& by, std::uint32_t ping) override;
+  void on_written(Session& by, const Outbox::Message& message) override;
   void on_fault(Session& session, const std::string& what) override;
   void on_over(Session& session, const std::string& why) override;
 
@@ -89,12 +82,12 @@ class Device final : public SessionParent {
   void keep_accepting();
   void keep_announcing();
   asio::awaitable<void> accept();
-  asio::awaitable<void> turn_away(tcp::socket socket);
+  asio::awaitable<void> turn_away(tcp::socket socket, Admission::Place place);
   asio::awaitable<void> announce();
-  void admit(tcp::socket socket);
+  void admit(tcp::socket socket, Admission::Place place);
   void say_visit(const std::string& what, std::vector<LogField> fields);
   void say_fault(const std::string& what);
-  void welcome(tcp::socket socket);
+  void welcome(tcp::socket socket, Admission::Place place);
   void on_membership();
   void use_initial_settings();
   void change_settings(Session& from, const protocol::ChangeSettings& change);
@@ -104,6 +97,7 @@ class Device final : public SessionParent {
   void ping(Time at);
   void on_ping(Simulator::Outcome outcome);
   void update_state(Time now);
+  void keep_figures_of(const Session& session);
 
   DeviceContext& context_;
   const SonarConfig& config_;
@@ -120,7 +114,11 @@ class Device final : public SessionParent {
 
   std::list<SessionPointer> sessions_;  // oldest first
   std::list<SessionPointer> leaving_;   // no longer counted as clients, still taking their last message
-  std::list<tcp::socket> queue_;        // connected, waiting for a place
+  struct Waiting {
+    tcp::socket socket;
+    Admission::Place place;
+  };
+  std::list<Waiting> queue_;  // connected, waiting for a place
   int turning_away_ = 0;
 
   Pacer pacer_;
@@ -136,7 +134,10 @@ class Device final : public SessionParent {
 
   DeviceFigures figures_;
   LogLimiter refusals_, visits_, changes_, notices_, faults_;
-  std::uint32_t last_served_ = 0;
+  struct {
+    std::uint32_t ping = 0;
+    Time tick{}, at{};
+  } last_served_;
   std::vector<StreamDigest> digests_;
 };
 

@@ -1,5 +1,6 @@
 // A Device's clients: who is let in, who waits, who is turned away, and what changes when one comes or goes.
 #include <array>
+#include <cmath>
 
 #include "daemon/device.hpp"
 
@@ -46,27 +47,33 @@ asio::awaitable<void> Device::accept() {
     tcp::socket socket = co_await acceptor_.async_accept(into(ec));
     if (stopping_) co_return;
     if (ec) {
+      if (context_.admission.send_away(acceptor_, ec)) continue;
       asio::steady_timer pause(context_.io, accept_pause);
       co_await pause.async_wait(into(ec));
       continue;
     }
-    admit(std::move(socket));
+    if (auto place = context_.admission.enter(socket)) {
+      admit(std::move(socket), std::move(place));
+    } else {
+      ++figures_.refused_clients;
+      close_politely(socket);
+    }
   }
 }
 
-void Device::admit(tcp::socket socket) {
-  if (sessions_.size() < static_cast<std::size_t>(config_.max_clients)) return welcome(std::move(socket));
+void Device::admit(tcp::socket socket, Admission::Place place) {
+  if (sessions_.size() < static_cast<std::size_t>(config_.max_clients)) return welcome(std::move(socket), std::move(place));
   if (config_.when_full == WhenClientsFull::take_over) {
     const SessionPointer oldest = sessions_.front();
     sessions_.pop_front();
     leaving_.push_back(oldest);
     oldest->finish("another client took over");
     if (sessions_.empty()) use_initial_settings();
-    return welcome(std::move(socket));
+    return welcome(std::move(socket), std::move(place));
   }
   if (config_.when_full == WhenClientsFull::queue && queue_.size() < longest_queue) {
     say_visit("client waits for a place", {{"waiting", queue_.size() + 1}});
-    queue_.push_back(std::move(socket));
+    queue_.push_back({std::move(socket), std::move(place)});
     return;
   }
   ++figures_.refused_clients;
@@ -74,7 +81,8 @@ void Device::admit(tcp::socket socket) {
   if (turning_away_ >= most_turned_away_at_once || stopping_) return;
   ++turning_away_;
   asio::co_spawn(
-      context_.io, [this, s = std::move(socket)]() mutable { return turn_away(std::move(s)); },
+      context_.io,
+      [this, s = std::move(socket), p = std::move(place)]() mutable { return turn_away(std::move(s), std::move(p)); },
       [this](std::exception_ptr fault) {
         if (fault) say_fault(text_of(fault));
         --turning_away_;
@@ -83,7 +91,7 @@ void Device::admit(tcp::socket socket) {
 }
 
 /// FIN and no byte. What the client has sent meanwhile is read away, or the kernel would answer it with RST.
-asio::awaitable<void> Device::turn_away(tcp::socket socket) {
+asio::awaitable<void> Device::turn_away(tcp::socket socket, Admission::Place place) {
   error_code ec;
   socket.shutdown(tcp::socket::shutdown_send, ec);
   asio::steady_timer deadline(context_.io, std::chrono::seconds(1));
@@ -95,11 +103,13 @@ asio::awaitable<void> Device::turn_away(tcp::socket socket) {
   deadline.cancel();
   // The handler above must be done with `socket` before this frame goes.
   co_await asio::post(context_.io, asio::use_awaitable);
+  socket.close(ec);  // before its place is free
+  place.reset();
 }
 
-void Device::welcome(tcp::socket socket) {
+void Device::welcome(tcp::socket socket, Admission::Place place) {
   const Time now = context_.clock.now();
-  Session::Setup setup{config_.outbox, context_.digest, ++figures_.clients, context_.stall_limit};
+  Session::Setup setup{config_.outbox, context_.digest, ++figures_.clients, context_.config.limits, std::move(place)};
   update_state(now);
   auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket), vendor_.converse(state_, now), setup);
   say_visit("client connected", {{"client", session->client()}});
@@ -124,19 +134,66 @@ void Device::on_over(Session& session, const std::string& why) {
   say_visit(
       "client gone: " + why,
       {{"client", session.client()}, {"pings", session.outbox().pings_written()}, {"dropped", session.outbox().pings_dropped()}});
-  figures_.dropped += session.outbox().pings_dropped();
+  keep_figures_of(session);
   if (context_.digest) digests_.push_back({session.number(), session.digest().size(), session.digest().hex()});
   const auto is_it = [&session](const SessionPointer& s) { return s.get() == &session; };
   leaving_.remove_if(is_it);
   if (sessions_.remove_if(is_it) == 0) return context_.on_change();
   if (!stopping_ && !queue_.empty()) {
-    tcp::socket next = std::move(queue_.front());
+    Waiting next = std::move(queue_.front());
     queue_.pop_front();
     if (sessions_.empty()) use_initial_settings();
-    welcome(std::move(next));
+    welcome(std::move(next.socket), std::move(next.place));
   } else {
     on_membership();
   }
+}
+
+// ---- figures
+
+namespace {
+
+void add(DeviceFigures& f, const Session& s) {
+  const Outbox& box = s.outbox();
+  f.offered += box.pings_offered();
+  f.sent += box.pings_written();
+  f.dropped += box.pings_dropped();
+  for (std::size_t why = 0; why < drop_reasons; ++why) f.dropped_by[why] += box.dropped_by_reason()[why];
+  f.waiting += box.pings_waiting();
+  f.bytes_written += s.bytes_written();
+  f.bytes_read += s.bytes_read();
+}
+
+}  // namespace
+
+void Device::on_written(Session&, const Outbox::Message& message) {
+  if (message.ping != 0) {
+    const Time now = context_.clock.now();
+    const auto seconds = [](std::chrono::nanoseconds d) { return std::chrono::duration<double>(d).count(); };
+    figures_.latency.add(seconds(now - message.fired_at));
+    if (message.ping > last_served_.ping) {
+      if (last_served_.ping != 0)
+        figures_.jitter.add(std::abs(seconds(now - last_served_.at) - seconds(message.fired_at - last_served_.tick)));
+      last_served_ = {message.ping, message.fired_at, now};
+      ++figures_.served;
+    }
+  }
+  context_.on_change();
+}
+
+/// Of a session that ends: they stay when it is gone.
+void Device::keep_figures_of(const Session& session) { add(figures_, session); }
+
+DeviceFigures Device::figures() const {
+  DeviceFigures f = figures_;
+  f.ticks = pacer_.ticks();
+  f.skipped = pacer_.skipped();
+  f.skipped_ticks = f.skipped.total() + f.skipped_stale;
+  f.clients_now = sessions_.size();
+  f.clients_queued = queue_.size();
+  for (const auto* list : {&sessions_, &leaving_})
+    for (const SessionPointer& s : *list) add(f, *s);
+  return f;
 }
 
 }  // namespace sonar

@@ -50,13 +50,15 @@ Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at) {
 
 void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit) {
   namespace option = asio::detail::socket_option;
-  const int limit_s = static_cast<int>(std::max(std::chrono::ceil<std::chrono::seconds>(limit).count(), std::int64_t{3}));
+  // Three probes, the last with a second to spare where there is one: kernel timers are late rather than early.
+  const auto probe_s =
+      static_cast<int>(std::max(std::chrono::floor<std::chrono::seconds>(limit).count() - 1, std::int64_t{3}) / 3);
   error_code ec;  // a refused option leaves the kernel's own patience, a quarter of an hour and more
   socket.set_option(asio::socket_base::keep_alive(true), ec);
-  socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPIDLE>(limit_s / 3), ec);
-  socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPINTVL>(limit_s / 3), ec);
+  socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPIDLE>(probe_s), ec);
+  socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPINTVL>(probe_s), ec);
   socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPCNT>(2), ec);
-  socket.set_option(option::integer<IPPROTO_TCP, TCP_USER_TIMEOUT>(1000 * limit_s), ec);
+  socket.set_option(option::integer<IPPROTO_TCP, TCP_USER_TIMEOUT>(3000 * probe_s), ec);
 }
 
 Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast) {

@@ -13,7 +13,7 @@ Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at);
 /// `broadcast`: may send to broadcast addresses.
 Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast);
 
-/// A peer that answers nothing for `limit`, be it our bytes or the probes sent while there are none, ends the connection with
+/// A peer that answers nothing, be it our bytes or the probes sent while there are none, ends the connection within `limit` with
 /// asio::error::timed_out. Whole seconds; at least 3.
 void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit);
 

@@ -13,6 +13,7 @@
 #include "daemon/bench.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/effective_switches.hpp"
+#include "daemon/real_time.hpp"
 #include "daemon/render/render_command.hpp"
 #include "daemon/standard_streams.hpp"
 
@@ -20,7 +21,6 @@ namespace sonar {
 namespace {
 
 using Steady = std::chrono::steady_clock;
-constexpr int compute_niceness = 10;
 
 double seconds_since(Steady::time_point begin) { return std::chrono::duration<double>(Steady::now() - begin).count(); }
 
@@ -56,6 +56,7 @@ int compute_threads(const EngineConfig& engine) {
 
 int run(const RunCommand& command, Steady::time_point begin) {
   std::signal(SIGPIPE, SIG_IGN);  // nobody reads the log any more (sonard 2>&1 | head): no reason to leave the clients
+  raise_descriptor_limit();
   auto found = find_config(command);
   if (!found) return complain(found.error());
   Config config = std::move(found->config);
@@ -69,8 +70,11 @@ int run(const RunCommand& command, Steady::time_point begin) {
   if (const std::string note = note_of_parts_left_out(config.engine.switches); !note.empty()) log.info(note);
   Parallel pool(compute_threads(config.engine), compute_niceness);  // outlives the engine inside App
   const EngineOptions engine_options{config.engine.simd};
-  auto engine =
-      start_engine([&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, engine_options); }, *scene);
+  Result<std::unique_ptr<PingEngine>> engine;
+  compute_apart([&] {
+    engine =
+        start_engine([&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, engine_options); }, *scene);
+  });
   if (!engine) return complain(engine.error());
   const auto make_engine = [&](const std::shared_ptr<const Scene>&) { return *std::move(engine); };
   AppOptions options;

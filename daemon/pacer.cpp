@@ -1,6 +1,7 @@
 #include "daemon/pacer.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace sonar {
 
@@ -16,7 +17,7 @@ void Pacer::configure(const PingSettings& settings, Time now) {
   if (running_ && period == period_ && settings.triggered == triggered_) return;
   const Time quiet_until = has_fired_ ? last_tick_ + period_ : now;
   running_ = period.count() > 0;
-  trigger_waits_ = trigger_waits_ && running_ && triggered_ && settings.triggered;
+  if (!(running_ && triggered_ && settings.triggered)) forget_trigger();
   triggered_ = settings.triggered;
   if (running_) {
     period_ = period;
@@ -28,15 +29,22 @@ void Pacer::configure(const PingSettings& settings, Time now) {
 
 void Pacer::stop() {
   running_ = false;
-  trigger_waits_ = false;
+  forget_trigger();
+}
+
+void Pacer::forget_trigger() {
+  if (std::exchange(trigger_waits_, false)) ++skipped_.trigger;
 }
 
 void Pacer::trigger(Time now, bool joins) {
   if (!running_ || !triggered_) return;
   if (trigger_waits_) {
-    if (!joins) ++skipped_;
+    if (joins) return;
+    ++ticks_;
+    ++skipped_.trigger;
     return;
   }
+  ++ticks_;
   trigger_waits_ = true;
   trigger_at_ = has_fired_ ? std::max({now, start_, last_tick_ + period_}) : std::max(now, start_);
 }
@@ -61,10 +69,12 @@ bool Pacer::fire(Time now, bool busy) {
     return true;
   }
   const std::int64_t reached = (now - start_) / period_;  // index of the newest tick that has passed
-  skipped_ += static_cast<std::uint64_t>(reached - index_);
+  const auto missed = static_cast<std::uint64_t>(reached - index_);
+  ticks_ += missed + 1;
+  skipped_.late += missed;
   index_ = reached + 1;
   if (busy) {
-    ++skipped_;
+    ++skipped_.busy;
     return false;
   }
   last_tick_ = start_ + reached * period_;

@@ -14,6 +14,14 @@ namespace sonar {
 /// range plus 2 ms (docs/protocols/oculus.md, section 5.6). Zero in standby.
 std::chrono::nanoseconds ping_period(const PingSettings& settings);
 
+/// Ticks and triggers that no ping came of.
+struct SkippedTicks {
+  std::uint64_t late = 0;     // the next one was due already
+  std::uint64_t busy = 0;     // the ping before it was still being computed
+  std::uint64_t trigger = 0;  // one waited already, or pings ended before its turn
+  std::uint64_t total() const { return late + busy + trigger; }
+};
+
 class Pacer {
  public:
   /// New settings. The grid goes on when period and trigger mode stay the same; otherwise it restarts at `now`, but not before
@@ -32,16 +40,22 @@ class Pacer {
 
   Time last_tick() const { return last_tick_; }
   std::chrono::nanoseconds period() const { return period_; }
-  std::uint64_t skipped_ticks() const { return skipped_; }
+  /// That were due; those skipped, fired, and a trigger that waits add up to it.
+  std::uint64_t ticks() const { return ticks_; }
+  const SkippedTicks& skipped() const { return skipped_; }
+  std::uint64_t skipped_ticks() const { return skipped_.total(); }
 
  private:
+  void forget_trigger();
+
   bool running_ = false, triggered_ = false, trigger_waits_ = false, has_fired_ = false;
   std::chrono::nanoseconds period_{0};
   Time start_{};            // of the grid
   std::int64_t index_ = 0;  // of the next tick on it
   Time trigger_at_{};
   Time last_tick_{};
-  std::uint64_t skipped_ = 0;
+  std::uint64_t ticks_ = 0;
+  SkippedTicks skipped_;
 };
 
 }  // namespace sonar

@@ -18,12 +18,12 @@ std::string reason(const error_code& ec) {
   return ec == asio::error::timed_out ? "takes no byte and does not answer any more" : ec.message();
 }
 
-void prepare(tcp::socket& socket, std::chrono::milliseconds stall_limit) {
+void prepare(tcp::socket& socket, const LimitConfig& limits) {
   error_code ec;  // a refused option costs smoothness, not correctness
   socket.set_option(tcp::no_delay(true), ec);
   using UnsentLimit = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
   socket.set_option(UnsentLimit(unsent_limit_bytes), ec);
-  end_when_silent(socket, stall_limit);  // one that is gone without a word, while little or nothing is sent to it
+  end_when_silent(socket, limits.dead_peer);  // one that is gone without a word, while little or nothing is sent to it
 }
 
 }  // namespace
@@ -36,12 +36,14 @@ Session::Session(SessionParent& parent, const Clock& clock, tcp::socket socket, 
       dialogue_(std::move(dialogue)),
       setup_(setup),
       outbox_(setup.outbox),
+      input_rate_(setup.limits.input_bytes_per_s),
+      wake_reader_(socket_.get_executor()),
       wake_writer_(socket_.get_executor(), Steady::time_point::max()),
       wake_watch_(socket_.get_executor()) {
   error_code ec;
   peer_ = socket_.remote_endpoint(ec);
   client_ = peer_.address().to_string() + ":" + std::to_string(peer_.port());
-  prepare(socket_, setup_.stall_limit);
+  prepare(socket_, setup_.limits);
 }
 
 protocol::Ipv4 Session::client_ip() const {
@@ -76,8 +78,18 @@ asio::awaitable<void> Session::read() {
       over(finishing_ ? why_ : reason(ec));
       co_return;
     }
+    bytes_read_ += n;
     if (!finishing_) handle(dialogue_->on_bytes(std::span(received_).first(n), clock_.now()));
+    const auto pause = input_rate_.pause_after(n, Steady::now());
+    if (pause.count() > 0 && !finishing_) co_await rest(pause);
   }
+}
+
+/// A client that sends too much waits; its goodbye, too, is only read then. finish() and over() end the pause.
+asio::awaitable<void> Session::rest(Steady::duration pause) {
+  wake_reader_.expires_after(pause);
+  error_code ec;
+  co_await wake_reader_.async_wait(into(ec));
 }
 
 void Session::handle(protocol::Reaction reaction) {
@@ -118,6 +130,7 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
     }
     if (setup_.digest) digest_.add(bytes.subspan(done, n));
     done += n;
+    bytes_written_ += n;
     progress_at_ = Steady::now();
   }
   co_return true;
@@ -134,7 +147,7 @@ asio::awaitable<void> Session::write() {
       if (!co_await write_whole(message)) co_return;
       writing_ = false;
       outbox_.written();
-      parent_.on_written(*this, message.ping);
+      parent_.on_written(*this, message);
     } else if (finishing_) {
       socket_.shutdown(tcp::socket::shutdown_send, ec);
       said_goodbye_ = true;  // the reader waits for the client's own goodbye, the watch for the deadline
@@ -163,8 +176,8 @@ asio::awaitable<void> Session::watch() {
     if (finishing_ && now >= finish_by_) {
       if (!said_goodbye_) reset("did not take its last message in time");
       over(why_);
-    } else if (writing_ && now - progress_at_ > setup_.stall_limit) {
-      reset("took no byte for " + std::to_string(setup_.stall_limit.count()) + " ms");
+    } else if (writing_ && now - progress_at_ > setup_.limits.stall) {
+      reset("took no byte for " + std::to_string(setup_.limits.stall.count()) + " ms");
     } else if (!finishing_ && !clock_.stepped()) {
       tick(clock_.now());
     }
@@ -176,13 +189,14 @@ void Session::tick(Time now) {
   handle(dialogue_->on_tick(now));
 }
 
-std::vector<protocol::Event> Session::push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, std::uint32_t number,
+std::vector<protocol::Event> Session::push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,
                                                 protocol::BytesView made_with, Time now) {
   if (over_ || finishing_) return {};
   protocol::Delivery delivery = dialogue_->on_ping(made_with, bytes->size(), now);
   if (!delivery.prefixes.empty()) {
     const bool as_it_is = delivery.prefixes.size() == 1 && delivery.prefixes.front().empty();
-    outbox_.push_ping(bytes, number, as_it_is ? std::vector<protocol::Bytes>{} : std::move(delivery.prefixes));
+    outbox_.push_ping(bytes, static_cast<std::uint32_t>(ping.number),
+                      as_it_is ? std::vector<protocol::Bytes>{} : std::move(delivery.prefixes), ping.fired_at);
     wake_writer_.cancel();
   }
   return std::move(delivery.events);
@@ -193,7 +207,8 @@ void Session::finish(std::string why) {
   finishing_ = true;
   why_ = std::move(why);
   finish_by_ = Steady::now() + finish_limit;
-  outbox_.drop_waiting_pings();
+  outbox_.drop_waiting_pings(DropReason::stop);
+  wake_reader_.cancel();
   wake_writer_.cancel();
   wake_watch_.cancel();
 }
@@ -209,6 +224,8 @@ void Session::over(std::string why) {
   if (std::exchange(over_, true)) return;
   error_code ec;
   socket_.close(ec);
+  outbox_.end(finishing_ ? DropReason::stop : DropReason::gone);
+  wake_reader_.cancel();
   wake_writer_.cancel();
   wake_watch_.cancel();
   parent_.on_over(*this, why);

@@ -8,8 +8,11 @@
 #include <memory>
 #include <string>
 
+#include "core/sonar/ping.hpp"
 #include "daemon/asio.hpp"
 #include "daemon/clock.hpp"
+#include "daemon/config.hpp"
+#include "daemon/input_rate.hpp"
 #include "daemon/outbox.hpp"
 #include "daemon/sha256.hpp"
 #include "protocol/vendor.hpp"
@@ -24,8 +27,8 @@ class SessionParent {
   virtual ~SessionParent() = default;
   /// Settings, triggers and stored addresses; replies, notices and Close are the session's own business.
   virtual void on_event(Session& from, const protocol::Event& event) = 0;
-  /// A message has been handed to the kernel whole; `ping` is its number or 0.
-  virtual void on_written(Session& by, std::uint32_t ping) = 0;
+  /// A message has been handed to the kernel whole.
+  virtual void on_written(Session& by, const Outbox::Message& message) = 0;
   /// An exception ended one of its coroutines; on_over follows.
   virtual void on_fault(Session& session, const std::string& what) = 0;
   virtual void on_over(Session& session, const std::string& why) = 0;
@@ -36,8 +39,9 @@ class Session : public std::enable_shared_from_this<Session> {
   struct Setup {
     OutboxRules outbox;
     bool digest = false;
-    std::uint64_t number = 0;                      // of the client, counted per sonar from 1
-    std::chrono::milliseconds stall_limit{10000};  // a client that takes no byte for so long is reset
+    std::uint64_t number = 0;           // of the client, counted per sonar from 1
+    LimitConfig limits;                 // what it may cost us
+    std::shared_ptr<const void> place;  // kept as long as the session lives
   };
   /// Longest time a client may take for its last message after finish(); then it is reset.
   static constexpr std::chrono::milliseconds finish_limit{1500};
@@ -47,7 +51,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   void start();
   /// Offers a ping, made with the settings of that request. Returns what the client wants next, for the device.
-  std::vector<protocol::Event> push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, std::uint32_t number,
+  std::vector<protocol::Event> push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,
                                          protocol::BytesView made_with, Time now);
   /// Stepped time: the keep-alives that are due at `now`.
   void tick(Time now);
@@ -60,6 +64,9 @@ class Session : public std::enable_shared_from_this<Session> {
   const Outbox& outbox() const { return outbox_; }
   const Sha256& digest() const { return digest_; }
   std::uint64_t number() const { return setup_.number; }
+  std::uint64_t bytes_written() const { return bytes_written_; }
+  std::uint64_t bytes_read() const { return bytes_read_; }
+  std::chrono::steady_clock::duration connected_for() const { return Steady::now() - connected_at_; }
   protocol::Ipv4 client_ip() const;
   std::string client() const { return client_; }  // "127.0.0.1:40123"
 
@@ -67,6 +74,7 @@ class Session : public std::enable_shared_from_this<Session> {
   using Steady = std::chrono::steady_clock;
 
   asio::awaitable<void> read();
+  asio::awaitable<void> rest(Steady::duration pause);
   asio::awaitable<void> write();
   asio::awaitable<void> watch();
   asio::awaitable<bool> write_whole(const Outbox::Message& message);
@@ -85,8 +93,11 @@ class Session : public std::enable_shared_from_this<Session> {
   Setup setup_;
   Outbox outbox_;
   Sha256 digest_;
-  asio::steady_timer wake_writer_, wake_watch_;
+  InputRate input_rate_;
+  asio::steady_timer wake_reader_, wake_writer_, wake_watch_;
   std::array<std::byte, 8192> received_{};
+  const Steady::time_point connected_at_ = Steady::now();
+  std::uint64_t bytes_written_ = 0, bytes_read_ = 0;
   Steady::time_point progress_at_{};  // a byte went out, while writing
   Steady::time_point finish_by_{};
   bool writing_ = false, finishing_ = false, said_goodbye_ = false, over_ = false;

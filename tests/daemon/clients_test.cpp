@@ -62,7 +62,7 @@ TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {
 
 TEST(Clients, OneThatTakesNothingIsReset) {
   DaemonSetup setup;
-  setup.options.stall_limit = milliseconds(300);
+  setup.more = "limits: {stall_s: 0.3}\n";
   Daemon daemon(setup);
   Client stalled(daemon.address(), 52100, 16384);
   stalled.fire(large_fire(PingRate::hz40));
@@ -76,7 +76,7 @@ TEST(Clients, OneThatTakesNothingIsReset) {
 
 TEST(Clients, OneWhoseComputerDiedInStandbyFreesItsPlace) {
   DaemonSetup setup;
-  setup.options.stall_limit = milliseconds(3000);
+  setup.more = "limits: {dead_peer_s: 3}\n";
   setup.sonar_lines = "    options: {dummy_period_ms: 200}\n";
   Daemon daemon(setup);
   Client dead(daemon.address());
@@ -93,7 +93,7 @@ TEST(Clients, OneWhoseComputerDiedInStandbyFreesItsPlace) {
 /// Nothing is sent to it: dummies are far apart, so only the kernel's probes can find out.
 TEST(Clients, OneWhoseComputerDiedInSilenceFreesItsPlace) {
   DaemonSetup setup;
-  setup.options.stall_limit = milliseconds(3000);
+  setup.more = "limits: {dead_peer_s: 3}\n";
   setup.sonar_lines = "    options: {dummy_period_ms: 60000}\n";
   Daemon daemon(setup);
   Client dead(daemon.address());

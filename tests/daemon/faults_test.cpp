@@ -24,7 +24,7 @@ class AskingDialogue final : public protocol::Dialogue {
 struct ThrowingParent final : SessionParent {
   std::string fault, why;
   void on_event(Session&, const protocol::Event&) override { throw std::runtime_error("no such luck"); }
-  void on_written(Session&, std::uint32_t) override {}
+  void on_written(Session&, const Outbox::Message&) override {}
   void on_fault(Session&, const std::string& what) override { fault = what; }
   void on_over(Session&, const std::string& reason) override { why = reason; }
 };

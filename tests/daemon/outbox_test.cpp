@@ -91,5 +91,45 @@ TEST(Outbox, DropWaitingPingsKeepsTheMessageBeingWrittenAndReplies) {
   EXPECT_EQ(box.pings_dropped(), 2u);
 }
 
+std::uint64_t dropped(const Outbox& box, DropReason why) { return box.dropped_by_reason()[static_cast<std::size_t>(why)]; }
+
+TEST(Outbox, EveryPingOfferedIsWrittenOrDroppedForAReason) {
+  Outbox box({2, WhenFull::replace_oldest});
+  push(box, 1);
+  ASSERT_TRUE(box.take());
+  box.written();
+  for (int i = 2; i <= 5; ++i) push(box, i);  // 4 and 5 wait, 2 and 3 found no place
+  ASSERT_TRUE(box.take());
+  EXPECT_EQ(box.pings_waiting(), 1u);
+  box.end(DropReason::gone);  // in the middle of 4
+  EXPECT_TRUE(box.idle());
+  EXPECT_EQ(box.pings_offered(), 5u);
+  EXPECT_EQ(box.pings_written(), 1u);
+  EXPECT_EQ(dropped(box, DropReason::slow), 2u);
+  EXPECT_EQ(dropped(box, DropReason::gone), 2u) << "the one being written, and the one waiting";
+  EXPECT_EQ(dropped(box, DropReason::stop), 0u);
+  EXPECT_EQ(box.pings_offered(), box.pings_written() + box.pings_dropped());
+}
+
+TEST(Outbox, AReplyThatIsCutIsNoDroppedPing) {
+  Outbox box({1, WhenFull::replace_oldest});
+  ASSERT_TRUE(box.push_reply(reply(1)));
+  ASSERT_TRUE(box.push_reply(reply(2)));
+  ASSERT_TRUE(box.take());
+  push(box, 1);
+  box.drop_waiting_pings();
+  box.end(DropReason::gone);
+  EXPECT_TRUE(box.idle());
+  EXPECT_EQ(dropped(box, DropReason::stop), 1u);
+  EXPECT_EQ(box.pings_dropped(), 1u);
+}
+
+TEST(Outbox, AMessageKnowsWhenItsPingWasFired) {
+  Outbox box({1, WhenFull::replace_oldest});
+  const Time fired = Time(std::chrono::seconds(7));
+  box.push_ping(std::make_shared<const Outbox::Bytes>(10), 1, {}, fired);
+  EXPECT_EQ(box.take().fired_at, fired);
+}
+
 }  // namespace
 }  // namespace sonar

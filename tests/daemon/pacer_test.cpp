@@ -129,5 +129,25 @@ TEST(Pacer, StopForgetsTheRhythm) {
   EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(130));
 }
 
+TEST(Pacer, EveryTickIsFiredOrSkippedForAReason) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  EXPECT_TRUE(pacer.fire(t0, false));
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(450), false));  // 100, 200, 300 are late
+  EXPECT_FALSE(pacer.fire(t0 + milliseconds(620), true));  // 500 late, 600 busy
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(700), false));
+  EXPECT_EQ(pacer.ticks(), 8u);
+  EXPECT_EQ(pacer.skipped().late, 4u);
+  EXPECT_EQ(pacer.skipped().busy, 1u);
+  pacer.configure(settings(10, 5, true), t0 + milliseconds(700));
+  pacer.trigger(t0 + milliseconds(750));
+  pacer.trigger(t0 + milliseconds(751), true);  // joins: not one of its own
+  pacer.trigger(t0 + milliseconds(752));
+  pacer.stop();  // and the one that waits has nobody left
+  EXPECT_EQ(pacer.ticks(), 10u);
+  EXPECT_EQ(pacer.skipped().trigger, 2u);
+  EXPECT_EQ(pacer.ticks(), 3u + pacer.skipped_ticks());
+}
+
 }  // namespace
 }  // namespace sonar

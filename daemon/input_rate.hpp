@@ -1,0 +1,34 @@
+// How fast one client is read: a bucket of bytes that fills at the allowed rate. Pure arithmetic; the Session asks after each
+// read how long to wait before the next, so that a client that sends too much waits in its own kernel.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+
+namespace sonar {
+
+class InputRate {
+ public:
+  using Steady = std::chrono::steady_clock;
+  /// What may come at once after a pause: a second's worth. 0 bytes a second: no limit.
+  explicit InputRate(std::size_t bytes_per_s) : rate_(static_cast<double>(bytes_per_s)), tokens_(rate_) {}
+
+  /// `bytes` were read; 0 = read on.
+  Steady::duration pause_after(std::size_t bytes, Steady::time_point now) {
+    if (rate_ <= 0) return {};
+    if (begun_) tokens_ = std::min(rate_, tokens_ + rate_ * std::chrono::duration<double>(now - last_).count());
+    begun_ = true;
+    last_ = now;
+    tokens_ -= static_cast<double>(bytes);
+    if (tokens_ >= 0) return {};
+    return std::chrono::duration_cast<Steady::duration>(std::chrono::duration<double>(-tokens_ / rate_));
+  }
+
+ private:
+  double rate_, tokens_;
+  bool begun_ = false;
+  Steady::time_point last_{};
+};
+
+}  // namespace sonar
