@@ -62,7 +62,7 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
 std::string sentence_from(const std::string& words) {
   constexpr std::string_view unknown = ": Cannot find field.";
   const auto at = words.find(unknown);
-  if (at == std::string::npos) return words;
+  if (at == std::string::npos) return words.substr(0, words.find('\n'));  // what follows shows the place, over several lines
   std::string key = words.substr(0, at);
   if (const auto space = key.rfind(' '); space != std::string::npos) key.erase(0, space + 1);
   return in_quotes(key) + ": unknown key";
@@ -86,6 +86,8 @@ Result<Request> request_from_json(std::string_view op, std::string_view json) {
   const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
   if (field == nullptr || field->containing_oneof() == nullptr) return refused("no such request");
   if (json.size() > largest_json) return refused("longer than 1 MiB");
+  if (const auto zero = json.find('\0'); zero != std::string_view::npos)  // to the reader the end, to protobuf more to read
+    return refused("not JSON: a zero byte at character " + std::to_string(zero + 1));
   StrictReader reader;
   if (!nlohmann::json::sax_parse(json, &reader)) return refused(reader.why);
   if (json.find_first_not_of(" \t\r\n") == std::string_view::npos || json[json.find_first_not_of(" \t\r\n")] != '{')

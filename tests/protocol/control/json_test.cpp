@@ -65,6 +65,7 @@ TEST(ControlJson, RefusesWithASentence) {
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5} {"range_m":6})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", "{\"sonar\":\"\xff\"}"), HasSubstr("not JSON"));
+  EXPECT_EQ(refusal_of("sonar", std::string("{}\0\n{", 5)), "not JSON: a zero byte at character 3");
   EXPECT_THAT(refusal_of("sonar", "[]"), HasSubstr("not a JSON object"));
   EXPECT_THAT(refusal_of("sonar", ""), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", std::string(100000, '[')), HasSubstr("nested deeper than 16"));
