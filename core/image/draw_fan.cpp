@@ -12,26 +12,6 @@ namespace {
 
 constexpr Rgb background{13, 17, 23}, ring_colour{150, 160, 170}, text_colour{190, 198, 206};
 
-/// Pixels and metres: the apex is at (apex_x, apex_y), y grows downwards.
-struct Layout {
-  int width = 0, height = 0;
-  double apex_x = 0, apex_y = 0, metres_per_pixel = 1;
-};
-
-Layout lay_out(const PolarImage& image, const FanStyle& style) {
-  const double half_aperture = std::max(std::abs(image.azimuth_rad.front()), std::abs(image.azimuth_rad.back()));
-  const double margin = style.rings ? 28 : 4;
-  Layout layout;
-  layout.width = style.width_px;
-  layout.metres_per_pixel = 2 * image.range_m() * std::sin(half_aperture) / (style.width_px - 2 * margin);
-  // A very narrow fan would be very tall.
-  layout.metres_per_pixel = std::max(layout.metres_per_pixel, image.range_m() / (4.0 * style.width_px));
-  layout.apex_x = style.width_px / 2.0;
-  layout.apex_y = margin + image.range_m() / layout.metres_per_pixel;
-  layout.height = static_cast<int>(std::ceil(layout.apex_y + margin));
-  return layout;
-}
-
 /// Place in the beam table, fractional; beam k spans [k - 0.5, k + 0.5]. Nothing outside the fan.
 std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azimuth) {
   const auto next = std::lower_bound(azimuth_rad.begin(), azimuth_rad.end(), azimuth, std::greater<>());
@@ -81,7 +61,7 @@ std::optional<float> footprint_mean(const PolarImage& image, double x_m, double 
   return static_cast<float>(sum / weights);
 }
 
-void draw_rings(Raster& raster, const PolarImage& image, const Layout& layout) {
+void draw_rings(Raster& raster, const PolarImage& image, const FanLayout& layout) {
   const double spacing = ring_spacing_m(image.range_m());
   const int scale = std::max(1, layout.width / 400);
   for (int ring = 1; ring * spacing <= image.range_m() * 1.0001; ++ring) {
@@ -117,6 +97,20 @@ Result<void> check(const PolarImage& image, const FanStyle& style) {
 
 }  // namespace
 
+FanLayout fan_layout(const PolarImage& image, const FanStyle& style) {
+  const double half_aperture = std::max(std::abs(image.azimuth_rad.front()), std::abs(image.azimuth_rad.back()));
+  const double margin = style.rings ? 28 : 4;
+  FanLayout layout;
+  layout.width = style.width_px;
+  layout.metres_per_pixel = 2 * image.range_m() * std::sin(half_aperture) / (style.width_px - 2 * margin);
+  // A very narrow fan would be very tall.
+  layout.metres_per_pixel = std::max(layout.metres_per_pixel, image.range_m() / (4.0 * style.width_px));
+  layout.apex_x = style.width_px / 2.0;
+  layout.apex_y = margin + image.range_m() / layout.metres_per_pixel;
+  layout.height = static_cast<int>(std::ceil(layout.apex_y + margin));
+  return layout;
+}
+
 double ring_spacing_m(double range_m) {
   const double decade = std::pow(10.0, std::floor(std::log10(range_m)));
   for (const double step : {0.1, 0.2, 0.5, 1.0})
@@ -126,7 +120,7 @@ double ring_spacing_m(double range_m) {
 
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style) {
   if (Result<void> sound = check(image, style); !sound) return tl::unexpected(sound.error());
-  const Layout layout = lay_out(image, style);
+  const FanLayout layout = fan_layout(image, style);
   Raster raster(layout.width, layout.height);
   for (int y = 0; y < layout.height; ++y) {
     for (int x = 0; x < layout.width; ++x) {

@@ -17,6 +17,14 @@ struct FanStyle {
   bool rings = true;  // range rings with their metres
 };
 
+/// Where the picture's metres lie among its pixels: the sonar is at (apex_x, apex_y), y grows downwards.
+struct FanLayout {
+  int width = 0, height = 0;
+  double apex_x = 0, apex_y = 0, metres_per_pixel = 1;
+};
+/// Of an image that draw_fan does not refuse.
+FanLayout fan_layout(const PolarImage& image, const FanStyle& style);
+
 /// Refuses an image without rows or beams, with a bearing table that does not run from port to starboard, or a fan wider than
 /// half a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
