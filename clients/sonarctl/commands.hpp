@@ -12,6 +12,7 @@
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
 #include "core/image/draw_fan.hpp"
+#include "core/image/terminal_fan.hpp"
 #include "protocol/control/pose_sample.hpp"
 #include "protocol/oculus/fire.hpp"
 
@@ -42,8 +43,12 @@ Result<void> listen(const ListenOptions& options);
 
 struct ViewOptions {
   SourceOptions source;
-  std::filesystem::path png;
-  std::size_t ping = 0;  // which of a recording's, from 0
+  std::filesystem::path png;               // file to write, or
+  bool terminal = false;                   // the picture as text
+  bool live = false;                       // every ping until interrupted, or so many
+  std::uint64_t pings = 0;                 // 0 = no limit
+  std::optional<TerminalColours> colours;  // nothing = what the terminal can show
+  std::size_t ping = 0;                    // which of a recording's, from 0
   FanStyle style;
 };
 Result<void> view(const ViewOptions& options);
@@ -62,6 +67,7 @@ struct PoseOptions {
   std::string to;                                  // HOST:PORT; empty = 127.0.0.1 and the protocol's port
   bool json = false;                               // JSON lines instead of protobuf
   bool confirm = false;                            // over the TCP control stream, each pose answered by the daemon
+  std::filesystem::path token_file;                // for the control stream of a sonard that wants one
   control::Frame frame = control::Frame::enu_flu;  // of the positions and angles below, and of what is sent
   std::string vehicle, object;                     // at most one; empty = the only vehicle there is. Objects go over TCP
   double rate_hz = 20, seconds = 0;                // 0 = one turn, or one line

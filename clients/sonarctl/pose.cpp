@@ -6,9 +6,9 @@
 #include <thread>
 
 #include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/control/control_client.hpp"
 #include "clients/sonarctl/trajectory.hpp"
 #include "protocol/control/control.hpp"
-#include "protocol/control/delimited.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -101,46 +101,15 @@ Result<void> send_datagram(const Socket& socket, const Endpoint& to, const std::
   return {};
 }
 
-/// One conversation on the control stream: a Hello, then a request and its answer at a time.
-class ControlClient {
- public:
-  explicit ControlClient(Socket socket) : socket_(std::move(socket)) {}
-
-  Result<void> request(control::Request request) {
-    request.id = ++last_id_;
-    const auto message = control::encode_request(request);
-    if (Result<void> sent = write_all(socket_, control::delimited(message)); !sent) return sent;
-    const Result<control::Response> answer = response();
+Result<Send> confirmed_sender(const Endpoint& to, const std::filesystem::path& token_file) {
+  auto opened = ControlClient::open({text_from(to), token_file});
+  if (!opened) return tl::unexpected(opened.error());
+  const auto client = std::make_shared<ControlClient>(std::move(*opened));
+  return Send([client](const PoseSample& sample) -> Result<void> {
+    const Result<control::Response> answer = client->request(sample);
     if (!answer) return tl::unexpected(answer.error());
-    if (answer->code != control::StatusCode::ok) return failure(ErrorKind::bad_data, "sonard refused the pose: " + answer->text);
     return {};
-  }
-
- private:
-  Result<control::Response> response() {
-    for (;;) {
-      auto message = parser_.next();
-      if (!message) return tl::unexpected(message.error());
-      if (*message) return control::decode_response(**message);
-      std::array<std::byte, 4096> chunk;
-      const Read read = read_some(socket_, chunk, std::chrono::seconds(5));
-      if (read.what != Wait::data) return failure(ErrorKind::io, "sonard did not answer on the control stream " + read.error);
-      parser_.feed(std::span<const std::byte>(chunk).first(read.size));
-    }
-  }
-
-  Socket socket_;
-  control::DelimitedParser parser_;
-  std::uint64_t last_id_ = 0;
-};
-
-Result<Send> confirmed_sender(const Endpoint& to) {
-  auto socket = connect_tcp(to, std::chrono::seconds(2));
-  if (!socket) return tl::unexpected(socket.error());
-  auto client = std::make_shared<ControlClient>(std::move(*socket));
-  if (Result<void> met = client->request({0, control::Hello{control::protocol_version, "sonarctl"}}); !met)
-    return tl::unexpected(met.error());
-  return Send([client](const PoseSample& sample) { return client->request({0, sample}); });
+  });
 }
 
 Result<Send> datagram_sender(const Endpoint& to, bool json) {
@@ -167,7 +136,7 @@ Result<void> send_poses(const PoseOptions& options) {
   const Result<Endpoint> to = parse_endpoint(options.to, {"127.0.0.1", options.json ? json_port : protobuf_port});
   if (!to) return tl::unexpected(to.error());
   const bool stream = options.confirm || !options.object.empty();
-  const Result<Send> send = stream ? confirmed_sender(*to) : datagram_sender(*to, options.json);
+  const Result<Send> send = stream ? confirmed_sender(*to, options.token_file) : datagram_sender(*to, options.json);
   if (!send) return tl::unexpected(send.error());
 
   const auto start = std::chrono::steady_clock::now();

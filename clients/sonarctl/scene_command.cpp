@@ -37,7 +37,8 @@ Result<void> info(const std::string& file, bool json) {
 Result<void> import_one(const ImportOptions& options) {
   const auto done = import_scene(options);
   if (!done) return tl::unexpected(done.error());
-  std::printf("%s: %zu shapes of %zu models", options.out.c_str(), done->shapes, done->models);
+  std::printf("%s: %zu shape%s of %zu model%s", options.out.c_str(), done->shapes, done->shapes == 1 ? "" : "s", done->models,
+              done->models == 1 ? "" : "s");
   if (done->converted_meshes > 0) std::printf(", %zu stretched meshes written beside it", done->converted_meshes);
   std::printf("\n");
   for (const std::string& what : done->left_out) std::printf("left out: %s\n", what.c_str());

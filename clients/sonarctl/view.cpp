@@ -1,88 +1,131 @@
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
-#include "clients/sonarctl/image_statistics.hpp"
 #include "clients/sonarctl/picture.hpp"
 #include "clients/sonarctl/source.hpp"
+#include "clients/sonarctl/terminal.hpp"
+#include "clients/sonarctl/view_figures.hpp"
 
 namespace sonar::clients {
 namespace {
 
-Result<PolarImage> fetch_picture(const SourceOptions& source, std::size_t number) {
-  const Result<oculus::DecodedPing> ping = fetch_ping(source, number);
+using Clock = std::chrono::steady_clock;
+
+double now_s() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
+
+Result<void> check(const ViewOptions& o) {
+  if (o.png.empty() && !o.terminal)
+    return failure(ErrorKind::usage, "say where the picture goes: --png FILE, or --term for the terminal");
+  if (o.live && !o.source.recording.empty())
+    return failure(ErrorKind::usage, "--live is for devices; of a recording, choose a ping with --ping");
+  if (o.pings > 0 && !o.live) return failure(ErrorKind::usage, "--pings goes with --live");
+  return {};
+}
+
+Result<Raster> write_picture(const ViewOptions& options, const PolarImage& image) {
+  Result<Raster> fan = draw_fan(image, options.style);
+  if (!fan) return fan;
+  if (Result<void> written = write_png(*fan, options.png); !written) return tl::unexpected(written.error());
+  return fan;
+}
+
+/// The picture as lines that fit the terminal above `lines_kept` others.
+Result<std::vector<std::string>> lines_of(const ViewOptions& options, const PolarImage& image, int lines_kept) {
+  const TerminalSize size = terminal_size();
+  TerminalStyle style;
+  style.columns = size.columns;
+  style.lines = size.lines - lines_kept;
+  style.colours = options.colours.value_or(choose_colours(terminal_facts()));
+  style.map = options.style.colours;
+  style.labels = options.style.rings;
+  return draw_terminal_fan(image, style);
+}
+
+Result<void> view_one(const ViewOptions& options) {
+  const Result<oculus::DecodedPing> ping = fetch_ping(options.source, options.ping);
   if (!ping) return tl::unexpected(ping.error());
-  return picture_of(*ping);
-}
-
-nlohmann::json speckle_figures(const PolarImage& image, const Window& w) {
-  return {
-      {"rows", {w.row_begin, w.row_end}},
-      {"beams", {w.beam_begin, w.beam_end}},
-      {"mean", mean(image, w)},
-      {"percentiles_1_5_25_50_75_95_99", percentiles(image, w, {0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99})},
-      {"saturated_share", share_at_least(image, w, 254)},
-      {"correlation_of_adjacent_beams", {correlation(image, w, 0, 1), correlation(image, w, 0, 2), correlation(image, w, 0, 3)}},
-      {"correlation_of_adjacent_rows", {correlation(image, w, 1, 0), correlation(image, w, 2, 0), correlation(image, w, 3, 0)}}};
-}
-
-/// The near field ends at the first echo; its first eight rows are the transmit leak.
-nlohmann::json range_figures(const PolarImage& image) {
-  const std::size_t echo = first_echo_row(image), leak = std::min<std::size_t>(8, image.rows);
-  const std::size_t tail = image.rows > 50 ? image.rows - 50 : 0;
-  return {{"first_echo_row", echo},
-          {"near_field_mean", mean(image, {leak, std::max(leak, echo), 0, image.beams})},
-          {"last_50_rows_mean", mean(image, {tail, image.rows, 0, image.beams})},
-          {"mean_of_each_50_rows", block_means(image, 50)}};
-}
-
-void print_plain(const nlohmann::json& figures, const std::string& prefix) {
-  for (const auto& [name, value] : figures.items()) {
-    if (value.is_object()) {
-      print_plain(value, prefix + name + ".");
-      continue;
-    }
-    std::string text;
-    char number[32];
-    for (const auto& v : value.is_array() ? value : nlohmann::json::array({value})) {
-      std::snprintf(number, sizeof number, "%s%.4g", text.empty() ? "" : " ", v.get<double>());
-      text += number;
-    }
-    std::printf("%-50s %s\n", (prefix + name).c_str(), text.c_str());
+  const Result<PolarImage> image = picture_of(*ping);
+  if (!image) return tl::unexpected(image.error());
+  if (!options.png.empty()) {
+    const Result<Raster> fan = write_picture(options, *image);
+    if (!fan) return tl::unexpected(fan.error());
+    std::printf("%s: %d x %d pixels, %zu rows x %zu beams, %.2f m\n", options.png.c_str(), fan->width, fan->height, image->rows,
+                image->beams, image->range_m());
   }
+  if (!options.terminal) return {};
+  const auto lines = lines_of(options, *image, 2);
+  if (!lines) return tl::unexpected(lines.error());
+  for (const std::string& line : *lines) std::puts(line.c_str());
+  ViewFigures figures;
+  figures.add(*ping, 0);
+  std::puts(figures.text().c_str());
+  return {};
+}
+
+class LiveView {
+ public:
+  LiveView(const ViewOptions& options, PingStream stream) : options_(options), stream_(std::move(stream)) {}
+
+  /// Ends well when interrupted, when enough pings were seen, or when nobody reads the output any more.
+  Result<void> run() {
+    const LiveScreen screen(options_.terminal && terminal_facts().is_terminal);
+    double heard_s = now_s();
+    while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
+      PingStream::Item item = stream_.next(std::chrono::milliseconds(500));
+      if (item.what == Wait::closed)
+        return failure(ErrorKind::io, "the device ended the connection" + (item.error.empty() ? "" : ": " + item.error) +
+                                          "; it stopped, or another client holds it (clients.max)");
+      if (item.what == Wait::data) heard_s = now_s();
+      if (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s)
+        return failure(ErrorKind::io, "not a byte from the device for " + std::to_string(options_.source.silence_limit_s) +
+                                          " s: is the daemon stopped or stuck?");
+      const auto* ping = item.what == Wait::data ? std::get_if<oculus::DecodedPing>(&*item.message) : nullptr;
+      if (ping == nullptr) continue;
+      const Result<bool> read = show(*ping, screen);
+      if (!read) return tl::unexpected(read.error());
+      if (!*read) break;
+    }
+    return {};
+  }
+
+ private:
+  /// False when nobody reads.
+  Result<bool> show(const oculus::DecodedPing& ping, const LiveScreen& screen) {
+    figures_.add(ping, now_s());
+    const Result<PolarImage> image = picture_of(ping);
+    if (!image) return tl::unexpected(image.error());
+    if (!options_.png.empty())
+      if (const Result<Raster> fan = write_picture(options_, *image); !fan) return tl::unexpected(fan.error());
+    if (!options_.terminal) {
+      const bool overwrites = terminal_facts().is_terminal;  // one line that changes, or one line a ping
+      std::printf(overwrites ? "\r\x1b[K%s  %s" : "%s  %s\n", options_.png.c_str(), figures_.text().c_str());
+      return std::fflush(stdout) == 0;
+    }
+    auto lines = lines_of(options_, *image, 1);
+    if (!lines) return tl::unexpected(lines.error());
+    lines->push_back(figures_.text());
+    return screen.show(*lines);
+  }
+
+  const ViewOptions& options_;
+  PingStream stream_;
+  ViewFigures figures_;
+};
+
+Result<void> view_live(const ViewOptions& options) {
+  const Result<Endpoint> device = find_device(options.source, false);
+  if (!device) return tl::unexpected(device.error());
+  auto stream = PingStream::open(*device, options.source.asked, milliseconds_from(options.source.connect_patience_s));
+  if (!stream) return tl::unexpected(stream.error());
+  const Result<void> ran = LiveView(options, std::move(*stream)).run();
+  if (!options.terminal && terminal_facts().is_terminal) std::puts("");
+  return ran;
 }
 
 }  // namespace
 
 Result<void> view(const ViewOptions& options) {
-  const Result<PolarImage> image = fetch_picture(options.source, options.ping);
-  if (!image) return tl::unexpected(image.error());
-  const Result<Raster> fan = draw_fan(*image, options.style);
-  if (!fan) return tl::unexpected(fan.error());
-  if (Result<void> written = write_png(*fan, options.png); !written) return written;
-  std::printf("%s: %d x %d pixels, %zu rows x %zu beams, %.2f m\n", options.png.c_str(), fan->width, fan->height, image->rows,
-              image->beams, image->range_m());
-  return {};
-}
-
-Result<void> stats(const StatsOptions& options) {
-  const Result<PolarImage> image = fetch_picture(options.source, options.ping);
-  if (!image) return tl::unexpected(image.error());
-  const Result<Window> window = parse_window(options.window, *image);
-  if (!window) return tl::unexpected(window.error());
-  nlohmann::json figures{{"window", speckle_figures(*image, *window)}, {"range", range_figures(*image)}};
-  if (!options.shadow.empty()) {
-    const Result<Window> shadow = parse_window(options.shadow, *image), around = parse_window(options.surroundings, *image);
-    if (!shadow) return tl::unexpected(shadow.error());
-    if (!around) return tl::unexpected(around.error());
-    const double dark = mean(*image, *shadow), bright = mean(*image, *around);
-    figures["shadow"] = {{"mean", dark}, {"surroundings_mean", bright}, {"ratio", bright > 0 ? dark / bright : 0.0}};
-  }
-  if (options.json) {
-    std::puts(figures.dump().c_str());
-  } else {
-    print_plain(figures, "");
-  }
-  return {};
+  if (Result<void> sound = check(options); !sound) return sound;
+  return options.live ? view_live(options) : view_one(options);
 }
 
 }  // namespace sonar::clients

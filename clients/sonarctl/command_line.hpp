@@ -1,0 +1,34 @@
+// The commands of sonarctl as a user types them: each adds its options to the parser and returns what is to be done when it was
+// the one that was asked for. main.cpp lists them; words that are none of theirs are answered with the nearest that is.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace sonar::clients {
+
+using Run = std::function<Result<void>()>;
+
+Run add_listen(CLI::App& app);
+Run add_view(CLI::App& app);
+Run add_stats(CLI::App& app);
+Run add_pose(CLI::App& app);
+Run add_doctor(CLI::App& app);
+Run add_status(CLI::App& app);
+Run add_events(CLI::App& app);
+Run add_set(CLI::App& app);
+Run add_load(CLI::App& app);
+Run add_object(CLI::App& app);
+
+/// `unknown command "veiw"; did you mean "view"?` or the same for an option, or empty when every word in front of the first
+/// value is known. Values are not looked at: the parser does that.
+std::string complaint_about_words(const CLI::App& app, const std::vector<std::string>& words);
+
+}  // namespace sonar::clients

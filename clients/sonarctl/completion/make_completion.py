@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""Writes the shell completions of sonard and sonarctl from what their --help says.
+
+usage: make_completion.py BUILD_DIR [--check]      --check: writes nothing, exits 1 when a file is not what it should be
+
+Run it after a command or an option was added; a test runs it with --check.
+"""
+import difflib
+import pathlib
+import re
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+OPTION = re.compile(r"^  (?:(-\w),)?(--[\w-]+)((?:[ :=(]\S.*|\s{2,}.*)?)$")
+CHOICES = re.compile(r"\{([^}]+)\}|TEXT:([\w.-]+(?:\|[\w.-]+)*)")  # of CLI11's own check, and of sonard's
+COMMAND = re.compile(r"^  ([a-z][\w-]*)\s{2,}\S")
+FILE_WORDS = {"--png", "--record", "--from-raw", "--token-file", "--out", "--poses", "--json-file"}
+SCENE_COMMANDS = {"load", "run", "check", "render", "info", "import"}  # they take files, not addresses
+
+
+def help_of(program, words):
+    return subprocess.run([program, *words, "--help"], capture_output=True, text=True, timeout=60, check=True).stdout
+
+
+def read_help(text):
+    """Sub-commands, and options with the choices of their values (empty = a value of any kind, None = no value)."""
+    commands, options, section = [], {}, ""
+    for line in text.splitlines():
+        if re.match(r"^\S.*:$", line):
+            section = line
+            continue
+        if section == "Subcommands:":
+            match = COMMAND.match(line)
+            if match:
+                commands.append(match[1])
+            continue
+        match = OPTION.match(line.rstrip())
+        if not match or not section or section.startswith("examples"):
+            continue
+        rest = match[3]
+        takes_value = bool(re.match(r"[ =]?(TEXT|INT|UINT|FLOAT|PATH|FILE|ENUM|NUMBER|\{)", rest.strip())) and not rest.startswith("  ")
+        choices = CHOICES.search(rest.split("  ")[0]) if takes_value else None
+        words = [w.split("->")[0] for w in re.split(r"[,|]", choices[1] or choices[2])] if choices else []
+        options[match[2]] = words if takes_value else None
+    return commands, options
+
+
+def walk(program, words=()):
+    """{("pose", "circle"): (commands, options)} of everything below."""
+    commands, options = read_help(help_of(program, words))
+    tree = {words: (commands, options)}
+    for command in commands:
+        tree.update(walk(program, (*words, command)))
+    return tree
+
+
+def sonard_tree(program):
+    """sonard lists its commands in a sentence, not in a section."""
+    tree = walk(program)
+    if len(tree) == 1:
+        commands = ["run", "check", "render", "bench"]
+        tree[()] = (commands, tree[()][1])
+        for command in commands:
+            tree[(command,)] = ([], read_help(help_of(program, (command,)))[1])
+    return tree
+
+
+def values(tree, of_words, files, anything):
+    """Case labels by what is offered after an option that takes a value: {"compadd ...": ['" run:--clock"', ...]}."""
+    actions = {}
+    for words, (_, options) in tree.items():
+        path = " ".join(("", *words))
+        for option, choices in options.items():
+            if choices is None:
+                continue
+            action = of_words(" ".join(choices)) if choices else files if option in FILE_WORDS else anything
+            actions.setdefault(action, []).append(f'"{path}:{option}"')
+    return [f"    {' | '.join(labels)}) {action} ;;" for action, labels in actions.items()]
+
+
+def words_of(name, tree):
+    """Path of a command, what may follow it, and whether file names may."""
+    for words, (commands, options) in tree.items():
+        takes_files = name == "sonard" if not words else words[-1] in SCENE_COMMANDS
+        yield " ".join(("", *words)), " ".join([*commands, *options]), takes_files
+
+
+def paths_below(tree):
+    return " | ".join(f'"{" ".join(("", *words))}"' for words in tree if words)
+
+
+def bash(name, tree):
+    lines = [f"# bash completion of {name}. Made by clients/sonarctl/completion/make_completion.py: do not edit.", f"_{name}() {{",
+             '  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]} path="" word',
+             '  for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do', '    case "$path $word" in',
+             f'      {paths_below(tree)}) path="$path $word" ;;', "    esac", "  done", '  case "$path:$previous" in']
+    lines += values(tree, lambda words: f'COMPREPLY=($(compgen -W "{words}" -- "$current")); return',
+                    'COMPREPLY=($(compgen -f -- "$current")); return', "COMPREPLY=(); return")
+    lines += ["  esac", '  case "$path" in']
+    for path, words, takes_files in words_of(name, tree):
+        files = '; [[ $current == -* ]] || COMPREPLY+=($(compgen -f -- "$current"))' if takes_files else ""
+        lines.append(f'    "{path}") COMPREPLY=($(compgen -W "{words}" -- "$current")){files} ;;')
+    return "\n".join([*lines, "  esac", "}", f"complete -o filenames -F _{name} {name}", ""])
+
+
+def zsh(name, tree):
+    """The same words by way of zsh's own functions."""
+    lines = [f"#compdef {name}", f"# zsh completion of {name}. Made by clients/sonarctl/completion/make_completion.py: do not edit.",
+             f"_{name}() {{", '  local current=${words[CURRENT]} previous=${words[CURRENT-1]} at="" word',
+             '  for word in ${words[2,CURRENT-1]}; do', '    case "$at $word" in', f'      {paths_below(tree)}) at="$at $word" ;;',
+             "    esac", "  done", '  case "$at:$previous" in']
+    lines += values(tree, lambda words: f"compadd -- {words}; return", "_files; return", "return")
+    lines += ["  esac", '  case "$at" in']
+    for path, words, takes_files in words_of(name, tree):
+        lines.append(f'    "{path}") compadd -- {words}{"; [[ $current == -* ]] || _files" if takes_files else ""} ;;')
+    return "\n".join([*lines, "  esac", "}", f'_{name} "$@"', ""])
+
+
+def main():
+    build = pathlib.Path(sys.argv[1])
+    check = "--check" in sys.argv[2:]
+    wrong = 0
+    for name, program, read in [("sonarctl", build / "clients/sonarctl", walk), ("sonard", build / "daemon/sonard", sonard_tree)]:
+        tree = read(str(program))
+        for file, text in [(HERE / name, bash(name, tree)), (HERE / f"_{name}", zsh(name, tree))]:
+            if not check:
+                file.write_text(text, encoding="utf-8")
+                continue
+            there = file.read_text(encoding="utf-8") if file.exists() else ""
+            if there != text:
+                wrong = 1
+                print(f"{file.name} is not what --help says; run clients/sonarctl/completion/make_completion.py BUILD_DIR:")
+                print("\n".join(difflib.unified_diff(there.splitlines(), text.splitlines(), "there", "should be", lineterm="", n=0)))
+    return wrong
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,128 @@
+#include "clients/sonarctl/control/control_client.hpp"
+
+#include <array>
+#include <fstream>
+#include <iterator>
+
+namespace sonar::clients {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::chrono::milliseconds left_until(Clock::time_point deadline) {
+  return std::max(std::chrono::milliseconds(0), std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()));
+}
+
+/// Without the blanks round it, as the daemon reads it.
+Result<std::string> token_from(const std::filesystem::path& file) {
+  if (file.empty()) return std::string();
+  constexpr const char* blanks = " \t\r\n";
+  std::ifstream in(file);
+  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const std::size_t first = text.find_first_not_of(blanks);
+  if (!in || first == std::string::npos)
+    return failure(ErrorKind::missing_file, "cannot read a token from " + file.string() +
+                                                ": it should be the file that control.token_file of sonard names");
+  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+Result<void> judge(const control::Response& answer) {
+  switch (answer.code) {
+    case control::StatusCode::ok:
+      return {};
+    case control::StatusCode::refused:
+      return failure(ErrorKind::bad_data, "sonard refused: " + answer.text);
+    case control::StatusCode::unsupported:
+      return failure(ErrorKind::unavailable, "this sonard does not know the request" +
+                                                 (answer.text.empty() ? "" : " (" + answer.text + ")") +
+                                                 ": is it of another version? sonard --version and sonarctl --version tell");
+    case control::StatusCode::failed:
+      break;
+  }
+  return failure(ErrorKind::bad_data, "sonard could not do it: " + answer.text);
+}
+
+}  // namespace
+
+Result<ControlClient> ControlClient::open(const ControlOptions& options) {
+  const Result<Endpoint> at = parse_endpoint(options.address, {"127.0.0.1", control_port});
+  if (!at) return tl::unexpected(at.error());
+  const Result<std::string> token = token_from(options.token_file);
+  if (!token) return tl::unexpected(token.error());
+  auto socket = connect_tcp(*at, options.connect_patience);
+  if (!socket && socket.error().kind == ErrorKind::unavailable)
+    return failure(ErrorKind::unavailable, "no sonard answers on the control stream, tcp " + text_from(*at) +
+                                               ": is one running there? Its banner names the address (--control HOST:PORT)");
+  if (!socket) return tl::unexpected(socket.error());
+  ControlClient client(std::move(*socket), *at);
+  const Result<control::Response> met = client.request(control::Hello{control::protocol_version, "sonarctl", *token});
+  if (!met) return tl::unexpected(met.error());
+  return client;
+}
+
+Result<control::Response> ControlClient::request(Operation operation, std::chrono::milliseconds patience) {
+  const std::uint64_t id = ++last_id_;
+  const auto message = control::encode_request({id, std::move(operation)});
+  if (Result<void> sent = write_all(socket_, control::delimited(message)); !sent) return tl::unexpected(sent.error());
+  const auto deadline = Clock::now() + patience;
+  for (;;) {
+    Result<std::optional<control::Response>> answer = next_message(deadline, false);
+    if (!answer) return tl::unexpected(answer.error());
+    if (!*answer)
+      return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " did not answer within " +
+                                                 std::to_string(patience.count() / 1000) + " s: is it busy, or stopped?");
+    control::Response& response = **answer;
+    if (const auto* event = std::get_if<control::Event>(&response.body); event != nullptr && response.id == 0) {
+      events_.push_back(*event);
+      continue;
+    }
+    if (response.id != id && response.id != 0) continue;  // of an earlier request that was not waited for
+    if (const Result<void> sound = judge(response); !sound) return tl::unexpected(sound.error());
+    if (response.id == id) return std::move(response);
+  }
+}
+
+Result<control::DaemonStatus> ControlClient::status(std::chrono::milliseconds patience) {
+  Result<control::Response> answer = request(control::GetStatus{}, patience);
+  if (!answer) return tl::unexpected(answer.error());
+  auto* status = std::get_if<control::DaemonStatus>(&answer->body);
+  if (status == nullptr) return failure(ErrorKind::bad_data, "sonard answered the question for its status without one");
+  return std::move(*status);
+}
+
+Result<std::optional<control::Event>> ControlClient::next_event(std::chrono::milliseconds patience) {
+  const auto deadline = Clock::now() + patience;
+  while (events_.empty()) {
+    const Result<std::optional<control::Response>> message = next_message(deadline, true);
+    if (!message) return tl::unexpected(message.error());
+    if (!*message) return std::optional<control::Event>{};
+    if (const auto* event = std::get_if<control::Event>(&(*message)->body)) events_.push_back(*event);
+  }
+  std::optional<control::Event> first = std::move(events_.front());
+  events_.pop_front();
+  return first;
+}
+
+/// Nothing when the time is over, or, `until_signal`, when a signal came.
+Result<std::optional<control::Response>> ControlClient::next_message(Clock::time_point deadline, bool until_signal) {
+  for (;;) {
+    auto message = parser_.next();
+    if (!message) return tl::unexpected(message.error());
+    if (*message) {
+      Result<control::Response> response = control::decode_response(**message);
+      if (!response) return tl::unexpected(response.error());
+      return std::optional<control::Response>(std::move(*response));
+    }
+    std::array<std::byte, 16384> chunk;
+    const Read read = read_some(socket_, chunk, left_until(deadline));
+    if (read.what == Wait::closed)
+      return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " closed the control stream" +
+                                                 (read.error.empty() ? "" : ": " + read.error) +
+                                                 "; its log says why (not a control port, a token, a stop)");
+    if (read.what == Wait::timed_out || (read.what == Wait::interrupted && until_signal))
+      return std::optional<control::Response>{};
+    if (read.what == Wait::data) parser_.feed(std::span<const std::byte>(chunk).first(read.size));
+  }
+}
+
+}  // namespace sonar::clients

@@ -1,0 +1,52 @@
+// A conversation with a running daemon on its control stream: Hello, requests and their answers, events. Blocking, with limits on
+// every wait. Used by pose, status, events, set, load, object and doctor.
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "clients/sonarctl/net.hpp"
+#include "protocol/control/control.hpp"
+#include "protocol/control/delimited.hpp"
+
+namespace sonar::clients {
+
+inline constexpr std::uint16_t control_port = 14770;
+
+struct ControlOptions {
+  std::string address;               // HOST:PORT, empty = 127.0.0.1:14770
+  std::filesystem::path token_file;  // what the daemon's control.token_file holds, when it has one
+  std::chrono::milliseconds connect_patience{2000};
+};
+
+class ControlClient {
+ public:
+  using Operation = decltype(control::Request::op);
+  static constexpr std::chrono::milliseconds usual_patience{10000};
+
+  /// Connected and greeted. Refused with one sentence: nobody there, no sonard, the token.
+  static Result<ControlClient> open(const ControlOptions& options);
+
+  /// The answer to one request; an answer that says no is an error with sonard's own sentence. Events that come meanwhile are
+  /// kept.
+  Result<control::Response> request(Operation operation, std::chrono::milliseconds patience = usual_patience);
+  Result<control::DaemonStatus> status(std::chrono::milliseconds patience = usual_patience);
+  /// What was subscribed to; nothing when `patience` is over or a signal came.
+  Result<std::optional<control::Event>> next_event(std::chrono::milliseconds patience);
+
+  const Endpoint& at() const { return at_; }
+
+ private:
+  ControlClient(Socket socket, Endpoint at) : socket_(std::move(socket)), at_(std::move(at)) {}
+  Result<std::optional<control::Response>> next_message(std::chrono::steady_clock::time_point deadline, bool until_signal);
+
+  Socket socket_;
+  Endpoint at_;
+  control::DelimitedParser parser_;
+  std::deque<control::Event> events_;
+  std::uint64_t last_id_ = 0;
+};
+
+}  // namespace sonar::clients

@@ -1,0 +1,18 @@
+// What a daemon says of itself, as text for people. Pure; status and events print it.
+#pragma once
+
+#include <string>
+
+#include "protocol/control/operations.hpp"
+
+namespace sonar::clients {
+
+/// Several lines, each with its newline.
+std::string text_from(const control::DaemonStatus& status);
+/// One line without newline.
+std::string text_from(const control::ObjectStatus& object);
+std::string text_from(const control::Event& event);
+/// "-6.00 0.00 -3.00 m, heading 90, pitch -15, roll 0 deg": east, north, up; compass; bow up; starboard down.
+std::string place_text(const Pose& body_in_world);
+
+}  // namespace sonar::clients

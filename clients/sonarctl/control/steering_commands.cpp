@@ -1,0 +1,281 @@
+// status, events, set, load and object on the command line: everything that goes over the control stream.
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "clients/sonarctl/command_line.hpp"
+#include "clients/sonarctl/control/control_commands.hpp"
+
+namespace sonar::clients {
+namespace {
+
+void add_control_options(CLI::App& command, ControlOptions& control) {
+  command.add_option("--control", control.address, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)");
+  command.add_option("--token-file", control.token_file, "the daemon's control.token_file, when it has one");
+}
+
+/// A body's place on the command line: in the frame named, into the house's.
+struct PlaceArguments {
+  std::vector<double> xyz_m, rpy_deg{0, 0, 0};
+  control::Frame frame = control::Frame::enu_flu;
+
+  void add_to(CLI::App& command, bool required) {
+    const std::map<std::string, control::Frame> frames{{"enu", control::Frame::enu_flu}, {"ned", control::Frame::ned_frd}};
+    CLI::Option* place = command.add_option("--xyz", xyz_m, "position, m")->expected(3)->delimiter(',')->check(CLI::Number);
+    if (required) place->required();
+    command.add_option("--rpy", rpy_deg, "roll, pitch, yaw in degrees, intrinsic Z-Y-X (default 0,0,0)")
+        ->expected(3)
+        ->delimiter(',')
+        ->check(CLI::Number);
+    command.add_option("--frame", frame, "of these: enu (FLU body, default) or ned (FRD body)")
+        ->transform(CLI::CheckedTransformer(frames, CLI::ignore_case));
+  }
+  Pose pose() const {
+    const RollPitchYaw rpy{rad_from_deg(rpy_deg[0]), rad_from_deg(rpy_deg[1]), rad_from_deg(rpy_deg[2])};
+    const Pose given{{xyz_m[0], xyz_m[1], xyz_m[2]}, quat_from_rpy(rpy)};
+    return frame == control::Frame::ned_frd ? enu_flu_from_ned_frd(given) : given;
+  }
+};
+
+/// `value` takes what was given; it stays empty otherwise.
+template <class T>
+CLI::Option* add_optional(CLI::App& command, const std::string& name, std::optional<T>& value, const std::string& help) {
+  return command.add_option_function<T>(
+      name, [&value](const T& given) { value = given; }, help);
+}
+
+std::string name_or_its(const std::string& name) { return name.empty() ? "the sonar" : name; }
+
+/// Commands share one ControlOptions; `what` is set by the sub-command that was named.
+struct Steering {
+  ControlOptions control;
+  std::function<Result<void>()> what;
+};
+
+struct SonarArguments {
+  control::SetSonar sonar;
+  std::string transmit;
+  std::vector<double> mount_xyz_m, mount_rpy_deg{0, 0, 0};
+  std::string mount_frame = "frd";
+
+  Result<control::SetSonar> finish() const {
+    control::SetSonar finished = sonar;
+    if (!transmit.empty()) finished.transmit = transmit == "on";
+    if (!mount_xyz_m.empty()) {
+      const RollPitchYaw rpy{rad_from_deg(mount_rpy_deg[0]), rad_from_deg(mount_rpy_deg[1]), rad_from_deg(mount_rpy_deg[2])};
+      const Pose given{{mount_xyz_m[0], mount_xyz_m[1], mount_xyz_m[2]}, quat_from_rpy(rpy)};
+      finished.mount = mount_frame == "frd" ? flu_from_frd(given) : given;
+    }
+    const bool any = finished.range_m || finished.rate_hz || finished.gain_percent || finished.mode || finished.beams ||
+                     finished.transmit || finished.mount;
+    if (!any)
+      return failure(ErrorKind::usage, "say what to set: --range, --rate, --gain, --mode, --beams, --transmit or --mount");
+    return finished;
+  }
+};
+
+void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
+  CLI::App& command = *set.add_subcommand("sonar", "as one more client of the sonar would: the last who asks wins");
+  command.footer(
+      "examples:\n"
+      "  sonarctl set sonar --range 20 --rate 5\n"
+      "  sonarctl set sonar front --transmit off\n"
+      "  sonarctl set sonar --mount 0.3,0,0.1 --mount-rpy 0,-30,0        a tilt head, FRD");
+  const auto arguments = std::make_shared<SonarArguments>();
+  control::SetSonar& s = arguments->sonar;
+  add_control_options(command, steering->control);
+  command.add_option("SONAR", s.sonar, "its name; may be left out when there is one");
+  add_optional(command, "--range", s.range_m, "metres");
+  add_optional(command, "--rate", s.rate_hz, "pings a second, the product's nearest; 0 = standby");
+  add_optional(command, "--gain", s.gain_percent, "per cent");
+  add_optional(command, "--mode", s.mode, "frequency mode, from 0: lowest first");
+  add_optional(command, "--beams", s.beams, "as the product has them");
+  command.add_option("--transmit", arguments->transmit, "off: it hears noise only, whatever its clients ask")
+      ->check(CLI::IsMember({"on", "off"}));
+  CLI::Option* mount = command.add_option("--mount", arguments->mount_xyz_m, "X,Y,Z of the sonar on its vehicle, m");
+  mount->expected(3)->delimiter(',')->check(CLI::Number);
+  command.add_option("--mount-rpy", arguments->mount_rpy_deg, "roll, pitch, yaw in degrees (default 0,0,0)")
+      ->expected(3)
+      ->delimiter(',')
+      ->check(CLI::Number)
+      ->needs(mount);
+  command.add_option("--mount-frame", arguments->mount_frame, "of these: frd (default) or flu")
+      ->check(CLI::IsMember({"frd", "flu"}))
+      ->needs(mount);
+  command.callback([steering, arguments] {
+    steering->what = [steering, arguments]() -> Result<void> {
+      const Result<control::SetSonar> wanted = arguments->finish();
+      if (!wanted) return tl::unexpected(wanted.error());
+      return steer(steering->control, *wanted, name_or_its(wanted->sonar) + " is set; sonarctl status shows what it made of it");
+    };
+  });
+}
+
+void add_set_water(CLI::App& set, const std::shared_ptr<Steering>& steering) {
+  CLI::App& command = *set.add_subcommand("water", "temperature, salt, acidity, speed of sound");
+  command.footer(
+      "examples:\n"
+      "  sonarctl set water --temperature 8 --salinity 34\n"
+      "  sonarctl set water --sound-speed 0                 computed from the rest again");
+  const auto water = std::make_shared<control::SetEnvironment>();
+  add_control_options(command, steering->control);
+  add_optional(command, "--temperature", water->temperature_c, "C");
+  add_optional(command, "--salinity", water->salinity_psu, "psu");
+  add_optional(command, "--ph", water->ph, "");
+  add_optional(command, "--sound-speed", water->sound_speed_mps, "m/s; 0 = computed from the rest");
+  command.callback([steering, water] {
+    steering->what = [steering, water]() -> Result<void> {
+      if (!water->temperature_c && !water->salinity_psu && !water->ph && !water->sound_speed_mps)
+        return failure(ErrorKind::usage, "say what to set: --temperature, --salinity, --ph or --sound-speed");
+      return steer(steering->control, *water, "the water is set");
+    };
+  });
+}
+
+Run run_of(const std::shared_ptr<Steering>& steering) {
+  return [steering] { return steering->what(); };
+}
+
+}  // namespace
+
+Run add_status(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand("status", "what a running sonard says of itself: sonars, clients, figures, vehicles");
+  command.footer(
+      "examples:\n"
+      "  sonarctl status\n"
+      "  sonarctl status --watch\n"
+      "  sonarctl status --json | jq '.sonars[].figures'");
+  const auto options = std::make_shared<StatusOptions>();
+  add_control_options(command, options->control);
+  command.add_flag("--json", options->json, "one JSON object (names as in control.proto)");
+  command.add_flag("--watch", options->watch, "again and again, until Ctrl-C");
+  command.add_option("--period", options->period_s, "seconds between two, with --watch")
+      ->check(CLI::Range(0.05, 3600.0))
+      ->capture_default_str();
+  return [options] { return print_status(*options); };
+}
+
+Run add_events(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand("events", "what happens in a running sonard, as it happens");
+  command.footer(
+      "examples:\n"
+      "  sonarctl events                              clients, poses and scenes\n"
+      "  sonarctl events --pings --count 10 --json");
+  const auto options = std::make_shared<EventsOptions>();
+  add_control_options(command, options->control);
+  command.add_flag("--pings", options->wanted.pings, "every ping");
+  command.add_flag("--clients", options->wanted.clients, "who connects and leaves");
+  command.add_flag("--poses", options->wanted.poses, "poses that stop, come back, or come from somebody else");
+  command.add_flag("--scene", options->wanted.scene, "scenes loaded and changed");
+  command.add_option("--count", options->count, "stop after so many");
+  command.add_option("--seconds", options->seconds, "stop after this time")->check(CLI::NonNegativeNumber);
+  command.add_flag("--json", options->json, "one JSON object a line");
+  return [options] {
+    control::Subscribe& wanted = options->wanted;
+    if (!wanted.pings && !wanted.clients && !wanted.poses && !wanted.scene) wanted.clients = wanted.poses = wanted.scene = true;
+    return print_events(*options);
+  };
+}
+
+Run add_set(CLI::App& app) {
+  CLI::App& set = *app.add_subcommand("set", "change a sonar or the water of a running sonard");
+  set.require_subcommand(1);
+  set.footer(
+      "examples:\n"
+      "  sonarctl set sonar --range 20 --rate 5\n"
+      "  sonarctl set water --temperature 8");
+  const auto steering = std::make_shared<Steering>();
+  add_set_sonar(set, steering);
+  add_set_water(set, steering);
+  return run_of(steering);
+}
+
+Run add_load(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand("load", "another scene for a running sonard; pings go on with the old one until then");
+  command.footer(
+      "examples:\n"
+      "  sonarctl load scenes/tank-rod.yaml           a file of this computer\n"
+      "  sonarctl load local-search.yaml              or one that sonard finds: beside its configuration, or shipped");
+  struct Arguments {
+    ControlOptions control;
+    std::string path;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  add_control_options(command, arguments->control);
+  command.add_option("SCENE", arguments->path, "scene file")->required();
+  return [arguments] { return load_scene(arguments->control, arguments->path); };
+}
+
+namespace {
+
+struct ObjectArguments {
+  std::string name;
+  control::AddObject added;
+  PlaceArguments place;
+};
+
+CLI::App& add_object_command(CLI::App& object, const std::string& name, const std::string& help,
+                             const std::shared_ptr<Steering>& steering, const std::shared_ptr<ObjectArguments>& arguments) {
+  CLI::App& command = *object.add_subcommand(name, help);
+  add_control_options(command, steering->control);
+  if (name != "list") command.add_option("OBJECT", arguments->name, "its name")->required();
+  return command;
+}
+
+}  // namespace
+
+Run add_object(CLI::App& app) {
+  CLI::App& object = *app.add_subcommand("object", "the objects of a running sonard's scene");
+  object.require_subcommand(1);
+  object.footer(
+      "examples:\n"
+      "  sonarctl object list\n"
+      "  sonarctl object add crate-2 --like crate --xyz 3,1,-5 --material steel\n"
+      "  sonarctl object place crate-2 --xyz 4,1,-5 --rpy 0,0,45\n"
+      "  sonarctl object hide crate-2\n"
+      "an object that moves all the time: sonarctl pose circle --object NAME");
+  const auto steering = std::make_shared<Steering>();
+  const auto arguments = std::make_shared<ObjectArguments>();
+  const auto does = [steering](CLI::App& command, const std::string& example, std::function<Result<void>()> what) {
+    command.footer("examples:\n  sonarctl object " + example);
+    command.callback([steering, what = std::move(what)] { steering->what = what; });
+  };
+
+  does(add_object_command(object, "list", "names, materials, places", steering, arguments), "list",
+       [steering] { return list_objects(steering->control); });
+
+  CLI::App& add = add_object_command(object, "add", "one more, in the shape of another", steering, arguments);
+  add.add_option("--like", arguments->added.like, "the object whose shape it takes")->required();
+  add.add_option("--material", arguments->added.material, "of the scene's materials; left out: that of the other");
+  add.add_flag("--moving", arguments->added.moving, "it takes poses from then on (sonarctl pose --object)");
+  arguments->place.add_to(add, true);
+  does(add, "add crate-2 --like crate --xyz 3,1,-5", [steering, arguments] {
+    control::AddObject wanted = arguments->added;
+    wanted.name = arguments->name;
+    wanted.in_world = arguments->place.pose();
+    return steer(steering->control, wanted, arguments->name + " is in the scene");
+  });
+
+  does(add_object_command(object, "remove", "out of the scene for good", steering, arguments), "remove crate-2",
+       [steering, arguments] {
+         return steer(steering->control, control::RemoveObject{arguments->name}, arguments->name + " is removed");
+       });
+  for (const bool visible : {true, false}) {
+    const std::string name = visible ? "show" : "hide";
+    does(add_object_command(object, name, visible ? "back into the scene" : "out of the scene until it is shown again", steering,
+                            arguments),
+         name + " crate-2", [steering, arguments, visible] {
+           return steer(steering->control, control::SetObject{arguments->name, visible, {}},
+                        arguments->name + (visible ? " is shown" : " is hidden"));
+         });
+  }
+
+  CLI::App& place = add_object_command(object, "place", "to another place", steering, arguments);
+  arguments->place.add_to(place, true);
+  does(place, "place crate-2 --xyz 4,1,-5 --rpy 0,0,45", [steering, arguments] {
+    return steer(steering->control, control::SetObject{arguments->name, {}, arguments->place.pose()},
+                 arguments->name + " is placed");
+  });
+  return run_of(steering);
+}
+
+}  // namespace sonar::clients

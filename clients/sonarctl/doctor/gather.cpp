@@ -1,0 +1,175 @@
+#include "clients/sonarctl/doctor/gather.hpp"
+
+#include <algorithm>
+
+#include "clients/sonarctl/doctor/probes.hpp"
+#include "clients/sonarctl/doctor/proc_net.hpp"
+#include "clients/sonarctl/doctor/watch_pings.hpp"
+#include "protocol/oculus/messages.hpp"
+
+namespace sonar::clients::doctor {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto status_patience = 2500ms;  // status messages come every second
+constexpr auto first_status = 1300ms;     // to learn who is connected
+constexpr auto short_patience = 700ms, own_patience = 200ms;
+
+class Gathering {
+ public:
+  explicit Gathering(const Questions& questions)
+      : questions_(questions),
+        deadline_(start_ + std::chrono::milliseconds(static_cast<std::int64_t>(1000 * questions.within_s))),
+        status_(questions.status_on) {}
+
+  Result<Facts> run() {
+    facts_.address_given = !questions_.address.empty();
+    const auto control = parse_endpoint(questions_.control, {"127.0.0.1", control_port});
+    const auto http = parse_endpoint(questions_.http, {"127.0.0.1", 8088});
+    const auto given = parse_endpoint(questions_.address, {"127.0.0.2", oculus::tcp_port});
+    if (!control) return tl::unexpected(control.error());
+    if (!http) return tl::unexpected(http.error());
+    if (!given) return tl::unexpected(given.error());
+
+    ask_control(*control);
+    facts_.http =
+        ask_health(*http, !questions_.http.empty(), until(http->host.starts_with("127.") ? own_patience : short_patience));
+    const DiscoveryQuestion heads(facts_.address_given ? std::vector{given->host} : std::vector<std::string>{});
+    const auto sockets = tcp_sockets();
+    const auto programs = programs_by_socket();
+    note_daemons(sockets, programs);
+    find_sonars(*given);
+    for (SonarFacts& sonar : facts_.sonars) look_at(sonar, sockets, programs);
+    hear_all();
+    facts_.heads = heads.answers();
+    facts_.kernel_ports = kernel_ports();
+    return std::move(facts_);
+  }
+
+ private:
+  std::chrono::milliseconds until(std::chrono::milliseconds patience) const { return std::min(patience, left_until(deadline_)); }
+  Steady::time_point no_later_than(Steady::time_point moment) const { return std::min(moment, deadline_); }
+
+  void ask_control(const Endpoint& at) {
+    facts_.control.at = at;
+    facts_.control.given = !questions_.control.empty();
+    const auto patience = at.host.starts_with("127.") ? own_patience : short_patience;
+    auto client = ControlClient::open({text_from(at), questions_.token_file, until(patience)});
+    if (!client) {
+      facts_.control.error = client.error().text;
+      return;
+    }
+    auto status = client->status(until(short_patience));
+    if (!status) {
+      facts_.control.error = status.error().text;
+      return;
+    }
+    facts_.control.status = std::move(*status);
+    if (facts_.control.status->clock == "realtime" &&
+        client->request(control::Subscribe{true, false, false, false}, until(short_patience)))
+      control_.emplace(std::move(*client));
+  }
+
+  /// Whoever listens on the sonars' port and is a sonard.
+  void note_daemons(const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
+    for (const SocketLine& socket : sockets) {
+      if (socket.state != listening || socket.local_port != oculus::tcp_port) continue;
+      PortHolder holder = holder_of(socket, programs);
+      if (holder.program == "sonard") facts_.daemons.push_back(std::move(holder));
+    }
+  }
+
+  void find_sonars(const Endpoint& given) {
+    if (facts_.address_given) return add_sonar(given, "");
+    if (facts_.control.status)
+      for (const control::SonarStatus& s : facts_.control.status->sonars)
+        if (s.listens.ends_with(":" + std::to_string(oculus::tcp_port))) add_sonar({s.advertised, oculus::tcp_port}, s.name);
+    if (facts_.sonars.empty()) {
+      status_.listen("", no_later_than(start_ + first_status));
+      for (const HeardStatus& heard : status_.facts().heard) add_sonar({heard.advertised, oculus::tcp_port}, "");
+    }
+    const bool other_heads = facts_.control.status && !facts_.control.status->sonars.empty();
+    if (facts_.sonars.empty() && !other_heads) add_sonar(given, "");
+  }
+  void add_sonar(const Endpoint& at, const std::string& name) {
+    SonarFacts sonar;
+    sonar.at = at;
+    sonar.name = name;
+    facts_.sonars.push_back(std::move(sonar));
+  }
+
+  const control::SonarStatus* said_of(const SonarFacts& sonar, const control::DaemonStatus& status) const {
+    for (const control::SonarStatus& s : status.sonars)
+      if (s.listens == text_from(sonar.at) || s.advertised + ":" + std::to_string(oculus::tcp_port) == text_from(sonar.at))
+        return &s;
+    return nullptr;
+  }
+
+  void note_clients(SonarFacts& sonar, const std::vector<SocketLine>& sockets) {
+    const control::SonarStatus* said = facts_.control.status ? said_of(sonar, *facts_.control.status) : nullptr;
+    if (said != nullptr) {
+      sonar.says = *said;
+      if (sonar.name.empty()) sonar.name = said->name;
+      for (const control::ClientStatus& client : said->clients) sonar.clients.push_back(client.address);
+      return;
+    }
+    // Nobody tells: the kernel knows of this computer, the status message of any.
+    for (const SocketLine& socket : sockets)
+      if (socket.state == established && socket.local_port == sonar.at.port && socket.local_host == sonar.at.host)
+        sonar.clients.push_back(socket.remote_host + ":" + std::to_string(socket.remote_port));
+    if (!sonar.clients.empty()) return;
+    status_.listen(sonar.at.host, no_later_than(start_ + first_status));
+    for (const HeardStatus& heard : status_.facts().heard)
+      if (!heard.client.empty() && (heard.advertised == sonar.at.host || heard.from == sonar.at.host))
+        sonar.clients.push_back(heard.client);
+  }
+
+  void look_at(SonarFacts& sonar, const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
+    const auto ip = ipv4_of(sonar.at.host);
+    if (!ip) {
+      sonar.unresolved = ip.error().text;
+      return;
+    }
+    sonar.at.host = *ip;
+    sonar.on_this_host = is_on_this_host(*ip);
+    for (const SocketLine& socket : sockets) {
+      const bool here = socket.local_host == *ip || socket.local_host == "0.0.0.0" || socket.local_host == "[::]";
+      if (sonar.on_this_host && here && socket.state == listening && socket.local_port == sonar.at.port)
+        sonar.listeners.push_back(holder_of(socket, programs));
+    }
+    if (left_until(deadline_) < 500ms) {
+      sonar.time_was_over = true;
+      return;
+    }
+    note_clients(sonar, sockets);
+    if (sonar.clients.empty() || questions_.take) watch_pings(sonar, control_ ? &*control_ : nullptr, deadline_, facts_.control);
+    note_figures(sonar);
+  }
+
+  /// With the pings just seen.
+  void note_figures(SonarFacts& sonar) {
+    if (!control_) return;
+    const auto status = control_->status(until(short_patience));
+    const control::SonarStatus* said = status ? said_of(sonar, *status) : nullptr;
+    if (said != nullptr) sonar.says = *said;
+  }
+
+  void hear_all() {
+    for (const SonarFacts& sonar : facts_.sonars) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
+    status_.finish();
+    facts_.status = status_.facts();
+  }
+
+  const Questions& questions_;
+  Steady::time_point start_ = Steady::now(), deadline_;
+  StatusListener status_;
+  std::optional<ControlClient> control_;
+  Facts facts_;
+};
+
+}  // namespace
+
+Result<Facts> gather(const Questions& questions) { return Gathering(questions).run(); }
+
+}  // namespace sonar::clients::doctor

@@ -1,0 +1,111 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "clients/sonarctl/doctor/judge.hpp"
+
+namespace sonar::clients::doctor {
+namespace {
+
+constexpr double largest_clock_difference_s = 0.5;  // stamps of WALL poses are refused from about one second on
+
+bool serves(const control::DaemonStatus& status, const SonarFacts& sonar) {
+  return std::any_of(status.sonars.begin(), status.sonars.end(), [&sonar](const control::SonarStatus& s) {
+    return s.advertised == sonar.at.host || s.listens == text_from(sonar.at);
+  });
+}
+
+void judge_control(const Facts& facts, std::vector<Finding>& findings) {
+  const ControlFacts& control = facts.control;
+  const std::string at = "control tcp " + text_from(control.at);
+  if (!control.status) {
+    const bool ours = std::any_of(facts.sonars.begin(), facts.sonars.end(), [](const SonarFacts& s) {
+      return s.on_this_host && (s.stream.outcome == StreamFacts::Outcome::pings || !s.clients.empty());
+    });
+    if (!control.given && !ours) return;  // a sonar of another computer, or none: nothing to expect here
+    findings.push_back({control.given ? Level::fail : Level::warn, "control", control.error,
+                        "without it nothing is said of poses, clients and the engine (--control HOST:PORT, --token-file FILE)"});
+    return;
+  }
+  const control::DaemonStatus& status = *control.status;
+  findings.push_back({Level::ok, "control",
+                      at + " answers: sonard " + status.version + ", " + std::to_string(status.sonars.size()) +
+                          (status.sonars.size() == 1 ? " sonar, " : " sonars, ") + status.clock + " clock",
+                      ""});
+  for (const SonarFacts& sonar : facts.sonars)
+    if (!serves(status, sonar))
+      findings.push_back({Level::warn, "control", "the sonard there does not serve " + sonar.at.host,
+                          "is there a second one? Give its control stream with --control"});
+  if (!status.engine.empty()) findings.push_back({Level::ok, "engine", "trace backend: " + status.engine, ""});
+}
+
+void judge_poses(const control::DaemonStatus& status, std::vector<Finding>& findings) {
+  for (const control::VehicleStatus& v : status.vehicles) {
+    if (v.stale)
+      findings.push_back({Level::warn, "poses", "poses of " + v.name + " have stopped, the last came from " + v.source,
+                          "start the sender again, or set poses.on_stale to what you want meanwhile"});
+    else
+      findings.push_back({Level::ok, "poses", "poses of " + v.name + ": " + v.source, ""});
+  }
+  if (status.poses.refused > 0)
+    findings.push_back(
+        {Level::warn, "poses",
+         std::to_string(status.poses.refused) + " poses were refused, " + std::to_string(status.poses.accepted) + " accepted",
+         "sonard's log says why of each kind: the frame, a norm, a name, the clock"});
+}
+
+void judge_http(const Facts& facts, std::vector<Finding>& findings) {
+  const HttpFacts& http = facts.http;
+  const std::string url = "http://" + text_from(http.at) + "/healthz";
+  if (http.code == 200) {
+    findings.push_back({Level::ok, "http", url + " says " + http.text, ""});
+  } else if (http.code != 0) {
+    findings.push_back(
+        {http.code >= 500 ? Level::fail : Level::warn, "http", url + " answers " + std::to_string(http.code) + ": " + http.text,
+         http.code == 401 || http.code == 403 ? "it wants a token or another host name, docs/control.md" : "see sonard's log"});
+  } else if (http.given || facts.control.status) {
+    findings.push_back({http.given ? Level::fail : Level::warn, "http", url + " does not answer: no metrics, no curl",
+                        "control.http of the configuration says where it is (--http HOST:PORT)"});
+  }
+}
+
+void judge_heads(const Facts& facts, std::vector<Finding>& findings) {
+  for (const BlueViewHead& head : facts.heads)
+    findings.push_back({Level::ok, "blueview",
+                        "BlueView head " + head.model + " (" + head.serial + ") answers discovery at tcp " + head.at, ""});
+  if (!facts.control.status) return;
+  for (const control::SonarStatus& sonar : facts.control.status->sonars) {
+    if (!sonar.listens.ends_with(":14750")) continue;
+    const auto answered = [&sonar](const BlueViewHead& head) {
+      return head.at == sonar.advertised + ":14750" || head.at == sonar.listens;
+    };
+    if (std::none_of(facts.heads.begin(), facts.heads.end(), answered))
+      findings.push_back({Level::warn, "blueview",
+                          "BlueView sonar " + sonar.name + " at " + sonar.listens + " does not answer discovery on udp 14751",
+                          "hosts that are given its address need no discovery; else see whether a firewall drops udp 14751"});
+  }
+}
+
+void judge_clocks(const ControlFacts& control, std::vector<Finding>& findings) {
+  if (!control.clock_ahead_s) return;
+  char text[120];
+  std::snprintf(text, sizeof text, "clock of that computer is %.2f s %s ours", std::abs(*control.clock_ahead_s),
+                *control.clock_ahead_s > 0 ? "ahead of" : "behind");
+  if (std::abs(*control.clock_ahead_s) < largest_clock_difference_s)
+    findings.push_back({Level::ok, "clock", text, ""});
+  else
+    findings.push_back({Level::warn, "clock", std::string(text) + ": poses stamped with WALL time are refused from one second on",
+                        "set both by NTP or PTP (timedatectl, chronyc tracking), or send ARRIVAL stamps"});
+}
+
+}  // namespace
+
+void judge_daemon(const Facts& facts, std::vector<Finding>& findings) {
+  judge_control(facts, findings);
+  if (facts.control.status) judge_poses(*facts.control.status, findings);
+  judge_http(facts, findings);
+  judge_heads(facts, findings);
+  judge_clocks(facts.control, findings);
+}
+
+}  // namespace sonar::clients::doctor

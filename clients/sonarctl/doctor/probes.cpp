@@ -1,0 +1,211 @@
+#include "clients/sonarctl/doctor/probes.hpp"
+
+#include <arpa/inet.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+
+#include "clients/sonarctl/doctor/proc_net.hpp"
+#include "protocol/blueview/frames.hpp"
+#include "protocol/oculus/decode.hpp"
+
+namespace sonar::clients::doctor {
+namespace {
+
+std::optional<sockaddr_in> address_of(const Endpoint& at) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(at.port);
+  if (::inet_pton(AF_INET, at.host.c_str(), &address.sin_addr) != 1) return std::nullopt;
+  return address;
+}
+
+// The casts are the sockets interface's own.
+const sockaddr* generic(const sockaddr_in& address) { return reinterpret_cast<const sockaddr*>(&address); }
+
+struct Datagram {
+  std::string from;
+  std::vector<std::byte> bytes;
+};
+/// The next one that is there already, or comes before the deadline.
+std::optional<Datagram> receive(const Socket& socket, Steady::time_point deadline) {
+  for (;;) {
+    pollfd ready{socket.fd(), POLLIN, 0};
+    const int polled = ::poll(&ready, 1, static_cast<int>(left_until(deadline).count()));
+    if (polled < 0 && errno == EINTR) continue;
+    if (polled != 1) return std::nullopt;
+    std::array<std::byte, 2048> buffer;
+    sockaddr_in from{};
+    socklen_t size = sizeof from;
+    const ssize_t received = ::recvfrom(socket.fd(), buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
+    if (received < 0) continue;  // an earlier question was refused
+    char text[INET_ADDRSTRLEN] = "";
+    ::inet_ntop(AF_INET, &from.sin_addr, text, sizeof text);
+    return Datagram{text, {buffer.begin(), buffer.begin() + received}};
+  }
+}
+
+std::string dotted(const std::array<std::uint8_t, 4>& ip) {
+  return std::to_string(ip[0]) + "." + std::to_string(ip[1]) + "." + std::to_string(ip[2]) + "." + std::to_string(ip[3]);
+}
+
+Socket udp_socket() { return Socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)); }
+
+std::string line_of(const std::string& file) {
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  return line;
+}
+
+}  // namespace
+
+std::chrono::milliseconds left_until(Steady::time_point deadline) {
+  return std::max(std::chrono::milliseconds(0), std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Steady::now()));
+}
+
+Result<std::string> ipv4_of(const std::string& host) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  const int rc = ::getaddrinfo(host.c_str(), nullptr, &hints, &found);
+  if (rc != 0)
+    return failure(ErrorKind::usage,
+                   "no address for \"" + host + "\": " + ::gai_strerror(rc) + "; give an IPv4 address such as 127.0.0.2");
+  sockaddr_in address{};
+  std::memcpy(&address, found->ai_addr, sizeof address);
+  ::freeaddrinfo(found);
+  char text[INET_ADDRSTRLEN] = "";
+  ::inet_ntop(AF_INET, &address.sin_addr, text, sizeof text);
+  return std::string(text);
+}
+
+bool is_on_this_host(const std::string& ipv4) {
+  const auto address = address_of({ipv4, 0});
+  const Socket socket = udp_socket();
+  return address && socket.fd() >= 0 && ::bind(socket.fd(), generic(*address), sizeof *address) == 0;
+}
+
+StatusListener::StatusListener(const Endpoint& on) {
+  facts_.on = on;
+  const auto address = address_of(on);
+  Socket socket = udp_socket();
+  const int yes = 1;
+  ::setsockopt(socket.fd(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  if (address && ::bind(socket.fd(), generic(*address), sizeof *address) == 0) {
+    socket_.emplace(std::move(socket));
+    return;
+  }
+  facts_.error = address ? std::strerror(errno) : "\"" + on.host + "\" is no IPv4 address";
+  const auto programs = programs_by_socket();
+  for (const SocketLine& line : udp_sockets())
+    if (line.local_port == on.port) facts_.holders.push_back(holder_of(line, programs));
+}
+
+bool StatusListener::heard(const std::string& host) const {
+  return std::any_of(facts_.heard.begin(), facts_.heard.end(),
+                     [&host](const HeardStatus& h) { return host.empty() || h.advertised == host || h.from == host; });
+}
+
+void StatusListener::listen(const std::string& host, Steady::time_point deadline) {
+  if (!socket_) return;
+  while (const auto datagram = receive(*socket_, Steady::now())) take(datagram->from, datagram->bytes);
+  while (!heard(host)) {
+    const auto datagram = receive(*socket_, deadline);
+    if (!datagram) return;
+    take(datagram->from, datagram->bytes);
+  }
+}
+
+void StatusListener::take(const std::string& from, std::span<const std::byte> datagram) {
+  const auto status = oculus::decode_status(datagram);
+  if (!status) return;  // somebody else's
+  HeardStatus heard;
+  heard.from = from;
+  heard.advertised = dotted(status->ip_address);
+  if (status->connected_ip != std::array<std::uint8_t, 4>{}) heard.client = dotted(status->connected_ip);
+  heard.device_id = status->device_id;
+  heard.size = datagram.size();
+  heard.complaints = oculus::status_violations(*status, datagram.size());
+  const auto known = std::find_if(facts_.heard.begin(), facts_.heard.end(), [&heard](const HeardStatus& h) {
+    return h.from == heard.from && h.advertised == heard.advertised;
+  });
+  if (known == facts_.heard.end())
+    facts_.heard.push_back(std::move(heard));
+  else
+    *known = std::move(heard);
+}
+
+void StatusListener::finish() { facts_.waited_s = std::chrono::duration<double>(Steady::now() - since_).count(); }
+
+DiscoveryQuestion::DiscoveryQuestion(const std::vector<std::string>& hosts) {
+  socket_.emplace(udp_socket());
+  const int yes = 1;
+  ::setsockopt(socket_->fd(), SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+  const std::array<std::uint8_t, 6> question{'B', 'V', 'E', '?', 1, 0};  // docs/protocols/blueview-link.md, "Discovery"
+  const std::vector<std::string> everywhere{"127.255.255.255", "255.255.255.255"};
+  for (const std::string& host : hosts.empty() ? everywhere : hosts)
+    if (const auto to = address_of({host, blueview::discovery_port}))
+      ::sendto(socket_->fd(), question.data(), question.size(), 0, generic(*to), sizeof *to);  // no network, no answer
+}
+
+std::vector<BlueViewHead> DiscoveryQuestion::answers() const {
+  std::vector<BlueViewHead> heads;
+  while (const auto datagram = receive(*socket_, Steady::now())) {
+    wire::Reader reader(datagram->bytes);
+    std::array<std::uint8_t, 4> mark{};
+    std::uint16_t version = 0, port = 0;
+    reader("mark", mark);
+    reader("version", version);
+    reader("port", port);
+    BlueViewHead head;
+    head.model = blueview::take_text(reader, "model");
+    head.serial = blueview::take_text(reader, "serial");
+    if (!reader.ok() || mark != std::array<std::uint8_t, 4>{'B', 'V', 'E', '!'}) continue;
+    head.at = datagram->from + ":" + std::to_string(port);
+    const bool known = std::any_of(heads.begin(), heads.end(), [&head](const BlueViewHead& h) { return h.at == head.at; });
+    if (!known) heads.push_back(std::move(head));
+  }
+  return heads;
+}
+
+HttpFacts ask_health(const Endpoint& at, bool given, std::chrono::milliseconds patience) {
+  HttpFacts facts{at, given, 0, {}};
+  const auto deadline = Steady::now() + patience;
+  const auto socket = connect_tcp(at, patience);
+  if (!socket) return facts;
+  const std::string request = "GET /healthz HTTP/1.1\r\nHost: " + text_from(at) + "\r\nConnection: close\r\n\r\n";
+  if (!write_all(*socket, std::as_bytes(std::span(request.data(), request.size())))) return facts;
+  std::string answer;
+  std::array<std::byte, 4096> chunk;
+  while (answer.size() < 65536) {
+    const Read read = read_some(*socket, chunk, left_until(deadline));
+    if (read.what != Wait::data) break;
+    for (std::size_t i = 0; i < read.size; ++i) answer += static_cast<char>(chunk[i]);
+  }
+  if (answer.starts_with("HTTP/1.") && answer.size() > 12) std::from_chars(answer.data() + 9, answer.data() + 12, facts.code);
+  const std::size_t body = answer.find("\r\n\r\n");
+  if (body == std::string::npos) return facts;
+  facts.text = answer.substr(body + 4, answer.find('\n', body + 4) - body - 4);
+  while (!facts.text.empty() && (facts.text.back() == '\r' || facts.text.back() == ' ')) facts.text.pop_back();
+  return facts;
+}
+
+KernelPorts kernel_ports() {
+  KernelPorts ports;
+  std::ifstream range("/proc/sys/net/ipv4/ip_local_port_range");
+  ports.known = static_cast<bool>(range >> ports.low >> ports.high);
+  ports.reserved = line_of("/proc/sys/net/ipv4/ip_local_reserved_ports");
+  return ports;
+}
+
+}  // namespace sonar::clients::doctor

@@ -1,0 +1,54 @@
+// Single questions to the network, each with a limit in time. Used by gather, which puts them in order.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/sonarctl/doctor/facts.hpp"
+#include "core/base/result.hpp"
+
+namespace sonar::clients::doctor {
+
+using Steady = std::chrono::steady_clock;
+std::chrono::milliseconds left_until(Steady::time_point deadline);
+
+/// "127.0.0.2" of a name, or a sentence.
+Result<std::string> ipv4_of(const std::string& host);
+/// Can be bound: all of 127.0.0.0/8, and the addresses of the interfaces.
+bool is_on_this_host(const std::string& ipv4);
+
+/// Listens for status messages and sorts them; they may come while other questions are asked.
+class StatusListener {
+ public:
+  explicit StatusListener(const Endpoint& on);
+  /// Takes what came; waits until one of `host` was heard (any host when it is empty) or `deadline`.
+  void listen(const std::string& host, Steady::time_point deadline);
+  bool heard(const std::string& host) const;
+  const StatusFacts& facts() const { return facts_; }
+  void finish();
+
+ private:
+  void take(const std::string& from, std::span<const std::byte> datagram);
+
+  std::optional<Socket> socket_;
+  Steady::time_point since_ = Steady::now();
+  StatusFacts facts_;
+};
+
+/// Broadcasts on this computer and its networks, or asks `hosts` alone; answers are read by `answers`.
+class DiscoveryQuestion {
+ public:
+  explicit DiscoveryQuestion(const std::vector<std::string>& hosts);
+  std::vector<BlueViewHead> answers() const;
+
+ private:
+  std::optional<Socket> socket_;
+};
+
+/// GET /healthz.
+HttpFacts ask_health(const Endpoint& at, bool given, std::chrono::milliseconds patience);
+
+KernelPorts kernel_ports();
+
+}  // namespace sonar::clients::doctor

@@ -1,0 +1,138 @@
+#include "clients/sonarctl/doctor/watch_pings.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/ping_log.hpp"
+#include "clients/sonarctl/ping_stream.hpp"
+
+namespace sonar::clients::doctor {
+namespace {
+
+using namespace std::chrono_literals;
+using Outcome = StreamFacts::Outcome;
+
+constexpr std::uint64_t enough_pings = 15;
+constexpr auto connect_patience = 1000ms, ping_patience = 4000ms, watch_time = 1600ms;
+
+double unix_now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
+double seconds_since(Steady::time_point start) { return std::chrono::duration<double>(Steady::now() - start).count(); }
+
+/// What drivers commonly ask for; version 2 has stamps that can be read.
+oculus::FireRequest usual_request() {
+  oculus::FireRequest fire;
+  fire.version = 2;
+  fire.settings.mode = 2;
+  fire.settings.ping_rate = oculus::PingRate::hz10;
+  fire.settings.flags = oculus::flag::range_in_metres | oculus::flag::simple_result | oculus::flag::beams_512;
+  fire.settings.range = 10;
+  fire.settings.gain_percent = 50;
+  return fire;
+}
+
+class Watch {
+ public:
+  Watch(StreamFacts& facts, Steady::time_point deadline) : facts_(facts), deadline_(deadline) {}
+
+  void run(PingStream stream) {
+    std::uint64_t others = 0;
+    bool ended = false;
+    while (!ended && !over() && interrupted == 0) {
+      const PingStream::Item item = stream.next(std::min<std::chrono::milliseconds>(50ms, left_until(deadline_)));
+      ended = item.what == Wait::closed;
+      if (item.what != Wait::data) continue;
+      if (const auto* ping = std::get_if<oculus::DecodedPing>(&*item.message))
+        take(*ping);
+      else
+        ++others;
+    }
+    facts_.junk_bytes = stream.junk_bytes();
+    facts_.dummies = others;
+    facts_.waited_s = seconds_since(start_);
+    const bool nothing = facts_.pings == 0 && others == 0 && facts_.junk_bytes == 0;
+    facts_.outcome = facts_.pings > 0 ? Outcome::pings : nothing && ended ? Outcome::closed_without_a_byte : Outcome::no_ping;
+    conclude();
+  }
+
+  /// Seconds by which each ping came later than it was fired, as the control stream's events have it.
+  std::vector<double> delays_s(ControlClient& control, const std::string& sonar) const {
+    std::vector<double> delays;
+    for (int i = 0; i < 1000; ++i) {
+      const auto event = control.next_event(i == 0 ? 50ms : 0ms);
+      if (!event || !*event) break;
+      const auto* ping = std::get_if<control::PingEvent>(&(*event)->what);
+      if (ping == nullptr || ping->sonar != sonar) continue;
+      const auto arrived = arrived_unix_s_.find(ping->number);
+      if (arrived != arrived_unix_s_.end()) delays.push_back(arrived->second - static_cast<double>(ping->fired_at_ns) * 1e-9);
+    }
+    return delays;
+  }
+
+ private:
+  bool over() const {
+    if (Steady::now() >= deadline_ || facts_.pings >= enough_pings) return true;
+    return facts_.pings > 0 ? seconds_since(first_) * 1s >= watch_time : seconds_since(start_) * 1s >= ping_patience;
+  }
+
+  void take(const oculus::DecodedPing& ping) {
+    const double at_s = seconds_since(start_);
+    if (facts_.pings == 0) {
+      first_ = Steady::now();
+      facts_.first_ping_ms = 1000 * at_s;
+      facts_.beams = ping.head.fixed.beam_count;
+      facts_.rows = ping.head.fixed.row_count;
+      facts_.bits = static_cast<unsigned>(8 * ping.bytes_per_sample());
+    }
+    const PingReport report = log_.add(ping, at_s);
+    ++facts_.pings;
+    if (!report.errors.empty() && ++facts_.broken == 1) facts_.first_complaint = report.errors.front();
+    arrived_unix_s_[ping.head.fixed.ping_id] = unix_now_s();
+    if (ping.head.fixed.ping_start_time_s > 0) behind_stamp_s_.push_back(at_s - ping.head.fixed.ping_start_time_s);
+  }
+
+  void conclude() {
+    const PingSummary summary = log_.summary(0);
+    facts_.rate_hz = summary.rate_hz;
+    facts_.missing = summary.missing_ids;
+    if (behind_stamp_s_.size() < 3) return;
+    const double promptest = *std::min_element(behind_stamp_s_.begin(), behind_stamp_s_.end());
+    facts_.spread_p99_ms = 1000 * (percentile(behind_stamp_s_, 0.99) - promptest);
+  }
+
+  StreamFacts& facts_;
+  Steady::time_point start_ = Steady::now(), first_ = start_, deadline_;
+  PingLog log_{std::nullopt};
+  std::map<std::uint32_t, double> arrived_unix_s_;
+  std::vector<double> behind_stamp_s_;
+};
+
+void take_delays(SonarFacts& sonar, const std::vector<double>& delays_s, ControlFacts& clocks) {
+  if (delays_s.empty()) return;
+  const double p50 = percentile(delays_s, 0.5), p99 = percentile(delays_s, 0.99);
+  if (!sonar.on_this_host) clocks.clock_ahead_s = -*std::min_element(delays_s.begin(), delays_s.end());
+  if (p50 < 0 || p50 > 2) return;  // clocks differ: no latency can be told
+  sonar.stream.latency_p50_ms = 1000 * p50;
+  sonar.stream.latency_p99_ms = 1000 * p99;
+}
+
+}  // namespace
+
+void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks) {
+  StreamFacts& facts = sonar.stream;
+  std::optional<oculus::FireRequest> asked;
+  if (sonar.clients.empty()) asked = usual_request();
+  facts.asked = asked.has_value();
+  facts.asked_hz = facts.asked ? 10 : 0;
+  Watch watch(facts, deadline);
+  auto stream = PingStream::open(sonar.at, asked, std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
+  if (!stream) {
+    facts.error = stream.error().text;
+    facts.outcome = facts.error.find("refused") != std::string::npos ? Outcome::refused : Outcome::unreachable;
+    return;
+  }
+  watch.run(std::move(*stream));
+  if (control != nullptr) take_delays(sonar, watch.delays_s(*control, sonar.name), clocks);
+}
+
+}  // namespace sonar::clients::doctor

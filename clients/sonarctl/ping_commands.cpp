@@ -1,0 +1,165 @@
+// listen, view and stats on the command line: what looks at pings.
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "clients/sonarctl/command_line.hpp"
+#include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/fire_options.hpp"
+
+namespace sonar::clients {
+namespace {
+
+/// Options that belong to a source of pings; finish() turns their texts into a SourceOptions once the line is parsed.
+struct SourceArguments {
+  std::string address;
+  std::uint16_t port = 52100;
+  bool discover = false, as_it_is = false;
+  std::string recording;
+  double patience_s = 2;
+  FireArguments fire;
+
+  void add_to(CLI::App& app, bool recordings) {
+    app.add_option("ADDRESS", address, "address of the sonar, HOST or HOST:PORT (default 127.0.0.2)");
+    app.add_option("--port", port, "TCP port of the sonar")->capture_default_str();
+    app.add_flag("--discover", discover, "take the address from the status broadcast on udp 52102");
+    app.add_option("--wait", patience_s, "seconds to go on trying to connect")->capture_default_str();
+    if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
+    app.add_flag("--as-it-is", as_it_is, "send no settings, only look (many sonars then send no pings)");
+    fire.add_to(app);
+  }
+
+  Result<SourceOptions> finish() const {
+    SourceOptions source;
+    const Result<Endpoint> device = parse_endpoint(address, {"127.0.0.2", port});
+    if (!device) return tl::unexpected(device.error());
+    source.device = *device;
+    source.discover = discover;
+    source.recording = recording;
+    source.connect_patience_s = patience_s;
+    if (!as_it_is && recording.empty()) source.asked = fire.request();
+    return source;
+  }
+};
+
+struct StyleArguments {
+  std::string colour_map = "copper";
+  int width_px = 1000;
+  bool no_rings = false;
+
+  void add_to(CLI::App& app) {
+    app.add_option("--colour-map", colour_map, "one of " + colour_map_names())->capture_default_str();
+    app.add_option("--width", width_px, "of the picture, in pixels")->capture_default_str();
+    app.add_flag("--no-rings", no_rings, "draw no range rings");
+  }
+
+  Result<FanStyle> finish() const {
+    const Result<ColourMap> map = find_colour_map(colour_map);
+    if (!map) return tl::unexpected(map.error());
+    return FanStyle{width_px, *map, !no_rings};
+  }
+};
+
+}  // namespace
+
+Run add_listen(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand("listen", "connect as a driver does; print and check every ping");
+  command.footer(
+      "examples:\n"
+      "  sonarctl listen --seconds 60\n"
+      "  sonarctl listen 127.0.0.3 --mode 1 --range 30 --beams 512 --pings 100 --quiet\n"
+      "  sonarctl listen --discover --json | head\n"
+      "exit code 0 only when every ping was sound and the settings were echoed as asked");
+  struct Arguments {
+    ListenOptions options;
+    SourceArguments source;
+    StyleArguments style;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  ListenOptions& options = arguments->options;
+  arguments->source.add_to(command, false);
+  command.add_option("--seconds", options.seconds, "stop after this time");
+  command.add_option("--pings", options.pings, "stop after so many pings");
+  command.add_flag("--json", options.json, "one JSON object a line, the last one a summary");
+  command.add_flag("--quiet", options.quiet, "only broken pings and the summary");
+  command.add_option("--record", options.record, "write the raw TCP bytes to this file");
+  command.add_option("--png", options.png, "draw the last ping into this file");
+  command.add_option("--started-at", options.started_at_unix_s, "UNIX time from which to count the time to the first ping");
+  arguments->style.add_to(command);
+  return [arguments]() -> Result<void> {
+    ListenOptions& listen_options = arguments->options;
+    auto source = arguments->source.finish();
+    auto style = arguments->style.finish();
+    if (!source) return tl::unexpected(source.error());
+    if (!style) return tl::unexpected(style.error());
+    listen_options.source = std::move(*source);
+    listen_options.style = std::move(*style);
+    listen_options.triggered = arguments->source.fire.triggered();
+    return listen(listen_options);
+  };
+}
+
+Run add_view(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand("view", "draw pings as fans: into a file or the terminal, once or live");
+  command.footer(
+      "examples:\n"
+      "  sonarctl view --png ping.png\n"
+      "  sonarctl view --term --live                  in the terminal until Ctrl-C\n"
+      "  sonarctl view --png ping.png --live          the file is replaced with every ping\n"
+      "  sonarctl view --from-raw recording.raw --ping 2 --png ping.png --colour-map gray --width 1600");
+  struct Arguments {
+    ViewOptions options;
+    SourceArguments source;
+    StyleArguments style;
+    bool ascii = false;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  ViewOptions& options = arguments->options;
+  arguments->source.add_to(command, true);
+  command.add_option("--png", options.png, "file to write");
+  command.add_flag("--term", options.terminal, "draw in the terminal: half blocks, in colour where it has colours");
+  command.add_flag("--ascii", arguments->ascii, "with --term: letters, no colours (default for files, pipes and NO_COLOR)");
+  command.add_flag("--live", options.live, "every ping, until Ctrl-C");
+  command.add_option("--pings", options.pings, "with --live: stop after so many pings");
+  command.add_option("--ping", options.ping, "which ping of a recording, from 0")->capture_default_str();
+  arguments->style.add_to(command);
+  return [arguments]() -> Result<void> {
+    auto source = arguments->source.finish();
+    auto style = arguments->style.finish();
+    if (!source) return tl::unexpected(source.error());
+    if (!style) return tl::unexpected(style.error());
+    ViewOptions& view_options = arguments->options;
+    view_options.source = std::move(*source);
+    view_options.style = std::move(*style);
+    if (arguments->ascii) view_options.colours = TerminalColours::none;
+    return view(view_options);
+  };
+}
+
+Run add_stats(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand("stats", "figures of one ping's samples: speckle correlation, noise, shadow");
+  command.footer(
+      "examples:\n"
+      "  sonarctl stats --rows 400:650\n"
+      "  sonarctl stats --from-raw recording.raw --rows 400:650 --json\n"
+      "  sonarctl stats --rows 150:300,0:200 --shadow 220:260,240:270 --surroundings 220:260,300:400");
+  struct Arguments {
+    StatsOptions options;
+    SourceArguments source;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  StatsOptions& options = arguments->options;
+  arguments->source.add_to(command, true);
+  command.add_option("--ping", options.ping, "which ping of a recording, from 0")->capture_default_str();
+  command.add_option("--rows", options.window, "window of the speckle figures, ROW:ROW or ROW:ROW,BEAM:BEAM");
+  CLI::Option* shadow = command.add_option("--shadow", options.shadow, "window in a shadow");
+  command.add_option("--surroundings", options.surroundings, "window beside it")->needs(shadow);
+  command.add_flag("--json", options.json, "one JSON object");
+  return [arguments]() -> Result<void> {
+    auto source = arguments->source.finish();
+    if (!source) return tl::unexpected(source.error());
+    arguments->options.source = std::move(*source);
+    return stats(arguments->options);
+  };
+}
+
+}  // namespace sonar::clients

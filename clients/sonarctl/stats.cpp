@@ -1,0 +1,77 @@
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "clients/sonarctl/image_statistics.hpp"
+#include "clients/sonarctl/picture.hpp"
+#include "clients/sonarctl/source.hpp"
+
+namespace sonar::clients {
+namespace {
+
+Result<PolarImage> fetch_picture(const SourceOptions& source, std::size_t number) {
+  const Result<oculus::DecodedPing> ping = fetch_ping(source, number);
+  if (!ping) return tl::unexpected(ping.error());
+  return picture_of(*ping);
+}
+
+nlohmann::json speckle_figures(const PolarImage& image, const Window& w) {
+  return {
+      {"rows", {w.row_begin, w.row_end}},
+      {"beams", {w.beam_begin, w.beam_end}},
+      {"mean", mean(image, w)},
+      {"percentiles_1_5_25_50_75_95_99", percentiles(image, w, {0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99})},
+      {"saturated_share", share_at_least(image, w, 254)},
+      {"correlation_of_adjacent_beams", {correlation(image, w, 0, 1), correlation(image, w, 0, 2), correlation(image, w, 0, 3)}},
+      {"correlation_of_adjacent_rows", {correlation(image, w, 1, 0), correlation(image, w, 2, 0), correlation(image, w, 3, 0)}}};
+}
+
+/// The near field ends at the first echo; its first eight rows are the transmit leak.
+nlohmann::json range_figures(const PolarImage& image) {
+  const std::size_t echo = first_echo_row(image), leak = std::min<std::size_t>(8, image.rows);
+  const std::size_t tail = image.rows > 50 ? image.rows - 50 : 0;
+  return {{"first_echo_row", echo},
+          {"near_field_mean", mean(image, {leak, std::max(leak, echo), 0, image.beams})},
+          {"last_50_rows_mean", mean(image, {tail, image.rows, 0, image.beams})},
+          {"mean_of_each_50_rows", block_means(image, 50)}};
+}
+
+void print_plain(const nlohmann::json& figures, const std::string& prefix) {
+  for (const auto& [name, value] : figures.items()) {
+    if (value.is_object()) {
+      print_plain(value, prefix + name + ".");
+      continue;
+    }
+    std::string text;
+    char number[32];
+    for (const auto& v : value.is_array() ? value : nlohmann::json::array({value})) {
+      std::snprintf(number, sizeof number, "%s%.4g", text.empty() ? "" : " ", v.get<double>());
+      text += number;
+    }
+    std::printf("%-50s %s\n", (prefix + name).c_str(), text.c_str());
+  }
+}
+
+}  // namespace
+
+Result<void> stats(const StatsOptions& options) {
+  const Result<PolarImage> image = fetch_picture(options.source, options.ping);
+  if (!image) return tl::unexpected(image.error());
+  const Result<Window> window = parse_window(options.window, *image);
+  if (!window) return tl::unexpected(window.error());
+  nlohmann::json figures{{"window", speckle_figures(*image, *window)}, {"range", range_figures(*image)}};
+  if (!options.shadow.empty()) {
+    const Result<Window> shadow = parse_window(options.shadow, *image), around = parse_window(options.surroundings, *image);
+    if (!shadow) return tl::unexpected(shadow.error());
+    if (!around) return tl::unexpected(around.error());
+    const double dark = mean(*image, *shadow), bright = mean(*image, *around);
+    figures["shadow"] = {{"mean", dark}, {"surroundings_mean", bright}, {"ratio", bright > 0 ? dark / bright : 0.0}};
+  }
+  if (options.json) {
+    std::puts(figures.dump().c_str());
+  } else {
+    print_plain(figures, "");
+  }
+  return {};
+}
+
+}  // namespace sonar::clients

@@ -1,0 +1,85 @@
+#include "clients/sonarctl/terminal.hpp"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <cstdlib>
+
+namespace sonar::clients {
+namespace {
+
+std::optional<int> positive_number(const std::optional<std::string>& text) {
+  int value = 0;
+  if (!text) return std::nullopt;
+  const auto [stop, error] = std::from_chars(text->data(), text->data() + text->size(), value);
+  if (error != std::errc{} || stop != text->data() + text->size() || value <= 0) return std::nullopt;
+  return value;
+}
+
+bool says_utf8(std::string locale) {
+  std::transform(locale.begin(), locale.end(), locale.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return locale.find("utf-8") != std::string::npos || locale.find("utf8") != std::string::npos;
+}
+
+}  // namespace
+
+TerminalFacts terminal_facts() {
+  return {::isatty(STDOUT_FILENO) == 1, [](const std::string& name) -> std::optional<std::string> {
+            const char* value = std::getenv(name.c_str());
+            return value != nullptr ? std::optional<std::string>(value) : std::nullopt;
+          }};
+}
+
+TerminalColours choose_colours(const TerminalFacts& facts) {
+  const std::string term = facts.variable("TERM").value_or("");
+  if (!facts.is_terminal || !facts.variable("NO_COLOR").value_or("").empty() || term.empty() || term == "dumb")
+    return TerminalColours::none;
+  for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"}) {  // the first that is set counts
+    const std::string locale = facts.variable(name).value_or("");
+    if (locale.empty()) continue;
+    if (!says_utf8(locale)) return TerminalColours::none;
+    break;
+  }
+  const std::string depth = facts.variable("COLORTERM").value_or("");
+  return depth == "truecolor" || depth == "24bit" ? TerminalColours::true_colour : TerminalColours::palette_256;
+}
+
+TerminalSize terminal_size() {
+  TerminalSize size;
+  winsize window{};
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 0 && window.ws_row > 0)
+    size = {window.ws_col, window.ws_row};
+  const TerminalFacts facts = terminal_facts();
+  size.columns = positive_number(facts.variable("COLUMNS")).value_or(size.columns);
+  size.lines = positive_number(facts.variable("LINES")).value_or(size.lines);
+  return size;
+}
+
+LiveScreen::LiveScreen(bool is_terminal) : is_terminal_(is_terminal) {
+  if (!is_terminal_) return;
+  std::fputs("\x1b[?1049h\x1b[?25l\x1b[2J", stdout);  // the other screen, no cursor, empty
+  std::fflush(stdout);
+}
+
+LiveScreen::~LiveScreen() {
+  if (!is_terminal_) return;
+  std::fputs("\x1b[0m\x1b[?25h\x1b[?1049l", stdout);
+  std::fflush(stdout);
+}
+
+bool LiveScreen::show(const std::vector<std::string>& lines) const {
+  std::string text = is_terminal_ ? "\x1b[H" : "";
+  for (const std::string& line : lines) {
+    if (is_terminal_ && &line != &lines.front()) text += "\r\n";
+    text += line + (is_terminal_ ? "\x1b[K" : "\n");  // to the end of the line nothing of the last picture stays
+  }
+  if (is_terminal_) text += "\x1b[J";
+  std::fputs(text.c_str(), stdout);
+  return std::fflush(stdout) == 0;
+}
+
+}  // namespace sonar::clients

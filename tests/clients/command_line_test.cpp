@@ -1,0 +1,48 @@
+// Words that sonarctl does not know are answered with the nearest that it does.
+#include "clients/sonarctl/command_line.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+
+namespace sonar::clients {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+std::string complaint(const std::vector<std::string>& words) {
+  CLI::App app("", "sonarctl");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "1");
+  add_view(app);
+  add_pose(app);
+  add_set(app);
+  return complaint_about_words(app, words);
+}
+
+TEST(CommandLine, NamesTheNearestCommand) {
+  EXPECT_EQ(complaint({"veiw"}), "unknown command \"veiw\"; did you mean \"view\"? (sonarctl --help)");
+  EXPECT_EQ(complaint({"pose", "cirlce"}), "unknown command \"cirlce\"; did you mean \"circle\"? (sonarctl pose --help)");
+  EXPECT_THAT(complaint({"qqq"}), AllOf(StartsWith("unknown command \"qqq\"; commands of sonarctl: view"), HasSubstr("pose")));
+}
+
+TEST(CommandLine, NamesTheNearestOption) {
+  EXPECT_EQ(complaint({"view", "--rnage", "3"}), "unknown option \"--rnage\"; did you mean \"--range\"? (sonarctl view --help)");
+  EXPECT_THAT(complaint({"set", "sonar", "--gian=3"}), HasSubstr("did you mean \"--gain\"? (sonarctl set sonar --help)"));
+  EXPECT_THAT(complaint({"--verison"}), HasSubstr("did you mean \"--version\"?"));
+}
+
+TEST(CommandLine, LeavesTheRestToTheParser) {
+  EXPECT_THAT(complaint({}), IsEmpty());
+  EXPECT_THAT(complaint({"view", "127.0.0.2", "--png", "veiw.png", "--range=3"}), IsEmpty());
+  EXPECT_THAT(complaint({"pose", "once", "--xyz", "0,0,-3", "--rpy", "-1,0,0"}), IsEmpty());
+  EXPECT_THAT(complaint({"view", "--", "--rnage"}), IsEmpty());
+  EXPECT_THAT(complaint({"--version"}), IsEmpty());
+}
+
+}  // namespace
+}  // namespace sonar::clients

@@ -1,0 +1,322 @@
+// What doctor says of every state it can find, without a network: facts in, lines out.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clients/sonarctl/doctor/judge.hpp"
+#include "clients/sonarctl/doctor/proc_net.hpp"
+
+namespace sonar::clients::doctor {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using Outcome = StreamFacts::Outcome;
+
+HeardStatus heard(const std::string& from) {
+  HeardStatus status;
+  status.from = status.advertised = from;
+  status.device_id = 7001;
+  status.size = 142;
+  return status;
+}
+
+SonarFacts healthy_sonar(const std::string& host) {
+  SonarFacts sonar;
+  sonar.at = {host, 52100};
+  sonar.on_this_host = true;
+  StreamFacts& s = sonar.stream;
+  s.outcome = Outcome::pings;
+  s.asked = true;
+  s.first_ping_ms = 96.4, s.beams = 512, s.rows = 437, s.bits = 8;
+  s.pings = 15, s.asked_hz = 10, s.rate_hz = 9.98;
+  s.latency_p50_ms = 18.2, s.latency_p99_ms = 21.4;
+  return sonar;
+}
+
+control::DaemonStatus daemon_of(const std::string& host) {
+  control::DaemonStatus status;
+  status.version = "0.1.0", status.clock = "realtime", status.engine = "embree, avx2";
+  control::SonarStatus sonar;
+  sonar.name = "front", sonar.listens = host + ":52100", sonar.advertised = host;
+  sonar.status_to = {"192.0.2.255:52102"};
+  sonar.rate_hz = 10;
+  status.sonars.push_back(sonar);
+  status.vehicles.push_back({"rov", "demo orbit", false, {}});
+  return status;
+}
+
+Facts healthy() {
+  Facts facts;
+  facts.sonars.push_back(healthy_sonar("127.0.0.2"));
+  facts.status.heard.push_back(heard("127.0.0.2"));
+  facts.status.waited_s = 2.5;
+  facts.control.at = {"127.0.0.1", 14770};
+  facts.control.status = daemon_of("127.0.0.2");
+  facts.http = {{"127.0.0.1", 8088}, false, 200, "ok"};
+  facts.kernel_ports = {true, 32768, 60999, "52100,52102"};
+  return facts;
+}
+
+/// The only line of that check; an empty one when there is none, or several.
+Finding line(const std::vector<Finding>& findings, const std::string& check) {
+  std::vector<Finding> found;
+  for (const Finding& f : findings)
+    if (f.check == check) found.push_back(f);
+  EXPECT_EQ(found.size(), 1u) << check << " in\n" << text_from(findings);
+  return found.size() == 1 ? found.front() : Finding{};
+}
+Finding line(const Facts& facts, const std::string& check) { return line(judge(facts), check); }
+
+void expect(const Finding& finding, Level level, const std::string& text, const std::string& cure) {
+  EXPECT_EQ(finding.level, level) << finding.text;
+  EXPECT_THAT(finding.text, HasSubstr(text));
+  if (cure.empty())
+    EXPECT_THAT(finding.cure, IsEmpty());
+  else
+    EXPECT_THAT(finding.cure, HasSubstr(cure));
+}
+
+TEST(Doctor, PraisesWhatIsWell) {
+  EXPECT_EQ(
+      text_from(judge(healthy())),
+      "ok    status broadcast received back on udp 52102 from 127.0.0.2\n"
+      "ok    tcp 127.0.0.2:52100 accepts, first ping decoded after 96 ms: 512 beams x 437 ranges, 8 bit, size fields consistent\n"
+      "ok    rate 10.0 Hz (asked 10), image latency 18 ms p50, 21 ms p99\n"
+      "ok    control tcp 127.0.0.1:14770 answers: sonard 0.1.0, 1 sonar, realtime clock\n"
+      "ok    trace backend: embree, avx2\n"
+      "ok    poses of rov: demo orbit\n"
+      "ok    http://127.0.0.1:8088/healthz says ok\n"
+      "ok    ports 52100,52102 are reserved\n"
+      "8 checks, 0 errors, 0 warnings\n");
+  EXPECT_FALSE(any_failed(judge(healthy())));
+}
+
+TEST(Doctor, WarnsOfPortsThatOthersMayTake) {
+  Facts facts = healthy();
+  facts.kernel_ports.reserved = "";
+  EXPECT_THAT(text_from(judge(facts)),
+              HasSubstr("warn  ports 52100,52102 lie in the ephemeral range 32768-60999: an outgoing "
+                        "connection may take one first; reserve: sysctl "
+                        "net.ipv4.ip_local_reserved_ports=52100,52102\n8 checks, 0 errors, 1 warning\n"));
+  facts.kernel_ports.reserved = "8080,52101-52110";
+  expect(line(facts, "ports"), Level::warn, "ports 52100 lie", "ip_local_reserved_ports=8080,52101-52110,52100,52102");
+  facts.kernel_ports = {true, 10000, 50000, ""};
+  expect(line(facts, "ports"), Level::ok, "outside the ephemeral range 10000-50000", "");
+  facts.kernel_ports.known = false;
+  EXPECT_THAT(text_from(judge(facts)), Not(HasSubstr("ephemeral")));
+}
+
+TEST(Doctor, KnowsWhyNoStatusComes) {
+  Facts facts = healthy();
+  facts.status.heard.clear();
+  expect(line(facts, "status"), Level::fail, "no status from 127.0.0.2 on udp 52102 within 2.5 s",
+         "a firewall may drop udp 52102");
+  facts.sonars[0].says = facts.control.status->sonars[0];
+  expect(line(facts, "status"), Level::fail, "no status", "it is sent to 192.0.2.255:52102");
+  facts.status.error = "Address already in use";
+  facts.status.holders = {{"0.0.0.0:52102", 4711, "oculus_node"}};
+  expect(line(facts, "status"), Level::warn,
+         "cannot listen on udp 52102, held without address reuse by oculus_node (pid 4711): Address already in use",
+         "stop that program");
+  facts.status.holders[0].pid = 0;
+  expect(line(facts, "status"), Level::warn, "by a program of another user", "stop that program");
+}
+
+TEST(Doctor, SaysWhatDriversWouldObjectToInTheStatus) {
+  Facts facts = healthy();
+  facts.status.heard[0].complaints = {"datagram length 140 is not a status message's 142"};
+  expect(line(facts, "status"), Level::fail, "datagram length 140", "142 bytes");
+}
+
+TEST(Doctor, FollowsTheAdvertisedAddress) {
+  Facts facts = healthy();
+  facts.status.heard[0].from = "127.0.0.1";
+  expect(line(facts, "status"), Level::ok, "from 127.0.0.1, which tells drivers to connect to 127.0.0.2", "");
+  facts.status.heard[0] = heard("127.0.0.2");
+  facts.status.heard[0].advertised = "10.1.1.1";
+  expect(line(facts, "status"), Level::fail, "connect to 10.1.1.1, where nobody answers", "advertise_ip");
+}
+
+TEST(Doctor, LeavesABusySonarAlone) {
+  Facts facts = healthy();
+  facts.sonars[0].stream = {};
+  facts.sonars[0].clients = {"127.0.0.1:41022"};
+  expect(line(facts, "ping"), Level::ok, "127.0.0.2 is busy: 127.0.0.1:41022 is connected and was left alone (--take", "");
+  facts.sonars[0].says = facts.control.status->sonars[0];
+  facts.sonars[0].says->figures.served = 120;
+  facts.sonars[0].says->figures.latency_ms_p99 = 33;
+  expect(line(facts, "ping"), Level::ok, "it says 120 pings served, 0 dropped, latency 0 ms p50, 33 ms p99", "");
+  EXPECT_FALSE(any_failed(judge(facts)));
+}
+
+TEST(Doctor, SaysWhereSomethingDoesListen) {
+  Facts facts;
+  facts.sonars.push_back({});
+  facts.sonars[0].at = {"127.0.0.2", 52100};
+  facts.sonars[0].on_this_host = true;
+  facts.sonars[0].stream.outcome = Outcome::refused;
+  expect(line(facts, "ping"), Level::fail, "tcp 127.0.0.2:52100 refuses the connection: nobody listens there",
+         "start it: sonard");
+  facts.status.heard.push_back(heard("127.0.0.9"));
+  expect(line(facts, "ping"), Level::fail, "refuses", "names a sonar at 127.0.0.9: sonarctl doctor 127.0.0.9");
+  facts.daemons = {{"127.0.0.5:52100", 12, "sonard"}};
+  expect(line(facts, "ping"), Level::fail, "refuses", "sonard (pid 12) listens on 127.0.0.5:52100: sonarctl doctor 127.0.0.5");
+  facts = {};
+  facts.sonars.push_back({});
+  facts.sonars[0].at = {"192.0.2.7", 52100};
+  facts.sonars[0].stream.outcome = Outcome::unreachable;
+  facts.sonars[0].stream.error = "Connection timed out";
+  expect(line(facts, "ping"), Level::fail, "does not answer: Connection timed out", "ip addr add 192.0.2.7/24 dev eth0");
+  facts.sonars[0].on_this_host = true;
+  expect(line(facts, "ping"), Level::fail, "does not answer", "a firewall on this computer may drop tcp 52100");
+}
+
+TEST(Doctor, NamesWhoElseHasThePort) {
+  Facts facts = healthy();
+  SonarFacts& sonar = facts.sonars[0];
+  sonar.stream = {};
+  sonar.stream.outcome = Outcome::no_ping;
+  sonar.stream.waited_s = 4;
+  sonar.listeners = {{"0.0.0.0:52100", 99, "nginx"}};
+  expect(line(facts, "ping"), Level::fail, "no ping came within 4.0 s: nginx (pid 99) has the port, not sonard", "stop it");
+  sonar.stream.junk_bytes = 300;
+  expect(line(facts, "ping"), Level::fail, "sends 300 bytes that are no Oculus messages: nginx (pid 99) listens on 0.0.0.0:52100",
+         "another program has the port");
+}
+
+TEST(Doctor, KnowsWhyNoPingComes) {
+  Facts facts = healthy();
+  SonarFacts& sonar = facts.sonars[0];
+  sonar.stream = {};
+  sonar.stream.outcome = Outcome::no_ping;
+  expect(line(facts, "ping"), Level::fail, "no ping came", "standby");
+  sonar.stream.asked = true;
+  expect(line(facts, "ping"), Level::fail, "no ping came", "overloaded");
+  sonar.says = facts.control.status->sonars[0];
+  sonar.says->figures.refused = 7;
+  expect(line(facts, "ping"), Level::fail, "the engine refused 7 of them", "log");
+  sonar.stream.outcome = Outcome::closed_without_a_byte;
+  expect(line(facts, "ping"), Level::warn, "closed the connection without a byte", "clients.max");
+}
+
+TEST(Doctor, FailsBrokenPings) {
+  Facts facts = healthy();
+  facts.sonars[0].stream.broken = 2;
+  facts.sonars[0].stream.first_complaint = "image_size is 5, not 6";
+  expect(line(facts, "ping"), Level::fail, "2 of 15 pings broken: image_size is 5, not 6", "sonarctl listen");
+  facts.sonars[0].stream.broken = 0;
+  facts.sonars[0].stream.junk_bytes = 3;
+  expect(line(facts, "ping"), Level::fail, "3 bytes between messages", "sonarctl listen");
+}
+
+TEST(Doctor, MeasuresTheRate) {
+  Facts facts = healthy();
+  StreamFacts& s = facts.sonars[0].stream;
+  s.rate_hz = 6.2;
+  expect(line(facts, "rate"), Level::warn, "rate 6.2 Hz (asked 10)", "engine.threads");
+  s.rate_hz = 10, s.missing = 4;
+  expect(line(facts, "rate"), Level::warn, "4 pings missing", "outbox");
+  s.missing = 0, s.latency_p50_ms.reset(), s.spread_p99_ms = 7.0;
+  expect(line(facts, "rate"), Level::ok, "images come 7 ms later than the promptest, p99", "");
+  facts.sonars[0].says = facts.control.status->sonars[0];
+  facts.sonars[0].says->figures.latency_ms_p50 = 25, facts.sonars[0].says->figures.latency_ms_p99 = 31;
+  expect(line(facts, "rate"), Level::ok, "image latency 25 ms p50, 31 ms p99", "");
+  s.asked = false, s.rate_hz = 3;
+  expect(line(facts, "rate"), Level::warn, "rate 3.0 Hz (asked 10)", "fewer beams");
+  s.pings = 1;
+  expect(line(facts, "rate"), Level::warn, "one ping only", "sonarctl listen 127.0.0.2");
+}
+
+TEST(Doctor, ExpectsControlWhereADaemonIs) {
+  Facts facts = healthy();
+  facts.control.status.reset();
+  facts.control.error = "nobody there";
+  expect(line(facts, "control"), Level::warn, "nobody there", "--control");
+  facts.control.given = true;
+  expect(line(facts, "control"), Level::fail, "nobody there", "--token-file");
+  facts.control.given = false;
+  facts.sonars[0].on_this_host = false;
+  EXPECT_THAT(text_from(judge(facts)), Not(HasSubstr("control"))) << "a device of another computer";
+  facts.control.status = daemon_of("127.0.0.77");
+  EXPECT_THAT(text_from(judge(facts)), HasSubstr("warn  the sonard there does not serve 127.0.0.2"));
+}
+
+TEST(Doctor, LooksAtPosesHttpAndClocks) {
+  Facts facts = healthy();
+  facts.control.status->vehicles[0] = {"rov", "json 127.0.0.1", true, {}};
+  expect(line(facts, "poses"), Level::warn, "poses of rov have stopped, the last came from json 127.0.0.1", "on_stale");
+  facts.control.status->vehicles[0].stale = false;
+  facts.control.status->poses.refused = 3;
+  EXPECT_THAT(text_from(judge(facts)), HasSubstr("warn  3 poses were refused, 0 accepted"));
+  facts.http.code = 0;
+  expect(line(facts, "http"), Level::warn, "does not answer", "--http");
+  facts.http.code = 503, facts.http.text = "no ping for 5 s";
+  expect(line(facts, "http"), Level::fail, "answers 503: no ping for 5 s", "log");
+  facts.http.code = 401;
+  expect(line(facts, "http"), Level::warn, "answers 401", "token");
+  facts.control.clock_ahead_s = -3.5;
+  expect(line(facts, "clock"), Level::warn, "3.50 s behind ours", "NTP");
+  facts.control.clock_ahead_s = 0.01;
+  expect(line(facts, "clock"), Level::ok, "0.01 s ahead of ours", "");
+}
+
+TEST(Doctor, ChecksEverySonarAndTellsThemApart) {
+  Facts facts = healthy();
+  facts.sonars.push_back(healthy_sonar("127.0.0.3"));
+  facts.sonars[0].name = "front";
+  facts.status.heard.push_back(heard("127.0.0.3"));
+  const std::string text = text_from(judge(facts));
+  EXPECT_THAT(text, HasSubstr("ok    front: tcp 127.0.0.2:52100 accepts"));
+  EXPECT_THAT(text, HasSubstr("ok    127.0.0.3: tcp 127.0.0.3:52100 accepts"));
+  expect(line(facts, "identity"), Level::warn, "127.0.0.2 and 127.0.0.3 have the same device id, 7001", "device_id");
+  facts.sonars[1].time_was_over = true;
+  EXPECT_THAT(text_from(judge(facts)),
+              HasSubstr("warn  127.0.0.3: 127.0.0.3 was not looked at: the time was over; give more with --within"));
+}
+
+TEST(Doctor, FindsBlueViewHeads) {
+  Facts facts = healthy();
+  control::SonarStatus head = facts.control.status->sonars[0];
+  head.name = "bow", head.listens = "127.0.0.4:14750", head.advertised = "127.0.0.4";
+  facts.control.status->sonars.push_back(head);
+  expect(line(facts, "blueview"), Level::warn, "BlueView sonar bow at 127.0.0.4:14750 does not answer discovery", "udp 14751");
+  facts.heads = {{"127.0.0.4:14750", "P900-90", "123"}};
+  expect(line(facts, "blueview"), Level::ok, "BlueView head P900-90 (123) answers discovery at tcp 127.0.0.4:14750", "");
+}
+
+TEST(Doctor, SpeaksJson) {
+  Facts facts = healthy();
+  facts.kernel_ports.reserved = "";
+  const std::string json = json_from(judge(facts));
+  EXPECT_THAT(json, AllOf(HasSubstr("\"checks\":8"), HasSubstr("\"errors\":0"), HasSubstr("\"warnings\":1"),
+                          HasSubstr("\"check\":\"ports\""), HasSubstr("\"level\":\"warn\"")));
+}
+
+TEST(ProcNet, ReadsSocketsAsTheKernelPrintsThem) {
+  const auto sockets = parse_proc_net(
+      "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n"
+      "   0: 0200007F:CB84 00000000:0000 0A 00000000:00000000 00:00000000 00000000     0        0 4242 1 0 100 0\n"
+      "   1: 0200007F:CB84 0100007F:A03E 01 00000000:00000000 02:00000000 00000000     0        0 4243 1 0 100 0\n"
+      "garbage\n"
+      "   2: 00000000000000000000000000000000:CB86 00000000000000000000000000000000:0000 07 0:0 00:0 0 0 0 77\n"
+      "   3: 0000000000000000FFFF00000500007F:CB86 00000000000000000000000000000000:0000 07 0:0 00:0 0 0 0 78\n"
+      "   4: 0200007F:CB84\n");
+  ASSERT_EQ(sockets.size(), 4u);
+  EXPECT_EQ(sockets[0].local_host, "127.0.0.2");
+  EXPECT_EQ(sockets[0].local_port, 52100);
+  EXPECT_EQ(sockets[0].state, listening);
+  EXPECT_EQ(sockets[0].inode, 4242u);
+  EXPECT_EQ(sockets[1].remote_host, "127.0.0.1");
+  EXPECT_EQ(sockets[1].state, established);
+  EXPECT_EQ(sockets[2].local_host, "[::]");
+  EXPECT_EQ(sockets[3].local_host, "127.0.0.5");
+  const PortHolder holder = holder_of(sockets[0], {{4242, {12, "sonard"}}});
+  EXPECT_EQ(holder.at, "127.0.0.2:52100");
+  EXPECT_EQ(holder.program, "sonard");
+  EXPECT_EQ(holder_of(sockets[1], {}).pid, 0);
+}
+
+}  // namespace
+}  // namespace sonar::clients::doctor
