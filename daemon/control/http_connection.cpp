@@ -242,8 +242,9 @@ asio::awaitable<void> HttpConnection::stream_events(control::Subscribe wanted, H
   });
   while (!over() && !ended_) {
     if (const auto event = events_.next()) {
-      const std::string line = control::json_of(*event) + "\n";
-      if (!co_await write_whole(head.http_1_0 ? line : chunk_of(line))) co_return;
+      std::string line = control::json_of(*event) + "\n";  // GCC 12 destroys a ?: inside of co_await twice
+      if (!head.http_1_0) line = chunk_of(line);
+      if (!co_await write_whole(std::move(line))) co_return;
     } else {
       error_code ec;
       co_await wake_writer_.async_wait(into(ec));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/config.hpp"
+#include "protocol/control/operations.hpp"
 
 namespace sonar {
 

@@ -50,6 +50,7 @@ Result<PoseSample> decode_pose_datagram(BytesView datagram);
 struct RefusedRequest {  // a Response can still name it
   std::uint64_t id = 0;
   std::string why;
+  bool pose = false;  // it should have been a pose
 };
 /// One message of the stream, without its length. A message that is not protobuf has id 0.
 tl::expected<Request, RefusedRequest> decode_request(BytesView message);
@@ -63,8 +64,9 @@ Result<Response> decode_response(BytesView message);
 // ---- the same in protobuf's JSON mapping, for HTTP and for people
 
 /// `op` is the name of a member of Request.op ("sonar", "set_object"), `json` its message. Refused with one sentence: not JSON,
-/// an unknown key, a wrong type, and whatever decode_request refuses.
-Result<Request> request_from_json(std::string_view op, std::string_view json);
+/// an unknown key, a wrong type, and whatever decode_request refuses. `name`: of the sonar or object that the message is about,
+/// when it was said elsewhere.
+Result<Request> request_from_json(std::string_view op, std::string_view json, std::string_view name = {});
 /// One line, no newline; names as in control.proto, numbers that are 0 and empty lists too. 64-bit numbers are strings, as
 /// protobuf's mapping has it.
 std::string json_of(const Response& response);

@@ -68,6 +68,16 @@ std::string sentence_from(const std::string& words) {
   return in_quotes(key) + ": unknown key";
 }
 
+/// False when the message names another one.
+bool set_name(Message& message, const std::string& name) {
+  const auto& of = *message.GetDescriptor();
+  const auto* field = of.FindFieldByName("sonar") != nullptr ? of.FindFieldByName("sonar") : of.FindFieldByName("object");
+  if (field == nullptr) return false;
+  const std::string said = message.GetReflection()->GetString(message, field);
+  if (said.empty()) message.GetReflection()->SetString(&message, field, name);
+  return said.empty() || said == name;
+}
+
 std::string json_from(Message& message) {
   repair_texts(message);
   google::protobuf::util::JsonPrintOptions options;
@@ -80,7 +90,7 @@ std::string json_from(Message& message) {
 
 }  // namespace
 
-Result<Request> request_from_json(std::string_view op, std::string_view json) {
+Result<Request> request_from_json(std::string_view op, std::string_view json, std::string_view name) {
   keep_protobuf_quiet();
   v1::Request message;
   const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
@@ -95,6 +105,8 @@ Result<Request> request_from_json(std::string_view op, std::string_view json) {
   const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()},
                                                                   message.GetReflection()->MutableMessage(&message, field));
   if (!status.ok()) return refused(sentence_from(std::string(status.message())));
+  if (!name.empty() && !set_name(*message.GetReflection()->MutableMessage(&message, field), std::string(name)))
+    return refused("this is about " + in_quotes(std::string(name)) + ", but the message names another");
   auto request = from(message);
   if (!request) return refused(request.error().why);
   return *std::move(request);

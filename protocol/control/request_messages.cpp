@@ -201,7 +201,9 @@ struct Fill {
 }  // namespace
 
 tl::expected<Request, RefusedRequest> from(const v1::Request& message) {
-  const auto refused_here = [&](std::string why) { return tl::unexpected(RefusedRequest{message.id(), std::move(why)}); };
+  const auto refused_here = [&](std::string why) {
+    return tl::unexpected(RefusedRequest{message.id(), std::move(why), message.has_pose() || message.has_object()});
+  };
   auto request = with_op(message);
   if (!request) return refused_here(request.error().text);
   if (const auto where = first_unreal_number(message)) return refused_here(*where + " is NaN or infinite");

@@ -77,6 +77,17 @@ TEST(ControlJson, RefusesWithASentence) {
   EXPECT_EQ(refusal_of("launch", "{}"), "no such request");
 }
 
+TEST(ControlJson, TheNameMayBeSaidElsewhere) {
+  const auto sonar = request_from_json("sonar", R"({"range_m":5})", "front");
+  ASSERT_TRUE(sonar) << sonar.error().text;
+  EXPECT_EQ(std::get<SetSonar>(sonar->op).sonar, "front");
+  EXPECT_EQ(std::get<SetObject>(request_from_json("set_object", R"({"object":"crate"})", "crate")->op).object, "crate");
+  const auto two = request_from_json("set_object", R"({"object":"crate"})", "wreck");
+  ASSERT_FALSE(two);
+  EXPECT_THAT(two.error().text, HasSubstr("names another"));
+  EXPECT_THAT(request_from_json("set_object", "{}", "a\nb").error().text, HasSubstr("control characters"));
+}
+
 TEST(ControlJson, TruncationsAreRefusedWithoutALineOnStderr) {
   const std::string whole = R"({"name":"a","like":"b","at":{"frame":"NED_FRD","position":{"x":1},"orientation":{"w":1}}})";
   testing::internal::CaptureStderr();

@@ -1,0 +1,241 @@
+// The control stream over loopback: greeting, token, answers in any order, events, limits, faults.
+#include <gmock/gmock.h>
+
+#include <list>
+
+#include "protocol/control/control.hpp"
+#include "protocol/control/delimited.hpp"
+#include "tests/daemon/control/control_bench.hpp"
+
+namespace sonar::testing_daemon {
+namespace {
+
+using control::StatusCode;
+using ::testing::HasSubstr;
+
+struct StreamClient {
+  Client tcp;
+  control::DelimitedParser parser;
+  explicit StreamClient(ControlBench& bench, int receive_buffer = 0) : tcp(bench.address, bench.stream_port(), receive_buffer) {}
+  void send(const control::Request& request) { tcp.send(control::delimited(control::encode_request(request))); }
+  void greet(const std::string& token = "") {
+    send({1, control::Hello{1, "test", token}});
+    const auto answer = next();
+    ASSERT_TRUE(answer);
+    ASSERT_EQ(answer->code, StatusCode::ok) << answer->text;
+    ASSERT_TRUE(answer->hello);
+  }
+  /// Nothing at the deadline or the end of the stream.
+  std::optional<control::Response> next(milliseconds timeout = patience) {
+    const auto deadline = Steady::now() + timeout;
+    while (true) {
+      const auto message = parser.next();
+      if (!message) return std::nullopt;
+      if (*message) {
+        auto response = control::decode_response(**message);
+        EXPECT_TRUE(response) << response.error().text;
+        return response ? std::optional(*std::move(response)) : std::nullopt;
+      }
+      const auto left = std::chrono::duration_cast<milliseconds>(deadline - Steady::now());
+      if (left.count() <= 0) return std::nullopt;
+      const auto raw = tcp.read_raw(1, left);
+      if (raw.empty() && tcp.ended) return std::nullopt;
+      parser.feed(raw);
+    }
+  }
+};
+
+TEST(ControlStream, AnswersByIdWhenTheyAreReady) {
+  ControlBench bench;
+  StreamClient client(bench);
+  client.greet();
+  client.send({2, control::LoadScene{"later"}});
+  client.send({3, control::GetStatus{}});
+  const auto status = client.next();
+  ASSERT_TRUE(status);
+  EXPECT_EQ(status->id, 3u);
+  EXPECT_EQ(std::get<control::DaemonStatus>(status->body).version, "fake");
+  bench.on_io([&] { bench.operations.later.at(0)({}); });
+  const auto load = client.next();
+  ASSERT_TRUE(load);
+  EXPECT_EQ(load->id, 2u);
+  EXPECT_EQ(load->code, StatusCode::ok);
+  control::SetSonar nobody;
+  nobody.sonar = "nobody";
+  client.send({4, nobody});
+  const auto refused = client.next();
+  EXPECT_EQ(refused->code, StatusCode::refused);
+  EXPECT_EQ(refused->text, "there is no sonar \"nobody\"");
+  client.send({5, control::LoadScene{"x.yaml"}});
+  EXPECT_EQ(client.next()->code, StatusCode::failed);
+  client.send({6, control::Unsupported{}});
+  EXPECT_EQ(client.next()->code, StatusCode::unsupported);
+  client.send({7, control::RemoveObject{}});
+  const auto malformed = client.next();
+  EXPECT_EQ(malformed->id, 7u);
+  EXPECT_THAT(malformed->text, HasSubstr("object is missing"));
+}
+
+TEST(ControlStream, PosesWithoutAnIdAreTakenInSilence) {
+  ControlBench bench;
+  StreamClient client(bench);
+  client.greet();
+  client.send({0, control::PoseSample{}});
+  client.send({9, control::PoseSample{}});
+  const auto answer = client.next();
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->id, 9u);
+  EXPECT_EQ(bench.operations.asked, 2);
+  bench.on_io([&] { EXPECT_THAT(bench.operations.last_sender.id, HasSubstr("protobuf tcp 127.")); });
+  control::PoseSample broken;
+  broken.pose.position_m.x = std::numeric_limits<double>::quiet_NaN();
+  client.send({10, broken});
+  EXPECT_EQ(client.next()->code, StatusCode::refused);
+  EXPECT_THAT(bench.log_text(), HasSubstr("pose refused: position has a NaN"));
+  bench.on_io([&] { EXPECT_EQ(bench.world.counters().refused, 1u); });
+}
+
+TEST(ControlStream, NobodyIsHeardWithoutTheToken) {
+  const TokenFile file;
+  ControlConfig config;
+  config.token_file = file.path;
+  ControlBench bench(config);
+  for (const std::string shown : {"", "0123456789abcdef-lax"}) {
+    StreamClient stranger(bench);
+    stranger.send({5, control::Hello{1, "test", shown}});
+    const auto answer = stranger.next();
+    ASSERT_TRUE(answer);
+    EXPECT_EQ(answer->code, StatusCode::refused);
+    EXPECT_THAT(answer->text, HasSubstr("token"));
+    EXPECT_FALSE(answer->hello);
+    EXPECT_TRUE(stranger.tcp.read_to_end());
+  }
+  StreamClient friendly(bench);
+  friendly.greet(TokenFile::text);
+  friendly.send({2, control::GetStatus{}});
+  EXPECT_EQ(friendly.next()->code, StatusCode::ok);
+  EXPECT_EQ(bench.operations.asked, 1);
+  EXPECT_THAT(bench.log_text(), HasSubstr("token"));
+  EXPECT_EQ(bench.log_text().find("0123456789"), std::string::npos) << "no secret in the log, be it ours or theirs";
+}
+
+TEST(ControlStream, EventsComeToThoseWhoAskedAndLossIsTold) {
+  ControlBench bench;
+  StreamClient client(bench);
+  client.greet();
+  client.send({2, control::Subscribe{true, false, false, false}});
+  ASSERT_EQ(client.next()->id, 2u);
+  bench.on_io([&] {
+    EXPECT_TRUE(bench.events.heard());
+    bench.events.tell({control::SceneEvent{"s", "not asked for"}, 0});
+    for (std::uint32_t i = 0; i < 100; ++i) bench.events.tell(ping_event(i));  // more than wait for one
+  });
+  for (std::uint32_t i = 0; i < EventQueue::deepest; ++i) {
+    const auto event = client.next();
+    ASSERT_TRUE(event);
+    EXPECT_EQ(event->id, 0u);
+    EXPECT_EQ(std::get<control::PingEvent>(std::get<control::Event>(event->body).what).number, i);
+  }
+  bench.on_io([&] { bench.events.tell(ping_event(100)); });
+  const auto after = client.next();
+  ASSERT_TRUE(after);
+  EXPECT_EQ(std::get<control::Event>(after->body).unsent, 100 - EventQueue::deepest);
+  client.send({3, control::Subscribe{}});
+  ASSERT_EQ(client.next()->id, 3u);
+  bench.on_io([&] { bench.events.tell(ping_event(101)); });
+  client.send({4, control::GetStatus{}});
+  EXPECT_EQ(client.next()->id, 4u) << "nothing is told after that";
+}
+
+TEST(ControlStream, AClientThatReadsNothingIsReadNoFurtherAndClosed) {
+  LimitConfig limits;
+  limits.stall = milliseconds(300);
+  ControlBench bench({}, limits);
+  StreamClient client(bench, 4096);
+  client.greet();
+  for (int i = 0; i < 200; ++i) {
+    control::Request request{static_cast<std::uint64_t>(i + 2), control::LoadScene{std::string(4000, 'x')}};  // echoed
+    client.send(request);
+    if (client.tcp.ended) break;
+  }
+  EXPECT_TRUE(eventually([&] { return bench.log_text().find("it reads nothing") != std::string::npos || bench.operations.asked == 200; }));
+}
+
+TEST(ControlStream, AnswersAfterTheClientHasLeftHurtNobody) {
+  ControlBench bench;
+  {
+    StreamClient client(bench);
+    client.greet();
+    client.send({2, control::LoadScene{"later"}});
+    EXPECT_TRUE(eventually([&] { return bench.operations.asked == 1; }));
+    client.tcp.reset();
+  }
+  bench.on_io([&] { bench.operations.later.at(0)({}); });
+  StreamClient next(bench);
+  next.greet();
+}
+
+TEST(ControlStream, HalfClosedClientsGetTheirLateAnswers) {
+  ControlBench bench;
+  StreamClient client(bench);
+  client.greet();
+  client.send({2, control::LoadScene{"later"}});
+  client.tcp.finish_sending();
+  EXPECT_TRUE(eventually([&] { return bench.operations.asked == 1; }));
+  bench.on_io([&] { bench.operations.later.at(0)({}); });
+  EXPECT_EQ(client.next()->id, 2u);
+  EXPECT_TRUE(client.tcp.read_to_end());
+}
+
+TEST(ControlStream, AFaultEndsItsConnectionOnly) {
+  ControlBench bench;
+  StreamClient unlucky(bench), lucky(bench);
+  unlucky.greet();
+  lucky.greet();
+  unlucky.send({2, control::LoadScene{"throw"}});
+  unlucky.tcp.read_to_end();
+  EXPECT_TRUE(unlucky.tcp.ended);
+  lucky.send({2, control::GetStatus{}});
+  EXPECT_TRUE(lucky.next());
+  EXPECT_THAT(bench.log_text(), HasSubstr("internal fault: no such luck"));
+}
+
+TEST(ControlStream, StrangersGetFourKilobytesAndThePlacesGoToTheBusy) {
+  LimitConfig limits;
+  limits.control_clients = 2;
+  ControlBench bench({}, limits);
+  Client chatter(bench.address, bench.stream_port());
+  chatter.send(std::vector<std::byte>{std::byte{0xff}, std::byte{0xff}, std::byte{0x20}});  // half a megabyte is to come
+  chatter.send(std::string(6000, 'x'));
+  chatter.read_to_end();
+  EXPECT_TRUE(chatter.ended);
+  StreamClient a(bench), b(bench);
+  a.greet();
+  b.greet();
+  std::this_thread::sleep_for(milliseconds(1200));
+  b.send({2, control::GetStatus{}});
+  ASSERT_TRUE(b.next());
+  StreamClient c(bench);
+  c.greet();
+  a.tcp.read_to_end();
+  EXPECT_TRUE(a.tcp.ended) << "silent for longest";
+  b.send({3, control::GetStatus{}});
+  EXPECT_TRUE(b.next());
+}
+
+TEST(ControlStream, StopsWithClientsSubscribersAndWorkUnderWay) {
+  ControlBench bench;
+  StreamClient idle(bench), subscriber(bench), waiting(bench);
+  subscriber.greet();
+  subscriber.send({2, control::Subscribe{true, true, true, true}});
+  ASSERT_TRUE(subscriber.next());
+  waiting.greet();
+  waiting.send({2, control::LoadScene{"later"}});
+  EXPECT_TRUE(eventually([&] { return bench.operations.asked == 1; }));
+  bench.stop();
+  subscriber.tcp.read_to_end();
+  EXPECT_TRUE(subscriber.tcp.ended);
+}
+
+}  // namespace
+}  // namespace sonar::testing_daemon
