@@ -6,35 +6,23 @@
 #include <csignal>
 
 #include "daemon/real_time.hpp"
+#include "daemon/world_parts.hpp"
 
 namespace sonar {
-namespace {
-
-World make_world(const Config& config, const Scene& scene, Time start) {
-  PoseRules rules;
-  rules.extrapolate_max = nanoseconds_from(config.poses.extrapolate_max_s);
-  rules.stale_after = nanoseconds_from(config.poses.stale_after_s);
-  rules.max_jump_m = config.poses.max_jump_m;
-  rules.stepped = config.clock == ClockMode::stepped;
-  std::vector<BodyStart> vehicles, objects;
-  for (const VehicleConfig& v : config.vehicles) vehicles.push_back({v.name, v.initial_pose, v.orbits});
-  for (std::size_t i = 0; i < scene.body_names.size(); ++i)
-    objects.push_back({scene.body_names[i], scene.bodies_in_world.at(i), false});
-  return World(rules, std::move(vehicles), std::move(objects), start);
-}
-
-}  // namespace
-
 App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory& make_engine, AppOptions options, Log& log)
     : config_(std::move(config)),
-      scene_(std::move(scene)),
-      options_(options),
+      options_(std::move(options)),
       log_(log),
       clock_(config_.clock == ClockMode::stepped),
-      world_(make_world(config_, *scene_, clock_.now())),
-      simulator_(io_, make_engine(scene_), compute_niceness),
+      world_(pose_rules(config_), vehicles_of(config_), bodies_of(*scene), clock_.now()),
+      simulator_(io_, make_engine(scene), compute_niceness),
+      changes_(
+          io_, simulator_, std::move(scene), make_engine, compute_niceness,
+          [this](const ScenePointer& now) { world_.use_objects(bodies_of(*now)); }, [this] { on_change(); }),
       admission_(config_.limits, log_),
-      pose_server_(io_, config_.poses, world_, clock_, log_, [this] { on_change(); }),
+      pose_intake_(
+          world_, clock_, log_, [this] { on_change(); }, &events_),
+      pose_server_(io_, config_.poses, pose_intake_, log_),
       context_{io_,
                clock_,
                world_,
@@ -42,6 +30,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                admission_,
                log_,
                config_,
+               events_,
                options_.digest,
                [this] { on_change(); },
                [this](const std::string& why) {
@@ -49,13 +38,14 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                  exit_code_ = exit_code(ErrorKind::bug);
                  stop("the engine failed");
                }},
+      fleet_(context_),
+      operations_(
+          {config_, clock_, world_, simulator_, changes_, admission_, pose_intake_, fleet_, events_, log_, options_.load_scene}),
+      control_(io_, config_.control, config_.limits, operations_, events_, pose_intake_, log_),
       signals_(io_),
       house_timer_(io_),
       notify_(
-          io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {
-  for (std::size_t i = 0; i < config_.sonars.size(); ++i)
-    devices_.emplace_back(context_, config_.sonars[i], static_cast<std::uint32_t>(i));
-}
+          io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {}
 
 Result<void> App::open() {
   if (options_.handle_signals) {  // before anybody can read that we are ready
@@ -63,15 +53,16 @@ Result<void> App::open() {
     signals_.add(SIGTERM);
     signals_.add(SIGHUP);  // else it would end us at once, without a word to the clients
   }
-  for (Device& d : devices_)
-    if (auto r = d.open(); !r) return r;
-  return pose_server_.open();
+  if (auto r = fleet_.open(config_); !r) return r;
+  if (auto r = pose_server_.open(); !r) return r;
+  return control_.open();
 }
 
 int App::run() {
   if (options_.handle_signals) wait_for_signal();
   pose_server_.start();
-  for (Device& d : devices_) d.start();
+  control_.start();
+  fleet_.start();
   asio::co_spawn(
       io_, [this] { return keep_house(); }, asio::detached);
   notify_.ready(status_line());
@@ -84,8 +75,8 @@ int App::run() {
 /// What `systemctl status` shows.
 std::string App::status_line() const {
   std::string line = "Serving";
-  for (const Device& d : devices_)
-    line += (&d == &devices_.front() ? " " : ", ") + d.config().name + " on " + text_of(d.config().bind_ip);
+  for (const Device& d : devices())
+    line += (&d == &devices().front() ? " " : ", ") + d.config().name + " on " + text_of(d.config().bind_ip);
   return line;
 }
 
@@ -93,7 +84,7 @@ void App::wait_for_signal() {
   signals_.async_wait([this](const error_code& ec, int signal) {
     if (ec) return;
     if (signal == SIGHUP) {
-      log_.info("SIGHUP: reload is not in this version; nothing changed");
+      reload();
     } else {
       if (stopping_) ::_exit(128 + signal);
       stop(signal == SIGINT ? "interrupted" : "terminated");
@@ -111,8 +102,10 @@ void App::stop(const std::string& why) {
   log_.info("stopping: " + why);
   notify_.stopping();
   pose_server_.stop();
+  control_.stop();
   house_timer_.cancel();
-  for (Device& d : devices_) d.stop();
+  changes_.stop();
+  fleet_.stop();
   on_change();
 }
 
@@ -124,17 +117,12 @@ void App::on_change() {
   });
 }
 
-bool App::enough_served() const {
-  if (options_.exit_after_pings == 0) return false;
-  std::uint64_t served = 0;
-  for (const Device& d : devices_) served += d.figures().served;
-  return served >= options_.exit_after_pings;
-}
+bool App::enough_served() const { return options_.exit_after_pings != 0 && fleet_.served() >= options_.exit_after_pings; }
 
 void App::look() {
   if (stopping_) {
     // The signal handler is the last thing that keeps run() from returning.
-    if (std::all_of(devices_.begin(), devices_.end(), [](const Device& d) { return d.gone(); })) signals_.cancel();
+    if (fleet_.gone()) signals_.cancel();
     return;
   }
   if (clock_.stepped()) return step_time();
@@ -142,20 +130,26 @@ void App::look() {
 }
 
 void App::step_time() {
-  if (!std::all_of(devices_.begin(), devices_.end(), [](const Device& d) { return d.settled(); })) return;
+  if (changes_.busy()) return;  // a change of the scene takes effect before the next step
+  std::list<Device>& devices = fleet_.devices();
+  if (!std::all_of(devices.begin(), devices.end(), [](const Device& d) { return d.settled(); })) return;
   if (enough_served()) return stop("served " + std::to_string(options_.exit_after_pings) + " pings");
   Device* next = nullptr;
-  for (Device& d : devices_)
+  for (Device& d : devices)
     if (d.next_tick() && (next == nullptr || *d.next_tick() < *next->next_tick())) next = &d;
   if (next == nullptr) return;
   clock_.advance_to(*next->next_tick());
-  for (Device& d : devices_) d.tick_sessions(clock_.now());
+  for (Device& d : devices) d.tick_sessions(clock_.now());
   next->step(clock_.now());
 }
 
 asio::awaitable<void> App::keep_house() {
   while (!stopping_) {
-    for (const std::string& sentence : world_.newly_stale(clock_.now())) log_.warning(sentence);
+    for (const World::Stale& stale : world_.newly_stale(clock_.now())) {
+      log_.warning(stale.sentence);
+      if (events_.heard()) events_.tell({control::PoseEvent{stale.vehicle, true, stale.sentence}});
+    }
+    fleet_.sweep();
     error_code ec;
     house_timer_.expires_after(std::chrono::milliseconds(500));
     co_await house_timer_.async_wait(into(ec));

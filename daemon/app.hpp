@@ -2,7 +2,8 @@
 // main.cpp and the tests make one; the engine factory is the seam where tests put a fake one.
 #pragma once
 
-#include <deque>
+#include <functional>
+#include <list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,13 +11,17 @@
 
 #include "core/base/result.hpp"
 #include "daemon/admission.hpp"
+#include "daemon/app_operations.hpp"
 #include "daemon/asio.hpp"
 #include "daemon/clock.hpp"
 #include "daemon/config.hpp"
-#include "daemon/device.hpp"
+#include "daemon/control/control_server.hpp"
+#include "daemon/fleet.hpp"
 #include "daemon/log.hpp"
 #include "daemon/notify.hpp"
+#include "daemon/pose_intake.hpp"
 #include "daemon/pose_server.hpp"
+#include "daemon/scene_changes.hpp"
 #include "daemon/simulator.hpp"
 #include "daemon/start_engine.hpp"
 #include "daemon/world.hpp"
@@ -26,13 +31,18 @@ namespace sonar {
 struct AppOptions {
   std::uint64_t exit_after_pings = 0;  // served, over all sonars; 0 = never
   bool digest = false;                 // SHA-256 of every client's stream
-  bool handle_signals = false;         // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP does nothing yet
-  NotifyPlace service_manager;         // is told when we are ready, stop, and that we are alive
+  bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP reads the configuration again
+  /// How the configuration is read again, the command line's part included; any thread. Empty: there is none (the demo).
+  std::function<Result<Config>()> read_config;
+  /// Any thread. Empty: no other scene can be loaded.
+  std::function<Result<ScenePointer>(const SceneFile&)> load_scene;
+  NotifyPlace service_manager;  // is told when we are ready, stop, and that we are alive
 };
 
 class App {
  public:
-  App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory& make_engine, AppOptions options, Log& log);
+  /// `make_engine` is kept: later scenes get theirs on another thread. What it refers to must outlive the App.
+  App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);
 
   /// Opens every listener; errors name the address and the next step.
   Result<void> open();
@@ -40,12 +50,20 @@ class App {
   int run();
   /// From any thread.
   void request_stop();
+  /// From any thread: `work` is done on the I/O thread.
+  void post(std::function<void()> work) { asio::post(io_, std::move(work)); }
 
   const Config& config() const { return config_; }
-  const Scene& scene() const { return *scene_; }
-  const PingEngine& engine() const { return simulator_.engine(); }
+  const Scene& scene() const { return *changes_.scene(); }
+  const std::string& engine_description() const { return simulator_.engine_description(); }
+  /// After run(): the destructor would wait for a scene that nobody wants any more.
+  bool is_building() const { return changes_.is_building(); }
   const PoseServer& poses() const { return pose_server_; }
-  const std::deque<Device>& devices() const { return devices_; }
+  const ControlServer& control() const { return control_; }
+  const std::list<Device>& devices() const { return fleet_.devices(); }
+  /// For servers of the control protocol, on the I/O thread.
+  Operations& operations() { return operations_; }
+  Events& events() { return events_; }
   const Admission& admission() const { return admission_; }
   /// After run().
   const World& world() const { return world_; }
@@ -57,21 +75,27 @@ class App {
   void step_time();
   bool enough_served() const;
   void wait_for_signal();
+  void reload();  // reload.cpp, as the next
+  void take_over(Config next);
   std::string status_line() const;
   asio::awaitable<void> keep_house();
 
   Config config_;
-  std::shared_ptr<const Scene> scene_;
   AppOptions options_;
   Log& log_;
   asio::io_context io_{1};
   Clock clock_;
+  Events events_;
   World world_;
   Simulator simulator_;
+  SceneChanges changes_;
   Admission admission_;
+  PoseIntake pose_intake_;
   PoseServer pose_server_;
   DeviceContext context_;
-  std::deque<Device> devices_;
+  Fleet fleet_;
+  AppOperations operations_;
+  ControlServer control_;
   asio::signal_set signals_;
   asio::steady_timer house_timer_;
   Notify notify_;

@@ -39,11 +39,19 @@ std::string sonar_lines(const Device& device) {
 
 std::string pose_line(const App& app) {
   const Endpoint protobuf = app.poses().protobuf(), json = app.poses().json();
-  std::string text = "pose      udp and tcp ";
-  text += protobuf.port != 0 ? address_text(protobuf) + " (protobuf)" : "protobuf off";
-  text += json.port != 0 ? "  " + address_text(json) + " (json)" : "  json off";
+  std::string text = "pose      ";
+  text += protobuf.port != 0 ? "udp " + address_text(protobuf) + " (protobuf)" : "protobuf off";
+  text += json.port != 0 ? "  udp and tcp " + address_text(json) + " (json)" : "  json off";
   text += "  | source: " + std::string(app.world().source_of(0)) + "\n";
   return text;
+}
+
+std::string control_line(const App& app) {
+  const Endpoint stream = app.control().stream(), http = app.control().http();
+  std::string text = "control   ";
+  text += stream.port != 0 ? "tcp " + address_text(stream) : "tcp off";
+  text += http.port != 0 ? "   http http://" + address_text(http) : "   http off";
+  return text + (app.config().control.token_file.empty() ? "\n" : "   token needed\n");
 }
 
 /// Largest resident memory so far [MB]; 0 where the system does not tell.
@@ -60,13 +68,14 @@ double peak_memory_mb() {
 }  // namespace
 
 std::string banner(const App& app, const BannerFacts& facts) {
-  std::string text = "sonard " SONARD_VERSION "  (" + app.engine().description() + ", CUDA: " + cuda_status() + ")\n";
+  std::string text = "sonard " SONARD_VERSION "  (" + app.engine_description() + ", CUDA: " + cuda_status() + ")\n";
   text += "config    " + facts.config_line + "\n";
   text += "scene     " + app.scene().name +
           format("   %zu triangles, %zu materials, %zu moving, built in %.0f ms\n", app.scene().triangle_count(),
                  app.scene().materials.size(), app.scene().body_names.size(), facts.scene_ms);
   for (const Device& d : app.devices()) text += sonar_lines(d);
   text += pose_line(app);
+  text += control_line(app);
   text += "seed      " + std::to_string(app.config().seed) + "   reproducible";
   if (app.config().clock == ClockMode::stepped) text += ", stepped clock";
   return text + "\n";
@@ -83,9 +92,9 @@ std::string summary(const App& app) {
     const DeviceFigures f = d.figures();
     text +=
         "sonar " + d.config().name +
-        format("  %llu pings, %llu served, %llu dropped, %llu late ticks, %llu clients", static_cast<unsigned long long>(f.pings),
+        format("  %llu pings, %llu served, %llu dropped, %llu skipped of %llu ticks, %llu clients", static_cast<unsigned long long>(f.pings),
                static_cast<unsigned long long>(f.served), static_cast<unsigned long long>(f.dropped),
-               static_cast<unsigned long long>(f.skipped_ticks), static_cast<unsigned long long>(f.clients));
+               static_cast<unsigned long long>(f.skipped_ticks), static_cast<unsigned long long>(f.ticks), static_cast<unsigned long long>(f.clients));
     if (f.pings > 0) text += format(", %.1f ms a ping", 1e3 * f.simulation_s / static_cast<double>(f.pings));
     text += "\n";
   }

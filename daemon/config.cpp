@@ -22,23 +22,6 @@ Ipv4 read_ip(const Node& node, Ipv4 fallback = {}) {
   return ip.value_or(fallback);
 }
 
-/// "127.0.0.1:14770"; the port may be left out when `default_port` is given.
-Endpoint read_endpoint(const Node& node, bool port_needed) {
-  const std::string text = node.text(64);
-  const std::size_t colon = text.find(':');
-  Endpoint endpoint;
-  const auto ip = parse_ipv4(std::string_view(text).substr(0, colon));
-  const auto port = colon == std::string::npos ? std::optional<std::int64_t>(0) : text::parse_integer(text.substr(colon + 1));
-  if (!ip || (port_needed && colon == std::string::npos))
-    node.fail("is not an address; write it as " +
-              std::string(port_needed ? "127.0.0.1:14770" : "127.255.255.255 or 192.168.1.7:52102"));
-  else if (!port || *port < 0 || *port > 65535)
-    node.fail("port must be a number from 0 to 65535");
-  else
-    endpoint = {*ip, static_cast<std::uint16_t>(*port)};
-  return endpoint;
-}
-
 AddressRange read_range(const Node& node) {
   const std::string text = node.text(64);
   const std::size_t slash = text.find('/');
@@ -60,7 +43,7 @@ void read_world(Map map, Config& config, const std::filesystem::path& directory)
     place.required("lon").number(Range::between(-180, 180));
     place.optional("alt").number_or(0, Range::between(-12000, 10000));
   }
-  config.water = read_water(map.optional("water"));
+  config.water = read_water(map.optional("water"), &config.allow_hot);
 }
 
 void read_vehicles(const Node& node, Config& config) {
@@ -199,6 +182,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   std::size_t index = 0;
   for (const Node& item : root.required("sonars").items(1, 64)) config.sonars.push_back(read_sonar(item.map(), config, index++));
   read_poses(root.optional("poses"), config.poses);
+  config.control = read_control(root.optional("control"), directory);
   config.engine = read_engine(root.optional("engine"));
   config.limits = read_limits(root.optional("limits"));
   config.clock =

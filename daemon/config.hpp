@@ -74,9 +74,9 @@ struct PoseConfig {
 struct ControlConfig {
   PoseListener stream{true, {{127, 0, 0, 1}, 14770}};  // TCP: the control stream
   PoseListener http{true, {{127, 0, 0, 1}, 8088}};
-  bool http_given = false;           // by the file: then it must be free; the default gives way with a warning
-  std::filesystem::path token_file;  // empty = none; needed when a listener is not on loopback
-  std::vector<std::string> hosts;    // names that HTTP's Host and Origin may have, beside addresses and localhost
+  bool stream_given = false, http_given = false;  // by the file: then it must be free; the default gives way with a warning
+  std::filesystem::path token_file;               // empty = none; needed when a listener is not on loopback
+  std::vector<std::string> hosts;                 // names that HTTP's Host and Origin may have, beside addresses and localhost
 };
 /// What strangers may cost us.
 struct LimitConfig {
@@ -100,6 +100,7 @@ struct Config {
   SceneFile scene;     // as found
   std::uint64_t seed = 1;
   Water water;
+  bool allow_hot = false;  // water of 30 C or more is meant
   std::vector<VehicleConfig> vehicles;
   std::vector<SonarConfig> sonars;
   PoseConfig poses;

@@ -48,7 +48,7 @@ SceneFile read_scene_file(const Node& node, const std::filesystem::path& directo
   return {given};
 }
 
-Water read_water(const Node& node) {
+Water read_water(const Node& node, bool* allow_hot) {
   Water water;
   if (!node.present()) return water;
   Map map = node.map();
@@ -59,9 +59,22 @@ Water read_water(const Node& node) {
   water.sound_speed_mps = map.optional("sound_speed_mps").number_or(0, Range::between(0, 2000));
   if (water.sound_speed_mps != 0 && water.sound_speed_mps < 1000)
     map.optional("sound_speed_mps").fail("must be 0 (computed from the rest) or from 1000 to 2000");
-  if (!map.optional("allow_hot").boolean_or(false) && water.temperature_c >= hot_c)
+  const bool hot_is_meant = map.optional("allow_hot").boolean_or(false);
+  if (allow_hot != nullptr) *allow_hot = hot_is_meant;
+  if (!hot_is_meant && water.temperature_c >= hot_c)
     temperature.fail("30 C or more sends a real driver to standby; add allow_hot: true if that is what you want");
   return water;
+}
+
+std::string why_no_water(const Water& water, bool allow_hot) {
+  if (!(water.temperature_c >= -2 && water.temperature_c <= 40)) return "temperature_c must be from -2 to 40";
+  if (!(water.salinity_psu >= 0 && water.salinity_psu <= 42)) return "salinity_psu must be from 0 to 42";
+  if (!(water.ph >= 6 && water.ph <= 9)) return "ph must be from 6 to 9";
+  if (water.sound_speed_mps != 0 && !(water.sound_speed_mps >= 1000 && water.sound_speed_mps <= 2000))
+    return "sound_speed_mps must be 0 (computed from the rest) or from 1000 to 2000";
+  if (water.temperature_c >= hot_c && !allow_hot)
+    return "30 C or more sends a real driver to standby; world.water.allow_hot: true in the configuration allows it";
+  return {};
 }
 
 protocol::OptionValues read_options(const Node& node, const protocol::Vendor& vendor) {

@@ -79,7 +79,7 @@ void Device::start() {
   if (beacon_period_.count() > 0) keep_announcing();
 }
 
-void Device::stop() {
+void Device::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
   error_code ec;
   acceptor_.close(ec);
@@ -91,7 +91,7 @@ void Device::stop() {
   for (Waiting& waiting : queue_) waiting.socket.close(ec);
   queue_.clear();
   const auto sessions = sessions_;  // finish() may end one at once and change the list
-  for (const SessionPointer& s : sessions) s->finish("sonard stops");
+  for (const SessionPointer& s : sessions) s->finish(why);
 }
 
 bool Device::gone() const { return sessions_.empty() && leaving_.empty() && turning_away_ == 0 && !busy_; }
@@ -112,7 +112,7 @@ bool Device::wants_pings() const {
   return !stopping_ && !sessions_.empty() && (asked_ || vendor_.pings_before_first_request(state_));
 }
 
-void Device::change_settings(Session& from, const protocol::ChangeSettings& change) {
+void Device::change_settings(const protocol::ChangeSettings& change, const std::string& who) {
   // Repeats arrive at ping rate from some drivers; only what the device does not already do is news.
   if (!asked_ || requests_[settings_id_] != change.request) {
     state_.request = change.request;
@@ -120,7 +120,7 @@ void Device::change_settings(Session& from, const protocol::ChangeSettings& chan
     if (!busy_) requests_.erase(requests_.begin(), requests_.find(settings_id_));
     std::uint64_t unsaid = 0;
     if (changes_.allows(LogLimiter::Clock::now(), unsaid))
-      context_.log.info("settings: " + change.summary, {{"sonar", config_.name}, {"client", from.client()}});
+      context_.log.info("settings: " + change.summary, {{"sonar", config_.name}, {"client", who}});
   }
   settings_ = change.settings;  // of a repeat too: what the device knows by itself, its sound speed say, follows its depth
   asked_ = true;
@@ -130,7 +130,7 @@ void Device::change_settings(Session& from, const protocol::ChangeSettings& chan
 void Device::on_event(Session& from, const protocol::Event& event) {
   if (stopping_) return;
   if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
-    change_settings(from, *change);
+    change_settings(*change, from.client());
   } else if (std::holds_alternative<protocol::RequestPing>(event)) {
     // The ping under way will do only if it was fired with the settings that hold now.
     const bool joins = std::get<protocol::RequestPing>(event).joins;
@@ -217,7 +217,7 @@ void Device::ping(Time at) {
   request.settings_id = under_way_settings_id_ = settings_id_;
   request.sonar_id = index_;
   request.seed = Seed(context_.config.seed);
-  request.blank = (stale && on_stale == OnStale::blank) || !settings_.transmit;
+  request.blank = (stale && on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
   request.switches = context_.config.engine.switches;
   busy_ = true;
   context_.simulator.submit(std::move(request), [this](Simulator::Outcome outcome) { on_ping(std::move(outcome)); });
@@ -246,6 +246,7 @@ void Device::on_ping(Simulator::Outcome outcome) {
     for (const SessionPointer& s : sessions_)
       for (protocol::Event& event : s->push_ping(bytes, request, made_with, now)) wishes.emplace_back(s, std::move(event));
     for (const auto& [session, event] : wishes) on_event(*session, event);
+    tell_of_ping(*outcome.ping, outcome.seconds);
     if (figures_.pings == 1) context_.log.debug("first ping simulated", {{"sonar", config_.name}, {"ms", outcome.seconds * 1e3}});
   } else {
     ++figures_.unwanted;

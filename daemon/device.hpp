@@ -19,6 +19,7 @@
 #include "daemon/datagram_answers.hpp"
 #include "daemon/log.hpp"
 #include "daemon/metrics.hpp"
+#include "daemon/operations.hpp"
 #include "daemon/pacer.hpp"
 #include "daemon/session.hpp"
 #include "daemon/simulator.hpp"
@@ -35,6 +36,7 @@ struct DeviceContext {
   Admission& admission;
   Log& log;
   const Config& config;
+  Events& events;
   bool digest = false;
   std::function<void()> on_change;                         // something stepped time or the end may have waited for
   std::function<void(const std::string& why)> on_failure;  // the engine failed: the daemon cannot go on
@@ -54,7 +56,7 @@ class Device final : public SessionParent {
   Result<void> open();
   void start();
   /// Stop accepting, stop pinging, let every client have its current message whole and a FIN.
-  void stop();
+  void stop(const std::string& why = "sonard stops");
 
   // Stepped time: App asks and tells.
   std::optional<Time> next_tick() const;
@@ -70,6 +72,17 @@ class Device final : public SessionParent {
   std::vector<udp::endpoint> status_destinations() const { return status_to_; }
   const protocol::DeviceState& state() const { return state_; }
   PingSettings initial_settings() const { return vendor_.initial_settings(state_).settings; }
+  std::uint32_t index() const { return index_; }
+
+  // What control may ask (device_control.cpp).
+  control::SonarStatus status(Time now) const;
+  /// Empty when all is well.
+  std::string trouble() const;
+  /// As one more client would have; nothing is changed when it is refused, with a sentence that says what the product can do.
+  Result<void> ask(const control::SetSonar& asked, const std::string& who);
+  /// Vehicle and mount, of a configuration that is else the same.
+  void use_place(const SonarConfig& config);
+  void use_water(const Water& water);
 
   void on_event(Session& from, const protocol::Event& event) override;
   void on_written(Session& by, const Outbox::Message& message) override;
@@ -90,7 +103,9 @@ class Device final : public SessionParent {
   void welcome(tcp::socket socket, Admission::Place place);
   void on_membership();
   void use_initial_settings();
-  void change_settings(Session& from, const protocol::ChangeSettings& change);
+  void change_settings(const protocol::ChangeSettings& change, const std::string& who);
+  void tell_of_ping(const Ping& ping, double simulation_s) const;
+  void tell_of_client(const Session& session, bool connected, const std::string& why) const;
   void arm();
   void on_timer();
   bool wants_pings() const;
@@ -100,7 +115,7 @@ class Device final : public SessionParent {
   void keep_figures_of(const Session& session);
 
   DeviceContext& context_;
-  const SonarConfig& config_;
+  SonarConfig config_;
   const protocol::Vendor& vendor_;
   std::uint32_t index_;
   protocol::DeviceState state_;
@@ -130,6 +145,7 @@ class Device final : public SessionParent {
   std::map<std::uint64_t, protocol::Bytes> requests_;  // settings_id -> the client's own bytes, echoed in its pings
   bool asked_ = false;                                 // a client that is still connected has sent settings
   std::uint32_t ping_number_ = 0;
+  bool transmits_ = true;  // as far as control is concerned
   bool busy_ = false, stopping_ = false, beacon_failed_ = false;
 
   DeviceFigures figures_;

@@ -113,6 +113,7 @@ void Device::welcome(tcp::socket socket, Admission::Place place) {
   update_state(now);
   auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket), vendor_.converse(state_, now), setup);
   say_visit("client connected", {{"client", session->client()}});
+  tell_of_client(*session, true, {});
   sessions_.push_back(session);
   session->start();
   on_membership();
@@ -134,6 +135,7 @@ void Device::on_over(Session& session, const std::string& why) {
   say_visit(
       "client gone: " + why,
       {{"client", session.client()}, {"pings", session.outbox().pings_written()}, {"dropped", session.outbox().pings_dropped()}});
+  tell_of_client(session, false, why);
   keep_figures_of(session);
   if (context_.digest) digests_.push_back({session.number(), session.digest().size(), session.digest().hex()});
   const auto is_it = [&session](const SessionPointer& s) { return s.get() == &session; };

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <new>
@@ -31,19 +32,20 @@ int complain(const Error& error) {
 
 struct Found {
   Config config;
-  std::string how;  // for the banner
+  std::string how;             // for the banner
+  std::filesystem::path file;  // empty = none
 };
 Result<Found> find_config(const RunCommand& command) {
-  const auto found = [](Result<Config> config, std::string how) -> Result<Found> {
+  const auto found = [](Result<Config> config, std::string how, std::filesystem::path file = {}) -> Result<Found> {
     if (!config) return tl::make_unexpected(config.error());
-    return Found{*std::move(config), std::move(how)};
+    return Found{*std::move(config), std::move(how), std::move(file)};
   };
   if (command.demo) return found(demo_config(), "built-in demo");
-  if (!command.config.empty()) return found(load_config(command.config), command.config);
+  if (!command.config.empty()) return found(load_config(command.config), command.config, command.config);
   std::string looked;
   for (const auto& place : config_search_path()) {
     std::error_code ec;
-    if (std::filesystem::exists(place, ec)) return found(load_config(place), place.string());
+    if (std::filesystem::exists(place, ec)) return found(load_config(place), place.string(), place);
     looked += (looked.empty() ? "" : ", ") + place.string();
   }
   return found(demo_config(), "none found (looked in " + looked + ") -> demo");
@@ -76,13 +78,24 @@ int run(const RunCommand& command, Steady::time_point begin) {
         start_engine([&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, engine_options); }, *scene);
   });
   if (!engine) return complain(engine.error());
-  const auto make_engine = [&](const std::shared_ptr<const Scene>&) { return *std::move(engine); };
+  const auto make_engine_for = [&](ScenePointer s) -> std::unique_ptr<PingEngine> {
+    if (*engine) return *std::move(engine);  // the first
+    return make_engine(std::move(s), pool, engine_options);
+  };
   AppOptions options;
   options.exit_after_pings = command.exit_after_pings;
   options.digest = command.digest;
   options.handle_signals = true;
+  options.load_scene = [](const SceneFile& file) { return load_scene(file); };
+  if (!found->file.empty())
+    options.read_config = [file = found->file, command]() -> Result<Config> {
+      auto again = load_config(file);
+      if (again)
+        if (const auto r = override_config(*again, command); !r) return tl::make_unexpected(r.error());
+      return again;
+    };
   options.service_manager = notify_place_from_environment();
-  App app(std::move(config), *scene, make_engine, options, log);
+  App app(std::move(config), *scene, make_engine_for, options, log);
   const double scene_ms = 1e3 * seconds_since(scene_begin);
   if (const auto r = app.open(); !r) return complain(r.error());
   std::fputs(banner(app, {found->how, scene_ms}).c_str(), stderr);
@@ -91,6 +104,10 @@ int run(const RunCommand& command, Steady::time_point begin) {
   const int code = app.run();
   std::fputs(summary(app).c_str(), stderr);
   std::fputs(digest_lines(app).c_str(), stdout);
+  if (app.is_building()) {  // a scene that nobody wants any more: not worth waiting for
+    std::fflush(nullptr);
+    std::_Exit(code);
+  }
   return code;
 }
 

@@ -29,6 +29,8 @@ std::string PoseIntake::take(control::PoseSample sample, const Sender& sender) {
   map_wall(sample.stamp);
   const PoseOutcome outcome = world_.accept(sample, sender, clock_.now());
   if (!outcome.refusal.empty() && outcome.verdict != PoseVerdict::late) say_refusal(outcome.refusal, sender);
+  if (!outcome.notice.empty() && events_ != nullptr && events_->heard())
+    events_->tell({control::PoseEvent{outcome.body, false, outcome.notice}});
   std::uint64_t unsaid = 0;
   if (!outcome.notice.empty() && notices_.allows(LogLimiter::Clock::now(), unsaid)) log_.info(outcome.notice);
   on_pose_();

@@ -8,14 +8,15 @@
 
 #include "daemon/clock.hpp"
 #include "daemon/log.hpp"
+#include "daemon/operations.hpp"
 #include "daemon/world.hpp"
 
 namespace sonar {
 
 class PoseIntake {
  public:
-  PoseIntake(World& world, const Clock& clock, Log& log, std::function<void()> on_pose)
-      : world_(world), clock_(clock), log_(log), on_pose_(std::move(on_pose)) {}
+  PoseIntake(World& world, const Clock& clock, Log& log, std::function<void()> on_pose, Events* events = nullptr)
+      : world_(world), clock_(clock), log_(log), on_pose_(std::move(on_pose)), events_(events) {}
 
   /// The refusal's sentence, or empty.
   std::string take(control::PoseSample sample, const Sender& sender);
@@ -30,6 +31,7 @@ class PoseIntake {
   const Clock& clock_;
   Log& log_;
   std::function<void()> on_pose_;
+  Events* events_;
   LogLimiter refusals_, notices_;
   std::chrono::nanoseconds wall_shift_{0};  // our time = WALL stamp + shift
 };

@@ -1,27 +1,24 @@
-// Listens for poses: protobuf and JSON lines, each by UDP and TCP, and hands them to the World.
-// Owned by App. A malformed message costs its sender a counted refusal and, now and then, a log line; never more.
+// Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. Owned by App; the control stream is a server of its own
+// (daemon/control/). A malformed message costs its sender a counted refusal and, now and then, a log line; never more.
 #pragma once
 
-#include <functional>
 #include <list>
 #include <memory>
+#include <span>
 #include <string>
-#include <vector>
 
 #include "core/base/result.hpp"
 #include "daemon/asio.hpp"
-#include "daemon/clock.hpp"
 #include "daemon/config.hpp"
 #include "daemon/log.hpp"
-#include "daemon/world.hpp"
-#include "protocol/control/control.hpp"
+#include "daemon/places.hpp"
+#include "daemon/pose_intake.hpp"
 
 namespace sonar {
 
 class PoseServer {
  public:
-  PoseServer(asio::io_context& io, const PoseConfig& config, World& world, const Clock& clock, Log& log,
-             std::function<void()> on_pose);
+  PoseServer(asio::io_context& io, const PoseConfig& config, PoseIntake& intake, Log& log);
 
   Result<void> open();
   void start();
@@ -36,50 +33,41 @@ class PoseServer {
   struct Listener {
     Encoding encoding;
     udp::socket datagrams;
-    tcp::acceptor acceptor;
+    tcp::acceptor acceptor;  // of JSON lines only
   };
-  using Steady = std::chrono::steady_clock;
   /// One TCP sender; closed by stop(), or when its place is needed and it has been silent for longest.
   struct Connection {
     tcp::socket socket;
     Sender sender;
-    Steady::time_point heard_at = Steady::now();
-    bool greeted = false;
+    std::chrono::steady_clock::time_point heard_at = std::chrono::steady_clock::now();
+    void close() {
+      error_code ec;
+      socket.close(ec);
+    }
   };
   using ConnectionPointer = std::shared_ptr<Connection>;
 
   Result<Endpoint> open(Listener& listener, Endpoint at);
   bool allowed(const asio::ip::address& from);
-  bool make_place();
   void keep_receiving(Listener& listener);
   void keep_accepting(Listener& listener);
   void say_fault(const std::exception_ptr& fault, const std::string& at);
   asio::awaitable<void> receive(Listener& listener);
   asio::awaitable<void> accept(Listener& listener);
   asio::awaitable<void> read_lines(ConnectionPointer connection);
-  asio::awaitable<void> read_requests(ConnectionPointer connection);
-  asio::awaitable<bool> answer(ConnectionPointer connection, control::Bytes message);
-  control::Response respond(Connection& connection, control::BytesView message, bool& close);
+  void admit(tcp::socket socket);
 
   void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);
   void on_line(const std::string& text, const Sender& sender);
-  /// The refusal's sentence, or empty.
-  std::string take(control::PoseSample sample, const Sender& sender);
-  void map_wall(control::Stamp& stamp);
-  void refuse(const std::string& why, const Sender& sender);
-  void say_refusal(const std::string& why, const Sender& sender);
 
   asio::io_context& io_;
   const PoseConfig& config_;
-  World& world_;
-  const Clock& clock_;
+  PoseIntake& intake_;
   Log& log_;
-  std::function<void()> on_pose_;
-  LogLimiter refusals_, notices_, faults_;
+  LogLimiter notices_, faults_;
   std::list<Listener> listeners_;
-  std::list<ConnectionPointer> connections_;
+  Places<Connection> connections_;
   Endpoint protobuf_at_, json_at_;
-  std::chrono::nanoseconds wall_shift_{0};  // our time = WALL stamp + shift
   bool stopping_ = false;
 };
 

@@ -10,7 +10,7 @@
 namespace sonar {
 
 Simulator::Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, int nice_by)
-    : io_(io), engine_(std::move(engine)) {
+    : io_(io), engine_(std::move(engine)), description_(engine_->description()) {
   asio::post(thread_, [nice_by] {
     // Niceness belongs to the thread on Linux; a refusal costs only smoothness.
     if (nice_by != 0 && ::nice(nice_by) == -1) return;
@@ -43,6 +43,14 @@ void Simulator::submit(PingRequest request, Done done) {
       begun_ = std::chrono::steady_clock::now();
       done(std::move(outcome));
     });
+  });
+}
+
+void Simulator::use(std::unique_ptr<PingEngine> engine, Retired retired) {
+  description_ = engine->description();
+  asio::post(thread_, [this, next = std::shared_ptr<PingEngine>(std::move(engine)), retired = std::move(retired)]() mutable {
+    std::swap(engine_, next);
+    asio::post(io_, [before = std::move(next), retired = std::move(retired)]() mutable { retired(std::move(before)); });
   });
 }
 

@@ -25,18 +25,29 @@ std::string joined_names(const std::vector<std::string>& names) {
 
 World::World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start)
     : rules_(rules), start_(start) {
-  const auto add = [this](std::vector<Track>& tracks, std::vector<BodyStart>& bodies) {
-    for (BodyStart& b : bodies) {
-      Track t;
-      t.source = b.orbits ? "demo orbit" : "initial pose";
-      t.body = std::move(b);
+  use_vehicles(std::move(vehicles));
+  use_objects(std::move(objects));
+}
+
+void World::use_vehicles(std::vector<BodyStart> vehicles) { vehicles_ = taken_over(vehicles_, vehicles); }
+void World::use_objects(std::vector<BodyStart> objects) { objects_ = taken_over(objects_, objects); }
+
+std::vector<World::Track> World::taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies) const {
+  std::vector<Track> tracks;
+  for (BodyStart& b : bodies) {
+    const auto known = std::find_if(old.begin(), old.end(), [&](const Track& t) { return t.body.name == b.name; });
+    Track t;
+    if (known != old.end()) {
+      t = std::move(*known);
+    } else {
       t.allowance = rules_.burst;
       t.allowance_at = start_;
-      tracks.push_back(std::move(t));
     }
-  };
-  add(vehicles_, vehicles);
-  add(objects_, objects);
+    if (t.history.empty()) t.source = b.orbits ? "demo orbit" : "initial pose";
+    t.body = std::move(b);
+    tracks.push_back(std::move(t));
+  }
+  return tracks;
 }
 
 World::Track* World::find(const PoseSample& sample, std::string& refusal) {
@@ -125,6 +136,7 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   } else if (track.stale_reported) {
     out.notice = "poses of " + track.body.name + " are back";
   }
+  if (!out.notice.empty()) out.body = track.body.name;
   track.source = sender.source;
   track.sender_id = sender.id;
   track.seq = sample.seq;
@@ -148,15 +160,15 @@ bool World::is_stale(const Track& track, Time now) const {
   return !track.history.empty() && now - track.last_arrival > rules_.stale_after;
 }
 
-std::vector<std::string> World::newly_stale(Time now) {
-  std::vector<std::string> sentences;
+std::vector<World::Stale> World::newly_stale(Time now) {
+  std::vector<Stale> sentences;
   for (Track& t : vehicles_) {  // objects may rest where they were put; a vehicle without news is a broken link
     if (t.stale_reported || !is_stale(t, now)) continue;
     t.stale_reported = true;
     ++counters_.stale;
-    sentences.push_back("no pose for " + t.body.name + " from " + t.source + " for " +
-                        std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(now - t.last_arrival).count()) +
-                        " ms");
+    const auto silent = std::chrono::duration_cast<std::chrono::milliseconds>(now - t.last_arrival);
+    sentences.push_back(
+        {t.body.name, "no pose for " + t.body.name + " from " + t.source + " for " + std::to_string(silent.count()) + " ms"});
   }
   return sentences;
 }

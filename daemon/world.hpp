@@ -42,6 +42,7 @@ struct PoseOutcome {
   PoseVerdict verdict = PoseVerdict::accepted;
   std::string refusal;  // one sentence when not accepted
   std::string notice;   // worth a log line: the source changed, poses came back
+  std::string body;     // with a notice: whose
 };
 
 struct PoseCounters {
@@ -63,6 +64,11 @@ class World {
  public:
   World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start);
 
+  // When the configuration is read again or the scene changes. Bodies that are there under the same name keep their poses.
+  void use_rules(const PoseRules& rules) { rules_ = rules; }
+  void use_vehicles(std::vector<BodyStart> vehicles);
+  void use_objects(std::vector<BodyStart> objects);
+
   PoseOutcome accept(const control::PoseSample& sample, const Sender& sender, Time now);
   void count_refused() { ++counters_.refused; }
 
@@ -70,10 +76,16 @@ class World {
   /// How it moves then, as vehicle_at() carries it on; at rest where that is faster than anything that carries a sonar.
   PoseHistory::Motion vehicle_moves(std::size_t vehicle, Time t) const;
   std::vector<Pose> objects_at(Time t) const;
+  Pose object_at(std::size_t object, Time t) const { return pose_at(objects_[object], t); }
+  bool is_hidden(std::size_t object) const { return objects_[object].hidden; }
+  void hide(std::size_t object, bool hidden) { objects_[object].hidden = hidden; }
   /// True when poses came once and then stopped for longer than the rules allow.
   bool is_stale(std::size_t vehicle, Time now) const { return is_stale(vehicles_[vehicle], now); }
-  /// One sentence for each body whose poses stopped since the last call.
-  std::vector<std::string> newly_stale(Time now);
+  struct Stale {
+    std::string vehicle, sentence;
+  };
+  /// The vehicles whose poses stopped since the last call.
+  std::vector<Stale> newly_stale(Time now);
   std::string_view source_of(std::size_t vehicle) const { return vehicles_[vehicle].source; }
   const PoseCounters& counters() const { return counters_; }
 
@@ -93,6 +105,7 @@ class World {
   };
   using Ns = std::chrono::nanoseconds;
 
+  std::vector<Track> taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies) const;
   Track* find(const control::PoseSample& sample, std::string& refusal);
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time now) const;
   bool over_rate(Track& track, Time now) const;

@@ -296,6 +296,36 @@ TEST(Rebind, RefusesWhatCannotServe) {
   EXPECT_EQ(refusal("192.168.2.5", "192.168.2.4"), "accepted") << "its own";
 }
 
+TEST(ConfigControl, DefaultsAreOnLoopbackAndGiveWay) {
+  const auto config = parse(two_sonars("", "192.168.2.5"));
+  ASSERT_TRUE(config);
+  EXPECT_EQ(text_of(config->control.stream.at), "127.0.0.1:14770");
+  EXPECT_EQ(text_of(config->control.http.at), "127.0.0.1:8088");
+  EXPECT_FALSE(config->control.stream_given || config->control.http_given);
+}
+
+TEST(ConfigControl, ReadsItsKeysAndRefusesStrangersWithoutAToken) {
+  const auto with = [](const std::string& control) { return parse(two_sonars("", "192.168.2.5") + "control: " + control + "\n"); };
+  const auto config = with("{stream: off, http: '127.0.0.9:0', hosts: [sonar-lab], token_file: secret}");
+  ASSERT_TRUE(config) << config.error().text;
+  EXPECT_FALSE(config->control.stream.enabled);
+  EXPECT_TRUE(config->control.http.enabled && config->control.http_given);
+  EXPECT_EQ(text_of(config->control.http.at), "127.0.0.9:0");
+  EXPECT_EQ(config->control.hosts.at(0), "sonar-lab");
+  EXPECT_EQ(config->control.token_file.filename(), "secret");
+  EXPECT_TRUE(with("{http: '0.0.0.0:8088', token_file: /etc/secret}"));
+  const auto refusal = [&](const std::string& control) {
+    const auto c = with(control);
+    EXPECT_TRUE(c || c.error().kind == ErrorKind::config);
+    return c ? std::string("accepted") : c.error().text;
+  };
+  EXPECT_THAT(refusal("{http: '0.0.0.0:8088'}"), HasSubstr("control.http: can be reached from other computers"));
+  EXPECT_THAT(refusal("{stream: '192.168.2.5:14770'}"), HasSubstr("control.token_file"));
+  EXPECT_THAT(refusal("{stream: '127.0.0.1:8088', http: '127.0.0.1:8088'}"), HasSubstr("the same address as control.stream"));
+  EXPECT_THAT(refusal("{htpp: off}"), HasSubstr("did you mean \"http\""));
+  EXPECT_THAT(refusal("{http: '127.0.0.1'}"), HasSubstr("is not an address"));
+}
+
 TEST(Config, PointsRenderFilesToTheirCommand) {
   const auto config = parse_config("scene: demo.yaml\nsonar: {}\n", "r.yaml", {});
   ASSERT_FALSE(config);

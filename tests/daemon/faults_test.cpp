@@ -54,10 +54,11 @@ struct PoseFaults : ::testing::Test {
     LogOptions options;
     options.sink = [this](LogLevel, const std::string& line) { log_text += line + "\n"; };
     log = std::make_unique<Log>(options);
-    server = std::make_unique<PoseServer>(io, config, world, clock, *log, [this] {
+    intake = std::make_unique<PoseIntake>(world, clock, *log, [this] {
       if (++poses == 1) throw std::runtime_error("no such luck");
       io.stop();
     });
+    server = std::make_unique<PoseServer>(io, config, *intake, *log);
     if (const auto r = server->open(); !r) throw std::runtime_error(r.error().text);
     server->start();
   }
@@ -70,6 +71,7 @@ struct PoseFaults : ::testing::Test {
   PoseConfig config;
   std::string log_text;
   std::unique_ptr<Log> log;
+  std::unique_ptr<PoseIntake> intake;
   std::unique_ptr<PoseServer> server;
   int poses = 0;
 };

@@ -25,28 +25,41 @@ sockaddr_in endpoint(const std::string& address, std::uint16_t port) {
 }
 const sockaddr* plain(const sockaddr_in& a) { return static_cast<const sockaddr*>(static_cast<const void*>(&a)); }
 
-std::shared_ptr<const Scene> small_scene(bool moving_object) {
+}  // namespace
+
+std::shared_ptr<const Mesh> small_mesh() {
+  auto mesh = std::make_shared<Mesh>();
+  mesh->vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mesh->triangles = {{0, 1, 2}, {0, 1, 3}};
+  mesh->material = {0, 0};
+  return mesh;
+}
+
+std::shared_ptr<Scene> small_scene(bool moving_object) {
   auto scene = std::make_shared<Scene>();
   scene->name = "test";
+  scene->materials = {Material{.name = "mud"}, Material{.name = "steel"}};
+  scene->objects = {Object{.name = "floor", .mesh = small_mesh(), .in_world = {{0, 0, -10}, {}}},
+                    Object{.name = "box", .mesh = small_mesh(), .in_world = {{3, 0, -3}, {}}}};
   if (moving_object) {
     scene->body_names = {"crate"};
     scene->bodies_in_world = {Pose{{5, 0, -3}, {}}};
+    scene->objects.push_back(Object{.name = "crate", .mesh = small_mesh(), .in_world = {{5, 0, -3}, {}}, .body = 0});
   }
   return scene;
 }
 
-std::string yaml(const DaemonSetup& s) {
+std::string yaml_of(const DaemonSetup& s) {
   const std::string poses =
       s.more.find("poses:") == std::string::npos ? "poses: {protobuf: '" + s.address + ":0', json: '" + s.address + ":0'}\n" : "";
+  const std::string control = s.more.find("control:") == std::string::npos ? "control: {stream: off, http: off}\n" : "";
   const std::string status =
       s.sonar_lines.find("status_to") == std::string::npos ? "    status_to: ['" + s.address + ":9']\n" : "";
   return "world: {scene: scene.yaml}\n"
          "vehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}\n"
          "sonars:\n  - name: front\n    profile: oculus-m1200d\n    bind_ip: " +
-         s.address + "\n" + status + s.sonar_lines + poses + s.more;
+         s.address + "\n" + status + s.sonar_lines + poses + control + s.more;
 }
-
-}  // namespace
 
 std::string own_address() {
   static std::atomic<unsigned> count{0};
@@ -66,6 +79,7 @@ std::vector<Ping> FakeEngine::run(std::span<const PingRequest> requests) {
     {
       std::lock_guard lock(record_->mutex);
       record_->requests.push_back(request);
+      record_->scenes.push_back(scene_);
     }
     if (takes_.count() > 0) std::this_thread::sleep_for(takes_);
     const auto number = static_cast<std::uint32_t>(request.number);
@@ -92,7 +106,9 @@ std::vector<Ping> FakeEngine::run(std::span<const PingRequest> requests) {
 Daemon::Daemon(DaemonSetup setup) : address_(setup.address) {
   const std::string directory = ::testing::TempDir();
   std::ofstream(directory + "/scene.yaml") << "name: test\n";
-  auto config = parse_config(yaml(setup), "test.yaml", directory);
+  config_path_ = directory + "/" + address_ + ".yaml";
+  if (setup.config_file) write_config(yaml_of(setup));
+  auto config = setup.config_file ? load_config(config_path_) : parse_config(yaml_of(setup), "test.yaml", directory);
   if (!config) throw std::runtime_error(config.error().text);
   LogOptions log;
   log.sink = [this](LogLevel, const std::string& line) {
@@ -100,10 +116,16 @@ Daemon::Daemon(DaemonSetup setup) : address_(setup.address) {
     log_text_ += line + "\n";
   };
   log_ = std::make_unique<Log>(log);
-  const auto make_engine = [&](const std::shared_ptr<const Scene>&) -> std::unique_ptr<PingEngine> {
-    return std::make_unique<FakeEngine>(record_, setup.engine_takes, setup.engine_before);
+  const auto make_engine = [record = record_, takes = setup.engine_takes, before = setup.engine_before,
+                            before_engine = setup.before_engine,
+                            first = true](ScenePointer scene) mutable -> std::unique_ptr<PingEngine> {
+    if (!std::exchange(first, false) && before_engine) before_engine(*scene);
+    return std::make_unique<FakeEngine>(record, takes, before, std::move(scene));
   };
-  app_ = std::make_unique<App>(*std::move(config), small_scene(setup.moving_object), make_engine, setup.options, *log_);
+  const ScenePointer scene = setup.scene ? setup.scene : small_scene(setup.moving_object);
+  if (!setup.options.load_scene) setup.options.load_scene = [scene](const SceneFile&) -> Result<ScenePointer> { return scene; };
+  if (setup.config_file) setup.options.read_config = [file = config_path_] { return load_config(file); };
+  app_ = std::make_unique<App>(*std::move(config), scene, make_engine, setup.options, *log_);
   if (const auto opened = app_->open(); !opened) throw std::runtime_error(opened.error().text);
   thread_ = std::thread([this] { code_ = app_->run(); });
 }
@@ -118,6 +140,39 @@ int Daemon::stop() {
 int Daemon::wait() {
   if (thread_.joinable()) thread_.join();
   return code_.value_or(-1);
+}
+
+void Daemon::write_config(const std::string& yaml) const { std::ofstream(config_path_) << yaml; }
+
+std::vector<ScenePointer> Daemon::scenes() {
+  std::lock_guard lock(record_->mutex);
+  return record_->scenes;
+}
+
+void Daemon::on_io_thread(const std::function<void()>& work) {
+  std::promise<void> done;
+  app_->post([&] {
+    work();
+    done.set_value();
+  });
+  done.get_future().wait();
+}
+
+std::future<OperationResult> Daemon::ask_later(const control::Operation& operation) {
+  auto answer = std::make_shared<std::promise<OperationResult>>();
+  auto future = answer->get_future();
+  app_->post([this, operation, answer] {
+    app_->operations().perform(operation, {"control test", "control"},
+                               [answer](OperationResult result) { answer->set_value(std::move(result)); });
+  });
+  return future;
+}
+
+OperationResult Daemon::ask(const control::Operation& operation) {
+  auto answer = ask_later(operation);
+  if (answer.wait_for(patience) == std::future_status::ready) return answer.get();
+  ADD_FAILURE() << "no answer";
+  return {OperationResult::Code::failed, "no answer", {}};
 }
 
 std::string Daemon::log_text() {
@@ -142,6 +197,8 @@ void Client::reset() {
   setsockopt(fd_, SOL_SOCKET, SO_LINGER, &now, sizeof now);
   close();
 }
+
+void Client::finish_sending() { shutdown(fd_, SHUT_WR); }
 
 void Client::die() {
   sock_filter drop_all{BPF_RET | BPF_K, 0, 0, 0};

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -31,6 +32,7 @@ class FakeEngine final : public PingEngine {
   struct Record {
     std::mutex mutex;
     std::vector<PingRequest> requests;
+    std::vector<ScenePointer> scenes;  // in which each was made
     std::vector<PingRequest> all() {
       std::lock_guard lock(mutex);
       return requests;
@@ -38,8 +40,8 @@ class FakeEngine final : public PingEngine {
   };
   /// `before` is called with the number of each ping and may throw.
   using Before = std::function<void(std::uint32_t)>;
-  FakeEngine(std::shared_ptr<Record> record, milliseconds takes, Before before = {})
-      : record_(std::move(record)), takes_(takes), before_(std::move(before)) {}
+  FakeEngine(std::shared_ptr<Record> record, milliseconds takes, Before before = {}, ScenePointer scene = {})
+      : record_(std::move(record)), takes_(takes), before_(std::move(before)), scene_(std::move(scene)) {}
   std::vector<Ping> run(std::span<const PingRequest> requests) override;
   std::string description() const override { return "fake"; }
   static std::uint8_t sample(std::uint32_t ping, std::size_t row, std::size_t beam);
@@ -48,7 +50,13 @@ class FakeEngine final : public PingEngine {
   std::shared_ptr<Record> record_;
   milliseconds takes_;
   Before before_;
+  ScenePointer scene_;
 };
+
+/// A few triangles: enough to be an object.
+std::shared_ptr<const Mesh> small_mesh();
+/// Objects "floor" and "box" of materials "mud" and "steel"; with `moving_object` also "crate", which moves.
+std::shared_ptr<Scene> small_scene(bool moving_object = false);
 
 struct DaemonSetup {
   std::string address = own_address();
@@ -58,7 +66,12 @@ struct DaemonSetup {
   milliseconds engine_takes{0};
   FakeEngine::Before engine_before;
   bool moving_object = false;
+  ScenePointer scene;                               // instead of small_scene()
+  std::function<void(const Scene&)> before_engine;  // on the thread that makes an engine for a later scene
+  bool config_file = false;                         // the configuration is in a file and can be read again
 };
+/// The configuration of a setup: what Daemon starts with.
+std::string yaml_of(const DaemonSetup& setup);
 
 class Daemon {
  public:
@@ -71,12 +84,22 @@ class Daemon {
   App& app() { return *app_; }
   const std::string& address() const { return address_; }
   std::vector<PingRequest> requests() { return record_->all(); }
+  /// The scenes in which those were made, one each.
+  std::vector<ScenePointer> scenes();
+  /// On the I/O thread, and waits for the answer.
+  OperationResult ask(const control::Operation& operation);
+  std::future<OperationResult> ask_later(const control::Operation& operation);
+  control::DaemonStatus status() { return std::get<control::DaemonStatus>(ask(control::GetStatus{}).body); }
+  /// On the I/O thread, and waits for it.
+  void on_io_thread(const std::function<void()>& work);
+  /// With setup.config_file: what a reload will read.
+  void write_config(const std::string& yaml) const;
   std::string log_text();
   /// Only after stop() or wait().
   DeviceFigures figures() const { return app_->devices().front().figures(); }
 
  private:
-  std::string address_;
+  std::string address_, config_path_;
   std::shared_ptr<FakeEngine::Record> record_ = std::make_shared<FakeEngine::Record>();
   std::mutex log_mutex_;
   std::string log_text_;
@@ -105,7 +128,8 @@ class Client {
   /// Reads to the end of the stream; true = FIN, false = reset or deadline.
   bool read_to_end(milliseconds timeout = patience);
   std::vector<std::byte> read_raw(std::size_t at_least, milliseconds timeout = patience);
-  void reset();  // RST
+  void reset();           // RST
+  void finish_sending();  // FIN, but go on reading
   /// From now on as a computer that lost its power: it takes and answers nothing, not even for its kernel.
   void die();
   void close();

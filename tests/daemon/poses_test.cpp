@@ -20,12 +20,14 @@ struct Poses : ::testing::Test {
   static DaemonSetup with_object() {
     DaemonSetup s;
     s.moving_object = true;
+    s.more = "control: {stream: '" + s.address + ":0', http: off}\n";
     return s;
   }
   Poses() : daemon(with_object()), client(daemon.address()) {
     client.fire(fire_at(PingRate::hz40));
     EXPECT_TRUE(client.next_ping());
     protobuf_port = daemon.app().poses().protobuf().port;
+    stream_port = daemon.app().control().stream().port;
     json_port = daemon.app().poses().json().port;
   }
   /// A later ping was asked for from x.
@@ -44,7 +46,7 @@ struct Poses : ::testing::Test {
   static std::string json_at_x(int x) { return "{\"position\":[0," + std::to_string(x) + ",3],\"attitude\":[0,0,0]}\n"; }
   Daemon daemon;
   Client client;
-  std::uint16_t protobuf_port = 0, json_port = 0;
+  std::uint16_t protobuf_port = 0, stream_port = 0, json_port = 0;
 };
 
 TEST_F(Poses, ProtobufDatagram) {
@@ -68,7 +70,7 @@ TEST_F(Poses, JsonLinesOverTcp) {
 }
 
 TEST_F(Poses, ControlStreamGreetsAndAnswers) {
-  Client sender(daemon.address(), protobuf_port);
+  Client sender(daemon.address(), stream_port);
   sender.send(control::delimited(control::encode_request({1, control::Hello{}})));
   sender.send(control::delimited(control::encode_request({2, at_x(14)})));
   EXPECT_TRUE(asked_from(14));
@@ -101,15 +103,15 @@ TEST_F(Poses, ControlStreamGreetsAndAnswers) {
 }
 
 TEST_F(Poses, ControlStreamNeedsAHelloFirstAndTheRightVersion) {
-  Client rude(daemon.address(), protobuf_port);
+  Client rude(daemon.address(), stream_port);
   rude.send(control::delimited(control::encode_request({7, at_x(99)})));
   EXPECT_GT(rude.read_raw(1).size(), 0u);
   EXPECT_TRUE(rude.read_to_end()) << "told, then closed";
-  Client future(daemon.address(), protobuf_port);
+  Client future(daemon.address(), stream_port);
   future.send(control::delimited(control::encode_request({8, control::Hello{2, ""}})));
   EXPECT_GT(future.read_raw(1).size(), 0u);
   EXPECT_TRUE(future.read_to_end());
-  Client oversized(daemon.address(), protobuf_port);
+  Client oversized(daemon.address(), stream_port);
   oversized.send(std::vector<std::byte>(8, std::byte{0xff}));
   EXPECT_TRUE(oversized.read_to_end());
 }
@@ -184,7 +186,8 @@ TEST(PoseRules, WallStampsFollowAClockThatWasSetAfterTheStart) {
   PoseConfig config;
   config.json.enabled = false;
   config.protobuf.at = {*parse_ipv4(own_address()), 0};
-  PoseServer server(io, config, world, clock, log, [&io] { io.stop(); });
+  PoseIntake intake(world, clock, log, [&io] { io.stop(); });
+  PoseServer server(io, config, intake, log);
   ASSERT_TRUE(server.open());
   server.start();
   const auto accepted_at = [&](Time stamp) {

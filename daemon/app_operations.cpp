@@ -1,0 +1,153 @@
+#include "daemon/app_operations.hpp"
+
+#include <cstdio>
+#include <utility>
+
+#include "daemon/config_parts.hpp"
+#include "daemon/reload.hpp"
+
+namespace sonar {
+namespace {
+
+OperationResult refused(std::string text) { return {OperationResult::Code::refused, std::move(text), {}}; }
+OperationResult result_of(const Error& error) {
+  // What the asker got wrong is of these kinds; the rest is our trouble.
+  const bool askers = error.kind == ErrorKind::usage || error.kind == ErrorKind::config;
+  return {askers ? OperationResult::Code::refused : OperationResult::Code::failed, error.text, {}};
+}
+OperationResult result_of(const Result<void>& outcome) { return outcome ? OperationResult{} : result_of(outcome.error()); }
+
+std::filesystem::path folder_of(const Config& config) { return std::filesystem::path(config.source).parent_path(); }
+
+/// The scene there is when its turn comes, changed.
+auto on_scene(std::function<Result<ScenePointer>(const Scene&)> edit) {
+  return [edit = std::move(edit)](const ScenePointer& now) { return edit(*now); };
+}
+
+/// Moving objects are placed and hidden by the World, unless the scene itself hides this one.
+bool is_the_worlds(const Scene& scene, const control::SetObject& asked) {
+  const Object* const object = object_named(scene, asked.object);
+  return body_named(scene, asked.object) >= 0 && (object == nullptr || object->visible || !asked.visible.value_or(false));
+}
+
+}  // namespace
+
+void AppOperations::perform(const control::Operation& operation, const Sender& sender, Done done) {
+  if (std::holds_alternative<control::GetStatus>(operation)) {
+    done({OperationResult::Code::done, {}, status()});
+  } else if (const auto* sample = std::get_if<control::PoseSample>(&operation)) {
+    const std::string refusal = parts_.poses.take(*sample, sender);
+    done(refusal.empty() ? OperationResult{} : refused(refusal));
+  } else if (const auto* sonar = std::get_if<control::SetSonar>(&operation)) {
+    done(carry_out(*sonar, sender));
+  } else if (const auto* environment = std::get_if<control::SetEnvironment>(&operation)) {
+    done(carry_out(*environment, sender));
+  } else if (const auto* scene = std::get_if<control::LoadScene>(&operation)) {
+    load(*scene, sender, std::move(done));
+  } else if (const auto* added = std::get_if<control::AddObject>(&operation)) {
+    edit([a = *added](const Scene& s) { return with_object(s, a); }, "object " + added->name + " added", sender, std::move(done));
+  } else if (const auto* removed = std::get_if<control::RemoveObject>(&operation)) {
+    edit([name = removed->object](const Scene& s) { return without_object(s, name); }, "object " + removed->object + " removed",
+         sender, std::move(done));
+  } else {
+    set(std::get<control::SetObject>(operation), sender, std::move(done));
+  }
+}
+
+// ---- sonars and water
+
+OperationResult AppOperations::carry_out(const control::SetSonar& asked, const Sender& sender) {
+  std::list<Device>& sonars = parts_.fleet.devices();
+  Device* const device = asked.sonar.empty() && sonars.size() == 1 ? &sonars.front() : parts_.fleet.find(asked.sonar);
+  if (device != nullptr) return result_of(device->ask(asked, sender.id));
+  std::string names;
+  for (const Device& d : sonars) names += (names.empty() ? "" : ", ") + d.config().name;
+  return refused(
+      (asked.sonar.empty() ? std::string("say which sonar") : "no sonar is called \"" + asked.sonar.substr(0, 64) + "\"") +
+      "; there are: " + names);
+}
+
+OperationResult AppOperations::carry_out(const control::SetEnvironment& asked, const Sender& sender) {
+  Water water = parts_.config.water;
+  water.temperature_c = asked.temperature_c.value_or(water.temperature_c);
+  water.salinity_psu = asked.salinity_psu.value_or(water.salinity_psu);
+  water.ph = asked.ph.value_or(water.ph);
+  water.sound_speed_mps = asked.sound_speed_mps.value_or(water.sound_speed_mps);
+  if (const std::string why = why_no_water(water, parts_.config.allow_hot); !why.empty()) return refused(why);
+  if (is_same(water, parts_.config.water)) return {};
+  parts_.config.water = water;
+  for (Device& d : parts_.fleet.devices()) d.use_water(water);
+  char text[96];
+  std::snprintf(text, sizeof text, "water: %g C, %g psu, pH %g, sound speed %s", water.temperature_c, water.salinity_psu,
+                water.ph, water.sound_speed_mps == 0 ? "computed" : std::to_string(water.sound_speed_mps).c_str());
+  parts_.log.info(text, {{"client", sender.id}});
+  return {};
+}
+
+// ---- the scene
+
+void AppOperations::say_change(const std::string& what, const Sender& sender) {
+  parts_.log.info("scene: " + what, {{"scene", parts_.changes.scene()->name}, {"client", sender.id}});
+  if (parts_.events.heard()) parts_.events.tell({control::SceneEvent{parts_.config.scene.name(), what}});
+}
+
+void AppOperations::edit(Edit edit, const std::string& what, const Sender& sender, Done done) {
+  if (parts_.changes.is_full()) return done({OperationResult::Code::failed, "64 changes of the scene wait already", {}});
+  parts_.changes.submit({on_scene(std::move(edit)), [this, what, sender, done = std::move(done)](const Result<void>& outcome) {
+                           if (outcome) say_change(what, sender);
+                           done(result_of(outcome));
+                         }});
+}
+
+void AppOperations::load(const control::LoadScene& asked, const Sender& sender, Done done) {
+  if (!parts_.load_scene) return done({OperationResult::Code::failed, "this program cannot load scenes", {}});
+  if (parts_.changes.is_full()) return done({OperationResult::Code::failed, "64 changes of the scene wait already", {}});
+  const std::filesystem::path folder = folder_of(parts_.config);
+  const auto file = find_scene(asked.path, folder);
+  if (asked.path.empty() || !file)
+    return done(refused("no scene file \"" + asked.path.substr(0, 256) + "\"; looked in " + scene_folders(folder)));
+  parts_.changes.submit({[load = parts_.load_scene, file = *file](const ScenePointer&) { return load(file); },
+                         [this, file = *file, sender, done = std::move(done)](const Result<void>& outcome) {
+                           if (outcome) {
+                             parts_.config.scene = file;
+                             for (const std::string& note : parts_.changes.scene()->notes) parts_.log.info(note);
+                             say_change("loaded " + file.name(), sender);
+                           }
+                           done(result_of(outcome));
+                         }});
+}
+
+/// Its turn comes after the changes before, also where nothing is to be built.
+void AppOperations::set(const control::SetObject& asked, const Sender& sender, Done done) {
+  if (parts_.changes.is_full()) return done({OperationResult::Code::failed, "64 changes of the scene wait already", {}});
+  auto finish = [this, asked, sender, done = std::move(done)](const Result<void>& outcome) {
+    const int body = body_named(*parts_.changes.scene(), asked.object);
+    const OperationResult result =
+        outcome && body >= 0 ? set_moving(asked, static_cast<std::size_t>(body), sender) : result_of(outcome);
+    if (result.code == OperationResult::Code::done)
+      say_change("object " + asked.object + (asked.visible ? (*asked.visible ? " shown" : " hidden") : " moved"), sender);
+    done(result);
+  };
+  if (!parts_.changes.busy() && is_the_worlds(*parts_.changes.scene(), asked)) return finish({});
+  parts_.changes.submit({[asked](const ScenePointer& now) -> Result<ScenePointer> {
+                           if (is_the_worlds(*now, asked)) return now;
+                           return with_object_set(*now, asked);
+                         },
+                         std::move(finish)});
+}
+
+OperationResult AppOperations::set_moving(const control::SetObject& asked, std::size_t body, const Sender& sender) {
+  const bool hidden = !asked.visible.value_or(!parts_.world.is_hidden(body));
+  if (asked.in_world) {
+    control::PoseSample sample;
+    sample.of = control::PoseSample::Of::object;
+    sample.name = asked.object;
+    sample.pose = *asked.in_world;
+    const std::string refusal = parts_.poses.take(sample, sender);
+    if (!refusal.empty()) return refused(refusal);
+  }
+  parts_.world.hide(body, hidden);
+  return {};
+}
+
+}  // namespace sonar

@@ -1,0 +1,54 @@
+// Carries out what control asks (operations.hpp): reads and changes the parts of the App, which owns this and them.
+#pragma once
+
+#include <chrono>
+
+#include "daemon/admission.hpp"
+#include "daemon/config.hpp"
+#include "daemon/fleet.hpp"
+#include "daemon/operations.hpp"
+#include "daemon/pose_intake.hpp"
+#include "daemon/scene_changes.hpp"
+
+namespace sonar {
+
+struct AppParts {
+  Config& config;
+  Clock& clock;
+  World& world;
+  Simulator& simulator;
+  SceneChanges& changes;
+  Admission& admission;
+  PoseIntake& poses;
+  Fleet& fleet;
+  Events& events;
+  Log& log;
+  std::function<Result<ScenePointer>(const SceneFile&)> load_scene;  // empty: scenes cannot be loaded
+};
+
+class AppOperations final : public Operations {
+ public:
+  explicit AppOperations(AppParts parts) : parts_(std::move(parts)) {}
+
+  void perform(const control::Operation& operation, const Sender& sender, Done done) override;
+  std::string metrics() const override;
+  std::string trouble() const override;
+
+ private:
+  using Edit = std::function<Result<ScenePointer>(const Scene&)>;
+
+  OperationResult carry_out(const control::SetSonar& asked, const Sender& sender);
+  OperationResult carry_out(const control::SetEnvironment& asked, const Sender& sender);
+  void load(const control::LoadScene& asked, const Sender& sender, Done done);
+  void set(const control::SetObject& asked, const Sender& sender, Done done);
+  OperationResult set_moving(const control::SetObject& asked, std::size_t body, const Sender& sender);
+  /// Of the scene as it is when the changes before have been made. `what` = for the log: "object crate added".
+  void edit(Edit edit, const std::string& what, const Sender& sender, Done done);
+  void say_change(const std::string& what, const Sender& sender);
+  control::DaemonStatus status() const;
+
+  AppParts parts_;
+  std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace sonar

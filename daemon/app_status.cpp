@@ -1,0 +1,75 @@
+// How the daemon is: everything that GetStatus answers, the figures for /metrics, and what is wrong.
+#include "daemon/app_operations.hpp"
+#include "daemon/prometheus.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr auto longest_ping = std::chrono::seconds(30);  // beyond: the simulation is stuck
+
+std::vector<control::ObjectStatus> objects_of(const Scene& scene, const World& world, Time now) {
+  std::vector<control::ObjectStatus> all;
+  const std::vector<Pose> bodies = world.objects_at(now);
+  for (const Object& o : scene.objects) {
+    if (o.name.empty()) continue;  // the place of one that was removed
+    control::ObjectStatus object;
+    object.name = o.name;
+    object.moving = body_named(scene, o.name) >= 0;
+    object.visible = o.visible && (o.body < 0 || !world.is_hidden(static_cast<std::size_t>(o.body)));
+    object.triangles = static_cast<std::uint32_t>(o.mesh->triangles.size());
+    if (!o.mesh->material.empty()) object.material = scene.materials.at(o.mesh->material.front()).name;
+    object.in_world = scene.in_world(o, bodies);
+    all.push_back(std::move(object));
+  }
+  return all;
+}
+
+}  // namespace
+
+std::string AppOperations::metrics() const {
+  DaemonFigures f;
+  f.version = SONARD_VERSION;
+  f.uptime_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+  for (const Device& d : parts_.fleet.devices()) f.sonars.emplace_back(d.config().name, d.figures());
+  f.poses = parts_.world.counters();
+  f.clients_now = parts_.admission.now();
+  f.turned_away_for_places = parts_.admission.refused_for_places();
+  f.turned_away_for_descriptors = parts_.admission.refused_for_descriptors();
+  f.process = figures_of_this_process();
+  return metrics_text(f);
+}
+
+std::string AppOperations::trouble() const {
+  const auto under_way = parts_.simulator.under_way_for();
+  if (under_way > longest_ping)
+    return "the simulation has been at one ping for " +
+           std::to_string(std::chrono::duration_cast<std::chrono::seconds>(under_way).count()) + " s";
+  return parts_.fleet.trouble();
+}
+
+control::DaemonStatus AppOperations::status() const {
+  const Config& config = parts_.config;
+  const Scene& scene = *parts_.changes.scene();
+  const World& world = parts_.world;
+  const Time now = parts_.clock.now();
+  control::DaemonStatus s;
+  s.version = SONARD_VERSION;
+  s.config = config.source;
+  s.scene = config.scene.name();
+  s.clock = parts_.clock.stepped() ? "stepped" : "realtime";
+  s.engine = parts_.simulator.engine_description();
+  s.seed = config.seed;
+  s.uptime_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+  s.resident_mb = static_cast<double>(figures_of_this_process().resident_bytes) / 1e6;
+  for (const Device& d : parts_.fleet.devices()) s.sonars.push_back(d.status(now));
+  for (std::size_t v = 0; v < config.vehicles.size(); ++v)
+    s.vehicles.push_back(
+        {config.vehicles[v].name, std::string(world.source_of(v)), world.is_stale(v, now), world.vehicle_at(v, now)});
+  s.objects = objects_of(scene, world, now);
+  const PoseCounters& p = world.counters();
+  s.poses = {p.accepted, p.refused, p.late, p.replaced, p.over_rate};
+  s.environment = {config.water.temperature_c, config.water.salinity_psu, config.water.ph, config.water.sound_speed_mps};
+  return s;
+}
+
+}  // namespace sonar

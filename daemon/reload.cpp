@@ -1,0 +1,89 @@
+#include "daemon/reload.hpp"
+
+#include <utility>
+
+#include "daemon/app.hpp"
+#include "daemon/world_parts.hpp"
+
+namespace sonar {
+namespace {
+
+bool same(const PoseListener& a, const PoseListener& b) {
+  return a.enabled == b.enabled && a.at.ip == b.at.ip && a.at.port == b.at.port;
+}
+bool same(const ControlConfig& a, const ControlConfig& b) {
+  return same(a.stream, b.stream) && same(a.http, b.http) && a.token_file == b.token_file && a.hosts == b.hosts;
+}
+bool same(const LogOptions& a, const LogOptions& b) { return a.level == b.level && a.json == b.json; }
+template <class T>
+bool same(const T& a, const T& b) {
+  return a == b;
+}
+
+}  // namespace
+
+bool is_same(const Water& a, const Water& b) {
+  return a.temperature_c == b.temperature_c && a.salinity_psu == b.salinity_psu && a.ph == b.ph &&
+         a.sound_speed_mps == b.sound_speed_mps;
+}
+
+std::vector<std::string> keep_what_needs_a_restart(const Config& now, Config& next) {
+  std::vector<std::string> keys;
+  const auto keep = [&keys](const char* key, const auto& is, auto& wanted) {
+    if (!same(is, wanted)) keys.emplace_back(key);
+    wanted = is;
+  };
+  keep("poses.protobuf", now.poses.protobuf, next.poses.protobuf);
+  keep("poses.json", now.poses.json, next.poses.json);
+  keep("control", now.control, next.control);
+  keep("limits.control_clients", now.limits.control_clients, next.limits.control_clients);
+  keep("engine.threads", now.engine.threads, next.engine.threads);
+  keep("engine.io_priority", now.engine.io_priority, next.engine.io_priority);
+  keep("engine.simd", now.engine.simd, next.engine.simd);
+  keep("clock", now.clock, next.clock);
+  keep("log", now.log, next.log);
+  return keys;
+}
+
+/// The file is read and its scene made ready where nobody waits for it; then everything changes in one moment.
+void App::reload() {
+  if (!options_.read_config || !options_.load_scene) return log_.info("reload: there is no configuration file; nothing changed");
+  if (changes_.is_full()) return log_.warning("reload: too many changes of the scene wait already; nothing changed");
+  notify_.reloading();
+  auto next = std::make_shared<Config>();
+  changes_.submit({[read = options_.read_config, load = options_.load_scene, next](const ScenePointer&) -> Result<ScenePointer> {
+                     auto config = read();
+                     if (!config) return tl::make_unexpected(config.error());
+                     *next = *std::move(config);
+                     return load(next->scene);
+                   },
+                   [this, next](const Result<void>& outcome) {
+                     if (outcome)
+                       take_over(std::move(*next));
+                     else
+                       log_.error("reload: " + outcome.error().text + "; the configuration stays as it was");
+                     notify_.ready(status_line());
+                   }});
+}
+
+void App::take_over(Config next) {
+  const std::vector<std::string> keys = keep_what_needs_a_restart(config_, next);
+  const bool other_water = !is_same(config_.water, next.water);
+  std::swap(config_, next);  // devices read it through their context
+  const Config& before = next;
+  world_.use_rules(pose_rules(config_));
+  world_.use_vehicles(vehicles_of(config_));
+  const Fleet::Change change = fleet_.take_over(before, config_);
+  if (other_water)
+    for (Device& d : fleet_.devices()) d.use_water(config_.water);
+
+  for (const std::string& error : change.errors) log_.error("reload: " + error);
+  std::string listed;
+  for (const std::string& key : keys) listed += (listed.empty() ? "" : ", ") + key;
+  if (!listed.empty()) log_.warning("reload: these need a restart and stay as they were: " + listed);
+  log_.info("reloaded: " + change.summary, {{"scene", scene().name}});
+  if (events_.heard()) events_.tell({control::SceneEvent{config_.scene.name(), "reloaded: " + change.summary}});
+  on_change();
+}
+
+}  // namespace sonar
