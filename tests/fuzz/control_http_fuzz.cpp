@@ -1,0 +1,68 @@
+// What may come to the HTTP port: requests out of a stream, and what they are judged to want. First byte: length of the pieces,
+// second: the policy; the rest is the stream. Whatever the pieces, the requests are the same; nothing passes without its Host,
+// and nothing but /healthz without the token.
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "daemon/control/http_judge.hpp"
+#include "tests/fuzz/byte_script.hpp"
+
+namespace {
+
+using namespace sonar;
+using fuzz::require;
+
+struct Taken {
+  std::vector<HttpRequest> requests;
+  unsigned refused = 0;
+};
+bool same(const HttpRequest& a, const HttpRequest& b) {
+  return a.method == b.method && a.target == b.target && a.host == b.host && a.origin == b.origin && a.body == b.body &&
+         a.authorization == b.authorization && a.content_type == b.content_type && a.keep_alive == b.keep_alive;
+}
+Taken take(std::span<const std::byte> stream, std::size_t piece) {
+  Taken taken;
+  HttpReader reader;
+  for (std::size_t at = 0; at < stream.size() && taken.refused == 0; at += piece) {
+    reader.feed(stream.subspan(at, std::min(piece, stream.size() - at)));
+    auto request = reader.next();
+    for (; request && *request; request = reader.next()) taken.requests.push_back(std::move(**request));
+    if (!request) taken.refused = request.error().status;
+    reader.asks_to_continue();
+  }
+  return taken;
+}
+
+void check(const HttpRequest& request, const HttpPolicy& policy) {
+  require(request.body.size() <= HttpReader::longest_body);
+  const Judgement judgement = judge(request, policy);
+  if (const auto* answer = std::get_if<HttpAnswer>(&judgement.wanted)) {
+    require(answer->status >= 400 && answer->status < 500 && answer->body.starts_with('{'));
+    return;
+  }
+  require(request.has_host && host_allowed(request.host, policy.reached, policy.hosts));
+  require(!request.has_origin || origin_allowed(request.origin, policy.reached, policy.hosts));
+  if (!policy.token.matches(bearer_token(request.authorization))) {
+    const auto* health = std::get_if<WantsHealth>(&judgement.wanted);
+    require(health != nullptr && !health->with_text);
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size < 3) return 0;
+  static const Token secret("0123456789abcdef");
+  static const Token none;
+  static const std::vector<std::string> hosts{"sonar.example"};
+  const HttpPolicy policy{data[1] % 2 == 1 ? secret : none, Ipv4{192, 168, 1, 2}, hosts};
+  const auto stream = std::as_bytes(std::span(data, size)).subspan(2);
+  const Taken whole = take(stream, stream.size()), pieces = take(stream, data[0] + std::size_t{1});
+  require(whole.requests.size() == pieces.requests.size());  // half a request may be refused sooner or later
+  for (std::size_t i = 0; i < whole.requests.size(); ++i) {
+    require(same(whole.requests[i], pieces.requests[i]));
+    check(whole.requests[i], policy);
+  }
+  return 0;
+}
