@@ -25,6 +25,7 @@ sonars:
     bind_ip: {address}
     status_to: [{address}]
 poses: {{protobuf: "{address}:14770", json: "{address}:14771"}}
+control: {{stream: "{address}:14770", http: "{address}:8088"{control}}}
 {more}
 """
 
@@ -42,10 +43,11 @@ class Sonard:
     """with Sonard(scene="demo.yaml") as daemon: ... daemon.address"""
 
     def __init__(self, scene="demo.yaml", profile="oculus-m1200d", pose="{frame: ENU_FLU, xyz_m: [-7, 0, -3]}",
-                 mount="{frame: FLU, xyz_m: [0, 0, 0]}", trajectory="", more="", arguments=()):
+                 mount="{frame: FLU, xyz_m: [0, 0, 0]}", trajectory="", more="", control="", arguments=()):
         self.folder = tempfile.TemporaryDirectory()
         self.scene, self.profile, self.pose, self.mount = ROOT / "scenes" / scene, profile, pose, mount
         self.trajectory = f", trajectory: {trajectory}" if trajectory else ""
+        self.control = control  # more of that section: ", token_file: token"
         self.more, self.arguments = more, [str(a) for a in arguments]
 
     def __enter__(self):
@@ -64,7 +66,8 @@ class Sonard:
         self.address = free_address()
         config = pathlib.Path(self.folder.name) / "sonard.yaml"
         config.write_text(CONFIG.format(address=self.address, scene=self.scene, profile=self.profile, pose=self.pose,
-                                        mount=self.mount, trajectory=self.trajectory, more=self.more), encoding="utf-8")
+                                        mount=self.mount, trajectory=self.trajectory, more=self.more, control=self.control),
+                          encoding="utf-8")
         self.log_path = pathlib.Path(self.folder.name) / "log"
         with open(self.log_path, "wb") as log:
             self.process = subprocess.Popen([str(SONARD), "run", str(config), *self.arguments], stdin=subprocess.DEVNULL,

@@ -35,6 +35,7 @@ sonars:
     bind_ip: $1
     status_to: [$1]
 poses: {protobuf: "$1:14770", json: "$1:14771"}
+control: {stream: "$1:14770", http: "$1:8088"}
 YAML
 }
 
