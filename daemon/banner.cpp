@@ -90,11 +90,11 @@ std::string summary(const App& app) {
   std::string text;
   for (const Device& d : app.devices()) {
     const DeviceFigures f = d.figures();
-    text +=
-        "sonar " + d.config().name +
-        format("  %llu pings, %llu served, %llu dropped, %llu skipped of %llu ticks, %llu clients", static_cast<unsigned long long>(f.pings),
-               static_cast<unsigned long long>(f.served), static_cast<unsigned long long>(f.dropped),
-               static_cast<unsigned long long>(f.skipped_ticks), static_cast<unsigned long long>(f.ticks), static_cast<unsigned long long>(f.clients));
+    text += "sonar " + d.config().name +
+            format("  %llu pings, %llu served, %llu dropped, %llu skipped of %llu ticks, %llu clients",
+                   static_cast<unsigned long long>(f.pings), static_cast<unsigned long long>(f.served),
+                   static_cast<unsigned long long>(f.dropped), static_cast<unsigned long long>(f.skipped_ticks),
+                   static_cast<unsigned long long>(f.ticks), static_cast<unsigned long long>(f.clients));
     if (f.pings > 0) text += format(", %.1f ms a ping", 1e3 * f.simulation_s / static_cast<double>(f.pings));
     text += "\n";
   }
