@@ -37,7 +37,7 @@ class FakeOperations final : public Operations {
   std::string metrics() const override { return "# TYPE sonard_up gauge\nsonard_up 1\n"; }
   std::string trouble() const override { return in_trouble ? "the engine hangs" : ""; }
 
-  std::atomic<int> asked{0};          // from any thread
+  std::atomic<int> asked{0};            // from any thread
   std::atomic<bool> in_trouble{false};  // likewise
   std::vector<Done> later;
   Sender last_sender;
@@ -45,7 +45,8 @@ class FakeOperations final : public Operations {
 
 class ControlBench {
  public:
-  explicit ControlBench(ControlConfig wanted = {}, LimitConfig wanted_limits = {}) : config(std::move(wanted)), limits(wanted_limits) {
+  explicit ControlBench(ControlConfig wanted = {}, LimitConfig wanted_limits = {})
+      : config(std::move(wanted)), limits(wanted_limits) {
     const Ipv4 ip = *parse_ipv4(address);
     config.stream.at = config.http.at = {ip, 0};
     LogOptions options;

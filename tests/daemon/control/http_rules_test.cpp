@@ -30,8 +30,8 @@ TEST(HttpRules, HostsWeMayBeCalled) {
                            "SONAR.example.org:80", "10.1.2.3"})
     EXPECT_TRUE(host_allowed(good, reached, names)) << good;
   for (const char* bad : {"", ":80", "evil.example", "localhost.evil.example", "127.0.0.1.evil.example", "192.168.1.7", "[::1]",
-                          "localhost:", "localhost:80a", "localhost:123456", "127.0.0.1:80:80", "localhost@evil.example", "0.0.0.0",
-                          "sonar-lab.", "127.1"})
+                          "localhost:", "localhost:80a", "localhost:123456", "127.0.0.1:80:80", "localhost@evil.example",
+                          "0.0.0.0", "sonar-lab.", "127.1"})
     EXPECT_FALSE(host_allowed(bad, reached, names)) << bad;
   EXPECT_TRUE(host_allowed("192.168.1.7:8088", {192, 168, 1, 7}, {})) << "the address we were reached at";
 }
@@ -47,10 +47,12 @@ TEST(HttpRules, OriginsThatMayAsk) {
 TEST(HttpRules, TokensAndTypes) {
   EXPECT_EQ(bearer_token("Bearer abc"), "abc");
   EXPECT_EQ(bearer_token("bearer   abc"), "abc");
-  for (const char* none : {"", "Bearer", "Bearer ", "Bearer   ", "Basic abc", "Bearerabc"}) EXPECT_EQ(bearer_token(none), "") << none;
+  for (const char* none : {"", "Bearer", "Bearer ", "Bearer   ", "Basic abc", "Bearerabc"})
+    EXPECT_EQ(bearer_token(none), "") << none;
   for (const char* good : {"application/json", "Application/JSON; charset=utf-8", "application/json ;x"})
     EXPECT_TRUE(is_json(good)) << good;
-  for (const char* bad : {"", "text/plain", "application/jsonp", "application/x-www-form-urlencoded", "text/plain; application/json"})
+  for (const char* bad :
+       {"", "text/plain", "application/jsonp", "application/x-www-form-urlencoded", "text/plain; application/json"})
     EXPECT_FALSE(is_json(bad)) << bad;
 }
 

@@ -20,8 +20,7 @@ struct HttpClient {
 
   void send(const std::string& method, const std::string& target, const std::string& body = "", const std::string& more = "") {
     std::string text = method + " " + target + " HTTP/1.1\r\nHost: " + host + "\r\n" + more;
-    if (method == "POST")
-      text += "Content-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) + "\r\n";
+    if (method == "POST") text += "Content-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) + "\r\n";
     tcp.send(text + "\r\n" + body);
   }
   bool more(milliseconds timeout = patience) {
