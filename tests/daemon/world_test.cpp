@@ -228,7 +228,10 @@ TEST(World, PosesGoStaleOnceAndComeBack) {
   EXPECT_TRUE(w.newly_stale(t0 + milliseconds(1000)).empty());
   EXPECT_FALSE(w.is_stale(0, t0 + milliseconds(1000)));
   EXPECT_TRUE(w.is_stale(0, t0 + milliseconds(1001)));
-  EXPECT_EQ(w.newly_stale(t0 + milliseconds(1500)).size(), 1u);
+  const auto stale = w.newly_stale(t0 + milliseconds(1500));
+  ASSERT_EQ(stale.size(), 1u);
+  EXPECT_EQ(stale[0].vehicle, "rov");
+  EXPECT_THAT(stale[0].sentence, HasSubstr("no pose for rov"));
   EXPECT_TRUE(w.newly_stale(t0 + milliseconds(1600)).empty()) << "said once";
   EXPECT_EQ(w.vehicle_at(0, t0 + seconds(60)).position_m.x, 4) << "held";
   EXPECT_THAT(w.accept(at_x(4, 2), udp, t0 + seconds(2)).notice, HasSubstr("are back"));
@@ -287,6 +290,42 @@ TEST(World, AVehicleMovesByItsPosesAndNotByAJump) {
   EXPECT_EQ(length(w.vehicle_moves(0, t0 + seconds(2)).velocity_mps), 0) << "held";
   w.accept(stamped(20, ClockDomain::wall, (t0 + milliseconds(200)).time_since_epoch(), 3), udp, t0 + milliseconds(200));
   EXPECT_EQ(length(w.vehicle_moves(0, t0 + milliseconds(210)).velocity_mps), 0) << "198 m/s is no movement";
+}
+
+TEST(World, VehiclesOfAnotherConfigurationKeepTheirPosesByName) {
+  World w = one_rov();
+  w.accept(at_x(7), json, t0);
+  w.use_vehicles({{"buoy", {{1, 1, 0}, {}}, false}, {"rov", {{0, 0, -9}, {}}, true}});
+  EXPECT_EQ(w.vehicle_at(0, t0).position_m.x, 1);
+  EXPECT_EQ(w.source_of(0), "initial pose");
+  EXPECT_EQ(w.vehicle_at(1, t0).position_m.x, 7) << "where its sender put it";
+  EXPECT_EQ(w.source_of(1), "json 127.0.0.1");
+  PoseSample next = at_x(8);
+  next.name = "rov";
+  EXPECT_TRUE(w.accept(next, json, t0 + milliseconds(100)).notice.empty()) << "and its sender goes on";
+}
+
+TEST(World, AVehicleWithoutPosesFollowsTheConfiguration) {
+  World w = one_rov();
+  w.use_vehicles({{"rov", {{0, -8, -2}, {}}, true}});
+  EXPECT_EQ(w.source_of(0), "demo orbit");
+  EXPECT_NEAR(w.vehicle_at(0, t0).position_m.y, -8, 1e-9);
+}
+
+TEST(World, ObjectsOfAnotherSceneKeepTheirPosesAndStayHidden) {
+  World w(PoseRules{}, {{"rov", {}, false}}, {{"crate", {{5, 0, 0}, {}}, false}, {"whale", {}, false}}, t0);
+  PoseSample s = at_x(3);
+  s.of = PoseSample::Of::object;
+  s.name = "crate";
+  w.accept(s, json, t0);
+  w.hide(0, true);
+  w.use_objects({{"seal", {{2, 0, 0}, {}}, false}, {"crate", {{9, 0, 0}, {}}, false}});
+  EXPECT_EQ(w.objects_at(t0).size(), 2u);
+  EXPECT_EQ(w.object_at(0, t0).position_m.x, 2);
+  EXPECT_TRUE(w.is_hidden(1));
+  EXPECT_GT(w.object_at(1, t0).position_m.z, 1000) << "hidden is far away";
+  w.hide(1, false);
+  EXPECT_EQ(w.object_at(1, t0).position_m.x, 3);
 }
 
 }  // namespace
