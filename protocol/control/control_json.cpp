@@ -58,14 +58,20 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
   std::vector<std::set<std::string>> keys_;  // of each open object
 };
 
-/// protobuf's own words: "(sonar.rang): Cannot find field." or "rang: Cannot find field."
+/// protobuf's own words: "(mount.xyz_m): Cannot find field." or "(range_m.value): invalid value \"far\" for type TYPE_DOUBLE",
+/// sometimes with a word in front, sometimes without brackets, and then several lines that show the place.
 std::string sentence_from(const std::string& words) {
-  constexpr std::string_view unknown = ": Cannot find field.";
-  const auto at = words.find(unknown);
-  if (at == std::string::npos) return words.substr(0, words.find('\n'));  // what follows shows the place, over several lines
-  std::string key = words.substr(0, at);
+  std::string what = words.substr(0, words.find('\n'));
+  const auto colon = what.find(": ");
+  if (colon == std::string::npos) return what;
+  std::string key = what.substr(0, colon);
+  what.erase(0, colon + 2);
   if (const auto space = key.rfind(' '); space != std::string::npos) key.erase(0, space + 1);
-  return in_quotes(key) + ": unknown key";
+  if (key.starts_with('(') && key.ends_with(')')) key = key.substr(1, key.size() - 2);
+  if (key.ends_with(".value")) key.resize(key.size() - 6);  // of wrappers such as DoubleValue
+  if (what == "Cannot find field.") what = "unknown key";
+  if (const auto type = what.find(" for type TYPE_"); type != std::string::npos) what.resize(type);
+  return in_quotes(key) + ": " + what;
 }
 
 /// False when the message names another one.

@@ -56,7 +56,8 @@ TEST(ControlJson, ReadsEveryRequestLikeItsBytes) {
 TEST(ControlJson, RefusesWithASentence) {
   EXPECT_THAT(refusal_of("sonar", R"({"rang_m":5})"), HasSubstr("\"rang_m\": unknown key"));
   EXPECT_THAT(refusal_of("sonar", R"({"mount":{"frame":"FRD","xyz_m":[0,0,0]}})"), HasSubstr("xyz_m"));
-  EXPECT_THAT(refusal_of("sonar", R"({"range_m":"far"})"), HasSubstr("far"));
+  EXPECT_EQ(refusal_of("sonar", R"({"range_m":"far"})"), R"("range_m": invalid value "far")");
+  EXPECT_THAT(refusal_of("sonar", R"({"mount":{"position":{"x":"far"}}})"), HasSubstr("position.x\": invalid value"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":"NaN"})"), HasSubstr("sonar.range_m is NaN"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":1e999})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"mode":-1})"), HasSubstr("-1"));
