@@ -28,11 +28,19 @@ class Help(unittest.TestCase):
                 result = run(*command, "--help")
                 self.assertEqual(result.returncode, 0, result.stderr)
                 self.assertIn("Usage", result.stdout)
-        for command in ["listen", "view", "stats", "pose"]:
-            self.assertIn("examples:", run(SONARCTL, command, "--help").stdout)
+
+    def test_every_command_of_sonarctl_gives_examples(self):
+        commands = run(SONARCTL, "--help").stdout.split("Subcommands:\n")[1].split("\n\n")[0]
+        names = [line.split()[0] for line in commands.splitlines() if line.startswith("  ") and line[2] != " "]
+        for name in ["doctor", "status", "listen", "view", "stats", "pose", "events", "set", "load", "object"]:
+            self.assertIn(name, names)
+        for words in [[], *([name] for name in names), ["set", "sonar"], ["set", "water"], ["object", "add"]]:
+            with self.subTest(words=words):
+                self.assertIn("examples:", run(SONARCTL, *words, "--help").stdout)
 
     def test_version(self):
         self.assertRegex(run(SONARD, "--version").stdout, r"^sonard \d+\.\d+\.\d+")
+        self.assertEqual(run(SONARCTL, "--version").stdout.split()[1], run(SONARD, "--version").stdout.split()[1])
 
 
 class Mistakes(unittest.TestCase):
@@ -43,7 +51,10 @@ class Mistakes(unittest.TestCase):
 
     def test_usage_is_64(self):
         self.expect(run(SONARD, "--no-such-option"), 64, "--no-such-option")
-        self.expect(run(SONARCTL), 64)
+        self.expect(run(SONARCTL), 64, "doctor, status, listen, view")
+        self.expect(run(SONARCTL, "veiw"), 64, 'unknown command "veiw"; did you mean "view"?')
+        self.expect(run(SONARCTL, "pose"), 64, "once, circle, line")
+        self.expect(run(SONARCTL, "pose", "once", "--xzy", "0,0,0"), 64, 'did you mean "--xyz"?', "sonarctl pose once --help")
         self.expect(run(SONARCTL, "listen", "--rate", "7"), 64, "--rate")
         self.expect(run(SONARCTL, "view", "--png", "x.png", "--from-raw", "y", "--colour-map", "pink"), 64, "gray, copper")
         self.expect(run(SONARCTL, "listen", "127.0.0.1:port"), 64, "127.0.0.1:port", "HOST:PORT")

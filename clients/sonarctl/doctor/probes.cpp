@@ -1,6 +1,7 @@
 #include "clients/sonarctl/doctor/probes.hpp"
 
 #include <arpa/inet.h>
+#include <ifaddrs.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -90,9 +91,19 @@ Result<std::string> ipv4_of(const std::string& host) {
 }
 
 bool is_on_this_host(const std::string& ipv4) {
-  const auto address = address_of({ipv4, 0});
-  const Socket socket = udp_socket();
-  return address && socket.fd() >= 0 && ::bind(socket.fd(), generic(*address), sizeof *address) == 0;
+  if (ipv4.starts_with("127.")) return true;
+  const auto asked = address_of({ipv4, 0});
+  ifaddrs* interfaces = nullptr;
+  if (!asked || ::getifaddrs(&interfaces) != 0) return false;
+  bool found = false;
+  for (const ifaddrs* i = interfaces; i != nullptr && !found; i = i->ifa_next) {
+    if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET) continue;
+    sockaddr_in address{};
+    std::memcpy(&address, i->ifa_addr, sizeof address);
+    found = address.sin_addr.s_addr == asked->sin_addr.s_addr;
+  }
+  ::freeifaddrs(interfaces);
+  return found;
 }
 
 StatusListener::StatusListener(const Endpoint& on) {

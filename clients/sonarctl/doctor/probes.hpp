@@ -15,7 +15,7 @@ std::chrono::milliseconds left_until(Steady::time_point deadline);
 
 /// "127.0.0.2" of a name, or a sentence.
 Result<std::string> ipv4_of(const std::string& host);
-/// Can be bound: all of 127.0.0.0/8, and the addresses of the interfaces.
+/// All of 127.0.0.0/8, and the addresses of the interfaces.
 bool is_on_this_host(const std::string& ipv4);
 
 /// Listens for status messages and sorts them; they may come while other questions are asked.

@@ -1,0 +1,107 @@
+"""sonarctl doctor beside a daemon that is well, none at all, one that is busy, and ports that others have."""
+import json
+import os
+import socket
+import subprocess
+import time
+import unittest
+
+from running_sonard import SONARCTL, Sonard, free_address, run
+
+PATIENT = ("--within", "40")  # the machine may be busy; a healthy one takes 3 s
+
+
+def doctor(address, *arguments, control_port=14770):
+    """Exit code and findings by check; whatever else runs on this machine is not looked at."""
+    result = run(SONARCTL, "doctor", address, "--json", "--status-on", address, "--control",
+                 f"{address}:{control_port}", "--http", f"{address}:8088", *arguments)
+    found = json.loads(result.stdout)
+    by_check = {}
+    for finding in found["findings"]:
+        by_check.setdefault(finding["check"], []).append(finding)
+    return result.returncode, by_check, found
+
+
+class Doctor(unittest.TestCase):
+    def expect(self, findings, check, level, *words):
+        self.assertIn(check, findings, findings)
+        finding = findings[check][0]
+        self.assertEqual(finding["level"], level, findings)
+        for word in words:
+            self.assertIn(word, finding["text"] + "; " + finding["cure"])
+
+    def test_a_healthy_daemon_passes(self):
+        with Sonard() as daemon:
+            code, findings, found = doctor(daemon.address, *PATIENT)
+            self.expect(findings, "status", "ok", f"received back on udp 52102 from {daemon.address}")
+            self.expect(findings, "ping", "ok", "accepts, first ping decoded after", "512 beams", "8 bit, size fields consistent")
+            self.assertIn(findings["rate"][0]["level"], ("ok", "warn"))  # a busy machine is slow
+            self.assertIn("(asked 10)", findings["rate"][0]["text"])
+            self.expect(findings, "control", "ok", "sonard", "1 sonar")
+            self.expect(findings, "engine", "ok", "trace backend")
+            self.expect(findings, "poses", "ok", "rov")
+            self.expect(findings, "http", "ok", "healthz")
+            self.assertIn("ports", findings)
+            self.assertEqual(found["errors"], 0)
+            self.assertEqual(found["checks"], len(found["findings"]))
+            self.assertEqual(code, 0)
+            text = run(SONARCTL, "doctor", daemon.address, "--status-on", daemon.address, "--control", f"{daemon.address}:14770",
+                       "--http", f"{daemon.address}:8088", *PATIENT)
+            self.assertRegex(text.stdout, r"\n\d+ checks, 0 errors, \d+ warnings?\n$")
+
+    def test_nothing_running_says_what_to_do(self):
+        start = time.monotonic()
+        code, findings, _ = doctor(free_address())
+        self.expect(findings, "ping", "fail", "refuses the connection: nobody listens there")
+        self.expect(findings, "control", "fail", "no sonard answers on the control stream")
+        self.assertEqual(code, 69)
+        self.assertLess(time.monotonic() - start, 30)  # 4 s on a quiet machine
+
+    def test_a_port_that_another_program_has_is_said_to_be(self):
+        address = free_address()
+        with socket.create_server((address, 52100)) as stream, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as datagrams:
+            datagrams.bind((address, 52102))  # as a driver does that shares no ports
+            command = subprocess.Popen([str(SONARCTL), "doctor", address, "--json", "--status-on", address, "--control",
+                                        f"{address}:14770", "--http", f"{address}:8088"], stdout=subprocess.PIPE,
+                                       stderr=subprocess.DEVNULL, text=True)
+            stream.settimeout(30)
+            client, _ = stream.accept()
+            client.sendall(b"220 mail.example ESMTP ready, please go on\r\n" * 8)
+            output = command.communicate(timeout=60)[0]
+            client.close()
+        findings = {f["check"]: [f] for f in json.loads(output)["findings"]}
+        self.expect(findings, "ping", "fail", "no Oculus messages", f"pid {os.getpid()}")
+        self.expect(findings, "status", "warn", "cannot listen on udp 52102, held without address reuse by", f"pid {os.getpid()}")
+        self.assertEqual(command.returncode, 69)
+
+    def test_a_busy_sonar_is_left_alone(self):
+        with Sonard() as daemon, socket.create_connection((daemon.address, 52100), 10) as driver:
+            driver.settimeout(10)
+            self.assertTrue(driver.recv(16))  # served: dummies come
+            code, findings, _ = doctor(daemon.address, *PATIENT)
+            self.expect(findings, "ping", "ok", "is busy", f":{driver.getsockname()[1]}", "was left alone")
+            self.assertEqual(code, 0)
+            # The same without the control stream: the kernel and the status message know.
+            _, findings, _ = doctor(daemon.address, *PATIENT, control_port=1)
+            self.expect(findings, "ping", "ok", "is busy", "was left alone")
+            self.assertNotIn("turned away", daemon.log())
+            # Connected all the same: this sonar has one place, and the driver keeps it.
+            _, findings, _ = doctor(daemon.address, "--take", *PATIENT)
+            self.expect(findings, "ping", "warn", "closed the connection without a byte", "clients.max")
+            self.assertTrue(driver.recv(16))
+
+    def test_an_address_of_nowhere_is_explained(self):
+        alone = ["unshare", "--user", "--map-root-user", "--net"]  # a network of its own: no packet gets out
+        try:
+            subprocess.run([*alone, "true"], check=True, capture_output=True, timeout=30)
+        except (OSError, subprocess.SubprocessError):
+            self.skipTest("no network namespaces for this user (unshare --user --net)")
+        result = run(*alone, SONARCTL, "doctor", "192.0.2.7", "--status-on", "127.0.0.1")
+        self.assertEqual(result.returncode, 69, result.stdout)
+        self.assertIn("tcp 192.0.2.7:52100 does not answer", result.stdout)
+        self.assertIn("not on this host", result.stdout)
+        self.assertIn("ip addr add 192.0.2.7/24", result.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

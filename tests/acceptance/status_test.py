@@ -1,0 +1,111 @@
+"""sonarctl status, events, set, load and object beside a running daemon."""
+import json
+import pathlib
+import socket
+import subprocess
+import tempfile
+import time
+import unittest
+
+from running_sonard import ROOT, SONARCTL, Sonard, free_address, run
+
+
+class Steering(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Sonard().__enter__()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.daemon.__exit__()
+
+    def ctl(self, *words):
+        return run(SONARCTL, *words, "--control", f"{self.daemon.address}:14770")
+
+    def does(self, *words):
+        result = self.ctl(*words)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def status(self):
+        return json.loads(self.does("status", "--json"))
+
+    def refuses(self, code, words, *expected):
+        result = self.ctl(*words)
+        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        for word in expected:
+            self.assertIn(word, result.stderr)
+
+    def test_status_for_people_and_programs(self):
+        text = self.does("status")
+        for word in ["sonard ", "scene ", "sonar     front", f"{self.daemon.address}:52100", "vehicle   rov", "poses "]:
+            self.assertIn(word, text)
+        status = self.status()
+        self.assertEqual(status["sonars"][0]["name"], "front")
+        self.assertEqual(status["vehicles"][0]["name"], "rov")
+
+    def test_events_come_as_they_happen(self):
+        events = subprocess.Popen([str(SONARCTL), "events", "--clients", "--count", "1", "--seconds", "60", "--json", "--control",
+                                   f"{self.daemon.address}:14770"], stdout=subprocess.PIPE, text=True)
+        deadline = time.monotonic() + 30
+        while events.poll() is None and time.monotonic() < deadline:  # until it has subscribed and a visit is seen
+            with socket.create_connection((self.daemon.address, 52100), 10):
+                time.sleep(0.2)
+        output = events.communicate(timeout=60)[0]
+        self.assertEqual(json.loads(output.splitlines()[0])["client"]["sonar"], "front")
+
+    def test_sonar_and_water_are_set(self):
+        self.does("set", "sonar", "--range", "5")
+        self.does("set", "water", "--temperature", "8", "--salinity", "34")
+        status = self.status()
+        self.assertAlmostEqual(status["sonars"][0]["range_m"], 5, delta=0.5)
+        self.assertEqual(status["environment"]["temperature_c"], 8)
+        self.refuses(64, ("set", "sonar"), "say what to set")
+        self.refuses(64, ("set", "water"), "say what to set")
+        self.refuses(65, ("set", "sonar", "stern", "--range", "5"), "stern")
+
+    def test_objects_come_go_and_move(self):
+        name = self.status()["objects"][0]["name"]
+        self.does("object", "add", "twin", "--like", name, "--xyz", "1,2,-3")
+        self.assertIn("twin", self.does("object", "list"))
+        self.does("object", "place", "twin", "--xyz", "3,4,5", "--frame", "ned")
+        self.does("object", "hide", "twin")
+        twin = next(o for o in self.status()["objects"] if o["name"] == "twin")
+        self.assertFalse(twin["visible"])
+        self.assertEqual([round(twin["position"][k], 6) for k in "xyz"], [4, 3, -5])
+        self.does("object", "show", "twin")
+        self.does("object", "remove", "twin")
+        self.assertNotIn("twin", self.does("object", "list"))
+        self.refuses(65, ("object", "hide", "twin"), "twin")
+
+    def test_another_scene_is_loaded(self):
+        self.does("load", ROOT / "scenes/tank-rod.yaml")
+        self.assertIn("tank", json.dumps(self.status()["scene"]))
+        self.refuses(65, ("load", "no-such-scene.yaml"), "no-such-scene.yaml")
+        self.does("load", ROOT / "scenes/demo.yaml")
+
+    def test_nobody_there_is_69(self):
+        result = run(SONARCTL, "status", "--control", f"{free_address()}:14770")
+        self.assertEqual(result.returncode, 69)
+        self.assertIn("no sonard answers on the control stream", result.stderr)
+
+
+class Secrets(unittest.TestCase):
+    def test_a_token_opens(self):
+        with tempfile.TemporaryDirectory() as folder:
+            token = pathlib.Path(folder) / "token"
+            token.write_text("0123456789abcdef01234567\n", encoding="utf-8")
+            token.chmod(0o600)
+            with Sonard(control=f', token_file: "{token}"') as daemon:
+                control = ("--control", f"{daemon.address}:14770")
+                refused = run(SONARCTL, "status", *control)
+                self.assertNotEqual(refused.returncode, 0)
+                self.assertIn("token", refused.stderr)
+                opened = run(SONARCTL, "status", *control, "--token-file", token)
+                self.assertEqual(opened.returncode, 0, opened.stderr)
+                self.assertEqual(run(SONARCTL, "status", *control, "--token-file", "none").returncode, 66)
+
+
+if __name__ == "__main__":
+    unittest.main()

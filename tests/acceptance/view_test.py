@@ -1,0 +1,86 @@
+"""sonarctl view in the terminal and live: letters for pipes, colours for terminals, and the terminal given back."""
+import os
+import pathlib
+import pty
+import select
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+from running_sonard import SONARCTL, Sonard
+
+
+def in_a_terminal(command, until, end, **environment):
+    """Output of a command on a terminal of its own; `end(process)` is called when `until` was seen."""
+    master, slave = pty.openpty()
+    variables = {**os.environ, "TERM": "xterm-256color", "LC_ALL": "C.UTF-8", "COLUMNS": "60", "LINES": "24", **environment}
+    variables.pop("NO_COLOR", None)
+    process = subprocess.Popen([str(c) for c in command], stdin=slave, stdout=slave, stderr=slave, env=variables)
+    os.close(slave)
+    output, ended, deadline = b"", False, time.monotonic() + 60
+    while time.monotonic() < deadline:
+        if not select.select([master], [], [], 0.2)[0]:
+            continue
+        try:
+            data = os.read(master, 65536)
+        except OSError:  # the other side is closed
+            break
+        output += data
+        if not data:
+            break
+        if not ended and until in output:
+            end(process)
+            ended = True
+    os.close(master)
+    return process.wait(20), output.decode(errors="replace")
+
+
+class View(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Sonard().__enter__()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.daemon.__exit__()
+
+    def test_a_pipe_gets_letters(self):
+        result = self.daemon.ctl("view", "--term")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertNotIn("\x1b", result.stdout)
+        self.assertTrue(result.stdout.isascii())
+        self.assertIn(" 9 m\n", result.stdout)
+        lines = result.stdout.splitlines()
+        self.assertGreater(len(lines), 8)
+        self.assertRegex(lines[-1], r"^ping \d+  \d+\.\d\d m  2\.\d+ MHz  512 beams x \d+ rows$")
+
+    def test_a_terminal_gets_colours_and_is_given_back(self):
+        code, output = in_a_terminal([SONARCTL, "view", self.daemon.address, "--term", "--live"], b" Hz  ",
+                                     lambda process: process.send_signal(signal.SIGINT))
+        self.assertEqual(code, 0, output[-500:])
+        self.assertTrue(output.startswith("\x1b[?1049h\x1b[?25l"))
+        self.assertTrue(output.endswith("\x1b[?25h\x1b[?1049l"), repr(output[-100:]))
+        self.assertIn("\u2580", output)
+        self.assertIn("38;5;", output)
+
+    def test_a_file_is_kept_up_to_date(self):
+        with tempfile.TemporaryDirectory() as folder:
+            png = pathlib.Path(folder) / "ping.png"
+            result = self.daemon.ctl("view", "--png", png, "--live", "--pings", "3", "--width", "200")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(len(result.stdout.splitlines()), 3)
+            self.assertEqual(png.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+            self.assertEqual([p.name for p in pathlib.Path(folder).iterdir()], ["ping.png"])  # nothing unfinished lies about
+
+    def test_contradictions_are_named(self):
+        for arguments, word in [((), "--term"), (("--term", "--live", "--from-raw", "x"), "--ping"),
+                                (("--term", "--pings", "3"), "--live")]:
+            result = self.daemon.ctl("view", *arguments)
+            self.assertEqual(result.returncode, 64)
+            self.assertIn(word, result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
