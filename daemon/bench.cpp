@@ -214,9 +214,9 @@ int run_bench(int argc, char** argv) {
   BenchOptions options;
   CLI::App cli{
       "Times whole pings, stage by stage, warm: the cells of the scene are made already. The first ping, which makes them, is\n"
-      "the figure \"cold\" of every case; it has no case of its own.\nExample: sonard bench --case P1 --case P3d --threads 1 "
-      "--threads 2 --json out.json",
+      "the figure \"cold\" of every case; it has no case of its own.",
       "sonard bench"};
+  cli.footer("examples:\n  sonard bench --case P1 --case P3d --threads 1 --threads 2 --json out.json");
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   cli.add_option("--case", options.cases, "case to run (may repeat; default all)")->check(one_of(names_of(bench_cases())));
   cli.add_option("--scene", options.scenes, "scene to run it over (may repeat; default all)")

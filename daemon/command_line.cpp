@@ -115,16 +115,25 @@ Command parse_command_line(int argc, char** argv) {
   if (bare) {
     add_run_options(app, run);
     app.footer(
+        "examples:\n"
+        "  sonard                           the configuration found in the usual places, else the demo\n"
+        "  sonard my.yaml --log-level debug\n"
         "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, bench; each has --help.\n"
         "Oculus sonars are wire-compatible. BlueView sonars are compatible with the vendor's SDK by libraries of our own, not on "
         "the wire. Not affiliated with either vendor.");
   } else {
     app.require_subcommand(1);
-    add_run_options(*app.add_subcommand("run", "serve the sonars of a configuration"), run);
-    app.add_subcommand("check", "validate a configuration and its scene, then exit")
-        ->add_option("config", check.config, "configuration file")
-        ->required();
-    add_render_options(*app.add_subcommand("render", "render pings into files, or check what they should hold"), render);
+    CLI::App& run_app = *app.add_subcommand("run", "serve the sonars of a configuration");
+    run_app.footer("examples:\n  sonard run my.yaml\n  sonard run --demo --clock stepped --exit-after-pings 20 --digest");
+    add_run_options(run_app, run);
+    CLI::App& check_app = *app.add_subcommand("check", "validate a configuration and its scene, then exit");
+    check_app.footer("examples:\n  sonard check my.yaml");
+    check_app.add_option("config", check.config, "configuration file")->required();
+    CLI::App& render_app = *app.add_subcommand("render", "render pings into files, or check what they should hold");
+    render_app.footer(
+        "examples:\n  sonard render my.yaml --out pings --pings 5 --format npy,png\n  sonard render my.yaml "
+        "--check-expectations");
+    add_render_options(render_app, render);
   }
   if (const std::string wrong = bare && argc > 1 ? unknown_command(argv[1]) : ""; !wrong.empty()) {
     std::fprintf(stderr, "%s; see sonard --help\n", wrong.c_str());

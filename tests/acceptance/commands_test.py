@@ -29,6 +29,10 @@ class Help(unittest.TestCase):
                 self.assertEqual(result.returncode, 0, result.stderr)
                 self.assertIn("Usage", result.stdout)
 
+    def test_every_command_of_sonard_gives_examples(self):
+        for words in [[], ["run"], ["check"], ["render"], ["bench"]]:
+            self.assertIn("examples:", run(SONARD, *words, "--help").stdout)
+
     def test_every_command_of_sonarctl_gives_examples(self):
         commands = run(SONARCTL, "--help").stdout.split("Subcommands:\n")[1].split("\n\n")[0]
         names = [line.split()[0] for line in commands.splitlines() if line.startswith("  ") and line[2] != " "]
