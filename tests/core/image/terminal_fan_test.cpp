@@ -48,7 +48,9 @@ TEST(TerminalFan, LeavesTheTerminalsColoursAsTheyWere) {
     ASSERT_TRUE(lines);
     for (const std::string& line : *lines) {
       const std::size_t last = line.rfind("\x1b[");
-      if (last != std::string::npos) EXPECT_EQ(line.substr(last, 4), "\x1b[0m") << line;
+      if (last != std::string::npos) {
+        EXPECT_EQ(line.substr(last, 4), "\x1b[0m") << line;
+      }
       EXPECT_THAT(line, Not(HasSubstr("\n")));
     }
   }
