@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs the tests. usage: ./test.sh [--long] [ctest arguments...]
-#   --long   afterwards full fuzzing and all sanitizers (tests/tools/long_checks.sh), hours: before a release
+#   --long   afterwards the loads, full fuzzing and all sanitizers (tests/tools/long_checks.sh), hours: before a release;
+#            docs/reliability.md is written anew
 # Tests that read recordings of real devices take their folder from SONARD_CAPTURES and are skipped without it.
 set -u -o pipefail
 cd "$(dirname "$0")" || exit 70
@@ -9,7 +10,7 @@ cd "$(dirname "$0")" || exit 70
 
 long=
 case "${1:-}" in
-  -h | --help) sed -n '2,4s/^# //p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,5s/^# //p' "$0"; exit 0 ;;
   --long) long=1; shift ;;
 esac
 
@@ -29,6 +30,7 @@ python3 tests/oracles/oracle_table.py build/release/oracles "${partial[@]}" || [
 if [ -n "$long" ]; then
   before_long=$status
   tests/tools/long_checks.sh || status=1
+  python3 tests/reliability/reliability_table.py "$SONARD_RELIABILITY" >docs/reliability.md || status=1
   echo "tests: $([ "$before_long" -eq 0 ] && echo passed || echo "FAILED, see above")"
 fi
 exit $status

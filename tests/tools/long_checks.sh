@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# What takes too long for every run, and is run before a release: full fuzzing, the whole functional suite under the address and
-# undefined-behaviour sanitizers, and what has threads under the thread sanitizer. Run by ./test.sh --long, or alone; two to four
-# hours on two cores. Every step is run, also after one that failed; a table ends it. usage: tests/tools/long_checks.sh [STEP...]
+# What takes too long for every run, and is run before a release: the loads, full fuzzing, the whole functional suite under the
+# address and undefined-behaviour sanitizers, and what has threads under the thread sanitizer. Run by ./test.sh --long, or alone;
+# two to four hours on two cores. Every step is run, also after one that failed; a table ends it.
+# usage: tests/tools/long_checks.sh [STEP...]
 #   SONARD_FUZZ_RUNS, SONARD_FUZZ_SECONDS   see tests/tools/fuzz.sh
 #   SONARD_RELIABILITY                      where figures are kept (build/reliability)
 set -u -o pipefail
@@ -22,11 +23,12 @@ step() {  # step NAME COMMAND...: runs it, when wished, and remembers how it end
   rows+=("$(printf '%-10s %-7s %6d s   %s' "$name" "$told" $((SECONDS - before)) "$*")")
 }
 
+step load tests/load/load.sh
 step tsan tests/tools/sanitized_tests.sh tsan
 step asan tests/tools/sanitized_tests.sh asan-all
 step fuzz tests/tools/fuzz.sh
 
-[ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are tsan, asan, fuzz" >&2; exit 64; }
+[ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are load, tsan, asan, fuzz" >&2; exit 64; }
 say "long checks"
 printf '%s\n' "${rows[@]}"
 echo "figures: $SONARD_RELIABILITY"

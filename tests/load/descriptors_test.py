@@ -1,0 +1,108 @@
+"""Every file descriptor used up by visitors: a stream that runs goes on, newcomers get a FIN, the log says so once, and all is as
+before when they have gone. The shipped program, its limit lowered from outside; --quick does the same for a shorter time."""
+import pathlib
+import resource
+import select
+import socket
+import sys
+import threading
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests/acceptance"), str(ROOT / "tests/reliability")]
+from oculus_reader import RESULT_V1, Client, fire_message  # noqa: E402
+from record import record  # noqa: E402
+from running_sonard import Sonard  # noqa: E402
+
+QUICK = "--quick" in sys.argv
+LASTS_S = 2 if QUICK else 15
+PROFILE = "oculus-m1200d\n    clients: {max: 16, when_full: queue}"
+
+
+class Neighbour(threading.Thread):
+    """Reads pings until told to stop, and notices when one is missing."""
+
+    def __init__(self, client):
+        super().__init__()
+        self.client, self.pings, self.missing, self.last, self.running, self.fault = client, 0, 0, None, True, None
+
+    def run(self):
+        try:
+            while self.running:
+                kind, message = self.client.message()
+                if kind != 0x23:
+                    continue
+                number = RESULT_V1.unpack_from(message, 53)[0]
+                if self.last is not None:
+                    self.missing += number - self.last - 1
+                self.last = number
+                self.pings += 1
+        except Exception as fault:  # told by the test
+            self.fault = fault
+
+
+def visit(endpoint):
+    visitor = socket.socket()
+    visitor.settimeout(20)
+    visitor.connect(endpoint)
+    return visitor
+
+
+def is_sent_away(endpoint):
+    """A FIN and no byte."""
+    with visit(endpoint) as newcomer:
+        return newcomer.recv(1) == b""
+
+
+class Descriptors(unittest.TestCase):
+    def flood(self, spare, limit):
+        more = f"limits: {{spare_descriptors: {spare}, stall_s: 60}}"  # visitors read nothing, and stay
+        with Sonard(more=more, profile=PROFILE) as daemon, Client(daemon.address) as client:
+            client.send(fire_message(range_=3.0))
+            neighbour = Neighbour(client)
+            neighbour.start()
+            resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (limit, limit))
+            data, poses = (daemon.address, 52100), (daemon.address, 14771)
+            visitors = [visit(data) for _ in range(60)]
+            deadline = time.monotonic() + 20
+            while spare and "file descriptors" not in daemon.log():  # first the clients: they keep theirs
+                self.assertLess(time.monotonic(), deadline, daemon.log())
+                time.sleep(0.05)
+            visitors += [visit(poses) for _ in range(60)]
+            before, end = neighbour.pings, time.monotonic() + LASTS_S
+            sent_away = 0
+            while time.monotonic() < end or sent_away < 3:
+                self.assertTrue(is_sent_away(data))
+                sent_away += 1
+                time.sleep(0.05)
+            self.assertGreater(neighbour.pings, before, f"the stream stopped: {neighbour.fault}")
+            log = daemon.log()
+            self.assertEqual(log.count("file descriptors"), 1, log)
+            for visitor in visitors:
+                visitor.close()
+            neighbour.running = False
+            neighbour.join(20)
+            self.assertIsNone(neighbour.fault)
+            self.assertEqual(neighbour.missing, 0)
+            with Client(daemon.address) as later:  # a place, and a descriptor, is free again
+                readable, _, _ = select.select([later.socket], [], [], 20)
+                self.assertTrue(readable)
+                self.assertNotEqual(later.socket.recv(1), b"")
+            code, _ = daemon.stop()
+            self.assertEqual(code, 0, daemon.log())
+        return neighbour.pings, sent_away
+
+    def test_the_last_ones_are_kept_back(self):
+        pings, _ = self.flood(spare=24, limit=64)
+        self.assertGreater(pings, 0)
+
+    def test_even_when_none_are_left_at_all(self):
+        pings, sent_away = self.flood(spare=0, limit=64)
+        if not QUICK:
+            record("descriptors", f"0 of {pings}, {sent_away} newcomers sent away", "0", True,
+                   "SONARD_BUILD=build/release python3 tests/load/descriptors_test.py")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0]])

@@ -1,0 +1,68 @@
+// What the load tests share: how long they run, and how their figures are kept.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdarg>
+#include <cstdio>
+#include <string>
+
+#include "daemon/metrics.hpp"
+#include "tests/load/ping_reader.hpp"
+#include "tests/reliability/record.hpp"
+
+namespace sonar::load {
+
+/// A few seconds each, with the same assertions but those that only hold on a quiet machine; set by --quick.
+inline bool quick = false;
+inline constexpr std::chrono::seconds patience{20};  // for anything that must happen
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool memory_is_ours = false;  // the sanitizer keeps what was freed
+#else
+inline constexpr bool memory_is_ours = true;
+#endif
+
+inline std::string format(const char* text, ...) __attribute__((format(printf, 1, 2)));
+inline std::string format(const char* text, ...) {
+  char line[256];
+  va_list arguments;
+  va_start(arguments, text);
+  std::vsnprintf(line, sizeof line, text, arguments);
+  va_end(arguments);
+  return line;
+}
+
+/// Says it and, in the full length, keeps it for docs/reliability.md.
+inline void keep(const std::string& item, const std::string& figure, const std::string& bound, bool passed) {
+  const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+  std::printf("  %-18s %s (%s)\n", item.c_str(), figure.c_str(), bound.c_str());
+  std::fflush(stdout);
+  if (quick) return;
+  const std::string command = std::string("build/release/tests/load/load_test --gtest_filter=Load.") + test->name();
+  EXPECT_TRUE(test::record_reliability({item, figure, bound, passed, command}));
+}
+
+/// What must be true of every sonar when it has stopped, whatever its clients did.
+inline void expect_accounts_balance(const DeviceFigures& f) {
+  EXPECT_EQ(f.ticks, f.pings + f.skipped_ticks);
+  EXPECT_EQ(f.waiting, 0u);
+  EXPECT_EQ(f.offered, f.sent + f.dropped);
+  std::uint64_t by_reason = 0;
+  for (const std::uint64_t drops : f.dropped_by) by_reason += drops;
+  EXPECT_EQ(f.dropped, by_reason);
+  EXPECT_EQ(f.latency.count(), f.sent);
+}
+
+template <class Done>
+bool eventually(Done&& done, std::chrono::milliseconds within = patience) {
+  const auto deadline = Steady::now() + within;
+  while (!done()) {
+    if (Steady::now() > deadline) return false;
+    timespec pause{0, 5'000'000};
+    nanosleep(&pause, nullptr);
+  }
+  return true;
+}
+
+}  // namespace sonar::load

@@ -1,0 +1,36 @@
+// A whole daemon in a thread of this process, with pings made beforehand and as many sonars as asked for, each on an address of
+// its own. Its header knows nothing of Asio, so that the tests compile quickly.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/metrics.hpp"
+
+namespace sonar::load {
+
+struct LoadSetup {
+  int sonars = 1;
+  std::string sonar_lines;  // more keys of every sonar: "    clients: {max: 4}\n"
+  std::string more;         // more sections
+};
+
+class LoadDaemon {
+ public:
+  explicit LoadDaemon(const LoadSetup& setup);
+  ~LoadDaemon();
+  const std::string& address(std::size_t sonar = 0) const;
+  /// Where poses and control are taken: UDP 14770 and 14771, TCP 14770 (control stream), 14771 (JSON poses) and 8088 (HTTP).
+  const std::string& pose_address() const { return address(0); }
+  int stop();
+  /// After stop().
+  DeviceFigures figures(std::size_t sonar = 0) const;
+  std::string log_text() const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace sonar::load

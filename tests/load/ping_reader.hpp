@@ -1,0 +1,68 @@
+// Drivers without a driver: many sockets read by one thread, every ping compared with what was made for it.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace sonar::load {
+
+using Steady = std::chrono::steady_clock;
+
+/// A connected TCP socket that sends and is closed when it goes; -1 when nobody listens.
+class Socket {
+ public:
+  Socket(const std::string& address, std::uint16_t port, int receive_buffer = 0);
+  ~Socket() { close(); }
+  Socket(Socket&& o) noexcept : fd_(o.fd_) { o.fd_ = -1; }
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  Socket& operator=(Socket&&) = delete;
+
+  int fd() const { return fd_; }
+  /// False when the other end does not take it within the time.
+  bool send(const std::vector<std::byte>& bytes, std::chrono::milliseconds patience = std::chrono::seconds(20));
+  /// Waits for bytes; -1 after the time or an error, 0 at the end of the stream.
+  long receive(std::byte* into, std::size_t size, std::chrono::milliseconds patience);
+  void close();
+  void reset();          // RST instead of FIN
+  void die();            // as a computer that lost its power: nothing is taken or answered any more
+  void close_one_way();  // FIN, and the other direction stays open
+
+ private:
+  int fd_ = -1;
+};
+
+/// An unmodified driver's request: mode 2, 40 Hz, 2 m, 256 beams of 8 bit. `hz` 0 = standby, else the next rate that exists.
+std::vector<std::byte> fire(int hz = 40);
+
+/// Cuts a stream into messages in a buffer of fixed size and judges each.
+class PingReader {
+ public:
+  explicit PingReader(Socket socket) : socket_(std::move(socket)) {}
+  Socket& socket() { return socket_; }
+  /// Reads what is there. False when the stream has ended.
+  bool read_some();
+
+  std::uint64_t pings = 0, garbled = 0;  // garbled: content, order, or a message that is none
+  std::uint64_t ids_skipped = 0;         // between two pings of this stream
+  std::uint32_t last_id = 0;
+  bool ended = false, was_reset = false;
+  Steady::time_point last_at{};
+  std::chrono::duration<double> longest_gap{0};
+  bool cut() const { return filled_ > 0; }  // the stream ended within a message
+
+ private:
+  void take_message(std::size_t size);
+
+  Socket socket_;
+  std::vector<std::byte> buffer_ = std::vector<std::byte>(std::size_t{1} << 18);
+  std::size_t filled_ = 0;
+};
+
+/// Reads them all until `until`, or until all have ended.
+void read_all(std::vector<std::unique_ptr<PingReader>>& readers, Steady::time_point until);
+
+}  // namespace sonar::load
