@@ -82,9 +82,10 @@ class Gathering {
 
   void find_sonars(const Endpoint& given) {
     if (facts_.address_given) return add_sonar(given, "");
+    const std::string oculus_port = std::string(":").append(std::to_string(oculus::tcp_port));
     if (facts_.control.status)
       for (const control::SonarStatus& s : facts_.control.status->sonars)
-        if (s.listens.ends_with(":" + std::to_string(oculus::tcp_port))) add_sonar({s.advertised, oculus::tcp_port}, s.name);
+        if (s.listens.ends_with(oculus_port)) add_sonar({s.advertised, oculus::tcp_port}, s.name);
     if (facts_.sonars.empty()) {
       status_.listen("", no_later_than(start_ + first_status));
       for (const HeardStatus& heard : status_.facts().heard) add_sonar({heard.advertised, oculus::tcp_port}, "");

@@ -61,7 +61,7 @@ void judge_ports(const KernelPorts& ports, std::vector<Finding>& findings) {
   std::string exposed;
   for (const int port : {52100, 52102})
     if (port >= ports.low && port <= ports.high && !reserves(ports.reserved, port))
-      exposed += (exposed.empty() ? "" : ",") + std::to_string(port);
+      exposed.append(exposed.empty() ? "" : ",").append(std::to_string(port));
   if (exposed.empty()) {
     const bool outside = ports.high < 52100 || ports.low > 52102;
     findings.push_back({Level::ok, "ports",
