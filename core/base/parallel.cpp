@@ -2,8 +2,10 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <unistd.h>
@@ -23,10 +25,19 @@ struct Parallel::Pool {
   void* body = nullptr;
   Call call = nullptr;
 
+  std::exception_ptr fault;  // the first of a round
+
+  /// In a worker an exception would end the whole program: out of memory in one ping must cost that ping only.
   void take_items(int worker) {
-    for (std::size_t i = next.fetch_add(1, std::memory_order_relaxed); i < count;
-         i = next.fetch_add(1, std::memory_order_relaxed))
-      call(body, i, worker);
+    try {
+      for (std::size_t i = next.fetch_add(1, std::memory_order_relaxed); i < count;
+           i = next.fetch_add(1, std::memory_order_relaxed))
+        call(body, i, worker);
+    } catch (...) {
+      next.store(count, std::memory_order_relaxed);  // no more items for the others
+      std::lock_guard lock(mutex);
+      if (!fault) fault = std::current_exception();
+    }
   }
 
   void work(int worker, int nice_by) {
@@ -86,6 +97,7 @@ void Parallel::run(std::size_t count, void* body, Call call) {
   p.take_items(0);
   std::unique_lock lock(p.mutex);
   p.finished.wait(lock, [&] { return p.busy == 0; });
+  if (p.fault) std::rethrow_exception(std::exchange(p.fault, nullptr));
 }
 
 }  // namespace sonar

@@ -18,7 +18,7 @@ class Parallel {
   int threads() const { return threads_; }
 
   /// Calls body(item, worker) once for every item in [0, count) and returns when all are done; worker is in [0, threads()).
-  /// One caller at a time. The body must not throw.
+  /// One caller at a time. What a body throws ends the loop: the first exception is thrown on when every worker has stopped.
   template <class Body>
   void for_each(std::size_t count, Body&& body) {
     using Plain = std::remove_reference_t<Body>;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <new>
 #include <vector>
 
 namespace sonar {
@@ -45,6 +46,28 @@ TEST_P(ParallelPool, ManySmallRounds) {
     pool.for_each(sum.size(), [&](std::size_t item, int) { ++sum[item]; });
   }
   for (const int n : sum) EXPECT_EQ(n, 500);  // for_each returns only when all items are done and visible
+}
+
+TEST_P(ParallelPool, AnExceptionEndsTheLoopAndReachesTheCaller) {
+  Parallel pool(GetParam());
+  for (int round = 0; round < 50; ++round) {
+    std::atomic<int> inside = 0;
+    const auto all = [&] {
+      pool.for_each(1000, [&](std::size_t item, int) {
+        ++inside;
+        if (item % 100 == 7) {
+          --inside;
+          throw std::bad_alloc();
+        }
+        --inside;
+      });
+    };
+    EXPECT_THROW(all(), std::bad_alloc);
+    EXPECT_EQ(inside, 0) << "no worker is left in the loop";
+    std::atomic<int> seen = 0;
+    pool.for_each(100, [&](std::size_t, int) { ++seen; });
+    EXPECT_EQ(seen, 100) << "and the next loop is whole";
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, ParallelPool, testing::Values(1, 2, 4), testing::PrintToStringParamName());
