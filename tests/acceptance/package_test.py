@@ -15,7 +15,7 @@ WANTED = {
     "sonard": ["usr/bin/sonard", "usr/bin/sonarctl", "usr/lib/systemd/system/sonard.service", "usr/share/man/man8/sonard.8.gz",
                "usr/share/man/man1/sonarctl.1.gz", "usr/share/man/man5/sonard.yaml.5.gz", "usr/share/sonard/scenes/demo.yaml",
                "usr/share/sonard/scenes/meshes/wreck.obj", "usr/share/doc/sonard/copyright", DOCUMENTS + "CHANGELOG.md.gz",
-               DOCUMENTS + "examples/sonard.yaml"],
+               DOCUMENTS + "examples/sonard.yaml", "usr/share/sonard/python/sonard_client/__init__.py"],
     "sonard-bvtsdk": ["usr/lib/sonard/bvt3/lib/libbvtsdk.so.3", "usr/lib/sonard/bvt4/lib/libbvtsdk.so.4",
                       "usr/lib/sonard/bvt4/include/bvt_sdk.h", "usr/lib/sonard/bvt3/lib/pkgconfig/bvtsdk.pc",
                       "usr/lib/sonard/bvt3/colormaps/jet.cmap", "usr/share/doc/sonard-bvtsdk/copyright"],

@@ -1,0 +1,16 @@
+"""Poses to sonard, pings from it, and control of a running daemon; the standard library only, numpy where it is installed.
+
+    from sonard_client import OculusClient, PoseSender, Control, Daemon, discover
+"""
+from .control import Control, ControlError, Events
+from .daemon import Daemon, DaemonFailed
+from .layouts import FireSettings
+from .oculus import OculusClient
+from .ping import Peak, Ping
+from .poses import PoseSender
+from .status import SonarFound, discover
+from .stream import Message, MessageReader
+
+__version__ = "0.1.0"
+__all__ = ["Control", "ControlError", "Daemon", "DaemonFailed", "Events", "FireSettings", "Message", "MessageReader",
+           "OculusClient", "Peak", "Ping", "PoseSender", "SonarFound", "discover"]

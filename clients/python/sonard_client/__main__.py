@@ -1,0 +1,82 @@
+"""python3 -m sonard_client listen|discover|pose|status: a look at a sonar, and a pose by hand."""
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import pathlib
+import sys
+from typing import List, Optional
+
+from . import Control, ControlError, OculusClient, PoseSender, discover
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python3 -m sonard_client", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    listen = commands.add_parser("listen", help="a line for each ping of a sonar")
+    listen.add_argument("address", nargs="?", default="127.0.0.2")
+    listen.add_argument("--range", type=float, default=10, help="m")
+    listen.add_argument("--rate", type=int, default=10, help="2, 5, 10, 15 or 40 a second")
+    listen.add_argument("--gain", type=float, default=50, help="per cent")
+    listen.add_argument("--count", type=int, help="pings; without it until Ctrl-C")
+    listen.add_argument("--timeout", type=float, default=10, help="s without a ping")
+    found = commands.add_parser("discover", help="the sonars whose status is heard")
+    found.add_argument("--seconds", type=float, default=2.5)
+    found.add_argument("--listen", default="0.0.0.0", help="address of this computer")
+    pose = commands.add_parser("pose", help="sends one pose")
+    pose.add_argument("xyz", nargs=3, type=float, help="m")
+    pose.add_argument("--rpy", nargs=3, type=float, default=(0, 0, 0), metavar="DEG", help="roll pitch yaw")
+    pose.add_argument("--frame", default="ENU_FLU", choices=("ENU_FLU", "NED_FRD"))
+    pose.add_argument("--to", default="127.0.0.1", help="host or host:port")
+    pose.add_argument("--encoding", default="json", choices=("json", "protobuf"))
+    pose.add_argument("--vehicle", default="")
+    status = commands.add_parser("status", help="what the daemon says, as JSON")
+    status.add_argument("--host", default="127.0.0.1")
+    status.add_argument("--port", type=int, default=8088)
+    status.add_argument("--token-file", help="its control.token_file")
+    return parser
+
+
+def _listen(options: argparse.Namespace) -> None:
+    with OculusClient(options.address) as sonar:
+        sonar.fire(range_m=options.range, rate_hz=options.rate, gain_percent=options.gain)
+        for ping in sonar.pings(options.timeout, options.count):
+            best = ping.strongest(beyond_m=0.5)
+            print(f"ping {ping.number}  {ping.rows} x {ping.beams}  {ping.frequency_hz / 1e6:.3f} MHz  "
+                  f"heading {ping.heading_deg or 0:.1f}  strongest {best.value:.0f} at {best.range_m:.2f} m, "
+                  f"{math.degrees(best.azimuth_rad):+.1f} deg to port", flush=True)
+
+
+def _run(options: argparse.Namespace) -> None:
+    if options.command == "listen":
+        _listen(options)
+    elif options.command == "discover":
+        for sonar in discover(options.seconds, options.listen):
+            print(f"{sonar.address}  id {sonar.device_id}  part {sonar.part_number}  " +
+                  (f"taken by {sonar.connected}" if sonar.connected else "free"))
+    elif options.command == "pose":
+        with PoseSender(options.to, options.encoding, vehicle=options.vehicle) as poses:
+            poses.send(options.xyz, rpy=[math.radians(a) for a in options.rpy], frame=options.frame)
+    else:
+        token = pathlib.Path(options.token_file).read_text(encoding="utf-8").strip() if options.token_file else None
+        print(json.dumps(Control(options.host, options.port, token).status(), indent=2))
+
+
+def main(arguments: Optional[List[str]] = None) -> int:
+    options = _parser().parse_args(arguments)
+    try:
+        _run(options)
+    except KeyboardInterrupt:
+        return 130
+    except ValueError as error:
+        print(f"sonard_client: {error}", file=sys.stderr)
+        return 64
+    except (ControlError, OSError) as error:
+        print(f"sonard_client: {error}", file=sys.stderr)
+        return 69
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

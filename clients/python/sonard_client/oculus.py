@@ -1,0 +1,138 @@
+"""A driver for Oculus sonars, emulated or real: connect, fire, take the pings."""
+from __future__ import annotations
+
+import socket
+import time
+from collections import deque
+from typing import Any, Deque, Iterator, Optional, Tuple
+
+from . import layouts
+from .layouts import FireSettings
+from .ping import Ping, ping_from
+from .stream import Message, MessageReader
+
+
+def endpoint(address: str, port: int) -> Tuple[str, int]:
+    """("host", port) of "host" or "host:port"."""
+    host, colon, number = address.rpartition(":")
+    if not colon:
+        return address, port
+    if not number.isdigit() or not 0 < int(number) < 65536:
+        raise ValueError(f"{address}: the port must be a number from 1 to 65535")
+    return host, int(number)
+
+
+def _checked(name: str, value: float, low: float, high: float) -> float:
+    if not low <= value <= high:  # true for NaN, too
+        raise ValueError(f"{name} is {value}: it must lie between {low:g} and {high:g}")
+    return value
+
+
+def settings_of(range_m: float, rate_hz: int, gain_percent: float, mode: int, beams: int, bits: int, gains: bool, salinity: float,
+                sound_speed: float, gamma: int, gain_assist: bool, triggered: bool) -> FireSettings:
+    """Trade units to the fields of a fire message; ValueError says which one the sonar does not know."""
+    for name, value, choice in (("mode", mode, (1, 2)), ("rate_hz", rate_hz, tuple(layouts.RATE_CODES)),
+                                ("beams", beams, (256, 512)), ("bits", bits, (8, 16, 32))):
+        if value not in choice:
+            raise ValueError(f"{name} is {value}: it must be one of {', '.join(map(str, sorted(choice)))}")
+    chosen = ((bits == 16, layouts.WIDE_SAMPLES), (gains, layouts.ROW_GAINS), (gain_assist, layouts.GAIN_ASSIST),
+              (beams == 512, layouts.MANY_BEAMS), (triggered, layouts.TRIGGERED))
+    flags = layouts.METRES | layouts.SIMPLE_PING | sum(bit for wanted, bit in chosen if wanted)
+    extended = (layouts.SAMPLES_32_BIT if bits == 32 else 0,) + (0,) * 8
+    return FireSettings(
+        mode=mode, rate_code=layouts.RATE_CODES[rate_hz], gamma=int(_checked("gamma", gamma, 0, 255)), flags=flags,
+        range=float(_checked("range_m", range_m, 0, 1000)), gain_percent=float(_checked("gain_percent", gain_percent, 0, 100)),
+        sound_speed_mps=float(_checked("sound_speed", sound_speed, 0, 2000)),
+        salinity_ppt=float(_checked("salinity", salinity, 0, 50)), extended=extended)
+
+
+class OculusClient:
+    """with OculusClient("127.0.0.2") as sonar: sonar.fire(range_m=5); ping = sonar.ping()
+
+    Keep reading: a sonar resets a client that takes nothing for long, and pings are not kept for it."""
+
+    def __init__(self, address: str, port: int = layouts.DATA_PORT, timeout: float = 5.0) -> None:
+        self.address = endpoint(address, port)
+        self.reader = MessageReader()
+        self.settings: Optional[FireSettings] = None  # asked for last
+        self._last_fire = b""
+        self._ready: Deque[Message] = deque()
+        self._heard = False
+        self._socket = socket.create_connection(self.address, timeout=timeout)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def fire(self, range_m: float = 10, rate_hz: int = 10, gain_percent: float = 50, mode: int = 2, beams: int = 512,
+             bits: int = 8, gains: bool = False, salinity: float = 0, sound_speed: float = 0, gamma: int = 127,
+             gain_assist: bool = False, triggered: bool = False, version: int = 2) -> FireSettings:
+        """Asks for pings with these settings until others are asked for.
+
+        rate_hz: 2, 5, 10, 15 or 40, at most; 0 = standby. mode: 1 low frequency, 2 high. gains: each row with a gain in front.
+        sound_speed: m/s, 0 = the sonar computes it. gamma: exponent of the samples = gamma / 255, 255 = linear.
+        triggered: one ping for each again(). version: of the messages; 2 brings heading, pitch and roll, old drivers use 0."""
+        if version not in (0, 1, 2):
+            raise ValueError(f"version is {version}: it must be 0, 1 or 2")
+        if bits == 32 and version != 2:
+            raise ValueError("32-bit samples need version 2")
+        self.settings = settings_of(range_m, rate_hz, gain_percent, mode, beams, bits, gains, salinity, sound_speed, gamma,
+                                    gain_assist, triggered)
+        self._last_fire = layouts.fire_bytes(self.settings, version)
+        self._socket.sendall(self._last_fire)
+        return self.settings
+
+    def again(self) -> None:
+        """The same fire message once more: the next ping, when the sonar is triggered."""
+        if not self._last_fire:
+            raise ValueError("nothing was fired yet: call fire() first")
+        self._socket.sendall(self._last_fire)
+
+    def standby(self) -> None:
+        """No more pings until the next fire()."""
+        self.fire(rate_hz=0)
+
+    def pings(self, timeout: float = 10.0, count: Optional[int] = None) -> Iterator[Ping]:
+        """Ping after ping, for ever or `count` of them; TimeoutError when none comes for `timeout` seconds, ConnectionError when
+        the sonar closes the connection."""
+        while count is None or count > 0:
+            yield self.ping(timeout)
+            if count is not None:
+                count -= 1
+
+    def ping(self, timeout: float = 10.0) -> Ping:
+        """The next ping; errors as with pings()."""
+        deadline = time.monotonic() + timeout
+        while True:
+            message = self.message(deadline - time.monotonic())
+            if message is None:
+                raise TimeoutError(f"no ping from {self.address[0]} within {timeout:g} s" +
+                                   ("" if self._last_fire else ": fire() was not called"))
+            if message.type == layouts.PING:
+                return ping_from(message)
+
+    def message(self, timeout: float = 10.0) -> Optional[Message]:
+        """The next message of any kind, dummies among them; None when none is whole within `timeout` seconds."""
+        deadline = time.monotonic() + timeout
+        while not self._ready:
+            left = deadline - time.monotonic()
+            if left <= 0:
+                return None
+            self._socket.settimeout(left)
+            try:
+                received = self._socket.recv(1 << 18)
+            except socket.timeout:
+                return None
+            if not received:
+                raise ConnectionError(f"{self.address[0]} closed the connection" +
+                                      ("" if self._heard else " without a word: it may have a client already"))
+            self._heard = True
+            self.reader.feed(received)
+            self._ready.extend(self.reader)
+        return self._ready.popleft()
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def __enter__(self) -> OculusClient:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()

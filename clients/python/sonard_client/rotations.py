@@ -1,0 +1,51 @@
+"""The few rotations that poses need: quaternions (w, x, y, z), body to world, Hamilton."""
+from __future__ import annotations
+
+import math
+from typing import Sequence, Tuple
+
+Quaternion = Tuple[float, float, float, float]
+Vector3 = Tuple[float, float, float]
+
+
+def quaternion_from_rpy(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
+    """Intrinsic Z-Y-X: yaw first, then pitch, then roll."""
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    return (cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy)
+
+
+def three(name: str, values: Sequence[float]) -> Vector3:
+    """Three finite numbers, or ValueError."""
+    numbers = tuple(float(v) for v in values)
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{name} must be three finite numbers, not {values!r}")
+    return numbers[0], numbers[1], numbers[2]
+
+
+def unit(values: Sequence[float]) -> Quaternion:
+    """Of length 1, from one that nearly is; ValueError where it is not, as sonard would refuse it."""
+    numbers = [float(v) for v in values]
+    if len(numbers) != 4 or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"a quaternion is four finite numbers w, x, y, z, not {values!r}")
+    norm = math.sqrt(sum(v * v for v in numbers))
+    if abs(norm - 1) > 1e-3:
+        raise ValueError(f"the quaternion has norm {norm:g}, not 1: normalise it before sending")
+    return numbers[0] / norm, numbers[1] / norm, numbers[2] / norm, numbers[3] / norm
+
+
+def orientation(quaternion: "Sequence[float] | None", rpy: "Sequence[float] | None") -> Quaternion:
+    """Whichever is given; level and ahead when neither is."""
+    if quaternion is not None and rpy is not None:
+        raise ValueError("give quaternion or rpy, not both")
+    if quaternion is not None:
+        return unit(quaternion)
+    return quaternion_from_rpy(*three("rpy", rpy)) if rpy is not None else (1.0, 0.0, 0.0, 0.0)
+
+
+def to_body(q: Quaternion, v: Vector3) -> Vector3:
+    """A vector in world axes, in body axes."""
+    w, x, y, z = q[0], -q[1], -q[2], -q[3]
+    tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
+    return v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx

@@ -1,0 +1,134 @@
+"""What Control says over HTTP, and what it makes of answers; a server of this test's own stands in for sonard."""
+import http.server
+import json
+import socket
+import sys
+import threading
+import unittest
+
+from common import PACKAGE  # and it is on the path
+
+from sonard_client import Control, ControlError
+
+ANSWERS = {
+    "/healthz": (503, "scene cannot be loaded\n"),
+    "/metrics": (200, '# HELP a b\n# TYPE a counter\nsonard_pings_total{sonar="front left"} 12\nsonard_late_seconds 1e-3\n\n'),
+    "/api/v1/status": (200, '{"seed":"18446744073709551615","sonars":[{"clients":[],"figures":{"pings":"7","clients":"1"}}]}'),
+    "/api/v1/sonar": (400, '{"code":"REFUSED","text":"no sonar is called \\"rear\\"; there are: front"}'),
+    "/api/v1/load": (502, "<html>a proxy</html>"),
+}
+
+
+class Handler(http.server.BaseHTTPRequestHandler):
+    def answer(self):
+        length = int(self.headers.get("Content-Length", 0))
+        body = json.loads(self.rfile.read(length)) if length else None
+        self.server.heard.append((self.command, self.path, dict(self.headers), body))
+        if self.path.startswith("/api/v1/events"):
+            return self.events()
+        status, text = ANSWERS.get(self.path, (200, '{"code":"OK","text":""}'))
+        self.send_response(status)
+        self.end_headers()
+        self.wfile.write(text.encode())
+
+    def events(self):
+        self.protocol_version = "HTTP/1.1"
+        self.send_response(200)
+        self.send_header("Transfer-Encoding", "chunked")
+        self.end_headers()
+        for line in (b'{"ping":{"number":1,"fired_at_ns":"123"},"unsent":"0"}\n', b'{"scene":{"text":"loaded"},"unsent":"2"}\n'):
+            self.wfile.write(b"%x\r\n%s\r\n" % (len(line), line))
+        if "clients" in self.path:
+            self.server.release.wait(20)  # silence
+        elif "poses" not in self.path:    # there it is cut off without an end
+            self.wfile.write(b"0\r\n\r\n")
+        self.close_connection = True
+
+    do_GET = do_POST = answer
+
+    def log_message(self, *_):
+        """Not into the test's output."""
+
+
+class Asked(unittest.TestCase):
+    def setUp(self):
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.server.heard, self.server.release = [], threading.Event()
+        thread = threading.Thread(target=self.server.serve_forever, args=(0.02,))
+        thread.start()
+        self.addCleanup(thread.join)
+        self.addCleanup(self.server.server_close)
+        self.addCleanup(self.server.shutdown)
+        self.addCleanup(self.server.release.set)
+        self.control = Control("127.0.0.1", self.server.server_address[1], token="secret")
+
+    def last(self):
+        method, path, headers, body = self.server.heard[-1]
+        self.assertEqual(headers["Authorization"], "Bearer secret")
+        if method == "POST":
+            self.assertEqual(headers["Content-Type"], "application/json")
+        return method, path, body
+
+    def test_answers(self):
+        self.assertEqual(self.control.health(), "scene cannot be loaded")
+        self.assertEqual(self.control.metrics(), {'sonard_pings_total{sonar="front left"}': 12.0, "sonard_late_seconds": 0.001})
+        status = self.control.status()
+        self.assertEqual(status["seed"], 2 ** 64 - 1)
+        self.assertEqual(status["sonars"][0], {"clients": [], "figures": {"pings": 7, "clients": 1}})
+        self.assertEqual(self.last(), ("GET", "/api/v1/status", None))
+
+    def test_refusals_carry_the_sentence(self):
+        with self.assertRaisesRegex(ControlError, "no sonar is called") as caught:
+            self.control.set_sonar("rear", range_m=5)
+        self.assertEqual((caught.exception.status, caught.exception.code), (400, "REFUSED"))
+        self.assertEqual(self.last(), ("POST", "/api/v1/sonar", {"sonar": "rear", "range_m": 5}))
+        with self.assertRaisesRegex(ControlError, "proxy") as caught:
+            self.control.load_scene("demo.yaml")
+        self.assertEqual((caught.exception.status, caught.exception.code), (502, ""))
+
+    def test_requests(self):
+        at = {"frame": "NED_FRD", "position": {"x": 1, "y": 2, "z": 3}, "orientation": {"w": 1, "x": 0, "y": 0, "z": 0}}
+        placed = dict(position=(1, 2, 3), frame="NED_FRD")
+        for call, path, body in (
+                (lambda: self.control.set_environment(temperature_c=4, ph=0), "environment",
+                 {"environment": {"temperature_c": 4, "ph": 0}}),
+                (lambda: self.control.add_object("b", "a", moving=True, **placed), "add_object",
+                 {"name": "b", "like": "a", "at": at, "moving": True}),
+                (lambda: self.control.remove_object("b"), "remove_object", {"object": "b"}),
+                (lambda: self.control.show_object("b"), "set_object", {"object": "b", "visible": True}),
+                (lambda: self.control.hide_object("b"), "set_object", {"object": "b", "visible": False}),
+                (lambda: self.control.place_object("b", **placed), "set_object", {"object": "b", "at": at}),
+                (lambda: self.control.move_object("b", **placed), "object", dict(at, object="b")),
+                (lambda: self.control.send_pose(vehicle="rov", **placed), "pose", dict(at, vehicle="rov"))):
+            with self.subTest(path):
+                call()
+                self.assertEqual(self.last(), ("POST", "/api/v1/" + path, body))
+        with self.assertRaises(ValueError):
+            self.control.place_object("b", (0, 0, 0), frame="up")
+        with self.assertRaises(ValueError):
+            self.control.set_sonar(range_m=float("nan"))
+
+    def test_events_until_the_end_a_cut_and_silence(self):
+        for kinds in ({"pings": True}, {"poses": True}):
+            events = list(self.control.events(**kinds))
+            self.assertEqual(events[0]["ping"]["fired_at_ns"], 123)
+            self.assertEqual((len(events), events[1]["unsent"]), (2, 2))
+        self.assertEqual(self.last()[1], "/api/v1/events?poses=1")
+        with self.control.events(clients=True, timeout=0.2) as events:
+            self.assertEqual(len([next(events), next(events)]), 2)
+            with self.assertRaisesRegex(TimeoutError, "no event"):
+                next(events)
+
+    def test_it_is_the_package_of_this_checkout(self):
+        self.assertIn(str(PACKAGE), sys.modules[Control.__module__].__file__)
+
+    def test_nobody_there(self):
+        with socket.socket() as unused:
+            unused.bind(("127.0.0.1", 0))
+            port = unused.getsockname()[1]
+        with self.assertRaises(OSError):
+            Control("127.0.0.1", port).status()
+
+
+if __name__ == "__main__":
+    unittest.main()
