@@ -30,23 +30,25 @@ void SceneChanges::stop() {
 
 void SceneChanges::submit(Change change) {
   if (stopped_) return;
-  if (!change.make && waiting_.empty()) return change.done({});
+  if (!change.make && !busy()) return change.done({});
   waiting_.push_back(std::move(change));
-  if (waiting_.size() == 1) begin();
+  if (!under_way_) begin();
 }
 
 void SceneChanges::begin() {
+  under_way_ = true;
   if (!waiting_.front().make) return finish(Built{scene_, nullptr});
   building_ = true;
-  asio::post(thread_, [this, change = waiting_.front(), now = scene_] {
-    auto built = std::make_shared<Result<Built>>(build(change, now));
+  // Without `done`: what that holds (a connection, say) must not end on another thread.
+  asio::post(thread_, [this, make = waiting_.front().make, now = scene_] {
+    auto built = std::make_shared<Result<Built>>(build(make, now));
     asio::post(io_, [this, built] { finish(std::move(*built)); });
   });
 }
 
-Result<SceneChanges::Built> SceneChanges::build(const Change& change, const ScenePointer& now) const {
+Result<SceneChanges::Built> SceneChanges::build(const Make& make, const ScenePointer& now) const {
   try {
-    auto scene = change.make(now);
+    auto scene = make(now);
     if (!scene) return tl::make_unexpected(scene.error());
     if (*scene == now || is_same(**scene, *now)) return Built{*scene, nullptr};
     auto engine = start_engine(make_engine_, *scene);
@@ -76,6 +78,7 @@ void SceneChanges::finish(Result<Built> built) {
     done({});
   else
     done(tl::make_unexpected(built.error()));
+  under_way_ = false;
   if (!stopped_ && !waiting_.empty()) begin();
   on_change_();
 }

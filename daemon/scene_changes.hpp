@@ -19,10 +19,10 @@ namespace sonar {
 
 class SceneChanges {
  public:
+  /// On the thread of its own: the scene there shall be; the one there is, when it stays.
+  using Make = std::function<Result<ScenePointer>(const ScenePointer& now)>;
   struct Change {
-    /// On the thread of its own: the scene there shall be; the one there is, when it stays. Empty: nothing is to be made, it
-    /// only waits for those before.
-    std::function<Result<ScenePointer>(const ScenePointer& now)> make;
+    Make make;  // empty: nothing is to be made, it only waits for those before
     /// On the I/O thread, when the new scene is in use, or nothing was changed. Never after stop().
     std::function<void(const Result<void>& outcome)> done;
   };
@@ -40,7 +40,7 @@ class SceneChanges {
 
   /// Done before this returns when nothing is to be made and nothing waits.
   void submit(Change change);
-  bool busy() const { return !waiting_.empty(); }
+  bool busy() const { return under_way_ || !waiting_.empty(); }
   bool is_full() const { return waiting_.size() >= most_waiting; }
   /// The thread is at work, perhaps for a Change that nobody waits for any more: the destructor would wait for it.
   bool is_building() const { return building_; }
@@ -54,7 +54,7 @@ class SceneChanges {
     std::shared_ptr<std::unique_ptr<PingEngine>> engine;  // empty: the scene stays
   };
   void begin();
-  Result<Built> build(const Change& change, const ScenePointer& now) const;
+  Result<Built> build(const Make& make, const ScenePointer& now) const;
   void finish(Result<Built> built);
 
   asio::io_context& io_;
@@ -64,6 +64,7 @@ class SceneChanges {
   InUse in_use_;
   std::function<void()> on_change_;
   std::deque<Change> waiting_;  // the first is under way
+  bool under_way_ = false;      // until its `done` has returned, which may submit another
   bool stopped_ = false, building_ = false;
   asio::thread_pool thread_{1};
 };

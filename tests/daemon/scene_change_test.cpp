@@ -139,6 +139,27 @@ TEST(SceneChange, ChangesQueueInOrder) {
   EXPECT_EQ(objects[2].in_world.position_m.x, 7);
 }
 
+TEST(SceneChange, WhoIsAnsweredMayAskAgainAtOnce) {
+  Daemon daemon;
+  std::vector<OperationResult::Code> answers;  // on the I/O thread
+  daemon.on_io_thread([&] {
+    Operations& operations = daemon.app().operations();
+    const auto keep = [&answers](OperationResult result) { answers.push_back(result.code); };
+    operations.perform(added("one"), {"control test", "control"}, [&operations, keep](OperationResult result) {
+      keep(result);
+      operations.perform(control::RemoveObject{"one"}, {"control test", "control"}, keep);
+    });
+    operations.perform(added("two"), {"control test", "control"}, keep);
+  });
+  ASSERT_TRUE(eventually([&] {
+    std::size_t answered = 0;
+    daemon.on_io_thread([&] { answered = answers.size(); });
+    return answered == 3;
+  }));
+  EXPECT_EQ(answers, (std::vector<Code>{Code::done, Code::done, Code::done}));
+  EXPECT_EQ(daemon.status().objects.size(), 3u);
+}
+
 TEST(SceneChange, AFailureChangesNothing) {
   DaemonSetup setup;
   setup.options.load_scene = [](const SceneFile& file) -> Result<ScenePointer> {
