@@ -64,5 +64,32 @@ class RealPings(unittest.TestCase):
                    "SONARD_BUILD=build/release python3 tests/load/real_pings_test.py")
 
 
+def scheduling(process):
+    """Niceness and policy (0 usual, 1 SCHED_FIFO) of every thread; the first is the one that runs sockets and pacing."""
+    tasks = sorted(pathlib.Path(f"/proc/{process.pid}/task").iterdir(), key=lambda task: int(task.name) != process.pid)
+    fields = [(task / "stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split() for task in tasks]
+    return [(int(f[16]), int(f[38])) for f in fields]
+
+
+class Threads(unittest.TestCase):
+    def test_all_but_the_one_with_the_sockets_are_nice(self):
+        with Sonard(trajectory="orbit", more="engine: {threads: 4}") as daemon, Client(daemon.address) as client:
+            client.send(fire_message())
+            next_ping(client)
+            first, *others = scheduling(daemon.process)
+        self.assertGreaterEqual(len(others), 4, "pool and simulation")
+        self.assertEqual(set(others), {(min(first[0] + 10, 19), 0)})
+
+    def test_real_time_by_wish(self):
+        with Sonard(more="engine: {io_priority: 5}") as daemon, Client(daemon.address) as client:
+            client.send(fire_message())
+            next_ping(client)
+            first, *others = scheduling(daemon.process)
+            refused = daemon.log().count("engine.io_priority has no effect")
+        self.assertEqual(first[1], 0 if refused else 1)
+        self.assertLessEqual(refused, 1)
+        self.assertEqual({policy for _, policy in others}, {0}, "what computes is not scheduled in real time")
+
+
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0]])
