@@ -1,0 +1,41 @@
+"""What the README prints is what comes out: tests/tools/first_minutes.sh in a network namespace of its own, line by line beside it.
+
+Numbers differ from run to run and machine to machine; words must not.
+"""
+import os
+import re
+import subprocess
+import unittest
+
+from running_sonard import BUILD, ROOT
+
+ISOLATED = ["unshare", "-rn", "sh", "-c", 'ip link set lo up && exec "$0" "$@"']
+MACHINE = [(r"cpu, \w+, ", "cpu, SIMD, "), (r"CUDA: .*", "CUDA: x"), (r"\(looked in .*\)", "(looked in PLACES)"),
+           (r"^(ok|warn) +rate .*", "rate"), (r"^(ok|warn) +ports .*", "ports"), (r"\d+ warnings?", "warnings")]
+
+
+def words(line):
+    for pattern, stand_in in MACHINE:
+        line = re.sub(pattern, stand_in, line)
+    return re.sub(r"\d+(\.\d+)?", "#", line).strip()
+
+
+class FirstMinutes(unittest.TestCase):
+    def test_the_readme_prints_what_comes_out(self):
+        possible = subprocess.run([*ISOLATED, "true"], capture_output=True, text=True, check=False)
+        if possible.returncode != 0:
+            self.skipTest(f"no network namespaces here: {possible.stderr.strip()}")
+        run = subprocess.run([*ISOLATED, ROOT / "tests/tools/first_minutes.sh", BUILD.resolve()], stdin=subprocess.DEVNULL,
+                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120, check=False,
+                             env={**os.environ, "LC_ALL": "C.UTF-8"})
+        self.assertEqual(run.returncode, 0, run.stdout)
+        came_out = {words(line) for line in run.stdout.splitlines()}
+        readme = (ROOT / "README.md").read_text(encoding="utf-8")
+        quoted = [line for block in re.findall(r"^```\n(\$ .*?)^```", readme, re.M | re.S) for line in block.splitlines() if line]
+        self.assertGreater(len(quoted), 20)
+        for line in quoted:
+            self.assertIn(words(line), came_out, run.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

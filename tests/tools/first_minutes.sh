@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# The first five minutes as a newcomer types them: each command, and what really comes out. The README quotes it.
+# usage: first_minutes.sh [BUILD_FOLDER]     programs of a build, build/release by default
+#        first_minutes.sh --package          builds the Debian package, installs it (as root) and uses that
+# It takes the usual addresses, 127.0.0.2 and the ports of poses, control and status: run it where nothing else does, or in
+# a network namespace (unshare -rn sh -c 'ip link set lo up; tests/tools/first_minutes.sh'). Exit code 0 when all went well.
+set -u -o pipefail
+cd "$(dirname "$0")/../.." || exit 70
+
+scratch=$(mktemp -d)
+daemon=
+finish() {
+  [ -z "$daemon" ] || kill -KILL "$daemon" 2>/dev/null
+  rm -rf "$scratch"
+}
+trap finish EXIT
+failed=0
+show() {  # show COMMAND...: prints it as typed, then runs it
+  printf '$ %s\n' "$*"
+  eval "$*" 2>&1 || { printf '(exit code %s)\n' $?; failed=1; }
+  echo
+}
+
+if [ "${1:-}" = --package ]; then
+  # shellcheck source=tests/tools/setup.sh
+  . tests/tools/setup.sh
+  { setup_and_build sonard sonarctl && need_packages dpkg-dev && cmake --build build/release --parallel "$(build_jobs)"; } >"$scratch/build" 2>&1 ||
+    { tail -n 40 "$scratch/build" >&2; exit 1; }
+  (cd build/release && cpack -G DEB >"$scratch/cpack" 2>&1) || { cat "$scratch/cpack" >&2; exit 1; }
+  show "apt-get install -y -qq ./build/release/sonard_0.1.0_amd64.deb >/dev/null && which sonard sonarctl"
+else
+  folder=$(cd "${1:-build/release}" && pwd) || exit 66
+  PATH="$folder/daemon:$folder/clients:$PATH"
+fi
+
+cp scenes/sonard.yaml "$scratch/my.yaml"
+root=$PWD
+cd "$scratch" || exit 70
+printf '$ sonard\n'
+HOME=$scratch sonard >"$scratch/out" 2>"$scratch/log" &
+daemon=$!
+for ((i = 0; i < 600; i++)); do grep -q '^ready in' "$scratch/log" && break; kill -0 $daemon 2>/dev/null || break; sleep 0.05; done
+cat "$scratch/log"
+grep -q '^ready in' "$scratch/log" || exit 1
+echo
+said=$(wc -l <"$scratch/log")
+
+show sonarctl doctor
+show sonarctl view --png ping.png
+show sonarctl listen --pings 20 --quiet
+pose='{"timestamp":1.0,"position":[0,0,3],"attitude":[0,0.1,0.5],"velocity":[0,0,0]}'
+if command -v nc >/dev/null; then
+  show "echo '$pose' | nc -u -w0 127.0.0.1 14771"
+else
+  show "echo '$pose' > /dev/udp/127.0.0.1/14771"
+fi
+show "sonarctl status | head -n 6"
+show "sonarctl set sonar front --range 5"
+if command -v curl >/dev/null; then show curl -s http://127.0.0.1:8088/healthz; fi
+show sonard check my.yaml
+sleep 0.2
+kill -TERM $daemon
+wait $daemon
+code=$?
+daemon=
+printf '# the log of sonard meanwhile\n'
+tail -n +$((said + 1)) "$scratch/log"
+[ $code = 0 ] || { echo "sonard ended with code $code" >&2; failed=1; }
+[ -s ping.png ] || { echo "no picture" >&2; failed=1; }
+cd "$root" || exit 70
+exit $failed
