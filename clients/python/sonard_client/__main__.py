@@ -24,6 +24,7 @@ def _parser() -> argparse.ArgumentParser:
     found = commands.add_parser("discover", help="the sonars whose status is heard")
     found.add_argument("--seconds", type=float, default=2.5)
     found.add_argument("--listen", default="0.0.0.0", help="address of this computer")
+    found.add_argument("--enough", type=int, help="ends when so many are known")
     pose = commands.add_parser("pose", help="sends one pose")
     pose.add_argument("xyz", nargs=3, type=float, help="m")
     pose.add_argument("--rpy", nargs=3, type=float, default=(0, 0, 0), metavar="DEG", help="roll pitch yaw")
@@ -52,7 +53,7 @@ def _run(options: argparse.Namespace) -> None:
     if options.command == "listen":
         _listen(options)
     elif options.command == "discover":
-        for sonar in discover(options.seconds, options.listen):
+        for sonar in discover(options.seconds, options.listen, enough=options.enough):
             print(f"{sonar.address}  id {sonar.device_id}  part {sonar.part_number}  " +
                   (f"taken by {sonar.connected}" if sonar.connected else "free"))
     elif options.command == "pose":

@@ -52,7 +52,7 @@ class OculusClient:
     Keep reading: a sonar resets a client that takes nothing for long, and pings are not kept for it."""
 
     def __init__(self, address: str, port: int = layouts.DATA_PORT, timeout: float = 5.0) -> None:
-        self.address = endpoint(address, port)
+        self.address, self._timeout = endpoint(address, port), timeout
         self.reader = MessageReader()
         self.settings: Optional[FireSettings] = None  # asked for last
         self._last_fire = b""
@@ -76,14 +76,14 @@ class OculusClient:
         self.settings = settings_of(range_m, rate_hz, gain_percent, mode, beams, bits, gains, salinity, sound_speed, gamma,
                                     gain_assist, triggered)
         self._last_fire = layouts.fire_bytes(self.settings, version)
-        self._socket.sendall(self._last_fire)
+        self._send(self._last_fire)
         return self.settings
 
     def again(self) -> None:
         """The same fire message once more: the next ping, when the sonar is triggered."""
         if not self._last_fire:
             raise ValueError("nothing was fired yet: call fire() first")
-        self._socket.sendall(self._last_fire)
+        self._send(self._last_fire)
 
     def standby(self) -> None:
         """No more pings until the next fire()."""
@@ -120,13 +120,25 @@ class OculusClient:
                 received = self._socket.recv(1 << 18)
             except socket.timeout:
                 return None
+            except ConnectionError:  # closed with our request unread
+                received = b""
             if not received:
-                raise ConnectionError(f"{self.address[0]} closed the connection" +
-                                      ("" if self._heard else " without a word: it may have a client already"))
+                raise self._closed()
             self._heard = True
             self.reader.feed(received)
             self._ready.extend(self.reader)
         return self._ready.popleft()
+
+    def _send(self, data: bytes) -> None:
+        try:
+            self._socket.settimeout(self._timeout)
+            self._socket.sendall(data)
+        except ConnectionError:
+            raise self._closed() from None
+
+    def _closed(self) -> ConnectionError:
+        return ConnectionError(f"{self.address[0]} closed the connection" +
+                               ("" if self._heard else " without a word: it may have a client already"))
 
     def close(self) -> None:
         self._socket.close()

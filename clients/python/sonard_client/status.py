@@ -42,16 +42,19 @@ def read_status(data: bytes, heard_from: str = "") -> Optional[SonarFound]:
                       None if client == "0.0.0.0" else client, word, rest[10], rest[18], heard_from)
 
 
-def discover(seconds: float = 2.5, listen: str = "0.0.0.0", port: int = layouts.STATUS_PORT) -> List[SonarFound]:
-    """The sonars whose status is heard within `seconds`, by address: the newest word of each. They speak once a second.
+def discover(seconds: float = 2.5, listen: str = "0.0.0.0", port: int = layouts.STATUS_PORT,
+             enough: Optional[int] = None) -> List[SonarFound]:
+    """The sonars whose status is heard within `seconds`, or sooner when they are `enough`, by address: the newest word of each.
+    They speak once a second.
 
-    The port may be shared with drivers that allow it. OSError when one does not."""
+    The port may be shared with drivers that allow it: all of them hear broadcasts, but only one hears status messages that are
+    sent to this computer alone. OSError when the port is another's."""
     found: Dict[Tuple[str, int], SonarFound] = {}
     deadline = time.monotonic() + seconds
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         sock.bind((listen, port))
-        while True:
+        while enough is None or len(found) < enough:
             left = deadline - time.monotonic()
             if left <= 0:
                 break

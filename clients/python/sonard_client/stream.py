@@ -5,7 +5,7 @@ It has no socket. What cannot be a message is skipped byte by byte to the next `
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Iterator
+from typing import Iterator, Optional
 
 from . import layouts
 from .layouts import HEADER_BYTES, Header
@@ -32,52 +32,63 @@ class MessageReader:
     """reader.feed(received); for message in reader: ..."""
 
     def __init__(self) -> None:
-        self._waiting = bytearray()
+        self._waiting, self._at = bytearray(), 0  # what is before _at was read or skipped
         self.skipped_bytes = 0
         self.last_fault = ""  # of what was skipped
 
     def feed(self, received: bytes) -> None:
+        del self._waiting[:self._at]
+        self._at = 0
         self._waiting += received
 
     def __iter__(self) -> Iterator[Message]:
         """The whole messages that are there; the rest waits for the next feed()."""
-        at = 0
-        try:
-            while True:
-                at = self._next_magic(at)
-                if len(self._waiting) - at < HEADER_BYTES:
-                    return
-                header = layouts.read_header(self._waiting[at:at + HEADER_BYTES])
-                fault = _header_fault(header)
-                if not fault and header.type == layouts.PING:
-                    head = layouts.ping_head_bytes(header.version)
-                    if len(self._waiting) - at < head:
-                        return
-                    fault = layouts.ping_fault(self._waiting[at:at + head], header)
-                if fault:
-                    self._skip(1, fault)
-                    at += 1
-                    continue
-                end = at + HEADER_BYTES + header.payload_bytes
-                if len(self._waiting) < end:
-                    return
-                data, at = bytes(self._waiting[at:end]), end
-                yield Message(header, data)
-        finally:
-            del self._waiting[:at]
+        while True:
+            message = self._next()
+            if message is None:
+                return
+            yield message
 
-    def _next_magic(self, at: int) -> int:
-        """Where the next header may begin: at the magic, or at a last byte that may be half of one."""
-        found = self._waiting.find(layouts.MAGIC, at)
+    def _next(self) -> Optional[Message]:
+        while True:
+            self._go_to_magic()
+            if self._there() < HEADER_BYTES:
+                return None
+            header = layouts.read_header(self._peek(HEADER_BYTES))
+            fault = _header_fault(header)
+            if not fault and header.type == layouts.PING:
+                head = layouts.ping_head_bytes(header.version)
+                if self._there() < head:
+                    return None
+                fault = layouts.ping_fault(self._peek(head), header)
+            if fault:
+                self._skip(1, fault)
+                continue
+            size = HEADER_BYTES + header.payload_bytes
+            if self._there() < size:
+                return None
+            data = self._peek(size)
+            self._at += size
+            return Message(header, data)
+
+    def _there(self) -> int:
+        return len(self._waiting) - self._at
+
+    def _peek(self, count: int) -> bytes:
+        return bytes(self._waiting[self._at:self._at + count])
+
+    def _go_to_magic(self) -> None:
+        """To where the next header may begin: the magic, or a last byte that may be half of one."""
+        found = self._waiting.find(layouts.MAGIC, self._at)
         if found < 0:
             found = len(self._waiting)
-            if found > at and self._waiting[-1] == layouts.MAGIC[0]:
+            if found > self._at and self._waiting[-1] == layouts.MAGIC[0]:
                 found -= 1
-        if found > at:
-            self._skip(found - at, "bytes that are no message")
-        return found
+        if found > self._at:
+            self._skip(found - self._at, "bytes that are no message")
 
     def _skip(self, count: int, why: str) -> None:
+        self._at += count
         self.skipped_bytes += count
         self.last_fault = why
 

@@ -114,7 +114,7 @@ class Asked(unittest.TestCase):
             self.assertEqual(events[0]["ping"]["fired_at_ns"], 123)
             self.assertEqual((len(events), events[1]["unsent"]), (2, 2))
         self.assertEqual(self.last()[1], "/api/v1/events?poses=1")
-        with self.control.events(clients=True, timeout=0.2) as events:
+        with self.control.events(clients=True, timeout=2) as events:
             self.assertEqual(len([next(events), next(events)]), 2)
             with self.assertRaisesRegex(TimeoutError, "no event"):
                 next(events)

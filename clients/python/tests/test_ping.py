@@ -1,6 +1,7 @@
 """Pings: every version and width, golden messages, gains, places in the picture; with numpy and without it."""
 import json
 import math
+import os
 import unittest
 
 from common import GOLDEN, made_ping
@@ -60,6 +61,8 @@ class Decoding(unittest.TestCase):
     def test_numpy_is_used_where_it_is_and_not_missed_where_it_is_not(self):
         kind = memoryview if arrays.numpy is None else arrays.numpy.ndarray
         self.assertIsInstance(decoded(made_ping(0)).samples, kind)
+        if arrays.numpy is None and os.environ.get("SONARD_CLIENT_NUMPY") != "hidden":
+            self.skipTest("numpy is not installed: only what replaces it was tested")
 
 
 class Picture(unittest.TestCase):

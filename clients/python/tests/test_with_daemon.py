@@ -101,8 +101,14 @@ class Running(unittest.TestCase):
             self.assertAlmostEqual(vehicle["position"]["z"], -1)
             self.assertAlmostEqual(abs(vehicle["orientation"]["w"]), 1)
 
+    def test_protobuf_takes_unix_time_and_turn_rates(self):
+        with PoseSender(self.address, "protobuf", clock="wall", vehicle="rov") as poses:
+            poses.send((0, 0, -9), angular_velocity=(0, 0, 0.1), timestamp=time.time())
+            self.eventually(lambda: self.vehicle()["position"]["z"] == -9)
+            self.eventually(lambda: self.vehicle()["orientation"]["z"] > 0.004)  # 0.1 rad/s for some of 0.2 s
+
     def test_discovery(self):
-        (sonar,) = discover(3, listen=self.address)
+        (sonar,) = discover(20, listen=self.address, enough=1)
         self.assertEqual((sonar.address, sonar.heard_from, sonar.part_number), (self.address, self.address, 1042))
 
     def test_control(self):
@@ -135,9 +141,11 @@ class Running(unittest.TestCase):
                 sonar.ping(timeout=0.1)
             sonar.fire(range_m=2)
             sonar.ping()
-            with self.assertRaisesRegex(ConnectionError, "may have a client already"), OculusClient(self.address) as second:
-                second.fire()
-                second.ping()
+            for asks in (False, True):
+                with self.assertRaisesRegex(ConnectionError, "may have a client already"), OculusClient(self.address) as second:
+                    if asks:
+                        second.fire()
+                    second.ping()
             sonar.standby()
             dummies = [sonar.message(20).type for _ in range(5)]
             self.assertIn(0xFF, dummies)
@@ -157,7 +165,7 @@ class Running(unittest.TestCase):
         self.assertEqual(self.said("pose", "-1", "2", "-4", "--rpy", "0", "10", "0", "--to", self.address)[0], 0)
         self.eventually(lambda: self.vehicle()["position"] == {"x": -1, "y": 2, "z": -4})
         self.assertIn('"front"', self.said("status", "--host", self.address)[1])
-        self.assertIn("id 7001", self.said("discover", "--listen", self.address)[1])
+        self.assertIn("id 7001", self.said("discover", "--listen", self.address, "--enough", "1", "--seconds", "20")[1])
         self.assertEqual(self.said("pose", "0", "0", "nan", "--to", self.address)[0], 64)
         with socket.socket() as unused:
             unused.bind(("127.0.0.1", 0))
@@ -214,7 +222,8 @@ class Manuals(unittest.TestCase):
         environment = dict(os.environ, PYTHONPATH=str(PACKAGE), PATH=f"{SONARD.parent}{os.pathsep}{os.environ['PATH']}")
         for name, code in listed.items():
             with self.subTest(name), Daemon(config("demo.yaml"), SONARD) as daemon, tempfile.TemporaryDirectory() as folder:
-                here = code.replace("127.0.0.2", daemon.address).replace("discover()", f'discover(listen="{daemon.address}")')
+                here = code.replace("127.0.0.2", daemon.address)
+                here = here.replace("discover()", f'discover(20, listen="{daemon.address}", enough=1)')
                 for name in ("PoseSender", "Control"):
                     here = here.replace(f"{name}()", f'{name}("{daemon.address}")')
                 done = subprocess.run([sys.executable, "-B", "-c", here], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
