@@ -3,14 +3,14 @@
 
 # What the build needs on Debian 12 and Ubuntu; all of it from the main archive.
 build_packages=(
-  g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libtinyxml2-dev libpng-dev zlib1g-dev libexpected-dev
-  libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libeigen3-dev libgtest-dev libgmock-dev
+  g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libtinyxml2-dev libpng-dev zlib1g-dev
+  libexpected-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libeigen3-dev libgtest-dev libgmock-dev
   libfftw3-dev
 )
 
 # What only tests use: without it some are skipped, saying so.
 test_packages=(
-  tshark systemd dpkg-dev strace
+  tshark systemd dpkg-dev strace python3-numpy
 )
 
 say() { printf '\n== %s\n' "$*"; }
