@@ -28,7 +28,6 @@ FLOORS = {
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     "clients": ["core/base/", "core/image/", "core/sonar/", "core/text/", "protocol/", "clients/"],
     "clients/scene_tools": ["core/base/", "core/scene/", "core/text/", "clients/scene_tools/"],  # docs/decisions/0013-scene-tools.md
-    "clients/scene_tools": ["core/base/", "core/scene/", "core/text/", "clients/scene_tools/"],  # docs/decisions/0013-scene-tools.md
     "clients/bvtsdk": ["clients/bvtsdk/"],  # loaded into foreign processes: nothing of the house comes along
     "tests": [""],
 }
@@ -40,7 +39,6 @@ DEPENDENCIES = {
     r"fftw": ["core/pipeline/pulses/spectral_transform.cpp"],
     r"yaml-cpp/": ["core/text/"],
     r"assimp/": ["core/scene/files/load_mesh.cpp"],
-    r"tinyxml2\.h": ["clients/scene_tools/xml_file.cpp"],
     r"tinyxml2\.h": ["clients/scene_tools/xml_file.cpp"],
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp"],
     r"zlib\.h": ["protocol/blueview/deflate.cpp", "clients/bvtsdk/", "core/image/"],
