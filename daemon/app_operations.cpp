@@ -143,6 +143,8 @@ OperationResult AppOperations::set_moving(const control::SetObject& asked, std::
     sample.of = control::PoseSample::Of::object;
     sample.name = asked.object;
     sample.pose = *asked.in_world;
+    sample.velocity_mps = sample.angular_velocity_radps = Vec3d{};  // it is put there: that is no movement to carry on
+    sample.reset_counter = ++placements_;
     const std::string refusal = parts_.poses.take(sample, sender);
     if (!refusal.empty()) return refused(refusal);
   }

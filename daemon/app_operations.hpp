@@ -48,6 +48,7 @@ class AppOperations final : public Operations {
   control::DaemonStatus status() const;
 
   AppParts parts_;
+  std::uint32_t placements_ = 0;  // of moving objects: none is a movement from the one before
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
 };
 
