@@ -77,7 +77,7 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
   CLI::App& command = *set.add_subcommand("sonar", "as one more client of the sonar would: the last who asks wins");
   command.footer(
       "examples:\n"
-      "  sonarctl set sonar --range 20 --rate 5\n"
+      "  sonarctl set sonar --range 5 --rate 5\n"
       "  sonarctl set sonar front --transmit off\n"
       "  sonarctl set sonar --mount 0.3,0,0.1 --mount-rpy 0,-30,0        a tilt head, FRD");
   const auto arguments = std::make_shared<SonarArguments>();
@@ -181,7 +181,7 @@ Run add_set(CLI::App& app) {
   set.require_subcommand(1);
   set.footer(
       "examples:\n"
-      "  sonarctl set sonar --range 20 --rate 5\n"
+      "  sonarctl set sonar --range 5 --rate 5\n"
       "  sonarctl set water --temperature 8");
   const auto steering = std::make_shared<Steering>();
   add_set_sonar(set, steering);
