@@ -80,12 +80,13 @@ struct ControlConfig {
 };
 /// What strangers may cost us.
 struct LimitConfig {
-  int clients = 256;                           // of all sonars together; 16 of one: SonarConfig::max_clients
-  int control_clients = 32;                    // of the stream, and of HTTP
-  std::size_t input_bytes_per_s = 1u << 20;    // of one client; more is read more slowly
-  std::chrono::milliseconds stall{10000};      // a client that takes no byte for so long is reset
-  std::chrono::milliseconds dead_peer{15000};  // one whose computer answers nothing
-  int spare_descriptors = 32;                  // never given to clients
+  int clients = 256;                             // of all sonars together; 16 of one: SonarConfig::max_clients
+  int control_clients = 32;                      // of the stream, and of HTTP
+  std::size_t input_bytes_per_s = 1u << 20;      // of one client; more is read more slowly
+  std::size_t control_message_bytes = 1u << 20;  // of one message of the stream, one body of HTTP
+  std::chrono::milliseconds stall{10000};        // a client that takes no byte for so long is reset
+  std::chrono::milliseconds dead_peer{15000};    // one whose computer answers nothing
+  int spare_descriptors = 32;                    // never given to clients
 };
 inline constexpr int most_fixed_rays = 100000;  // a column
 struct EngineConfig {

@@ -1,5 +1,6 @@
 #include "daemon/control/http_reader.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <boost/beast/http/parser.hpp>
@@ -13,9 +14,9 @@ constexpr std::size_t longest_unread = 64u << 10;  // chunk headers and trailers
 
 std::string text_of(boost::beast::string_view view) { return {view.data(), view.size()}; }
 
-HttpRefusal refusal_of(const boost::beast::error_code& ec) {
+HttpRefusal refusal_of(const boost::beast::error_code& ec, std::size_t most_body) {
   if (ec == http::error::header_limit) return {431, "the header is longer than 8 KiB"};
-  if (ec == http::error::body_limit) return {413, "the body is longer than 1 MiB"};
+  if (ec == http::error::body_limit) return {413, "the body is longer than " + std::to_string(most_body) + " bytes"};
   if (ec == http::error::bad_version) return {505, "HTTP/1.0 and 1.1 are spoken here"};
   return {400, "this is not an HTTP request: " + ec.message()};
 }
@@ -41,14 +42,15 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> request_from(http::request
 
 struct HttpReader::Parser {
   http::request_parser<http::string_body> beast;
-  Parser() {
+  explicit Parser(std::size_t most_body) {
     beast.eager(true);
     beast.header_limit(longest_header);
-    beast.body_limit(longest_body);
+    beast.body_limit(most_body);
   }
 };
 
-HttpReader::HttpReader() : parser_(std::make_unique<Parser>()) {}
+HttpReader::HttpReader(std::size_t most_body)
+    : most_body_(std::min(most_body, longest_body)), parser_(std::make_unique<Parser>(most_body_)) {}
 HttpReader::~HttpReader() = default;
 
 void HttpReader::feed(std::span<const std::byte> received) {
@@ -66,12 +68,12 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
       if (buffer_.size() > longest_unread) return tl::unexpected(HttpRefusal{400, "a chunk's header never ends"});
       break;
     }
-    if (ec) return tl::unexpected(refusal_of(ec));
+    if (ec) return tl::unexpected(refusal_of(ec, most_body_));
     if (used == 0) break;
   }
   if (!parser_->beast.is_done()) return std::optional<HttpRequest>{};
   auto message = parser_->beast.release();
-  parser_ = std::make_unique<Parser>();
+  parser_ = std::make_unique<Parser>(most_body_);
   continued_ = false;
   return request_from(std::move(message));
 }

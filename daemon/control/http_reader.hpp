@@ -26,7 +26,8 @@ class HttpReader {
  public:
   static constexpr std::size_t longest_header = 8192, longest_body = std::size_t{1} << 20;
 
-  HttpReader();
+  /// `most_body`: bytes, at most longest_body.
+  explicit HttpReader(std::size_t most_body = longest_body);
   ~HttpReader();
   void feed(std::span<const std::byte> received);
   /// The next whole request; nullopt = more bytes are needed; a refusal is final.
@@ -38,6 +39,7 @@ class HttpReader {
 
  private:
   struct Parser;
+  std::size_t most_body_;
   std::unique_ptr<Parser> parser_;
   std::string buffer_;
   bool continued_ = false;

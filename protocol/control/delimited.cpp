@@ -17,9 +17,9 @@ Result<std::optional<std::vector<std::byte>>> DelimitedParser::next() {
     ++used;
     if ((byte & 0x80) == 0) break;
   }
-  if (length > largest_message)
-    return failure(ErrorKind::bad_data,
-                   "control stream: a message of " + std::to_string(length) + " bytes exceeds the limit of 1 MiB");
+  if (length > most_)
+    return failure(ErrorKind::bad_data, "control stream: a message of " + std::to_string(length) +
+                                            " bytes exceeds the limit of " + std::to_string(most_));
   if (buffer_.size() - start_ - used < length) return std::optional<std::vector<std::byte>>{};
   const auto first = buffer_.begin() + static_cast<std::ptrdiff_t>(start_ + used);
   std::vector<std::byte> message(first, first + static_cast<std::ptrdiff_t>(length));

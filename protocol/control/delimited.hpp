@@ -2,6 +2,7 @@
 // Source: protobuf encoding guide, "varint"; the cap is ours (control.proto).
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -16,11 +17,14 @@ class DelimitedParser {
  public:
   static constexpr std::size_t largest_message = 1u << 20;
 
+  /// `most`: bytes of a message, at most largest_message.
+  explicit DelimitedParser(std::size_t most = largest_message) : most_(std::min(most, largest_message)) {}
   void feed(std::span<const std::byte> received) { buffer_.insert(buffer_.end(), received.begin(), received.end()); }
   /// The next whole message; nullopt = more bytes are needed; an error is final: the stream has no meaning after it.
   Result<std::optional<std::vector<std::byte>>> next();
 
  private:
+  std::size_t most_;
   std::vector<std::byte> buffer_;  // never longer than one message and one read
   std::size_t start_ = 0;          // of the next message
 };

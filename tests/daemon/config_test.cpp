@@ -171,17 +171,19 @@ TEST(Config, LimitsAndPriorityAreRead) {
   EXPECT_EQ(usual->limits.spare_descriptors, 32);
   EXPECT_EQ(usual->engine.io_priority, 0);
   const auto c = parse(base +
-                       "limits: {clients: 7, control_clients: 3, input_bytes_per_s: 4096, stall_s: 0.5, dead_peer_s: 4,"
+                       "limits: {clients: 7, control_clients: 3, input_bytes_per_s: 4096, control_message_bytes: 2048, stall_s: 0.5, dead_peer_s: 4,"
                        " spare_descriptors: 9}\nengine: {io_priority: 5}\n");
   ASSERT_TRUE(c) << c.error().text;
   EXPECT_EQ(c->limits.clients, 7);
   EXPECT_EQ(c->limits.control_clients, 3);
   EXPECT_EQ(c->limits.input_bytes_per_s, 4096u);
+  EXPECT_EQ(c->limits.control_message_bytes, 2048u);
   EXPECT_EQ(c->limits.stall, std::chrono::milliseconds(500));
   EXPECT_EQ(c->limits.dead_peer, std::chrono::seconds(4));
   EXPECT_EQ(c->limits.spare_descriptors, 9);
   EXPECT_EQ(c->engine.io_priority, 5);
   EXPECT_THAT(why(base + "limits: {clients: 0}\n"), HasSubstr("limits.clients"));
+  EXPECT_THAT(why(base + "limits: {control_message_bytes: 1048577}\n"), HasSubstr("limits.control_message_bytes"));
   EXPECT_THAT(why(base + "limits: {dead_peer_s: 1}\n"), HasSubstr("limits.dead_peer_s"));
   EXPECT_THAT(why(base + "limits: {stal_s: 1}\n"), HasSubstr("stall_s"));
   EXPECT_THAT(why(base + "engine: {io_priority: 100}\n"), HasSubstr("engine.io_priority"));

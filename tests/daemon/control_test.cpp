@@ -244,7 +244,10 @@ TEST(Delimited, RefusesLengthsBeyondTheCap) {
   parser.feed(length);
   const auto r = parser.next();
   ASSERT_FALSE(r);
-  EXPECT_THAT(r.error().text, HasSubstr("1 MiB"));
+  EXPECT_THAT(r.error().text, HasSubstr("limit of 1048576"));
+  DelimitedParser careful(100);
+  careful.feed(Bytes{std::byte{101}});
+  EXPECT_FALSE(careful.next());
   DelimitedParser endless;
   endless.feed(Bytes(6, std::byte{0xff}));
   ASSERT_FALSE(endless.next());

@@ -98,6 +98,14 @@ TEST(HttpReader, EndlessChunkHeadersAndTrailersAreBounded) {
   EXPECT_NE(take(trailers, 16384).refused, 0u);
 }
 
+TEST(HttpReader, BodiesAreBoundedAsConfigured) {
+  HttpReader reader(100);
+  reader.feed(bytes_of("POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 101\r\n\r\n" + std::string(101, ' ')));
+  const auto next = reader.next();
+  ASSERT_FALSE(next);
+  EXPECT_EQ(next.error().status, 413u);
+}
+
 TEST(HttpReader, WaitingClientsAreToldToGoOnOnce) {
   HttpReader reader;
   EXPECT_FALSE(reader.begun());

@@ -164,7 +164,7 @@ TEST(ControlHttp, BodiesAndHeadersAreBounded) {
     const auto answer = client.next();
     EXPECT_EQ(answer.status, 413);
     EXPECT_THAT(answer.head, HasSubstr("Connection: close"));
-    EXPECT_THAT(answer.document()["text"].get<std::string>(), HasSubstr("1 MiB"));
+    EXPECT_THAT(answer.document()["text"].get<std::string>(), HasSubstr("1048576 bytes"));
   }
   {
     HttpClient client(bench);
