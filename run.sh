@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs sonard. usage: ./run.sh [sonard arguments...]   without arguments: the demo, until Ctrl-C
 #        ./run.sh --check   runs the demo by itself: 20 pings over TCP, a picture in out/demo.png, the figures; exit code 0 or not
+#        ./run.sh --package makes Debian packages in build/release
 set -u -o pipefail
 cd "$(dirname "$0")" || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -8,13 +9,18 @@ cd "$(dirname "$0")" || exit 70
 
 case "${1:-}" in
   -h | --help)
-    sed -n '2,3s/^# //p' "$0"
+    sed -n '2,4s/^# //p' "$0"
     exit 0
     ;;
   --check)
     setup_and_build sonard sonarctl || exit
     say "checking the demo"
     exec tests/tools/check_demo.sh build/release
+    ;;
+  --package)
+    # What the packages depend on is read from the programs by tools of dpkg-dev; without them it would be left out.
+    setup_and_build && need_packages dpkg-dev && cd build/release && cpack -G DEB && say "packages" && ls -1 "$PWD"/*.deb
+    exit
     ;;
 esac
 

@@ -22,11 +22,7 @@ show() {  # show COMMAND...: prints it as typed, then runs it
 }
 
 if [ "${1:-}" = --package ]; then
-  # shellcheck source=tests/tools/setup.sh
-  . tests/tools/setup.sh
-  { setup_and_build sonard sonarctl && need_packages dpkg-dev && cmake --build build/release --parallel "$(build_jobs)"; } >"$scratch/build" 2>&1 ||
-    { tail -n 40 "$scratch/build" >&2; exit 1; }
-  (cd build/release && cpack -G DEB >"$scratch/cpack" 2>&1) || { cat "$scratch/cpack" >&2; exit 1; }
+  ./run.sh --package >"$scratch/build" 2>&1 </dev/null || { tail -n 40 "$scratch/build" >&2; exit 1; }
   show "apt-get install -y -qq ./build/release/sonard_0.1.0_amd64.deb >/dev/null && which sonard sonarctl"
 else
   folder=$(cd "${1:-build/release}" && pwd) || exit 66
