@@ -11,6 +11,7 @@ import re
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -19,6 +20,9 @@ from oculus_reader import HEADER, Client, Ping, fire_message
 from pcap_writer import Capture, pieces
 from running_sonard import BUILD, ROOT, Sonard
 from tshark import messages, tshark, why_not
+
+sys.path.insert(0, str(ROOT / "tests/reliability"))
+from record import record  # noqa: E402  the folder above
 
 GOLDEN = ROOT / "tests/protocol/oculus/golden"
 WHY_NOT = why_not()
@@ -202,6 +206,8 @@ class RecordedRun(Dissected):
             for piece in pieces(block, iter(lambda: dice.choice([1, 2, 15, 16, 17, 100, 1448, 9000, 60000]), 0)):
                 capture.tcp(sender, piece)
         self.check_run(self.dissect(capture), status, streams, sent, junk_runs)
+        record("dissector", f"{1 + sum(len(s) for s in sent.values())} messages, every field equal", "equal, field by field", True,
+               "python3 tests/acceptance/dissector_test.py")
 
     def check_run(self, found, status, streams, sent, junk_runs):
         self.assertGreater(junk_runs, 2)

@@ -5,7 +5,8 @@
 #   asan-all  the same over the whole functional suite, the shipped programs and the BlueView call sequences among it
 #   tsan      threads: protocol, control, daemon, clients, the BlueView call sequences, the pool, and the CPU pipeline over analytic
 #             rays in place of Embree
-# With targets only those test programs. Reports are in the output; the exit status is 1 when there was any.
+# With targets only those test programs. Reports are in the output; the exit status is 1 when there was any. Figures of sanitized
+# programs are kept nowhere: SONARD_RELIABILITY gets the one line that says how all this ended.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -14,7 +15,7 @@ cd "$(dirname "$0")/../.." || exit 70
 kind=asan
 case "${1:-}" in
   asan | asan-all | tsan) kind=$1; shift ;;
-  -h | --help) sed -n '2,8s/^# //p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,9s/^# //p' "$0"; exit 0 ;;
 esac
 preset=${kind%-all}
 
@@ -30,8 +31,15 @@ case $kind in
     ;;
   tsan) wanted='^tests/(protocol|daemon|clients)/.*_test$|/base_test$|/analytic_rays_test$' ;;
 esac
-# Through ctest: the shipped programs. Rendering and determinism compute for long again.
-programs='^acceptance\.(commands|protocol|mirror|blueview_link|demo)$|^bvtsdk\.sequences$'
+# Through ctest: the shipped programs. Not among them, with the reasons:
+#   render, determinism, picture, capture_comparison   compute for long; rendering and pictures are sounded by the test programs
+#   service, package, container                        judge unit, archive and image files, not a program of ours at run time
+#   bench                                              measures speed, by the same engine as the others
+#   the Python client alone and without numpy          no program of ours takes part
+acceptance=(commands protocol mirror blueview_link demo life_cycle control reload status doctor view completion scene_command
+  dissector driver_example first_minutes)
+programs="^acceptance\.($(IFS='|'; echo "${acceptance[*]}"))\$"
+programs+='|^load\.(descriptors|real_pings)$|^python_client\.with_daemon$|^bvtsdk\.sequences$'
 [ "$kind" != tsan ] || programs='^bvtsdk\.sequences$'
 
 need_packages "${build_packages[@]}" && configure "$preset" || exit
@@ -40,11 +48,13 @@ more=()
 if [ ${#targets[@]} -eq 0 ]; then
   mapfile -t targets < <(ninja -C "build/$preset" -t targets all | sed -n 's/: CXX_EXECUTABLE_LINKER.*//p' |
     grep -E "$wanted" | grep -vE "$left_out")
-  [ "$kind" = asan ] || more=(sonard sonarctl bvtsdk_programs)
+  [ "$kind" = asan ] || more=(sonard sonarctl dump_oculus bvtsdk_programs)
 fi
 [ ${#targets[@]} -gt 0 ] || { echo "no test program matches $wanted" >&2; exit 1; }
 build "$preset" "${targets[@]}" "${more[@]}" || exit
 
+figures=${SONARD_RELIABILITY:-}
+unset SONARD_RELIABILITY
 # A refused huge length must not be a sanitizer's failure. Suppressions: third-party libraries only, with their reasons.
 export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
 export UBSAN_OPTIONS=print_stacktrace=1
@@ -65,6 +75,7 @@ for i in "${!targets[@]}"; do
       [ -d "tests/fuzz/corpus/$input" ] && given+=("tests/fuzz/corpus/$input")
       "$program" "${given[@]}" || failed+=("$name")
       ;;
+    load_test) "$program" --quick --gtest_brief=1 </dev/null || failed+=("$name") ;;
     *) "$program" --gtest_brief=1 </dev/null || failed+=("$name") ;;
   esac
 done
@@ -74,7 +85,8 @@ fi
 
 printf '\n%d programs under %s in %d s, failed: %s\n' ${#targets[@]} "$kind" $((SECONDS - started)) "${failed[*]:-none}"
 if [ ${#more[@]} -gt 0 ]; then
-  python3 tests/reliability/record.py "$preset" "${#targets[@]} test programs, ${#failed[@]} with a report" "no report" \
+  SONARD_RELIABILITY=$figures python3 tests/reliability/record.py "$preset" \
+    "${#targets[@]} test programs and the shipped ones, ${#failed[@]} with a report" "no report" \
     "$([ ${#failed[@]} -eq 0 ] && echo yes || echo no)" "tests/tools/sanitized_tests.sh $kind"
 fi
 [ ${#failed[@]} -eq 0 ]
