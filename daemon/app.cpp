@@ -44,6 +44,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       control_(io_, config_.control, config_.limits, operations_, events_, pose_intake_, log_),
       signals_(io_),
       house_timer_(io_),
+      stop_timer_(io_),
       notify_(
           io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {}
 
@@ -83,7 +84,9 @@ std::string App::status_line() const {
 void App::wait_for_signal() {
   signals_.async_wait([this](const error_code& ec, int signal) {
     if (ec) return;
-    if (signal == SIGHUP) {
+    if (signal == SIGHUP && stopping_) {
+      on_change();  // look() may have cancelled before we wait again
+    } else if (signal == SIGHUP) {
       reload();
     } else {
       if (stopping_) ::_exit(128 + signal);
@@ -106,6 +109,11 @@ void App::stop(const std::string& why) {
   house_timer_.cancel();
   changes_.stop();
   fleet_.stop();
+  // Clients have been sent away by then. What still holds us up, a long ping say, is not waited for.
+  stop_timer_.expires_after(stop_limit);
+  stop_timer_.async_wait([this](const error_code& ec) {
+    if (!ec) io_.stop();
+  });
   on_change();
 }
 
@@ -121,8 +129,11 @@ bool App::enough_served() const { return options_.exit_after_pings != 0 && fleet
 
 void App::look() {
   if (stopping_) {
-    // The signal handler is the last thing that keeps run() from returning.
-    if (fleet_.gone()) signals_.cancel();
+    // These two are the last things that keep run() from returning.
+    if (fleet_.gone()) {
+      signals_.cancel();
+      stop_timer_.cancel();
+    }
     return;
   }
   if (clock_.stepped()) return step_time();

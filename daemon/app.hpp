@@ -41,6 +41,9 @@ struct AppOptions {
 
 class App {
  public:
+  /// After stop() run() returns by then, whatever is still under way.
+  static constexpr std::chrono::milliseconds stop_limit{1800};
+
   /// `make_engine` is kept: later scenes get theirs on another thread. What it refers to must outlive the App.
   App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);
 
@@ -56,8 +59,8 @@ class App {
   const Config& config() const { return config_; }
   const Scene& scene() const { return *changes_.scene(); }
   const std::string& engine_description() const { return simulator_.engine_description(); }
-  /// After run(): the destructor would wait for a scene that nobody wants any more.
-  bool is_building() const { return changes_.is_building(); }
+  /// After run(): the destructor would wait for a scene or a ping that nobody wants any more.
+  bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0; }
   const PoseServer& poses() const { return pose_server_; }
   const ControlServer& control() const { return control_; }
   const std::list<Device>& devices() const { return fleet_.devices(); }
@@ -97,7 +100,7 @@ class App {
   AppOperations operations_;
   ControlServer control_;
   asio::signal_set signals_;
-  asio::steady_timer house_timer_;
+  asio::steady_timer house_timer_, stop_timer_;
   Notify notify_;
   bool look_posted_ = false, stopping_ = false;
   int exit_code_ = 0;

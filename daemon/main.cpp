@@ -104,7 +104,7 @@ int run(const RunCommand& command, Steady::time_point begin) {
   const int code = app.run();
   std::fputs(summary(app).c_str(), stderr);
   std::fputs(digest_lines(app).c_str(), stdout);
-  if (app.is_building()) {  // a scene that nobody wants any more: not worth waiting for
+  if (app.is_at_work()) {  // on a scene or a ping that nobody wants any more: not worth waiting for
     std::fflush(nullptr);
     std::_Exit(code);
   }

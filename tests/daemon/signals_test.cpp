@@ -47,5 +47,36 @@ TEST(Signals, TerminateStillEndsGracefullyAfterAHangup) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("stopping: terminated"));
 }
 
+TEST(Signals, AHangupThatComesWithTheTerminationDoesNotKeepItAlive) {
+  Daemon daemon(with_signals());
+  daemon.on_io_thread([] {  // both are there before either is taken up
+    ASSERT_EQ(raise(SIGTERM), 0);
+    ASSERT_EQ(raise(SIGHUP), 0);
+  });
+  const auto begin = Steady::now();
+  EXPECT_EQ(daemon.wait(), 0);
+  EXPECT_LT(Steady::now() - begin, App::stop_limit) << "nobody is connected: there is nothing to wait for";
+  EXPECT_THAT(daemon.log_text(), Not(HasSubstr("reload:")));
+}
+
+TEST(Signals, TerminateDoesNotWaitForALongPing) {
+  std::promise<void> begun, let_go;
+  DaemonSetup setup = with_signals();
+  setup.engine_before = [&, once = let_go.get_future().share()](std::uint32_t) {
+    begun.set_value();
+    once.wait();
+  };
+  Daemon daemon(setup);
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz10));
+  ASSERT_EQ(begun.get_future().wait_for(patience), std::future_status::ready);
+  ASSERT_EQ(kill(getpid(), SIGTERM), 0);
+  EXPECT_TRUE(client.read_to_end()) << "a FIN, not a reset";
+  client.close();
+  EXPECT_EQ(daemon.wait(), 0) << "run() returns while the ping is under way";
+  EXPECT_TRUE(daemon.app().is_at_work());
+  let_go.set_value();
+}
+
 }  // namespace
 }  // namespace sonar::testing_daemon
