@@ -40,18 +40,23 @@ class Events {
   using Listener = std::function<void(const control::Event&)>;
   using Token = std::shared_ptr<void>;  // the listener is told as long as its token lives
   [[nodiscard]] Token listen(Listener listener) {
+    forget_the_gone();
     auto kept = std::make_shared<Listener>(std::move(listener));
     listeners_.push_back(kept);
     return kept;
   }
   bool heard() const { return !listeners_.empty(); }  // else nobody need make an event
   void tell(const control::Event& event) {
-    listeners_.remove_if([](const std::weak_ptr<Listener>& l) { return l.expired(); });
+    forget_the_gone();
     for (const std::weak_ptr<Listener>& l : listeners_)
       if (const auto listener = l.lock()) (*listener)(event);
   }
 
  private:
+  void forget_the_gone() {
+    listeners_.remove_if([](const std::weak_ptr<Listener>& l) { return l.expired(); });
+  }
+
   std::list<std::weak_ptr<Listener>> listeners_;
 };
 

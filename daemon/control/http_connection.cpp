@@ -72,7 +72,9 @@ HttpConnection::HttpConnection(ControlContext& context, tcp::socket socket, Send
       stall_(std::make_shared<Deadline>(socket_)),
       wake_reader_(context.io, never),
       wake_writer_(context.io, never),
-      wake_operation_(context.io, never) {
+      wake_operation_(context.io, never),
+      rest_(context.io),
+      reader_(context.limits.control_message_bytes) {
   error_code ec;
   const auto at = socket_.local_endpoint(ec);
   if (!ec && at.address().is_v4()) reached_ = {at.address().to_v4().to_bytes(), at.port()};
@@ -85,6 +87,7 @@ void HttpConnection::close() {
   wake_reader_.cancel();
   wake_writer_.cancel();
   wake_operation_.cancel();
+  rest_.cancel();
 }
 
 void HttpConnection::turn_away(tcp::socket socket) {
@@ -114,9 +117,9 @@ asio::awaitable<void> HttpConnection::read() {
       reader_.feed(std::span(buffer).first(n));
       hand_over();
     }
-    if (const auto pause = rate.pause_after(n, Steady::now()); pause.count() > 0) {
-      asio::steady_timer timer(context_.io, pause);
-      co_await timer.async_wait(into(ec));
+    if (const auto pause = rate.pause_after(n, Steady::now()); pause.count() > 0 && !over()) {
+      rest_.expires_after(pause);
+      co_await rest_.async_wait(into(ec));
     }
   }
   ended_ = true;
@@ -222,9 +225,9 @@ asio::awaitable<HttpAnswer> HttpConnection::carry_out(control::Operation operati
     *result = std::move(done);
     if (const auto self = weak.lock()) self->wake_operation_.cancel();
   });
-  if (!*result) {
+  wake_operation_.expires_after(operation_limit);
+  while (!*result && !over() && wake_operation_.expiry() > Steady::now()) {  // one given up on may be done meanwhile
     error_code ec;
-    wake_operation_.expires_after(operation_limit);
     co_await wake_operation_.async_wait(into(ec));
   }
   if (*result) co_return answer_from(**result);

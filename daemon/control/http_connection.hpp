@@ -48,7 +48,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   Sender sender_;  // the address without the port: every curl has another
   Endpoint reached_;
   std::shared_ptr<Deadline> request_limit_, stall_;
-  asio::steady_timer wake_reader_, wake_writer_, wake_operation_;
+  asio::steady_timer wake_reader_, wake_writer_, wake_operation_, rest_;
   HttpReader reader_;
   std::optional<HttpRequest> request_;  // read, not yet answered
   std::optional<HttpRefusal> refusal_;  // of what cannot be read

@@ -33,6 +33,8 @@ StreamConnection::StreamConnection(ControlContext& context, tcp::socket socket, 
       stall_(std::make_shared<Deadline>(socket_)),
       wake_reader_(context.io, never),
       wake_writer_(context.io, never),
+      rest_(context.io),
+      parser_(context.limits.control_message_bytes),
       rate_(context.limits.input_bytes_per_s) {}
 
 void StreamConnection::close() {
@@ -42,6 +44,7 @@ void StreamConnection::close() {
   greeting_->none();
   wake_reader_.cancel();
   wake_writer_.cancel();
+  rest_.cancel();
 }
 
 // ---- requests
@@ -69,9 +72,9 @@ asio::awaitable<void> StreamConnection::read() {
       while (!over() && answers_.size() + under_way_ >= most_open_requests) co_await wake_reader_.async_wait(into(ec));
     }
     if (!greeted_ && received > longest_before_hello) ending_ = true;
-    if (const auto pause = rate_.pause_after(n, Steady::now()); pause.count() > 0 && !ending_) {
-      asio::steady_timer timer(context_.io, pause);
-      co_await timer.async_wait(into(ec));
+    if (const auto pause = rate_.pause_after(n, Steady::now()); pause.count() > 0 && !ending_ && !over()) {
+      rest_.expires_after(pause);
+      co_await rest_.async_wait(into(ec));
     }
   }
   ending_ = true;

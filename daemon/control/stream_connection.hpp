@@ -46,7 +46,7 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   tcp::socket socket_;
   Sender sender_;
   std::shared_ptr<Deadline> greeting_, stall_;
-  asio::steady_timer wake_reader_, wake_writer_;
+  asio::steady_timer wake_reader_, wake_writer_, rest_;
   control::DelimitedParser parser_;
   InputRate rate_;
   std::deque<control::Bytes> answers_;  // framed

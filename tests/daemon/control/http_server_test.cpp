@@ -268,5 +268,20 @@ TEST(ControlHttp, StopsWithStreamsAndWorkUnderWay) {
   EXPECT_TRUE(events.tcp.ended);
 }
 
+TEST(ControlHttp, StopsWithoutWaitingForThoseWhoSentTooMuch) {
+  LimitConfig limits;
+  limits.input_bytes_per_s = 1024;  // what follows is worth a quarter of a minute
+  ControlBench bench({}, limits);
+  HttpClient talks(bench);
+  talks.tcp.send("POST /api/v1/pose HTTP/1.1\r\nContent-Length: 100000\r\n\r\n" + std::string(30000, ' '));
+  Client streams(bench.address, bench.stream_port());
+  streams.send(std::string("\x04\x12\x02\x08\x01\xa0\x8d\x06") + std::string(30000, ' '));
+  ASSERT_FALSE(streams.read_raw(1).empty()) << "the answer to its Hello";
+  std::this_thread::sleep_for(milliseconds(200));
+  const auto begin = Steady::now();
+  bench.stop();
+  EXPECT_LT(Steady::now() - begin, std::chrono::seconds(8));
+}
+
 }  // namespace
 }  // namespace sonar::testing_daemon
