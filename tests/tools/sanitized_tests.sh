@@ -4,7 +4,7 @@
 #             seeds and made-up inputs; the default, and what .ci/run does
 #   asan-all  the same over the whole functional suite, the shipped programs and the BlueView call sequences among it
 #   tsan      threads: protocol, control, daemon, clients, the BlueView call sequences, the pool, and the CPU pipeline over analytic
-#             rays in place of Embree
+#             rays in place of Embree, alone (analytic_rays_test) and under a whole daemon (daemon_analytic_test, with the daemon's)
 # With targets only those test programs. Reports are in the output; the exit status is 1 when there was any. Figures of sanitized
 # programs are kept nowhere: SONARD_RELIABILITY gets the one line that says how all this ended.
 set -u -o pipefail
