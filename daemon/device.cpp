@@ -104,6 +104,7 @@ void Device::use_initial_settings() {
   protocol::ChangeSettings initial = vendor_.initial_settings(state_);
   settings_ = initial.settings;
   state_.request = initial.request;
+  requests_.clear();  // pings made with those before are nobody's
   requests_[++settings_id_] = std::move(initial.request);
   oldest_wanted_id_ = settings_id_;
 }

@@ -94,12 +94,15 @@ void Device::admit(tcp::socket socket, Admission::Place place) {
 asio::awaitable<void> Device::turn_away(tcp::socket socket, Admission::Place place) {
   error_code ec;
   socket.shutdown(tcp::socket::shutdown_send, ec);
+  bool late = false;
   asio::steady_timer deadline(context_.io, std::chrono::seconds(1));
-  deadline.async_wait([&socket](const error_code& e) {
-    if (!e) socket.cancel();
+  deadline.async_wait([&socket, &late](const error_code& e) {
+    if (e) return;
+    late = true;  // a read that has just ended is past cancelling, and another would have no end
+    socket.cancel();
   });
   std::array<std::byte, 1024> dustbin;
-  for (int reads = 0; !ec && reads < 64; ++reads) co_await socket.async_read_some(asio::buffer(dustbin), into(ec));
+  for (int reads = 0; !ec && !late && reads < 64; ++reads) co_await socket.async_read_some(asio::buffer(dustbin), into(ec));
   deadline.cancel();
   // The handler above must be done with `socket` before this frame goes.
   co_await asio::post(context_.io, asio::use_awaitable);

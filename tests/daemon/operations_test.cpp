@@ -43,7 +43,7 @@ TEST(Status, SaysWhatThereIsAndWhatItDoes) {
   Daemon daemon(setup);
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40, 3));
-  ASSERT_TRUE(sees_range(client, 3));
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(sees_range(client, 3));  // the first is on the books when the second is written
   const control::DaemonStatus s = daemon.status();
   EXPECT_FALSE(s.version.empty());
   EXPECT_EQ(s.config, "test.yaml");
