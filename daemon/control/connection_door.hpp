@@ -38,12 +38,14 @@ class ConnectionDoor {
     error_code ec;
     acceptor_.close(ec);
     places_.close_all();
+    leaving_.close_all();
   }
   /// Port 0 = not listening.
   Endpoint at() const { return at_; }
 
  private:
   static constexpr auto accept_pause = std::chrono::milliseconds(100);
+  static constexpr std::size_t most_leaving = 16;
 
   void keep_accepting() {
     asio::co_spawn(
@@ -81,7 +83,7 @@ class ConnectionDoor {
     });
     if (!room) {
       say_refused(context_, std::to_string(places_.most()) + " connections are open and busy already", sender.id);
-      return Connection::turn_away(std::move(socket));
+      return turn_away(std::move(socket), sender);
     }
     end_when_silent(socket, context_.limits.dead_peer);
     socket.set_option(tcp::no_delay(true), ec);
@@ -90,19 +92,30 @@ class ConnectionDoor {
     run(connection, connection->read());
     run(connection, connection->write());
   }
+  /// It is told why, and lives for a moment; beyond so many it is closed without a word.
+  void turn_away(tcp::socket socket, const Sender& sender) {
+    if (!leaving_.make_room([](const Connection&) {})) return;
+    auto connection = std::make_shared<Connection>(context_, std::move(socket), sender);
+    connection->turn_away();
+    leaving_.add(connection);
+    run(connection, connection->read());
+    run(connection, connection->write());
+  }
   /// One of its coroutines. A fault of ours ends this connection and no other.
   void run(const std::shared_ptr<Connection>& connection, asio::awaitable<void> part) {
     asio::co_spawn(context_.io, std::move(part), [this, connection](std::exception_ptr fault) {
       if (fault) say_fault(context_, fault, connection->sender().id);
       if (fault) connection->close();
-      if (connection->over()) places_.remove(connection);
+      if (!connection->over()) return;
+      places_.remove(connection);
+      leaving_.remove(connection);
     });
   }
 
   ControlContext& context_;
   std::string protocol_;
   tcp::acceptor acceptor_;
-  Places<Connection> places_;
+  Places<Connection> places_, leaving_{most_leaving};
   Endpoint at_;
   bool stopping_ = false;
 };

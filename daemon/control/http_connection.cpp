@@ -90,11 +90,9 @@ void HttpConnection::close() {
   rest_.cancel();
 }
 
-void HttpConnection::turn_away(tcp::socket socket) {
-  error_code ec;
-  socket.non_blocking(true, ec);
-  const std::string bytes = bytes_of(answer_of(503, StatusCode::failed, "too many connections are open"), true, false);
-  socket.write_some(asio::buffer(bytes), ec);
+void HttpConnection::turn_away() {
+  refusal_ = HttpRefusal{503, "too many connections are open"};
+  discards_ = true;
 }
 
 // ---- requests
@@ -169,8 +167,9 @@ asio::awaitable<void> HttpConnection::write() {
     if (std::exchange(continue_asked_, false)) {
       if (!co_await write_whole("HTTP/1.1 100 Continue\r\n\r\n")) break;
     } else if (refusal_) {
-      const HttpAnswer refusal = answer_of(refusal_->status, StatusCode::refused, refusal_->why);
-      say_refused(context_, refusal_->why, sender_.id);
+      const StatusCode code = refusal_->status == 503 ? StatusCode::failed : StatusCode::refused;
+      const HttpAnswer refusal = answer_of(refusal_->status, code, refusal_->why);
+      if (refusal_->status != 503) say_refused(context_, refusal_->why, sender_.id);  // the door has said that
       co_await write_answer(refusal, {false, false, true});
       break;
     } else if (request_) {

@@ -22,8 +22,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   asio::awaitable<void> write();
   void close();
   bool over() const { return !socket_.is_open(); }
-  /// There is no place for it: 503, if its kernel takes that at once.
-  static void turn_away(tcp::socket socket);
+  /// Before it reads: there is no place for it. It says 503 and hears the client out for a moment.
+  void turn_away();
   const Sender& sender() const { return sender_; }
 
   Steady::time_point heard_at = Steady::now();

@@ -26,8 +26,8 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   asio::awaitable<void> write();
   void close();
   bool over() const { return !socket_.is_open(); }
-  /// There is no place for it.
-  static void turn_away(tcp::socket) {}
+  /// Before it reads: there is no place for it.
+  void turn_away() { ending_ = true; }
   const Sender& sender() const { return sender_; }
 
   Steady::time_point heard_at = Steady::now();  // or written to: a subscriber says nothing

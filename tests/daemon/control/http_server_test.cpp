@@ -245,6 +245,22 @@ TEST(ControlHttp, TooManyAreToldSoAndTheSilentGiveWay) {
   EXPECT_TRUE(a.tcp.ended);
 }
 
+TEST(ControlHttp, ThoseTurnedAwayReadWhyWhateverTheyHaveSent) {
+  LimitConfig limits;
+  limits.control_clients = 1;
+  ControlBench bench({}, limits);
+  HttpClient busy(bench);
+  for (int i = 0; i < 10; ++i) {
+    if (busy.get("/healthz").status != 200) break;  // a slow machine: it was silent for a second and gave up its place
+    HttpClient newcomer(bench);
+    newcomer.send("POST", "/api/v1/load", std::string(20000, ' '));
+    const auto answer = newcomer.next();
+    if (answer.status == 400) break;  // likewise
+    ASSERT_EQ(answer.status, 503) << "an answer, not a reset";
+    EXPECT_THAT(answer.body, HasSubstr("too many connections"));
+  }
+}
+
 TEST(ControlHttp, AFaultEndsItsConnectionOnly) {
   ControlBench bench;
   HttpClient unlucky(bench);
