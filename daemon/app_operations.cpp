@@ -103,18 +103,30 @@ void AppOperations::load(const control::LoadScene& asked, const Sender& sender, 
   if (!parts_.load_scene) return done({OperationResult::Code::failed, "this program cannot load scenes", {}});
   if (parts_.changes.is_full()) return done({OperationResult::Code::failed, "64 changes of the scene wait already", {}});
   const std::filesystem::path folder = folder_of(parts_.config);
+  if (!has_scene_name(asked.path))
+    return done(refused("\"" + asked.path.substr(0, 256) + "\" is no scene: their names end in .yaml or .yml"));
   const auto file = find_scene(asked.path, folder);
-  if (asked.path.empty() || !file)
-    return done(refused("no scene file \"" + asked.path.substr(0, 256) + "\"; looked in " + scene_folders(folder)));
-  parts_.changes.submit({[load = parts_.load_scene, file = *file](const ScenePointer&) { return load(file); },
-                         [this, file = *file, sender, done = std::move(done)](const Result<void>& outcome) {
-                           if (outcome) {
-                             parts_.config.scene = file;
-                             for (const std::string& note : parts_.changes.scene()->notes) parts_.log.info(note);
-                             say_change("loaded " + file.name(), sender);
-                           }
-                           done(result_of(outcome));
-                         }});
+  if (!file) return done(refused("no scene file \"" + asked.path.substr(0, 256) + "\"; looked in " + scene_folders(folder)));
+  parts_.changes.submit(
+      {[load = parts_.load_scene, file = *file](const ScenePointer&) { return load(file); },
+       [this, file = *file, quoted = may_be_quoted(*file, folder), sender, done = std::move(done)](const Result<void>& outcome) {
+         if (!outcome && !quoted) return done(without_words(outcome.error(), file, sender));
+         if (outcome) {
+           parts_.config.scene = file;
+           for (const std::string& note : parts_.changes.scene()->notes) parts_.log.info(note);
+           say_change("loaded " + file.name(), sender);
+         }
+         done(result_of(outcome));
+       }});
+}
+
+/// What stands in files anywhere on this computer is nothing for whoever may ask here: it goes to the log.
+OperationResult AppOperations::without_words(const Error& error, const SceneFile& file, const Sender& sender) {
+  parts_.log.warning("scene not loaded: " + error.text, {{"client", sender.id}});
+  OperationResult result = result_of(error);
+  if (error.kind == ErrorKind::unavailable || error.kind == ErrorKind::bug) return result;  // says nothing of the file
+  result.text = file.name() + " is no scene without mistakes; sonard's log says what is wrong with it (docs/control.md)";
+  return result;
 }
 
 /// Its turn comes after the changes before, also where nothing is to be built.

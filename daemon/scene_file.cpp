@@ -1,5 +1,6 @@
 #include "daemon/scene_file.hpp"
 
+#include <algorithm>
 #include <system_error>
 #include <vector>
 
@@ -8,14 +9,17 @@
 namespace sonar {
 namespace {
 
-/// Where the program was put first, so that an unpacked or moved installation finds its own; then the tree it was built from.
+/// Where the program was put first, so that an unpacked or moved installation finds its own; in a build folder links lead to the
+/// tree (CMakeLists.txt), whose place the program does not know.
 std::vector<std::filesystem::path> make_shipped_folders() {
   std::error_code ec;
   std::vector<std::filesystem::path> folders;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ec);
   if (!ec) folders.push_back((program.parent_path() / SONARD_SCENES_FROM_PROGRAM).lexically_normal());
-  for (const char* folder : {SONARD_SCENES_SOURCE, SONARD_SCENES_INSTALLED}) folders.emplace_back(folder);
+  folders.emplace_back(SONARD_SCENES_INSTALLED);
   std::erase_if(folders, [&](const std::filesystem::path& folder) { return !std::filesystem::is_directory(folder, ec); });
+  for (std::filesystem::path& folder : folders)
+    if (auto real = std::filesystem::canonical(folder, ec); !ec) folder = std::move(real);
   return folders;
 }
 const std::vector<std::filesystem::path>& shipped_folders() {
@@ -23,7 +27,25 @@ const std::vector<std::filesystem::path>& shipped_folders() {
   return folders;
 }
 
+/// Links followed. The root holds everything: it is nobody's folder of scenes.
+bool is_below(const std::filesystem::path& file, const std::filesystem::path& folder) {
+  std::error_code ec;
+  const auto real = std::filesystem::canonical(file, ec);
+  if (ec) return false;
+  const auto top = std::filesystem::canonical(folder.empty() ? std::filesystem::path(".") : folder, ec);
+  if (ec || top == top.root_path()) return false;
+  return std::mismatch(top.begin(), top.end(), real.begin(), real.end()).first == top.end();
+}
+
 }  // namespace
+
+bool has_scene_name(const std::filesystem::path& given) { return given.extension() == ".yaml" || given.extension() == ".yml"; }
+
+bool may_be_quoted(const SceneFile& file, const std::filesystem::path& directory) {
+  if (file.built_in || is_below(file.path, directory)) return true;
+  const auto& shipped = shipped_folders();
+  return std::any_of(shipped.begin(), shipped.end(), [&](const auto& folder) { return is_below(file.path, folder); });
+}
 
 std::optional<SceneFile> find_scene(const std::filesystem::path& given, const std::filesystem::path& directory) {
   std::error_code ec;

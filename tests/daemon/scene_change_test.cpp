@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <filesystem>
+#include <fstream>
 
 #include "tests/daemon/loopback.hpp"
 
@@ -12,6 +14,7 @@ namespace {
 
 using oculus::PingRate;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using Code = OperationResult::Code;
 
 /// Holds whoever passes until it is opened.
@@ -183,6 +186,29 @@ TEST(SceneChange, AFailureChangesNothing) {
   EXPECT_THAT(daemon.status().scene, HasSubstr("scene.yaml"));
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
   for (const ScenePointer& scene : daemon.scenes()) EXPECT_EQ(scene->objects.size(), 2u);
+}
+
+TEST(SceneChange, WordsOfFilesElsewhereStayHere) {
+  const std::string file = ::testing::TempDir() + "secret" + std::to_string(::getpid()) + ".yaml";
+  std::ofstream(file) << "password\n";
+  DaemonSetup setup;
+  setup.options.load_scene = [](const SceneFile& f) -> Result<ScenePointer> {  // as the loader does
+    std::string word;
+    std::ifstream(f.path) >> word;
+    return failure(ErrorKind::bad_data, f.name() + ":1:1: expected a map, found \"" + word + "\"");
+  };
+  Daemon daemon(setup);
+  for (const char* other : {"/etc/passwd", "", "/proc/self/environ"}) {
+    const OperationResult refused = daemon.ask(control::LoadScene{other});
+    EXPECT_EQ(refused.code, Code::refused);
+    EXPECT_THAT(refused.text, HasSubstr("their names end in .yaml or .yml"));
+  }
+  const OperationResult answer = daemon.ask(control::LoadScene{file});
+  EXPECT_EQ(answer.code, Code::failed);
+  EXPECT_THAT(answer.text, HasSubstr(file + " is no scene without mistakes; sonard's log"));
+  EXPECT_THAT(answer.text, Not(HasSubstr("password")));
+  EXPECT_THAT(daemon.log_text(), HasSubstr("password"));
+  std::filesystem::remove(file);
 }
 
 TEST(SceneChange, ALoadedSceneKeepsThePosesOfBodiesItAlsoHas) {

@@ -82,6 +82,28 @@ TEST(SceneFile, AFileOnDiskComesBeforeTheBuiltInScene) {
   EXPECT_FALSE(find_scene("nowhere.yaml", here.path));
 }
 
+TEST(SceneFile, OnlyTheConfigurationsFolderAndTheShippedScenesMayBeQuoted) {
+  const EmptyFolder here, elsewhere;
+  std::ofstream(elsewhere.path / "secret.yaml") << "password\n";
+  std::ofstream(here.path / "mine.yaml") << "name: mine\n";
+  std::filesystem::create_symlink(elsewhere.path / "secret.yaml", here.path / "link.yaml");
+  std::filesystem::current_path(here.path);
+  EXPECT_TRUE(may_be_quoted({here.path / "mine.yaml"}, here.path));
+  EXPECT_TRUE(may_be_quoted({"mine.yaml"}, {})) << "the working directory, of a configuration named without a folder";
+  EXPECT_TRUE(may_be_quoted({scenes / "tank-rod.yaml"}, here.path));
+  EXPECT_TRUE(may_be_quoted({"demo.yaml", true}, here.path));
+  EXPECT_FALSE(may_be_quoted({elsewhere.path / "secret.yaml"}, here.path));
+  EXPECT_FALSE(may_be_quoted({here.path / "link.yaml"}, here.path));
+  EXPECT_FALSE(may_be_quoted({here.path / ".." / elsewhere.path.filename() / "secret.yaml"}, here.path));
+  EXPECT_FALSE(may_be_quoted({elsewhere.path / "secret.yaml"}, "/")) << "a service's working directory";
+}
+
+TEST(SceneFile, NamesOfScenesAreNames) {
+  for (const char* name : {"demo.yaml", "/a/b.yml", "../c.yaml"}) EXPECT_TRUE(has_scene_name(name)) << name;
+  for (const char* name : {"", "/etc/passwd", "token", ".yaml", "a.yaml/b", "a.yaml.txt"})
+    EXPECT_FALSE(has_scene_name(name)) << name;
+}
+
 TEST(SceneFile, TheDemoRunsOverTheBuiltInSceneWhateverFilesThereAre) {
   const EmptyFolder here;
   std::ofstream(here.path / "demo.yaml") << "name: mine\n";
