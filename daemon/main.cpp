@@ -13,6 +13,7 @@
 #include "daemon/banner.hpp"
 #include "daemon/bench.hpp"
 #include "daemon/command_line.hpp"
+#include "daemon/control/token.hpp"
 #include "daemon/effective_switches.hpp"
 #include "daemon/real_time.hpp"
 #include "daemon/render/render_command.hpp"
@@ -114,6 +115,11 @@ int run(const RunCommand& command, Steady::time_point begin) {
 int check(const CheckCommand& command) {
   const auto config = load_config(command.config);
   if (!config) return complain(config.error());
+  if (!config->control.token_file.empty()) {
+    std::string warning;
+    if (const auto token = Token::read(config->control.token_file, warning); !token) return complain(token.error());
+    if (!warning.empty()) std::fprintf(stderr, "sonard: %s\n", warning.c_str());
+  }
   const auto scene = load_scene(config->scene);
   if (!scene) return complain(scene.error());
   std::printf("%s: ok, %zu sonar(s); scene %s: ok, %zu triangles\n", command.config.c_str(), config->sonars.size(),

@@ -73,6 +73,16 @@ class Mistakes(unittest.TestCase):
         self.expect(check(GOOD.replace("m1200d", "m1200")), 78, "oculus-m1200d")
         self.expect(check(GOOD.replace("demo.yaml", "demi.yaml")), 78, "test.yaml:1:", "world.scene", "no such file")
 
+    def test_a_token_that_cannot_be_used_is_78(self):
+        with tempfile.TemporaryDirectory() as folder:
+            token = pathlib.Path(folder) / "token"
+            text = GOOD + f"control: {{token_file: {token}}}\n"
+            self.expect(check(text), 78, "control.token_file", "cannot be read; make one")
+            token.write_text("short\n", encoding="utf-8")
+            self.expect(check(text), 78, "control.token_file", "at least 16 characters")
+            token.write_text("abcdefgh01234567\n", encoding="utf-8")
+            self.expect(check(text), 0)
+
     def test_a_broken_scene_is_65_with_its_place(self):
         with tempfile.TemporaryDirectory() as folder:
             scene = pathlib.Path(folder) / "scene.yaml"
