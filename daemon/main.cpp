@@ -57,7 +57,16 @@ int compute_threads(const EngineConfig& engine) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
+/// Of this thread, and of all that are started from now on. A hangup that nobody handles would end us without a word.
+void let_hangups_through(bool let) {
+  sigset_t hangup;
+  sigemptyset(&hangup);
+  sigaddset(&hangup, SIGHUP);
+  pthread_sigmask(let ? SIG_UNBLOCK : SIG_BLOCK, &hangup, nullptr);
+}
+
 int run(const RunCommand& command, Steady::time_point begin) {
+  let_hangups_through(false);     // one that comes while the scene loads waits until there is somebody to take it
   std::signal(SIGPIPE, SIG_IGN);  // nobody reads the log any more (sonard 2>&1 | head): no reason to leave the clients
   raise_descriptor_limit();
   auto found = find_config(command);
@@ -102,7 +111,9 @@ int run(const RunCommand& command, Steady::time_point begin) {
   std::fputs(banner(app, {found->how, scene_ms}).c_str(), stderr);
   std::fputs(ready_line(app, seconds_since(begin)).c_str(), stderr);
 
+  let_hangups_through(true);
   const int code = app.run();
+  let_hangups_through(false);
   std::fputs(summary(app).c_str(), stderr);
   std::fputs(digest_lines(app).c_str(), stdout);
   if (app.is_at_work()) {  // on a scene or a ping that nobody wants any more: not worth waiting for

@@ -315,6 +315,13 @@ class ExitCodes(unittest.TestCase):
                     self.assertIn(variable, result.stderr)
                     self.assertNotIn("--" + variable[7:].lower().replace("_", "-"), result.stderr)
 
+    def test_a_hangup_while_it_stops_changes_nothing(self):
+        with Sonard() as daemon:
+            daemon.process.send_signal(signal.SIGTERM)
+            while daemon.process.poll() is None:
+                daemon.process.send_signal(signal.SIGHUP)
+                time.sleep(0.001)
+            self.assertEqual(daemon.process.returncode, 0)
 
 if __name__ == "__main__":
     unittest.main()

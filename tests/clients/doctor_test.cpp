@@ -54,7 +54,9 @@ Facts healthy() {
   facts.status.waited_s = 2.5;
   facts.control.at = {"127.0.0.1", 14770};
   facts.control.status = daemon_of("127.0.0.2");
-  facts.http = {{"127.0.0.1", 8088}, false, 200, "ok"};
+  facts.http.at = {"127.0.0.1", 8088};
+  facts.http.code = 200;
+  facts.http.text = "ok";
   facts.kernel_ports = {true, 32768, 60999, "52100,52102"};
   return facts;
 }
