@@ -66,7 +66,7 @@ class Installed:
             config.write_text(text.replace("ADDRESS", free_address()).replace("SCENE", "nowhere.yaml"), encoding="utf-8")
             error = run(self.program("sonard"), "check", config).stderr
             looked = error.split("looked in ")[1]
-            first = looked.split(", ")[1].split(" and ")[0].strip()
+            first = looked.strip().replace(" and ", ", ").split(", ")[1]
             self.assertEqual(pathlib.Path(first).resolve(), (self.root / self.prefix / "share/sonard/scenes").resolve(), error)
 
     def test_the_example_configuration_is_valid(self):
