@@ -1,7 +1,7 @@
 // What rays see: the scene's triangles behind a bounding-volume hierarchy (Embree, in embree_scene.cpp and nowhere else).
 // Static geometry is built once at high quality relative to `origin()`; moving bodies are instances, re-placed per ping. The seam
-// for another tracer is the linker: a program that defines the members of RayScene itself is linked without Embree's, as the tests
-// do that trace analytic primitives under the thread sanitizer (tests/core/pipeline/analytic_rays.cpp).
+// for another tracer is the linker: a program that defines the members of RayScene itself is linked without Embree's, as the
+// tests do that trace analytic primitives under the thread sanitizer (tests/core/pipeline/analytic_rays.cpp).
 #pragma once
 
 #include <cstdint>
