@@ -110,7 +110,7 @@ struct Scene {
   WaterColumn water_column;
   std::vector<OtherSonar> other_sonars;
   std::optional<Vec3d> ray_origin;  // of a scene changed while it ran: as before (core/scene/ray_origin.hpp)
-  std::vector<std::string> notes;  // what the loader did that its user should know, one sentence each
+  std::vector<std::string> notes;   // what the loader did that its user should know, one sentence each
 
   /// Where an object sits in its body; in the world for a static one.
   Pose in_body(const Object& object) const {

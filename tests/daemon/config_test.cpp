@@ -171,7 +171,8 @@ TEST(Config, LimitsAndPriorityAreRead) {
   EXPECT_EQ(usual->limits.spare_descriptors, 32);
   EXPECT_EQ(usual->engine.io_priority, 0);
   const auto c = parse(base +
-                       "limits: {clients: 7, control_clients: 3, input_bytes_per_s: 4096, control_message_bytes: 2048, stall_s: 0.5, dead_peer_s: 4,"
+                       "limits: {clients: 7, control_clients: 3, input_bytes_per_s: 4096, control_message_bytes: 2048, stall_s: "
+                       "0.5, dead_peer_s: 4,"
                        " spare_descriptors: 9}\nengine: {io_priority: 5}\n");
   ASSERT_TRUE(c) << c.error().text;
   EXPECT_EQ(c->limits.clients, 7);
@@ -334,7 +335,9 @@ TEST(ConfigControl, DefaultsAreOnLoopbackAndGiveWay) {
 }
 
 TEST(ConfigControl, ReadsItsKeysAndRefusesStrangersWithoutAToken) {
-  const auto with = [](const std::string& control) { return parse(two_sonars("", "192.168.2.5") + "control: " + control + "\n"); };
+  const auto with = [](const std::string& control) {
+    return parse(two_sonars("", "192.168.2.5") + "control: " + control + "\n");
+  };
   const auto config = with("{stream: off, http: '127.0.0.9:0', hosts: [sonar-lab], token_file: secret}");
   ASSERT_TRUE(config) << config.error().text;
   EXPECT_FALSE(config->control.stream.enabled);
