@@ -29,7 +29,7 @@ std::vector<control::ObjectStatus> objects_of(const Scene& scene, const World& w
 std::string AppOperations::metrics() const {
   DaemonFigures f;
   f.version = SONARD_VERSION;
-  f.uptime_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+  f.uptime_s = seconds(std::chrono::steady_clock::now() - started_);
   for (const Device& d : parts_.fleet.devices()) f.sonars.emplace_back(d.config().name, d.figures());
   f.poses = parts_.world.counters();
   f.clients_now = parts_.admission.now();
@@ -59,7 +59,7 @@ control::DaemonStatus AppOperations::status() const {
   s.clock = parts_.clock.stepped() ? "stepped" : "realtime";
   s.engine = parts_.simulator.engine_description();
   s.seed = config.seed;
-  s.uptime_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+  s.uptime_s = seconds(std::chrono::steady_clock::now() - started_);
   s.resident_mb = static_cast<double>(figures_of_this_process().resident_bytes) / 1e6;
   for (const Device& d : parts_.fleet.devices()) s.sonars.push_back(d.status(now));
   for (std::size_t v = 0; v < config.vehicles.size(); ++v)

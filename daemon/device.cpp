@@ -181,8 +181,7 @@ void Device::on_timer() {
 }
 
 void Device::step(Time now) {
-  if (const auto due = pacer_.next_tick(); due && now >= *due)
-    figures_.lateness.add(std::chrono::duration<double>(now - *due).count());
+  if (const auto due = pacer_.next_tick(); due && now >= *due) figures_.lateness.add(seconds(now - *due));
   if (pacer_.fire(now, busy_)) ping(pacer_.last_tick());
 }
 

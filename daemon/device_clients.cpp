@@ -174,7 +174,6 @@ void add(DeviceFigures& f, const Session& s) {
 void Device::on_written(Session&, const Outbox::Message& message) {
   if (message.ping != 0) {
     const Time now = context_.clock.now();
-    const auto seconds = [](std::chrono::nanoseconds d) { return std::chrono::duration<double>(d).count(); };
     figures_.latency.add(seconds(now - message.fired_at));
     if (message.ping > last_served_.ping) {
       if (last_served_.ping != 0)

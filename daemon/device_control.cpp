@@ -23,8 +23,7 @@ control::SonarFigures told(const DeviceFigures& f) {
 }
 
 control::ClientStatus told(const Session& s) {
-  return {s.client(), s.outbox().pings_written(), s.outbox().pings_dropped(), s.bytes_written(),
-          std::chrono::duration<double>(s.connected_for()).count()};
+  return {s.client(), s.outbox().pings_written(), s.outbox().pings_dropped(), s.bytes_written(), seconds(s.connected_for())};
 }
 
 }  // namespace

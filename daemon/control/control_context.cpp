@@ -14,4 +14,17 @@ void say_fault(ControlContext& context, const std::exception_ptr& fault, const s
     context.log.error("internal fault: " + text_of(fault) + " (please report it)", {{"at", at}, {"unsaid", unsaid}});
 }
 
+asio::awaitable<bool> write_whole(ControlContext& context, tcp::socket& socket, Deadline& stall, const Sender& to,
+                                  asio::const_buffer bytes) {
+  while (bytes.size() > 0) {
+    error_code ec;
+    stall.within(context.limits.stall);
+    bytes += co_await socket.async_write_some(asio::buffer(bytes), into(ec));
+    if (stall.passed()) say_refused(context, "it reads nothing", to.id);
+    if (ec || !socket.is_open()) co_return false;
+  }
+  stall.none();
+  co_return true;
+}
+
 }  // namespace sonar

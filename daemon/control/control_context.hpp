@@ -57,4 +57,8 @@ class Deadline : public std::enable_shared_from_this<Deadline> {
   bool passed_ = false;
 };
 
+/// False when the client is gone, or took no byte for limits.stall. What it is given must live until it is done.
+asio::awaitable<bool> write_whole(ControlContext& context, tcp::socket& socket, Deadline& stall, const Sender& to,
+                                  asio::const_buffer bytes);
+
 }  // namespace sonar

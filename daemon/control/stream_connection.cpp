@@ -189,19 +189,10 @@ asio::awaitable<void> StreamConnection::write() {
   close();
 }
 
-/// False when the client is gone, or took no byte for limits.stall.
 asio::awaitable<bool> StreamConnection::write_whole(control::Bytes bytes) {
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    error_code ec;
-    stall_->within(context_.limits.stall);
-    done += co_await socket_.async_write_some(asio::buffer(bytes.data() + done, bytes.size() - done), into(ec));
-    if (stall_->passed()) say_refused(context_, "it reads nothing", sender_.id);
-    if (ec || over()) co_return false;
-  }
-  stall_->none();
-  heard_at = Steady::now();
-  co_return true;
+  const bool whole = co_await sonar::write_whole(context_, socket_, *stall_, sender_, asio::buffer(bytes));
+  if (whole) heard_at = Steady::now();
+  co_return whole;
 }
 
 }  // namespace sonar
