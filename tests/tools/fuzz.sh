@@ -19,6 +19,9 @@ if [ ${#names[@]} -eq 0 ]; then
 fi
 [ ${#names[@]} -gt 0 ] || { echo "no fuzz target" >&2; exit 1; }
 
+# A third-party library's leak is no finding; each has its reason there.
+export LSAN_OPTIONS="suppressions=$PWD/tests/tools/lsan.supp"
+
 # figure NAME LOG: one number of libFuzzer's last words.
 figure() { sed -n "s/^stat::$1: *//p" "$2" | tail -n 1; }
 

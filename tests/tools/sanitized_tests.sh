@@ -57,6 +57,7 @@ figures=${SONARD_RELIABILITY:-}
 unset SONARD_RELIABILITY
 # A refused huge length must not be a sanitizer's failure. Suppressions: third-party libraries only, with their reasons.
 export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
+export LSAN_OPTIONS="suppressions=$PWD/tests/tools/lsan.supp"
 export UBSAN_OPTIONS=print_stacktrace=1
 export TSAN_OPTIONS="halt_on_error=1:second_deadlock_stack=1:suppressions=$PWD/tests/tools/tsan.supp"
 
