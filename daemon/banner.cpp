@@ -1,24 +1,15 @@
 #include "daemon/banner.hpp"
 
-#include <cstdarg>
-#include <cstdio>
 #include <fstream>
 
+#include "core/text/format.hpp"
 #include "cuda/cuda_status.hpp"
 
 namespace sonar {
 namespace {
 
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
-  char line[512];
-  va_list arguments;
-  va_start(arguments, pattern);
-  std::vsnprintf(line, sizeof line, pattern, arguments);
-  va_end(arguments);
-  return line;
-}
+using text::format;
 
-std::string frequency_text(double hz) { return hz >= 1e6 ? format("%.3g MHz", hz / 1e6) : format("%.3g kHz", hz / 1e3); }
 std::string address_text(const Endpoint& e) { return text_of(e); }
 
 std::string sonar_lines(const Device& device) {
@@ -26,7 +17,7 @@ std::string sonar_lines(const Device& device) {
   const SonarModel& model = *device.state().model;
   const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
   std::string text = "sonar     " + device.config().name + "  " + model.name + "  " +
-                     frequency_text(static_cast<double>(mode.centre_hz)) +
+                     text::frequency_text(static_cast<double>(mode.centre_hz)) +
                      format("  %d beams  %g m  %g Hz\n", s.beam_count, s.range_m, static_cast<double>(s.rate_hz));
   const tcp::endpoint data = device.data_endpoint();
   text += format("  data    tcp %s:%d", data.address().to_string().c_str(), data.port());

@@ -1,29 +1,22 @@
 // A description of a scene as text and as JSON.
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "clients/scene_tools/describe_scene.hpp"
 #include "clients/scene_tools/figures.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::scene_tools {
 namespace {
 
-std::string formatted(const char* format, double value) {
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
+using text::format;
 
 /// Three digits that matter, no zeros that do not, and never an exponent for lengths of this world.
 std::string short_number(double v) {
   const double size = std::abs(v);
   const int decimals = size == 0 || size >= 1e6 ? 0 : std::clamp(2 - static_cast<int>(std::floor(std::log10(size))), 0, 4);
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%.*f", decimals, v);
-  std::string out = text.data();
+  std::string out = format("%.*f", decimals, v);
   if (out.find('.') != std::string::npos) out.erase(out.find_last_not_of('0') + 1);
   if (out.ends_with('.')) out.pop_back();
   return out == "-0" ? "0" : out;
@@ -112,7 +105,7 @@ std::string place_text(Vec3d p) {
 }
 std::string bytes_text(std::size_t bytes) {
   const double b = static_cast<double>(bytes);
-  return b < 1e6 ? formatted("%.0f kB", b / 1e3) : formatted("%.1f MB", b / 1e6);
+  return b < 1e6 ? format("%.0f kB", b / 1e3) : format("%.1f MB", b / 1e6);
 }
 
 std::string summary_of(const SceneDescription& scene) {
@@ -135,11 +128,11 @@ std::string table_of(const SceneDescription& scene) {
   out += table(objects, {3}) + "\n";
   std::vector<Row> materials{{"material", "law", "strength [dB]", "roughness [mm]", "reflection", "objects", "triangles"}};
   for (const DescribedMaterial& m : scene.materials)
-    materials.push_back({m.name, m.law, formatted("%.1f", m.strength_db), short_number(1e3 * m.roughness_m),
-                         formatted("%.2f", m.reflection), grouped(m.objects), grouped(m.triangles)});
+    materials.push_back({m.name, m.law, format("%.1f", m.strength_db), short_number(1e3 * m.roughness_m),
+                         format("%.2f", m.reflection), grouped(m.objects), grouped(m.triangles)});
   if (materials.size() > 1) out += table(materials, {2, 3, 4, 5, 6});
   if (scene.other_sonars > 0) out += std::string("other sonars: ") + grouped(scene.other_sonars) + "\n";
-  if (scene.volume_db > -150) out += std::string("water column: ") + formatted("%.0f", scene.volume_db) + " dB per cubic metre\n";
+  if (scene.volume_db > -150) out += std::string("water column: ") + format("%.0f", scene.volume_db) + " dB per cubic metre\n";
   const Remarks remarks = remarks_on(scene);
   for (const std::string& warning : remarks.warnings) out += std::string("warning: ") + warning + "\n";
   for (const std::string& note : remarks.notes) out += std::string("note: ") + note + "\n";

@@ -2,18 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
+
+#include "core/text/format.hpp"
 
 namespace sonar::clients {
 namespace {
 
-template <class... Values>
-std::string formatted(const char* format, Values... values) {
-  char text[400];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
+using text::format;
 
 unsigned long long wide(std::uint64_t value) { return value; }
 
@@ -79,20 +75,20 @@ std::vector<std::string> complaints(const PingSummary& summary, bool asked) {
 
 std::string line_from(const oculus::DecodedPing& ping, const PingReport& report) {
   const oculus::PingResultV2& f = ping.head.fixed;
-  std::string line = formatted("ping %u  %u x %u  %zu bit  %.2f m  %.4f MHz  %zu bytes", f.ping_id, unsigned{f.row_count},
-                               unsigned{f.beam_count}, 8 * ping.bytes_per_sample(), f.row_count * f.range_resolution_m,
-                               f.frequency_hz / 1e6, ping.message.size());
+  std::string line =
+      format("ping %u  %u x %u  %zu bit  %.2f m  %.4f MHz  %zu bytes", f.ping_id, unsigned{f.row_count}, unsigned{f.beam_count},
+             8 * ping.bytes_per_sample(), f.row_count * f.range_resolution_m, f.frequency_hz / 1e6, ping.message.size());
   for (const std::string& error : report.errors) line += "\n  error: " + error;
   for (const std::string& mismatch : report.echo_mismatches) line += "\n  echo: " + mismatch;
   return line;
 }
 
 std::string text_from(const PingSummary& s, bool asked) {
-  std::string text = formatted("pings %llu, missing ids %llu, identity errors %llu, junk bytes %llu, dummies %llu\n",
-                               wide(s.pings), wide(s.missing_ids), wide(s.identity_errors), wide(s.junk_bytes), wide(s.dummies));
-  text += formatted("rate %.2f Hz, interval p50 %.1f ms, p99 %.1f ms, longest %.1f ms, %.2f MB/s", s.rate_hz, s.interval_p50_ms,
-                    s.interval_p99_ms, s.interval_max_ms,
-                    s.pings > 0 ? s.rate_hz * static_cast<double>(s.bytes) / static_cast<double>(s.pings) / 1e6 : 0.0);
+  std::string text = format("pings %llu, missing ids %llu, identity errors %llu, junk bytes %llu, dummies %llu\n", wide(s.pings),
+                            wide(s.missing_ids), wide(s.identity_errors), wide(s.junk_bytes), wide(s.dummies));
+  text += format("rate %.2f Hz, interval p50 %.1f ms, p99 %.1f ms, longest %.1f ms, %.2f MB/s", s.rate_hz, s.interval_p50_ms,
+                 s.interval_p99_ms, s.interval_max_ms,
+                 s.pings > 0 ? s.rate_hz * static_cast<double>(s.bytes) / static_cast<double>(s.pings) / 1e6 : 0.0);
   if (asked) text += "\nsettings echoed as asked: " + echo_text(s);
   return text;
 }

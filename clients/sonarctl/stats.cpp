@@ -4,6 +4,7 @@
 #include "clients/sonarctl/image_statistics.hpp"
 #include "clients/sonarctl/picture.hpp"
 #include "clients/sonarctl/source.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -42,11 +43,8 @@ void print_plain(const nlohmann::json& figures, const std::string& prefix) {
       continue;
     }
     std::string text;
-    char number[32];
-    for (const auto& v : value.is_array() ? value : nlohmann::json::array({value})) {
-      std::snprintf(number, sizeof number, "%s%.4g", text.empty() ? "" : " ", v.get<double>());
-      text += number;
-    }
+    for (const auto& v : value.is_array() ? value : nlohmann::json::array({value}))
+      text += text::format("%s%.4g", text.empty() ? "" : " ", v.get<double>());
     std::printf("%-50s %s\n", (prefix + name).c_str(), text.c_str());
   }
 }

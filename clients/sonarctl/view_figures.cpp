@@ -1,7 +1,8 @@
 #include "clients/sonarctl/view_figures.hpp"
 
 #include <algorithm>
-#include <cstdio>
+
+#include "core/text/format.hpp"
 
 namespace sonar::clients {
 
@@ -11,20 +12,16 @@ void ViewFigures::add(const oculus::DecodedPing& ping, Seconds at) {
   if (arrivals_.size() > remembered) arrivals_.pop_front();
   ++pings_;
   const oculus::PingResultV2& f = ping.head.fixed;
-  char text[160];
-  std::snprintf(text, sizeof text, "ping %u  %.2f m  %.4g MHz  %u beams x %u rows", f.ping_id, f.row_count * f.range_resolution_m,
-                f.frequency_hz / 1e6, unsigned{f.beam_count}, unsigned{f.row_count});
-  ping_text_ = text;
+  ping_text_ = text::format("ping %u  %.2f m  %.4g MHz  %u beams x %u rows", f.ping_id, f.row_count * f.range_resolution_m,
+                            f.frequency_hz / 1e6, unsigned{f.beam_count}, unsigned{f.row_count});
 }
 
 std::string ViewFigures::text() const {
   std::string text = ping_text_;
   if (arrivals_.size() < 2) return text;
   const double rate_hz = static_cast<double>(arrivals_.size() - 1) / std::max(1e-9, arrivals_.back() - arrivals_.front());
-  char rate[40];
-  std::snprintf(rate, sizeof rate, "  %.1f Hz  ", rate_hz);
   const std::uint64_t gaps = sequence_.skipped_ids();
-  return text + rate + (gaps == 0 ? "no gaps" : std::to_string(gaps) + " missed");
+  return text + text::format("  %.1f Hz  ", rate_hz) + (gaps == 0 ? "no gaps" : std::to_string(gaps) + " missed");
 }
 
 }  // namespace sonar::clients

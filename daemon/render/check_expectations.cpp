@@ -1,8 +1,8 @@
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 
 #include "core/paper/paper_engine.hpp"
+#include "core/text/format.hpp"
 #include "daemon/render/coverage.hpp"
 #include "daemon/render/expectation.hpp"
 #include "daemon/render/render_job.hpp"
@@ -83,16 +83,12 @@ Result<Step> take_step(const std::string& source, const RenderJob& job, Parallel
 }  // namespace
 
 std::string Verdict::sentence() const {
-  char figures[200];
   const char* sign = expectation.bound == Expectation::Bound::near       ? ""
                      : expectation.bound == Expectation::Bound::at_least ? "at least "
                                                                          : "at most ";
-  std::snprintf(figures, sizeof figures, " %.6g %s, expected %s%.6g", measured, unit_of(expectation).c_str(), sign, expected);
-  std::string text = expectation.place + ": " + expectation.what + ": " + name_of(expectation.measure) + figures;
-  if (expectation.bound == Expectation::Bound::near) {
-    std::snprintf(figures, sizeof figures, " within %g", expectation.within);
-    text += figures;
-  }
+  std::string text = expectation.place + ": " + expectation.what + ": " + name_of(expectation.measure) +
+                     text::format(" %.6g %s, expected %s%.6g", measured, unit_of(expectation).c_str(), sign, expected);
+  if (expectation.bound == Expectation::Bound::near) text += text::format(" within %g", expectation.within);
   return text;
 }
 

@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cstdarg>
 #include <cstdio>
 #include <string>
 
+#include "core/text/format.hpp"
 #include "daemon/metrics.hpp"
 #include "tests/load/ping_reader.hpp"
 #include "tests/reliability/record.hpp"
@@ -23,15 +23,7 @@ inline constexpr bool memory_is_ours = false;  // the sanitizer keeps what was f
 inline constexpr bool memory_is_ours = true;
 #endif
 
-inline std::string format(const char* text, ...) __attribute__((format(printf, 1, 2)));
-inline std::string format(const char* text, ...) {
-  char line[256];
-  va_list arguments;
-  va_start(arguments, text);
-  std::vsnprintf(line, sizeof line, text, arguments);
-  va_end(arguments);
-  return line;
-}
+using text::format;
 
 /// Says it and, in the full length, keeps it for docs/reliability.md.
 inline void keep(const std::string& item, const std::string& figure, const std::string& bound, bool passed) {

@@ -1,22 +1,14 @@
 #include "clients/sonarctl/control/status_text.hpp"
 
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 
 #include "core/base/geometry.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::clients {
 namespace {
 
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
-  char text[600];
-  va_list arguments;
-  va_start(arguments, pattern);
-  std::vsnprintf(text, sizeof text, pattern, arguments);
-  va_end(arguments);
-  return text;
-}
+using text::format;
 
 unsigned long long wide(std::uint64_t value) { return value; }
 
@@ -29,10 +21,8 @@ std::string duration_text(double seconds) {
 
 std::string line(const char* name, const std::string& text) { return format("%-9s ", name) + text + "\n"; }
 
-std::string frequency_text(double hz) { return hz >= 1e6 ? format("%.3g MHz", hz / 1e6) : format("%.3g kHz", hz / 1e3); }
-
 std::string settings_text(const control::SonarStatus& s) {
-  std::string text = frequency_text(s.frequency_hz) + format("  %g m", s.range_m);
+  std::string text = text::frequency_text(s.frequency_hz) + format("  %g m", s.range_m);
   text += s.rate_hz > 0 ? format("  %g Hz", s.rate_hz) : std::string("  standby");
   text += format("  gain %.3g dB  %u beams x %u rows", s.gain_db, s.beams, s.rows);
   if (!s.transmits) text += "  transmitter off";

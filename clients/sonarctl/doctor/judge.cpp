@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "core/text/format.hpp"
+
 namespace sonar::clients::doctor {
 namespace {
 
@@ -78,9 +80,7 @@ void judge_ports(const KernelPorts& ports, std::vector<Finding>& findings) {
 std::string text_from(const std::vector<Finding>& findings) {
   std::string text;
   for (const Finding& f : findings) {
-    char level[8];
-    std::snprintf(level, sizeof level, "%-6s", name_of(f.level));
-    text += level + f.text + (f.cure.empty() ? "" : "; " + f.cure) + "\n";
+    text += text::format("%-6s", name_of(f.level)) + f.text + (f.cure.empty() ? "" : "; " + f.cure) + "\n";
   }
   return text + counted(std::ssize(findings), "check") + ", " + counted(count_of(findings, Level::fail), "error") + ", " +
          counted(count_of(findings, Level::warn), "warning") + "\n";

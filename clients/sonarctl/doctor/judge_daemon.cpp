@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "clients/sonarctl/doctor/judge.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -88,13 +88,12 @@ void judge_heads(const Facts& facts, std::vector<Finding>& findings) {
 
 void judge_clocks(const ControlFacts& control, std::vector<Finding>& findings) {
   if (!control.clock_ahead_s) return;
-  char text[120];
-  std::snprintf(text, sizeof text, "clock of that computer is %.2f s %s ours", std::abs(*control.clock_ahead_s),
-                *control.clock_ahead_s > 0 ? "ahead of" : "behind");
+  const std::string text = text::format("clock of that computer is %.2f s %s ours", std::abs(*control.clock_ahead_s),
+                                        *control.clock_ahead_s > 0 ? "ahead of" : "behind");
   if (std::abs(*control.clock_ahead_s) < largest_clock_difference_s)
     findings.push_back({Level::ok, "clock", text, ""});
   else
-    findings.push_back({Level::warn, "clock", std::string(text) + ": poses stamped with WALL time are refused from one second on",
+    findings.push_back({Level::warn, "clock", text + ": poses stamped with WALL time are refused from one second on",
                         "set both by NTP or PTP (timedatectl, chronyc tracking), or send ARRIVAL stamps"});
 }
 

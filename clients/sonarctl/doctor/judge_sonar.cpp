@@ -1,18 +1,13 @@
 #include <algorithm>
-#include <cstdio>
 
 #include "clients/sonarctl/doctor/judge.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
 
 using Outcome = StreamFacts::Outcome;
-
-std::string number(const char* format, double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
+using text::format;
 
 std::string joined(const std::vector<std::string>& words) {
   std::string text;
@@ -88,7 +83,7 @@ class SonarJudge {
   /// The sonar answers, but its status does not come.
   void judge_silence(const std::string& port) {
     std::string text = "no status from " + sonar_.at.host + " on udp " + port + " within " +
-                       number("%.1f", facts_.status.waited_s) + " s: drivers that look for the sonar wait for ever";
+                       format("%.1f", facts_.status.waited_s) + " s: drivers that look for the sonar wait for ever";
     std::string cure =
         "a firewall may drop udp " + port + " (nft list ruleset; ufw status), or status_to of the sonar must name this computer";
     if (sonar_.says)
@@ -119,7 +114,7 @@ class SonarJudge {
       case Outcome::pings:
         break;
     }
-    const std::string first = at_ + " accepts, first ping decoded after " + number("%.0f", s.first_ping_ms) +
+    const std::string first = at_ + " accepts, first ping decoded after " + format("%.0f", s.first_ping_ms) +
                               " ms: " + std::to_string(s.beams) + " beams x " + std::to_string(s.rows) + " ranges, " +
                               std::to_string(s.bits) + " bit, ";
     if (s.broken > 0 || s.junk_bytes > 0)
@@ -133,7 +128,7 @@ class SonarJudge {
 
   void judge_no_ping() {
     const StreamFacts& s = sonar_.stream;
-    const std::string waited = " within " + number("%.1f", s.waited_s) + " s";
+    const std::string waited = " within " + format("%.1f", s.waited_s) + " s";
     if (s.junk_bytes > 0 && s.dummies == 0) {
       std::string who;
       for (const PortHolder& holder : sonar_.listeners) who = ": " + text_of(holder) + " listens on " + holder.at;
@@ -178,32 +173,32 @@ class SonarJudge {
     if (!sonar_.says) return " (--take connects anyway)";
     const control::SonarFigures& f = sonar_.says->figures;
     return "; it says " + std::to_string(f.served) + " pings served, " + std::to_string(f.dropped) + " dropped, latency " +
-           number("%.0f", f.latency_ms_p50) + " ms p50, " + number("%.0f", f.latency_ms_p99) + " ms p99 (--take connects anyway)";
+           format("%.0f", f.latency_ms_p50) + " ms p50, " + format("%.0f", f.latency_ms_p99) + " ms p99 (--take connects anyway)";
   }
 
   std::string latency_text() const {
     const StreamFacts& s = sonar_.stream;
     const auto both = [](double p50, double p99) {
-      return ", image latency " + number("%.0f", p50) + " ms p50, " + number("%.0f", p99) + " ms p99";
+      return ", image latency " + format("%.0f", p50) + " ms p50, " + format("%.0f", p99) + " ms p99";
     };
     if (s.latency_p50_ms) return both(*s.latency_p50_ms, s.latency_p99_ms.value_or(*s.latency_p50_ms));
     if (sonar_.says && sonar_.says->figures.latency_ms_p99 > 0)
       return both(sonar_.says->figures.latency_ms_p50, sonar_.says->figures.latency_ms_p99);
-    if (s.spread_p99_ms) return ", images come " + number("%.0f", *s.spread_p99_ms) + " ms later than the promptest, p99";
+    if (s.spread_p99_ms) return ", images come " + format("%.0f", *s.spread_p99_ms) + " ms later than the promptest, p99";
     return {};
   }
 
   void judge_rate() {
     const StreamFacts& s = sonar_.stream;
     if (s.pings < 2)
-      return add(Level::warn, "rate", "one ping only in " + number("%.1f", s.waited_s) + " s: no rate can be told",
+      return add(Level::warn, "rate", "one ping only in " + format("%.1f", s.waited_s) + " s: no rate can be told",
                  "sonarctl listen " + sonar_.at.host + " looks for longer");
     const double expected_hz = s.asked ? s.asked_hz : sonar_.says ? sonar_.says->rate_hz : 0;
-    std::string text = "rate " + number("%.1f", s.rate_hz) + " Hz";
-    if (expected_hz > 0) text += " (asked " + number("%g", expected_hz) + ")";
+    std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
+    if (expected_hz > 0) text += " (asked " + format("%g", expected_hz) + ")";
     text += latency_text();
     if (expected_hz > 0 && s.rate_hz < 0.85 * expected_hz) {
-      if (sonar_.says) text += ", " + number("%.0f", sonar_.says->figures.simulation_ms) + " ms of computing a ping";
+      if (sonar_.says) text += ", " + format("%.0f", sonar_.says->figures.simulation_ms) + " ms of computing a ping";
       return add(Level::warn, "rate", text + ": the simulation is slower than the rate",
                  "fewer beams, less range, more threads (engine.threads), or less else on this computer");
     }

@@ -1,0 +1,28 @@
+// Texts with numbers in them: short ones, long ones and none at all.
+#include "core/text/format.hpp"
+
+#include <gtest/gtest.h>
+
+namespace sonar::text {
+namespace {
+
+TEST(Format, WritesAsPrintfDoes) {
+  EXPECT_EQ(format("%d of %g m, %s", 3, 2.5, "far"), "3 of 2.5 m, far");
+  EXPECT_EQ(format("100 %%"), "100 %");
+  EXPECT_EQ(format("%s", ""), "");
+}
+
+TEST(Format, IsOfAnyLength) {
+  const std::string name(5000, 'x');
+  EXPECT_EQ(format("a %s b", name.c_str()), "a " + name + " b");
+}
+
+TEST(Format, FrequenciesAreSaidInTheirUnit) {
+  EXPECT_EQ(frequency_text(2.1e6), "2.1 MHz");
+  EXPECT_EQ(frequency_text(1e6), "1 MHz");
+  EXPECT_EQ(frequency_text(750e3), "750 kHz");
+  EXPECT_EQ(frequency_text(0), "0 kHz");
+}
+
+}  // namespace
+}  // namespace sonar::text
