@@ -1,0 +1,202 @@
+#include "core/motion/columns.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "core/motion/stamp.hpp"
+#include "core/text/decimal.hpp"
+#include "core/text/nearest.hpp"
+
+namespace sonar::motion {
+namespace {
+
+constexpr double norm_allowed = 0.01;  // of a quaternion, or of a row of a matrix; less is rounding, and repaired
+constexpr double farthest = 1e8;       // m, m/s, rad/s
+constexpr std::size_t longest_quoted = 40, longest_name = 64;
+
+using Complaint = std::optional<std::string>;
+
+Complaint not_a_number(std::string_view word, const char* what = "a number") {
+  return in_quotes(word) + " is not " + what + std::string(text::number_hint(word));
+}
+
+/// Finite, decimal; leading zeros are no octals in tables.
+std::optional<double> number(std::string_view word) {
+  if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
+  double v = 0;
+  const char* const last = word.data() + word.size();
+  const auto end = std::from_chars(word.data(), last, v);
+  if (end.ec != std::errc{} || end.ptr != last || !std::isfinite(v)) return std::nullopt;
+  return v;
+}
+
+double largest(Vec3d v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+
+/// Of a rotation matrix; by its largest part, so that nothing is divided by something small.
+Quatd quat_from(const Rotation& r) {
+  const auto& m = r.m;
+  const double trace = m[0][0] + m[1][1] + m[2][2];
+  if (trace > 0) return normalized({1 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]});
+  if (m[0][0] >= m[1][1] && m[0][0] >= m[2][2])
+    return normalized({m[2][1] - m[1][2], 1 + m[0][0] - m[1][1] - m[2][2], m[0][1] + m[1][0], m[0][2] + m[2][0]});
+  if (m[1][1] >= m[2][2])
+    return normalized({m[0][2] - m[2][0], m[0][1] + m[1][0], 1 + m[1][1] - m[0][0] - m[2][2], m[1][2] + m[2][1]});
+  return normalized({m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], 1 + m[2][2] - m[0][0] - m[1][1]});
+}
+
+bool is_rotation(const Rotation& r) {
+  const Vec3d a{r.m[0][0], r.m[0][1], r.m[0][2]}, b{r.m[1][0], r.m[1][1], r.m[1][2]}, c{r.m[2][0], r.m[2][1], r.m[2][2]};
+  for (const Vec3d& row : {a, b, c})
+    if (!(std::abs(length(row) - 1) <= norm_allowed)) return false;
+  return largest({dot(a, b), dot(b, c), dot(c, a)}) <= norm_allowed && dot(cross(a, b), c) > 0;
+}
+
+}  // namespace
+
+const std::array<std::string_view, Columns::columns> Columns::long_names{
+    "t_s",       "t_ns",    "x_m",    "y_m",    "z_m",    "qw",       "qx",       "qy",       "qz",  "roll_deg",
+    "pitch_deg", "yaw_deg", "vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps", "body"};
+const std::array<std::string_view, Columns::columns> Columns::short_names{
+    "t", "t_ns", "x", "y", "z", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw", "vx", "vy", "vz", "wx", "wy", "wz", "body"};
+
+std::string in_quotes(std::string_view word) {
+  std::string out = "\"";
+  for (const char c : word.substr(0, longest_quoted)) out += c >= 0x20 && c < 0x7f ? c : '?';
+  return out + (word.size() > longest_quoted ? "...\"" : "\"");
+}
+
+void Columns::put(std::span<const Column> order) {
+  for (const Column c : order) place_[c] = static_cast<int>(count_++);
+}
+
+Columns Columns::tum() {
+  Columns c;
+  c.put(std::array{t, x, y, z, qx, qy, qz, qw});
+  return c;
+}
+
+Columns Columns::euroc(std::size_t words) {
+  Columns c;
+  c.put(std::array{t_ns, x, y, z, qw, qx, qy, qz});
+  if (words > c.count_) c.put(std::array{vx, vy, vz});
+  c.count_ = std::max(c.count_, words);
+  return c;
+}
+
+Columns Columns::kitti() {
+  Columns c;
+  c.count_ = 12;
+  c.matrix_ = true;
+  return c;
+}
+
+Complaint Columns::refuse_header(const Words& header, Columns& out) {
+  out = Columns();
+  out.count_ = header.size();
+  for (std::size_t i = 0; i < header.size(); ++i) {
+    std::size_t c = 0;
+    while (c < columns && header[i] != long_names[c] && header[i] != short_names[c]) ++c;
+    if (c == columns)
+      return "unknown column " + in_quotes(header[i]) +
+             text::suggestion(header[i].substr(0, longest_name), long_names, "columns");
+    if (out.place_[c] >= 0) return "column " + std::string(header[i]) + " stands twice";
+    out.place_[c] = static_cast<int>(i);
+  }
+  return out.refuse_set();
+}
+
+Complaint Columns::refuse_set() const {
+  if (!has(t) && !has(t_ns)) return "column t_s is missing";
+  if (has(t) && has(t_ns)) return "give the time once: t_s or t_ns";
+  for (const Column c : {x, y, z})
+    if (!has(c)) return "column " + std::string(long_names[c]) + " is missing";
+  const auto of = [this](std::initializer_list<Column> group) {
+    return std::count_if(group.begin(), group.end(), [this](Column c) { return has(c); });
+  };
+  const auto quaternion = of({qw, qx, qy, qz});
+  if (quaternion != 0 && quaternion != 4) return "a quaternion needs qw, qx, qy and qz";
+  if (quaternion != 0 && of({roll, pitch, yaw}) != 0) return "give a quaternion or angles, not both";
+  if (of({vx, vy, vz}) % 3 != 0) return "a velocity needs vx_mps, vy_mps and vz_mps";
+  if (of({wx, wy, wz}) % 3 != 0) return "an angular velocity needs wx_radps, wy_radps and wz_radps";
+  return std::nullopt;
+}
+
+Complaint Columns::refuse_vector(const Words& words, Column first, const char* what, Vec3d& out) const {
+  double* const parts[3] = {&out.x, &out.y, &out.z};
+  for (int i = 0; i < 3; ++i) {
+    const std::string_view text = word(words, static_cast<Column>(first + i));
+    const auto value = number(text);
+    if (!value) return not_a_number(text);
+    *parts[i] = *value;
+  }
+  if (largest(out) > farthest) return std::string(what) + " is beyond 1e8";
+  return std::nullopt;
+}
+
+Complaint Columns::refuse_stamp(const Words& words, Row& out) const {
+  const std::string_view text = word(words, has(t) ? t : t_ns);
+  const auto stamp = has(t) ? nanoseconds_of_seconds(text) : nanoseconds_of_nanoseconds(text);
+  if (!stamp) return not_a_number(text, has(t) ? "a time in seconds" : "a time in nanoseconds");
+  out.stamp_ns = *stamp;
+  return std::nullopt;
+}
+
+Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
+  std::array<double, 4> v{};
+  const auto fill = [&](std::initializer_list<Column> group) -> Complaint {
+    std::size_t i = 0;
+    for (const Column c : group) {
+      const auto value = has(c) ? number(word(words, c)) : 0.0;
+      if (!value) return not_a_number(word(words, c));
+      v[i++] = *value;
+    }
+    return std::nullopt;
+  };
+  if (!has(qw)) {
+    if (auto wrong = fill({roll, pitch, yaw})) return wrong;
+    if (std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}) > farthest) return "an angle is beyond 1e8";
+    out.pose.orientation = quat_from_rpy({rad_from_deg(v[0]), rad_from_deg(v[1]), rad_from_deg(v[2])});
+    return std::nullopt;
+  }
+  if (auto wrong = fill({qw, qx, qy, qz})) return wrong;
+  const Quatd q{v[0], v[1], v[2], v[3]};
+  const double norm = std::sqrt(norm_squared(q));
+  if (norm == 0) return "the quaternion is zero";
+  if (!(std::abs(norm - 1) <= norm_allowed)) return "the quaternion's norm is " + std::to_string(norm) + ", it must be 1";
+  out.pose.orientation = normalized(q);
+  return std::nullopt;
+}
+
+Complaint Columns::refuse_matrix(const Words& words, Row& out) const {
+  std::array<double, 12> v{};
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    const auto value = number(words[i]);
+    if (!value) return not_a_number(words[i]);
+    v[i] = *value;
+  }
+  const Rotation turn{{{v[0], v[1], v[2]}, {v[4], v[5], v[6]}, {v[8], v[9], v[10]}}};
+  out.pose.position_m = {v[3], v[7], v[11]};
+  if (largest(out.pose.position_m) > farthest) return "the position is beyond 1e8";
+  if (!is_rotation(turn)) return "the first three columns of the matrix are no rotation";
+  out.pose.orientation = quat_from(turn);
+  return std::nullopt;
+}
+
+Complaint Columns::refuse(const Words& words, Row& out) const {
+  if (matrix_) return refuse_matrix(words, out);
+  if (auto wrong = refuse_stamp(words, out)) return wrong;
+  if (auto wrong = refuse_vector(words, x, "the position", out.pose.position_m)) return wrong;
+  if (auto wrong = refuse_orientation(words, out)) return wrong;
+  if (has(vx))
+    if (auto wrong = refuse_vector(words, vx, "the velocity", out.velocity_mps)) return wrong;
+  if (has(wx))
+    if (auto wrong = refuse_vector(words, wx, "the angular velocity", out.angular_velocity_radps)) return wrong;
+  if (!has(body)) return std::nullopt;
+  out.body = word(words, body);
+  const bool printable = std::none_of(out.body.begin(), out.body.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7f; });
+  if (out.body.empty() || out.body.size() > longest_name || !printable) return "a body's name has 1 to 64 printable characters";
+  return std::nullopt;
+}
+
+}  // namespace sonar::motion

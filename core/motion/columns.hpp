@@ -1,0 +1,66 @@
+// One line of a trajectory file as a pose: which column means what, by the file's header or by its format.
+// Used by trajectory_file.cpp, which cuts the file into lines and words.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/motion/trajectory.hpp"
+
+namespace sonar::motion {
+
+using Words = std::vector<std::string_view>;
+
+/// As written: in the frame of the file.
+struct Row {
+  std::int64_t stamp_ns = 0;
+  Pose pose;
+  Vec3d velocity_mps, angular_velocity_radps;
+  std::string_view body;  // of a body column
+};
+
+/// A word of somebody else's file, fit for a sentence: printable and not long.
+std::string in_quotes(std::string_view word);
+
+class Columns {
+ public:
+  /// Errors are what the sentence says after file and line.
+  static std::optional<std::string> refuse_header(const Words& header, Columns& out);
+  static Columns tum();
+  /// 8, 11 or 17 words: without velocity, with it, with the biases of an IMU, which say nothing of poses.
+  static Columns euroc(std::size_t words);
+  /// Twelve numbers, the first three rows of the matrix that takes points of the body to the world; no time.
+  static Columns kitti();
+
+  std::size_t count() const { return count_; }
+  bool has_body() const { return has(body); }
+  bool has_velocity() const { return has(vx); }
+  bool has_angular_velocity() const { return has(wx); }
+  /// What is wrong with the line, or nothing. `words` are count() many.
+  std::optional<std::string> refuse(const Words& words, Row& out) const;
+
+ private:
+  enum Column { t, t_ns, x, y, z, qw, qx, qy, qz, roll, pitch, yaw, vx, vy, vz, wx, wy, wz, body, columns };
+  static const std::array<std::string_view, columns> long_names, short_names;
+
+  Columns() { place_.fill(-1); }
+  bool has(Column c) const { return place_[c] >= 0; }
+  void put(std::span<const Column> order);
+  std::optional<std::string> refuse_set() const;
+  std::optional<std::string> refuse_stamp(const Words& words, Row& out) const;
+  std::optional<std::string> refuse_orientation(const Words& words, Row& out) const;
+  std::optional<std::string> refuse_matrix(const Words& words, Row& out) const;
+  std::optional<std::string> refuse_vector(const Words& words, Column first, const char* what, Vec3d& out) const;
+  std::string_view word(const Words& words, Column c) const { return words[static_cast<std::size_t>(place_[c])]; }
+
+  std::array<int, columns> place_{};
+  std::size_t count_ = 0;
+  bool matrix_ = false;
+};
+
+}  // namespace sonar::motion

@@ -1,0 +1,64 @@
+#include "core/motion/playback.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace sonar::motion {
+namespace {
+
+__extension__ using Wide = __int128;
+constexpr std::int64_t one = 1'000'000;  // in millionths
+
+}  // namespace
+
+std::optional<Speed> Speed::from(double factor) {
+  if (!(factor >= slowest && factor <= fastest)) return std::nullopt;
+  return Speed{std::llround(factor * static_cast<double>(one))};
+}
+
+Ns Playback::line(Time clock) const {
+  if (paused_) return place_at_;
+  const Wide product = static_cast<Wide>((clock - clock_at_).count()) * rules_.speed.millionths;
+  Wide passed = product / one;
+  if (product % one < 0) --passed;  // downwards, also before clock_at_
+  constexpr auto farthest = static_cast<Wide>(std::numeric_limits<std::int64_t>::max());
+  return Ns(static_cast<std::int64_t>(std::clamp(place_at_.count() + passed, -farthest, farthest)));
+}
+
+Playback::Place Playback::place(Time clock) const {
+  const Ns reached = line(clock);
+  const double rate = paused_ ? 0 : rules_.speed.factor();
+  if (reached < Ns{0}) return {Ns{0}, 0};
+  if (duration_ == Ns{0}) return {Ns{0}, 0};
+  if (rules_.loop) return {reached % duration_, rate};
+  return reached > duration_ ? Place{duration_, 0} : Place{reached, rate};
+}
+
+void Playback::begin_anew(Time clock) {
+  const Ns reached = line(clock);
+  place_at_ = reached < Ns{0} ? reached : place(clock).at;  // what it still waits, it waits
+  clock_at_ = clock;
+}
+
+void Playback::pause(Time clock) {
+  begin_anew(clock);
+  paused_ = true;
+}
+
+void Playback::resume(Time clock) {
+  begin_anew(clock);
+  paused_ = false;
+}
+
+void Playback::seek(Time clock, Ns to) {
+  clock_at_ = clock;
+  place_at_ = std::clamp(to, Ns{0}, duration_);
+}
+
+void Playback::use_speed(Time clock, Speed speed) {
+  begin_anew(clock);
+  rules_.speed = speed;
+}
+
+}  // namespace sonar::motion

@@ -1,0 +1,19 @@
+// Time stamps of text, exact to the nanosecond: a double would round UNIX times to a quarter of a microsecond.
+// Used by the readers of trajectory files.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace sonar::motion {
+
+/// Farthest from 0 that a stamp may be, [ns]: 146 years, so that differences cannot overflow.
+inline constexpr std::int64_t farthest_stamp_ns = 4'600'000'000'000'000'000;
+
+/// "1403636579.763555584", "1.40363657976e+09", "-2": decimal text [s], rounded to the nearest nanosecond.
+std::optional<std::int64_t> nanoseconds_of_seconds(std::string_view text);
+/// "1403636579763555584" or, as some programs write whole numbers, "1.403636579763555584e+18".
+std::optional<std::int64_t> nanoseconds_of_nanoseconds(std::string_view text);
+
+}  // namespace sonar::motion

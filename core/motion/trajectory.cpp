@@ -1,0 +1,64 @@
+#include "core/motion/trajectory.hpp"
+
+#include <algorithm>
+#include <cassert>
+
+#include "core/base/units.hpp"
+#include "core/motion/turning.hpp"
+
+namespace sonar::motion {
+namespace {
+
+bool same(Vec3d a, Vec3d b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+bool same(const Pose& a, const Pose& b) {
+  const Quatd &p = a.orientation, &q = b.orientation;
+  return same(a.position_m, b.position_m) && p.w == q.w && p.x == q.x && p.y == q.y && p.z == q.z;
+}
+template <class T>
+bool all_same(const std::vector<T>& a, const std::vector<T>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const T& x, const T& y) { return same(x, y); });
+}
+
+}  // namespace
+
+Trajectory::Trajectory(Points points, Ns duration)
+    : points_(std::move(points)), duration_(std::max(duration, points_.times.back())) {
+  assert(points_.poses.size() == points_.times.size());
+  assert(points_.velocities_mps.empty() || points_.velocities_mps.size() == points_.times.size());
+  assert(points_.angular_velocities_radps.empty() || points_.angular_velocities_radps.size() == points_.times.size());
+}
+
+bool Trajectory::operator==(const Trajectory& other) const {
+  const Points &a = points_, &b = other.points_;
+  return duration_ == other.duration_ && a.times == b.times && all_same(a.poses, b.poses) &&
+         all_same(a.velocities_mps, b.velocities_mps) && all_same(a.angular_velocities_radps, b.angular_velocities_radps);
+}
+
+/// Of the way that ends at point `after`, u of it done.
+Motion Trajectory::between(std::size_t after, double u) const {
+  const std::size_t before = after - 1;
+  const double per_s = 1 / seconds(points_.times[after] - points_.times[before]);
+  const Pose &a = points_.poses[before], &b = points_.poses[after];
+  const auto told = [&](const std::vector<Vec3d>& values) { return values[before] + u * (values[after] - values[before]); };
+  Motion moves;
+  moves.velocity_mps = points_.velocities_mps.empty() ? per_s * (b.position_m - a.position_m) : told(points_.velocities_mps);
+  moves.angular_velocity_radps = points_.angular_velocities_radps.empty() ? per_s * rotation_between(a.orientation, b.orientation)
+                                                                          : told(points_.angular_velocities_radps);
+  return moves;
+}
+
+Moment Trajectory::at(Ns time) const {
+  const std::vector<Ns>& times = points_.times;
+  if (time < times.front()) return {points_.poses.front(), {}};
+  if (time > times.back() || times.size() == 1) return {points_.poses.back(), {}};
+  if (time == times.back()) return {points_.poses.back(), between(times.size() - 1, 1)};
+  const auto after = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), time) - times.begin());
+  const Pose &a = points_.poses[after - 1], &b = points_.poses[after];
+  const double u =
+      static_cast<double>((time - times[after - 1]).count()) / static_cast<double>((times[after] - times[after - 1]).count());
+  const Motion moves = between(after, u);
+  if (u == 0) return {a, moves};
+  return {{a.position_m + u * (b.position_m - a.position_m), slerp(a.orientation, b.orientation, u)}, moves};
+}
+
+}  // namespace sonar::motion

@@ -1,0 +1,56 @@
+// The way of one body through the world: poses at known times, and the pose and the motion at any time between them.
+// Read from files by trajectory_file.hpp, played against a clock by playback.hpp; pure, no clock, no file.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::motion {
+
+using Ns = std::chrono::nanoseconds;
+
+/// How a body moves; at rest by default.
+struct Motion {
+  Vec3d velocity_mps;            // world axes
+  Vec3d angular_velocity_radps;  // body axes
+};
+struct Moment {
+  Pose body_in_world;  // world ENU, body FLU
+  Motion moves;
+};
+
+/// Poses in the order of time, with velocities where the file had them. `times` count from the start of the file, which may
+/// lie before the first pose of this body, as its end may lie after the last one: bodies of one file share both.
+struct Points {
+  std::vector<Ns> times;                        // not negative, rising
+  std::vector<Pose> poses;                      // as many
+  std::vector<Vec3d> velocities_mps;            // world axes; as many, or none
+  std::vector<Vec3d> angular_velocities_radps;  // body axes; as many, or none
+};
+
+class Trajectory {
+ public:
+  /// At least one point. `duration` of the whole file: at least the last time.
+  explicit Trajectory(Points points, Ns duration = Ns{0});
+
+  /// Between points straight on (lerp) and evenly turning (slerp); before the first and after the last point held there.
+  /// The motion is what the file says, interpolated, else that of the way between the two points; at a point that of what
+  /// follows, at the last one of what went before. Where the pose is held it is rest.
+  Moment at(Ns time) const;
+
+  Ns duration() const { return duration_; }
+  std::size_t size() const { return points_.times.size(); }
+  const Points& points() const { return points_; }
+  /// The same points to the last bit.
+  bool operator==(const Trajectory& other) const;
+
+ private:
+  Motion between(std::size_t after, double u) const;
+  Points points_;
+  Ns duration_;
+};
+
+}  // namespace sonar::motion

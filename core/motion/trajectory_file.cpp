@@ -1,0 +1,280 @@
+#include "core/motion/trajectory_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+#include "core/motion/columns.hpp"
+#include "core/motion/stamp.hpp"
+#include "core/text/nearest.hpp"
+
+namespace sonar::motion {
+namespace {
+
+constexpr std::size_t most_bodies = 256;
+constexpr std::uintmax_t most_bytes = std::uintmax_t{1} << 30;
+
+constexpr std::array<std::string_view, 5> format_names{"auto", "csv", "tum", "euroc", "kitti"};
+constexpr std::array<std::string_view, 2> frame_names{"ENU_FLU", "NED_FRD"};
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+std::string_view trimmed(std::string_view s) {
+  while (!s.empty() && is_blank(s.front())) s.remove_prefix(1);
+  while (!s.empty() && is_blank(s.back())) s.remove_suffix(1);
+  return s;
+}
+
+/// By hand: the search functions of strings are slow for words as short as numbers.
+void split(std::string_view line, bool commas, Words& words) {
+  words.clear();
+  for (std::size_t at = 0; at <= line.size();) {
+    std::size_t end = at;
+    while (end < line.size() && !(commas ? line[end] == ',' : is_blank(line[end]))) ++end;
+    const std::string_view word = line.substr(at, end - at);
+    if (commas || !word.empty()) words.push_back(commas ? trimmed(word) : word);
+    at = end + 1;
+  }
+}
+
+bool is_number(std::string_view word) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  double v = 0;
+  return std::from_chars(word.data(), word.data() + word.size(), v).ptr == word.data() + word.size() && !word.empty();
+}
+
+std::optional<Frame> frame_called(std::string_view word) {
+  std::string upper(word.substr(0, 16));
+  std::transform(upper.begin(), upper.end(), upper.begin(),
+                 [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; });
+  for (std::size_t i = 0; i < frame_names.size(); ++i)
+    if (upper == frame_names[i]) return static_cast<Frame>(i);
+  return std::nullopt;
+}
+
+/// The points of one body while the file is read; stamps are still the file's.
+struct Track {
+  std::string body;
+  Points points;
+};
+
+class Reader {
+ public:
+  Reader(const std::string& name, const ReadOptions& asked) : name_(name), asked_(asked), format_(asked.format) {}
+
+  Result<TrajectoryFile> run(std::string_view text) {
+    if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
+    for (std::size_t at = 0; at < text.size() && wrong_.empty();) {
+      const std::size_t end = std::min(text.find('\n', at), text.size());
+      ++line_;
+      take(trimmed(text.substr(at, end - at)));
+      at = end + 1;
+    }
+    if (wrong_.empty()) look_at_the_whole();
+    if (!wrong_.empty()) return failure(ErrorKind::bad_data, wrong_);
+    return finished();
+  }
+
+ private:
+  void complain(const std::string& what) {
+    if (wrong_.empty()) wrong_ = name_ + ":" + std::to_string(line_) + ": " + what;
+  }
+
+  void take(std::string_view line) {
+    if (line.empty()) return;
+    if (line.front() == '#') return take_comment(line);
+    if (columns_) {
+      split(line, commas_, words_);
+    } else {
+      commas_ = line.find(',') != std::string_view::npos;
+      split(line, commas_, words_);
+      if (begin_table()) return;
+      if (!wrong_.empty()) return;
+    }
+    if (words_.size() != columns_->count())
+      return complain(std::to_string(words_.size()) + " values instead of " + std::to_string(columns_->count()));
+    Row row;
+    if (const auto wrong = columns_->refuse(words_, row)) return complain(*wrong);
+    if (format_ == Format::kitti) {
+      const double stamp_ns = static_cast<double>(rows_) * 1e9 / *asked_.rate_hz;
+      if (stamp_ns > static_cast<double>(farthest_stamp_ns)) return complain("the time is beyond 146 years");
+      row.stamp_ns = std::llround(stamp_ns);
+    }
+    keep(row);
+    ++rows_;
+  }
+
+  /// Knows the columns from then on. True when the line was a header; else it is one of numbers, or something is wrong.
+  bool begin_table() {
+    const bool numbers = is_number(words_.front());
+    if (format_ == Format::automatic) format_ = guessed(numbers);
+    if (!wrong_.empty()) return false;
+    if (asked_.rate_hz && format_ != Format::kitti) complain("the lines have times, they need no rate_hz");
+    switch (format_) {
+      case Format::tum:
+        columns_ = Columns::tum();
+        return false;
+      case Format::euroc:
+        if (const std::size_t n = words_.size(); n != 8 && n != 11 && n != 17)
+          complain(std::to_string(n) + " values instead of 8, 11 or 17");
+        columns_ = Columns::euroc(words_.size());
+        return false;
+      case Format::kitti:
+        if (!(asked_.rate_hz.value_or(0) > 0)) complain("KITTI lines have no time; say how many there are a second: rate_hz");
+        columns_ = Columns::kitti();
+        return false;
+      default:
+        break;
+    }
+    if (numbers) {
+      complain("a CSV file begins with a line of column names: t_s,x_m,y_m,z_m,qw,qx,qy,qz");
+      return false;
+    }
+    Columns columns = Columns::tum();
+    if (const auto wrong = Columns::refuse_header(words_, columns)) complain(*wrong);
+    columns_ = columns;
+    return true;
+  }
+
+  Format guessed(bool numbers) {
+    if (!numbers) return Format::csv;
+    if (commas_) return Format::euroc;
+    if (words_.size() == 12) return Format::kitti;
+    if (words_.size() != 8) complain(std::to_string(words_.size()) + " values instead of 8 (TUM) or 12 (KITTI)");
+    return Format::tum;
+  }
+
+  void take_comment(std::string_view line) {
+    const std::size_t word = line.find("frame:");
+    if (word == std::string_view::npos) return;
+    Words words;
+    split(line.substr(word + 6), false, words);
+    const auto frame = words.empty() ? std::nullopt : frame_called(words.front());
+    if (!frame) return complain("the frame must be ENU_FLU or NED_FRD");
+    if (frame_.value_or(*frame) != *frame) return complain("the frame was another one before");
+    if (asked_.frame.value_or(*frame) != *frame)
+      return complain("the file says " + std::string(name_of(*frame)) + ", but it was to be read as " +
+                      std::string(name_of(*asked_.frame)));
+    frame_ = frame;
+  }
+
+  void keep(const Row& row) {
+    Track* const track = track_of(row.body);
+    if (track == nullptr) return complain("more than " + std::to_string(most_bodies) + " bodies");
+    Points& p = track->points;
+    if (!p.times.empty() && Ns(row.stamp_ns) <= p.times.back())
+      return complain("the time does not rise" + (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
+    p.times.emplace_back(row.stamp_ns);
+    p.poses.push_back(row.pose);
+    if (columns_->has_velocity()) p.velocities_mps.push_back(row.velocity_mps);
+    if (columns_->has_angular_velocity()) p.angular_velocities_radps.push_back(row.angular_velocity_radps);
+  }
+
+  Track* track_of(std::string_view body) {
+    if (last_ < tracks_.size() && tracks_[last_].body == body) return &tracks_[last_];
+    for (last_ = 0; last_ < tracks_.size(); ++last_)
+      if (tracks_[last_].body == body) return &tracks_[last_];
+    if (tracks_.size() == most_bodies) return nullptr;
+    return &tracks_.emplace_back(Track{std::string(body), {}});
+  }
+
+  void look_at_the_whole() {
+    if (tracks_.empty()) {
+      wrong_ = name_ + ": no poses; write one a line, see docs/trajectories.md";
+    } else if (!frame_ && !asked_.frame) {
+      wrong_ = name_ +
+               ": in which frame the poses are is not said; begin the file with a line \"# frame: ENU_FLU\" or \"# frame: "
+               "NED_FRD\", or give the frame with the file's name (docs/trajectories.md)";
+    }
+  }
+
+  TrajectoryFile finished() {
+    TrajectoryFile file;
+    file.format = format_;
+    file.frame = frame_ ? *frame_ : *asked_.frame;
+    Ns first = tracks_.front().points.times.front(), last = first;
+    for (const Track& t : tracks_) {
+      first = std::min(first, t.points.times.front());
+      last = std::max(last, t.points.times.back());
+    }
+    file.begins_at = first;
+    file.duration = last - first;
+    for (Track& t : tracks_) {
+      for (Ns& at : t.points.times) at -= first;
+      if (file.frame == Frame::ned_frd) turn_to_enu_flu(t.points);
+      file.bodies.push_back({std::move(t.body), std::make_shared<const Trajectory>(std::move(t.points), file.duration)});
+    }
+    return file;
+  }
+
+  static void turn_to_enu_flu(Points& p) {
+    for (Pose& pose : p.poses) pose = enu_flu_from_ned_frd(pose);
+    for (Vec3d& v : p.velocities_mps) v = enu_from_ned(v);
+    for (Vec3d& w : p.angular_velocities_radps) w = flu_from_frd(w);
+  }
+
+  const std::string& name_;
+  const ReadOptions& asked_;
+  Format format_;
+  std::optional<Frame> frame_;
+  std::optional<Columns> columns_;
+  bool commas_ = false;
+  Words words_;
+  std::size_t line_ = 0, rows_ = 0, last_ = 0;
+  std::vector<Track> tracks_;
+  std::string wrong_;
+};
+
+Result<std::string> text_of(const std::filesystem::path& file) {
+  std::error_code ec;
+  const auto type = std::filesystem::status(file, ec).type();
+  const bool readable = type == std::filesystem::file_type::regular || type == std::filesystem::file_type::fifo;
+  std::FILE* const in = readable ? std::fopen(file.c_str(), "rb") : nullptr;
+  if (in == nullptr)
+    return failure(ErrorKind::missing_file, "cannot read the poses in " + file.string() + "; is the file there?");
+  std::string text;
+  if (const auto size = std::filesystem::file_size(file, ec); !ec && size <= most_bytes) text.reserve(size + 1);
+  std::array<char, std::size_t{1} << 16> part;
+  for (std::size_t n = 0; text.size() <= most_bytes && (n = std::fread(part.data(), 1, part.size(), in)) > 0;)
+    text.append(part.data(), n);
+  const bool failed = std::ferror(in) != 0;
+  std::fclose(in);
+  if (failed) return failure(ErrorKind::io, "reading the poses in " + file.string() + " failed");
+  if (text.size() > most_bytes)
+    return failure(ErrorKind::bad_data, file.string() + ": more than a gigabyte of poses; split the file");
+  return text;
+}
+
+}  // namespace
+
+std::string_view name_of(Format format) { return format_names[static_cast<std::size_t>(format)]; }
+std::string_view name_of(Frame frame) { return frame_names[static_cast<std::size_t>(frame)]; }
+
+Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::string& name, const ReadOptions& options) {
+  return Reader(name, options).run(text);
+}
+
+Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options) {
+  const auto text = text_of(file);
+  if (!text) return tl::make_unexpected(text.error());
+  return parse_trajectories(*text, file.string(), options);
+}
+
+Result<std::shared_ptr<const Trajectory>> trajectory_of(const TrajectoryFile& file, const std::string& name,
+                                                        const std::string& body) {
+  std::vector<std::string_view> names;
+  for (const TrajectoryFile::Body& b : file.bodies) {
+    if (b.name == body || (body.empty() && file.bodies.size() == 1)) return b.trajectory;
+    names.push_back(b.name);
+  }
+  if (names.front().empty())
+    return failure(ErrorKind::bad_data, name + ": there is one body in it and it has no name; leave out body");
+  if (body.empty())
+    return failure(ErrorKind::bad_data, name + ": several bodies; say which: body" + text::suggestion("", names, "there are"));
+  return failure(ErrorKind::bad_data,
+                 name + ": no body is called " + in_quotes(body) + text::suggestion(body, names, "there are"));
+}
+
+}  // namespace sonar::motion

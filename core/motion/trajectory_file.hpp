@@ -1,0 +1,47 @@
+// Files of trajectories: own CSV with a header, TUM, EuRoC CSV, KITTI matrices; what each looks like is in docs/trajectories.md.
+// Read by `sonard run` for what it plays and by `sonard render`; the result is in our frames, its times from the file's start.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/motion/trajectory.hpp"
+
+namespace sonar::motion {
+
+enum class Format { automatic, csv, tum, euroc, kitti };
+enum class Frame { enu_flu, ned_frd };  // of the world and of the body
+std::string_view name_of(Format format);
+std::string_view name_of(Frame frame);
+
+struct ReadOptions {
+  Format format = Format::automatic;   // told by the first line with numbers or names
+  std::optional<Frame> frame = {};     // needed when the file does not say; a file that says otherwise is refused
+  std::optional<double> rate_hz = {};  // lines a second; of KITTI files, which have no times, and of no others
+};
+
+struct TrajectoryFile {
+  struct Body {
+    std::string name;  // empty when the file names none
+    std::shared_ptr<const Trajectory> trajectory;
+  };
+  std::vector<Body> bodies;  // as they appear; at least one
+  Format format = Format::csv;
+  Frame frame = Frame::enu_flu;
+  Ns begins_at{0};  // the earliest stamp: what the trajectories call 0
+  Ns duration{0};   // to the latest
+};
+
+/// A comment of the file says its frame: `# frame: NED_FRD`. Errors: name:line: what.
+Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::string& name, const ReadOptions& options);
+Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options);
+/// Of the body that is called so; with an empty name, of the only one. Errors name the bodies there are.
+Result<std::shared_ptr<const Trajectory>> trajectory_of(const TrajectoryFile& file, const std::string& name,
+                                                        const std::string& body);
+
+}  // namespace sonar::motion

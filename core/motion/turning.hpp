@@ -1,0 +1,30 @@
+// Turns from one orientation to another, and part of the way. Used where poses are interpolated: trajectories here, what senders
+// told in daemon/pose_history.
+#pragma once
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::motion {
+
+/// Rotation by a vector [rad].
+inline Quatd quat_from_rotation(Vec3d r) {
+  const double angle = length(r);
+  if (angle < 1e-12) return normalized(Quatd{1, r.x / 2, r.y / 2, r.z / 2});
+  const double s = std::sin(angle / 2) / angle;
+  return {std::cos(angle / 2), r.x * s, r.y * s, r.z * s};
+}
+
+/// The rotation vector [rad] that turns a into b, in a's own axes; shortest way.
+inline Vec3d rotation_between(Quatd a, Quatd b) {
+  Quatd d = conjugate(a) * b;
+  if (d.w < 0) d = {-d.w, -d.x, -d.y, -d.z};
+  const double sine = std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
+  if (sine < 1e-12) return {2 * d.x, 2 * d.y, 2 * d.z};
+  const double factor = 2 * std::atan2(sine, d.w) / sine;
+  return {factor * d.x, factor * d.y, factor * d.z};
+}
+
+/// Shortest way from a (u = 0) to b (u = 1) at constant turn rate.
+inline Quatd slerp(Quatd a, Quatd b, double u) { return normalized(a * quat_from_rotation(u * rotation_between(a, b))); }
+
+}  // namespace sonar::motion
