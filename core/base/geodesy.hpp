@@ -1,0 +1,41 @@
+// Latitudes and longitudes as places: WGS84, through earth-centred coordinates to the plane that touches the ground at an origin.
+// Senders with satellite positions are brought into the world by it; all in double, exact to micrometres near the origin.
+#pragma once
+
+#include <cmath>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar {
+
+struct Geodetic {
+  double latitude_rad = 0, longitude_rad = 0;
+  double altitude_m = 0;  // above the ellipsoid; any other level serves as long as all places are given above the same one
+};
+
+inline constexpr double earth_semi_major_m = 6378137.0;        // WGS84 (NIMA TR8350.2, table 3.1)
+inline constexpr double earth_flattening = 1 / 298.257223563;  // the same
+inline constexpr double earth_eccentricity_squared = earth_flattening * (2 - earth_flattening);
+
+/// Earth-centred, earth-fixed [m]: x through latitude 0 longitude 0, z through the north pole.
+inline Vec3d ecef_from(const Geodetic& place) {
+  const double s = std::sin(place.latitude_rad), c = std::cos(place.latitude_rad);
+  const double normal_m = earth_semi_major_m / std::sqrt(1 - earth_eccentricity_squared * s * s);
+  return {(normal_m + place.altitude_m) * c * std::cos(place.longitude_rad),
+          (normal_m + place.altitude_m) * c * std::sin(place.longitude_rad),
+          (normal_m * (1 - earth_eccentricity_squared) + place.altitude_m) * s};
+}
+
+/// The axes east, north, up at a place, expressed in earth-centred ones.
+inline Pose enu_in_ecef(const Geodetic& place) {
+  const Quatd about_z = turned_by({0, 0, place.longitude_rad + pi / 2});  // x turns east
+  const Quatd about_x = turned_by({pi / 2 - place.latitude_rad, 0, 0});   // z turns up
+  return {ecef_from(place), about_z * about_x};
+}
+
+/// The axes east, north, up at `place`, expressed in those at `origin`: where it is, and how little they are turned.
+inline Pose enu_in_enu_of(const Geodetic& origin, const Geodetic& place) {
+  return compose(inverse(enu_in_ecef(origin)), enu_in_ecef(place));
+}
+
+}  // namespace sonar
