@@ -1,0 +1,77 @@
+// MAVLink frames, versions 1 and 2: found in a datagram and checked, or written. Nothing of a datagram is believed before its
+// checksum was computed; protocol/mavlink/mavlink_poses.hpp makes poses of what is inside.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "protocol/mavlink/messages.hpp"
+
+namespace sonar::mavlink {
+
+inline constexpr std::size_t largest_payload = 255;
+
+/// A frame whose checksum is right, of a message in known_messages().
+struct Frame {
+  int version = 2;
+  std::uint8_t sequence = 0, system = 0, component = 0;
+  std::uint32_t id = 0;
+  std::size_t payload_size = 0;                      // as sent: version 2 leaves out zeros at the end
+  std::array<std::byte, largest_payload> payload{};  // zeros beyond
+};
+/// The message of a frame; M must be the frame's own.
+template <class M>
+M message_in(const Frame& frame) {
+  M message;
+  wire::Reader reader(frame.payload);
+  all_fields(reader, message);
+  return message;
+}
+
+struct FrameCounts {
+  std::uint64_t frames = 0;        // good ones
+  std::uint64_t unknown = 0;       // of messages we do not read; skipped whole
+  std::uint64_t bad_checksum = 0;  // damaged, or of a dialect that gave the number to another message
+  std::uint64_t wrong_size = 0;    // version 1 payload of another length than the message has
+  std::uint64_t junk_bytes = 0;    // belong to no frame
+};
+
+/// The frames of one datagram, one after the other. `datagram` must outlive it.
+class FrameReader {
+ public:
+  explicit FrameReader(BytesView datagram) : rest_(datagram) {}
+  std::optional<Frame> next();
+  const FrameCounts& counts() const { return counts_; }
+
+ private:
+  struct Header;
+  std::optional<Header> header() const;
+  std::optional<Frame> judged(const Header& header);
+  bool begins_a_frame(std::size_t at) const;
+  void skip(std::size_t count) { rest_ = rest_.subspan(count); }
+
+  BytesView rest_;
+  FrameCounts counts_;
+};
+
+/// CRC-16/MCRF4XX, which MAVLink calls X.25; `crc` carries on an earlier one.
+std::uint16_t checksum(BytesView bytes, std::uint16_t crc = 0xFFFF);
+
+/// Who speaks.
+struct Speaker {
+  std::uint8_t system = 1, component = 0;
+  std::uint8_t sequence = 0;  // of the next frame
+};
+/// A frame of version 2 around a payload; counts the speaker's sequence up.
+Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Speaker& speaker);
+template <class M>
+Bytes framed(const M& message, Speaker& speaker) {
+  Bytes payload;
+  wire::Writer writer(payload);
+  all_fields(writer, message);
+  return framed(M::id, M::crc_extra, payload, speaker);
+}
+
+}  // namespace sonar::mavlink

@@ -1,0 +1,285 @@
+#include "protocol/mavlink/mavlink_poses.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar::mavlink {
+namespace {
+
+using control::ClockDomain;
+using control::RawPose;
+using control::Stamp;
+
+constexpr std::uint8_t no_autopilot = 8;  // MAV_AUTOPILOT_INVALID: ground stations, cameras, ourselves
+constexpr std::int64_t late_ms = 1000;    // a clock that goes back further than this has been restarted
+constexpr std::int64_t late_ns = late_ms * 1'000'000;
+constexpr double farthest_m = 100e3;  // from the origin; beyond, the tangent plane means nothing
+constexpr double moved_origin_m = 0.01;
+
+std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
+
+/// Those whose sender can be nothing but a vehicle, or its simulator.
+bool bears_a_pose(std::uint32_t id) { return id != Heartbeat::id && id != SystemTime::id && id != GpsGlobalOrigin::id; }
+
+Stamp boot_stamp(std::int64_t at_ms) { return {ClockDomain::sim, at_ms * 1'000'000}; }
+
+std::string fields_of(const RawPose& raw) {
+  return std::string("position attitude") + (raw.velocity_mps ? " velocity" : "") + (raw.angular_velocity_radps ? " rates" : "");
+}
+
+}  // namespace
+
+std::string_view name_of(Source source) {
+  constexpr std::array<std::string_view, source_count> names{"ODOMETRY",
+                                                             "SIM_STATE",
+                                                             "ATT_POS_MOCAP",
+                                                             "VISION_POSITION_ESTIMATE",
+                                                             "LOCAL_POSITION_NED and attitude",
+                                                             "GLOBAL_POSITION_INT and attitude"};
+  return names[index_of(source)];
+}
+
+MavlinkPoses::MavlinkPoses(Settings settings) : settings_(std::move(settings)) {
+  us_.component = own_component;
+  if (settings_.system_id != 0) us_.system = settings_.system_id;
+}
+
+// ---- who is meant
+
+void MavlinkPoses::begin(std::uint8_t system, Time now) {
+  system_ = us_.system = system;
+  found_at_ = now;
+  next_request_ = now;
+  has_autopilot_ = reported_ = sim_state_is_coarse_ = false;
+  autopilot_component_ = 1;
+  heard_.clear();
+  local_in_world_.reset();
+  newest_ns_ = {};
+  yielded_ = {};
+  reset_counter_ = {};
+  begin_histories();
+}
+
+/// Nothing from before may be joined with what comes now.
+void MavlinkPoses::begin_histories() {
+  attitudes_.clear();
+  local_.clear();
+  global_.clear();
+  newest_boot_ms_ = 0;
+  ++resets_;
+}
+
+bool MavlinkPoses::is_meant(const Frame& frame, Time now) {
+  if (frame.system == us_.system && frame.component == own_component) return false;  // our own, sent back by a router
+  if (settings_.component_id != 0 && frame.component != settings_.component_id) return false;
+  if (settings_.system_id != 0) {
+    if (frame.system != settings_.system_id) return false;
+    if (!system_) begin(frame.system, now);
+    return true;
+  }
+  if (system_ && frame.system == *system_) return true;
+  if (system_ && now - last_heard_ <= system_silence) return false;
+  const bool shows_itself =
+      frame.id == Heartbeat::id ? message_in<Heartbeat>(frame).autopilot != no_autopilot : bears_a_pose(frame.id);
+  if (shows_itself) begin(frame.system, now);
+  return shows_itself;
+}
+
+/// Of several components that send the same message one is listened to; heartbeats come from all.
+bool MavlinkPoses::is_heard(const Frame& frame, Time now) {
+  const auto known = heard_.find(frame.id);
+  const bool other = known != heard_.end() && known->second.component != frame.component;
+  if (other && frame.id != Heartbeat::id && now - known->second.at <= system_silence) return false;
+  heard_[frame.id] = {frame.component, now};
+  return true;
+}
+
+bool MavlinkPoses::is_fresh(std::uint32_t message, Time now) const {
+  const auto known = heard_.find(message);
+  return known != heard_.end() && now - known->second.at <= source_silence;
+}
+
+// ---- what arrives
+
+Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
+  Reaction out;
+  if (datagram.size() > largest_datagram) {
+    out.refusals.push_back("datagram is longer than " + std::to_string(largest_datagram) + " bytes");
+    return out;
+  }
+  FrameReader frames(datagram);
+  while (const auto frame = frames.next()) {
+    if (!is_meant(*frame, now)) continue;
+    last_heard_ = now;
+    if (is_heard(*frame, now)) on_frame(*frame, {now, out});
+  }
+  judge(frames.counts(), out);
+  return out;
+}
+
+void MavlinkPoses::judge(const FrameCounts& now, Reaction& out) {
+  counts_.frames += now.frames;
+  counts_.unknown += now.unknown;
+  counts_.bad_checksum += now.bad_checksum;
+  counts_.wrong_size += now.wrong_size;
+  counts_.junk_bytes += now.junk_bytes;
+  if (now.bad_checksum > 0)
+    out.refusals.emplace_back(
+        "a MAVLink frame has a wrong checksum: damaged, or of a dialect with another message of that number");
+  else if (now.wrong_size > 0)
+    out.refusals.emplace_back("a MAVLink 1 message has the wrong length");
+  else if (now.junk_bytes > 0)
+    out.refusals.push_back(std::to_string(now.junk_bytes) + " bytes are no MAVLink");
+}
+
+void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
+  switch (frame.id) {
+    case Heartbeat::id:
+      return take(message_in<Heartbeat>(frame), frame);
+    case Attitude::id:
+      if (!is_fresh(AttitudeQuaternion::id, at.now)) take(attitude_of(message_in<Attitude>(frame)), at);
+      return;
+    case AttitudeQuaternion::id:
+      return take(attitude_of(message_in<AttitudeQuaternion>(frame)), at);
+    case LocalPositionNed::id:
+      return take(message_in<LocalPositionNed>(frame), at);
+    case GlobalPositionInt::id:
+      return take(message_in<GlobalPositionInt>(frame), at);
+    case GpsGlobalOrigin::id:
+      return take(message_in<GpsGlobalOrigin>(frame), at);
+    case VisionPositionEstimate::id:
+      return take(message_in<VisionPositionEstimate>(frame), at);
+    case SimState::id:
+      return take(message_in<SimState>(frame), at);
+    case AttPosMocap::id:
+      return take(message_in<AttPosMocap>(frame), at);
+    case Odometry::id:
+      return take(message_in<Odometry>(frame), at);
+    default:
+      return;  // SYSTEM_TIME: poses are stamped with the boot clock, which the World maps to ours
+  }
+}
+
+void MavlinkPoses::take(const Heartbeat& m, const Frame& frame) {
+  if (m.autopilot == no_autopilot) return;
+  has_autopilot_ = true;
+  autopilot_ = m.autopilot;
+  autopilot_component_ = frame.component;
+}
+
+void MavlinkPoses::take(const AttitudeReading& reading, Moment at) {
+  note_boot_time(reading.at_ms);
+  attitudes_.put(reading);
+  join_pairs(at);
+}
+
+void MavlinkPoses::take(const LocalPositionNed& m, Moment at) {
+  note_boot_time(m.boot_ms);
+  local_.put(place_of(m));
+  join_pairs(at);
+}
+
+void MavlinkPoses::take(const GlobalPositionInt& m, Moment at) {
+  note_boot_time(m.boot_ms);
+  const auto place = placed(GlobalPositionInt::name, geodetic_of(m), at);
+  if (!place) return;
+  global_.put({m.boot_ms, *place, {0.01 * m.north_cmps, 0.01 * m.east_cmps, 0.01 * m.down_cmps}});
+  join_pairs(at);
+}
+
+void MavlinkPoses::take(const GpsGlobalOrigin& m, Moment at) {
+  const auto place = placed(GpsGlobalOrigin::name, geodetic_of(m), at);
+  if (!place) return;
+  const Vec3d before = local_in_world_.value_or(Pose{}).position_m;
+  if (length(place->position_m - before) > moved_origin_m) ++resets_;
+  local_in_world_ = *place;
+}
+
+void MavlinkPoses::take(const SimState& m, Moment at) {
+  const auto place = placed(SimState::name, geodetic_of(m), at);
+  sim_state_is_coarse_ = !has_exact_position(m);
+  if (place) offer(Source::sim_state, raw_pose(m), Stamp{}, *place, at);
+}
+
+void MavlinkPoses::take(const VisionPositionEstimate& m, Moment at) {
+  on_reset_counter(Source::vision, m.reset_counter);
+  offer(Source::vision, raw_pose(m), stamp_of(Source::vision, m.time_us), Pose{}, at);
+}
+
+void MavlinkPoses::take(const AttPosMocap& m, Moment at) {
+  offer(Source::mocap, raw_pose(m), stamp_of(Source::mocap, m.time_us), Pose{}, at);
+}
+
+void MavlinkPoses::take(const Odometry& m, Moment at) {
+  const auto raw = raw_pose(m);
+  if (!raw) return refuse(Odometry::name, raw.error().text, at);
+  on_reset_counter(Source::odometry, m.reset_counter);
+  offer(Source::odometry, *raw, stamp_of(Source::odometry, m.time_us), local_in_world_.value_or(Pose{}), at);
+}
+
+// ---- what becomes of it
+
+void MavlinkPoses::join_pairs(Moment at) {
+  while (const auto pair = local_.next(attitudes_))
+    offer(Source::local, raw_pose(pair->attitude, pair->place), boot_stamp(pair->place.at_ms), local_in_world_.value_or(Pose{}),
+          at);
+  while (const auto pair = global_.next(attitudes_))
+    offer(Source::global, raw_pose(pair->attitude, {pair->place.at_ms, {}, pair->place.ned_mps}), boot_stamp(pair->place.at_ms),
+          pair->place.enu_in_world, at);
+}
+
+/// East, north, up at a place, in the world; nothing without an origin or a fix, or when it makes no sense.
+std::optional<Pose> MavlinkPoses::placed(std::string_view message, const Result<std::optional<Geodetic>>& place, Moment at) {
+  if (!place) {
+    refuse(message, place.error().text, at);
+    return std::nullopt;
+  }
+  if (!settings_.origin || !*place) return std::nullopt;
+  const Pose enu = enu_in_enu_of(*settings_.origin, **place);
+  const double away_m = length(enu.position_m);
+  if (away_m <= farthest_m) return enu;
+  refuse(message, "it is " + std::to_string(std::llround(away_m / 1000)) + " km from world.origin; one of the two is wrong", at);
+  return std::nullopt;
+}
+
+void MavlinkPoses::offer(Source source, const RawPose& raw, Stamp stamp, const Pose& enu_in_world, Moment at) {
+  for (std::size_t better = 0; better < index_of(source); ++better)
+    if (yielded_[better] && at.now - *yielded_[better] <= source_silence) return;
+  control::PoseSample sample;
+  sample.name = settings_.vehicle;
+  sample.stamp = stamp;
+  sample.reset_counter = resets_;
+  sample.fields = fields_of(raw);
+  auto pose = checked(std::move(sample), raw);
+  if (!pose) return refuse(name_of(source), pose.error().text, at);
+  pose->pose = compose(enu_in_world, pose->pose);
+  yielded_[index_of(source)] = at.now;
+  at.out.poses.push_back({*std::move(pose), "system " + std::to_string(*system_) + " " + std::string(name_of(source))});
+}
+
+/// UNIX time or time since boot: the sender's own clock either way. None, or one beyond reason: the moment of arrival.
+Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
+  if (time_us == 0 || time_us > control::largest_stamp_ns / 1000) return {};
+  const auto ns = static_cast<std::int64_t>(time_us * 1000);
+  std::int64_t& newest_ns = newest_ns_[index_of(source)];
+  if (ns < newest_ns - late_ns) ++resets_;
+  newest_ns = ns < newest_ns - late_ns ? ns : std::max(newest_ns, ns);
+  return {ClockDomain::sim, ns};
+}
+
+void MavlinkPoses::note_boot_time(std::int64_t ms) {
+  if (ms < newest_boot_ms_ - late_ms) begin_histories();
+  newest_boot_ms_ = std::max(newest_boot_ms_, ms);
+}
+
+void MavlinkPoses::on_reset_counter(Source source, std::uint8_t counter) {
+  std::optional<std::uint8_t>& known = reset_counter_[index_of(source)];
+  if (known && *known != counter) ++resets_;
+  known = counter;
+}
+
+void MavlinkPoses::refuse(std::string_view message, const std::string& why, Moment at) {
+  at.out.refusals.push_back(std::string(message) + ": " + why);
+}
+
+}  // namespace sonar::mavlink

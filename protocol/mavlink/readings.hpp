@@ -1,0 +1,49 @@
+// What single messages say of a vehicle, in the terms of control::RawPose: north-east-down world, forward-right-down body.
+// protocol/mavlink/mavlink_poses.hpp decides which of them count.
+#pragma once
+
+#include <optional>
+
+#include "core/base/geodesy.hpp"
+#include "core/base/result.hpp"
+#include "protocol/control/pose_sample.hpp"
+#include "protocol/mavlink/messages.hpp"
+
+namespace sonar::mavlink {
+
+/// Attitude of the body (FRD) in NED, at a moment of the sender's clock.
+struct AttitudeReading {
+  std::int64_t at_ms = 0;
+  Quatd frd_in_ned;
+  Vec3d rates_radps;  // about the body's axes
+};
+AttitudeReading attitude_of(const Attitude& m);
+AttitudeReading attitude_of(const AttitudeQuaternion& m);
+
+/// A place, and the velocity north, east, down [m/s].
+struct PlaceReading {
+  std::int64_t at_ms = 0;
+  Vec3d ned_m;
+  Vec3d ned_mps;
+};
+PlaceReading place_of(const LocalPositionNed& m);
+
+/// Degrees times 1e7; no value at all at 0, 0: that is how autopilots say that they do not know.
+/// Errors: a latitude or longitude beyond the globe's.
+Result<std::optional<Geodetic>> geodetic_of(const GlobalPositionInt& m);
+Result<std::optional<Geodetic>> geodetic_of(const GpsGlobalOrigin& m);
+/// Of the integers when they are there, else of the floats.
+Result<std::optional<Geodetic>> geodetic_of(const SimState& m);
+
+control::RawPose raw_pose(const AttitudeReading& attitude, const PlaceReading& place);
+/// The position stays 0: geodetic_of() has it.
+control::RawPose raw_pose(const SimState& m);
+control::RawPose raw_pose(const AttPosMocap& m);
+control::RawPose raw_pose(const VisionPositionEstimate& m);
+/// Errors: a frame_id or child_frame_id that says nothing about axes we know.
+Result<control::RawPose> raw_pose(const Odometry& m);
+
+/// Whether its position uses the integer extensions, which version 1 cannot carry.
+bool has_exact_position(const SimState& m);
+
+}  // namespace sonar::mavlink
