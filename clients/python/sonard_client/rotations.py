@@ -49,3 +49,14 @@ def to_body(q: Quaternion, v: Vector3) -> Vector3:
     w, x, y, z = q[0], -q[1], -q[2], -q[3]
     tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
     return v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx
+
+
+def between(a: Quaternion, b: Quaternion, u: float) -> Quaternion:
+    """The way from a (u = 0) to b (u = 1), evenly and the shorter way round."""
+    cosine = sum(p * q for p, q in zip(a, b))
+    sign = -1.0 if cosine < 0 else 1.0
+    angle = math.acos(min(1.0, abs(cosine)))
+    if angle < 1e-6:
+        return unit([p + u * (sign * q - p) for p, q in zip(a, b)])
+    from_a, from_b = math.sin((1 - u) * angle) / math.sin(angle), sign * math.sin(u * angle) / math.sin(angle)
+    return unit([from_a * p + from_b * q for p, q in zip(a, b)])

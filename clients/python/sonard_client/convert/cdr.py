@@ -1,0 +1,88 @@
+"""The bytes of ROS messages: CDR as ROS 2 writes it, and the unpadded form of ROS 1. Only what poses need."""
+from __future__ import annotations
+
+import struct
+from typing import List, Tuple
+
+
+class Broken(ValueError):
+    """The bytes are not what their type says; the text has no file in it yet."""
+
+
+class Reader:
+    """Fields in order. CDR aligns numbers to their own size, counted from behind its four bytes of head."""
+
+    def __init__(self, data: bytes, ros1: bool = False) -> None:
+        self._data, self._at, self._base, self._aligned, self._order = data, 0, 0, not ros1, "<"
+        if ros1:
+            return
+        if len(data) < 4 or data[0] != 0 or data[1] > 1:
+            raise Broken("no plain CDR: its first bytes are " + data[:4].hex(" "))
+        self._order = "<" if data[1] else ">"
+        self._at = self._base = 4
+
+    def numbers(self, kind: str, count: int = 1) -> Tuple[float, ...]:
+        size = struct.calcsize("=" + kind)
+        if self._aligned:
+            self._at += -(self._at - self._base) % size
+        if self._at + size * count > len(self._data):
+            raise Broken(f"ends after {len(self._data)} bytes, within a field at {self._at}")
+        values = struct.unpack_from(f"{self._order}{count}{kind}", self._data, self._at)
+        self._at += size * count
+        return values
+
+    def text(self) -> str:
+        (length,) = self.numbers("I")
+        end = self._at + int(length)
+        if end > len(self._data):
+            raise Broken(f"a text of {int(length)} bytes at {self._at}, in a message of {len(self._data)}")
+        raw = self._data[self._at:end]
+        self._at = end
+        return raw.rstrip(b"\0").decode("utf-8", "replace")
+
+
+Pose = Tuple[Tuple[float, float, float], Tuple[float, float, float, float]]  # position; orientation x, y, z, w as sent
+
+
+def _header(reader: Reader, ros1: bool) -> Tuple[float, str]:
+    if ros1:
+        reader.numbers("I")  # seq
+    (seconds,) = reader.numbers("I" if ros1 else "i")
+    (nanoseconds,) = reader.numbers("I")
+    return seconds + 1e-9 * nanoseconds, reader.text()
+
+
+def _pose(reader: Reader) -> Pose:
+    v = reader.numbers("d", 7)
+    return (v[0], v[1], v[2]), (v[3], v[4], v[5], v[6])
+
+
+def decode(kind: str, data: bytes, ros1: bool) -> List[Tuple[str, float, Pose]]:
+    """Of a message of that type: for each pose in it what to add to the topic's name, the stamp [s], and the pose."""
+    reader = Reader(data, ros1)
+    if kind == "TFMessage":
+        (count,) = reader.numbers("I")
+        return [_transform(reader, ros1) for _ in range(int(count))]
+    if kind == "TransformStamped":
+        return [_transform(reader, ros1)]
+    stamp, _ = _header(reader, ros1)
+    if kind == "Odometry":
+        reader.text()
+    return [("", stamp, _pose(reader))]
+
+
+def _transform(reader: Reader, ros1: bool) -> Tuple[str, float, Pose]:
+    stamp, parent = _header(reader, ros1)
+    child = reader.text()
+    return f" {parent}->{child}", stamp, _pose(reader)
+
+
+# Types whose poses are read, the one to be preferred first; the package before the name does not matter.
+KINDS = ("Odometry", "PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "TFMessage")
+PACKAGES = ("nav_msgs", "geometry_msgs", "tf2_msgs", "tf")
+
+
+def kind_of(schema: str) -> str:
+    """Of "nav_msgs/msg/Odometry" or "nav_msgs/Odometry"; empty for all else."""
+    parts = schema.split("/")
+    return parts[-1] if parts[0] in PACKAGES and parts[-1] in KINDS else ""

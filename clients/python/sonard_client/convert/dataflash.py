@@ -1,0 +1,151 @@
+"""ArduPilot's dataflash logs (.bin): every message has the head A3 95 and its type; FMT messages, type 128, describe the others.
+
+Layouts are those of ArduPilot's AP_Logger; what a log says of its messages counts, so that logs of any age are read.
+"""
+from __future__ import annotations
+
+import math
+import pathlib
+import struct
+from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
+
+from ..geodesy import Geodetic
+from ..rotations import Quaternion, quaternion_from_rpy, unit
+from .track import ConvertError, Source, Stream, Track, Warn, chosen, track_of
+
+MAGIC = b"\xa3\x95"
+FMT = 128
+_FMT = struct.Struct("<BB4s16s64s")  # type, length, name, format, labels
+# Format characters: struct's, and what the number is multiplied by.
+_KINDS: Dict[str, Tuple[str, float]] = {
+    "a": ("64s", 0), "b": ("b", 1), "B": ("B", 1), "h": ("h", 1), "H": ("H", 1), "i": ("i", 1), "I": ("I", 1), "f": ("f", 1),
+    "d": ("d", 1), "g": ("e", 1), "n": ("4s", 0), "N": ("16s", 0), "Z": ("64s", 0), "c": ("h", 0.01), "C": ("H", 0.01),
+    "e": ("i", 0.01), "E": ("I", 0.01), "L": ("i", 1e-7), "M": ("B", 1), "q": ("q", 1), "Q": ("Q", 1)}
+# Ground truth of the simulator first, then what the vehicle believed.
+FULL = ("SIM", "XKF1", "NKF1", "EKF1", "AHR2")
+LOCAL = ("XKF1", "NKF1", "EKF1")  # metres from the filter's origin
+WANTED = FULL + ("ATT", "POS", "GPS", "ORGN")
+EKF_ORIGIN = 0  # type of an ORGN message; 1 is the home of the attitude system
+FIX_2D = 2
+
+
+class Format(NamedTuple):
+    name: str
+    length: int
+    body: Optional[struct.Struct]  # None where the description contradicts itself
+    labels: Tuple[str, ...]
+    factors: Tuple[float, ...]
+
+
+def _text(raw: bytes) -> str:
+    return raw.split(b"\0")[0].decode("latin-1")
+
+
+def _format(data: bytes, at: int) -> "Tuple[int, Format]":
+    kind, length, name, characters, labels = _FMT.unpack_from(data, at + 3)
+    known = [_KINDS.get(c) for c in _text(characters)]
+    names = tuple(_text(labels).split(",")) if _text(labels) else ()
+    body = struct.Struct("<" + "".join(k[0] for k in known if k)) if all(known) else None
+    if body is not None and (body.size + 3 != length or len(names) != len(known)):
+        body = None
+    return kind, Format(_text(name), length, body, names, tuple(k[1] for k in known if k))
+
+
+def records(data: bytes, warn: Warn) -> "Iterator[Tuple[str, Dict[str, float]]]":
+    """Numbers of the messages that hold poses, scaled to degrees, metres and seconds as the format says. What cannot be read is
+    passed over to the next head, and told at the end."""
+    formats: Dict[int, Format] = {FMT: Format("FMT", 3 + _FMT.size, None, (), ())}
+    at, skipped, first_skipped = 0, 0, -1
+    while at + 3 <= len(data):
+        described = formats.get(data[at + 2]) if data[at:at + 2] == MAGIC else None
+        if described is None or described.length < 3:
+            following = data.find(MAGIC, at + 1)
+            following = len(data) if following < 0 else following
+            skipped += following - at
+            first_skipped = at if first_skipped < 0 else first_skipped
+            at = following
+            continue
+        if at + described.length > len(data):
+            warn(f"ends within a message, at byte {at}: what comes before it was read")
+            break
+        if data[at + 2] == FMT:
+            kind, said = _format(data, at)
+            if kind != FMT:
+                formats[kind] = said
+                if said.body is None and said.name in WANTED:
+                    warn(f"at byte {at}: the description of {said.name} contradicts itself; these messages are left out")
+        elif described.name in WANTED and described.body is not None:
+            values = described.body.unpack_from(data, at + 3)
+            scaled = zip(described.labels, values, described.factors)
+            yield described.name, {label: value * factor for label, value, factor in scaled if factor}
+        at += described.length
+    if skipped:
+        warn(f"{skipped} bytes are no message, the first at byte {first_skipped}; they were passed over")
+
+
+def _time_s(fields: Dict[str, float]) -> Optional[float]:
+    if "TimeUS" in fields:
+        return 1e-6 * fields["TimeUS"]
+    return 1e-3 * fields["TimeMS"] if "TimeMS" in fields else None
+
+
+def _attitude(fields: Dict[str, float]) -> Optional[Quaternion]:
+    if all(f"Q{i}" in fields for i in range(1, 5)):
+        parts = [fields[f"Q{i}"] for i in range(1, 5)]
+        if abs(sum(p * p for p in parts) - 1) < 1e-3:
+            return unit(parts)
+    if not all(name in fields and math.isfinite(fields[name]) for name in ("Roll", "Pitch", "Yaw")):
+        return None
+    return quaternion_from_rpy(*(math.radians(fields[name]) for name in ("Roll", "Pitch", "Yaw")))
+
+
+def _geodetic(fields: Dict[str, float]) -> Optional[Geodetic]:
+    if not all(name in fields for name in ("Lat", "Lng", "Alt")):
+        return None
+    place = Geodetic(fields["Lat"], fields["Lng"], fields["Alt"])
+    return place if place.is_fix and fields.get("Status", 3) >= FIX_2D else None
+
+
+class _Gathered:
+    def __init__(self) -> None:
+        self.attitudes: Dict[str, Stream[Quaternion]] = {}
+        self.positions: "Dict[str, Stream]" = {}
+        self.origin: Optional[Geodetic] = None
+
+    def take(self, name: str, fields: Dict[str, float]) -> None:
+        t = _time_s(fields)
+        if name == "ORGN" and fields.get("Type", EKF_ORIGIN) == EKF_ORIGIN:
+            self.origin = self.origin or _geodetic(fields)
+        if t is None or name == "ORGN":
+            return
+        instance = int(fields.get("C", fields.get("I", 0)))
+        key = f"{name}:{instance}" if instance else name
+        attitude = _attitude(fields)
+        if attitude is not None:
+            self.attitudes.setdefault(key, []).append((t, attitude))
+        if name in LOCAL:
+            local = tuple(fields.get(n, math.nan) for n in ("PN", "PE", "PD"))
+            if all(map(math.isfinite, local)):
+                self.positions.setdefault(key, []).append((t, local))
+            return
+        place = _geodetic(fields)
+        if place is not None:
+            self.positions.setdefault(key, []).append((t, place))
+
+    def sources(self) -> List[Source]:
+        full = sorted((k for k in self.attitudes if k.split(":")[0] in FULL), key=lambda k: (FULL.index(k.split(":")[0]), k))
+        found = [Source(key, self.attitudes[key], self.positions.get(key, [])) for key in full]
+        return found + [Source(f"ATT+{p}", self.attitudes.get("ATT", []), self.positions.get(p, [])) for p in ("POS", "GPS")]
+
+
+def read_dataflash(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None) -> Track:
+    """The vehicle's way: NED_FRD, seconds since the autopilot started."""
+    data = path.read_bytes()
+    if not data.startswith(MAGIC):
+        raise ConvertError(f"{path}: at byte 0: no dataflash log: it does not begin with A3 95")
+    gathered = _Gathered()
+    for name, fields in records(data, warn):
+        gathered.take(name, fields)
+    wanted = chosen(gathered.sources(), source, str(path))
+    local = wanted.name.split(":")[0] in LOCAL
+    return track_of(wanted, str(path), warn, origin, gathered.origin if local else None)

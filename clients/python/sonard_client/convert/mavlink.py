@@ -1,0 +1,112 @@
+"""MAVLink frames of versions 1 and 2 as bytes, and the messages that say where a vehicle is.
+
+Layouts and CRC seeds follow from MAVLink's message definitions (minimal, standard, common): fields by falling size, extensions
+behind them. A payload of version 2 is sent without its trailing zeros.
+"""
+from __future__ import annotations
+
+import struct
+from typing import Dict, NamedTuple, Optional, Tuple
+
+V1, V2 = 0xFE, 0xFD
+SIGNED = 0x01
+SIGNATURE_BYTES = 13
+
+
+class Message(NamedTuple):
+    name: str
+    seed: int           # of the CRC: CRC_EXTRA
+    fixed: str          # struct's format without extensions
+    extensions: str
+    fields: Tuple[str, ...]
+
+
+def _names(text: str) -> Tuple[str, ...]:
+    return tuple(text.split())
+
+
+_SIM_STATE = ("q1 q2 q3 q4 roll pitch yaw xacc yacc zacc xgyro ygyro zgyro lat lon alt std_dev_horz std_dev_vert vn ve vd "
+              "lat_int lon_int")
+MESSAGES: Dict[int, Message] = {
+    0: Message("HEARTBEAT", 50, "I5B", "", _names("custom_mode type autopilot base_mode system_status mavlink_version")),
+    30: Message("ATTITUDE", 39, "I6f", "", _names("time_boot_ms roll pitch yaw rollspeed pitchspeed yawspeed")),
+    31: Message("ATTITUDE_QUATERNION", 246, "I7f", "4f",
+                _names("time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed offset1 offset2 offset3 offset4")),
+    32: Message("LOCAL_POSITION_NED", 185, "I6f", "", _names("time_boot_ms x y z vx vy vz")),
+    33: Message("GLOBAL_POSITION_INT", 104, "I4i3hH", "", _names("time_boot_ms lat lon alt relative_alt vx vy vz hdg")),
+    49: Message("GPS_GLOBAL_ORIGIN", 39, "3i", "Q", _names("latitude longitude altitude time_usec")),
+    102: Message("VISION_POSITION_ESTIMATE", 158, "Q6f", "84xB", _names("time_usec x y z roll pitch yaw reset_counter")),
+    108: Message("SIM_STATE", 32, "21f", "2i", _names(_SIM_STATE)),
+    138: Message("ATT_POS_MOCAP", 109, "Q7f", "84x", _names("time_usec q1 q2 q3 q4 x y z")),
+    331: Message("ODOMETRY", 91, "Q13f168xBB", "BBb",
+                 _names("time_usec x y z q1 q2 q3 q4 vx vy vz rollspeed pitchspeed yawspeed frame_id child_frame_id "
+                        "reset_counter estimator_type quality")),
+}
+# MAV_FRAME, as frame_id of ODOMETRY.
+LOCAL_NED, LOCAL_FRD = 1, 20
+
+
+def _crc_of_byte(value: int) -> int:
+    for _ in range(8):
+        value = value >> 1 ^ (0x8408 if value & 1 else 0)
+    return value
+
+
+_CRCS = tuple(map(_crc_of_byte, range(256)))
+
+
+def crc(data: bytes, seed: int) -> int:
+    """CRC-16/MCRF4XX over everything behind the magic byte, then over the seed."""
+    value = 0xFFFF
+    for byte in data:
+        value = value >> 8 ^ _CRCS[(value ^ byte) & 0xFF]
+    return value >> 8 ^ _CRCS[(value ^ seed) & 0xFF]
+
+
+class Frame(NamedTuple):
+    message_id: int
+    system: int
+    component: int
+    payload: bytes
+    length: int          # of the frame, magic to signature
+    intact: "Optional[bool]"  # None: a message whose seed is not known here
+
+
+def frame_length(data: bytes, at: int) -> Optional[int]:
+    """Of the frame that begins there, from its first bytes; None where none can. May reach beyond the data."""
+    if at + 3 > len(data):
+        return None
+    if data[at] == V1:
+        return 8 + data[at + 1]
+    if data[at] == V2 and data[at + 2] & ~SIGNED == 0:
+        return 12 + data[at + 1] + (SIGNATURE_BYTES if data[at + 2] & SIGNED else 0)
+    return None
+
+
+def read_frame(data: bytes, at: int) -> Optional[Frame]:
+    """The frame that begins there; None where there is none, or not all of it."""
+    length = frame_length(data, at)
+    if length is None or at + length > len(data):
+        return None
+    size = data[at + 1]
+    head = 6 if data[at] == V1 else 10
+    body = data[at + 1:at + head + size]
+    message_id = data[at + 5] if head == 6 else int.from_bytes(data[at + 7:at + 10], "little")
+    known = MESSAGES.get(message_id)
+    sum_of = int.from_bytes(data[at + head + size:at + head + size + 2], "little")
+    system = data[at + 3] if head == 6 else data[at + 5]
+    component = data[at + 4] if head == 6 else data[at + 6]
+    return Frame(message_id, system, component, data[at + head:at + head + size], length,
+                 crc(body, known.seed) == sum_of if known else None)
+
+
+def fields_of(frame: Frame) -> "Optional[Dict[str, float]]":
+    """Of a known message; extensions that were not sent are 0, as MAVLink has it. None for others, and for payloads that no
+    layout has."""
+    known = MESSAGES.get(frame.message_id)
+    if known is None:
+        return None
+    whole = struct.Struct("<" + known.fixed + known.extensions)
+    if len(frame.payload) > whole.size:
+        return None
+    return dict(zip(known.fields, whole.unpack(frame.payload.ljust(whole.size, b"\0"))))

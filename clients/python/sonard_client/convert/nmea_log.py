@@ -1,0 +1,47 @@
+"""Logs of NMEA 0183 sentences: a pose at every fix, with the attitude and depth that were last told."""
+from __future__ import annotations
+
+import pathlib
+from typing import List, Optional
+
+from ..geodesy import Geodetic
+from ..nmea import Assumptions, NmeaError, NmeaPoses, parse_sentence
+from ..rotations import quaternion_from_rpy
+from .track import ConvertError, Row, Track, Warn, rising
+
+
+def read_nmea(path: pathlib.Path, warn: Warn, origin: Optional[Geodetic] = None, assumed: Assumptions = Assumptions()) -> Track:
+    """In NED_FRD, seconds of the day. Depth is what `assumed` makes of DPT and DBT."""
+    poses = NmeaPoses(assumed._replace(origin=origin))
+    rows: List[Row] = []
+    refused, first_refused, too_early, at = 0, "", 0, 0
+    for line in path.read_bytes().splitlines(keepends=True):
+        begin, at = at, at + len(line)
+        if not line.strip():
+            continue
+        try:
+            changed = poses.feed(parse_sentence(line.decode("latin-1")))
+        except NmeaError as error:
+            refused += 1
+            first_refused = first_refused or f"at byte {begin}: {error}"
+            continue
+        if changed != "place" or poses.instruments.fix_time_s is None:
+            continue
+        pose = poses.pose()
+        if pose is None:
+            too_early += 1
+        else:
+            rows.append(Row(poses.instruments.fix_time_s, pose[0], quaternion_from_rpy(*pose[1])))
+    if refused:
+        warn(f"{first_refused}; {refused} lines were left out")
+    if not rows:
+        raise ConvertError(f"{path}: no poses: {'; '.join(poses.unknown()[:2]) or 'no fix with a time'}")
+    if too_early:
+        warn(f"{too_early} fixes before the first heading were left out")
+    for phrase in poses.unknown():
+        warn(f"not told: {phrase}")
+    kept = [row for _, row in rising([(row.t_s, row) for row in rows])]
+    if len(kept) < len(rows):
+        warn(f"{len(rows) - len(kept)} fixes whose time does not rise were left out")
+    kinds = ", ".join(sorted(poses.instruments.heard))
+    return Track("NED_FRD", f"NMEA {kinds}", kept, [f"origin: {poses.origin}" + ("" if origin else " (the first fix)")])

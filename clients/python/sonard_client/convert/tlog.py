@@ -1,0 +1,163 @@
+"""Telemetry logs of ground stations (.tlog): for every MAVLink frame the time of its arrival, microseconds since 1970 in eight
+bytes, the highest first, and the frame.
+"""
+from __future__ import annotations
+
+import math
+import pathlib
+from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
+
+from ..geodesy import Geodetic
+from ..rotations import Quaternion, quaternion_from_rpy, unit
+from .mavlink import LOCAL_FRD, LOCAL_NED, MESSAGES, Frame, fields_of, frame_length, read_frame
+from .track import ConvertError, Source, Stream, Track, Warn, chosen, track_of
+
+STAMP_BYTES = 8
+FULL = ("ODOMETRY", "SIM_STATE", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE")
+ATTITUDES, POSITIONS = ("ATTITUDE_QUATERNION", "ATTITUDE"), ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
+
+
+class Logged(NamedTuple):
+    arrived_s: float
+    frame: Frame
+
+
+def _believable(data: bytes, at: int, frame: Frame) -> bool:
+    """Whether a record begins there: an intact frame, or one of an unknown message with another record or the end behind it."""
+    if frame.intact is not None:
+        return frame.intact
+    behind = at + STAMP_BYTES + frame.length
+    return behind == len(data) or frame_length(data, behind + STAMP_BYTES) is not None
+
+
+def records(data: bytes, warn: Warn) -> Iterator[Logged]:
+    """The frames whose CRC holds, or cannot be judged since the message holds no pose."""
+    at, skipped, first_skipped = 0, 0, -1
+    while at + STAMP_BYTES < len(data):
+        length = frame_length(data, at + STAMP_BYTES)
+        if length is not None and at + STAMP_BYTES + length > len(data) and len(data) - at < STAMP_BYTES + 300:
+            warn(f"ends within a frame, at byte {at}: what comes before it was read")
+            break
+        frame = read_frame(data, at + STAMP_BYTES) if length is not None else None
+        if frame is None or not _believable(data, at, frame):
+            first_skipped = at if first_skipped < 0 else first_skipped
+            skipped += 1
+            at += 1
+            continue
+        yield Logged(1e-6 * int.from_bytes(data[at:at + STAMP_BYTES], "big"), frame)
+        at += STAMP_BYTES + frame.length
+    if skipped:
+        warn(f"{skipped} bytes are no intact frame, the first at byte {first_skipped}; they were passed over")
+
+
+def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
+    parts = [f[f"q{i}"] for i in range(1, 5)]
+    return unit(parts) if abs(sum(p * p for p in parts) - 1) < 1e-3 else None
+
+
+def _angles(f: Dict[str, float]) -> Optional[Quaternion]:
+    three = f["roll"], f["pitch"], f["yaw"]
+    return quaternion_from_rpy(*three) if all(map(math.isfinite, three)) else None
+
+
+def _metres(f: Dict[str, float]) -> "Optional[Tuple[float, float, float]]":
+    three = f["x"], f["y"], f["z"]
+    return three if all(map(math.isfinite, three)) else None
+
+
+def _simulated_place(f: Dict[str, float]) -> Geodetic:
+    """Older simulators send the places as float degrees only, steps of 0.4 m at middle latitudes."""
+    if f["lat_int"] or f["lon_int"]:
+        return Geodetic(1e-7 * f["lat_int"], 1e-7 * f["lon_int"], f["alt"])
+    return Geodetic(f["lat"], f["lon"], f["alt"])
+
+
+class _Vehicle:
+    """What one system of the network said of itself."""
+
+    def __init__(self) -> None:
+        self.attitudes: Dict[str, Stream[Quaternion]] = {}
+        self.positions: "Dict[str, Stream]" = {}
+        self.origin: Optional[Geodetic] = None
+        self.frames: Dict[str, int] = {}  # frame_ids of ODOMETRY that are passed over, and FRD
+
+    def take(self, logged: Logged) -> None:
+        fields = fields_of(logged.frame)
+        if fields is None:
+            return
+        name = MESSAGES[logged.frame.message_id].name
+        if name == "GPS_GLOBAL_ORIGIN":
+            place = Geodetic(1e-7 * fields["latitude"], 1e-7 * fields["longitude"], 1e-3 * fields["altitude"])
+            self.origin = self.origin or (place if place.is_fix else None)
+            return
+        # Attitude and position are paired by the vehicle's clock where both carry it; otherwise arrival has to do.
+        t = 1e-3 * fields["time_boot_ms"] if "time_boot_ms" in fields else \
+            1e-6 * fields["time_usec"] if fields.get("time_usec") else logged.arrived_s
+        attitude: Optional[Quaternion] = None
+        position: "Optional[tuple]" = None
+        if name == "ODOMETRY" and fields["frame_id"] not in (LOCAL_NED, LOCAL_FRD):
+            key = f"{fields['frame_id']:.0f}"
+            self.frames[key] = self.frames.get(key, 0) + 1
+            return
+        if name == "ODOMETRY" and fields["frame_id"] == LOCAL_FRD:
+            self.frames["frd"] = self.frames.get("frd", 0) + 1
+        if name in ("ODOMETRY", "ATT_POS_MOCAP", "ATTITUDE_QUATERNION", "SIM_STATE"):
+            attitude = _quaternion(fields)
+        elif name in ("ATTITUDE", "VISION_POSITION_ESTIMATE"):
+            attitude = _angles(fields)
+        if name in ("ODOMETRY", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE", "LOCAL_POSITION_NED"):
+            position = _metres(fields)
+        elif name in ("SIM_STATE", "GLOBAL_POSITION_INT"):
+            place = _simulated_place(fields) if name == "SIM_STATE" else \
+                Geodetic(1e-7 * fields["lat"], 1e-7 * fields["lon"], 1e-3 * fields["alt"])
+            position = place if place.is_fix else None
+        if name in FULL and (attitude is None or position is None):
+            return
+        if attitude is not None:
+            self.attitudes.setdefault(name, []).append((t, attitude))
+        if position is not None:
+            self.positions.setdefault(name, []).append((t, position))
+
+    def sources(self) -> List[Source]:
+        pairs = [(n, n) for n in FULL[:2]] + [(a, p) for p in POSITIONS for a in ATTITUDES] + [(n, n) for n in FULL[2:]]
+        return [Source(a if a == p else f"{a}+{p}", self.attitudes.get(a, []), self.positions.get(p, [])) for a, p in pairs]
+
+    @property
+    def weight(self) -> int:
+        return max(min(len(s.attitudes), len(s.positions)) for s in self.sources())
+
+
+def _vehicle(vehicles: Dict[int, _Vehicle], system: Optional[int], name: str, warn: Warn) -> _Vehicle:
+    with_poses = sorted((n for n, v in vehicles.items() if v.weight), key=lambda n: -vehicles[n].weight)
+    if system is not None:
+        if system not in vehicles:
+            raise ConvertError(f"{name}: system {system} does not occur; there are " +
+                               (", ".join(map(str, sorted(vehicles))) or "none"))
+        return vehicles[system]
+    if len(with_poses) > 1:
+        warn(f"poses of systems {', '.join(map(str, sorted(with_poses)))}; taking {with_poses[0]}, which has most: --system N "
+             "takes another")
+    return vehicles[with_poses[0]] if with_poses else _Vehicle()
+
+
+def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None,
+              system: Optional[int] = None) -> Track:
+    """The vehicle's way: NED_FRD."""
+    data = path.read_bytes()
+    vehicles: Dict[int, _Vehicle] = {}
+    frames = 0
+    for logged in records(data, warn):
+        frames += 1
+        vehicles.setdefault(logged.frame.system, _Vehicle()).take(logged)
+    if not frames:
+        raise ConvertError(f"{path}: at byte 0: no telemetry log: it holds no MAVLink frame behind a time of eight bytes")
+    vehicle = _vehicle(vehicles, system, str(path), warn)
+    wanted = chosen(vehicle.sources(), source, str(path))
+    if wanted.name == "ODOMETRY" and vehicle.frames.pop("frd", 0):
+        warn("ODOMETRY is in a local frame whose heading need not be north; x is taken as north")
+    if vehicle.frames:
+        warn("ODOMETRY of frames " + ", ".join(f"{k} ({n} messages)" for k, n in sorted(vehicle.frames.items())) +
+             " was left out: only local NED and FRD (1 and 20) are read")
+    local = not isinstance(wanted.positions[0][1], Geodetic)
+    of_local = vehicle.origin if local and wanted.name.endswith("LOCAL_POSITION_NED") else None
+    return track_of(wanted, str(path), warn, origin, of_local)

@@ -1,0 +1,218 @@
+"""NMEA 0183 sentences, and what a vehicle's instruments say in them: no socket, no clock.
+
+HDT heading; PRDID pitch, roll, heading; PHTRO pitch and roll; GGA, RMC, GLL position; DPT, DBT depth of water below a transducer.
+"""
+from __future__ import annotations
+
+import math
+from typing import List, NamedTuple, Optional, Set, Tuple
+
+from .geodesy import Geodetic, LocalPlane
+from .rotations import Vector3
+
+DAY_S = 86400.0
+FIX_KINDS = ("GGA", "RMC", "GLL")  # the first one heard of counts: the others repeat it
+ATTITUDE_KINDS = ("HDT", "PRDID", "PHTRO")
+DEPTH_KINDS = ("DPT", "DBT")
+
+
+class NmeaError(ValueError):
+    """Why a line is no sentence."""
+
+
+class Sentence(NamedTuple):
+    kind: str  # "GGA" of "$GPGGA"; proprietary ones whole: "PRDID"
+    fields: Tuple[str, ...]
+
+
+def checksum(body: str) -> int:
+    """Of what stands between $ and *."""
+    value = 0
+    for byte in body.encode("latin-1", "replace"):
+        value ^= byte
+    return value
+
+
+def parse_sentence(line: str, without_checksum: bool = False) -> Sentence:
+    """What stands before the $, a time for instance, is passed over. A sentence without a checksum is refused unless told."""
+    start = line.find("$")
+    if start < 0:
+        raise NmeaError("no sentence: there is no $")
+    body, star, told = line[start + 1:].strip().partition("*")
+    if star:
+        try:
+            right = int(told[:2], 16) == checksum(body) and len(told.strip()) == 2
+        except ValueError:
+            right = False
+        if not right:
+            raise NmeaError(f"checksum {told!r} where {checksum(body):02X} is right")
+    elif not without_checksum:
+        raise NmeaError("no checksum")
+    address, *fields = body.split(",")
+    if len(address) < 3 or not address.isalnum():
+        raise NmeaError(f"{address[:12]!r} is no kind of sentence")
+    return Sentence(address if address.startswith("P") else address[-3:], tuple(fields))
+
+
+def _number(text: str) -> Optional[float]:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _angle(text: str, half: str, degrees: int) -> Optional[float]:
+    """ddmm.mmm and dddmm.mmm with N, S, E, W."""
+    minutes = _number(text[degrees:])
+    if not text[:degrees].isdigit() or minutes is None or not 0 <= minutes < 60 or half not in ("N", "S", "E", "W"):
+        return None
+    value = int(text[:degrees]) + minutes / 60
+    return -value if half in ("S", "W") else value
+
+
+def time_of_day_s(text: str) -> Optional[float]:
+    """hhmmss.ss"""
+    seconds = _number(text[4:])
+    if not text[:4].isdigit() or seconds is None or not 0 <= seconds < 61:
+        return None
+    return 3600.0 * int(text[:2]) + 60 * int(text[2:4]) + seconds
+
+
+class Instruments:
+    """What was last said; None is unknown. Heading is true, clockwise from north; pitch bow up, roll starboard down positive."""
+
+    def __init__(self) -> None:
+        self.heading_deg: Optional[float] = None
+        self.pitch_deg: Optional[float] = None
+        self.roll_deg: Optional[float] = None
+        self.place: Optional[Geodetic] = None  # without altitude: an antenna's height says nothing of a vehicle's depth
+        self.fix_time_s: Optional[float] = None  # of the day; beyond 86400 after midnight
+        self.water_below_m: Optional[float] = None
+        self.heard: Set[str] = set()
+        self._fixes_by: Optional[str] = None
+
+    def feed(self, sentence: Sentence) -> str:
+        """ "place", "attitude" or "depth" where the sentence told something of it, else empty."""
+        kind, fields = sentence
+        if kind in FIX_KINDS:
+            return self._fix(kind, fields)
+        if kind in ATTITUDE_KINDS:
+            return self._attitude(kind, fields)
+        if kind in DEPTH_KINDS:
+            return self._depth(kind, fields)
+        return ""
+
+    def _fix(self, kind: str, fields: Tuple[str, ...]) -> str:
+        if self._fixes_by is not None and FIX_KINDS.index(self._fixes_by) < FIX_KINDS.index(kind):
+            return ""
+        first, clock, valid = {"GGA": (1, 0, 5), "RMC": (2, 0, 1), "GLL": (0, 4, 5)}[kind]
+        if len(fields) < 4 + first:
+            return ""
+        status = fields[valid] if len(fields) > valid else "A"
+        if status in ("0", "V", ""):
+            return ""
+        latitude = _angle(fields[first], fields[first + 1], 2)
+        longitude = _angle(fields[first + 2], fields[first + 3], 3)
+        if latitude is None or longitude is None or not Geodetic(latitude, longitude).is_fix:
+            return ""
+        self._fixes_by = kind
+        self.place = Geodetic(latitude, longitude)
+        now = time_of_day_s(fields[clock]) if len(fields) > clock else None  # GLL of old instruments has neither time nor status
+        if now is not None:
+            before = self.fix_time_s
+            while before is not None and now < before - DAY_S / 2:
+                now += DAY_S
+            self.fix_time_s = now
+        self.heard.add(kind)
+        return "place"
+
+    def _attitude(self, kind: str, fields: Tuple[str, ...]) -> str:
+        numbers: List[Optional[float]] = [_number(f) for f in fields]
+        if kind == "HDT" and numbers and numbers[0] is not None:
+            self.heading_deg = numbers[0]
+        elif kind == "PRDID" and len(numbers) >= 3 and None not in numbers[:3]:
+            self.pitch_deg, self.roll_deg = numbers[0], numbers[1]
+            if "HDT" not in self.heard:
+                self.heading_deg = numbers[2]
+        elif kind == "PHTRO" and len(numbers) >= 4 and numbers[0] is not None and numbers[2] is not None and \
+                fields[1] in ("M", "P") and fields[3] in ("B", "T"):
+            self.pitch_deg = numbers[0] if fields[1] == "M" else -numbers[0]  # M: bow up
+            self.roll_deg = numbers[2] if fields[3] == "T" else -numbers[2]   # T: port up
+        else:
+            return ""
+        self.heard.add(kind)
+        return "attitude"
+
+    def _depth(self, kind: str, fields: Tuple[str, ...]) -> str:
+        depth = _number(fields[0 if kind == "DPT" else 2]) if len(fields) > (0 if kind == "DPT" else 2) else None
+        if depth is None or depth < 0:
+            return ""
+        self.water_below_m = depth
+        self.heard.add(kind)
+        return "depth"
+
+
+class Assumptions(NamedTuple):
+    """What no sentence tells, told by the user."""
+    origin: Optional[Geodetic] = None       # the first fix
+    north_east_m: Optional[Tuple[float, float]] = None  # where there is no fix at all
+    heading_deg: Optional[float] = None     # until one is heard
+    depth_m: float = 0.0
+    depth_is_vehicle: bool = False          # DPT and DBT are the vehicle's own depth
+    bottom_m: Optional[float] = None        # depth of the bottom: the vehicle is DPT or DBT above it
+
+
+class NmeaPoses:
+    """Poses in NED_FRD from sentences and assumptions."""
+
+    def __init__(self, assumed: Assumptions = Assumptions()) -> None:
+        self.assumed, self.instruments = assumed, Instruments()
+        self._plane = LocalPlane(Geodetic(*assumed.origin[:2])) if assumed.origin else None
+
+    @property
+    def origin(self) -> Optional[Geodetic]:
+        return self._plane.origin if self._plane else None
+
+    def feed(self, sentence: Sentence) -> str:
+        changed = self.instruments.feed(sentence)
+        if self._plane is None and self.instruments.place is not None:
+            self._plane = LocalPlane(self.instruments.place)
+        return changed
+
+    def pose(self) -> "Optional[Tuple[Vector3, Vector3]]":
+        """Position north, east, down [m] and roll, pitch, yaw [rad]; None as long as place or heading are unknown."""
+        said, assumed = self.instruments, self.assumed
+        heading = said.heading_deg if said.heading_deg is not None else assumed.heading_deg
+        if heading is None:
+            return None
+        if said.place is not None and self._plane is not None:
+            north, east, _ = self._plane.ned(said.place)  # its third is the curve of the Earth
+        elif assumed.north_east_m is not None:
+            north, east = assumed.north_east_m
+        else:
+            return None
+        down = assumed.depth_m
+        if said.water_below_m is not None and assumed.depth_is_vehicle:
+            down = said.water_below_m
+        elif said.water_below_m is not None and assumed.bottom_m is not None:
+            down = assumed.bottom_m - said.water_below_m
+        angles = (math.radians(said.roll_deg or 0.0), math.radians(said.pitch_deg or 0.0), math.radians(heading))
+        return (north, east, down), angles
+
+    def unknown(self) -> List[str]:
+        """What the poses hold that nobody said; one phrase each."""
+        said, assumed = self.instruments, self.assumed
+        out = []
+        if said.place is None:
+            out.append("no position (a fix of GGA, RMC or GLL)" + (": it stays where --at says" if assumed.north_east_m else ""))
+        if said.heading_deg is None:
+            out.append("no heading (HDT or PRDID)" + (": --heading is taken" if assumed.heading_deg is not None else ""))
+        if said.pitch_deg is None:
+            out.append("no pitch and roll (PRDID or PHTRO): 0 is taken")
+        if said.water_below_m is None:
+            out.append(f"no depth (DPT or DBT): {assumed.depth_m:g} m is taken")
+        elif not assumed.depth_is_vehicle and assumed.bottom_m is None:
+            out.append(f"the vehicle's depth: DPT and DBT are the water below it ({assumed.depth_m:g} m is taken; --bottom or "
+                       "--depth-is-vehicle say more)")
+        return out
