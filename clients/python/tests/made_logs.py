@@ -123,7 +123,8 @@ def telemetry_log(kinds=("ATTITUDE", "LOCAL_POSITION_NED"), steps=50, version=2,
         stamp = round(1e6 * (began_s + STEP_S * step)) + late_us
         out += stamp.to_bytes(8, "big") + mavlink_frame(name, values, version, system, step & 0xFF)
 
-    put(0, "GPS_GLOBAL_ORIGIN", round(1e7 * ORIGIN[0]), round(1e7 * ORIGIN[1]), round(1e3 * ORIGIN[2]), *([0] if version == 2 else []))
+    origin = round(1e7 * ORIGIN[0]), round(1e7 * ORIGIN[1]), round(1e3 * ORIGIN[2])
+    put(0, "GPS_GLOBAL_ORIGIN", *origin, *([0] if version == 2 else []))
     for step in range(steps):
         t, north, east, down, roll, pitch, yaw = moment(step)
         boot_ms, q, (lat, lon, alt) = round(1e3 * (t + boot_s)), quaternion(roll, pitch, yaw), degrees_at(north, east, down)
@@ -250,7 +251,8 @@ def bag(connections, compression="none", pack=lambda data: data):
         for t, data in told:
             stamp = struct.pack("<II", int(t), round((t - int(t)) * 1e9))
             inner += bag_record([("op", b"\x02"), conn, ("time", stamp)], data)
-    chunk = bag_record([("op", b"\x05"), ("compression", compression.encode()), ("size", struct.pack("<I", len(inner)))], pack(inner))
+    size = ("size", struct.pack("<I", len(inner)))
+    chunk = bag_record([("op", b"\x05"), ("compression", compression.encode()), size], pack(inner))
     return b"#ROSBAG V2.0\n" + bag_record([("op", b"\x03"), ("index_pos", bytes(8))], b" " * 100) + chunk
 
 

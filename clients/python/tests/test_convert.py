@@ -188,7 +188,8 @@ class Telemetry(WithFolder):
         for name, values in (("ATT_POS_MOCAP", (0, *made.quaternion(*angles), north, east, down, *[0] * 21)),
                              ("VISION_POSITION_ESTIMATE", (0, north, east, down, *angles, *[0] * 21, 5))):
             with self.subTest(name):
-                track = self.convert(round(1e6 * 77).to_bytes(8, "big") + made.mavlink_frame(name, values, signed=True), kind="tlog")
+                frame = made.mavlink_frame(name, values, signed=True)
+                track = self.convert(round(1e6 * 77).to_bytes(8, "big") + frame, kind="tlog")
                 self.assert_way(track, range(1), t0=77, metres=1e-6, radians=1e-6)
 
     def test_broken_frames_cost_only_themselves(self):
@@ -421,7 +422,8 @@ class Command(WithFolder):
         self.assertEqual(self.said(self.file(made.dataflash_log()), "-o", "-", "--frame", "ENU_FLU")[0], 64)
 
     def test_gaps_are_told(self):
-        log = made.dataflash_log(("SIM",), 3) + made.dataflash_message("SIM", 9000000, 0, 0, 0, 0, 476000000, -1223300000, 1, 0, 0, 0)
+        late = made.dataflash_message("SIM", 9000000, 0, 0, 0, 0, 476000000, -1223300000, 1, 0, 0, 0)
+        log = made.dataflash_log(("SIM",), 3) + late
         self.assertIn("no pose for 8.8 s after second 0.2", self.said(self.file(log), "-o", "-")[2])
 
     def test_what_goes_wrong_has_its_code(self):
