@@ -27,6 +27,7 @@ FLOORS = {
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
     "protocol/oculus": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
     "protocol/blueview": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
+    "protocol/recording": ["core/base/", "core/sonar/", "protocol/wire/", "protocol/oculus/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     "clients": ["core/base/", "core/image/", "core/sonar/", "core/text/", "protocol/", "clients/"],
     "clients/scene_tools": ["core/base/", "core/scene/", "core/text/", "clients/scene_tools/"],  # docs/decisions/0013-scene-tools.md
@@ -43,7 +44,7 @@ DEPENDENCIES = {
     r"assimp/": ["core/scene/files/load_mesh.cpp"],
     r"tinyxml2\.h": ["clients/scene_tools/xml_file.cpp"],
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp"],
-    r"zlib\.h": ["protocol/blueview/deflate.cpp", "clients/bvtsdk/", "core/image/"],
+    r"zlib\.h": ["protocol/blueview/deflate.cpp", "protocol/recording/inflate.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],
     r"boost/asio\.hpp": ["daemon/asio.hpp"],
     r"spdlog/|fmt/": ["daemon/", "clients/"],

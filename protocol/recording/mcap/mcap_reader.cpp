@@ -1,0 +1,162 @@
+#include "protocol/recording/mcap/mcap_reader.hpp"
+
+#include <algorithm>
+
+#include "protocol/recording/crc32.hpp"
+
+namespace sonar::recording::mcap {
+namespace {
+
+constexpr std::size_t most_channels = 4096;
+
+std::string at_byte(std::uint64_t at) { return " at byte " + std::to_string(at); }
+
+}  // namespace
+
+Reader::Reader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_, magic.size()) {}
+
+Result<Reader> Reader::open(std::unique_ptr<Source> source) {
+  std::array<std::byte, magic.size()> front{};
+  const std::size_t there = source->read_at(0, front);
+  const bool right =
+      there == front.size() && std::equal(front.begin(), front.end(), magic.begin(),
+                                          [](std::byte a, std::uint8_t b) { return std::to_integer<std::uint8_t>(a) == b; });
+  if (!right) return failure(ErrorKind::bad_data, source->name() + " is no MCAP file");
+  return Reader(std::move(source));
+}
+
+void Reader::rewind() {
+  scan_.seek(magic.size());
+  schemas_.clear();
+  channels_.clear();
+  damages_.clear();
+  chunk_end_ = 0;
+  ended_ = false;
+}
+
+void Reader::stop(std::string why) {
+  damages_.add(std::move(why));
+  ended_ = true;
+}
+
+std::optional<Message> Reader::next() {
+  while (!ended_) {
+    if (chunk_end_ != 0 && scan_.position() >= chunk_end_) {
+      scan_.seek(chunk_end_);
+      chunk_end_ = 0;
+    }
+    const bool in_chunk = chunk_end_ != 0;
+    if (auto message = take_record(in_chunk ? chunk_end_ : source_->size(), in_chunk)) return message;
+  }
+  return std::nullopt;
+}
+
+/// One record that ends before `end`; a message if it is one. Damage inside a chunk leaves out the rest of the chunk.
+std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
+  const std::uint64_t at = scan_.position();
+  const auto give_up = [&](std::string why) {
+    if (!in_chunk) return stop(std::move(why));
+    damages_.add(std::move(why));
+    scan_.seek(chunk_end_);
+  };
+  if (end - at < record_front_bytes) {
+    if (end == at && damages_.any())
+      ended_ = true;  // what is missing has been told
+    else
+      give_up("the file ends" + at_byte(at) + " without the end of its data: it was not closed");
+    return std::nullopt;
+  }
+  RecordReader front(scan_.take(record_front_bytes));
+  const auto code = front.number<Opcode>();
+  const auto length = front.number<std::uint64_t>();
+  if (code == Opcode::chunk && !in_chunk && length > end - scan_.position()) {
+    damages_.add("the chunk" + at_byte(at) + " is cut short by the end of the file");
+    enter_chunk(at, end - scan_.position(), true);
+    return std::nullopt;
+  }
+  if (!front.ok() || length > end - scan_.position()) {
+    give_up("the record" + at_byte(at) + " is cut short by the end of the " + (in_chunk ? "chunk" : "file"));
+    return std::nullopt;
+  }
+  const std::uint64_t behind = scan_.position() + length;
+  if (code == Opcode::data_end || code == Opcode::footer) {
+    ended_ = !in_chunk;
+  } else if (code == Opcode::chunk && !in_chunk) {
+    enter_chunk(at, length, false);
+    if (chunk_end_ != 0) return std::nullopt;
+  } else if (code == Opcode::message || code == Opcode::schema || code == Opcode::channel) {
+    const BytesView content = length <= longest_record ? scan_.take(static_cast<std::size_t>(length)) : BytesView{};
+    if (length > longest_record) {
+      damages_.add("the record" + at_byte(at) + " is too long, " + std::to_string(length) + " bytes");
+    } else if (code == Opcode::message) {
+      auto message = take_message(content, at);
+      scan_.seek(behind);
+      return message;
+    } else if (code == Opcode::schema) {
+      if (auto schema = read_schema(content); schema && schemas_.size() < most_channels)
+        schemas_.insert_or_assign(schema->id, std::move(*schema));
+    } else if (auto channel = read_channel(content)) {
+      if (channels_.size() < most_channels) channels_.insert_or_assign(channel->id, std::move(*channel));
+    } else {
+      damages_.add("the channel" + at_byte(at) + " cannot be read");
+    }
+  }
+  scan_.seek(behind);
+  return std::nullopt;
+}
+
+std::optional<Message> Reader::take_message(BytesView content, std::uint64_t at) {
+  RecordReader record(content);
+  Message message;
+  message.channel = record.number<std::uint16_t>();
+  message.sequence = record.number<std::uint32_t>();
+  message.logged_at = record.time();
+  message.published_at = record.time();
+  const BytesView data = record.rest();
+  if (!record.ok() || !channels_.contains(message.channel)) {
+    damages_.add("the message" + at_byte(at) + (record.ok() ? " belongs to no channel" : " is shorter than its fields"));
+    return std::nullopt;
+  }
+  message.data.assign(data.begin(), data.end());
+  return message;
+}
+
+/// Sets chunk_end_, or leaves the chunk out. Of one that is cut short the records that are whole are read, unchecked.
+void Reader::enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut) {
+  const std::uint64_t end = scan_.position() + length;
+  const std::size_t front_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(length, 40 + 256));
+  const std::uint64_t content = scan_.position();
+  RecordReader front(scan_.peek(front_bytes));
+  front.time();
+  front.time();
+  const auto size = front.number<std::uint64_t>();
+  const auto crc = front.number<std::uint32_t>();
+  const std::string compression = front.string();
+  const auto stored = front.number<std::uint64_t>();
+  scan_.seek(end);
+  if (!front.ok()) return damages_.add("the chunk" + at_byte(at) + " has no sound front");
+  const std::uint64_t begin = content + 28 + 4 + compression.size() + 8;
+  if (!compression.empty())
+    return damages_.add("the chunk" + at_byte(at) + " is compressed (" + compression.substr(0, 16) +
+                        "), which is not read: write the file without compression");
+  if (stored != size || (!is_cut && stored != end - begin))
+    return damages_.add("the chunk" + at_byte(at) + " does not have the size it says");
+  if (!is_cut && crc != 0 && !is_chunk_sound(begin, size, crc))
+    return damages_.add("the chunk" + at_byte(at) + " is damaged (CRC): its messages are left out");
+  scan_.seek(begin);
+  if (begin < end) chunk_end_ = end;
+}
+
+bool Reader::is_chunk_sound(std::uint64_t from, std::uint64_t size, std::uint32_t crc) {
+  Crc32 found;
+  scan_.seek(from);
+  for (std::uint64_t left = size; left > 0;) {
+    const BytesView block = scan_.take(static_cast<std::size_t>(std::min<std::uint64_t>(left, 256 << 10)));
+    if (block.empty()) return false;
+    found.add(block);
+    left -= block.size();
+  }
+  return found.value() == crc;
+}
+
+}  // namespace sonar::recording::mcap

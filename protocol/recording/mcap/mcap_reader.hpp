@@ -1,0 +1,42 @@
+// Reads the messages of an MCAP file front to back, chunk by chunk, with or without summary: what a crash or a full disk left is
+// read up to where it ends. Uncompressed chunks only; a chunk whose CRC is wrong is left out.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "protocol/recording/mcap/mcap_records.hpp"
+#include "protocol/recording/piece.hpp"
+
+namespace sonar::recording::mcap {
+
+class Reader {
+ public:
+  /// bad_data when the magic number is not there.
+  static Result<Reader> open(std::unique_ptr<Source> source);
+
+  std::optional<Message> next();
+  /// Of the messages given so far.
+  const std::map<std::uint16_t, Channel>& channels() const { return channels_; }
+  const std::map<std::uint16_t, Schema>& schemas() const { return schemas_; }
+  std::optional<Error> damage() const { return damages_.error(source_->name()); }
+  void rewind();
+
+ private:
+  explicit Reader(std::unique_ptr<Source> source);
+  std::optional<Message> take_record(std::uint64_t end, bool in_chunk);
+  std::optional<Message> take_message(BytesView content, std::uint64_t at);
+  void enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut);
+  bool is_chunk_sound(std::uint64_t from, std::uint64_t size, std::uint32_t crc);
+  void stop(std::string why);
+
+  std::unique_ptr<Source> source_;
+  Scan scan_;
+  std::map<std::uint16_t, Schema> schemas_;
+  std::map<std::uint16_t, Channel> channels_;
+  Damages damages_;
+  std::uint64_t chunk_end_ = 0;  // 0 = not in a chunk
+  bool ended_ = false;
+};
+
+}  // namespace sonar::recording::mcap

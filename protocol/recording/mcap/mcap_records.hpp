@@ -1,0 +1,100 @@
+// The records of an MCAP file (mcap.dev, version 0): an opcode, a length, and fields little-endian, strings and maps behind their
+// length. Shared by writer and reader.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/units.hpp"
+#include "protocol/recording/store.hpp"
+
+namespace sonar::recording::mcap {
+
+inline constexpr std::array<std::uint8_t, 8> magic{0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
+
+enum class Opcode : std::uint8_t {
+  header = 0x01,
+  footer = 0x02,
+  schema = 0x03,
+  channel = 0x04,
+  message = 0x05,
+  chunk = 0x06,
+  message_index = 0x07,
+  chunk_index = 0x08,
+  statistics = 0x0B,
+  summary_offset = 0x0E,
+  data_end = 0x0F,
+};
+inline constexpr std::size_t record_front_bytes = 9;     // opcode and length
+inline constexpr std::size_t message_front_bytes = 22;   // channel, sequence, two times
+inline constexpr std::size_t longest_record = 64 << 20;  // of a foreign file; chunks are not read whole
+
+struct Schema {
+  std::uint16_t id = 0;  // not 0
+  std::string name, encoding, text;
+};
+struct Channel {
+  std::uint16_t id = 0, schema = 0;  // schema 0 = none
+  std::string topic, message_encoding;
+  std::map<std::string, std::string> metadata;
+};
+struct Message {
+  std::uint16_t channel = 0;
+  std::uint32_t sequence = 0;
+  Time logged_at{}, published_at{};
+  Bytes data;
+};
+
+/// Appends fields; a record is closed by end_record.
+class RecordWriter {
+ public:
+  explicit RecordWriter(Bytes& out) : out_(out), writer_(out) {}
+  template <class T>
+  void number(T value) {
+    const T kept = value;
+    writer_("number", kept);
+  }
+  void time(Time at) { number(static_cast<std::uint64_t>(at.time_since_epoch().count())); }
+  void string(std::string_view text);
+  void strings(const std::map<std::string, std::string>& map);
+  void bytes(BytesView data) { out_.insert(out_.end(), data.begin(), data.end()); }
+
+  void begin(Opcode code);
+  void end();
+
+ private:
+  Bytes& out_;
+  wire::Writer writer_;
+  std::size_t length_at_ = 0;
+};
+
+/// Consumes fields of a record's content; ok() tells whether all were there.
+class RecordReader {
+ public:
+  explicit RecordReader(BytesView content) : reader_(content) {}
+  template <class T>
+  T number() {
+    T value{};
+    reader_("number", value);
+    return value;
+  }
+  Time time() { return Time(std::chrono::nanoseconds(static_cast<std::int64_t>(number<std::uint64_t>()))); }
+  std::string string();
+  std::map<std::string, std::string> strings();
+  BytesView bytes(std::size_t count) { return reader_.block("bytes", count); }
+  BytesView rest() { return reader_.block("rest", reader_.remaining()); }
+  bool ok() const { return reader_.ok(); }
+
+ private:
+  wire::Reader reader_;
+};
+
+void append(Bytes& out, const Schema& schema);
+void append(Bytes& out, const Channel& channel);
+std::optional<Schema> read_schema(BytesView content);
+std::optional<Channel> read_channel(BytesView content);
+
+}  // namespace sonar::recording::mcap

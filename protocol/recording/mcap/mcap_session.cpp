@@ -1,0 +1,108 @@
+#include "protocol/recording/mcap/mcap_session.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace sonar::recording {
+namespace {
+
+constexpr const char* vendor_encoding = "oculus";  // of opaque messages; what tells them from others
+constexpr std::size_t most_names = 16;
+
+class McapPieceReader final : public PieceReader {
+ public:
+  McapPieceReader(mcap::Reader reader, std::string sonar)
+      : reader_(std::move(reader)), wished_(std::move(sonar)), sonar_(wished_) {}
+
+  std::optional<Piece> next() override {
+    while (auto message = reader_.next()) {
+      const mcap::Channel& channel = reader_.channels().at(message->channel);
+      if (channel.message_encoding != vendor_encoding) continue;
+      const auto told = [&channel](const char* key) {
+        const auto found = channel.metadata.find(key);
+        return found == channel.metadata.end() ? std::string() : found->second;
+      };
+      const std::string sonar = told("sonar");
+      if (!chosen_ && wished_.empty()) sonar_ = sonar;
+      chosen_ = true;
+      if (sonar != sonar_) {
+        if (others_.size() < most_names) others_.insert(sonar);
+        continue;
+      }
+      return Piece{message->logged_at, told("from") == "client" ? Origin::client : Origin::device,
+                   told("carrier") == "udp" ? Carrier::datagram : Carrier::stream, std::move(message->data)};
+    }
+    return std::nullopt;
+  }
+  std::optional<Error> damage() const override { return reader_.damage(); }
+  std::string note() const override {
+    std::string names;
+    for (const std::string& name : others_) names += (names.empty() ? "" : ", ") + name;
+    return names.empty() ? "" : "the file holds other sonars too: " + names;
+  }
+  void rewind() override { reader_.rewind(); }
+
+ private:
+  mcap::Reader reader_;
+  std::string wished_, sonar_;
+  bool chosen_ = false;
+  std::set<std::string> others_;
+};
+
+}  // namespace
+
+McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar) : writer_(std::move(sink)), sonar_(std::move(sonar)) {
+  device_ = vendor_channel("device", "device", "tcp");
+  client_ = vendor_channel("client", "client", "tcp");
+  status_ = vendor_channel("status", "device", "udp");
+  image_ = json_channel("image", mcap::image_schema());
+  pose_ = json_channel("pose", mcap::pose_schema());
+  truth_ = json_channel("truth", mcap::truth_schema());
+}
+
+std::uint16_t McapSession::vendor_channel(const char* topic, const char* from, const char* carrier) {
+  mcap::Channel channel;
+  channel.topic = std::string("/") + sonar_ + "/" + topic;
+  channel.message_encoding = vendor_encoding;
+  channel.metadata = {{"vendor", "oculus"}, {"sonar", sonar_}, {"from", from}, {"carrier", carrier}};
+  return writer_.add_channel(std::move(channel));
+}
+
+std::uint16_t McapSession::json_channel(const char* topic, const mcap::JsonSchema& schema) {
+  mcap::Channel channel;
+  channel.schema = writer_.add_schema(schema.name, "jsonschema", schema.text);
+  channel.topic = std::string("/") + sonar_ + "/" + topic;
+  channel.message_encoding = "json";
+  return writer_.add_channel(std::move(channel));
+}
+
+Result<void> McapSession::write(const Piece& piece) {
+  const std::uint16_t channel = piece.from == Origin::client ? client_ : piece.by == Carrier::datagram ? status_ : device_;
+  if (Result<void> written = writer_.write(channel, piece.at, piece.bytes); !written) return written;
+  if (channel != device_ || piece.bytes.size() < oculus::header_size) return {};
+  if (oculus::header_of(piece.bytes).type != oculus::MessageType::ping_result) return {};
+  const auto ping = oculus::decode_ping(piece.bytes);
+  return ping && ping->has_image ? write_json(image_, piece.at, mcap::image_json(piece.at, sonar_, *ping)) : Result<void>{};
+}
+
+Result<void> McapSession::write_pose(Time at, const Pose& sonar_in_world) {
+  return write_json(pose_, at, mcap::pose_json(at, "world", sonar_in_world));
+}
+
+Result<void> McapSession::write_truth(Time at, const mcap::PingTruth& truth) {
+  return write_json(truth_, at, mcap::truth_json(truth));
+}
+
+Result<void> McapSession::write_json(std::uint16_t channel, Time at, const std::string& text) {
+  Bytes bytes(text.size());
+  std::transform(text.begin(), text.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
+  return writer_.write(channel, at, bytes);
+}
+
+Result<std::unique_ptr<PieceReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar) {
+  auto reader = mcap::Reader::open(std::move(source));
+  if (!reader) return tl::unexpected(reader.error());
+  return std::make_unique<McapPieceReader>(std::move(*reader), std::move(sonar));
+}
+
+}  // namespace sonar::recording

@@ -1,0 +1,38 @@
+// A session as an MCAP file: the vendor's bytes message by message, each ping also as a picture, poses and ground truth where
+// they are known. The vendor's bytes can be replayed; the rest is for viewers.
+#pragma once
+
+#include <memory>
+
+#include "protocol/recording/mcap/mcap_json.hpp"
+#include "protocol/recording/mcap/mcap_reader.hpp"
+#include "protocol/recording/mcap/mcap_writer.hpp"
+#include "protocol/recording/piece.hpp"
+
+namespace sonar::recording {
+
+/// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose, /NAME/truth in JSON.
+class McapSession final : public PieceWriter {
+ public:
+  McapSession(std::unique_ptr<Sink> sink, std::string sonar);
+
+  Result<void> write(const Piece& piece) override;
+  /// Where the sonar was. `at` as in Piece: never before what was written last.
+  Result<void> write_pose(Time at, const Pose& sonar_in_world);
+  Result<void> write_truth(Time at, const mcap::PingTruth& truth);
+  Result<void> close() override { return writer_.close(); }
+
+ private:
+  std::uint16_t vendor_channel(const char* topic, const char* from, const char* carrier);
+  std::uint16_t json_channel(const char* topic, const mcap::JsonSchema& schema);
+  Result<void> write_json(std::uint16_t channel, Time at, const std::string& text);
+
+  mcap::Writer writer_;
+  std::string sonar_;
+  std::uint16_t device_, client_, status_, image_, pose_, truth_;
+};
+
+/// The vendor's bytes of one sonar: the one named, or the first there is. bad_data when it is no MCAP file.
+Result<std::unique_ptr<PieceReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar = {});
+
+}  // namespace sonar::recording

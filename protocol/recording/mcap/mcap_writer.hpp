@@ -1,0 +1,60 @@
+// Writes MCAP files: uncompressed chunks with their CRC and indexes, a summary, a footer. Channels and what is in their messages
+// are the caller's business (mcap_session.hpp).
+#pragma once
+
+#include <memory>
+
+#include "protocol/recording/crc32.hpp"
+#include "protocol/recording/mcap/mcap_records.hpp"
+
+namespace sonar::recording::mcap {
+
+class Writer {
+ public:
+  static constexpr std::size_t chunk_bytes = 1 << 20;           // a chunk ends behind the message that fills it
+  static constexpr std::chrono::seconds longest_chunk_time{2};  // so that little is lost with the program
+
+  explicit Writer(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
+
+  std::uint16_t add_schema(std::string name, std::string encoding, std::string text);
+  std::uint16_t add_channel(Channel channel);  // whose id is set here
+  /// Messages of a channel are numbered from 0. io: nothing more can be written; what is in the file stays readable.
+  Result<void> write(std::uint16_t channel, Time at, BytesView data);
+  /// Ends the last chunk, adds summary and footer, closes. After an error of write(): tries to add what belongs to the chunks
+  /// that are in the file, and tells the first error. io.
+  Result<void> close();
+
+ private:
+  struct ChunkPlace {
+    Time first{}, last{};
+    std::uint64_t offset = 0, length = 0, index_length = 0, size = 0;
+    std::map<std::uint16_t, std::uint64_t> index_offsets;
+  };
+  using Entries = std::vector<std::pair<Time, std::uint64_t>>;  // of a channel: time, place in the chunk
+
+  Result<void> begin();
+  Result<void> put(const Bytes& bytes);
+  Result<void> end_chunk();
+  void append_message_indexes(Bytes& out, ChunkPlace& place) const;
+  Bytes summary() const;
+  void announce(Bytes& out, const Channel& channel, std::vector<bool>& schemas) const;
+  void append_statistics(Bytes& out) const;
+  static void append_chunk_index(Bytes& out, const ChunkPlace& place);
+
+  std::unique_ptr<Sink> sink_;
+  std::vector<Schema> schemas_;
+  std::vector<Channel> channels_;
+  std::vector<std::uint32_t> next_sequence_;
+  std::vector<bool> announced_, announced_before_;  // in the file or this chunk; in the file
+  Bytes chunk_;
+  Time chunk_first_{}, chunk_last_{};
+  std::map<std::uint16_t, Entries> entries_;
+  std::vector<ChunkPlace> chunks_;
+  std::map<std::uint16_t, std::uint64_t> counts_;  // of messages in whole chunks
+  std::uint64_t position_ = 0;
+  Crc32 data_crc_;
+  bool begun_ = false;
+  std::optional<Error> broken_;
+};
+
+}  // namespace sonar::recording::mcap

@@ -1,0 +1,192 @@
+#include "protocol/recording/oculus_log.hpp"
+
+#include <cmath>
+
+#include "protocol/recording/inflate.hpp"
+#include "protocol/recording/message_splitter.hpp"
+
+namespace sonar::recording {
+namespace {
+
+constexpr std::size_t file_header_bytes = wire::wire_size<OculusLogHeader>(), item_bytes = wire::wire_size<OculusLogItem>();
+constexpr std::size_t most_payload = oculus::reply_limit + 1024;  // of an item we want; others are skipped unread
+
+template <class M>
+M read_as(BytesView bytes) {
+  M message;
+  wire::Reader reader(bytes);
+  fields(reader, message);
+  return message;
+}
+
+/// Seconds as a double are exact to a quarter of a microsecond in our days; what is no time at all becomes 1970.
+Time time_of(double unix_s) {
+  if (!std::isfinite(unix_s) || std::abs(unix_s) > 4e9) return {};
+  return Time(nanoseconds_from(unix_s));
+}
+Time time_of(const OculusLogTime& t) {
+  if (t.seconds > 4'000'000'000u || t.nanoseconds >= 1'000'000'000u) return {};
+  return Time(std::chrono::seconds(t.seconds) + std::chrono::nanoseconds(t.nanoseconds));
+}
+
+bool is_item(const OculusLogItem& item) { return item.magic == OculusLogItem{}.magic && item.size == item_bytes; }
+
+class LogReader final : public PieceReader {
+ public:
+  explicit LogReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_, file_header_bytes) {}
+
+  std::optional<Piece> next() override {
+    while (scan_.left() > 0) {
+      const std::uint64_t at = scan_.position();
+      const BytesView front = scan_.take(item_bytes);
+      if (front.size() < item_bytes) return cut(at, "the header of an item");
+      const auto item = read_as<OculusLogItem>(front);
+      if (!is_item(item)) {
+        if (!find_item(at)) return std::nullopt;
+        continue;
+      }
+      if (item.payload_size > scan_.left()) return cut(at, "an item of " + std::to_string(item.payload_size) + " bytes");
+      if (item.type != oculus_message_item) {
+        scan_.skip(item.payload_size);
+        continue;
+      }
+      if (auto piece = message(item, at)) return piece;
+    }
+    return std::nullopt;
+  }
+  std::optional<Error> damage() const override { return damages_.error(source_->name()); }
+  void rewind() override {
+    scan_.seek(file_header_bytes);
+    damages_.clear();
+  }
+
+ private:
+  std::optional<Piece> cut(std::uint64_t at, const std::string& what) {
+    damages_.add(what + " at byte " + std::to_string(at) + " is cut short by the end of the file");
+    scan_.seek(source_->size());
+    return std::nullopt;
+  }
+
+  /// Somebody else's bytes, or damaged ones: on to the next item.
+  bool find_item(std::uint64_t at) {
+    damages_.add("no item begins at byte " + std::to_string(at));
+    for (std::uint64_t from = at + 1; from + item_bytes <= source_->size(); ++from) {
+      scan_.seek(from);
+      const BytesView front = scan_.peek(item_bytes);
+      if (front.size() < item_bytes) break;
+      if (front[0] == std::byte{0xDD} && is_item(read_as<OculusLogItem>(front))) return true;
+    }
+    scan_.seek(source_->size());
+    return false;
+  }
+
+  std::optional<Piece> message(const OculusLogItem& item, std::uint64_t at) {
+    const auto refuse = [&](const std::string& why) {
+      damages_.add("the message at byte " + std::to_string(at) + " " + why);
+      return std::nullopt;
+    };
+    if (item.payload_size > most_payload) {
+      scan_.skip(item.payload_size);
+      return refuse("has " + std::to_string(item.payload_size) + " bytes, more than any message");
+    }
+    const BytesView payload = scan_.take(item.payload_size);
+    Piece piece;
+    piece.bytes.assign(payload.begin(), payload.end());
+    if (item.compression == 1) {
+      auto plain = piece.bytes.size() < 4 ? std::nullopt : inflate(BytesView(piece.bytes).subspan(4), oculus::reply_limit);
+      if (!plain) return refuse("does not decompress");
+      piece.bytes = std::move(*plain);
+    } else if (item.compression != 0) {
+      return refuse("is compressed in a way that is not known: " + std::to_string(item.compression));
+    }
+    if (piece.bytes.size() < oculus::header_size) return refuse("is shorter than a header");
+    const oculus::MessageHeader header = oculus::header_of(piece.bytes);
+    if (oculus::message_length(header, oculus::Sender::device) != piece.bytes.size())
+      return refuse("is not as long as its header says");
+    if (header.type == oculus::MessageType::status) piece.by = Carrier::datagram;
+    if (header.type == oculus::MessageType::fire) piece.from = Origin::client;
+    piece.at = exact_time().value_or(time_of(item.at_unix_s));
+    return piece;
+  }
+
+  std::optional<Time> exact_time() {
+    constexpr std::size_t whole = item_bytes + wire::wire_size<OculusLogTime>();
+    const BytesView front = scan_.peek(whole);
+    if (front.size() < whole) return std::nullopt;
+    const auto item = read_as<OculusLogItem>(front);
+    if (!is_item(item) || item.type != oculus_time_item || item.payload_size != wire::wire_size<OculusLogTime>() ||
+        item.compression != 0)
+      return std::nullopt;
+    return time_of(read_as<OculusLogTime>(front.subspan(item_bytes)));
+  }
+
+  std::unique_ptr<Source> source_;
+  Scan scan_;
+  Damages damages_;
+};
+
+class LogWriter final : public PieceWriter {
+ public:
+  explicit LogWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
+
+  Result<void> write(const Piece& piece) override {
+    if (piece.from != Origin::device || piece.by != Carrier::stream || piece.bytes.size() < oculus::header_size) return {};
+    const auto length = oculus::message_length(oculus::header_of(piece.bytes), oculus::Sender::device);
+    if (length != piece.bytes.size()) return {};
+    Bytes record;
+    if (!begun_) append_header(record, piece.at);
+    append_item(record, oculus_message_item, piece.at, piece.bytes);
+    const auto since = piece.at.time_since_epoch();
+    const auto whole = std::chrono::floor<std::chrono::seconds>(since);
+    const OculusLogTime exact{static_cast<std::uint64_t>(whole.count()), static_cast<std::uint64_t>((since - whole).count())};
+    append_item(record, oculus_time_item, piece.at, wire::bytes_of(exact));
+    Result<void> written = sink_->append(record);
+    begun_ = begun_ || written;
+    return written;
+  }
+  Result<void> close() override {
+    if (!begun_) {  // nothing came: still a file of its kind
+      Bytes header;
+      append_header(header, {});
+      if (Result<void> written = sink_->append(header); !written) return written;
+    }
+    return sink_->close();
+  }
+
+ private:
+  static void append_header(Bytes& out, Time at) {
+    OculusLogHeader header;
+    header.created_unix_s = seconds(at.time_since_epoch());
+    wire::append(out, header);
+  }
+  static void append_item(Bytes& out, std::uint16_t type, Time at, BytesView payload) {
+    OculusLogItem item;
+    item.type = type;
+    item.at_unix_s = seconds(at.time_since_epoch());
+    item.original_size = item.payload_size = static_cast<std::uint32_t>(payload.size());
+    wire::append(out, item);
+    out.insert(out.end(), payload.begin(), payload.end());
+  }
+
+  std::unique_ptr<Sink> sink_;
+  bool begun_ = false;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<PieceReader>> read_oculus_log(std::unique_ptr<Source> source) {
+  Scan scan(*source);
+  const BytesView front = scan.take(file_header_bytes);
+  const auto refuse = [&](const std::string& why) { return failure(ErrorKind::bad_data, source->name() + why); };
+  if (front.size() < file_header_bytes) return refuse(" ends within its file header: it holds no message");
+  const auto header = read_as<OculusLogHeader>(front);
+  if (header.magic != OculusLogHeader{}.magic || header.size != file_header_bytes) return refuse(" is no .oculus log file");
+  if (header.version != 1)
+    return refuse(": .oculus log files of version " + std::to_string(header.version) + " are not read, only version 1");
+  if (header.encryption != 0) return refuse(" is encrypted: export it without encryption");
+  return std::make_unique<LogReader>(std::move(source));
+}
+
+std::unique_ptr<PieceWriter> write_oculus_log(std::unique_ptr<Sink> sink) { return std::make_unique<LogWriter>(std::move(sink)); }
+
+}  // namespace sonar::recording

@@ -1,0 +1,77 @@
+// Log files of the vendor's own kind, .oculus version 1 (docs/recording.md, "Oculus log files"): file header, then items of 40
+// bytes and a payload; type 10 is a whole message, type 1010 the exact time of the one before it. Read and written as the open
+// readers do.
+#pragma once
+
+#include <memory>
+
+#include "protocol/recording/piece.hpp"
+#include "protocol/recording/store.hpp"
+
+namespace sonar::recording {
+
+struct OculusLogHeader {
+  std::uint32_t magic = 0x11223344, size = 48;
+  std::array<char, 16> source{'O', 'c', 'u', 'l', 'u', 's'};
+  std::uint16_t version = 1, encryption = 0;
+  std::uint32_t pad = 0;
+  std::int64_t key = 0;
+  double created_unix_s = 0;
+};
+template <class V, wire::Like<OculusLogHeader> M>
+constexpr void fields(V& visit, M& m) {
+  visit("fileHeader", m.magic);
+  visit("sizeHeader", m.size);
+  visit("source", m.source);
+  visit("version", m.version);
+  visit("encryption", m.encryption);
+  visit("pad", m.pad);
+  visit("key", m.key);
+  visit("time", m.created_unix_s);
+}
+
+struct OculusLogItem {
+  std::uint32_t magic = 0xAABBCCDD, size = 40;
+  std::uint16_t type = 0;
+  std::uint16_t version = 0;  // unknown: what the vendor writes here; readers do not look
+  std::uint32_t pad0 = 0;
+  double at_unix_s = 0;
+  std::uint16_t compression = 0, pad1 = 0;  // 1 = zlib behind a 4-byte big-endian length
+  std::uint32_t original_size = 0, payload_size = 0, pad2 = 0;
+};
+template <class V, wire::Like<OculusLogItem> M>
+constexpr void fields(V& visit, M& m) {
+  visit("itemHeader", m.magic);
+  visit("sizeHeader", m.size);
+  visit("type", m.type);
+  visit("version", m.version);
+  visit("pad0", m.pad0);
+  visit("time", m.at_unix_s);
+  visit("compression", m.compression);
+  visit("pad1", m.pad1);
+  visit("originalSize", m.original_size);
+  visit("payloadSize", m.payload_size);
+  visit("pad2", m.pad2);
+}
+
+/// Exact time of the item before it.
+struct OculusLogTime {
+  std::uint64_t seconds = 0, nanoseconds = 0;  // since 1970
+};
+template <class V, wire::Like<OculusLogTime> M>
+constexpr void fields(V& visit, M& m) {
+  visit("seconds", m.seconds);
+  visit("nanoseconds", m.nanoseconds);
+}
+
+inline constexpr std::uint16_t oculus_message_item = 10, oculus_time_item = 1010;
+
+static_assert(wire::wire_size<OculusLogHeader>() == 48);
+static_assert(wire::wire_size<OculusLogItem>() == 40);
+
+/// bad_data when it is no such file, or one of version 2 or encrypted.
+Result<std::unique_ptr<PieceReader>> read_oculus_log(std::unique_ptr<Source> source);
+/// Keeps the messages of the device's TCP stream; what lies between messages has no place in this format and is left out.
+std::unique_ptr<PieceWriter> write_oculus_log(std::unique_ptr<Sink> sink);
+
+}  // namespace sonar::recording

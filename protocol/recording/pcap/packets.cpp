@@ -1,0 +1,166 @@
+#include "protocol/recording/pcap/packets.hpp"
+
+namespace sonar::recording {
+namespace {
+
+constexpr std::uint32_t micro_magic = 0xA1B2C3D4, nano_magic = 0xA1B23C4D, section_magic = 0x0A0D0D0A, order_magic = 0x1A2B3C4D;
+constexpr std::size_t most_interfaces = 1024;
+constexpr std::size_t most_block = PacketReader::longest_packet + 4096;  // a packet with its options
+constexpr std::uint32_t interface_block = 1, simple_block = 3, enhanced_block = 6;
+constexpr std::uint16_t end_option = 0, resolution_option = 9;
+
+std::uint32_t u32_at(BytesView bytes, std::size_t offset, wire::Endian endian) {
+  std::uint32_t value = 0;
+  wire::Reader reader(bytes.subspan(std::min(offset, bytes.size())), endian);
+  reader("u32", value);
+  return value;
+}
+std::uint16_t u16_at(BytesView bytes, std::size_t offset, wire::Endian endian) {
+  std::uint16_t value = 0;
+  wire::Reader reader(bytes.subspan(std::min(offset, bytes.size())), endian);
+  reader("u16", value);
+  return value;
+}
+
+Time time_of(std::uint64_t ticks, std::uint64_t ticks_per_s) {
+  const std::uint64_t whole_s = ticks / ticks_per_s, rest = ticks % ticks_per_s;
+  if (whole_s > 4'000'000'000u) return {};  // 2096 and later is damage
+  const double rest_ns = 1e9 * static_cast<double>(rest) / static_cast<double>(ticks_per_s);
+  return Time(std::chrono::seconds(whole_s) + std::chrono::nanoseconds(static_cast<std::int64_t>(rest_ns)));
+}
+
+/// Of pcapng: a power of ten, or with the top bit of two. Anything finer than 10^18 a second is damage.
+std::uint64_t ticks_per_s(unsigned resolution) {
+  const unsigned base = (resolution & 0x80u) != 0 ? 2 : 10, exponent = resolution & 0x7Fu;
+  std::uint64_t ticks = 1;
+  for (unsigned i = 0; i < exponent; ++i) {
+    if (ticks > 1'000'000'000'000'000'000u / base) return 1'000'000;
+    ticks *= base;
+  }
+  return ticks;
+}
+
+}  // namespace
+
+std::nullopt_t PacketReader::stop(std::string why) {
+  damage_ = std::move(why);
+  scan_.seek(scan_.position() + scan_.left());
+  return std::nullopt;
+}
+
+Result<PacketReader> PacketReader::open(Source& source) {
+  PacketReader reader(source);
+  if (!reader.read_front()) return failure(ErrorKind::bad_data, source.name() + " is no capture file (pcap or pcapng)");
+  return reader;
+}
+
+void PacketReader::rewind() {
+  scan_.seek(0);
+  damage_.reset();
+  read_front();
+}
+
+bool PacketReader::read_front() {
+  interfaces_.clear();
+  const BytesView magic = scan_.peek(4);
+  if (magic.size() < 4) return false;
+  ng_ = u32_at(magic, 0, wire::Endian::little) == section_magic;
+  if (ng_) return true;
+  for (const auto endian : {wire::Endian::little, wire::Endian::big}) {
+    const std::uint32_t found = u32_at(magic, 0, endian);
+    if (found != micro_magic && found != nano_magic) continue;
+    const BytesView header = scan_.take(24);
+    if (header.size() < 24) return false;
+    endian_ = endian;
+    // The upper bits say how long the frame's checksum is.
+    interfaces_.push_back({u32_at(header, 20, endian) & 0xFFFFu, found == nano_magic ? 1'000'000'000u : 1'000'000u});
+    return true;
+  }
+  return false;
+}
+
+std::optional<Packet> PacketReader::next() {
+  if (scan_.left() == 0) return std::nullopt;
+  return ng_ ? next_block() : next_classic();
+}
+
+std::optional<Packet> PacketReader::next_classic() {
+  const std::string at = "byte " + std::to_string(scan_.position());
+  const BytesView header = scan_.take(16);
+  if (header.size() < 16) return stop("the packet at " + at + " is cut short by the end of the file");
+  const std::uint32_t whole_s = u32_at(header, 0, endian_), rest = u32_at(header, 4, endian_), size = u32_at(header, 8, endian_);
+  if (size > longest_packet) return stop("the packet at " + at + " would have " + std::to_string(size) + " bytes");
+  const std::uint64_t per_s = interfaces_.front().ticks_per_s;
+  const BytesView bytes = scan_.take(size);
+  if (bytes.size() < size) return stop("the packet at " + at + " is cut short by the end of the file");
+  return Packet{time_of(whole_s * per_s + rest, per_s), interfaces_.front().link_type, bytes};
+}
+
+bool PacketReader::begin_section(std::uint64_t at) {
+  scan_.seek(at);
+  const BytesView front = scan_.peek(12);
+  if (front.size() < 12) return false;
+  for (const auto endian : {wire::Endian::little, wire::Endian::big}) {
+    if (u32_at(front, 8, endian) != order_magic) continue;
+    endian_ = endian;
+    interfaces_.clear();
+    return true;
+  }
+  return false;
+}
+
+void PacketReader::add_interface(BytesView body) {
+  if (interfaces_.size() >= most_interfaces) return;
+  Interface made{u16_at(body, 0, endian_), 1'000'000};
+  for (std::size_t at = 8; at + 4 <= body.size();) {
+    const std::uint16_t code = u16_at(body, at, endian_), size = u16_at(body, at + 2, endian_);
+    if (code == end_option || at + 4 + size > body.size()) break;
+    if (code == resolution_option && size >= 1) made.ticks_per_s = ticks_per_s(std::to_integer<unsigned>(body[at + 4]));
+    at += 4 + (size + 3u) / 4 * 4;
+  }
+  interfaces_.push_back(made);
+}
+
+std::optional<Packet> PacketReader::enhanced(BytesView body, std::uint64_t at) {
+  const std::uint32_t interface = u32_at(body, 0, endian_), size = u32_at(body, 12, endian_);
+  if (body.size() < 20 || interface >= interfaces_.size() || size > body.size() - 20)
+    return stop("the packet block at byte " + std::to_string(at) + " does not hold what it says");
+  const std::uint64_t ticks = std::uint64_t{u32_at(body, 4, endian_)} << 32 | u32_at(body, 8, endian_);
+  const Interface& from = interfaces_[interface];
+  return Packet{time_of(ticks, from.ticks_per_s), from.link_type, body.subspan(20, size)};
+}
+
+std::optional<Packet> PacketReader::simple(BytesView body, std::uint64_t at) {
+  if (body.size() < 4 || interfaces_.empty())
+    return stop("the packet block at byte " + std::to_string(at) + " does not hold what it says");
+  const std::size_t size = std::min<std::size_t>(u32_at(body, 0, endian_), body.size() - 4);
+  return Packet{{}, interfaces_.front().link_type, body.subspan(4, size)};
+}
+
+std::optional<Packet> PacketReader::next_block() {
+  while (scan_.left() > 0) {
+    const std::uint64_t at = scan_.position();
+    const std::string place = "the block at byte " + std::to_string(at);
+    if (u32_at(scan_.peek(4), 0, endian_) == section_magic && !begin_section(at)) return stop(place + " begins no section");
+    const BytesView front = scan_.take(8);
+    const std::uint32_t type = u32_at(front, 0, endian_), size = u32_at(front, 4, endian_);
+    if (front.size() < 8 || (size >= 12 && size - 8 > scan_.left())) return stop(place + " is cut short by the end of the file");
+    if (size < 12 || size % 4 != 0) return stop(place + " has an impossible length, " + std::to_string(size));
+    if (type != interface_block && type != simple_block && type != enhanced_block) {
+      scan_.skip(size - 8);
+      continue;
+    }
+    if (size > most_block) return stop(place + " would have " + std::to_string(size) + " bytes");
+    const BytesView rest = scan_.take(size - 8);
+    const BytesView body = rest.first(rest.size() - 4);  // the length once more
+    if (u32_at(rest, body.size(), endian_) != size) return stop(place + " does not end as it begins");
+    if (type == interface_block) {
+      add_interface(body);
+      continue;
+    }
+    return type == enhanced_block ? enhanced(body, at) : simple(body, at);
+  }
+  return std::nullopt;
+}
+
+}  // namespace sonar::recording

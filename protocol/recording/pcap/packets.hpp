@@ -1,0 +1,55 @@
+// Packets of a capture file, classic pcap or pcapng, one after the other. First step of reading a capture; ip_packet.hpp takes
+// them apart.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "protocol/recording/piece.hpp"
+#include "protocol/recording/store.hpp"
+
+namespace sonar::recording {
+
+struct Packet {
+  Time at{};
+  std::uint32_t link_type = 0;  // LINKTYPE_ number
+  BytesView bytes;              // as captured; valid until the next call
+};
+
+/// pcap: seconds and micro- or nanoseconds, either byte order. pcapng: sections, interfaces with their own time unit, enhanced
+/// and simple packets; other blocks are passed over.
+class PacketReader {
+ public:
+  static constexpr std::size_t longest_packet = 256 << 10;  // tcpdump's own bound
+  /// bad_data for anything else.
+  static Result<PacketReader> open(Source& source);
+
+  std::optional<Packet> next();
+  /// Where the file could not be read any further.
+  const std::optional<std::string>& damage() const { return damage_; }
+  void rewind();
+
+ private:
+  struct Interface {
+    std::uint32_t link_type = 0;
+    std::uint64_t ticks_per_s = 1'000'000;
+  };
+  explicit PacketReader(Source& source) : scan_(source) {}
+  bool read_front();
+  std::optional<Packet> next_classic();
+  std::optional<Packet> next_block();
+  std::optional<Packet> enhanced(BytesView body, std::uint64_t at);
+  std::optional<Packet> simple(BytesView body, std::uint64_t at);
+  bool begin_section(std::uint64_t at);
+  void add_interface(BytesView body);
+  std::nullopt_t stop(std::string why);
+
+  Scan scan_;
+  bool ng_ = false;
+  wire::Endian endian_ = wire::Endian::little;
+  std::vector<Interface> interfaces_;
+  std::optional<std::string> damage_;
+};
+
+}  // namespace sonar::recording

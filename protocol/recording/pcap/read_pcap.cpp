@@ -1,0 +1,201 @@
+#include <deque>
+#include <map>
+#include <set>
+
+#include "protocol/recording/message_splitter.hpp"
+#include "protocol/recording/pcap/packets.hpp"
+#include "protocol/recording/pcap/pcap.hpp"
+#include "protocol/recording/pcap/tcp_stream.hpp"
+
+namespace sonar::recording {
+namespace {
+
+constexpr std::size_t most_senders = 4096, most_connections = 64;
+
+bool begins_message(BytesView payload) {
+  if (payload.size() < oculus::header_size) return false;
+  const oculus::MessageHeader header = oculus::header_of(payload);
+  return header.oculus_id == oculus::magic && is_known(header);
+}
+
+// ---- first reading: who is the sonar?
+
+struct Sender {
+  std::uint64_t bytes = 0;
+  bool oculus = false;
+};
+struct Found {
+  IpEnd device;
+  std::string note;
+};
+
+Result<Found> find_device(Source& source, const PcapReading& reading) {
+  auto packets = PacketReader::open(source);
+  if (!packets) return tl::unexpected(packets.error());
+  std::map<IpEnd, Sender> senders;
+  std::set<std::uint32_t> unknown_links;
+  while (const auto packet = packets->next()) {
+    if (!is_known_link_type(packet->link_type) && unknown_links.size() < 16) unknown_links.insert(packet->link_type);
+    const auto segment = parse_packet(packet->link_type, packet->bytes);
+    if (!segment || !segment->tcp || segment->payload.empty()) continue;
+    if (senders.size() >= most_senders && !senders.contains(segment->source)) continue;
+    Sender& sender = senders[segment->source];
+    sender.bytes += segment->payload.size();
+    sender.oculus = sender.oculus || begins_message(segment->payload);
+  }
+  std::optional<IpEnd> best;
+  std::string others;
+  const auto rank = [&](const IpEnd& end) { return std::pair(end.port == oculus::tcp_port, senders.at(end).bytes); };
+  for (const auto& [end, sender] : senders)
+    if (sender.oculus && (!reading.device || *reading.device == end.address) && (!best || rank(end) > rank(*best))) best = end;
+  if (!best) {
+    std::string why = source.name() + " holds no TCP stream of an Oculus" + (reading.device ? " with that address" : "");
+    for (const std::uint32_t type : unknown_links) why += "; packets of link type " + std::to_string(type) + " are not read";
+    if (packets->damage()) why += "; " + *packets->damage();
+    return failure(ErrorKind::bad_data, why);
+  }
+  for (const auto& [end, sender] : senders)
+    if (sender.oculus && end.port == best->port && end != *best) others += (others.empty() ? "" : ", ") + text_of(end);
+  return Found{*best, others.empty() ? "" : "the capture holds other sonars too: " + others};
+}
+
+// ---- second reading: what it and its clients said
+
+struct Connection {
+  TcpStream device_stream, client_stream;
+  MessageSplitter device{Origin::device}, client{Origin::client};
+  std::uint64_t last_packet = 0;
+};
+
+class PcapReader final : public PieceReader {
+ public:
+  PcapReader(std::unique_ptr<Source> source, PacketReader packets, Found found)
+      : source_(std::move(source)), packets_(std::move(packets)), found_(std::move(found)) {}
+
+  std::optional<Piece> next() override {
+    while (ready_.empty()) {
+      const auto packet = packets_.next();
+      if (!packet) {
+        if (connections_.empty()) break;
+        finish(connections_.begin());
+        continue;
+      }
+      ++packet_number_;
+      if (const auto segment = parse_packet(packet->link_type, packet->bytes)) take(packet->at, *segment);
+    }
+    if (ready_.empty()) return std::nullopt;
+    Piece piece = std::move(ready_.front());
+    ready_.pop_front();
+    return piece;
+  }
+
+  std::optional<Error> damage() const override {
+    Damages all = damages_;
+    if (packets_.damage()) all.add(*packets_.damage());
+    return all.error(source_->name());
+  }
+  std::string note() const override { return found_.note; }
+
+  void rewind() override {
+    packets_.rewind();
+    packet_number_ = 0;
+    connections_.clear();
+    ready_.clear();
+    damages_.clear();
+  }
+
+ private:
+  using Place = std::map<IpEnd, Connection>::iterator;
+
+  void take(Time at, const Segment& segment) {
+    const IpEnd& device = found_.device;
+    if (!segment.tcp) {
+      if (segment.target.port == oculus::status_port && segment.source.address == device.address &&
+          begins_message(segment.payload))
+        ready_.push_back({at, Origin::device, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});
+      return;
+    }
+    if (segment.source == device) add(at, segment, segment.target, Origin::device);
+    if (segment.target == device) add(at, segment, segment.source, Origin::client);
+  }
+
+  void add(Time at, const Segment& segment, const IpEnd& client, Origin from) {
+    const bool syn = (segment.flags & tcp_flag::syn) != 0;
+    Place place = connections_.find(client);
+    if (place != connections_.end() && syn && stream_of(place->second, from).is_other(segment.sequence)) {
+      finish(place);
+      place = connections_.end();
+    }
+    if (place == connections_.end()) {
+      if (!syn && segment.payload.empty()) return;
+      make_room();
+      place = connections_.try_emplace(client).first;
+    }
+    place->second.last_packet = packet_number_;
+    stream_of(place->second, from).add(at, segment.sequence, segment.payload, syn);
+    drain(place->second, client, from);
+    if ((segment.flags & tcp_flag::rst) != 0) finish(place);
+  }
+
+  void make_room() {
+    if (connections_.size() < most_connections) return;
+    Place oldest = connections_.begin();
+    for (Place each = oldest; each != connections_.end(); ++each)
+      if (each->second.last_packet < oldest->second.last_packet) oldest = each;
+    finish(oldest);
+  }
+
+  void finish(Place place) {
+    for (const Origin from : {Origin::device, Origin::client}) {
+      stream_of(place->second, from).finish();
+      drain(place->second, place->first, from);
+      MessageSplitter& splitter = from == Origin::device ? place->second.device : place->second.client;
+      const std::uint64_t losses = splitter.losses();
+      splitter.finish();
+      while (auto piece = splitter.next()) ready_.push_back(std::move(*piece));
+      if (splitter.losses() > losses)
+        damages_.add("the last message from " + text_of(from == Origin::device ? found_.device : place->first) + " to " +
+                     text_of(from == Origin::device ? place->first : found_.device) + " is not whole");
+    }
+    connections_.erase(place);
+  }
+
+  static TcpStream& stream_of(Connection& connection, Origin from) {
+    return from == Origin::device ? connection.device_stream : connection.client_stream;
+  }
+
+  void drain(Connection& connection, const IpEnd& client, Origin from) {
+    MessageSplitter& splitter = from == Origin::device ? connection.device : connection.client;
+    while (const auto run = stream_of(connection, from).next()) {
+      const std::uint64_t lost = splitter.lost_bytes();
+      if (run->missing_before > 0 || run->from_middle) splitter.break_off();
+      splitter.append(run->at, run->bytes);
+      while (auto piece = splitter.next()) ready_.push_back(std::move(*piece));
+      if (run->missing_before > 0)
+        damages_.add("before packet " + std::to_string(packet_number_) + " the capture lacks " +
+                     std::to_string(run->missing_before) + " bytes of the connection with " + text_of(client));
+      else if (run->from_middle && splitter.lost_bytes() > lost)
+        damages_.add("the capture begins within a message of the connection with " + text_of(client));
+    }
+  }
+
+  std::unique_ptr<Source> source_;
+  PacketReader packets_;
+  Found found_;
+  std::uint64_t packet_number_ = 0;  // as Wireshark counts
+  std::map<IpEnd, Connection> connections_;
+  std::deque<Piece> ready_;
+  Damages damages_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<PieceReader>> read_pcap(std::unique_ptr<Source> source, const PcapReading& reading) {
+  auto found = find_device(*source, reading);
+  if (!found) return tl::unexpected(found.error());
+  auto packets = PacketReader::open(*source);
+  if (!packets) return tl::unexpected(packets.error());
+  return std::make_unique<PcapReader>(std::move(source), std::move(*packets), std::move(*found));
+}
+
+}  // namespace sonar::recording

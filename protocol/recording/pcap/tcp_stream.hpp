@@ -1,0 +1,53 @@
+// One direction of a TCP connection, put in order again: retransmitted bytes once, early segments when their turn comes, lost
+// ones told. Third step of reading a capture; the bytes then go to a MessageSplitter.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+
+#include "core/base/units.hpp"
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::recording {
+
+class TcpStream {
+ public:
+  static constexpr std::size_t most_waiting_bytes = 8u << 20;  // early segments; more means that what is missing is lost
+  static constexpr std::size_t most_waiting = 8192;
+
+  struct Run {
+    Time at{};
+    wire::Bytes bytes;
+    std::uint64_t missing_before = 0;  // bytes that the capture lacks here
+    bool from_middle = false;          // the capture begins after the connection did
+  };
+
+  /// `sequence` is that of the first byte, or of the SYN itself.
+  void add(Time at, std::uint32_t sequence, wire::BytesView payload, bool syn);
+  /// The connection or the capture is over: what waits comes out.
+  void finish();
+  std::optional<Run> next();
+  /// True when a SYN with this number begins another connection than the one that is being read.
+  bool is_other(std::uint32_t syn_sequence) const { return begun_ && (!saw_syn_ || first_ != syn_sequence + 1); }
+
+ private:
+  struct Early {
+    Time at{};
+    wire::Bytes bytes;
+  };
+  void begin(std::uint32_t sequence, bool syn);
+  void give(Time at, wire::BytesView bytes);
+  void give_what_follows();
+  void skip_to_first_waiting();
+
+  bool begun_ = false, saw_syn_ = false, from_middle_ = false;
+  std::uint32_t first_ = 0;     // of the first byte
+  std::uint64_t position_ = 0;  // of the next byte, from the first on
+  std::uint64_t missing_ = 0;
+  std::map<std::uint64_t, Early> waiting_;
+  std::size_t waiting_bytes_ = 0;
+  std::deque<Run> ready_;
+};
+
+}  // namespace sonar::recording

@@ -1,0 +1,79 @@
+#include "protocol/recording/raw_dump.hpp"
+
+namespace sonar::recording {
+namespace {
+
+constexpr std::size_t block_bytes = 256 << 10;
+
+class RawReader final : public PieceReader {
+ public:
+  explicit RawReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
+
+  std::optional<Piece> next() override {
+    while (true) {
+      if (auto piece = splitter_.next()) return piece;
+      if (scan_.left() == 0) return end();
+      const BytesView block = scan_.take(block_bytes);
+      if (block.empty()) return unreadable();
+      splitter_.append({}, block);
+    }
+  }
+  std::optional<Error> damage() const override { return damages_.error(source_->name()); }
+  void rewind() override {
+    scan_.seek(0);
+    splitter_ = MessageSplitter(Origin::device);
+    damages_.clear();
+    ended_ = false;
+  }
+  bool knows_times() const override { return false; }
+
+ private:
+  std::optional<Piece> end() {
+    if (std::exchange(ended_, true)) return std::nullopt;
+    const std::size_t unfinished = splitter_.waiting_bytes();
+    splitter_.finish();
+    auto last = splitter_.next();
+    if (splitter_.losses() > 0)
+      damages_.add("the file ends at byte " + std::to_string(source_->size()) + " within a message, of which " +
+                   std::to_string(unfinished) + " bytes are there");
+    return last;
+  }
+  std::optional<Piece> unreadable() {
+    if (!std::exchange(ended_, true)) damages_.add("cannot be read from byte " + std::to_string(scan_.position()) + " on");
+    return std::nullopt;
+  }
+
+  std::unique_ptr<Source> source_;
+  Scan scan_;
+  MessageSplitter splitter_{Origin::device};
+  Damages damages_;
+  bool ended_ = false;
+};
+
+class RawWriter final : public PieceWriter {
+ public:
+  explicit RawWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
+  Result<void> write(const Piece& piece) override {
+    if (piece.from != Origin::device || piece.by != Carrier::stream) return {};
+    return sink_->append(piece.bytes);
+  }
+  Result<void> close() override { return sink_->close(); }
+
+ private:
+  std::unique_ptr<Sink> sink_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<PieceReader>> read_raw_dump(std::unique_ptr<Source> source) {
+  Scan scan(*source);
+  const BytesView front = scan.take(oculus::header_size);
+  const bool header = front.size() == oculus::header_size && is_known(oculus::header_of(front)) &&
+                      oculus::message_length(oculus::header_of(front), oculus::Sender::device);
+  if (!header) return failure(ErrorKind::bad_data, source->name() + " does not begin with an Oculus message");
+  return std::make_unique<RawReader>(std::move(source));
+}
+
+std::unique_ptr<PieceWriter> write_raw_dump(std::unique_ptr<Sink> sink) { return std::make_unique<RawWriter>(std::move(sink)); }
+
+}  // namespace sonar::recording

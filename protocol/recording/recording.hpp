@@ -1,0 +1,25 @@
+// A recording of any kind, told by its first bytes: .oculus log, raw dump, capture (pcap, pcapng), MCAP. What `sonard replay` and
+// `sonarctl record --from` open.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "protocol/recording/piece.hpp"
+#include "protocol/recording/store.hpp"
+
+namespace sonar::recording {
+
+enum class Format { oculus_log, raw_dump, pcap, mcap };
+const char* name_of(Format format);
+
+struct Recording {
+  Format format{};
+  std::unique_ptr<PieceReader> reader;
+};
+/// `sonar`: which of several in the file, an IPv4 address in captures, a name in MCAP; empty = the one that says most, or first.
+/// missing_file, io, bad_data; usage for a sonar that no such file can name.
+Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
+Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});
+
+}  // namespace sonar::recording

@@ -1,0 +1,141 @@
+// MCAP: what a chunk must have beyond what a round trip shows, and the JSON for viewers. tests/acceptance/mcap_checker.py,
+// written from the format's description alone, checks whole files.
+#include "protocol/recording/crc32.hpp"
+#include "tests/protocol/recording/recording_testing.hpp"
+
+namespace sonar::recording::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::string text_of(const Bytes& bytes) {
+  std::string text;
+  for (const std::byte b : bytes) text += static_cast<char>(b);
+  return text;
+}
+
+Bytes session(const std::vector<Piece>& pieces, bool closed = true) {
+  Bytes file;
+  McapSession writer(sink_into(file), "front");
+  for (const Piece& piece : pieces) EXPECT_TRUE(writer.write(piece));
+  EXPECT_TRUE(writer.write_pose(after_ms(9000), {{1.5, -2, -3.25}, {1, 0, 0, 0}}));
+  const std::vector<BeamTruth> beams{{12.5f, 3}, {}, {0.25f, 0}};
+  EXPECT_TRUE(writer.write_truth(after_ms(9000), {7, after_ms(8999), {}, beams}));
+  if (closed) {
+    EXPECT_TRUE(writer.close());
+  }
+  return file;
+}
+
+TEST(Crc32, KnownAnswer) { EXPECT_EQ(crc32(bytes_of("123456789")), 0xCBF43926u); }
+
+TEST(Base64, KnownAnswers) {
+  EXPECT_EQ(mcap::base64(bytes_of("")), "");
+  EXPECT_EQ(mcap::base64(bytes_of("f")), "Zg==");
+  EXPECT_EQ(mcap::base64(bytes_of("fo")), "Zm8=");
+  EXPECT_EQ(mcap::base64(bytes_of("foobar")), "Zm9vYmFy");
+  EXPECT_EQ(mcap::base64(Bytes{std::byte{0xFB}, std::byte{0xFF}, std::byte{0}}), "+/8A");
+}
+
+TEST(Mcap, ChannelsForViewers) {
+  auto reader = mcap::Reader::open(source_from("a file", session(conversation())));
+  ASSERT_TRUE(reader);
+  std::map<std::string, std::vector<mcap::Message>> found;
+  while (auto message = reader->next()) {
+    const std::string topic = reader->channels().at(message->channel).topic;
+    EXPECT_EQ(message->sequence, found[topic].size());
+    found[topic].push_back(std::move(*message));
+  }
+  EXPECT_FALSE(reader->damage());
+  std::vector<std::string> topics;
+  for (const auto& [topic, messages] : found) topics.push_back(topic);
+  EXPECT_THAT(topics,
+              ElementsAre("/front/client", "/front/device", "/front/image", "/front/pose", "/front/status", "/front/truth"));
+  EXPECT_EQ(found["/front/image"].size(), 3u);
+  EXPECT_EQ(reader->schemas().at(reader->channels().at(found["/front/image"][0].channel).schema).name, "foxglove.RawImage");
+  EXPECT_EQ(
+      text_of(found["/front/image"][0].data),
+      R"({"timestamp":{"sec":1700000000,"nsec":223456789},"frame_id":"front","width":4,"height":5,"encoding":"mono8","step":4,)"
+      R"("data":"AQgPFh0kKzI5QEdOVVxjanF4f4Y="})");
+  EXPECT_EQ(
+      text_of(found["/front/pose"][0].data),
+      R"({"timestamp":{"sec":1700000009,"nsec":123456789},"frame_id":"world","pose":{"position":{"x":1.5,"y":-2,"z":-3.25},)"
+      R"("orientation":{"x":0,"y":0,"z":0,"w":1}}})");
+  EXPECT_EQ(text_of(found["/front/truth"][0].data),
+            R"({"timestamp":{"sec":1700000009,"nsec":122456789},"ping":7,"sonar_in_world":{"position":{"x":0,"y":0,"z":0},)"
+            R"("orientation":{"x":0,"y":0,"z":0,"w":1}},"range_m":[12.5,0,0.25],"object":[3,-1,0]})");
+}
+
+TEST(Mcap, ImagesOfWiderSamples) {
+  const auto wide = oculus::decode_ping(ping_message(1, 2, 1, 16)), widest = oculus::decode_ping(ping_message(1, 1, 1, 32));
+  ASSERT_TRUE(wide && widest);
+  EXPECT_THAT(mcap::image_json({}, "front", *wide), HasSubstr(R"("encoding":"16UC1","step":4,"data":"AQgPFg==")"));
+  EXPECT_THAT(mcap::image_json({}, "front", *widest), HasSubstr(R"("encoding":"32FC1","step":4,)"));
+}
+
+TEST(Mcap, WithoutItsEndEverythingButTheLastChunkIsThere) {
+  auto opened = open_bytes(session(conversation(), false));  // chunks of 2 s: the last one never reached the file
+  ASSERT_TRUE(opened);
+  std::vector<Piece> expected = conversation();
+  expect_same(read_all(*opened->reader), expected);
+  ASSERT_TRUE(opened->reader->damage());
+  EXPECT_THAT(opened->reader->damage()->text, HasSubstr("it was not closed"));
+}
+
+TEST(Mcap, WhatIsWholeInACutChunkIsRead) {
+  std::vector<Piece> pieces = conversation();
+  pieces.resize(6);
+  const Bytes whole = session(pieces);
+  auto opened = open_bytes({whole.begin(), whole.begin() + 6000});
+  ASSERT_TRUE(opened);
+  const std::vector<Piece> found = read_all(*opened->reader);
+  EXPECT_GE(found.size(), 2u);
+  EXPECT_EQ(found[0].bytes, conversation()[0].bytes);
+  ASSERT_TRUE(opened->reader->damage());
+  EXPECT_THAT(opened->reader->damage()->text, HasSubstr("is cut short by the end of the file"));
+}
+
+TEST(Mcap, SaysThatItReadsNoCompression) {
+  Bytes file;
+  const auto sink = sink_into(file);
+  mcap::RecordWriter record(file);
+  for (const std::uint8_t b : mcap::magic) record.number(b);
+  record.begin(mcap::Opcode::chunk);
+  record.time(start);
+  record.time(start);
+  record.number(std::uint64_t{1000});
+  record.number(std::uint32_t{0});
+  record.string("zstd");
+  record.number(std::uint64_t{3});
+  record.bytes(bytes_of("abc"));
+  record.end();
+  auto opened = open_bytes(file);
+  ASSERT_TRUE(opened);
+  EXPECT_FALSE(opened->reader->next());
+  EXPECT_THAT(opened->reader->damage()->text, HasSubstr("is compressed (zstd), which is not read"));
+}
+
+TEST(Mcap, OneOfSeveralSonars) {
+  Bytes file;
+  mcap::Writer writer(sink_into(file));
+  std::vector<std::uint16_t> channels;
+  for (const char* name : {"left", "right"}) {
+    mcap::Channel channel;
+    channel.topic = std::string("/") + name + "/device";
+    channel.message_encoding = "oculus";
+    channel.metadata = {{"sonar", name}, {"from", "device"}, {"carrier", "tcp"}};
+    channels.push_back(writer.add_channel(channel));
+  }
+  ASSERT_TRUE(writer.write(channels[0], start, ping_message(1)));
+  ASSERT_TRUE(writer.write(channels[1], start, ping_message(2)));
+  ASSERT_TRUE(writer.close());
+  auto first = open_bytes(file), right = open_bytes(file, "right");
+  ASSERT_TRUE(first && right);
+  EXPECT_EQ(device_stream(read_all(*first->reader)), ping_message(1));
+  EXPECT_EQ(first->reader->note(), "the file holds other sonars too: right");
+  EXPECT_EQ(device_stream(read_all(*right->reader)), ping_message(2));
+}
+
+}  // namespace
+}  // namespace sonar::recording::testing

@@ -1,0 +1,196 @@
+// What holds for every format: what was written is read again, whatever part of the file is there, and a full disk spoils
+// nothing.
+#include <sys/resource.h>
+
+#include <csignal>
+
+#include "tests/protocol/recording/recording_testing.hpp"
+
+namespace sonar::recording::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+class EveryFormat : public ::testing::TestWithParam<Format> {};
+INSTANTIATE_TEST_SUITE_P(Recording, EveryFormat, ::testing::ValuesIn(all_formats), [](const auto& format) {
+  std::string name = name_of(format.param);
+  std::erase_if(name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; });
+  return name;
+});
+
+TEST_P(EveryFormat, GivesBackWhatWasWritten) {
+  auto opened = open_bytes(recorded(GetParam(), conversation()));
+  ASSERT_TRUE(opened) << opened.error().text;
+  EXPECT_EQ(opened->format, GetParam());
+  for (int round = 0; round < 2; ++round) {
+    expect_same(read_all(*opened->reader), kept_by(GetParam(), conversation()), opened->reader->knows_times());
+    EXPECT_FALSE(opened->reader->damage());
+    opened->reader->rewind();
+  }
+}
+
+TEST_P(EveryFormat, KeepsLongMessages) {
+  std::vector<Piece> pieces;
+  for (std::uint32_t i = 0; i < 4; ++i)
+    pieces.push_back({after_ms(100 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i, 512, 700, 32)});
+  auto opened = open_bytes(recorded(GetParam(), pieces));
+  ASSERT_TRUE(opened) << opened.error().text;
+  expect_same(read_all(*opened->reader), pieces, opened->reader->knows_times());
+}
+
+TEST_P(EveryFormat, GivesWhatIsReadableOfAFileCutShortAnywhere) {
+  const std::vector<Piece> written = kept_by(GetParam(), conversation());
+  const Bytes whole = recorded(GetParam(), conversation());
+  std::size_t most = 0;
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    auto opened = open_bytes({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)});
+    if (!opened) {
+      EXPECT_EQ(opened.error().kind, ErrorKind::bad_data);
+      EXPECT_EQ(most, 0u) << "at " << size << " of " << whole.size() << ": " << opened.error().text;
+      continue;
+    }
+    const std::vector<Piece> pieces = read_all(*opened->reader);
+    ASSERT_LE(pieces.size(), written.size());
+    ASSERT_GE(pieces.size() + 1, most) << size;  // a longer file never says less, but for the order of the last two
+    for (const Piece& piece : pieces) {
+      const auto same = [&piece](const Piece& other) { return other.bytes == piece.bytes && other.from == piece.from; };
+      ASSERT_TRUE(std::any_of(written.begin(), written.end(), same)) << "cut at " << size;
+    }
+    most = std::max(most, pieces.size());
+  }
+  EXPECT_GE(most + 1, written.size());
+}
+
+TEST_P(EveryFormat, SurvivesAnyByteBeingWrong) {
+  const std::vector<Piece> pieces{{start, Origin::device, Carrier::stream, dummy_message()},
+                                  {after_ms(10), Origin::device, Carrier::stream, dummy_message()}};
+  const Bytes whole = recorded(GetParam(), pieces);
+  for (std::size_t at = 0; at < whole.size(); ++at)
+    for (const unsigned flip : {0x01u, 0x80u, 0xFFu}) {
+      Bytes damaged = whole;
+      damaged[at] ^= static_cast<std::byte>(flip);
+      auto opened = open_bytes(damaged);
+      if (opened) {
+        EXPECT_LE(read_all(*opened->reader).size(), 4u);
+      }
+    }
+}
+
+/// Files may grow to so many bytes for as long as it lives, as if the disk ended there.
+class SmallDisk {
+ public:
+  explicit SmallDisk(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit small{bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~SmallDisk() { ::setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST_P(EveryFormat, AFullDiskLeavesWhatWasWritten) {
+  const TemporaryFile file("full-disk");
+  std::vector<Piece> written;
+  std::optional<Error> error;
+  {
+    auto sink = create_sink(file.path());
+    ASSERT_TRUE(sink);
+    const SmallDisk disk(3'000'000);
+    const auto writer = writer_for(GetParam(), std::move(*sink));
+    for (std::uint32_t i = 0; i < 400 && !error; ++i) {
+      Piece piece{after_ms(100 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i, 256, 100)};
+      if (Result<void> told = writer->write(piece); !told) error = told.error();
+      written.push_back(std::move(piece));
+    }
+    ASSERT_TRUE(error);
+    EXPECT_FALSE(writer->write(written.front()));
+    static_cast<void>(writer->close());
+  }
+  EXPECT_EQ(error->kind, ErrorKind::io);
+  EXPECT_THAT(error->text, HasSubstr("cannot write on to " + file.path().string()));
+  EXPECT_THAT(error->text, HasSubstr("bytes are whole"));
+
+  auto opened = open_recording(file.path());
+  ASSERT_TRUE(opened) << opened.error().text;
+  const std::vector<Piece> found = read_all(*opened->reader);
+  EXPECT_FALSE(opened->reader->damage()) << opened->reader->damage()->text;
+  ASSERT_GT(found.size(), GetParam() == Format::mcap ? 20u : 90u);
+  written.resize(found.size());
+  expect_same(found, written, opened->reader->knows_times());
+}
+
+TEST(Recording, RefusesOtherFiles) {
+  const auto text_of = [](const std::string& content) {
+    auto opened = open_bytes(bytes_of(content));
+    EXPECT_FALSE(opened);
+    return opened ? "" : opened.error().text;
+  };
+  EXPECT_EQ(text_of(""), "a file is empty");
+  EXPECT_THAT(text_of("hello"), HasSubstr("no recording: expected an .oculus log, a raw dump, pcap, pcapng or MCAP"));
+  EXPECT_THAT(text_of("SQLite format 3"), HasSubstr("version 2"));
+  EXPECT_THAT(text_of("SO, it begins like a message"), HasSubstr("does not begin with an Oculus message"));
+  const auto missing = open_recording("/no/such/recording");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().kind, ErrorKind::missing_file);
+  const auto folder = open_recording(std::filesystem::temp_directory_path());
+  ASSERT_FALSE(folder);
+  EXPECT_EQ(folder.error().kind, ErrorKind::bad_data);
+}
+
+TEST(Recording, BytesBetweenMessagesAreKept) {
+  std::vector<Piece> pieces = conversation();
+  const Bytes junk = bytes_of("S?SO what");
+  pieces.insert(pieces.begin() + 3, {after_ms(120), Origin::device, Carrier::stream, junk});
+  for (const Format format : {Format::raw_dump, Format::pcap, Format::mcap}) {
+    auto opened = open_bytes(recorded(format, pieces));
+    ASSERT_TRUE(opened);
+    EXPECT_EQ(device_stream(read_all(*opened->reader)), device_stream(pieces)) << name_of(format);
+    EXPECT_FALSE(opened->reader->damage());
+  }
+}
+
+TEST(Recording, ADamagedPlaceCostsOnlyItself) {
+  for (const Format format : {Format::oculus_log, Format::mcap}) {
+    std::vector<Piece> pieces;
+    for (std::uint32_t i = 0; i < 9; ++i)
+      pieces.push_back({after_ms(1500 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i)});
+    Bytes file = recorded(format, pieces);
+    file[file.size() / 2] ^= std::byte{0xFF};
+    for (std::size_t i = 0; format == Format::oculus_log && i < 4; ++i) file[48 + i] ^= std::byte{0x55};
+    auto opened = open_bytes(file);
+    ASSERT_TRUE(opened);
+    const std::vector<Piece> found = read_all(*opened->reader);
+    EXPECT_GE(found.size(), 6u) << name_of(format);
+    EXPECT_LT(found.size(), 10u);
+    EXPECT_EQ(found.back().bytes, pieces.back().bytes);
+    ASSERT_TRUE(opened->reader->damage());
+    EXPECT_THAT(opened->reader->damage()->text, HasSubstr("a file: "));
+    EXPECT_THAT(opened->reader->damage()->text, HasSubstr("at byte "));
+  }
+}
+
+/// A real device's bytes through every format (SONARD_CAPTURES).
+TEST(Recording, KeepsTheCapturedPings) {
+  const char* folder = std::getenv("SONARD_CAPTURES");
+  if (folder == nullptr) GTEST_SKIP() << "SONARD_CAPTURES names no folder of recordings";
+  std::filesystem::path file = std::filesystem::path(folder) / "three_pings_8bit.raw";
+  if (!std::filesystem::exists(file)) file = std::filesystem::path(folder) / "oculus/three_pings_8bit.raw";
+  auto dump = open_recording(file);
+  if (!dump) GTEST_SKIP() << dump.error().text;
+  std::vector<Piece> pieces = read_all(*dump->reader);
+  ASSERT_EQ(pieces.size(), 3u);
+  EXPECT_FALSE(dump->reader->damage());
+  EXPECT_EQ(device_stream(pieces).size(), std::filesystem::file_size(file));
+  for (std::size_t i = 0; i < 3; ++i) pieces[i].at = after_ms(62 * static_cast<int>(i));
+  for (const Format format : all_formats) {
+    auto opened = open_bytes(recorded(format, pieces));
+    ASSERT_TRUE(opened);
+    expect_same(read_all(*opened->reader), pieces, opened->reader->knows_times());
+  }
+}
+
+}  // namespace
+}  // namespace sonar::recording::testing

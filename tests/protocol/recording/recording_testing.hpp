@@ -1,0 +1,151 @@
+// What the tests of recordings share: a small conversation with everything in it, and files that go away.
+#pragma once
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "protocol/oculus/encode_ping.hpp"
+#include "protocol/oculus/fire.hpp"
+#include "protocol/recording/mcap/mcap_session.hpp"
+#include "protocol/recording/oculus_log.hpp"
+#include "protocol/recording/pcap/pcap.hpp"
+#include "protocol/recording/raw_dump.hpp"
+#include "protocol/recording/recording.hpp"
+
+namespace sonar::recording::testing {
+
+inline const Time start = Time(std::chrono::nanoseconds(1'700'000'000'123'456'789));
+inline Time after_ms(int ms) { return start + std::chrono::milliseconds(ms); }
+
+inline Bytes bytes_of(const std::string& text) {
+  Bytes bytes;
+  for (const char c : text) bytes.push_back(static_cast<std::byte>(c));
+  return bytes;
+}
+
+inline Bytes ping_message(std::uint32_t id, std::uint16_t beams = 4, std::uint16_t rows = 5, unsigned bits = 8) {
+  oculus::PingHead head;
+  head.fixed.header = {oculus::magic, 7001, 0, oculus::MessageType::ping_result, 0, 0, 0};
+  head.fixed.ping_id = id;
+  head.fixed.frequency_hz = 2.1e6;
+  head.fixed.range_resolution_m = 0.01;
+  head.fixed.row_count = rows;
+  head.fixed.beam_count = beams;
+  head.fixed.data_size = bits == 8 ? oculus::DataSize::bits8 : bits == 16 ? oculus::DataSize::bits16 : oculus::DataSize::bits32;
+  std::vector<std::int16_t> bearings(beams);
+  Bytes samples(std::size_t{beams} * rows * bits / 8);
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<std::byte>(i * 7 + id);
+  for (std::size_t i = 0; i < beams; ++i) bearings[i] = static_cast<std::int16_t>(10 * i);
+  return oculus::encode_ping(head, {bearings, {}, samples});
+}
+
+inline Bytes dummy_message() {
+  oculus::DummyMessage message;
+  message.header.type = oculus::MessageType::dummy;
+  message.header.source = 7001;
+  return wire::bytes_of(message);
+}
+
+inline Bytes status_message() {
+  oculus::StatusMessage status;
+  status.header = {oculus::magic, 7001, 0, oculus::MessageType::status, 0, 126, 1042};
+  status.device_id = 7001;
+  status.ip_address = {127, 0, 0, 2};
+  return wire::bytes_of(status);
+}
+
+/// Two settings, keep-alives, three pings, a status: both ends, both carriers.
+inline std::vector<Piece> conversation() {
+  using enum Origin;
+  using enum Carrier;
+  const Bytes fire = oculus::make_fire({});
+  return {{after_ms(0), device, stream, dummy_message()},    {after_ms(1), client, stream, fire},
+          {after_ms(100), device, stream, ping_message(1)},  {after_ms(150), device, datagram, status_message()},
+          {after_ms(200), device, stream, ping_message(2)},  {after_ms(250), client, stream, fire},
+          {after_ms(4300), device, stream, ping_message(3)}, {after_ms(4400), device, stream, dummy_message()}};
+}
+
+inline std::vector<Piece> read_all(PieceReader& reader) {
+  std::vector<Piece> pieces;
+  while (auto piece = reader.next()) pieces.push_back(std::move(*piece));
+  return pieces;
+}
+
+/// Bytes the device sent by TCP.
+inline Bytes device_stream(const std::vector<Piece>& pieces) {
+  Bytes stream;
+  for (const Piece& piece : pieces)
+    if (piece.from == Origin::device && piece.by == Carrier::stream)
+      stream.insert(stream.end(), piece.bytes.begin(), piece.bytes.end());
+  return stream;
+}
+
+inline void expect_same(const std::vector<Piece>& found, const std::vector<Piece>& expected, bool with_times = true) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    SCOPED_TRACE(i);
+    EXPECT_EQ(found[i].from, expected[i].from);
+    EXPECT_EQ(found[i].by, expected[i].by);
+    EXPECT_EQ(found[i].bytes, expected[i].bytes);
+    if (with_times) {
+      EXPECT_EQ(found[i].at, expected[i].at);
+    }
+  }
+}
+
+inline std::unique_ptr<PieceWriter> writer_for(Format format, std::unique_ptr<Sink> sink) {
+  switch (format) {
+    case Format::oculus_log:
+      return write_oculus_log(std::move(sink));
+    case Format::raw_dump:
+      return write_raw_dump(std::move(sink));
+    case Format::pcap:
+      return write_pcap(std::move(sink), {});
+    default:
+      return std::make_unique<McapSession>(std::move(sink), "front");
+  }
+}
+
+/// What this format keeps of a conversation.
+inline std::vector<Piece> kept_by(Format format, std::vector<Piece> pieces) {
+  if (format == Format::oculus_log || format == Format::raw_dump)
+    std::erase_if(pieces, [](const Piece& piece) { return piece.from == Origin::client || piece.by == Carrier::datagram; });
+  return pieces;
+}
+
+inline Bytes recorded(Format format, const std::vector<Piece>& pieces) {
+  Bytes file;
+  const auto writer = writer_for(format, sink_into(file));
+  for (const Piece& piece : pieces) EXPECT_TRUE(writer->write(piece));
+  EXPECT_TRUE(writer->close());
+  return file;
+}
+
+inline Result<Recording> open_bytes(Bytes bytes, const std::string& sonar = {}) {
+  return open_recording(source_from("a file", std::move(bytes)), sonar);
+}
+
+inline const std::vector<Format> all_formats{Format::oculus_log, Format::raw_dump, Format::pcap, Format::mcap};
+
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& name)
+      : path_(std::filesystem::temp_directory_path() / (std::to_string(::getpid()) + "-" + name)) {}
+  ~TemporaryFile() {
+    std::error_code ec;
+    std::filesystem::remove(path_, ec);
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace sonar::recording::testing

@@ -1,0 +1,79 @@
+// The splitter loses no byte that is not part of a broken message, however the stream is cut.
+#include "tests/protocol/recording/recording_testing.hpp"
+
+namespace sonar::recording::testing {
+namespace {
+
+std::vector<Bytes> drain(MessageSplitter& splitter) {
+  std::vector<Bytes> found;
+  while (auto piece = splitter.next()) found.push_back(std::move(piece->bytes));
+  return found;
+}
+
+Bytes joined(const std::vector<Bytes>& parts) {
+  Bytes all;
+  for (const Bytes& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+TEST(MessageSplitter, FindsMessagesHoweverTheStreamIsCut) {
+  const std::vector<Bytes> sent{dummy_message(), bytes_of("S S?SOno"), ping_message(1), dummy_message(), ping_message(2)};
+  const Bytes stream = joined(sent);
+  for (std::size_t cut = 0; cut <= stream.size(); ++cut) {
+    MessageSplitter splitter(Origin::device);
+    splitter.append(after_ms(1), BytesView(stream).first(cut));
+    std::vector<Bytes> found = drain(splitter);
+    splitter.append(after_ms(2), BytesView(stream).subspan(cut));
+    for (Bytes& part : drain(splitter)) found.push_back(std::move(part));
+    EXPECT_EQ(joined(found), stream) << cut;
+    for (const Bytes& message : {ping_message(1), ping_message(2)})
+      EXPECT_THAT(found, ::testing::Contains(message)) << "cut at " << cut;
+    EXPECT_EQ(splitter.losses(), 0u);
+  }
+}
+
+TEST(MessageSplitter, TimeIsThatOfTheLastByte) {
+  const Bytes ping = ping_message(1);
+  MessageSplitter splitter(Origin::device);
+  splitter.append(after_ms(1), BytesView(ping).first(100));
+  EXPECT_FALSE(splitter.next());
+  splitter.append(after_ms(7), BytesView(ping).subspan(100));
+  const auto piece = splitter.next();
+  ASSERT_TRUE(piece);
+  EXPECT_EQ(piece->at, after_ms(7));
+}
+
+TEST(MessageSplitter, MissingBytesCostTheMessagesTheyBelongTo) {
+  const Bytes ping = ping_message(1), next = ping_message(2);
+  MessageSplitter splitter(Origin::device);
+  splitter.append(start, BytesView(ping).first(500));
+  EXPECT_TRUE(drain(splitter).empty());
+  splitter.break_off();
+  splitter.append(start, BytesView(ping).subspan(700));
+  splitter.append(start, next);
+  EXPECT_EQ(drain(splitter), std::vector<Bytes>{next});
+  EXPECT_EQ(splitter.losses(), 1u);
+  EXPECT_EQ(splitter.lost_bytes(), ping.size() - 200);
+}
+
+TEST(MessageSplitter, AnUnfinishedMessageIsNotGiven) {
+  const Bytes ping = ping_message(1);
+  MessageSplitter splitter(Origin::device);
+  splitter.append(start, BytesView(ping).first(ping.size() - 1));
+  splitter.finish();
+  EXPECT_TRUE(drain(splitter).empty());
+  EXPECT_EQ(splitter.losses(), 1u);
+  EXPECT_EQ(splitter.lost_bytes(), ping.size() - 1);
+}
+
+TEST(MessageSplitter, ClientsMayLeaveTheirPayloadSizeOut) {
+  Bytes fire = oculus::make_fire({});
+  for (std::size_t i = 10; i < 14; ++i) fire[i] = std::byte{0};
+  MessageSplitter splitter(Origin::client);
+  splitter.append(start, fire);
+  splitter.append(start, fire);
+  EXPECT_EQ(drain(splitter), (std::vector<Bytes>{fire, fire}));
+}
+
+}  // namespace
+}  // namespace sonar::recording::testing
