@@ -69,8 +69,9 @@ class Signs(unittest.TestCase):
 
     def test_what_is_no_fix_is_none(self):
         for body in ("GPGGA,123519,4807.038,N,01131.000,E,0,00,,,M,,M,,", "GPRMC,123519,V,4807.038,N,01131.000,E,,,,,",
-                     "GPGLL,4807.038,N,01131.000,E,123519,V", "GPGGA,123519,,,,,1,08,0.9,,M,,M,,", "GPGGA", "GPGLL,4867.0,N,01131.0,E",
-                     "GPGLL,9907.038,N,01131.000,E,123519,A", "GPGLL,4807.038,X,01131.000,E,123519,A"):
+                     "GPGLL,4807.038,N,01131.000,E,123519,V", "GPGGA,123519,,,,,1,08,0.9,,M,,M,,", "GPGGA",
+                     "GPGLL,4867.0,N,01131.0,E", "GPGLL,9907.038,N,01131.000,E,123519,A",
+                     "GPGLL,4807.038,X,01131.000,E,123519,A"):
             with self.subTest(body):
                 self.assertIsNone(self.said(body).place)
 

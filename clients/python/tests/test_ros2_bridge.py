@@ -1,0 +1,174 @@
+"""What the ROS 2 bridge computes, without ROS: frames, the line it sends, the status it reads; and that its files are whole."""
+import ast
+import importlib
+import json
+import math
+import socket
+import sys
+import types
+import unittest
+import xml.etree.ElementTree
+from unittest import mock
+
+from common import ROOT
+
+BRIDGE = ROOT / "clients/ros2_bridge"
+sys.path.insert(0, str(BRIDGE))
+from sonard_bridge import conversions as c  # noqa: E402
+
+from sonard_client.rotations import quaternion_from_rpy  # noqa: E402
+
+HALF = math.sqrt(0.5)
+
+
+class Frames(unittest.TestCase):
+    def assert_close(self, got, wanted):
+        self.assertEqual(len(got), len(wanted))
+        for a, b in zip(got, wanted):
+            self.assertAlmostEqual(a, b, places=12)
+
+    def test_order_of_quaternions(self):
+        self.assert_close(c.wxyz((0.1, 0.2, 0.3, math.sqrt(0.86))), (math.sqrt(0.86), 0.1, 0.2, 0.3))
+        self.assert_close(c.xyzw(c.wxyz((0, 0, HALF, HALF))), (0, 0, HALF, HALF))
+        for bad in ((0, 0, 0, 0), (0, 0, 0, 2), (math.nan, 0, 0, 1)):
+            with self.subTest(bad), self.assertRaises(c.Unusable):
+                c.wxyz(bad)
+
+    def test_a_vector_of_the_body_in_the_world(self):
+        bow_north = (HALF, 0, 0, HALF)  # ENU: yaw 90 degrees
+        self.assert_close(c.rotate(bow_north, (1, 0, 0)), (0, 1, 0))
+        self.assert_close(c.rotate(bow_north, (0, 1, 0)), (-1, 0, 0))  # port is west
+
+    def test_aircraft_axes(self):
+        self.assert_close(c.enu_from_ned((1, 2, 3)), (2, 1, -3))
+        self.assert_close(c.flu_from_frd((1, 2, 3)), (1, -2, -3))
+        for rpy in ((0, 0, 0), (0.1, -0.2, 0.3), (-1, 0.5, 2.5)):
+            ned, enu = quaternion_from_rpy(*rpy), quaternion_from_rpy(rpy[0], -rpy[1], math.pi / 2 - rpy[2])
+            turned = c.enu_flu_from_ned_frd(ned)
+            self.assertAlmostEqual(abs(sum(a * b for a, b in zip(turned, enu))), 1, places=12)
+            for v in ((1, 0, 0), (0, 1, 0), (0.3, -0.4, 2)):
+                self.assert_close(c.rotate(turned, c.flu_from_frd(v)), c.enu_from_ned(c.rotate(ned, v)))
+
+    def test_images_have_z_ahead_and_x_up(self):
+        self.assert_close(c.flu_from_image((0, 0, 1)), (1, 0, 0))
+        self.assert_close(c.flu_from_image((1, 0, 0)), (0, 0, 1))
+        self.assert_close(c.flu_from_image((0, 1, 0)), (0, -1, 0))  # right-handed: y is starboard
+        for v in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 2, 3)):
+            self.assert_close(c.image_from_flu(c.flu_from_image(v)), v)
+            self.assert_close(c.rotate(c.wxyz(c.IMAGE_IN_FLU_XYZW), v), c.flu_from_image(v))
+        self.assert_close(c.beam_direction(0), (0, 0, 1))
+        self.assertLess(c.beam_direction(0.3)[1], 0)  # to port
+
+    def test_the_readme_gives_the_same_rotation(self):
+        text = (BRIDGE / "README.md").read_text(encoding="utf-8")
+        given = [float(text.split(f"--q{axis} ")[1].split()[0]) for axis in "xyzw"]
+        for got, wanted in zip(given, c.IMAGE_IN_FLU_XYZW):
+            self.assertAlmostEqual(got, wanted, places=7)
+
+
+class Lines(unittest.TestCase):
+    def test_a_pose_with_its_velocity(self):
+        line = json.loads(c.json_line((1, 2, -3), (HALF, 0, 0, HALF), 12.5, "rov", (1, 0, 0)))
+        self.assertEqual((line["frame"], line["position"], line["timestamp"], line["vehicle"]), ("ENU_FLU", [1, 2, -3], 12.5, "rov"))
+        self.assertAlmostEqual(line["velocity"][1], 1)
+        self.assertEqual(set(json.loads(c.json_line((0, 0, 0), (1, 0, 0, 0)))), {"frame", "position", "quaternion"})
+        self.assertNotIn("velocity", json.loads(c.json_line((0, 0, 0), (1, 0, 0, 0), velocity_in_body=(math.nan, 0, 0))))
+
+    def test_what_is_not_sent(self):
+        for position, stamp in (((math.nan, 0, 0), None), ((1, 2), None), ((0, 0, 0), -1.0), ((0, 0, 0), 5e9)):
+            with self.subTest(position, stamp=stamp), self.assertRaises(c.Unusable):
+                c.json_line(position, (1, 0, 0, 0), stamp)
+
+    def test_stamps(self):
+        self.assertIsNone(c.stamp_s(0, 0))
+        self.assertEqual(c.stamp_s(3, 500_000_000), 3.5)
+
+    def test_endpoints(self):
+        self.assertEqual(c.endpoint("10.0.0.1", 7), ("10.0.0.1", 7))
+        self.assertEqual(c.endpoint("10.0.0.1:9", 7), ("10.0.0.1", 9))
+        with self.assertRaises(ValueError):
+            c.endpoint("10.0.0.1:x", 7)
+
+    def test_a_vehicle_in_the_status(self):
+        status = {"vehicles": [{"name": "rov", "position": {"x": 1, "z": -3}, "orientation": {"w": 1}}, {"name": "buoy"}]}
+        self.assertEqual(c.vehicle_in(status, "rov"), ((1, 0, -3), (1, 0, 0, 0)))
+        for name in ("", "buoy", "none"):
+            self.assertIsNone(c.vehicle_in(status, name))
+        self.assertIsNone(c.vehicle_in({}, ""))
+
+
+def stubs(parameters):
+    """Modules with just the names the node takes from ROS; they say nothing of whether ROS has them so."""
+    class Node:
+        def __init__(self, name):
+            self.logged, self.subscribed = [], []
+
+        def declare_parameter(self, name, default):
+            return types.SimpleNamespace(value=parameters.get(name, default))
+
+        def create_subscription(self, kind, topic, call, qos):
+            self.subscribed.append((topic, call))
+
+        def get_logger(self):
+            def log(text, **_):
+                self.logged.append(text)
+            return types.SimpleNamespace(info=log, warning=log)
+
+    made = {"rclpy": {}, "rclpy.node": {"Node": Node}, "rclpy.qos": {"qos_profile_sensor_data": 5},
+            "geometry_msgs": {}, "geometry_msgs.msg": {"PoseStamped": object}, "nav_msgs": {}, "nav_msgs.msg": {"Odometry": object},
+            "tf2_ros": {"Buffer": object, "TransformException": Exception, "TransformListener": object}}
+    modules = {name: types.ModuleType(name) for name in made}
+    for name, content in made.items():
+        vars(modules[name]).update(content)
+    return modules
+
+
+class TheNode(unittest.TestCase):
+    def bridge(self, **parameters):
+        with mock.patch.dict(sys.modules, stubs(parameters)):
+            sys.modules.pop("sonard_bridge.node", None)
+            node = importlib.import_module("sonard_bridge.node").Bridge()
+        self.addCleanup(node.socket.close)
+        return node
+
+    def test_odometry_becomes_a_datagram(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
+            there.bind(("127.0.0.1", 0))
+            there.settimeout(10)
+            node = self.bridge(odometry="/odom", sonard="127.0.0.1:%d" % there.getsockname()[1], vehicle="rov")
+            ((topic, call),) = node.subscribed
+            self.assertEqual(topic, "/odom")
+            of = types.SimpleNamespace
+            header = of(stamp=of(sec=3, nanosec=500000000))
+            pose = of(position=of(x=1.0, y=2.0, z=-3.0), orientation=of(x=0.0, y=0.0, z=HALF, w=HALF))
+            call(of(header=header, pose=of(pose=pose), twist=of(twist=of(linear=of(x=1.0, y=0.0, z=0.0)))))
+            line = json.loads(there.recv(4096))
+            self.assertEqual((line["position"], line["timestamp"], line["vehicle"]), ([1, 2, -3], 3.5, "rov"))
+            self.assertAlmostEqual(line["velocity"][1], 1)
+            pose.orientation.w = 0.0
+            call(of(header=header, pose=of(pose=pose), twist=of(twist=of(linear=of(x=1.0, y=0.0, z=0.0)))))
+            self.assertIn("left out: orientation", node.logged[-1])
+
+    def test_one_source_is_needed(self):
+        for parameters in ({}, {"odometry": "/a", "pose": "/b"}, {"tf_parent": "map"}, {"tf_child": "base_link"}):
+            with self.subTest(**parameters), self.assertRaisesRegex(ValueError, "set one of"):
+                self.bridge(**parameters)
+
+
+class Package(unittest.TestCase):
+    def test_its_files_are_whole(self):
+        package = xml.etree.ElementTree.parse(BRIDGE / "package.xml").getroot()
+        self.assertEqual(package.findtext("name"), "sonard_bridge")
+        self.assertTrue((BRIDGE / "resource" / package.findtext("name")).exists())
+        for name in ("setup.py", "launch/bridge.launch.py", "sonard_bridge/node.py"):
+            ast.parse((BRIDGE / name).read_text(encoding="utf-8"), name)
+        self.assertIn(f'version="{package.findtext("version")}"', (BRIDGE / "setup.py").read_text(encoding="utf-8"))
+
+    def test_the_node_takes_from_conversions_what_there_is(self):
+        tree = ast.parse((BRIDGE / "sonard_bridge/node.py").read_text(encoding="utf-8"))
+        (taken,) = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module == "conversions"]
+        self.assertEqual([a.name for a in taken.names if not hasattr(c, a.name)], [])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,116 @@
+"""Between ROS and sonard, without ROS: frames, the pose as a line of JSON, and what the daemon says of its vehicles.
+
+sonard's world is ENU and its body FLU, as ROS has both by REP 103: poses pass as they are, but ROS writes quaternions x, y, z, w and
+sonard w, x, y, z. Images of marine_acoustic_msgs are in a frame of their own: z ahead in the middle of the fan, x up, so y to
+starboard.
+"""
+from __future__ import annotations
+
+import json
+import math
+from typing import Any, Dict, Optional, Sequence, Tuple
+
+Vector3 = Tuple[float, float, float]
+Quaternion = Tuple[float, float, float, float]  # w, x, y, z
+LATEST_STAMP_S = 4.5e9
+NORM_ALLOWED = 1e-3
+
+
+class Unusable(ValueError):
+    """Why a message cannot be sent on; one sentence."""
+
+
+def wxyz(xyzw: Sequence[float]) -> Quaternion:
+    """sonard's order from ROS's, of length 1; Unusable where it is none: an all-zero one is ROS's "not set"."""
+    norm = math.sqrt(sum(v * v for v in xyzw))
+    if len(xyzw) != 4 or not math.isfinite(norm) or abs(norm - 1) > NORM_ALLOWED:
+        raise Unusable(f"orientation {tuple(xyzw)} has length {norm:g}, not 1")
+    x, y, z, w = (v / norm for v in xyzw)
+    return w, x, y, z
+
+
+def xyzw(q: Sequence[float]) -> Quaternion:
+    """ROS's order from sonard's."""
+    return q[1], q[2], q[3], q[0]
+
+
+def rotate(q: Quaternion, v: Sequence[float]) -> Vector3:
+    """A vector of the body in the axes that q is told in."""
+    w, x, y, z = q
+    tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
+    return v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx
+
+
+def enu_from_ned(v: Sequence[float]) -> Vector3:
+    """And NED from ENU: it is its own inverse."""
+    return v[1], v[0], -v[2]
+
+
+def flu_from_frd(v: Sequence[float]) -> Vector3:
+    """And FRD from FLU."""
+    return v[0], -v[1], -v[2]
+
+
+def enu_flu_from_ned_frd(q: Quaternion) -> Quaternion:
+    """Body to world, of a sender that keeps to aircraft's axes; and back: it is its own inverse but for the sign of all four."""
+    w, x, y, z = q
+    s = math.sqrt(0.5)
+    return s * (w + z), s * (x + y), s * (x - y), s * (w - z)
+
+
+def flu_from_image(v: Sequence[float]) -> Vector3:
+    """From the frame of marine_acoustic_msgs' images to sonard's sonar frame (x ahead, y to port, z up)."""
+    return v[2], -v[1], v[0]
+
+
+def image_from_flu(v: Sequence[float]) -> Vector3:
+    return v[2], -v[1], v[0]
+
+
+def beam_direction(azimuth_rad: float) -> Vector3:
+    """Of a beam, azimuth positive to port, in the frame of marine_acoustic_msgs."""
+    return image_from_flu((math.cos(azimuth_rad), math.sin(azimuth_rad), 0.0))
+
+
+# The image frame in the sonar's: a static transform from the sonar's FLU frame to its image frame has this rotation, x, y, z, w.
+IMAGE_IN_FLU_XYZW = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+
+
+def json_line(position: Sequence[float], orientation: Quaternion, stamp_s: Optional[float] = None, vehicle: str = "",
+              velocity_in_body: Optional[Sequence[float]] = None) -> bytes:
+    """A pose as sonard takes it by UDP. ROS's twists are in the axes of the body, sonard's in those of the world."""
+    if len(position) != 3 or not all(map(math.isfinite, position)):
+        raise Unusable(f"position {tuple(position)} is not three finite numbers")
+    line: Dict[str, Any] = {"frame": "ENU_FLU", "position": list(position), "quaternion": list(orientation)}
+    if stamp_s is not None:
+        if not 0 <= stamp_s <= LATEST_STAMP_S:
+            raise Unusable(f"stamp {stamp_s:g} s is not between 0 and 4.5e9")
+        line["timestamp"] = stamp_s
+    if vehicle:
+        line["vehicle"] = vehicle
+    if velocity_in_body is not None and all(map(math.isfinite, velocity_in_body)):
+        line["velocity"] = list(rotate(orientation, velocity_in_body))
+    return json.dumps(line, allow_nan=False, separators=(",", ":")).encode() + b"\n"
+
+
+def stamp_s(seconds: int, nanoseconds: int) -> Optional[float]:
+    """None for an unset stamp: then the moment of receipt counts."""
+    return seconds + 1e-9 * nanoseconds if seconds or nanoseconds else None
+
+
+def vehicle_in(status: Dict[str, Any], name: str) -> "Optional[Tuple[Vector3, Quaternion]]":
+    """Position and orientation w, x, y, z of a vehicle, or of the only one, in a status of the daemon."""
+    vehicles = [v for v in status.get("vehicles", []) if not name or v.get("name") == name]
+    if len(vehicles) != 1 or "orientation" not in vehicles[0]:
+        return None
+    place, turn = vehicles[0].get("position", {}), vehicles[0]["orientation"]
+    position = float(place.get("x", 0)), float(place.get("y", 0)), float(place.get("z", 0))
+    return position, (float(turn.get("w", 0)), float(turn.get("x", 0)), float(turn.get("y", 0)), float(turn.get("z", 0)))
+
+
+def endpoint(text: str, port: int) -> Tuple[str, int]:
+    """host or host:port"""
+    host, colon, number = text.partition(":")
+    if colon and not number.isdigit():
+        raise ValueError(f"{text!r} is not host:port")
+    return host, int(number) if colon else port
