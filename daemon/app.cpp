@@ -161,6 +161,7 @@ asio::awaitable<void> App::keep_house() {
       if (events_.heard()) events_.tell({control::PoseEvent{stale.vehicle, true, stale.sentence}});
     }
     fleet_.sweep();
+    for (Device& d : fleet_.devices()) d.forget_who_left();
     error_code ec;
     house_timer_.expires_after(std::chrono::milliseconds(500));
     co_await house_timer_.async_wait(into(ec));

@@ -103,6 +103,7 @@ class App {
   asio::steady_timer house_timer_, stop_timer_;
   Notify notify_;
   bool look_posted_ = false, stopping_ = false;
+  int reloads_ = 0;  // asked for and not yet done
   int exit_code_ = 0;
 };
 

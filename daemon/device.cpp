@@ -119,9 +119,8 @@ void Device::change_settings(const protocol::ChangeSettings& change, const std::
     state_.request = change.request;
     requests_[++settings_id_] = change.request;
     if (!busy_) requests_.erase(requests_.begin(), requests_.find(settings_id_));
-    std::uint64_t unsaid = 0;
-    if (changes_.allows(LogLimiter::Clock::now(), unsaid))
-      context_.log.info("settings: " + change.summary, {{"sonar", config_.name}, {"client", who}});
+    say_at_times(context_.log, changes_, LogLevel::info, "settings: " + change.summary,
+                 {{"sonar", config_.name}, {"client", who}});
   }
   settings_ = change.settings;  // of a repeat too: what the device knows by itself, its sound speed say, follows its depth
   asked_ = true;

@@ -83,6 +83,8 @@ class Device final : public SessionParent {
   /// Vehicle and mount, of a configuration that is else the same.
   void use_place(const SonarConfig& config);
   void use_water(const Water& water);
+  /// Visitors that wait for a place and have hung up. Now and then, and before a place is given or refused.
+  void forget_who_left();
 
   void on_event(Session& from, const protocol::Event& event) override;
   void on_written(Session& by, const Outbox::Message& message) override;

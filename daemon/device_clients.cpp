@@ -1,4 +1,6 @@
 // A Device's clients: who is let in, who waits, who is turned away, and what changes when one comes or goes.
+#include <poll.h>
+
 #include <array>
 #include <cmath>
 
@@ -11,22 +13,24 @@ constexpr auto accept_pause = std::chrono::milliseconds(100);  // after running 
 constexpr std::size_t longest_queue = 16;
 constexpr int most_turned_away_at_once = 16;
 
+/// Also when what it sent is still unread: the end of the stream lies behind that.
+bool has_left(tcp::socket& socket) {
+  pollfd asked{socket.native_handle(), POLLRDHUP, 0};
+  return ::poll(&asked, 1, 0) > 0;
+}
+
 }  // namespace
 
 /// For what any visitor can cause, again and again.
 void Device::say_visit(const std::string& what, std::vector<LogField> fields) {
-  std::uint64_t unsaid = 0;
-  if (!visits_.allows(LogLimiter::Clock::now(), unsaid)) return;
   fields.insert(fields.begin(), {"sonar", config_.name});
-  if (unsaid > 0) fields.emplace_back("unsaid", unsaid);
-  context_.log.info(what, fields);
+  say_at_times(context_.log, visits_, LogLevel::info, what, std::move(fields));
 }
 
 /// A mistake of ours, not of a client: it may cost that client its connection, never the others.
 void Device::say_fault(const std::string& what) {
-  std::uint64_t unsaid = 0;
-  if (faults_.allows(LogLimiter::Clock::now(), unsaid))
-    context_.log.error("internal fault: " + what + " (please report it)", {{"sonar", config_.name}, {"unsaid", unsaid}});
+  say_at_times(context_.log, faults_, LogLevel::error, "internal fault: " + what + " (please report it)",
+               {{"sonar", config_.name}});
 }
 
 void Device::on_fault(Session&, const std::string& what) { say_fault(what); }
@@ -71,6 +75,7 @@ void Device::admit(tcp::socket socket, Admission::Place place) {
     if (sessions_.empty()) use_initial_settings();
     return welcome(std::move(socket), std::move(place));
   }
+  forget_who_left();
   if (config_.when_full == WhenClientsFull::queue && queue_.size() < longest_queue) {
     say_visit("client waits for a place", {{"waiting", queue_.size() + 1}});
     queue_.push_back({std::move(socket), std::move(place)});
@@ -110,6 +115,11 @@ asio::awaitable<void> Device::turn_away(tcp::socket socket, Admission::Place pla
   place.reset();
 }
 
+void Device::forget_who_left() {
+  const std::size_t left = std::erase_if(queue_, [](Waiting& waiting) { return has_left(waiting.socket); });
+  for (std::size_t i = 0; i < left; ++i) say_visit("client gone: it waited for a place", {{"waiting", queue_.size()}});
+}
+
 void Device::welcome(tcp::socket socket, Admission::Place place) {
   const Time now = context_.clock.now();
   Session::Setup setup{config_.outbox, context_.digest, ++figures_.clients, context_.config.limits, std::move(place)};
@@ -144,6 +154,7 @@ void Device::on_over(Session& session, const std::string& why) {
   const auto is_it = [&session](const SessionPointer& s) { return s.get() == &session; };
   leaving_.remove_if(is_it);
   if (sessions_.remove_if(is_it) == 0) return context_.on_change();
+  forget_who_left();
   if (!stopping_ && !queue_.empty()) {
     Waiting next = std::move(queue_.front());
     queue_.pop_front();

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "daemon/standard_streams.hpp"
@@ -14,24 +16,9 @@ namespace {
 
 constexpr std::size_t longest_line = 3900;  // what a pipe takes at once is 4096 bytes
 
+/// Names of files may hold any bytes: what is no UTF-8 is replaced.
 std::string json_string(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    const auto u = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (u < 0x20) {
-      constexpr std::string_view digits = "0123456789abcdef";
-      out += "\\u00";
-      out += digits[u >> 4];
-      out += digits[u & 15];
-    } else {
-      out += c;
-    }
-  }
-  out += '"';
-  return out;
+  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 /// Text from outside must not forge lines: control characters become '?', values with spaces are quoted.
@@ -85,7 +72,23 @@ Log::Log(LogOptions options) : options_(std::move(options)) {
 Log::~Log() = default;
 
 void Log::write(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields) {
-  if (level < options_.level) return;
+  if (level >= options_.level) emit(level, phrase, fields);
+}
+
+void Log::announce(std::string_view lines) {
+  if (!options_.json && !options_.sink) {
+    std::fwrite(lines.data(), 1, lines.size(), stderr);
+    return;
+  }
+  while (!lines.empty()) {
+    const std::string_view line = lines.substr(0, lines.find('\n'));
+    lines.remove_prefix(std::min(lines.size(), line.size() + 1));
+    const std::size_t first = line.find_first_not_of(' ');  // lines that go on are indented
+    if (first != std::string_view::npos) emit(LogLevel::info, line.substr(first), {});
+  }
+}
+
+void Log::emit(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields) {
   if (options_.sink) {
     options_.sink(level, text_line(phrase, fields));
     return;
@@ -93,7 +96,7 @@ void Log::write(LogLevel level, std::string_view phrase, const std::vector<LogFi
   // Whoever reads the log must not hold up the clients.
   if (sink_->lost > 0 && !standard_error_is_blocked()) {
     const std::uint64_t lost = std::exchange(sink_->lost, 0);
-    write(LogLevel::warning, "log lines lost: nobody took them", {{"lines", lost}});
+    emit(LogLevel::warning, "log lines lost: nobody took them", {{"lines", lost}});
   }
   if (standard_error_is_blocked()) {
     ++sink_->lost;
@@ -114,6 +117,13 @@ bool LogLimiter::allows(Clock::time_point now, std::uint64_t& unsaid) {
   tokens_ -= 1;
   unsaid = std::exchange(swallowed_, 0);
   return true;
+}
+
+void say_at_times(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields) {
+  std::uint64_t unsaid = 0;
+  if (!limiter.allows(LogLimiter::Clock::now(), unsaid)) return;
+  if (unsaid > 0) fields.emplace_back("unsaid", unsaid);
+  log.write(level, phrase, fields);
 }
 
 }  // namespace sonar

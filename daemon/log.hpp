@@ -1,4 +1,4 @@
-// One line per event: a short phrase, then key=value. The only way the daemon speaks after its banner; spdlog is behind it.
+// One line per event: a short phrase, then key=value, or an object of JSON. The only way the daemon speaks; spdlog is behind it.
 #pragma once
 
 #include <chrono>
@@ -34,9 +34,12 @@ class Log {
   void info(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::info, phrase, fields); }
   void warning(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::warning, phrase, fields); }
   void error(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::error, phrase, fields); }
+  void write(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields);
+  /// Banner and summary, which no level holds back. As they stand in the text format; in JSON a message each line.
+  void announce(std::string_view lines);
 
  private:
-  void write(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields);
+  void emit(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields);
   LogOptions options_;
   struct Sink;
   std::unique_ptr<Sink> sink_;
@@ -54,5 +57,8 @@ class LogLimiter {
   Clock::time_point last_{};
   std::uint64_t swallowed_ = 0;
 };
+
+/// Says a line as often as its limiter allows; one after others that were swallowed says how many.
+void say_at_times(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields = {});
 
 }  // namespace sonar

@@ -6,9 +6,7 @@ constexpr auto wall_tolerance = std::chrono::milliseconds(1);
 }
 
 void PoseIntake::say_refusal(const std::string& why, const Sender& sender) {
-  std::uint64_t unsaid = 0;
-  if (refusals_.allows(LogLimiter::Clock::now(), unsaid))
-    log_.warning("pose refused: " + why, {{"from", sender.id}, {"unsaid", unsaid}});
+  say_at_times(log_, refusals_, LogLevel::warning, "pose refused: " + why, {{"from", sender.id}});
 }
 
 void PoseIntake::refuse(const std::string& why, const Sender& sender) {
@@ -31,8 +29,7 @@ std::string PoseIntake::take(control::PoseSample sample, const Sender& sender) {
   if (!outcome.refusal.empty() && outcome.verdict != PoseVerdict::late) say_refusal(outcome.refusal, sender);
   if (!outcome.notice.empty() && events_ != nullptr && events_->heard())
     events_->tell({control::PoseEvent{outcome.body, false, outcome.notice}});
-  std::uint64_t unsaid = 0;
-  if (!outcome.notice.empty() && notices_.allows(LogLimiter::Clock::now(), unsaid)) log_.info(outcome.notice);
+  if (!outcome.notice.empty()) say_at_times(log_, notices_, LogLevel::info, outcome.notice);
   on_pose_();
   return outcome.refusal;
 }

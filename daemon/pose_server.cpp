@@ -60,9 +60,7 @@ void PoseServer::start() {
 }
 
 void PoseServer::say_fault(const std::exception_ptr& fault, const std::string& at) {
-  std::uint64_t unsaid = 0;
-  if (faults_.allows(LogLimiter::Clock::now(), unsaid))
-    log_.error("internal fault: " + text_of(fault) + " (please report it)", {{"at", at}, {"unsaid", unsaid}});
+  say_at_times(log_, faults_, LogLevel::error, "internal fault: " + text_of(fault) + " (please report it)", {{"at", at}});
 }
 
 /// A listener outlives whatever one message does to us.
@@ -165,9 +163,8 @@ void PoseServer::admit(tcp::socket socket) {
   const Sender sender = sender_of(true, "tcp", peer.address(), peer.port());
   if (!allowed(peer.address())) return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
   const bool room = connections_.make_room([this](const Connection& evicted) {
-    std::uint64_t unsaid = 0;
-    if (notices_.allows(LogLimiter::Clock::now(), unsaid))
-      log_.info("pose connection closed: silent for longest, and its place was needed", {{"from", evicted.sender.id}});
+    say_at_times(log_, notices_, LogLevel::info, "pose connection closed: silent for longest, and its place was needed",
+                 {{"from", evicted.sender.id}});
   });
   if (!room) return intake_.refuse(std::to_string(most_connections) + " connections are open and busy already", sender);
   end_when_silent(socket, dead_after);

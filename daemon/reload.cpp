@@ -49,6 +49,8 @@ std::vector<std::string> keep_what_needs_a_restart(const Config& now, Config& ne
 void App::reload() {
   if (!options_.read_config || !options_.load_scene) return log_.info("reload: there is no configuration file; nothing changed");
   if (changes_.is_full()) return log_.warning("reload: too many changes of the scene wait already; nothing changed");
+  if (reloads_ == 2) return;  // one is under way; the other waits, and will read what the file says then
+  ++reloads_;
   notify_.reloading();
   auto next = std::make_shared<Config>();
   changes_.submit({[read = options_.read_config, load = options_.load_scene, next](const ScenePointer&) -> Result<ScenePointer> {
@@ -62,6 +64,7 @@ void App::reload() {
                        take_over(std::move(*next));
                      else
                        log_.error("reload: " + outcome.error().text + "; the configuration stays as it was");
+                     --reloads_;
                      notify_.ready(status_line());
                    }});
 }
@@ -73,6 +76,7 @@ void App::take_over(Config next) {
   const Config& before = next;
   world_.use_rules(pose_rules(config_));
   world_.use_vehicles(vehicles_of(config_));
+  world_.show_again();
   const Fleet::Change change = fleet_.take_over(before, config_);
   if (other_water)
     for (Device& d : fleet_.devices()) d.use_water(config_.water);

@@ -1,7 +1,9 @@
 #include "daemon/world.hpp"
 
 #include <algorithm>
+
 #include <cmath>
+#include <utility>
 
 namespace sonar {
 namespace {
@@ -144,6 +146,7 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   track.domain = sample.stamp.domain;
   track.last_arrival = now;
   track.hidden = sample.hidden;
+  track.hidden_for_now = false;
   track.stale_reported = false;
   const PoseHistory::Sample kept{at, sample.pose, sample.velocity_mps, sample.angular_velocity_radps};
   if (over_rate(track, now) && !track.history.empty()) {
@@ -154,6 +157,11 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   }
   ++counters_.accepted;
   return out;
+}
+
+void World::show_again() {
+  for (Track& t : objects_)
+    if (std::exchange(t.hidden_for_now, false)) t.hidden = false;
 }
 
 bool World::is_stale(const Track& track, Time now) const {

@@ -78,7 +78,10 @@ class World {
   std::vector<Pose> objects_at(Time t) const;
   Pose object_at(std::size_t object, Time t) const { return pose_at(objects_[object], t); }
   bool is_hidden(std::size_t object) const { return objects_[object].hidden; }
-  void hide(std::size_t object, bool hidden) { objects_[object].hidden = hidden; }
+  /// Until its next pose, or show_again().
+  void hide(std::size_t object, bool hidden) { objects_[object].hidden = objects_[object].hidden_for_now = hidden; }
+  /// What hide() has hidden; what poses hide stays.
+  void show_again();
   /// True when poses came once and then stopped for longer than the rules allow.
   bool is_stale(std::size_t vehicle, Time now) const { return is_stale(vehicles_[vehicle], now); }
   struct Stale {
@@ -99,7 +102,7 @@ class World {
     control::ClockDomain domain{};
     Time last_arrival{};
     std::chrono::nanoseconds offset{0};  // our time = sender's time + offset
-    bool hidden = false, stale_reported = false;
+    bool hidden = false, hidden_for_now = false, stale_reported = false;
     double allowance = 0;  // poses that may be kept now; refilled with time
     Time allowance_at{};
   };

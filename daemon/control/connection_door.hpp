@@ -76,10 +76,8 @@ class ConnectionDoor {
     const std::string address = peer.address().to_string();
     const Sender sender{protocol_ + " tcp " + address + ":" + std::to_string(peer.port()), protocol_ + " " + address};
     const bool room = places_.make_room([this](const Connection& evicted) {
-      std::uint64_t unsaid = 0;
-      if (context_.notices.allows(LogLimiter::Clock::now(), unsaid))
-        context_.log.info("control connection closed: silent for longest, and its place was needed",
-                          {{"from", evicted.sender().id}});
+      say_at_times(context_.log, context_.notices, LogLevel::info,
+                   "control connection closed: silent for longest, and its place was needed", {{"from", evicted.sender().id}});
     });
     if (!room) {
       say_refused(context_, std::to_string(places_.most()) + " connections are open and busy already", sender.id);

@@ -38,9 +38,9 @@ std::string head_of(unsigned status, const std::string& type, const std::string&
   return head + "\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n" + more + "\r\n";
 }
 
-std::string bytes_of(const HttpAnswer& answer, bool last, bool without_body) {
+std::string bytes_of(const HttpAnswer& answer, std::string_view connection, bool without_body) {
   std::string more = "Content-Length: " + std::to_string(answer.body.size()) + "\r\n";
-  if (last) more += "Connection: close\r\n";
+  if (!connection.empty()) more.append("Connection: ").append(connection).append("\r\n");
   if (!answer.allow.empty()) more += "Allow: " + answer.allow + "\r\n";
   if (answer.status == 401) more += "WWW-Authenticate: Bearer\r\n";
   return head_of(answer.status, answer.type, more) + (without_body ? "" : answer.body);
@@ -194,8 +194,7 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
     co_return;
   }
   HttpAnswer answer = co_await make_answer(std::move(judgement.wanted));
-  if (answer.status == 401 || answer.status == 403)
-    say_refused(context_, answer.body.substr(0, answer.body.size() - 1), sender_.id);
+  if (!answer.why.empty()) say_refused(context_, answer.why, sender_.id);
   if (!co_await write_answer(std::move(answer), head) || head.last)
     said_all_ = true;
   else
@@ -255,7 +254,8 @@ asio::awaitable<void> HttpConnection::stream_events(control::Subscribe wanted, H
 }
 
 asio::awaitable<bool> HttpConnection::write_answer(HttpAnswer answer, Head head) {
-  return write_whole(bytes_of(answer, head.last, head.without_body));
+  const char* connection = head.last ? "close" : head.http_1_0 ? "keep-alive" : "";  // 1.1 keeps it unless told
+  return write_whole(bytes_of(answer, connection, head.without_body));
 }
 
 asio::awaitable<bool> HttpConnection::write_whole(std::string bytes) {

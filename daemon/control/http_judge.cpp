@@ -44,7 +44,9 @@ std::optional<HttpAnswer> stopped_at_the_door(const HttpRequest& request, const 
 }  // namespace
 
 HttpAnswer answer_of(unsigned status, StatusCode code, const std::string& text) {
-  return {status, control::json_of(code, text) + "\n"};
+  HttpAnswer answer{status, control::json_of(code, text) + "\n"};
+  if (status == 401 || status == 403) answer.why = text;
+  return answer;
 }
 
 Judgement judge(const HttpRequest& request, const HttpPolicy& policy) {

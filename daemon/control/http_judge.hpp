@@ -18,6 +18,7 @@ struct HttpAnswer {
   std::string body;
   std::string type = "application/json";
   std::string allow = {};  // of 405
+  std::string why = {};    // for the log, of 401 and 403
 };
 /// {"code", "text"}; every answer that is no document is one.
 HttpAnswer answer_of(unsigned status, control::StatusCode code, const std::string& text);

@@ -216,6 +216,28 @@ TEST(Admission, QueueServesTheNextWhenAPlaceIsFree) {
   EXPECT_TRUE(second.next_ping()) << "and its fire message was kept";
 }
 
+TEST(Admission, WhoHangsUpWhileWaitingLosesThePlaceInTheQueue) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 1, when_full: queue}\n";
+  Daemon daemon(setup);
+  auto first = std::make_unique<Client>(daemon.address());
+  first->fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(first->next_ping());
+  for (int i = 0; i < 40; ++i) {  // more than may wait; what they sent lies before the end of their streams
+    Client leaves(daemon.address());
+    leaves.fire(fire_at(PingRate::hz40, 2));
+  }
+  Client stays(daemon.address());
+  stays.fire(fire_at(PingRate::hz40, 3));
+  EXPECT_FALSE(stays.next(milliseconds(200)));
+  EXPECT_FALSE(stays.ended);
+  EXPECT_TRUE(eventually([&] { return daemon.figures().clients_queued == 1; }));
+  first.reset();
+  const auto ping = stays.next_ping();
+  ASSERT_TRUE(ping);
+  EXPECT_EQ(ping->head.fixed.fire.range, 3) << "nobody who had gone was asked";
+}
+
 TEST(Admission, TheLastFireWinsAmongSeveral) {
   DaemonSetup setup;
   setup.sonar_lines = "    clients: {max: 3}\n";

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <future>
+#include <thread>
 
 #include "daemon/reload.hpp"
 #include "tests/daemon/loopback.hpp"
@@ -40,6 +42,25 @@ std::size_t times(const std::string& text, const std::string& words) {
 [[nodiscard]] bool reload(Daemon& daemon, const std::string& words, std::size_t nth = 1) {
   if (kill(getpid(), SIGHUP) != 0) return false;
   return eventually([&] { return times(daemon.log_text(), words) >= nth; });
+}
+
+TEST(Reload, AStormOfHangupsIsReadTwice) {
+  std::promise<void> let_go;
+  DaemonSetup setup = with_file();
+  setup.options.load_scene = [goes = let_go.get_future().share()](const SceneFile&) -> Result<ScenePointer> {
+    goes.wait();
+    return std::make_shared<const Scene>();
+  };
+  Daemon daemon(setup);
+  daemon.on_io_thread([] {
+    for (int i = 0; i < 10; ++i) ASSERT_EQ(raise(SIGHUP), 0);
+  });
+  std::this_thread::sleep_for(milliseconds(300));  // all have been heard; the first still loads
+  let_go.set_value();
+  ASSERT_TRUE(eventually([&] { return times(daemon.log_text(), "reloaded:") >= 2; }));
+  ASSERT_TRUE(reload(daemon, "reloaded:", 3)) << "and a later one again";
+  daemon.stop();
+  EXPECT_EQ(times(daemon.log_text(), "reloaded:"), 3u) << "the first, one for all that came meanwhile, the later one";
 }
 
 TEST(Reload, UntouchedSonarsStreamOnWhileOthersComeChangeAndGo) {

@@ -328,5 +328,23 @@ TEST(World, ObjectsOfAnotherSceneKeepTheirPosesAndStayHidden) {
   EXPECT_EQ(w.object_at(1, t0).position_m.x, 3);
 }
 
+TEST(World, WhatWasHiddenForNowIsShownAgainAndWhatItsPosesHideIsNot) {
+  World w(PoseRules{}, {{"rov", {}, false}}, {{"crate", {}, false}, {"whale", {}, false}, {"seal", {}, false}}, t0);
+  PoseSample s = at_x(3);
+  s.of = PoseSample::Of::object;
+  s.hidden = true;
+  for (const char* name : {"crate", "seal"}) {
+    s.name = name;
+    w.accept(s, json, t0);
+  }
+  w.hide(1, true);
+  w.hide(2, false);
+  w.hide(2, true);
+  w.show_again();
+  EXPECT_TRUE(w.is_hidden(0));
+  EXPECT_FALSE(w.is_hidden(1));
+  EXPECT_FALSE(w.is_hidden(2)) << "control had the last word";
+}
+
 }  // namespace
 }  // namespace sonar

@@ -207,15 +207,22 @@ TEST(ControlHttp, WithATokenOnlyHealthIsOpen) {
   EXPECT_EQ(client.get("/healthz").body, "in trouble\n");
   EXPECT_EQ(client.get("/api/v1/status", std::string("Authorization: Bearer ") + TokenFile::text + "\r\n").status, 200);
   EXPECT_EQ(bench.log_text().find("0123456789"), std::string::npos);
+  EXPECT_THAT(bench.log_text(), HasSubstr("control refused: this daemon wants a token: "));
+  EXPECT_EQ(bench.log_text().find("unsaid"), std::string::npos) << "nothing went unsaid";
 }
 
 TEST(ControlHttp, OldClientsAndThoseWhoAskToContinue) {
   ControlBench bench;
   {
     HttpClient client(bench);
+    client.tcp.send("GET /healthz HTTP/1.0\r\nHost: localhost\r\nConnection: keep-alive\r\n\r\n");
+    const auto kept = client.next();
+    EXPECT_EQ(kept.body, "ok\n");
+    EXPECT_THAT(kept.head, HasSubstr("\r\nConnection: keep-alive\r\n"));
     client.tcp.send("GET /healthz HTTP/1.0\r\nHost: localhost\r\n\r\n");
-    EXPECT_EQ(client.next().body, "ok\n");
-    client.tcp.finish_sending();
+    const auto last = client.next();
+    EXPECT_EQ(last.body, "ok\n");
+    EXPECT_THAT(last.head, HasSubstr("\r\nConnection: close\r\n"));
     EXPECT_TRUE(client.tcp.read_to_end());
   }
   HttpClient client(bench);
