@@ -40,7 +40,8 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                }},
       fleet_(context_),
       operations_(
-          {config_, clock_, world_, simulator_, changes_, admission_, pose_intake_, fleet_, events_, log_, options_.load_scene}),
+          {config_, clock_, world_, simulator_, changes_, admission_, pose_intake_, fleet_, events_, control_, log_,
+           options_.load_scene}),
       control_(io_, config_.control, config_.limits, operations_, events_, pose_intake_, log_),
       signals_(io_),
       house_timer_(io_),

@@ -12,6 +12,8 @@
 
 namespace sonar {
 
+class ControlServer;
+
 struct AppParts {
   Config& config;
   Clock& clock;
@@ -22,6 +24,7 @@ struct AppParts {
   PoseIntake& poses;
   Fleet& fleet;
   Events& events;
+  const ControlServer& control;  // asked where it listens, once all is made
   Log& log;
   std::function<Result<ScenePointer>(const SceneFile&)> load_scene;  // empty: scenes cannot be loaded
 };

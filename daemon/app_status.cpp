@@ -1,5 +1,6 @@
 // How the daemon is: everything that GetStatus answers, the figures for /metrics, and what is wrong.
 #include "daemon/app_operations.hpp"
+#include "daemon/control/control_server.hpp"
 #include "daemon/prometheus.hpp"
 
 namespace sonar {
@@ -23,6 +24,9 @@ std::vector<control::ObjectStatus> objects_of(const Scene& scene, const World& w
   }
   return all;
 }
+
+/// Empty = nobody listens.
+std::string served_at(Endpoint at) { return at.port == 0 ? std::string() : text_of(at); }
 
 }  // namespace
 
@@ -69,6 +73,8 @@ control::DaemonStatus AppOperations::status() const {
   const PoseCounters& p = world.counters();
   s.poses = {p.accepted, p.refused, p.late, p.replaced, p.over_rate};
   s.environment = {config.water.temperature_c, config.water.salinity_psu, config.water.ph, config.water.sound_speed_mps};
+  s.control = served_at(parts_.control.stream());
+  s.http = served_at(parts_.control.http());
   return s;
 }
 

@@ -93,6 +93,7 @@ struct DaemonStatus {
   std::vector<ObjectStatus> objects;
   PoseFigures poses;
   SetEnvironment environment;  // complete
+  std::string control, http;   // addresses listened on; empty = not served
 };
 
 // ---- events

@@ -137,6 +137,8 @@ void fill(v1::DaemonStatus& out, const DaemonStatus& s) {
   for (const ObjectStatus& object : s.objects) fill(*out.add_objects(), object);
   fill(*out.mutable_poses(), s.poses);
   fill(*out.mutable_environment(), s.environment);
+  out.set_control(s.control);
+  out.set_http(s.http);
 }
 DaemonStatus from(const v1::DaemonStatus& m) {
   DaemonStatus s;
@@ -153,6 +155,8 @@ DaemonStatus from(const v1::DaemonStatus& m) {
   for (const v1::ObjectStatus& object : m.objects()) s.objects.push_back(from(object));
   s.poses = from(m.poses());
   s.environment = from(m.environment());
+  s.control = m.control();
+  s.http = m.http();
   return s;
 }
 

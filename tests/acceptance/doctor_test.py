@@ -1,8 +1,10 @@
 """sonarctl doctor beside a daemon that is well, none at all, one that is busy, and ports that others have."""
 import json
 import os
+import pathlib
 import socket
 import subprocess
+import tempfile
 import time
 import unittest
 
@@ -20,6 +22,14 @@ def doctor(address, *arguments, control_port=14770):
     for finding in found["findings"]:
         by_check.setdefault(finding["check"], []).append(finding)
     return result.returncode, by_check, found
+
+
+def told_of_control(daemon, *arguments):
+    """As doctor(), but only the control stream is named: where HTTP is, the daemon says."""
+    result = run(SONARCTL, "doctor", daemon.address, "--json", "--status-on", daemon.address, "--control", f"{daemon.address}:14770",
+                 *PATIENT, *arguments)
+    found = json.loads(result.stdout)
+    return result.returncode, {f["check"]: [f] for f in found["findings"]}, found
 
 
 class Doctor(unittest.TestCase):
@@ -49,11 +59,36 @@ class Doctor(unittest.TestCase):
                        "--http", f"{daemon.address}:8088", *PATIENT)
             self.assertRegex(text.stdout, r"\n\d+ checks, 0 errors, \d+ warnings?\n$")
 
+    def test_http_is_asked_where_the_daemon_serves_it(self):
+        with Sonard() as daemon:
+            code, findings, _ = told_of_control(daemon)
+            self.expect(findings, "http", "ok", f"http://{daemon.address}:8088/healthz says ok")
+            self.assertEqual(code, 0)
+        with Sonard(http="off") as daemon:
+            self.expect(told_of_control(daemon)[1], "http", "ok", "HTTP is not served")
+
+    def test_a_token_that_was_not_given_is_a_warning_that_says_how(self):
+        with tempfile.TemporaryDirectory() as folder:
+            token = pathlib.Path(folder) / "token"
+            token.write_text("0123456789abcdef01234567\n", encoding="utf-8")
+            token.chmod(0o600)
+            with Sonard(control=f', token_file: "{token}"') as daemon:
+                code, findings, _ = told_of_control(daemon)
+                self.expect(findings, "control", "warn", "wants a token", "--token-file FILE")
+                self.assertEqual(code, 0)
+                code, findings, _ = told_of_control(daemon, "--token-file", token)
+                self.expect(findings, "control", "ok", "1 sonar")
+                self.assertEqual(code, 0)
+                token.write_text("another one, long enough\n", encoding="utf-8")
+                code, findings, _ = told_of_control(daemon, "--token-file", token)
+                self.expect(findings, "control", "fail", "is not that of control.token_file")
+
     def test_nothing_running_says_what_to_do(self):
         start = time.monotonic()
         code, findings, _ = doctor(free_address())
         self.expect(findings, "ping", "fail", "refuses the connection: nobody listens there")
         self.expect(findings, "control", "fail", "no sonard answers on the control stream")
+        self.assertEqual(str(findings["control"]).count("--control HOST:PORT"), 1)
         self.assertEqual(code, 69)
         self.assertLess(time.monotonic() - start, 30)  # 4 s on a quiet machine
 

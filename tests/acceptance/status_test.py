@@ -44,6 +44,9 @@ class Steering(unittest.TestCase):
         status = self.status()
         self.assertEqual(status["sonars"][0]["name"], "front")
         self.assertEqual(status["vehicles"][0]["name"], "rov")
+        self.assertEqual(status["control"], f"{self.daemon.address}:14770")
+        self.assertEqual(status["http"], f"{self.daemon.address}:8088")
+        self.assertIn(f"control   tcp {self.daemon.address}:14770  http {self.daemon.address}:8088\n", text)
 
     def test_events_come_as_they_happen(self):
         events = subprocess.Popen([str(SONARCTL), "events", "--clients", "--count", "1", "--seconds", "60", "--json", "--control",

@@ -235,9 +235,12 @@ TEST(Doctor, ExpectsControlWhereADaemonIs) {
   Facts facts = healthy();
   facts.control.status.reset();
   facts.control.error = "nobody there";
-  expect(line(facts, "control"), Level::warn, "nobody there", "--control");
+  expect(line(facts, "control"), Level::warn, "nobody there", "nothing is said of poses");
   facts.control.given = true;
-  expect(line(facts, "control"), Level::fail, "nobody there", "--token-file");
+  expect(line(facts, "control"), Level::fail, "nobody there", "nothing is said of poses");
+  facts.control.wants_token = true;
+  expect(line(facts, "control"), Level::warn, "127.0.0.1:14770 wants a token, and none was given", "--token-file FILE");
+  facts.control.wants_token = false;
   facts.control.given = false;
   facts.sonars[0].on_this_host = false;
   EXPECT_THAT(text_from(judge(facts)), Not(HasSubstr("control"))) << "a device of another computer";
@@ -258,6 +261,10 @@ TEST(Doctor, LooksAtPosesHttpAndClocks) {
   expect(line(facts, "http"), Level::fail, "answers 503: no ping for 5 s", "log");
   facts.http.code = 401;
   expect(line(facts, "http"), Level::warn, "answers 401", "token");
+  facts.http.place = HttpFacts::Place::not_served;
+  expect(line(facts, "http"), Level::ok, "HTTP is not served", "");
+  facts.http.place = HttpFacts::Place::only_over_there;
+  expect(line(facts, "http"), Level::ok, "http://127.0.0.1:8088/healthz is for that computer alone", "");
   facts.control.clock_ahead_s = -3.5;
   expect(line(facts, "clock"), Level::warn, "3.50 s behind ours", "NTP");
   facts.control.clock_ahead_s = 0.01;

@@ -91,6 +91,8 @@ std::string text_from(const control::DaemonStatus& s) {
   text += line("config", s.config);
   text += line("scene", s.scene + "  seed " + std::to_string(s.seed) + "  clock " + s.clock);
   text += line("engine", s.engine);
+  if (!s.control.empty())  // an older daemon does not say it
+    text += line("control", "tcp " + s.control + (s.http.empty() ? std::string("  http off") : "  http " + s.http));
   text += line("water", water_text(s.environment));
   for (const control::SonarStatus& sonar : s.sonars) text += sonar_text(sonar);
   for (const control::VehicleStatus& v : s.vehicles)

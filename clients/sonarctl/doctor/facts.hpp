@@ -63,12 +63,18 @@ struct SonarFacts {
 
 struct ControlFacts {
   Endpoint at;
-  bool given = false;  // by the user: then it should answer
-  std::string error;   // why there is no status
+  bool given = false;        // by the user: then it should answer
+  std::string error;         // why there is no status
+  bool wants_token = false;  // that is why, and none was given
   std::optional<control::DaemonStatus> status;
   std::optional<double> clock_ahead_s;  // the daemon's clock against ours, other computers only
 };
 struct HttpFacts {
+  enum class Place {
+    asked,
+    not_served,      // the daemon says so
+    only_over_there  // on loopback of another computer
+  } place = Place::asked;
   Endpoint at;
   bool given = false;
   int code = 0;  // 0 = no answer

@@ -14,6 +14,7 @@ using namespace std::chrono_literals;
 
 constexpr auto status_patience = 2500ms;  // status messages come every second
 constexpr auto first_status = 1300ms;     // to learn who is connected
+const Endpoint usual_http{"127.0.0.1", 8088};
 constexpr auto short_patience = 700ms, own_patience = 200ms;
 
 class Gathering {
@@ -26,15 +27,14 @@ class Gathering {
   Result<Facts> run() {
     facts_.address_given = !questions_.address.empty();
     const auto control = parse_endpoint(questions_.control, {"127.0.0.1", control_port});
-    const auto http = parse_endpoint(questions_.http, {"127.0.0.1", 8088});
+    const auto http = parse_endpoint(questions_.http, usual_http);
     const auto given = parse_endpoint(questions_.address, {"127.0.0.2", oculus::tcp_port});
     if (!control) return tl::unexpected(control.error());
     if (!http) return tl::unexpected(http.error());
     if (!given) return tl::unexpected(given.error());
 
     ask_control(*control);
-    facts_.http =
-        ask_health(*http, !questions_.http.empty(), until(http->host.starts_with("127.") ? own_patience : short_patience));
+    ask_http(*http);
     const DiscoveryQuestion heads(facts_.address_given ? std::vector{given->host} : std::vector<std::string>{});
     const auto sockets = tcp_sockets();
     const auto programs = programs_by_socket();
@@ -58,6 +58,8 @@ class Gathering {
     auto client = ControlClient::open({text_from(at), questions_.token_file, until(patience)});
     if (!client) {
       facts_.control.error = client.error().text;
+      const bool of_a_token = facts_.control.error.find("wants a token") != std::string::npos;
+      facts_.control.wants_token = of_a_token && questions_.token_file.empty();
       return;
     }
     auto status = client->status(until(short_patience));
@@ -69,6 +71,23 @@ class Gathering {
     if (facts_.control.status->clock == "realtime" &&
         client->request(control::Subscribe{true, false, false, false}, until(short_patience)))
       control_.emplace(std::move(*client));
+  }
+
+  /// Where the user says, else where the daemon that answered says, else at the usual place.
+  void ask_http(Endpoint at) {
+    const bool given = !questions_.http.empty();
+    const std::optional<control::DaemonStatus>& status = facts_.control.status;
+    if (!given && status && !status->control.empty()) {  // an older one says nothing of either
+      at = parse_endpoint(status->http, usual_http).value_or(usual_http);
+      if (at.host == "0.0.0.0") at.host = facts_.control.at.host;
+      facts_.http.at = at;
+      if (status->http.empty()) facts_.http.place = HttpFacts::Place::not_served;
+      const auto daemon = ipv4_of(facts_.control.at.host);
+      const bool another_computer = daemon && !is_on_this_host(*daemon);
+      if (at.host.starts_with("127.") && another_computer) facts_.http.place = HttpFacts::Place::only_over_there;
+      if (facts_.http.place != HttpFacts::Place::asked) return;
+    }
+    facts_.http = ask_health(at, given, until(at.host.starts_with("127.") ? own_patience : short_patience));
   }
 
   /// Whoever listens on the sonars' port and is a sonard.

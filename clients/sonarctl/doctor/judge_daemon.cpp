@@ -22,9 +22,14 @@ void judge_control(const Facts& facts, std::vector<Finding>& findings) {
     const bool ours = std::any_of(facts.sonars.begin(), facts.sonars.end(), [](const SonarFacts& s) {
       return s.on_this_host && (s.stream.outcome == StreamFacts::Outcome::pings || !s.clients.empty());
     });
-    if (!control.given && !ours) return;  // a sonar of another computer, or none: nothing to expect here
-    findings.push_back({control.given ? Level::fail : Level::warn, "control", control.error,
-                        "without it nothing is said of poses, clients and the engine (--control HOST:PORT, --token-file FILE)"});
+    if (!control.given && !ours && !control.wants_token) return;  // a sonar of another computer, or none: nothing to expect here
+    if (control.wants_token)
+      findings.push_back({Level::warn, "control",
+                          at + " wants a token, and none was given: nothing is said of poses, clients, engine",
+                          "show it: --token-file FILE, the file that control.token_file of its configuration names"});
+    else
+      findings.push_back({control.given ? Level::fail : Level::warn, "control", control.error,
+                          "without it nothing is said of poses, clients and the engine"});
     return;
   }
   const control::DaemonStatus& status = *control.status;
@@ -57,7 +62,11 @@ void judge_poses(const control::DaemonStatus& status, std::vector<Finding>& find
 void judge_http(const Facts& facts, std::vector<Finding>& findings) {
   const HttpFacts& http = facts.http;
   const std::string url = "http://" + text_from(http.at) + "/healthz";
-  if (http.code == 200) {
+  if (http.place == HttpFacts::Place::not_served) {
+    findings.push_back({Level::ok, "http", "HTTP is not served: no metrics, no curl", ""});
+  } else if (http.place == HttpFacts::Place::only_over_there) {
+    findings.push_back({Level::ok, "http", url + " is for that computer alone, and was not asked", ""});
+  } else if (http.code == 200) {
     findings.push_back({Level::ok, "http", url + " says " + http.text, ""});
   } else if (http.code != 0) {
     findings.push_back(

@@ -190,7 +190,9 @@ std::vector<BlueViewHead> DiscoveryQuestion::answers() const {
 }
 
 HttpFacts ask_health(const Endpoint& at, bool given, std::chrono::milliseconds patience) {
-  HttpFacts facts{at, given, 0, {}};
+  HttpFacts facts;
+  facts.at = at;
+  facts.given = given;
   const auto deadline = Steady::now() + patience;
   const auto socket = connect_tcp(at, patience);
   if (!socket) return facts;

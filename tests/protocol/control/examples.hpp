@@ -75,6 +75,8 @@ inline DaemonStatus full_status() {
   s.objects = {{"crate", "steel", true, false, 12, tilted}};
   s.poses = {21, 22, 23, 24, 25};
   s.environment = {12, 30, 8, 0};
+  s.control = "127.0.0.4:14770";
+  s.http = "127.0.0.5:8088";
   return s;
 }
 
