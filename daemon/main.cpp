@@ -26,8 +26,14 @@ using Steady = std::chrono::steady_clock;
 
 double seconds_since(Steady::time_point begin) { return std::chrono::duration<double>(Steady::now() - begin).count(); }
 
-int complain(const Error& error) {
-  std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
+/// On the log stream, and in its format as far as that is known by then.
+int complain(const Error& error, bool json = false) {
+  LogOptions options;
+  options.json = true;
+  if (json)
+    Log(options).error(error.text);
+  else
+    std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
   return exit_code(error.kind);
 }
 
@@ -65,17 +71,20 @@ void let_hangups_through(bool let) {
   pthread_sigmask(let ? SIG_UNBLOCK : SIG_BLOCK, &hangup, nullptr);
 }
 
-int run(const RunCommand& command, Steady::time_point begin) {
+/// `json` = how the log is written, for complaints of the caller.
+int run(const RunCommand& command, Steady::time_point begin, bool& json) {
+  json = command.log_format == "json";
   let_hangups_through(false);     // one that comes while the scene loads waits until there is somebody to take it
   std::signal(SIGPIPE, SIG_IGN);  // nobody reads the log any more (sonard 2>&1 | head): no reason to leave the clients
   raise_descriptor_limit();
   auto found = find_config(command);
-  if (!found) return complain(found.error());
+  if (!found) return complain(found.error(), json);
   Config config = std::move(found->config);
-  if (const auto r = override_config(config, command); !r) return complain(r.error());
+  if (command.log_format.empty()) json = config.log.json;
+  if (const auto r = override_config(config, command); !r) return complain(r.error());  // of the command line
   const auto scene_begin = Steady::now();
   const auto scene = load_scene(config.scene);
-  if (!scene) return complain(scene.error());
+  if (!scene) return complain(scene.error(), json);
 
   Log log(config.log);
   for (const std::string& note : (*scene)->notes) log.info(note);
@@ -87,7 +96,7 @@ int run(const RunCommand& command, Steady::time_point begin) {
     engine =
         start_engine([&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, engine_options); }, *scene);
   });
-  if (!engine) return complain(engine.error());
+  if (!engine) return complain(engine.error(), json);
   const auto make_engine_for = [&](ScenePointer s) -> std::unique_ptr<PingEngine> {
     if (*engine) return *std::move(engine);  // the first
     return make_engine(std::move(s), pool, engine_options);
@@ -107,14 +116,13 @@ int run(const RunCommand& command, Steady::time_point begin) {
   options.service_manager = notify_place_from_environment();
   App app(std::move(config), *scene, make_engine_for, options, log);
   const double scene_ms = 1e3 * seconds_since(scene_begin);
-  if (const auto r = app.open(); !r) return complain(r.error());
-  std::fputs(banner(app, {found->how, scene_ms}).c_str(), stderr);
-  std::fputs(ready_line(app, seconds_since(begin)).c_str(), stderr);
+  if (const auto r = app.open(); !r) return complain(r.error(), json);
+  log.announce(banner(app, {found->how, scene_ms}) + ready_line(app, seconds_since(begin)));
 
   let_hangups_through(true);
   const int code = app.run();
   let_hangups_through(false);
-  std::fputs(summary(app).c_str(), stderr);
+  log.announce(summary(app));
   std::fputs(digest_lines(app).c_str(), stdout);
   if (app.is_at_work()) {  // on a scene or a ping that nobody wants any more: not worth waiting for
     std::fflush(nullptr);
@@ -152,18 +160,17 @@ int bench(const BenchCommand& command) {
 int main(int argc, char** argv) {
   sonar::open_closed_standard_streams();
   const auto begin = std::chrono::steady_clock::now();
+  bool json = false;
   try {
     const sonar::Command command = sonar::parse_command_line(argc, argv);
     if (const auto* leave = std::get_if<sonar::Leave>(&command)) return leave->exit_code;
     if (const auto* check = std::get_if<sonar::CheckCommand>(&command)) return sonar::check(*check);
     if (const auto* render = std::get_if<sonar::RenderCommand>(&command)) return sonar::render::run_render(*render);
     if (const auto* bench = std::get_if<sonar::BenchCommand>(&command)) return sonar::bench(*bench);
-    return sonar::run(std::get<sonar::RunCommand>(command), begin);
+    return sonar::run(std::get<sonar::RunCommand>(command), begin, json);
   } catch (const std::bad_alloc&) {
-    std::fputs("sonard: not enough memory; use a smaller scene or free some\n", stderr);
-    return sonar::exit_code(sonar::ErrorKind::unavailable);
+    return sonar::complain({sonar::ErrorKind::unavailable, "not enough memory; use a smaller scene or free some"}, json);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "sonard: %s (this is a bug, please report it)\n", e.what());
-    return sonar::exit_code(sonar::ErrorKind::bug);
+    return sonar::complain({sonar::ErrorKind::bug, std::string(e.what()) + " (this is a bug, please report it)"}, json);
   }
 }
