@@ -10,6 +10,7 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "core/pipeline/ping_engine.hpp"
+#include "core/text/arguments.hpp"
 #include "daemon/bench_cases.hpp"
 #include "daemon/bench_parts.hpp"
 #include "daemon/effective_switches.hpp"
@@ -218,24 +219,28 @@ int run_bench(int argc, char** argv) {
       "sonard bench"};
   cli.footer("examples:\n  sonard bench --case P1 --case P3d --threads 1 --threads 2 --json out.json");
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  cli.add_option("--case", options.cases, "case to run (may repeat; default all)")->check(one_of(names_of(bench_cases())));
+  cli.add_option("--case", options.cases, "case to run (may repeat; default all)")->check(text::one_of(names_of(bench_cases())));
   cli.add_option("--scene", options.scenes, "scene to run it over (may repeat; default all)")
-      ->check(one_of(names_of(bench_scenes())));
-  cli.add_option("--threads", options.threads, "threads (may repeat; default all processors)")->check(CLI::Range(1, 256));
-  cli.add_option("--pings", options.pings, "pings to time")->check(CLI::Range(1, 100000))->capture_default_str();
+      ->check(text::one_of(names_of(bench_scenes())));
+  cli.add_option("--threads", options.threads, "threads (may repeat; default all processors)")->check(text::whole_number(1, 256));
+  cli.add_option("--pings", options.pings, "pings to time")->check(text::whole_number(1, 100000))->capture_default_str();
   cli.add_option("--give", options.given_parts,
                  "give scene and sonar what this part of the model needs, where they lack it (may repeat; default none)")
-      ->check(one_of(parts_to_give()));
+      ->check(text::one_of(parts_to_give()));
   cli.add_option("--frequency-sum", options.frequency_sum, "of the modes paper and raster: by a transform, or term by term")
-      ->check(one_of({"fast", "direct"}))
+      ->check(text::one_of({"fast", "direct"}))
       ->capture_default_str();
   cli.add_option("--scenes-dir", options.scene_folder, "folder to look for the scene files in first; else the shipped ones");
   cli.add_option("--json", options.json_file, "also write the figures to this file");
   add_model_options(cli, options.model);
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (const std::string wrong = text::complaint_about_words(cli, words); !wrong.empty())
+    return complain({ErrorKind::usage, wrong});
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return cli.exit(e) == 0 ? 0 : exit_code(ErrorKind::usage);
+    if (e.get_exit_code() == 0) return cli.exit(e);  // --help
+    return complain({ErrorKind::usage, text::complaint_about(cli, e, words)});
   }
   if (const auto r = override_engine(options.engine, options.seed, options.model); !r) return complain(r.error());
   if (options.threads.empty()) options.threads.push_back(processors);

@@ -3,14 +3,18 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <string_view>
 
+#include "core/text/arguments.hpp"
 #include "core/text/nearest.hpp"
 
 namespace sonar {
 namespace {
+
+using text::number;
+using text::one_of;
+using text::whole_number;
 
 constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the names of the files
 
@@ -24,7 +28,7 @@ void add_run_options(CLI::App& app, RunCommand& run) {
   add_engine_options(app, run.engine);
   app.add_option("--bind", run.bind, "address of the first sonar instead of its bind_ip and advertise_ip")
       ->envname("SONARD_BIND");
-  app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings");
+  app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings")->check(whole_number());
   app.add_flag("--digest", run.digest, "print the SHA-256 of every client's byte stream at the end");
   app.add_option("--log-format", run.log_format, "text or json (default text)")
       ->check(one_of({"text", "json"}))
@@ -38,7 +42,7 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
   app.add_option("config", render.config, "configuration or render file (docs/render.md)");
   app.add_option("--out", render.out, "folder for the files; made when it is not there");
   app.add_option("--pings", render.pings, "pings to render (1; with --poses: one for every line)")
-      ->check(CLI::Range(std::uint64_t{1}, most_rendered_pings));
+      ->check(whole_number(1, most_rendered_pings));
   app.add_option("--format", render.formats, "npy, png, raw: any of them, comma between (default npy,png)")
       ->delimiter(',')
       ->allow_extra_args(false)
@@ -49,7 +53,7 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
   app.add_option("--pose-frame", render.pose_frame, "of that file, when it does not say so itself; default ENU_FLU")
       ->check(one_of({"ENU_FLU", "NED_FRD"}));
   app.add_option("--rate", render.rate_hz, "pings a second (as the sonar is set; with --poses: at every line)")
-      ->check(CLI::Range(0.001, 10000.0));
+      ->check(number(0.001, 10000.0));
   app.add_option("--report", render.report,
                  "coverage: every bin of a plane bed against the closed form; without a configuration "
                  "for every sonar there is")
@@ -65,27 +69,16 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
 /// What is missing or makes no sense together; empty = nothing.
 std::string complaint(const RenderCommand& render) {
   const bool writes = render.report.empty() && !render.check_expectations;
-  if (render.config.empty() && render.report.empty()) return "sonard render needs a configuration or render file";
+  if (render.config.empty() && render.report.empty()) return "it needs a configuration or render file: sonard render FILE";
   if (writes && render.out.empty()) return "say where the files go: --out DIR";
   if (!writes && !render.out.empty()) return "--report and --check-expectations write no files: leave out --out";
   if (!render.pose_frame.empty() && render.poses.empty()) return "--pose-frame is about --poses FILE, which is not given";
   return {};
 }
 
-/// CLI11 names the option; of a value that came from the environment the user knows the variable.
-std::string name_the_source(const CLI::App& app, const CLI::Error& error, const std::vector<std::string_view>& words) {
-  std::string message = CLI::FailureMessage::simple(&app, error);
-  std::vector<const CLI::App*> apps{&app};
-  for (const CLI::App* command : app.get_subcommands()) apps.push_back(command);
-  for (const CLI::App* each : apps)
-    for (const CLI::Option* option : each->get_options()) {
-      const std::string name = option->get_name(), variable = option->get_envname();
-      const auto is_it = [&name](std::string_view word) { return word == name || word.substr(0, name.size() + 1) == name + "="; };
-      const std::size_t at = message.find(name + ":");
-      if (variable.empty() || at == std::string::npos || std::getenv(variable.c_str()) == nullptr) continue;
-      if (std::none_of(words.begin(), words.end(), is_it)) message.replace(at, name.size(), variable + " (environment)");
-    }
-  return message;
+Leave complain(const std::string& wrong) {
+  std::fprintf(stderr, "sonard: %s\n", wrong.c_str());
+  return Leave{exit_code(ErrorKind::usage)};
 }
 
 /// A first word that is no option, no command and nothing like a file; empty = it may be one of these.
@@ -94,8 +87,7 @@ std::string unknown_command(std::string_view word) {
   const bool like_a_file = word.find_first_of("./") != std::string_view::npos || std::filesystem::exists(word, ec);
   if (word.empty() || word[0] == '-' || like_a_file) return {};
   constexpr std::array<std::string_view, 4> commands{"run", "check", "render", "bench"};
-  return "sonard: there is no command or file \"" + std::string(word) + "\"" +
-         text::suggestion(word, commands, "the commands are");
+  return "there is no command or file \"" + std::string(word) + "\"" + text::suggestion(word, commands, "the commands are");
 }
 
 }  // namespace
@@ -104,7 +96,7 @@ Command parse_command_line(int argc, char** argv) {
   // The benchmark has its own arguments; they are handed over untouched.
   if (argc > 1 && std::string_view(argv[1]) == "bench") return BenchCommand{{argv + 1, argv + argc}};
 
-  CLI::App app{"sonard: emulates imaging sonars on the network, from a 3D scene"};
+  CLI::App app{"sonard: emulates imaging sonars on the network, from a 3D scene", "sonard"};
   app.set_version_flag("--version", std::string("sonard " SONARD_VERSION));
   RunCommand run;
   CheckCommand check;
@@ -128,30 +120,29 @@ Command parse_command_line(int argc, char** argv) {
     add_run_options(run_app, run);
     CLI::App& check_app = *app.add_subcommand("check", "validate a configuration and its scene, then exit");
     check_app.footer("examples:\n  sonard check my.yaml");
-    check_app.add_option("config", check.config, "configuration file")->required();
+    check_app.add_option("config", check.config, "the configuration file to look at")->required();
     CLI::App& render_app = *app.add_subcommand("render", "render pings into files, or check what they should hold");
     render_app.footer(
         "examples:\n  sonard render my.yaml --out pings --pings 5 --format npy,png\n  sonard render my.yaml "
         "--check-expectations");
     add_render_options(render_app, render);
   }
-  if (const std::string wrong = bare && argc > 1 ? unknown_command(argv[1]) : ""; !wrong.empty()) {
-    std::fprintf(stderr, "%s; see sonard --help\n", wrong.c_str());
-    return Leave{exit_code(ErrorKind::usage)};
-  }
-  app.failure_message([typed = std::vector<std::string_view>(argv + 1, argv + std::max(argc, 1))](
-                          const CLI::App* a, const CLI::Error& e) { return name_the_source(*a, e, typed); });
+  const std::vector<std::string> typed(argv + std::min(argc, 1), argv + argc);
+  if (const std::string wrong = bare && argc > 1 ? unknown_command(argv[1]) : ""; !wrong.empty())
+    return complain(wrong + text::where_help_is(app));
+  if (const std::string wrong = text::complaint_about_words(app, typed); !wrong.empty()) return complain(wrong);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return Leave{app.exit(e) == 0 ? 0 : exit_code(ErrorKind::usage)};
+    if (e.get_exit_code() != 0) return complain(text::complaint_about(app, e, typed));
+    app.exit(e);  // --help and --version
+    return Leave{0};
   }
   if (!bare && app.got_subcommand("check")) return check;
   if (!bare && app.got_subcommand("render")) {
     const std::string wrong = complaint(render);
     if (wrong.empty()) return render;
-    std::fprintf(stderr, "%s; see sonard render --help\n", wrong.c_str());
-    return Leave{exit_code(ErrorKind::usage)};
+    return complain(wrong + text::where_help_is(app));
   }
   return run;
 }

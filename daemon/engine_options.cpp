@@ -1,28 +1,19 @@
 #include "daemon/engine_options.hpp"
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 
-#include "core/text/nearest.hpp"
+#include "core/text/arguments.hpp"
 #include "daemon/effective_switches.hpp"
 
 namespace sonar {
 
-CLI::Validator one_of(std::vector<std::string> names) {
-  std::string described;
-  for (const std::string& name : names) described += (described.empty() ? "" : "|") + name;
-  const auto refusal = [names = std::move(names)](std::string& given) -> std::string {
-    if (std::find(names.begin(), names.end(), given) != names.end()) return {};
-    const std::vector<std::string_view> candidates(names.begin(), names.end());
-    return "there is no \"" + given + "\"" + text::suggestion(given, candidates, "give one of");
-  };
-  return CLI::Validator(refusal, described, "one of");
-}
+using text::one_of;
+using text::whole_number;
 
 void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
   constexpr const char* parts = "Parts of the model (a configuration may say otherwise than these defaults)";
   const Switches defaults;
-  app.add_option("--seed", given.seed, "seed of speckle and noise (default 1)")->envname("SONARD_SEED");
+  app.add_option("--seed", given.seed, "seed of speckle and noise (default 1)")->check(whole_number())->envname("SONARD_SEED");
   app.add_option("--simd", given.simd, "instruction set of the hot loops (default auto)")
       ->check(one_of({"auto", "portable", "avx2", "avx512"}))
       ->envname("SONARD_SIMD");
@@ -32,7 +23,7 @@ void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
       ->group(parts);
   app.add_option("--fixed-fan", given.fixed_fan,
                  "rays a column with one scatterer each, no surface cells; default 0: as the mode has it")
-      ->check(CLI::Range(0, most_fixed_rays))
+      ->check(whole_number(0, most_fixed_rays))
       ->group(parts);
   app.add_flag("--expected-power", given.expected_power, "mean echo power instead of speckle")->group(parts);
   for (std::size_t i = 0; i < named_switches.size(); ++i) {
@@ -46,7 +37,7 @@ void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
 
 void add_engine_options(CLI::App& app, EngineOptionsGiven& given) {
   app.add_option("--threads", given.threads, "compute threads (default 0: all cores)")
-      ->check(CLI::Range(0, 256))
+      ->check(whole_number(0, 256))
       ->envname("SONARD_THREADS");
   add_model_options(app, given);
 }

@@ -13,7 +13,6 @@
 
 namespace CLI {
 class App;
-class Validator;
 }  // namespace CLI
 
 namespace sonar {
@@ -31,9 +30,6 @@ struct EngineOptionsGiven {
 /// Everything but the threads, which a benchmark varies.
 void add_model_options(CLI::App& app, EngineOptionsGiven& given);
 void add_engine_options(CLI::App& app, EngineOptionsGiven& given);
-
-/// Refuses with the value, and the nearest one that is allowed.
-CLI::Validator one_of(std::vector<std::string> names);
 
 /// Usage error: a part that is switched on but left out by the mode or the fixed fan. One of the file's own is no error.
 Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given);

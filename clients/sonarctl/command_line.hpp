@@ -1,5 +1,5 @@
 // The commands of sonarctl as a user types them: each adds its options to the parser and returns what is to be done when it was
-// the one that was asked for. main.cpp lists them; words that are none of theirs are answered with the nearest that is.
+// the one that was asked for. main.cpp lists them.
 #pragma once
 
 #include <functional>
@@ -26,9 +26,5 @@ Run add_events(CLI::App& app);
 Run add_set(CLI::App& app);
 Run add_load(CLI::App& app);
 Run add_object(CLI::App& app);
-
-/// `unknown command "veiw"; did you mean "view"?` or the same for an option, or empty when every word in front of the first
-/// value is known. Values are not looked at: the parser does that.
-std::string complaint_about_words(const CLI::App& app, const std::vector<std::string>& words);
 
 }  // namespace sonar::clients

@@ -3,8 +3,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
+#include "core/text/arguments.hpp"
+
 namespace sonar::clients {
 namespace {
+
+using text::number;
+using text::one_of;
+using text::whole_number;
 
 const std::map<std::string, oculus::PingRate>& rates() {
   using oculus::PingRate;
@@ -18,19 +24,19 @@ const std::map<std::string, oculus::PingRate>& rates() {
 
 void FireArguments::add_to(CLI::App& app) {
   const auto group = [](CLI::Option* option) { return option->group("Settings of the sonar")->capture_default_str(); };
-  group(app.add_option("--mode", mode, "1 low frequency, wide; 2 high frequency, narrow"))->check(CLI::Range(1, 2));
-  CLI::Option* metres = group(app.add_option("--range", range_m, "metres"))->check(CLI::Range(0.0, 1000.0));
+  group(app.add_option("--mode", mode, "1 low frequency, wide; 2 high frequency, narrow"))->check(whole_number(1, 2));
+  CLI::Option* metres = group(app.add_option("--range", range_m, "metres"))->check(number(0.0, 1000.0));
   group(app.add_option("--range-percent", range_percent, "of the mode's maximum, instead of metres"))
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(number(0.0, 100.0))
       ->excludes(metres);
-  group(app.add_option("--gain", gain_percent, "per cent"))->check(CLI::Range(0.0, 100.0));
-  group(app.add_option("--rate", rate, "pings a second at most"))->check(CLI::IsMember({"2", "5", "10", "15", "40", "standby"}));
-  group(app.add_option("--beams", beams, ""))->check(CLI::IsMember({256, 512}));
-  group(app.add_option("--bits", bits, "a sample; 32 needs --version 2"))->check(CLI::IsMember({8, 16, 32}));
-  group(app.add_option("--gamma", gamma, "as the wire has it: gamma = value / 255"))->check(CLI::Range(0, 255));
-  group(app.add_option("--speed-of-sound", sound_speed_mps, "m/s; 0 = the sonar computes it"))->check(CLI::Range(0.0, 2000.0));
-  group(app.add_option("--salinity", salinity_ppt, "ppt"))->check(CLI::Range(0.0, 50.0));
-  group(app.add_option("--version", version, "of the messages"))->check(CLI::Range(0, 2));
+  group(app.add_option("--gain", gain_percent, "per cent"))->check(number(0.0, 100.0));
+  group(app.add_option("--rate", rate, "pings a second at most"))->check(one_of({"2", "5", "10", "15", "40", "standby"}));
+  group(app.add_option("--beams", beams, ""))->check(one_of({"256", "512"}));
+  group(app.add_option("--bits", bits, "a sample; 32 needs --version 2"))->check(one_of({"8", "16", "32"}));
+  group(app.add_option("--gamma", gamma, "as the wire has it: gamma = value / 255"))->check(whole_number(0, 255));
+  group(app.add_option("--speed-of-sound", sound_speed_mps, "m/s; 0 = the sonar computes it"))->check(number(0.0, 2000.0));
+  group(app.add_option("--salinity", salinity_ppt, "ppt"))->check(number(0.0, 50.0));
+  group(app.add_option("--version", version, "of the messages"))->check(whole_number(0, 2));
   app.add_flag("--gains", row_gains, "a gain in front of every row")->group("Settings of the sonar");
   app.add_flag("--gain-assist", gain_assist, "flag bit 4")->group("Settings of the sonar");
   app.add_flag("--trigger", trigger, "one ping for each request (network trigger)")->group("Settings of the sonar");

@@ -1,11 +1,13 @@
 // sonarctl: what a sonar's user has at hand when something is unclear. The list of its commands, and errors to exit codes.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/scene_command.hpp"
+#include "core/text/arguments.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -13,21 +15,6 @@ namespace {
 int complain(const std::string& text, ErrorKind kind) {
   std::fprintf(stderr, "sonarctl: %s\n", text.c_str());
   return exit_code(kind);
-}
-
-/// "sonarctl pose circle": as far as the line was understood.
-std::string asked_command(const CLI::App& app) {
-  const std::vector<CLI::App*> asked = app.get_subcommands();
-  return app.get_name() + (asked.empty() ? "" : " " + asked_command(*asked.front()));
-}
-
-/// Of the command that was asked for, or of sonarctl itself: "once, circle, line".
-std::string command_names(const CLI::App& app) {
-  const std::vector<CLI::App*> asked = app.get_subcommands();
-  if (!asked.empty()) return command_names(*asked.front());
-  std::string names;
-  for (const CLI::App* command : app.get_subcommands({})) names += (names.empty() ? "" : ", ") + command->get_name();
-  return names;
 }
 
 int run(int argc, char** argv) {
@@ -43,15 +30,14 @@ int run(int argc, char** argv) {
       {"doctor", add_doctor(app)}, {"status", add_status(app)}, {"listen", add_listen(app)}, {"view", add_view(app)},
       {"stats", add_stats(app)},   {"pose", add_pose(app)},     {"events", add_events(app)}, {"set", add_set(app)},
       {"load", add_load(app)},     {"object", add_object(app)}, {"scene", add_scene(app)}};
-  const std::string complaint = complaint_about_words(app, {argv + 1, argv + argc});
+  const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  const std::string complaint = text::complaint_about_words(app, words);
   if (!complaint.empty()) return complain(complaint, ErrorKind::usage);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
-    std::string text = error.what();
-    if (text == "A subcommand is required") text = "say what to do: " + command_names(app);
-    return complain(text + " (" + asked_command(app) + " --help)", ErrorKind::usage);
+    return complain(text::complaint_about(app, error, words), ErrorKind::usage);
   }
   for (const auto& [name, command] : commands) {
     if (!app.got_subcommand(name)) continue;

@@ -2,12 +2,17 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/fire_options.hpp"
+#include "core/text/arguments.hpp"
 
 namespace sonar::clients {
 namespace {
+
+using text::number;
+using text::whole_number;
 
 /// Options that belong to a source of pings; finish() turns their texts into a SourceOptions once the line is parsed.
 struct SourceArguments {
@@ -19,10 +24,10 @@ struct SourceArguments {
   FireArguments fire;
 
   void add_to(CLI::App& app, bool recordings) {
-    app.add_option("ADDRESS", address, "address of the sonar, HOST or HOST:PORT (default 127.0.0.2)");
-    app.add_option("--port", port, "TCP port of the sonar")->capture_default_str();
+    app.add_option("ADDRESS", address, "address of the sonar, HOST or HOST:PORT (default 127.0.0.2)")->check(clients::address());
+    app.add_option("--port", port, "TCP port of the sonar")->check(whole_number(1, 65535))->capture_default_str();
     app.add_flag("--discover", discover, "take the address from the status broadcast on udp 52102");
-    app.add_option("--wait", patience_s, "seconds to go on trying to connect")->capture_default_str();
+    app.add_option("--wait", patience_s, "seconds to go on trying to connect")->check(number(0))->capture_default_str();
     if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
     app.add_flag("--as-it-is", as_it_is, "send no settings, only look (many sonars then send no pings)");
     fire.add_to(app);
@@ -47,8 +52,10 @@ struct StyleArguments {
   bool no_rings = false;
 
   void add_to(CLI::App& app) {
-    app.add_option("--colour-map", colour_map, "one of " + colour_map_names())->capture_default_str();
-    app.add_option("--width", width_px, "of the picture, in pixels")->capture_default_str();
+    app.add_option("--colour-map", colour_map, "one of " + colour_map_names())
+        ->check(clients::colour_map())
+        ->capture_default_str();
+    app.add_option("--width", width_px, "of the picture, in pixels")->check(whole_number(1, 100000))->capture_default_str();
     app.add_flag("--no-rings", no_rings, "draw no range rings");
   }
 
@@ -77,13 +84,14 @@ Run add_listen(CLI::App& app) {
   const auto arguments = std::make_shared<Arguments>();
   ListenOptions& options = arguments->options;
   arguments->source.add_to(command, false);
-  command.add_option("--seconds", options.seconds, "stop after this time");
-  command.add_option("--pings", options.pings, "stop after so many pings");
+  command.add_option("--seconds", options.seconds, "stop after this time")->check(number(0));
+  command.add_option("--pings", options.pings, "stop after so many pings")->check(whole_number());
   command.add_flag("--json", options.json, "one JSON object a line, the last one a summary");
   command.add_flag("--quiet", options.quiet, "only broken pings and the summary");
   command.add_option("--record", options.record, "write the raw TCP bytes to this file");
   command.add_option("--png", options.png, "draw the last ping into this file");
-  command.add_option("--started-at", options.started_at_unix_s, "UNIX time from which to count the time to the first ping");
+  command.add_option("--started-at", options.started_at_unix_s, "UNIX time from which to count the time to the first ping")
+      ->check(number());
   arguments->style.add_to(command);
   return [arguments]() -> Result<void> {
     ListenOptions& listen_options = arguments->options;
@@ -119,8 +127,8 @@ Run add_view(CLI::App& app) {
   command.add_flag("--term", options.terminal, "draw in the terminal: half blocks, in colour where it has colours");
   command.add_flag("--ascii", arguments->ascii, "with --term: letters, no colours (default for files, pipes and NO_COLOR)");
   command.add_flag("--live", options.live, "every ping, until Ctrl-C");
-  command.add_option("--pings", options.pings, "with --live: stop after so many pings");
-  command.add_option("--ping", options.ping, "which ping of a recording, from 0")->capture_default_str();
+  command.add_option("--pings", options.pings, "with --live: stop after so many pings")->check(whole_number());
+  command.add_option("--ping", options.ping, "which ping of a recording, from 0")->check(whole_number())->capture_default_str();
   arguments->style.add_to(command);
   return [arguments]() -> Result<void> {
     auto source = arguments->source.finish();
@@ -149,7 +157,7 @@ Run add_stats(CLI::App& app) {
   const auto arguments = std::make_shared<Arguments>();
   StatsOptions& options = arguments->options;
   arguments->source.add_to(command, true);
-  command.add_option("--ping", options.ping, "which ping of a recording, from 0")->capture_default_str();
+  command.add_option("--ping", options.ping, "which ping of a recording, from 0")->check(whole_number())->capture_default_str();
   command.add_option("--rows", options.window, "window of the speckle figures, ROW:ROW or ROW:ROW,BEAM:BEAM");
   CLI::Option* shadow = command.add_option("--shadow", options.shadow, "window in a shadow");
   command.add_option("--surroundings", options.surroundings, "window beside it")->needs(shadow);

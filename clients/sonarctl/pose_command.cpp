@@ -3,28 +3,30 @@
 #include <cmath>
 #include <memory>
 
+#include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
+#include "core/text/arguments.hpp"
 
 namespace sonar::clients {
 namespace {
 
+using text::number;
+
 void add_pose_options(CLI::App& command, PoseOptions& options) {
-  command.add_option("--to", options.to, "HOST:PORT of sonard (default 127.0.0.1:14770, with --json :14771)");
+  command.add_option("--to", options.to, "HOST:PORT of sonard (default 127.0.0.1:14770, with --json :14771)")->check(address());
   command.add_flag("--json", options.json, "send JSON lines with ArduPilot's keys, not protobuf");
   command.add_flag("--confirm", options.confirm, "use the TCP control stream and have each pose answered");
   command.add_option("--token-file", options.token_file, "with --confirm or --object: the daemon's control.token_file");
-  const std::map<std::string, control::Frame> frames{{"enu", control::Frame::enu_flu}, {"ned", control::Frame::ned_frd}};
-  command.add_option("--frame", options.frame, "of the arguments and of what is sent: enu (FLU body) or ned (FRD body)")
-      ->transform(CLI::CheckedTransformer(frames, CLI::ignore_case));
+  add_frame_option(command, options.frame, "of the arguments and of what is sent: enu (FLU body) or ned (FRD body)");
   command.add_option("--vehicle", options.vehicle, "name of the vehicle, if there are several");
   command.add_option("--object", options.object, "move an object of the scene instead");
-  command.add_option("--rate", options.rate_hz, "poses a second")->check(CLI::Range(0.001, 1000.0))->capture_default_str();
-  command.add_option("--seconds", options.seconds, "how long; 0 = once, one turn, one line")->check(CLI::NonNegativeNumber);
+  command.add_option("--rate", options.rate_hz, "poses a second")->check(number(0.001, 1000.0))->capture_default_str();
+  command.add_option("--seconds", options.seconds, "how long; 0 = once, one turn, one line")->check(number(0));
 }
 
 void add_triple(CLI::App& command, const std::string& name, std::vector<double>& value, const std::string& help) {
-  command.add_option(name, value, help)->expected(3)->delimiter(',')->check(CLI::Range(-1e7, 1e7))->capture_default_str();
+  command.add_option(name, value, help)->expected(3)->delimiter(',')->check(number(-1e7, 1e7))->capture_default_str();
 }
 
 }  // namespace
@@ -47,17 +49,19 @@ Run add_pose(CLI::App& app) {
 
   CLI::App& circle = *pose.add_subcommand("circle", "round a centre, looking at it");
   add_triple(circle, "--centre", options->centre_m, "m");
-  circle.add_option("--radius", options->radius_m, "m")->check(CLI::Range(0.0, 1e6))->capture_default_str();
-  circle.add_option("--period", options->period_s, "seconds a turn; negative = clockwise")->capture_default_str();
-  circle.add_option("--pitch", options->pitch_deg, "degrees, bow up positive")->check(CLI::Range(-90.0, 90.0));
+  circle.add_option("--radius", options->radius_m, "m")->check(number(0.0, 1e6))->capture_default_str();
+  circle.add_option("--period", options->period_s, "seconds a turn; negative = clockwise")
+      ->check(number())
+      ->capture_default_str();
+  circle.add_option("--pitch", options->pitch_deg, "degrees, bow up positive")->check(number(-90.0, 90.0));
   circle.add_flag("!--look-ahead", options->look_inwards, "look along the path");
   circle.callback([options] { options->path = PoseOptions::Path::circle; });
 
   CLI::App& line = *pose.add_subcommand("line", "from a point to another, looking ahead");
   add_triple(line, "--from", options->from_m, "m");
   add_triple(line, "--to-point", options->to_m, "m");
-  line.add_option("--speed", options->speed_mps, "m/s")->check(CLI::Range(1e-3, 1e3))->capture_default_str();
-  line.add_option("--pitch", options->pitch_deg, "degrees, bow up positive")->check(CLI::Range(-90.0, 90.0));
+  line.add_option("--speed", options->speed_mps, "m/s")->check(number(1e-3, 1e3))->capture_default_str();
+  line.add_option("--pitch", options->pitch_deg, "degrees, bow up positive")->check(number(-90.0, 90.0));
   line.callback([options] { options->path = PoseOptions::Path::line; });
 
   for (CLI::App* command : {&once, &circle, &line}) add_pose_options(*command, *options);

@@ -6,6 +6,7 @@
 
 #include "clients/scene_tools/describe_scene.hpp"
 #include "clients/scene_tools/import_scene.hpp"
+#include "core/text/arguments.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -88,7 +89,8 @@ void add_import(CLI::App& scene, SceneArguments& a) {
   command.add_option("--moving", o.moving, "this MODEL shall move by poses (repeatable)")->allow_extra_args(false);
   command.add_option("--offset", a.offset, "X,Y,Z added to every place, m; z = 0 is the water's surface")
       ->delimiter(',')
-      ->expected(3);
+      ->expected(3)
+      ->check(text::number());
   command.add_flag("--skip-missing", o.read.skip_missing, "leave out models and meshes that are not found");
   command.add_flag("--no-check", a.no_check, "do not try meshes, nor load what was written");
   command.add_flag("--overwrite", o.overwrite, "replace the scene file");

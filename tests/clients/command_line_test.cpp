@@ -6,6 +6,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/text/arguments.hpp"
+
 namespace sonar::clients {
 namespace {
 
@@ -21,7 +23,7 @@ std::string complaint(const std::vector<std::string>& words) {
   add_view(app);
   add_pose(app);
   add_set(app);
-  return complaint_about_words(app, words);
+  return text::complaint_about_words(app, words);
 }
 
 TEST(CommandLine, NamesTheNearestCommand) {

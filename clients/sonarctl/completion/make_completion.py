@@ -13,7 +13,7 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 OPTION = re.compile(r"^  (?:(-\w),)?(--[\w-]+)((?:[ :=(]\S.*|\s{2,}.*)?)$")
-CHOICES = re.compile(r"\{([^}]+)\}|TEXT:([\w.-]+(?:\|[\w.-]+)*)")  # of CLI11's own check, and of sonard's
+CHOICES = re.compile(r"\{([^}]+)\}|TEXT:([\w.-]+(?:\|[\w.-]+)*)|INT:([\w.-]+(?:\|[\w.-]+)+)")  # of CLI11's own check, and of ours
 COMMAND = re.compile(r"^  ([a-z][\w-]*)\s{2,}\S")
 FILE_WORDS = {"--png", "--record", "--from-raw", "--token-file", "--out", "--poses", "--json-file"}
 SCENE_COMMANDS = {"load", "run", "check", "render", "info", "import"}  # they take files, not addresses
@@ -41,7 +41,7 @@ def read_help(text):
         rest = match[3]
         takes_value = bool(re.match(r"[ =]?(TEXT|INT|UINT|FLOAT|PATH|FILE|ENUM|NUMBER|\{)", rest.strip())) and not rest.startswith("  ")
         choices = CHOICES.search(rest.split("  ")[0]) if takes_value else None
-        words = [w.split("->")[0] for w in re.split(r"[,|]", choices[1] or choices[2])] if choices else []
+        words = [w.split("->")[0] for w in re.split(r"[,|]", choices[1] or choices[2] or choices[3])] if choices else []
         options[match[2]] = words if takes_value else None
     return commands, options
 

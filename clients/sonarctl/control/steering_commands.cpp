@@ -2,14 +2,21 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/control/control_commands.hpp"
+#include "core/text/arguments.hpp"
 
 namespace sonar::clients {
 namespace {
 
+using text::number;
+using text::one_of;
+using text::whole_number;
+
 void add_control_options(CLI::App& command, ControlOptions& control) {
-  command.add_option("--control", control.address, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)");
+  command.add_option("--control", control.address, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)")
+      ->check(address());
   command.add_option("--token-file", control.token_file, "the daemon's control.token_file, when it has one");
 }
 
@@ -19,15 +26,13 @@ struct PlaceArguments {
   control::Frame frame = control::Frame::enu_flu;
 
   void add_to(CLI::App& command, bool required) {
-    const std::map<std::string, control::Frame> frames{{"enu", control::Frame::enu_flu}, {"ned", control::Frame::ned_frd}};
-    CLI::Option* place = command.add_option("--xyz", xyz_m, "position, m")->expected(3)->delimiter(',')->check(CLI::Number);
+    CLI::Option* place = command.add_option("--xyz", xyz_m, "position, m")->expected(3)->delimiter(',')->check(number());
     if (required) place->required();
     command.add_option("--rpy", rpy_deg, "roll, pitch, yaw in degrees, intrinsic Z-Y-X (default 0,0,0)")
         ->expected(3)
         ->delimiter(',')
-        ->check(CLI::Number);
-    command.add_option("--frame", frame, "of these: enu (FLU body, default) or ned (FRD body)")
-        ->transform(CLI::CheckedTransformer(frames, CLI::ignore_case));
+        ->check(number());
+    add_frame_option(command, frame, "of these: enu (FLU body, default) or ned (FRD body)");
   }
   Pose pose() const {
     const RollPitchYaw rpy{rad_from_deg(rpy_deg[0]), rad_from_deg(rpy_deg[1]), rad_from_deg(rpy_deg[2])};
@@ -84,22 +89,22 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
   control::SetSonar& s = arguments->sonar;
   add_control_options(command, steering->control);
   command.add_option("SONAR", s.sonar, "its name; may be left out when there is one");
-  add_optional(command, "--range", s.range_m, "metres");
-  add_optional(command, "--rate", s.rate_hz, "pings a second, the product's nearest; 0 = standby");
-  add_optional(command, "--gain", s.gain_percent, "per cent");
-  add_optional(command, "--mode", s.mode, "frequency mode, from 0: lowest first");
-  add_optional(command, "--beams", s.beams, "as the product has them");
+  add_optional(command, "--range", s.range_m, "metres")->check(number());
+  add_optional(command, "--rate", s.rate_hz, "pings a second, the product's nearest; 0 = standby")->check(number());
+  add_optional(command, "--gain", s.gain_percent, "per cent")->check(number());
+  add_optional(command, "--mode", s.mode, "frequency mode, from 0: lowest first")->check(whole_number(0, 255));
+  add_optional(command, "--beams", s.beams, "as the product has them")->check(whole_number(0, 65535));
   command.add_option("--transmit", arguments->transmit, "off: it hears noise only, whatever its clients ask")
-      ->check(CLI::IsMember({"on", "off"}));
+      ->check(one_of({"on", "off"}));
   CLI::Option* mount = command.add_option("--mount", arguments->mount_xyz_m, "X,Y,Z of the sonar on its vehicle, m");
-  mount->expected(3)->delimiter(',')->check(CLI::Number);
+  mount->expected(3)->delimiter(',')->check(number());
   command.add_option("--mount-rpy", arguments->mount_rpy_deg, "roll, pitch, yaw in degrees (default 0,0,0)")
       ->expected(3)
       ->delimiter(',')
-      ->check(CLI::Number)
+      ->check(number())
       ->needs(mount);
   command.add_option("--mount-frame", arguments->mount_frame, "of these: frd (default) or flu")
-      ->check(CLI::IsMember({"frd", "flu"}))
+      ->check(one_of({"frd", "flu"}))
       ->needs(mount);
   command.callback([steering, arguments] {
     steering->what = [steering, arguments]() -> Result<void> {
@@ -118,10 +123,10 @@ void add_set_water(CLI::App& set, const std::shared_ptr<Steering>& steering) {
       "  sonarctl set water --sound-speed 0                 computed from the rest again");
   const auto water = std::make_shared<control::SetEnvironment>();
   add_control_options(command, steering->control);
-  add_optional(command, "--temperature", water->temperature_c, "C");
-  add_optional(command, "--salinity", water->salinity_psu, "psu");
-  add_optional(command, "--ph", water->ph, "");
-  add_optional(command, "--sound-speed", water->sound_speed_mps, "m/s; 0 = computed from the rest");
+  add_optional(command, "--temperature", water->temperature_c, "C")->check(number());
+  add_optional(command, "--salinity", water->salinity_psu, "psu")->check(number());
+  add_optional(command, "--ph", water->ph, "")->check(number());
+  add_optional(command, "--sound-speed", water->sound_speed_mps, "m/s; 0 = computed from the rest")->check(number());
   command.callback([steering, water] {
     steering->what = [steering, water]() -> Result<void> {
       if (!water->temperature_c && !water->salinity_psu && !water->ph && !water->sound_speed_mps)
@@ -149,7 +154,7 @@ Run add_status(CLI::App& app) {
   command.add_flag("--json", options->json, "one JSON object (names as in control.proto)");
   command.add_flag("--watch", options->watch, "again and again, until Ctrl-C");
   command.add_option("--period", options->period_s, "seconds between two, with --watch")
-      ->check(CLI::Range(0.05, 3600.0))
+      ->check(number(0.05, 3600.0))
       ->capture_default_str();
   return [options] { return print_status(*options); };
 }
@@ -166,8 +171,8 @@ Run add_events(CLI::App& app) {
   command.add_flag("--clients", options->wanted.clients, "who connects and leaves");
   command.add_flag("--poses", options->wanted.poses, "poses that stop, come back, or come from somebody else");
   command.add_flag("--scene", options->wanted.scene, "scenes loaded and changed");
-  command.add_option("--count", options->count, "stop after so many");
-  command.add_option("--seconds", options->seconds, "stop after this time")->check(CLI::NonNegativeNumber);
+  command.add_option("--count", options->count, "stop after so many")->check(whole_number());
+  command.add_option("--seconds", options->seconds, "stop after this time")->check(number(0));
   command.add_flag("--json", options->json, "one JSON object a line");
   return [options] {
     control::Subscribe& wanted = options->wanted;

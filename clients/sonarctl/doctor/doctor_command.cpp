@@ -3,9 +3,11 @@
 #include <cstdio>
 #include <memory>
 
+#include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/doctor/gather.hpp"
 #include "clients/sonarctl/doctor/judge.hpp"
+#include "core/text/arguments.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -41,17 +43,23 @@ Run add_doctor(CLI::App& app) {
       "a sonar that has a client is left alone (--take connects anyway); exit code 0 when nothing failed, 69 otherwise");
   const auto arguments = std::make_shared<Arguments>();
   doctor::Questions& questions = arguments->questions;
-  command.add_option("ADDRESS", questions.address, "of one sonar, HOST or HOST:PORT; left out: every sonar that can be found");
+  command.add_option("ADDRESS", questions.address, "of one sonar, HOST or HOST:PORT; left out: every sonar that can be found")
+      ->check(address());
   command.add_flag("--json", arguments->json, "one JSON object");
   command.add_flag("--take", questions.take,
                    "connect to sonars that have a client, too; with clients.when_full: take_over it loses its place");
   command.add_option("--within", questions.within_s, "seconds that all checks together may take")
-      ->check(CLI::Range(1.0, 600.0))
+      ->check(text::number(1, 600))
       ->capture_default_str();
-  command.add_option("--control", questions.control, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)");
+  command.add_option("--control", questions.control, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)")
+      ->check(address());
   command.add_option("--token-file", questions.token_file, "the daemon's control.token_file, when it has one");
-  command.add_option("--http", questions.http, "HOST:PORT of sonard's HTTP listener (default 127.0.0.1:8088)");
-  command.add_option("--status-on", arguments->status_on, "where to listen for status messages (default 0.0.0.0:52102)");
+  command
+      .add_option("--http", questions.http,
+                  "HOST:PORT of sonard's HTTP listener (default: where the daemon says, else 127.0.0.1:8088)")
+      ->check(address());
+  command.add_option("--status-on", arguments->status_on, "where to listen for status messages (default 0.0.0.0:52102)")
+      ->check(address());
   return [arguments] { return examine(*arguments); };
 }
 
