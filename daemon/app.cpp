@@ -23,6 +23,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       pose_intake_(
           world_, clock_, log_, [this] { on_change(); }, &events_),
       pose_server_(io_, config_.poses, pose_intake_, log_),
+      mavlink_server_(io_, config_, pose_intake_, log_),
       context_{io_,
                clock_,
                world_,
@@ -57,12 +58,14 @@ Result<void> App::open() {
   }
   if (auto r = fleet_.open(config_); !r) return r;
   if (auto r = pose_server_.open(); !r) return r;
+  if (auto r = mavlink_server_.open(); !r) return r;
   return control_.open();
 }
 
 int App::run() {
   if (options_.handle_signals) wait_for_signal();
   pose_server_.start();
+  mavlink_server_.start();
   control_.start();
   fleet_.start();
   asio::co_spawn(
@@ -106,6 +109,7 @@ void App::stop(const std::string& why) {
   log_.info("stopping: " + why);
   notify_.stopping();
   pose_server_.stop();
+  mavlink_server_.stop();
   control_.stop();
   house_timer_.cancel();
   changes_.stop();

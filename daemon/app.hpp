@@ -18,6 +18,7 @@
 #include "daemon/control/control_server.hpp"
 #include "daemon/fleet.hpp"
 #include "daemon/log.hpp"
+#include "daemon/mavlink_server.hpp"
 #include "daemon/notify.hpp"
 #include "daemon/pose_intake.hpp"
 #include "daemon/pose_server.hpp"
@@ -62,6 +63,7 @@ class App {
   /// After run(): the destructor would wait for a scene or a ping that nobody wants any more.
   bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0; }
   const PoseServer& poses() const { return pose_server_; }
+  const MavlinkServer& mavlink() const { return mavlink_server_; }
   const ControlServer& control() const { return control_; }
   const std::list<Device>& devices() const { return fleet_.devices(); }
   /// For servers of the control protocol, on the I/O thread.
@@ -95,6 +97,7 @@ class App {
   Admission admission_;
   PoseIntake pose_intake_;
   PoseServer pose_server_;
+  MavlinkServer mavlink_server_;
   DeviceContext context_;
   Fleet fleet_;
   AppOperations operations_;

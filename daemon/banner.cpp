@@ -33,6 +33,7 @@ std::string pose_line(const App& app) {
   std::string text = "pose      ";
   text += protobuf.port != 0 ? "udp " + address_text(protobuf) + " (protobuf)" : "protobuf off";
   text += json.port != 0 ? "  udp and tcp " + address_text(json) + " (json)" : "  json off";
+  for (const std::string& endpoint : app.mavlink().endpoints()) text += "  " + endpoint + " (mavlink)";
   text += "  | source: " + std::string(app.world().source_of(0)) + "\n";
   return text;
 }

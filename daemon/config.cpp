@@ -37,12 +37,7 @@ AddressRange read_range(const Node& node) {
 void read_world(Map map, Config& config, const std::filesystem::path& directory) {
   config.scene = read_scene_file(map.required("scene"), directory);
   config.seed = map.optional("seed").unsigned_integer_or(1);
-  if (Node origin = map.optional("origin")) {  // nothing uses it before geodetic poses do; checked so that it is right then
-    Map place = origin.map();
-    place.required("lat").number(Range::between(-90, 90));
-    place.required("lon").number(Range::between(-180, 180));
-    place.optional("alt").number_or(0, Range::between(-12000, 10000));
-  }
+  config.origin = read_origin(map.optional("origin"));
   config.water = read_water(map.optional("water"), &config.allow_hot);
 }
 
@@ -143,7 +138,7 @@ PoseListener read_listener(const Node& node, std::uint16_t default_port, bool ha
   return listener;
 }
 
-void read_poses(const Node& node, PoseConfig& poses) {
+void read_poses(const Node& node, const std::vector<VehicleConfig>& vehicles, PoseConfig& poses) {
   poses.protobuf.at = {{127, 0, 0, 1}, 14770};
   poses.json.at = {{127, 0, 0, 1}, 14771};
   if (!node.present()) return;
@@ -151,6 +146,7 @@ void read_poses(const Node& node, PoseConfig& poses) {
   for (const Node& range : map.optional("allow_from").items(0, 64)) poses.allow_from.push_back(read_range(range));
   poses.protobuf = read_listener(map.optional("protobuf"), 14770, !poses.allow_from.empty());
   poses.json = read_listener(map.optional("json"), 14771, !poses.allow_from.empty());
+  poses.mavlink = read_mavlink(map.optional("mavlink"), !poses.allow_from.empty(), vehicles);
   const bool same = poses.protobuf.enabled && poses.json.enabled && poses.json.at.port != 0 &&
                     poses.protobuf.at.ip == poses.json.at.ip && poses.protobuf.at.port == poses.json.at.port;
   if (same) map.optional("json").fail("the same address as poses.protobuf; give each its own port");
@@ -181,7 +177,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   read_vehicles(root.required("vehicles"), config);
   std::size_t index = 0;
   for (const Node& item : root.required("sonars").items(1, 64)) config.sonars.push_back(read_sonar(item.map(), config, index++));
-  read_poses(root.optional("poses"), config.poses);
+  read_poses(root.optional("poses"), config.vehicles, config.poses);
   config.control = read_control(root.optional("control"), directory);
   config.engine = read_engine(root.optional("engine"));
   config.limits = read_limits(root.optional("limits"));

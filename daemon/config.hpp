@@ -5,10 +5,12 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "core/base/geodesy.hpp"
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
 #include "core/pipeline/ping_engine.hpp"
@@ -62,8 +64,18 @@ struct PoseListener {
   bool enabled = true;
   Endpoint at;
 };
+/// A MAVLink link that poses come by (docs/autopilots.md).
+struct MavlinkConfig {
+  bool dials = false;  // udpout: we speak first, and hear that address only
+  Endpoint at;
+  std::string vehicle;
+  std::uint8_t system_id = 0, component_id = 0;  // 0 = the first that speaks
+  bool request_rates = false;                    // ask the autopilot for its messages, rate_hz each
+  double rate_hz = 50;
+};
 struct PoseConfig {
   PoseListener protobuf, json;
+  std::vector<MavlinkConfig> mavlink;
   std::vector<AddressRange> allow_from;  // empty = anybody who reaches the listener (loopback only)
   double extrapolate_max_s = 0.2;
   double stale_after_s = 1.0;
@@ -100,6 +112,7 @@ struct Config {
   std::string source;  // the file, or what stands in for it
   SceneFile scene;     // as found
   std::uint64_t seed = 1;
+  std::optional<Geodetic> origin;  // where latitudes and longitudes are counted from
   Water water;
   bool allow_hot = false;  // water of 30 C or more is meant
   std::vector<VehicleConfig> vehicles;

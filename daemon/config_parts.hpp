@@ -15,6 +15,10 @@ Pose read_world_pose(const text::Node& node);
 Pose read_mount(const text::Node& node);
 /// "127.0.0.1:14770"; the port may be left out unless it is needed.
 Endpoint read_endpoint(const text::Node& node, bool port_needed);
+/// `{lat, lon, alt}` of the world's origin; absent = nowhere.
+std::optional<Geodetic> read_origin(const text::Node& node);
+/// One endpoint, or a list of links. `has_ranges`: poses.allow_from says who is heard.
+std::vector<MavlinkConfig> read_mavlink(const text::Node& node, bool has_ranges, const std::vector<VehicleConfig>& vehicles);
 /// Relative files start in `directory`.
 ControlConfig read_control(const text::Node& node, const std::filesystem::path& directory);
 /// The name of a scene file, found as find_scene() does.

@@ -1,5 +1,6 @@
 #include "daemon/reload.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "daemon/app.hpp"
@@ -10,6 +11,19 @@ namespace {
 
 bool same(const PoseListener& a, const PoseListener& b) {
   return a.enabled == b.enabled && a.at.ip == b.at.ip && a.at.port == b.at.port;
+}
+bool same(const MavlinkConfig& a, const MavlinkConfig& b) {
+  return a.dials == b.dials && a.at.ip == b.at.ip && a.at.port == b.at.port && a.vehicle == b.vehicle &&
+         a.system_id == b.system_id && a.component_id == b.component_id && a.request_rates == b.request_rates &&
+         a.rate_hz == b.rate_hz;
+}
+bool same(const std::vector<MavlinkConfig>& a, const std::vector<MavlinkConfig>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const MavlinkConfig& x, const MavlinkConfig& y) { return same(x, y); });
+}
+bool same(const std::optional<Geodetic>& a, const std::optional<Geodetic>& b) {
+  if (!a || !b) return !a && !b;
+  return a->latitude_rad == b->latitude_rad && a->longitude_rad == b->longitude_rad && a->altitude_m == b->altitude_m;
 }
 bool same(const ControlConfig& a, const ControlConfig& b) {
   return same(a.stream, b.stream) && same(a.http, b.http) && a.token_file == b.token_file && a.hosts == b.hosts;
@@ -35,6 +49,8 @@ std::vector<std::string> keep_what_needs_a_restart(const Config& now, Config& ne
   };
   keep("poses.protobuf", now.poses.protobuf, next.poses.protobuf);
   keep("poses.json", now.poses.json, next.poses.json);
+  keep("poses.mavlink", now.poses.mavlink, next.poses.mavlink);
+  keep("world.origin", now.origin, next.origin);
   keep("control", now.control, next.control);
   keep("limits.control_clients", now.limits.control_clients, next.limits.control_clients);
   keep("engine.threads", now.engine.threads, next.engine.threads);

@@ -111,6 +111,7 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   while (const auto frame = frames.next()) {
     if (!is_meant(*frame, now)) continue;
     last_heard_ = now;
+    out.heard = true;
     if (is_heard(*frame, now)) on_frame(*frame, {now, out});
   }
   judge(frames.counts(), out);

@@ -38,6 +38,7 @@ struct Reaction {
   std::vector<std::string> refusals;  // what was wrong, one sentence each
   std::vector<std::string> notices;   // worth a line in the log
   std::vector<Bytes> replies;         // datagrams for whoever sends to us
+  bool heard = false;                 // something of the system that is meant was in the datagram
 };
 
 class MavlinkPoses {
