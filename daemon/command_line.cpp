@@ -49,8 +49,8 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
       ->check(one_of({"npy", "png", "raw"}));
   app.add_flag("--complex", render.complex, "also the complex beam signal, before magnitude and gain (npy)");
   app.add_option("--sonar", render.sonar, "which sonar of the configuration, when it has several");
-  app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, or TUM");
-  app.add_option("--pose-frame", render.pose_frame, "of that file, when it does not say so itself; default ENU_FLU")
+  app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, TUM, EuRoC");
+  app.add_option("--pose-frame", render.pose_frame, "of that file, when it does not say so itself")
       ->check(one_of({"ENU_FLU", "NED_FRD"}));
   app.add_option("--rate", render.rate_hz, "pings a second (as the sonar is set; with --poses: at every line)")
       ->check(number(0.001, 10000.0));

@@ -63,8 +63,8 @@ Result<Step> take_step(const std::string& source, const RenderJob& job, Parallel
   const auto make = [&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, {.simd = job.engine.simd}); };
   const auto engine = start_engine(make, job.scene);
   if (!engine) return tl::make_unexpected(engine.error());
-  const double time_s = job.path.poses.empty() ? 0 : job.path.poses.front().time_s;
-  PingRequest request = make_request(job, PingNumber{1}, time_s);
+  const std::vector<Time> times = times_of(job.path);
+  PingRequest request = make_request(job, PingNumber{1}, times.empty() ? Time{} : times.front());
   request.switches.keep_pressure = true;
   Step step{known_values(job, request), {}};
   try {

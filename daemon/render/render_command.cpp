@@ -57,15 +57,24 @@ class ProgressLine {
   Clock::time_point begin_ = Clock::now(), told_ = begin_;
 };
 
+Result<VehiclePath> path_of(const RenderCommand& command) {
+  motion::ReadOptions options;
+  if (!command.pose_frame.empty())
+    options.frame = command.pose_frame == "NED_FRD" ? motion::Frame::ned_frd : motion::Frame::enu_flu;
+  const auto file = motion::load_trajectories(command.poses, options);
+  if (!file) return tl::make_unexpected(file.error());
+  return path_in(*file, command.poses, {});
+}
+
 Result<RenderInput> input_of(const RenderCommand& command) {
   auto input = load_render_input(command.config, command.sonar);
   if (!input) return input;
   for (RenderJob& job : input->jobs)
     if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return tl::make_unexpected(r.error());
   if (!command.poses.empty()) {
-    auto poses = load_poses(command.poses, command.pose_frame == "NED_FRD" ? PoseFrame::ned_frd : PoseFrame::enu_flu);
-    if (!poses) return tl::make_unexpected(poses.error());
-    for (RenderJob& job : input->jobs) job.path.poses = *poses;
+    const auto path = path_of(command);
+    if (!path) return tl::make_unexpected(path.error());
+    for (RenderJob& job : input->jobs) job.path = *path;
   }
   return input;
 }
@@ -75,7 +84,7 @@ Result<Coverage> coverage_of(const RenderJob& given, Parallel& pool) {
   const auto make = [&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, {.simd = job.engine.simd}); };
   const auto engine = start_engine(make, job.scene);
   if (!engine) return tl::make_unexpected(engine.error());
-  PingRequest request = make_request(job, PingNumber{1}, 0);
+  PingRequest request = make_request(job, PingNumber{1}, Time{});
   request.switches.keep_pressure = true;
   try {
     return measure_coverage(job, (*engine)->run({&request, 1}).at(0));

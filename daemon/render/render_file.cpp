@@ -5,6 +5,7 @@
 
 #include "core/text/strict_yaml.hpp"
 #include "daemon/config_parts.hpp"
+#include "daemon/read_trajectory.hpp"
 #include "daemon/render/render_job.hpp"
 #include "daemon/render/sonar_keys.hpp"
 
@@ -48,11 +49,13 @@ void read_path(const Node& node, const std::filesystem::path& folder, RenderJob&
   Map keys = node.map();
   job.path.initial = read_world_pose(keys.optional("at"));
   job.path.orbits = keys.optional("orbit").boolean_or(false);
-  const Node file = keys.optional("file");
-  if (!file.present()) return;
-  auto poses = load_poses(folder / file.text(1024));
-  if (!poses) return file.fail(poses.error().text);
-  job.path.poses = *std::move(poses);
+  const TrajectoryKeys trajectory(keys);
+  if (!trajectory.file) return;
+  const NamedTrajectoryFile named = read_trajectory_file(trajectory, folder);
+  if (named.file.bodies.empty()) return;
+  auto path = path_in(named.file, named.path.string(), named.body);
+  if (!path) return trajectory.file.fail(path.error().text);
+  job.path = *std::move(path);
 }
 
 /// Needs the water and the path.
@@ -61,7 +64,7 @@ void read_sonar(const Node& node, RenderJob& job) {
   const Node profile_node = keys.optional("profile"), options = keys.optional("options");
   job.sonar_name = keys.optional("name").text_or("sonar", 64);
   job.mount = read_mount(keys.optional("mount"));
-  const double depth_m = depth_from_z(compose(vehicle_at(job.path, 0), job.mount).position_m.z);
+  const double depth_m = depth_from_z(compose(vehicle_at(job.path, Time{}), job.mount).position_m.z);
   const Node ping = keys.optional("ping"), model_node = keys.optional("model");
   protocol::Profile profile{nullptr, std::make_shared<const SonarModel>(plain_model())};
   protocol::OptionValues values;
@@ -176,8 +179,8 @@ Result<RenderInput> from_config(const std::filesystem::path& file, const std::st
   job.seed = config->seed;
   job.engine = config->engine;
   job.mount = s.mount;
-  job.path = {vehicle.initial_pose, vehicle.orbits, {}};
-  const double depth_m = depth_from_z(compose(vehicle_at(job.path, 0), job.mount).position_m.z);
+  job.path = {vehicle.initial_pose, vehicle.orbits, {}, {}};
+  const double depth_m = depth_from_z(compose(vehicle_at(job.path, Time{}), job.mount).position_m.z);
   job.settings = device_settings(s.profile, s.options, job.water, depth_m);
   RenderInput input{file.string(), {}, text};
   if (!config->scene.built_in)

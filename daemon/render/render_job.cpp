@@ -14,14 +14,14 @@ PingSettings device_settings(const protocol::Profile& profile, const protocol::O
   return profile.vendor->initial_settings(device).settings;
 }
 
-PingRequest make_request(const RenderJob& job, PingNumber number, double time_s) {
+PingRequest make_request(const RenderJob& job, PingNumber number, Time at) {
   PingRequest request;
   request.model = job.model;
   request.number = number;
-  request.fired_at = Time{} + nanoseconds_from(time_s);
-  request.vehicle_in_world = vehicle_at(job.path, time_s);
+  request.fired_at = at;
+  request.vehicle_in_world = vehicle_at(job.path, at);
   request.sonar_in_world = compose(request.vehicle_in_world, job.mount);
-  request.sonar_moves = sonar_twist_at(job.path, job.mount, time_s);
+  request.sonar_moves = sonar_twist_at(job.path, job.mount, at);
   request.bodies_in_world = job.scene->bodies_in_world;
   request.water = job.water;
   request.settings = job.settings;

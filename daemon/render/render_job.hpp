@@ -47,7 +47,7 @@ Result<RenderInput> load_render_input(const std::filesystem::path& file, const s
 Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder);
 
 /// Everything a ping of the job depends on.
-PingRequest make_request(const RenderJob& job, PingNumber number, double time_s);
+PingRequest make_request(const RenderJob& job, PingNumber number, Time at);
 
 /// The settings a device of that profile starts with.
 PingSettings device_settings(const protocol::Profile& profile, const protocol::OptionValues& options, const Water& water,

@@ -142,26 +142,26 @@ Result<void> write_ping(const RenderJob& job, const Ping& ping, const PingEngine
 
 }  // namespace
 
-Result<std::vector<double>> firing_times(const RenderJob& job, const OutputOptions& o) {
-  const std::vector<TimedPose>& poses = job.path.poses;
-  std::vector<double> times;
+Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& o) {
+  const std::vector<Time> lines = times_of(job.path);
   const auto too_many = [&](const std::string& there_are) {
     return failure(ErrorKind::usage, "--pings " + std::to_string(*o.pings) + ": the poses are enough for " + there_are);
   };
-  if (!poses.empty() && !o.rate_hz) {
-    if (o.pings && *o.pings > poses.size()) return too_many(std::to_string(poses.size()) + ", one at each line; or give --rate");
-    for (std::size_t i = 0; i < o.pings.value_or(poses.size()); ++i) times.push_back(poses[i].time_s);
-    return times;
+  if (!lines.empty() && !o.rate_hz) {
+    if (o.pings && *o.pings > lines.size()) return too_many(std::to_string(lines.size()) + ", one at each line; or give --rate");
+    return std::vector<Time>(lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(o.pings.value_or(lines.size())));
   }
   const double usual_hz = job.settings.rate_hz > 0 ? static_cast<double>(job.settings.rate_hz) : 10;
-  const double rate_hz = o.rate_hz.value_or(usual_hz), begin_s = poses.empty() ? 0 : poses.front().time_s;
+  const double rate_hz = o.rate_hz.value_or(usual_hz);
+  const Time begin = lines.empty() ? Time{} : lines.front();
   std::uint64_t n = o.pings.value_or(1);
-  if (!poses.empty()) {
-    const auto fit = static_cast<std::uint64_t>(std::floor((poses.back().time_s - begin_s) * rate_hz + 1e-6)) + 1;
+  if (!lines.empty()) {
+    const auto fit = static_cast<std::uint64_t>(std::floor(seconds(lines.back() - begin) * rate_hz + 1e-6)) + 1;
     if (o.pings && *o.pings > fit) return too_many(std::to_string(fit) + " at that rate");
     n = o.pings.value_or(fit);
   }
-  for (std::uint64_t i = 0; i < n; ++i) times.push_back(begin_s + static_cast<double>(i) / rate_hz);
+  std::vector<Time> times;
+  for (std::uint64_t i = 0; i < n; ++i) times.push_back(begin + nanoseconds_from(static_cast<double>(i) / rate_hz));
   return times;
 }
 
@@ -169,7 +169,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
                               const std::function<void(const Progress&)>& told) {
   const std::string digest = digest_of(input, o.rate_hz.value_or(0));
   Progress progress;
-  std::vector<std::vector<double>> times;
+  std::vector<std::vector<Time>> times;
   for (const RenderJob& job : input.jobs) {
     auto of_job = firing_times(job, o);
     if (!of_job) return tl::make_unexpected(of_job.error());
@@ -180,7 +180,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
   for (std::size_t j = 0; j < input.jobs.size(); ++j) {
     const RenderJob& job = input.jobs[j];
     std::unique_ptr<PingEngine> engine;  // not before it is needed: a finished folder costs no scene
-    for (const double time_s : times[j]) {
+    for (const Time at : times[j]) {
       const std::uint64_t number = progress.done + 1;
       if (is_finished(o, number, digest)) {
         ++progress.kept;
@@ -193,7 +193,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
           if (!started) return tl::make_unexpected(started.error());
           engine = *std::move(started);
         }
-        PingRequest request = make_request(job, PingNumber{static_cast<std::uint32_t>(number)}, time_s);
+        PingRequest request = make_request(job, PingNumber{static_cast<std::uint32_t>(number)}, at);
         request.switches.keep_pressure = o.npy;
         request.switches.keep_beams = o.complex;
         request.switches.keep_truth = true;

@@ -26,7 +26,7 @@ struct Progress {
 };
 
 /// When the pings of a job are fired [s]. usage: more pings than the poses last.
-Result<std::vector<double>> firing_times(const RenderJob& job, const OutputOptions& options);
+Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& options);
 
 /// `told` after every ping, in order. Errors: io; what the engine refuses.
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& options, Parallel& pool,

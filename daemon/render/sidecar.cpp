@@ -115,6 +115,16 @@ void add(Sha256& hash, const json& value) {
   hash.add(std::as_bytes(std::span(text.data(), text.size())));
 }
 
+void add_path(Sha256& hash, const VehiclePath& path) {
+  if (!path.trajectory) return;
+  const motion::Points& p = path.trajectory->points();
+  add(hash, {path.begins_at.time_since_epoch().count(), p.times.size()});
+  hash.add(std::as_bytes(std::span(p.times)));
+  hash.add(std::as_bytes(std::span(p.poses)));
+  hash.add(std::as_bytes(std::span(p.velocities_mps)));
+  hash.add(std::as_bytes(std::span(p.angular_velocities_radps)));
+}
+
 void add_scene(Sha256& hash, const Scene& scene) {
   for (const Object& o : scene.objects) {
     add(hash, {o.name, o.visible, json_of(o.in_world)});
@@ -175,7 +185,7 @@ std::string digest_of(const RenderInput& input, double rate_hz) {
     hash.add(std::as_bytes(std::span(job.mode().waveform.samples)));
     add(hash, {json_of(job.settings), json_of(job.water), json_of(job.engine.switches), job.seed, job.sonar_id, job.values,
                static_cast<int>(job.engine.simd), json_of(job.mount), json_of(job.path.initial), job.path.orbits});
-    for (const TimedPose& p : job.path.poses) add(hash, {p.time_s, json_of(p.body_in_world)});
+    add_path(hash, job.path);
     add_scene(hash, *job.scene);
   }
   return hash.hex();

@@ -134,6 +134,8 @@ class Render(unittest.TestCase):
     def test_poses_from_a_file(self):
         poses = self.path / "poses.csv"
         poses.write_text("t_s,x_m,y_m,z_m,yaw_deg\n0,0,0,0,0\n1,0.5,0,0,10\n2,1,0,0,20\n", encoding="utf-8")
+        self.expect(self.render("--poses", poses), 65, "poses.csv", "frame", "ENU_FLU")
+        poses.write_text("# frame: ENU_FLU\n" + poses.read_text(encoding="utf-8"), encoding="utf-8")
         self.expect(self.render("--poses", poses, "--format", "raw"), 0, "3 of 3 pings")
         side = json.loads((self.out / "000002.json").read_text(encoding="utf-8"))
         self.assertEqual(side["time_s"], 1)
@@ -145,6 +147,8 @@ class Render(unittest.TestCase):
         self.expect(self.render("--poses", poses, "--format", "raw", "--rate", "2", out=other), 0, "5 of 5 pings")
         poses.write_text("t,x,y,z\n0,0,0\n", encoding="utf-8")
         self.expect(self.render("--poses", poses, out=self.path / "third"), 65, "poses.csv:2: 3 values")
+        poses.write_text("t,x,y,z\n0,0,0,0\n", encoding="utf-8")
+        self.expect(self.render("--poses", poses, "--pose-frame", "ENU_FLU", "--format", "raw", out=self.path / "third"), 0, "1 of 1")
 
     def test_mistakes_are_one_sentence(self):
         self.expect(self.render(config=self.path / "none.yaml"), 66, "none.yaml")

@@ -170,7 +170,14 @@ TEST(Digest, FollowsEverythingThatChangesAPing) {
   EXPECT_TRUE(changed([](RenderJob& j) { j.seed = 2; }));
   EXPECT_TRUE(changed([](RenderJob& j) { j.engine.switches.volume = false; }));
   EXPECT_TRUE(changed([](RenderJob& j) { j.settings.gain_db = 1; }));
-  EXPECT_TRUE(changed([](RenderJob& j) { j.path.poses.push_back({}); }));
+  const auto way = [](double z_m) {
+    return std::make_shared<const motion::Trajectory>(motion::Points{{motion::Ns{0}}, {{{0, 0, z_m}, {}}}, {}, {}});
+  };
+  EXPECT_TRUE(changed([&](RenderJob& j) { j.path.trajectory = way(0); }));
+  RenderInput follows = input, elsewhere = input;
+  follows.jobs[0].path.trajectory = way(0);
+  elsewhere.jobs[0].path.trajectory = way(1);
+  EXPECT_NE(digest_of(follows, 0), digest_of(elsewhere, 0));
   EXPECT_TRUE(changed([](RenderJob& j) { j.water.ph = 7; }));
   EXPECT_FALSE(changed([](RenderJob& j) { j.engine.threads = 3; }));
 }
@@ -212,7 +219,7 @@ Coverage coverage_with(const std::string& waveform) {
                            waveform + "}}\n")
                         .jobs.at(0));
   Parallel pool(2);
-  PingRequest request = make_request(job, PingNumber{1}, 0);
+  PingRequest request = make_request(job, PingNumber{1}, Time{});
   request.switches.keep_pressure = true;
   const auto coverage = measure_coverage(job, make_engine(job.scene, pool, {})->run({&request, 1}).at(0));
   if (!coverage) throw std::runtime_error(coverage.error().text);
@@ -231,7 +238,7 @@ TEST(Coverage, TakesTheEnergyOfThePulseInUse) {
 TEST(Coverage, KnowsWhatItCannotCompare) {
   RenderJob job = shipped_sonars_over_a_bed().front();
   Ping ping;
-  ping.request = make_request(job, PingNumber{1}, 0);
+  ping.request = make_request(job, PingNumber{1}, Time{});
   ping.request.sonar_in_world.orientation = quat_from_rpy({0.1, 0.2, 0});
   EXPECT_THAT(measure_coverage(job, ping).error().text, HasSubstr("roll"));
   ping.request.sonar_in_world.orientation = {};
@@ -248,7 +255,7 @@ TEST(Sidecar, TellsTheSwitchesThatTookEffect) {
   Parallel pool(1);
   const auto switches_told = [&](const std::string& part) {
     const auto engine = make_engine(job.scene, pool, {});
-    const PingRequest request = make_request(job, PingNumber{1}, 0);
+    const PingRequest request = make_request(job, PingNumber{1}, Time{});
     return sidecar(job, engine->run({&request, 1}).at(0), *engine, "")["switches"][part].get<bool>();
   };
   EXPECT_TRUE(switches_told("specular"));
