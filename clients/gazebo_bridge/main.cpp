@@ -1,0 +1,93 @@
+// gazebo_bridge: follows models of a Gazebo world and sends their poses to sonard, JSON by UDP.
+// Built where Ignition Transport 11 is (SONAR_GAZEBO); everything but the subscription is in model_poses.hpp.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <functional>
+#include <ignition/msgs.hh>
+#include <ignition/transport.hh>
+#include <span>
+
+#include "clients/gazebo_bridge/model_poses.hpp"
+#include "clients/sonarctl/net.hpp"
+
+namespace sonar::clients {
+namespace {
+
+struct Options {
+  std::string world = "default", topic, to;
+  std::vector<std::string> models;
+};
+
+/// Touched by the one thread that delivers messages; the main thread only waits.
+struct Following {
+  std::vector<FollowedModel> models;
+  Socket socket;
+  bool heard = false, unheard = false;
+  std::size_t sent = 0;
+
+  void take(const ignition::msgs::Pose_V& message) {
+    const std::vector<std::string> lines = lines_from(message, models);
+    for (const std::string& line : lines) {
+      // Refused is about the datagram before: a sonard that restarts must not end the simulation's bridge.
+      const bool refused = !write_all(socket, std::as_bytes(std::span(line)));
+      if (refused && !unheard) std::fprintf(stderr, "gazebo_bridge: sonard does not listen there yet\n");
+      unheard = refused;
+    }
+    sent += lines.size();
+    if (!heard) tell_first(message);
+    heard = true;
+  }
+
+  void tell_first(const ignition::msgs::Pose_V& message) const {
+    std::fprintf(stderr, "gazebo_bridge: %d poses in the first message, %zu of the models followed\n", message.pose_size(), sent);
+    if (sent == models.size()) return;
+    std::fprintf(stderr, "gazebo_bridge: not all of them are there; it has:");
+    for (int i = 0; i < message.pose_size(); ++i) std::fprintf(stderr, " %s", message.pose(i).name().c_str());
+    std::fprintf(stderr, "\n");
+  }
+};
+
+int complain(const Error& error) {
+  std::fprintf(stderr, "gazebo_bridge: %s\n", error.text.c_str());
+  return exit_code(error.kind);
+}
+
+int follow(const Options& options) {
+  std::vector<FollowedModel> models;
+  for (const std::string& text : options.models) {
+    auto followed = parse_followed(text);
+    if (!followed) return complain(followed.error());
+    models.push_back(*std::move(followed));
+  }
+  const Result<Endpoint> to = parse_endpoint(options.to, {"127.0.0.1", 14771});
+  if (!to) return complain(to.error());
+  auto socket = connect_udp(*to);
+  if (!socket) return complain(socket.error());
+
+  Following following{std::move(models), *std::move(socket)};
+  const std::string topic = options.topic.empty() ? "/world/" + options.world + "/pose/info" : options.topic;
+  ignition::transport::Node node;
+  std::function<void(const ignition::msgs::Pose_V&)> take = [&](const ignition::msgs::Pose_V& m) { following.take(m); };
+  if (!node.Subscribe(topic, take)) return complain({ErrorKind::unavailable, "cannot subscribe to " + topic});
+  std::fprintf(stderr, "gazebo_bridge: %s to %s\n", topic.c_str(), text_from(*to).c_str());
+  ignition::transport::waitForShutdown();
+  node.Unsubscribe(topic);
+  std::fprintf(stderr, "gazebo_bridge: %zu poses sent\n", following.sent);
+  return 0;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("gazebo_bridge: poses of Gazebo's models to sonard");
+  Options options;
+  app.add_option("model", options.models, "MODEL or MODEL=VEHICLE; several for several vehicles")->required();
+  app.add_option("--world", options.world, "name of the world")->capture_default_str();
+  app.add_option("--topic", options.topic, "of poses; default /world/WORLD/pose/info");
+  app.add_option("--to", options.to, "sonard's poses.json: host or host:port; default 127.0.0.1:14771");
+  CLI11_PARSE(app, argc, argv);
+  return follow(options);
+}
+
+}  // namespace
+}  // namespace sonar::clients
+
+int main(int argc, char** argv) { return sonar::clients::run(argc, argv); }
