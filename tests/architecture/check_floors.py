@@ -52,6 +52,7 @@ DEPENDENCIES = {
     r"nlohmann/": ["protocol/control/", "daemon/", "clients/"],
     r"CLI/": ["core/text/arguments.cpp", "daemon/", "clients/"],
     r"cuda|nv[a-z]+\.h": ["cuda/"],
+    r"ignition/": ["clients/gazebo_bridge/"],
     r"tbb/|oneapi/": [],
     r"Eigen/": [],
 }
