@@ -89,7 +89,7 @@ std::string sentence_about_missing(const CLI::App& asked, const std::string& sai
   const std::string name = before(said, " is required");
   const CLI::Option* option = find_option(asked, name);
   const std::string meaning = option == nullptr ? "" : option->get_description();
-  return full_name(asked) + " needs " + name + (meaning.empty() ? "" : ", " + meaning);
+  return (asked.get_parent() == nullptr ? "it" : asked.get_name()) + " needs " + name + (meaning.empty() ? "" : ", " + meaning);
 }
 
 std::string sentence_about_count(const CLI::App& asked, const std::string& said) {
@@ -165,26 +165,26 @@ CLI::Validator one_of(std::vector<std::string> names) {
 }
 
 CLI::Validator whole_number(std::uint64_t low, std::uint64_t high) {
-  constexpr std::uint64_t any = std::numeric_limits<std::uint64_t>::max();
-  const std::string least = std::to_string(low), range = high == any ? least + " or more" : least + " to " + std::to_string(high);
-  const auto refusal = [low, high, range](std::string& given) -> std::string {
+  const bool bounded_above = high != std::numeric_limits<std::uint64_t>::max();
+  const std::string least = std::to_string(low), range = least + " to " + std::to_string(high);
+  const std::string allowed = bounded_above ? " from " + range : " of " + least + " or more";
+  const auto refusal = [low, high, allowed](std::string& given) -> std::string {
     const auto value = parse_unsigned(given);
     if (value && low <= *value && *value <= high) return {};
-    return in_quotes(given) + " is not a whole number, " + range;
+    return in_quotes(given) + " is not a whole number" + allowed;
   };
-  return CLI::Validator(refusal, high == any ? "" : "[" + range + "]", "whole number");
+  return CLI::Validator(refusal, bounded_above ? "[" + range + "]" : "", "whole number");
 }
 
 CLI::Validator number(double low, double high) {
-  const bool bounded_below = low != std::numeric_limits<double>::lowest(),
-             bounded_above = high != std::numeric_limits<double>::max();
-  const std::string range = bounded_above   ? format("%.10g to %.10g", low, high)
-                            : bounded_below ? format("%.10g or more", low)
-                                            : std::string();
-  const auto refusal = [low, high, range](std::string& given) -> std::string {
+  const bool bounded_below = low != std::numeric_limits<double>::lowest();
+  const bool bounded_above = high != std::numeric_limits<double>::max();
+  const std::string range = format("%.10g to %.10g", low, high);
+  const std::string allowed = bounded_above ? " from " + range : bounded_below ? format(" of %.10g or more", low) : std::string();
+  const auto refusal = [low, high, allowed](std::string& given) -> std::string {
     double value = 0;
     if (is_number(given, value) && low <= value && value <= high) return {};
-    return in_quotes(given) + " is not a number" + (range.empty() ? "" : ", ") + range;
+    return in_quotes(given) + " is not a number" + allowed;
   };
   return CLI::Validator(refusal, bounded_above ? "[" + range + "]" : "", "number");
 }

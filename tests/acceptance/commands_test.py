@@ -64,8 +64,8 @@ class Mistakes(unittest.TestCase):
         self.expect(run(SONARCTL, "listen", "127.0.0.1:port"), 64, "127.0.0.1:port", "HOST:PORT")
 
     def test_what_is_wrong_with_a_line_is_said_in_one(self):
-        words = [(["--threads", "abc"], "--threads", '"abc" is not a whole number, 0 to 256'),
-                 (["run", "--threads", "257"], "--threads", '"257" is not a whole number, 0 to 256', "sonard run --help"),
+        words = [(["--threads", "abc"], "--threads", '"abc" is not a whole number from 0 to 256'),
+                 (["run", "--threads", "257"], "--threads", '"257" is not a whole number from 0 to 256', "sonard run --help"),
                  (["run", "--seed", "0x10"], "--seed", '"0x10" is not a whole number'),
                  (["--mode", "raser"], "--mode", '"raser" is none of canonical, paper, raster'),
                  (["run", "--threds", "2"], "--threds", 'did you mean "--threads"?'),
@@ -73,25 +73,25 @@ class Mistakes(unittest.TestCase):
                  (["run", "--clock"], "--clock needs a value: realtime, or stepped"),
                  (["--demo=maybe"], "--demo is a switch"),
                  (["chekc"], 'no command or file "chekc"; did you mean "check"?'),
-                 (["check"], "sonard check needs config, the configuration file", "sonard check --help"),
+                 (["check"], "sonard: check needs config, the configuration file", "sonard check --help"),
                  (["render"], "a configuration or render file", "sonard render --help"),
-                 (["render", "x.yaml", "--out", "d", "--rate", "often"], "--rate", '"often" is not a number, 0.001 to 10000'),
-                 (["bench", "--threads", "0"], "--threads", '"0" is not a whole number, 1 to 256', "sonard bench --help"),
+                 (["render", "x.yaml", "--out", "d", "--rate", "often"], "--rate", '"often" is not a number from 0.001 to 10000'),
+                 (["bench", "--threads", "0"], "--threads", '"0" is not a whole number from 1 to 256', "sonard bench --help"),
                  (["bench", "--case", "P99"], "--case", '"P99"'), (["bench", "--csae", "P1"], 'did you mean "--case"?'),
                  (["--bind", "localhost", "--demo"], "--bind", '"localhost" is not an IPv4 address')]
         for line, *expected in words:
             with self.subTest(sonard=line):
                 self.expect_one_line("sonard: ", run(SONARD, *line), *expected)
         words = [(["listen", "--rate", "7"], "--rate", '"7" is none of 2, 5, 10, 15, 40, standby', "sonarctl listen --help"),
-                 (["listen", "--seconds", "long"], "--seconds", '"long" is not a number, 0 or more'),
+                 (["listen", "--seconds", "long"], "--seconds", '"long" is not a number of 0 or more'),
                  (["listen", "--range", "5", "--range-percent", "5"], "--range and --range-percent cannot be given together"),
                  (["listen", "127.0.0.1:port"], '"127.0.0.1:port" is no address: write HOST:PORT'),
                  (["status", "--control", "127.0.0.1:0"], "--control", '"127.0.0.1:0" is no address'),
-                 (["doctor", "--within", "0"], "--within", '"0" is not a number, 1 to 600'),
+                 (["doctor", "--within", "0"], "--within", '"0" is not a number from 1 to 600'),
                  (["pose", "once", "--frame", "nde"], "--frame", '"nde" is none of enu, ned'),
                  (["pose", "once", "--xyz", "1,2"], "--xyz needs 3 values"),
                  (["set", "sonar", "--mode", "high"], "--mode", '"high" is not a whole number'),
-                 (["load"], "sonarctl load needs SCENE, scene file"), (["scene"], "say what to do: check, info, import"),
+                 (["load"], "sonarctl: load needs SCENE, scene file"), (["scene"], "say what to do: check, info, import"),
                  (["view", "--png", "x.png", "--colour-map", "pink"], "--colour-map", "gray, copper")]
         for line, *expected in words:
             with self.subTest(sonarctl=line):

@@ -44,12 +44,12 @@ std::string complaint(const std::vector<std::string>& words) {
 TEST(Arguments, NumbersAreWholeDecimalAndInTheirRange) {
   EXPECT_THAT(complaint({"look", "x", "--threads", "256", "--rate", "+.5"}), IsEmpty());
   EXPECT_EQ(complaint({"look", "x", "--threads", "abc"}),
-            "--threads: \"abc\" is not a whole number, 0 to 256 (tool look --help)");
+            "--threads: \"abc\" is not a whole number from 0 to 256 (tool look --help)");
   for (const char* wrong : {"257", "-1", "0x10", "010", "1.5", "1e2", "", " 3", "99999999999999999999"})
-    EXPECT_THAT(complaint({"look", "x", "--threads", wrong}), HasSubstr("is not a whole number, 0 to 256")) << wrong;
-  EXPECT_EQ(complaint({"look", "x", "--rate", "fast"}), "--rate: \"fast\" is not a number, 0.5 to 10 (tool look --help)");
+    EXPECT_THAT(complaint({"look", "x", "--threads", wrong}), HasSubstr("is not a whole number from 0 to 256")) << wrong;
+  EXPECT_EQ(complaint({"look", "x", "--rate", "fast"}), "--rate: \"fast\" is not a number from 0.5 to 10 (tool look --help)");
   for (const char* wrong : {"0.4", "11", "nan", "inf", "0x1p3", "1 ", "+-1", "1e999"})
-    EXPECT_THAT(complaint({"look", "x", "--rate", wrong}), HasSubstr("is not a number, 0.5 to 10")) << wrong;
+    EXPECT_THAT(complaint({"look", "x", "--rate", wrong}), HasSubstr("is not a number from 0.5 to 10")) << wrong;
 }
 
 TEST(Arguments, ChoicesAreNamed) {
@@ -60,7 +60,7 @@ TEST(Arguments, ChoicesAreNamed) {
 
 TEST(Arguments, WhatIsMissingOrTooMuchIsNamed) {
   EXPECT_EQ(complaint({}), "say what to do: look (tool --help)");
-  EXPECT_EQ(complaint({"look"}), "tool look needs FILE, what to look at (tool look --help)");
+  EXPECT_EQ(complaint({"look"}), "look needs FILE, what to look at (tool look --help)");
   EXPECT_EQ(complaint({"look", "x", "y"}), "\"y\" is a word too many for tool look (tool look --help)");
   EXPECT_THAT(complaint({"look", "x", "-z"}), HasSubstr("\"-z\" is no option of tool look"));
   EXPECT_EQ(complaint({"look", "x", "--threads"}), "--threads needs a value: how many (tool look --help)");
