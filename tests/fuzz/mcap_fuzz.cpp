@@ -1,0 +1,16 @@
+// MCAP files of anybody: every message, and the sonar's among them.
+#include "protocol/recording/mcap/mcap_session.hpp"
+#include "tests/fuzz/recording_fuzz.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace sonar;
+  const recording::Bytes bytes = fuzz::bytes_from(data, size);
+  if (auto reader = recording::mcap::Reader::open(recording::source_from("input", bytes)))
+    while (const auto message = reader->next())
+      if (!reader->channels().contains(message->channel) || message->data.size() > size) std::abort();
+  auto reader = recording::read_mcap(recording::source_from("input", bytes));
+  if (!reader) return 0;
+  while (const auto piece = (*reader)->next())
+    if (piece->bytes.size() > size) std::abort();
+  return 0;
+}

@@ -1,0 +1,45 @@
+// What every reader of recordings must keep, whatever the file: it ends, its pieces are no larger than messages may be, and a
+// second reading gives the same.
+#pragma once
+
+#include <cstdlib>
+
+#include "protocol/recording/recording.hpp"
+
+namespace sonar::fuzz {
+
+inline recording::Bytes bytes_from(const std::uint8_t* data, std::size_t size) {
+  recording::Bytes bytes(size);
+  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(data[i]);
+  return bytes;
+}
+
+struct ReadThrough {
+  std::uint64_t pieces = 0, bytes = 0;
+  bool damaged = false;
+  bool operator==(const ReadThrough&) const = default;
+};
+/// `most_bytes` may come out of the file.
+inline ReadThrough read_through(recording::PieceReader& reader, std::uint64_t most_bytes) {
+  ReadThrough read;
+  while (const auto piece = reader.next()) {
+    ++read.pieces;
+    read.bytes += piece->bytes.size();
+    if (piece->bytes.empty() || read.bytes > most_bytes) std::abort();
+  }
+  read.damaged = reader.damage().has_value();
+  if (reader.next()) std::abort();
+  return read;
+}
+
+inline void check_reader(Result<std::unique_ptr<recording::PieceReader>> reader, std::uint64_t most_bytes) {
+  if (!reader) {
+    if (reader.error().text.empty()) std::abort();
+    return;
+  }
+  const ReadThrough first = read_through(**reader, most_bytes);
+  (*reader)->rewind();
+  if (read_through(**reader, most_bytes) != first) std::abort();
+}
+
+}  // namespace sonar::fuzz
