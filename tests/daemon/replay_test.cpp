@@ -1,0 +1,282 @@
+// Replay on loopback: a driver gets the recording's bytes, all of them and nothing else, at the pace asked for.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <future>
+#include <thread>
+
+#include "daemon/replay/replay_server.hpp"
+#include "protocol/oculus/decode.hpp"
+#include "protocol/oculus/encode_ping.hpp"
+#include "protocol/recording/oculus_log.hpp"
+#include "protocol/recording/pcap/pcap.hpp"
+#include "protocol/recording/raw_dump.hpp"
+
+namespace sonar {
+namespace {
+
+using recording::Bytes;
+using recording::Carrier;
+using recording::Origin;
+using recording::Piece;
+using std::chrono::milliseconds;
+using Steady = std::chrono::steady_clock;
+constexpr milliseconds patience{20000};
+constexpr std::size_t everything = ~std::size_t{0};
+
+/// 127.192..127.223, from the process number and a counter: nobody else's.
+Ipv4 own_address() {
+  static std::atomic<unsigned> count{0};
+  const unsigned number = static_cast<unsigned>(::getpid()) * 16 + count++;
+  return {127, static_cast<std::uint8_t>(192 + (number >> 16) % 32), static_cast<std::uint8_t>(number >> 8),
+          static_cast<std::uint8_t>(1 + number % 250)};
+}
+
+Bytes ping_message(std::uint32_t id) {
+  oculus::PingHead head;
+  head.fixed.header = {oculus::magic, 7001, 0, oculus::MessageType::ping_result, 0, 0, 0};
+  head.fixed.ping_id = id;
+  head.fixed.frequency_hz = 2.1e6;
+  head.fixed.sound_speed_mps = 1500;
+  head.fixed.range_resolution_m = 0.1;
+  head.fixed.row_count = 300;
+  head.fixed.beam_count = 256;
+  const std::vector<std::int16_t> bearings(256);
+  const Bytes samples(256 * 300, static_cast<std::byte>(id));
+  return oculus::encode_ping(head, {bearings, {}, samples});
+}
+
+std::vector<Piece> pieces_of(std::uint32_t pings, milliseconds period) {
+  std::vector<Piece> pieces;
+  for (std::uint32_t i = 0; i < pings; ++i)
+    pieces.push_back({Time(std::chrono::seconds(1000)) + i * period, Origin::device, Carrier::stream, ping_message(i + 1)});
+  return pieces;
+}
+
+Bytes stream_of(const std::vector<Piece>& pieces) {
+  Bytes stream;
+  for (const Piece& piece : pieces) stream.insert(stream.end(), piece.bytes.begin(), piece.bytes.end());
+  return stream;
+}
+
+using MakeWriter = std::unique_ptr<recording::PieceWriter> (*)(std::unique_ptr<recording::Sink>);
+Bytes file_of(MakeWriter make, const std::vector<Piece>& pieces) {
+  Bytes file;
+  const auto writer = make(recording::sink_into(file));
+  for (const Piece& piece : pieces) EXPECT_TRUE(writer->write(piece));
+  EXPECT_TRUE(writer->close());
+  return file;
+}
+
+/// A replay server in a thread of its own.
+class Replay {
+ public:
+  Replay(Bytes file, ReplayOptions options) : log_(quiet()) {
+    auto opened = recording::open_recording(recording::source_from("recording", std::move(file)));
+    if (!opened) throw std::runtime_error(opened.error().text);
+    recording_ = std::move(*opened);
+    auto device = find_replay_device(*recording_.reader, "recording", 1042);
+    if (!device) throw std::runtime_error(device.error().text);
+    options.at = {own_address(), 0};
+    server_ = std::make_unique<ReplayServer>(io_, *recording_.reader, *device, options, log_);
+    if (const auto listening = server_->open(); !listening) throw std::runtime_error(listening.error().text);
+    server_->start();
+    done_ = std::async(std::launch::async, [this] { io_.run(); });
+  }
+  ~Replay() {
+    stop();
+    done_.wait();
+  }
+  void stop() {
+    asio::post(io_, [this] { server_->stop(); });
+  }
+  bool ends() { return done_.wait_for(patience) == std::future_status::ready; }
+  tcp::endpoint at() const { return {asio::ip::address_v4(server_->at().ip), server_->at().port}; }
+  /// After the end.
+  const ReplayServer::Figures& figures() const { return server_->figures(); }
+
+ private:
+  static LogOptions quiet() {
+    LogOptions options;
+    options.sink = [](LogLevel, const std::string&) {};
+    return options;
+  }
+  Log log_;
+  asio::io_context io_;
+  recording::Recording recording_;
+  std::unique_ptr<ReplayServer> server_;
+  std::future<void> done_;
+};
+
+class Driver {
+ public:
+  explicit Driver(const Replay& replay) : socket_(io_) { socket_.connect(replay.at()); }
+  /// Up to `most` bytes, fewer when the stream ends before.
+  Bytes read(std::size_t most) {
+    Bytes bytes, block(1 << 16);
+    error_code ec;
+    while (!ec && bytes.size() < most) {
+      const std::size_t n = socket_.read_some(asio::buffer(block.data(), std::min(block.size(), most - bytes.size())), ec);
+      bytes.insert(bytes.end(), block.begin(), block.begin() + static_cast<std::ptrdiff_t>(n));
+    }
+    return bytes;
+  }
+  void send(const Bytes& bytes) { asio::write(socket_, asio::buffer(bytes)); }
+  void reset() {
+    socket_.set_option(asio::socket_base::linger(true, 0));
+    socket_.close();
+  }
+
+ private:
+  asio::io_context io_;
+  tcp::socket socket_;
+};
+
+ReplayOptions as_fast_as_read() {
+  ReplayOptions options;
+  options.stepped = true;
+  return options;
+}
+
+TEST(Replay, EveryByteOfEveryFormat) {
+  const std::vector<Piece> pieces = pieces_of(40, milliseconds(5));
+  const MakeWriter pcap = [](std::unique_ptr<recording::Sink> sink) { return recording::write_pcap(std::move(sink), {}); };
+  for (const MakeWriter make : {&recording::write_oculus_log, &recording::write_raw_dump, pcap}) {
+    Replay replay(file_of(make, pieces), as_fast_as_read());
+    Driver driver(replay);
+    EXPECT_EQ(driver.read(everything), stream_of(pieces));
+    EXPECT_TRUE(replay.ends());
+    EXPECT_EQ(replay.figures().messages, 40u);
+    EXPECT_EQ(replay.figures().times_through, 1u);
+  }
+}
+
+TEST(Replay, WhatAClientSaysChangesNothing) {
+  const std::vector<Piece> pieces = pieces_of(20, milliseconds(10));
+  Replay replay(file_of(&recording::write_oculus_log, pieces), {});
+  Driver driver(replay);
+  driver.send(oculus::make_fire({}));
+  driver.send(Bytes(5000, std::byte{0x53}));
+  EXPECT_EQ(driver.read(everything), stream_of(pieces));
+  EXPECT_TRUE(replay.ends());
+}
+
+TEST(Replay, KeepsTheRecordedPaceScaled) {
+  const std::vector<Piece> pieces = pieces_of(11, milliseconds(100));
+  ReplayOptions options;
+  options.speed = 2;
+  Replay replay(file_of(&recording::write_oculus_log, pieces), options);
+  const auto begin = Steady::now();
+  Driver driver(replay);
+  EXPECT_EQ(driver.read(everything), stream_of(pieces));
+  EXPECT_GE(Steady::now() - begin, milliseconds(490));  // a second, twice as fast; how late it may be the machine decides
+}
+
+TEST(Replay, LoopsUntilStopped) {
+  const std::vector<Piece> pieces = pieces_of(3, milliseconds(1));
+  ReplayOptions options = as_fast_as_read();
+  options.loop = true;
+  Replay replay(file_of(&recording::write_raw_dump, pieces), options);
+  Driver driver(replay);
+  const Bytes once = stream_of(pieces), twice_and_more = driver.read(2 * once.size() + 100);
+  EXPECT_EQ(Bytes(twice_and_more.begin(), twice_and_more.begin() + static_cast<std::ptrdiff_t>(once.size())), once);
+  EXPECT_TRUE(std::equal(once.begin(), once.end(), twice_and_more.begin() + static_cast<std::ptrdiff_t>(once.size())));
+  replay.stop();
+  const std::size_t rest = driver.read(everything).size() + 100;
+  EXPECT_EQ(rest % ping_message(1).size(), 0u) << "the stream ends with a whole message";
+  EXPECT_TRUE(replay.ends());
+}
+
+TEST(Replay, TheNextClientGetsItFromTheFront) {
+  const std::vector<Piece> pieces = pieces_of(50, milliseconds(20));
+  Replay replay(file_of(&recording::write_oculus_log, pieces), {});
+  {
+    Driver first(replay);
+    EXPECT_EQ(first.read(1000).size(), 1000u);
+    Driver second(replay);
+    EXPECT_TRUE(second.read(1).empty()) << "one at a time, as the device";
+    EXPECT_EQ(first.read(1000).size(), 1000u);
+    first.reset();
+  }
+  for (const auto give_up = Steady::now() + patience; Steady::now() < give_up;) {
+    Driver next(replay);
+    const Bytes begin = next.read(2000);
+    if (begin.empty()) continue;  // the first is not yet gone
+    const Bytes expected = stream_of(pieces);
+    EXPECT_TRUE(std::equal(begin.begin(), begin.end(), expected.begin()));
+    return;
+  }
+  FAIL() << "nobody was served any more";
+}
+
+TEST(Replay, StopsWithAClientThatDoesNotRead) {
+  const std::vector<Piece> pieces = pieces_of(400, milliseconds(0));  // 32 MB: more than the kernel holds
+  Replay replay(file_of(&recording::write_raw_dump, pieces), as_fast_as_read());
+  Driver driver(replay);
+  EXPECT_EQ(driver.read(10).size(), 10u);
+  std::this_thread::sleep_for(milliseconds(100));
+  const auto begin = Steady::now();
+  replay.stop();
+  EXPECT_TRUE(replay.ends());
+  EXPECT_LT(Steady::now() - begin, std::chrono::seconds(10));
+}
+
+TEST(Replay, StatusLeadsDriversHere) {
+  asio::io_context io;
+  const Ipv4 ip = own_address();
+  udp::socket listener(io, udp::endpoint(asio::ip::address_v4(ip), 0));
+  std::vector<Piece> pieces = pieces_of(2, milliseconds(1));
+  oculus::StatusMessage recorded;
+  recorded.header.part_number = recorded.part_number = 1032;
+  recorded.header.type = oculus::MessageType::status;
+  recorded.header.source = 7001;
+  recorded.device_id = 7001;
+  recorded.ip_address = {192, 168, 1, 200};
+  recorded.arm0_version = 0x01020003;
+  const MakeWriter pcap = [](std::unique_ptr<recording::Sink> sink) { return recording::write_pcap(std::move(sink), {}); };
+  for (const bool with_status : {false, true}) {
+    if (with_status) pieces.push_back({pieces.back().at, Origin::device, Carrier::datagram, wire::bytes_of(recorded)});
+    ReplayOptions options;
+    options.status_to = {{ip, listener.local_endpoint().port()}};
+    Replay replay(file_of(pcap, pieces), options);
+    Bytes datagram(2000);
+    datagram.resize(listener.receive(asio::buffer(datagram)));
+    const auto status = oculus::decode_status(datagram);
+    ASSERT_TRUE(status);
+    EXPECT_THAT(oculus::status_violations(*status, datagram.size()), ::testing::IsEmpty());
+    EXPECT_EQ(asio::ip::address_v4(status->ip_address), replay.at().address().to_v4());
+    EXPECT_EQ(status->header.source, 7001);
+    EXPECT_EQ(status->part_number, with_status ? 1032 : 1042);
+    EXPECT_EQ(status->arm0_version, with_status ? 0x01020003u : 0u);
+  }
+}
+
+TEST(Replay, NeedsAMessageOfADevice) {
+  auto opened = recording::open_recording(recording::source_from("f", file_of(&recording::write_oculus_log, {})));
+  ASSERT_TRUE(opened);
+  const auto device = find_replay_device(*opened->reader, "f", 1042);
+  ASSERT_FALSE(device);
+  EXPECT_EQ(device.error().text, "f holds no message of a sonar");
+}
+
+TEST(ReplayPace, GapsAreScaledBoundedAndNotMadeUpFor) {
+  const auto start = Steady::now();
+  const auto at = [](int ms) { return Time(milliseconds(ms)); };
+  ReplayPace pace(2, {});
+  EXPECT_EQ(pace.due(at(1000), start), start);
+  EXPECT_EQ(pace.due(at(1100), start), start + milliseconds(50));
+  EXPECT_EQ(pace.due(at(1050), start), start + milliseconds(50)) << "a recording whose time goes back";
+  EXPECT_EQ(pace.due(at(61050), start), start + milliseconds(50 + 2500));
+  pace.begin_again();
+  EXPECT_EQ(pace.due(at(1000), start), start + milliseconds(50 + 2500 + 50));
+  EXPECT_EQ(pace.due(at(1100), start + milliseconds(9000)), start + milliseconds(9000));
+  EXPECT_EQ(pace.due(at(1200), start + milliseconds(9100)), start + milliseconds(9050)) << "a little late is made up for";
+  ReplayPace untimed(1, milliseconds(100));
+  EXPECT_EQ(untimed.due({}, start), start);
+  EXPECT_EQ(untimed.due({}, start), start + milliseconds(100));
+}
+
+}  // namespace
+}  // namespace sonar
