@@ -24,7 +24,7 @@ sonars:
     mount: {mount}
     bind_ip: {address}
     status_to: [{address}]
-poses: {{protobuf: "{address}:14770", json: "{address}:14771"}}
+poses: {{protobuf: "{address}:14770", json: "{address}:14771"{poses}}}
 control: {{stream: "{address}:14770", http: "{http}"{control}}}
 {more}
 """
@@ -43,12 +43,14 @@ class Sonard:
     """with Sonard(scene="demo.yaml") as daemon: ... daemon.address"""
 
     def __init__(self, scene="demo.yaml", profile="oculus-m1200d", pose="{frame: ENU_FLU, xyz_m: [-7, 0, -3]}",
-                 mount="{frame: FLU, xyz_m: [0, 0, 0]}", trajectory="", more="", control="", http="", arguments=()):
+                 mount="{frame: FLU, xyz_m: [0, 0, 0]}", trajectory="", more="", control="", http="", poses="",
+                 arguments=()):
         self.folder = tempfile.TemporaryDirectory()
         self.scene, self.profile, self.pose, self.mount = ROOT / "scenes" / scene, profile, pose, mount
         self.trajectory = f", trajectory: {trajectory}" if trajectory else ""
         self.control = control  # more of that section: ", token_file: token"
         self.http = http  # empty: port 8088 of the address
+        self.poses = poses  # as control; ADDRESS in it becomes the daemon's
         self.more, self.arguments = more, [str(a) for a in arguments]
 
     def __enter__(self):
@@ -68,7 +70,8 @@ class Sonard:
         config = pathlib.Path(self.folder.name) / "sonard.yaml"
         config.write_text(CONFIG.format(address=self.address, scene=self.scene, profile=self.profile, pose=self.pose,
                                         mount=self.mount, trajectory=self.trajectory, more=self.more, control=self.control,
-                                        http=self.http or f"{self.address}:8088"),
+                                        http=self.http or f"{self.address}:8088",
+                                        poses=self.poses.replace("ADDRESS", self.address)),
                           encoding="utf-8")
         self.log_path = pathlib.Path(self.folder.name) / "log"
         with open(self.log_path, "wb") as log:

@@ -1,0 +1,241 @@
+"""An autopilot that speaks MAVLink drives a sonar along a square: the picture shows point targets where the true poses say.
+
+The vehicle is mavlink_frames.py, written from the message definitions; pings are read by the Python client, and the moment of each
+ping comes from the daemon's events. Only pings are judged whose pose had arrived in time: what a busy computer sends late is
+another question (tests/daemon/world_test.cpp).
+"""
+import math
+import pathlib
+import socket
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+import mavlink_frames
+from running_sonard import ROOT, Sonard, run, SONARD
+
+sys.path.insert(0, str(ROOT / "clients/python"))
+from sonard_client import Control, OculusClient  # noqa: E402
+
+SIDE_M, LEG_S, TURN_S, DEPTH_M = 1.0, 1.2, 2.0, 3.0
+START_S = 1.0  # at rest before it goes
+SALINITY = 30.0  # as the water's, so that the device believes the water's sound speed
+RANGE_M, FIELD_DEG = 8.0, 50  # targets farther to the side are left out
+RING_M, TARGETS = 4.5, 10  # round the square's middle
+OLDEST_POSE_S = 0.04  # before a ping
+GOLDEN = ROOT / "tests/protocol/mavlink/golden/frames.txt"
+
+
+def eased(u):
+    """From 0 to 1, with velocity 0 at both ends; and its derivative."""
+    u = min(max(u, 0.0), 1.0)
+    return (1 - math.cos(math.pi * u)) / 2, math.pi / 2 * math.sin(math.pi * u)
+
+
+class Path:
+    """Where the vehicle truly is: north, east, heading clockwise from north, and the rates of all three."""
+    DURATION_S = START_S + 4 * (LEG_S + TURN_S)
+
+    def __call__(self, t):
+        north, east, heading = -SIDE_M / 2, -SIDE_M / 2, 0.0
+        t -= START_S
+        for _ in range(4):
+            share, rate = eased(t / LEG_S)
+            ahead = math.cos(heading), math.sin(heading)
+            north, east = north + SIDE_M * share * ahead[0], east + SIDE_M * share * ahead[1]
+            if t < LEG_S:
+                speed = SIDE_M * rate / LEG_S if t > 0 else 0.0
+                return north, east, heading, speed * ahead[0], speed * ahead[1], 0.0
+            t -= LEG_S
+            share, rate = eased(t / TURN_S)
+            heading += math.pi / 2 * share
+            if t < TURN_S:
+                return north, east, heading, 0.0, 0.0, math.pi / 2 * rate / TURN_S
+            t -= TURN_S
+        return north, east, heading, 0.0, 0.0, 0.0
+
+
+class Vehicle(threading.Thread):
+    """Sends attitudes and, 7 ms later, positions, 50 times a second, along the path; remembers when each left."""
+
+    def __init__(self, address, port):
+        super().__init__(daemon=True)
+        self.to, self.path, self.sent = (address, port), Path(), []
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.settimeout(0)
+        self.say = mavlink_frames.Speaker(system=1, component=1)
+        self.began_unix, self.began = time.time(), time.monotonic()  # one reading: the clock on the wall may be set meanwhile
+        self.heard = []
+        self.end = threading.Event()
+
+    def now(self):
+        return time.monotonic() - self.began
+
+    def send(self, message, **values):
+        self.socket.sendto(self.say(message, **values), self.to)
+
+    def run(self):
+        beat = -1
+        while not self.end.is_set():
+            t = round(self.now(), 3)
+            _, _, heading, _, _, turn = self.path(t)
+            if int(t) > beat:
+                beat = int(t)
+                self.send("HEARTBEAT", type=12, autopilot=3, base_mode=81, system_status=4, mavlink_version=3)
+            self.send("ATTITUDE", time_boot_ms=round(1000 * t) + 5000, yaw=math.remainder(heading, 2 * math.pi), yawspeed=turn)
+            time.sleep(0.007)
+            t = round(self.now(), 3)
+            north, east, _, to_north, to_east, _ = self.path(t)
+            self.send("LOCAL_POSITION_NED", time_boot_ms=round(1000 * t) + 5000, x=north, y=east, z=DEPTH_M, vx=to_north, vy=to_east)
+            self.sent.append((t, self.now()))
+            self.listen()
+            time.sleep(0.012)
+
+    def listen(self):
+        try:
+            while True:
+                self.heard += list(mavlink_frames.read_frames(self.socket.recv(2048)))
+        except BlockingIOError:
+            pass
+
+    def stop(self):
+        self.end.set()
+        self.join(10)
+        self.socket.close()
+
+    def has_fresh_pose_at(self, t):
+        """A pose not older than OLDEST_POSE_S had left, and had 5 ms to arrive."""
+        return any(stamp >= t - OLDEST_POSE_S for stamp, left in self.sent if left <= t - 0.005)
+
+
+def target(i):
+    """East, north."""
+    angle = 2 * math.pi * (i + 0.25) / TARGETS
+    return RING_M * math.cos(angle), RING_M * math.sin(angle)
+
+
+def scene():
+    points = "\n".join(f"  - {{name: t{i}, type: point, target_strength_db: -15, pose: {{xyz_m: [{target(i)[0]}, {target(i)[1]}, {-DEPTH_M}]}}}}"
+                       for i in range(TARGETS))
+    return f"name: ring\nobjects:\n{points}\n"
+
+
+def expected(ping, pose, place):
+    """Row and beam, both with fractions, or nothing when it is out of the field."""
+    north, east, heading = pose[:3]
+    to_north, to_east = place[1] - north, place[0] - east
+    ahead = to_north * math.cos(heading) + to_east * math.sin(heading)
+    port = to_north * math.sin(heading) - to_east * math.cos(heading)
+    range_m, azimuth = math.hypot(ahead, port), math.atan2(port, ahead)
+    if abs(azimuth) > math.radians(FIELD_DEG) or not 1 < range_m < RANGE_M - 0.5:
+        return None
+    azimuths = [float(a) for a in ping.azimuths_rad]  # falling: beam 0 is most to port
+    beam = next(b for b in range(len(azimuths) - 1) if azimuths[b + 1] <= azimuth)
+    return range_m / ping.row_m - 0.5, beam + (azimuths[beam] - azimuth) / (azimuths[beam] - azimuths[beam + 1])
+
+
+def found_near(ping, place):
+    """The centre of the echo round the brightest sample near a place."""
+    row, beam = (int(round(x)) for x in place)
+    rows = range(max(row - 8, 0), min(row + 9, ping.rows))
+    beams = range(max(beam - 8, 0), min(beam + 9, ping.beams))
+    image = {(r, b): int(ping.samples[r, b]) for r in rows for b in beams}
+    top = max(image, key=image.get)
+    bright = [(v * v, r, b) for (r, b), v in image.items() if abs(r - top[0]) <= 3 and abs(b - top[1]) <= 4 and v > image[top] / 3]
+    weight = sum(w for w, _, _ in bright)
+    return sum(w * r for w, r, _ in bright) / weight, sum(w * b for w, _, b in bright) / weight, image[top]
+
+
+class Mavlink(unittest.TestCase):
+    def test_the_golden_frames_are_what_the_generator_prints(self):
+        self.assertEqual(GOLDEN.read_text(encoding="utf-8").splitlines(), list(mavlink_frames.golden_lines()))
+
+    def test_a_square_under_an_autopilot(self):
+        with tempfile.TemporaryDirectory() as folder:
+            ring = pathlib.Path(folder) / "ring.yaml"
+            ring.write_text(scene(), encoding="utf-8")
+            # Without motion within a ping, so that one pose says where everything is.
+            with Sonard(scene=ring, pose=f"{{frame: ENU_FLU, xyz_m: [0, 0, {-DEPTH_M}]}}", more="engine: {noise: off, motion: off}",
+                        poses=", mavlink: 'udpin:ADDRESS:14551'") as daemon:
+                self.drive(daemon)
+
+    def drive(self, daemon):
+        fired_at, pings = {}, []
+        control = Control(daemon.address)
+        events = control.events(pings=True, timeout=20)
+        listener = threading.Thread(target=self.collect, args=(events, fired_at), daemon=True)
+        listener.start()
+        vehicle = Vehicle(daemon.address, 14551)
+        vehicle.start()
+        try:
+            with OculusClient(daemon.address) as sonar:
+                sonar.fire(range_m=RANGE_M, rate_hz=10, gain_percent=20, mode=1, beams=256, bits=16, gamma=255, salinity=SALINITY)
+                while vehicle.now() < Path.DURATION_S:
+                    pings.append(sonar.ping(timeout=20))
+            status = control.status()["vehicles"][0]
+        finally:
+            vehicle.stop()
+            events.close()
+            listener.join(10)
+        self.assertIn("system 1 LOCAL_POSITION_NED and attitude", status["source"])
+        self.assertIn("system 1 (ArduPilot) sends HEARTBEAT, ATTITUDE, LOCAL_POSITION_NED; poses from LOCAL_POSITION_NED and attitude",
+                      daemon.log())
+        names = [name for name, _ in vehicle.heard]
+        self.assertGreaterEqual(names.count("HEARTBEAT"), 3)
+        self.assertEqual(set(names), {"HEARTBEAT"}, "nothing is asked of an autopilot unless the configuration says so")
+        self.assertTrue(all(v["autopilot"] == 8 and v["type"] == 18 and v["system"] == 1 for _, v in vehicle.heard))
+        self.judge(vehicle, pings, fired_at)
+
+    @staticmethod
+    def collect(events, fired_at):
+        try:
+            for event in events:
+                if "ping" in event:
+                    fired_at[event["ping"]["number"]] = event["ping"]["fired_at_ns"]
+        except (OSError, ValueError, AttributeError):
+            pass  # closed
+
+    def judge(self, vehicle, pings, fired_at):
+        judged, seen, headings = 0, [], set()
+        for ping in pings:
+            if ping.number not in fired_at:
+                continue
+            t = fired_at[ping.number] / 1e9 - vehicle.began_unix
+            if t < START_S / 2 or not vehicle.has_fresh_pose_at(t):
+                continue
+            pose = vehicle.path(t)
+            off_deg = math.degrees(math.remainder(math.radians(ping.heading_deg) - pose[2], 2 * math.pi))
+            self.assertLess(abs(off_deg), 0.3, f"heading at {t:.3f} s")
+            judged += 1
+            headings.add(round(pose[2] / (math.pi / 2)) % 4)
+            for i in range(TARGETS):
+                place = expected(ping, pose, target(i))
+                if place is None:
+                    continue
+                row, beam, value = found_near(ping, place)
+                where = f"target {i} at {t:.3f} s: row {row:.2f}, beam {beam:.2f}; by the true pose {place[0]:.2f}, {place[1]:.2f}"
+                self.assertGreater(value, 0, where)
+                seen.append((abs(row - place[0]), abs(beam - place[1])))
+                self.assertLessEqual(seen[-1][0], 1.0, where)
+                self.assertLessEqual(seen[-1][1], 0.5, where)
+        print(f"{judged} of {len(pings)} pings, {len(seen)} echoes: rows off by {max(r for r, _ in seen):.2f} at most, "
+              f"beams by {max(b for _, b in seen):.2f}")
+        self.assertGreaterEqual(judged, 20)
+        self.assertEqual(headings, {0, 1, 2, 3}, "every side of the square")
+        self.assertGreaterEqual(len(seen), 40)
+
+    def test_a_listener_for_everybody_is_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            config = pathlib.Path(folder) / "sonard.yaml"
+            config.write_text("world: {scene: demo.yaml}\nvehicles: [{name: rov}]\n"
+                              "sonars: [{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}]\n"
+                              "poses: {mavlink: 'udpin:0.0.0.0:14551'}\n", encoding="utf-8")
+            result = run(SONARD, "check", config)
+            self.assertEqual(result.returncode, 78)
+            self.assertIn("poses.mavlink: poses from other computers need poses.allow_from", result.stdout + result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
