@@ -39,7 +39,8 @@ struct Following {
   }
 
   void tell_first(const ignition::msgs::Pose_V& message) const {
-    std::fprintf(stderr, "gazebo_bridge: %d poses in the first message, %zu of the models followed\n", message.pose_size(), sent);
+    std::fprintf(stderr, "gazebo_bridge: %d poses in the first message, %zu of %zu models followed\n", message.pose_size(), sent,
+                 models.size());
     if (sent == models.size()) return;
     std::fprintf(stderr, "gazebo_bridge: not all of them are there; it has:");
     for (int i = 0; i < message.pose_size(); ++i) std::fprintf(stderr, " %s", message.pose(i).name().c_str());

@@ -1,7 +1,7 @@
 """Between ROS and sonard, without ROS: frames, the pose as a line of JSON, and what the daemon says of its vehicles.
 
-sonard's world is ENU and its body FLU, as ROS has both by REP 103: poses pass as they are, but ROS writes quaternions x, y, z, w and
-sonard w, x, y, z. Images of marine_acoustic_msgs are in a frame of their own: z ahead in the middle of the fan, x up, so y to
+sonard's world is ENU and its body FLU, as ROS has both by REP 103: poses pass as they are, but ROS writes quaternions x, y, z, w
+and sonard w, x, y, z. Images of marine_acoustic_msgs are in a frame of their own: z ahead in the middle of the fan, x up, so y to
 starboard.
 """
 from __future__ import annotations
