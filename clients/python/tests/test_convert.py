@@ -157,6 +157,13 @@ class Telemetry(WithFolder):
                     self.assert_way(track, range(49), t0=25, metres=1e-5, radians=1e-5)
                     self.assertEqual(track.comments[0], "origin: 47.60000000,-122.33000000,10.000")
 
+    def test_a_vehicle_that_starts_again_goes_on_in_time(self):
+        again = made.telemetry_log(began_s=1_700_000_060, boot_s=3)
+        rows = self.convert(made.telemetry_log() + again).rows
+        self.assertEqual(len(rows), 99)  # one between the two: a position on either side of it
+        self.assertAlmostEqual(rows[-1].t_s - rows[0].t_s, 64.8, delta=0.02)
+        self.assertIn("started again (1 x)", self.warned[0])
+
     def test_what_is_better_goes_first(self):
         all_of_it = ("ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "SIM_STATE", "ODOMETRY")
         log = made.telemetry_log(all_of_it)
@@ -258,6 +265,19 @@ class Recordings(WithFolder):
         track = self.convert(made.mcap([self.channel(nested, "Pose", encoding="json")]))
         self.assertEqual(track.frame, "ENU_FLU")
         self.assert_way(track, range(30), t0=100, radians=1e-6)
+
+    def test_a_recording_of_sonard_itself(self):
+        """The texts are those of docs/recording.md: pictures beside poses."""
+        def pose(step):
+            t, (x, y, z), (a, b, c, d) = made.enu_moment(step)
+            return (f'{{"timestamp":{{"sec":100,"nsec":{round(1e9 * t)}}},"frame_id":"world","pose":'
+                    f'{{"position":{{"x":{x},"y":{y},"z":{z}}},"orientation":{{"x":{a},"y":{b},"z":{c},"w":{d}}}}}}}').encode()
+
+        image = self.channel(lambda step: b'{"data":"' + bytes(1000) + b'"}', "foxglove.RawImage", "/front/image", "json", 10)
+        log = made.mcap([image, self.channel(pose, "foxglove.PoseInFrame", "/front/pose", "json", 10)])
+        track = self.convert(log)
+        self.assertEqual((track.source, track.frame, self.warned), ("/front/pose", "ENU_FLU", []))
+        self.assert_way(track, range(10), t0=100, radians=1e-6)
 
     def test_poses_of_the_foxglove_schemas(self):
         def part(field, content):

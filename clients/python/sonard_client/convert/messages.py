@@ -25,7 +25,9 @@ class Found(NamedTuple):
 def may_hold_poses(encoding: str, schema: str) -> bool:
     if encoding in ("cdr", "ros1"):
         return bool(kind_of(schema))
-    return encoding == "json" or (encoding == "protobuf" and schema in FOXGLOVE)
+    if encoding == "json":  # other schemas of these two are images and ranges: long to read, and no poses
+        return schema in FOXGLOVE or not schema.startswith(("foxglove.", "sonard."))
+    return encoding == "protobuf" and schema in FOXGLOVE
 
 
 def poses_in(topic: str, encoding: str, schema: str, data: bytes) -> List[Found]:

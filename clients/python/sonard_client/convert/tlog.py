@@ -13,6 +13,7 @@ from .mavlink import LOCAL_FRD, LOCAL_NED, MESSAGES, Frame, fields_of, frame_len
 from .track import ConvertError, Source, Stream, Track, Warn, chosen, track_of
 
 STAMP_BYTES = 8
+RESTART_S = 5.0  # frames that come late by less are only late
 FULL = ("ODOMETRY", "SIM_STATE", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE")
 ATTITUDES, POSITIONS = ("ATTITUDE_QUATERNION", "ATTITUDE"), ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
 
@@ -80,6 +81,9 @@ class _Vehicle:
         self.positions: "Dict[str, Stream]" = {}
         self.origin: Optional[Geodetic] = None
         self.frames: Dict[str, int] = {}  # frame_ids of ODOMETRY that are passed over, and FRD
+        self.restarts = 0
+        self._boot: "Optional[Tuple[float, float]]" = None  # the last time since start, and when it arrived
+        self._before_s = 0.0  # what times since start are counted from, after a restart
 
     def take(self, logged: Logged) -> None:
         fields = fields_of(logged.frame)
@@ -91,7 +95,7 @@ class _Vehicle:
             self.origin = self.origin or (place if place.is_fix else None)
             return
         # Attitude and position are paired by the vehicle's clock where both carry it; otherwise arrival has to do.
-        t = 1e-3 * fields["time_boot_ms"] if "time_boot_ms" in fields else \
+        t = self._since_start(1e-3 * fields["time_boot_ms"], logged.arrived_s) if "time_boot_ms" in fields else \
             1e-6 * fields["time_usec"] if fields.get("time_usec") else logged.arrived_s
         attitude: Optional[Quaternion] = None
         position: "Optional[tuple]" = None
@@ -117,6 +121,14 @@ class _Vehicle:
             self.attitudes.setdefault(name, []).append((t, attitude))
         if position is not None:
             self.positions.setdefault(name, []).append((t, position))
+
+    def _since_start(self, boot_s: float, arrived_s: float) -> float:
+        """Goes on by the time of arrival when the vehicle starts again."""
+        if self._boot is not None and boot_s < self._boot[0] - RESTART_S:
+            self._before_s += self._boot[0] - boot_s + max(0.0, arrived_s - self._boot[1])
+            self.restarts += 1
+        self._boot = boot_s, arrived_s
+        return self._before_s + boot_s
 
     def sources(self) -> List[Source]:
         pairs = [(n, n) for n in FULL[:2]] + [(a, p) for p in POSITIONS for a in ATTITUDES] + [(n, n) for n in FULL[2:]]
@@ -158,6 +170,8 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
     if vehicle.frames:
         warn("ODOMETRY of frames " + ", ".join(f"{k} ({n} messages)" for k, n in sorted(vehicle.frames.items())) +
              " was left out: only local NED and FRD (1 and 20) are read")
+    if vehicle.restarts:
+        warn(f"the vehicle started again ({vehicle.restarts} x); its clock is carried on by the times of arrival")
     local = not isinstance(wanted.positions[0][1], Geodetic)
     of_local = vehicle.origin if local and wanted.name.endswith("LOCAL_POSITION_NED") else None
     return track_of(wanted, str(path), warn, origin, of_local)
