@@ -1,22 +1,16 @@
 """Logs made by hand, converted: poses against the way they were made from; whatever is cut off or changed ends in poses or in one
 sentence."""
-import bz2
 import contextlib
 import io
-import json
 import math
-import pathlib
 import random
-import struct
-import tempfile
 import unittest
 from unittest import mock
 
-import common  # noqa: F401  puts the package on the path
 import made_logs as made
+from converted import WithFolder
 
-from sonard_client.convert import ConvertError, Geodetic, convert, format_of
-from sonard_client.convert import compression
+from sonard_client.convert import ConvertError, Geodetic, format_of
 from sonard_client.convert.__main__ import main
 from sonard_client.convert.mavlink import crc
 from sonard_client.geodesy import LocalPlane, ecef, parse_origin
@@ -24,38 +18,6 @@ from sonard_client.nmea import Assumptions
 from sonard_client.rotations import between, quaternion_from_rpy
 
 HERE = Geodetic(*made.ORIGIN)
-
-
-class WithFolder(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.warned = []
-
-    def file(self, data, name="log"):
-        path = self.folder / name
-        path.write_bytes(data if isinstance(data, bytes) else data.encode())
-        return path
-
-    def convert(self, data, **how):
-        self.warned = []
-        return convert(self.file(data), warn=self.warned.append, **how)
-
-    def assert_way(self, track, steps, every=1, t0=0.0, metres=0.01, radians=2e-4, origin_down=0.0):
-        """track is the way of made_logs.moment(), in NED_FRD or ENU_FLU; angles to a rounded hundredth of a degree."""
-        self.assertEqual(len(track.rows), len(steps), track.rows[:2])
-        for row, step in zip(track.rows, steps):
-            t, north, east, down, roll, pitch, yaw = made.moment(step)
-            position, turn = (north, east, down - origin_down), made.quaternion(roll, pitch, yaw)
-            if track.frame == "ENU_FLU":
-                _, position, xyzw = made.enu_moment(step)
-                turn = xyzw[3], xyzw[0], xyzw[1], xyzw[2]
-            self.assertAlmostEqual(row.t_s, t0 + t, delta=0.0051)
-            for got, wanted in zip(row.position_m, position):
-                self.assertAlmostEqual(got, wanted, delta=metres)
-            cosine = abs(sum(a * b for a, b in zip(row.orientation, turn)))
-            self.assertLess(2 * math.acos(min(1.0, cosine)), radians)
 
 
 class Geodesy(unittest.TestCase):
@@ -215,137 +177,6 @@ class Telemetry(WithFolder):
         values = (3, north, east, down, *made.quaternion(*angles), *[0] * 6, 21, 8, 0, 0, 0)
         with self.assertRaises(ConvertError):
             self.convert(bytes(8) + made.mavlink_frame("ODOMETRY", values))
-
-
-class Recordings(WithFolder):
-    def channel(self, maker, schema, topic="/odom", encoding="cdr", steps=30, **how):
-        return topic, encoding, schema, [(5000 + made.STEP_S * i, maker(i, **how)) for i in range(steps)]
-
-    def test_every_ros_message_with_a_pose(self):
-        for maker, schema, topic in ((made.odometry, "nav_msgs/msg/Odometry", "/odom"),
-                                     (made.pose_stamped, "geometry_msgs/msg/PoseStamped", "/odom"),
-                                     (made.transforms, "tf2_msgs/msg/TFMessage", "/odom odom->base_link")):
-            for how in ({}, {"big": True}, {"ros1": True}):
-                with self.subTest(schema, **how):
-                    encoding = "ros1" if how.get("ros1") else "cdr"
-                    track = self.convert(made.mcap([self.channel(maker, schema, encoding=encoding, **how)]), topic=topic)
-                    self.assertEqual((track.frame, track.source, self.warned), ("ENU_FLU", topic, []))
-                    self.assert_way(track, range(30), t0=100, metres=1e-9, radians=1e-6)
-
-    def test_without_a_stamp_the_time_of_recording_counts(self):
-        data = made.mcap([self.channel(made.pose_stamped, "geometry_msgs/msg/PoseStamped", t0=0)], chunked=False)
-        self.assert_way(self.convert(data), range(30), t0=5000, radians=1e-6)
-
-    def test_odometry_goes_before_poses_and_doubt_is_an_error(self):
-        odometry = self.channel(made.odometry, "nav_msgs/msg/Odometry")
-        pose = self.channel(made.pose_stamped, "geometry_msgs/msg/PoseStamped", "/pose")
-        self.assertEqual(self.convert(made.mcap([pose, odometry])).source, "/odom")
-        self.assertEqual(self.convert(made.mcap([pose, odometry]), topic="/pose").source, "/pose")
-        second = self.channel(made.odometry, "nav_msgs/msg/Odometry", "/other")
-        with self.assertRaisesRegex(ConvertError, r"'/odom' \(30 poses\), '/other' \(30 poses\); say which"):
-            self.convert(made.mcap([odometry, second]))
-        with self.assertRaisesRegex(ConvertError, "no poses on topic '/nowhere'"):
-            self.convert(made.mcap([odometry]), topic="/nowhere")
-        with self.assertRaisesRegex(ConvertError, "no poses: no message"):
-            self.convert(made.mcap([self.channel(made.odometry, "sensor_msgs/msg/Imu")]))
-
-    def test_json_poses(self):
-        def line(step):
-            t, north, east, down, roll, pitch, yaw = made.moment(step)
-            return json.dumps({"timestamp": t, "position": [north, east, down], "attitude": [roll, pitch, yaw]}).encode()
-
-        def nested(step):
-            t, (x, y, z), (a, b, c, d) = made.enu_moment(step)
-            pose = {"position": {"x": x, "y": y, "z": z}, "orientation": {"x": a, "y": b, "z": c, "w": d}}
-            return json.dumps({"header": {"stamp": {"sec": 100, "nanosec": round(1e9 * t)}}, "pose": {"pose": pose}}).encode()
-
-        track = self.convert(made.mcap([self.channel(line, "", encoding="json")]))
-        self.assertEqual(track.frame, "NED_FRD")
-        self.assert_way(track, range(30), radians=1e-6)
-        track = self.convert(made.mcap([self.channel(nested, "Pose", encoding="json")]))
-        self.assertEqual(track.frame, "ENU_FLU")
-        self.assert_way(track, range(30), t0=100, radians=1e-6)
-
-    def test_a_recording_of_sonard_itself(self):
-        """The texts are those of docs/recording.md: pictures beside poses."""
-        def pose(step):
-            t, (x, y, z), (a, b, c, d) = made.enu_moment(step)
-            return (f'{{"timestamp":{{"sec":100,"nsec":{round(1e9 * t)}}},"frame_id":"world","pose":'
-                    f'{{"position":{{"x":{x},"y":{y},"z":{z}}},"orientation":{{"x":{a},"y":{b},"z":{c},"w":{d}}}}}}}').encode()
-
-        image = self.channel(lambda step: b'{"data":"' + bytes(1000) + b'"}', "foxglove.RawImage", "/front/image", "json", 10)
-        log = made.mcap([image, self.channel(pose, "foxglove.PoseInFrame", "/front/pose", "json", 10)])
-        track = self.convert(log)
-        self.assertEqual((track.source, track.frame, self.warned), ("/front/pose", "ENU_FLU", []))
-        self.assert_way(track, range(10), t0=100, radians=1e-6)
-
-    def test_poses_of_the_foxglove_schemas(self):
-        def part(field, content):
-            return bytes((field << 3 | 2, len(content))) + content
-
-        def doubles(values):
-            return b"".join(bytes((i << 3 | 1,)) + struct.pack("<d", v) for i, v in enumerate(values, 1) if v)
-
-        def in_frame(step):
-            _, position, xyzw = made.enu_moment(step)
-            return part(1, b"\x08\x64\x10\x07") + part(2, b"map") + part(3, part(1, doubles(position)) + part(2, doubles(xyzw)))
-
-        def transform(step):
-            _, position, xyzw = made.enu_moment(step)
-            return part(2, b"map") + part(3, b"rov") + part(4, doubles(position)) + part(5, doubles(xyzw))
-
-        track = self.convert(made.mcap([self.channel(in_frame, "foxglove.PoseInFrame", encoding="protobuf", steps=1)]))
-        self.assert_way(track, range(1), t0=100, radians=1e-6)
-        track = self.convert(made.mcap([self.channel(transform, "foxglove.FrameTransform", encoding="protobuf")]))
-        self.assertEqual(track.source, "/odom map->rov")
-        self.assert_way(track, range(30), t0=5000, radians=1e-6)
-
-    def test_a_recording_that_was_not_closed_or_breaks_off(self):
-        data = made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], closed=False)
-        self.assertEqual(len(self.convert(data).rows), 30)
-        self.assertIn("was not closed", self.warned[0])
-        self.assertEqual(len(self.convert(data[:-1]).rows), 20)
-        self.assertRegex(self.warned[0], "ends within a record, at byte [0-9]+")
-
-    def test_a_chunk_whose_checksum_is_wrong_is_left_out(self):
-        data = bytearray(made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")]))
-        data[len(data) // 2] ^= 1
-        self.assertEqual(len(self.convert(bytes(data)).rows), 20)
-        self.assertRegex(self.warned[0], "at byte [0-9]+: a chunk cannot be read: the checksum .* 1 chunks were left out")
-
-    def test_a_message_that_is_too_short_is_named(self):
-        channel = self.channel(made.odometry, "nav_msgs/msg/Odometry")
-        channel[3][4] = (channel[3][4][0], channel[3][4][1][:60])
-        self.assertEqual(len(self.convert(made.mcap([channel])).rows), 29)
-        self.assertRegex(self.warned[0], "at byte [0-9]+, topic /odom: ends after 60 bytes")
-
-    def test_compressed_chunks_need_their_module(self):
-        class Backwards:  # stands for a module that may not be here
-            @staticmethod
-            def decompress(data):
-                return data[::-1]
-        data = made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], compress=("lz4", lambda d: d[::-1]))
-        with mock.patch.object(compression, "_module", lambda *names: Backwards if names == ("lz4.frame",) else None):
-            self.assertEqual(len(self.convert(data).rows), 30)
-        for kind, package in (("lz4", "python3-lz4"), ("zstd", "python3-zstandard")):
-            data = made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], compress=(kind, lambda d: d[::-1]))
-            with mock.patch.object(compression, "_module", lambda *names: None), \
-                    self.assertRaisesRegex(ConvertError, f"at byte [0-9]+: a chunk is compressed by {kind}: install {package}"):
-                self.convert(data)
-        with self.assertRaisesRegex(ConvertError, "compressed by 'rar', which is not known"):
-            self.convert(made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], compress=("rar", lambda d: d)))
-
-    def test_bags(self):
-        told = [(5000 + made.STEP_S * i, made.odometry(i, ros1=True)) for i in range(30)]
-        for kind, pack in (("none", lambda d: d), ("bz2", bz2.compress)):
-            with self.subTest(kind):
-                data = made.bag([("/odom", "nav_msgs/Odometry", told), ("/imu", "sensor_msgs/Imu", [(1, b"")])], kind, pack)
-                track = self.convert(data)
-                self.assertEqual((track.frame, track.source, self.warned), ("ENU_FLU", "/odom", []))
-                self.assert_way(track, range(30), t0=100, metres=1e-9, radians=1e-6)
-        with self.assertRaisesRegex(ConvertError, "no poses"):
-            self.convert(data[:-10])
-        self.assertIn("ends within a record", self.warned[0])
 
 
 class Nmea(WithFolder):
