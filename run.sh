@@ -19,7 +19,7 @@ case "${1:-}" in
     ;;
   --package)
     # What the packages depend on is read from the programs by tools of dpkg-dev; without them it would be left out.
-    setup_and_build && need_packages dpkg-dev && cd build/release && cpack -G DEB && say "packages" && ls -1 "$PWD"/*.deb
+    setup_and_build installed && need_packages dpkg-dev && cd build/release && cpack -G DEB && say "packages" && ls -1 "$PWD"/*.deb
     exit
     ;;
 esac

@@ -54,6 +54,13 @@ endif()
 install(FILES ${changelogs} DESTINATION ${documents} COMPONENT sonard)
 install(FILES ${changelogs} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
 
+# Everything above that is built; what ./run.sh --package asks for.
+add_custom_target(installed)
+add_dependencies(installed sonard sonarctl bvtsdk3 bvtsdk3_colour_maps bvtsdk4 bvtsdk4_colour_maps)
+if(SONAR_GZIP)
+  add_dependencies(installed package_documents)
+endif()
+
 # ---- the packages: one for the daemon and its tools, one for those who build BlueView drivers
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME sonard)
