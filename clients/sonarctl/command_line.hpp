@@ -19,6 +19,7 @@ using Run = std::function<Result<void>()>;
 Run add_listen(CLI::App& app);
 Run add_view(CLI::App& app);
 Run add_stats(CLI::App& app);
+Run add_record(CLI::App& app);
 Run add_pose(CLI::App& app);
 Run add_doctor(CLI::App& app);
 Run add_status(CLI::App& app);

@@ -121,6 +121,7 @@ class Driver {
       const std::size_t n = socket_.read_some(asio::buffer(block.data(), std::min(block.size(), most - bytes.size())), ec);
       bytes.insert(bytes.end(), block.begin(), block.begin() + static_cast<std::ptrdiff_t>(n));
     }
+    if (ec) socket_.close(ec);  // as drivers do at the end of the stream
     return bytes;
   }
   void send(const Bytes& bytes) { asio::write(socket_, asio::buffer(bytes)); }

@@ -85,8 +85,8 @@ Result<void> McapSession::write(const Piece& piece) {
   return ping && ping->has_image ? write_json(image_, piece.at, mcap::image_json(piece.at, sonar_, *ping)) : Result<void>{};
 }
 
-Result<void> McapSession::write_pose(Time at, const Pose& sonar_in_world) {
-  return write_json(pose_, at, mcap::pose_json(at, "world", sonar_in_world));
+Result<void> McapSession::write_pose(Time at, Time of, const Pose& sonar_in_world) {
+  return write_json(pose_, at, mcap::pose_json(of, "world", sonar_in_world));
 }
 
 Result<void> McapSession::write_truth(Time at, const mcap::PingTruth& truth) {

@@ -17,8 +17,8 @@ class McapSession final : public PieceWriter {
   McapSession(std::unique_ptr<Sink> sink, std::string sonar);
 
   Result<void> write(const Piece& piece) override;
-  /// Where the sonar was. `at` as in Piece: never before what was written last.
-  Result<void> write_pose(Time at, const Pose& sonar_in_world);
+  /// Where the sonar was, and when. `at` as in Piece: never before what was written last.
+  Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
   Result<void> write_truth(Time at, const mcap::PingTruth& truth);
   Result<void> close() override { return writer_.close(); }
 

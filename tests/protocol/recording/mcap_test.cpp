@@ -19,7 +19,7 @@ Bytes session(const std::vector<Piece>& pieces, bool closed = true) {
   Bytes file;
   McapSession writer(sink_into(file), "front");
   for (const Piece& piece : pieces) EXPECT_TRUE(writer.write(piece));
-  EXPECT_TRUE(writer.write_pose(after_ms(9000), {{1.5, -2, -3.25}, {1, 0, 0, 0}}));
+  EXPECT_TRUE(writer.write_pose(after_ms(9000), after_ms(9000), {{1.5, -2, -3.25}, {1, 0, 0, 0}}));
   const std::vector<BeamTruth> beams{{12.5f, 3}, {}, {0.25f, 0}};
   EXPECT_TRUE(writer.write_truth(after_ms(9000), {7, after_ms(8999), {}, beams}));
   if (closed) {
