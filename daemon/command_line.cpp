@@ -86,7 +86,7 @@ std::string unknown_command(std::string_view word) {
   std::error_code ec;
   const bool like_a_file = word.find_first_of("./") != std::string_view::npos || std::filesystem::exists(word, ec);
   if (word.empty() || word[0] == '-' || like_a_file) return {};
-  constexpr std::array<std::string_view, 4> commands{"run", "check", "render", "bench"};
+  constexpr std::array<std::string_view, 5> commands{"run", "check", "render", "replay", "bench"};
   return "there is no command or file \"" + std::string(word) + "\"" + text::suggestion(word, commands, "the commands are");
 }
 
@@ -101,8 +101,9 @@ Command parse_command_line(int argc, char** argv) {
   RunCommand run;
   CheckCommand check;
   RenderCommand render;
+  ReplayCommand replay;
   // `sonard CONFIG` is `sonard run CONFIG`: the word may be left out.
-  constexpr std::array<std::string_view, 3> words{"run", "check", "render"};
+  constexpr std::array<std::string_view, 4> words{"run", "check", "render", "replay"};
   const bool bare = argc < 2 || std::find(words.begin(), words.end(), argv[1]) == words.end();
   if (bare) {
     add_run_options(app, run);
@@ -110,7 +111,7 @@ Command parse_command_line(int argc, char** argv) {
         "examples:\n"
         "  sonard                           the configuration found in the usual places, else the demo\n"
         "  sonard my.yaml --log-level debug\n"
-        "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, bench; each has --help.\n"
+        "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, replay FILE, bench; each has --help.\n"
         "Oculus sonars are wire-compatible. BlueView sonars are compatible with the vendor's SDK by libraries of our own, not on "
         "the wire. Not affiliated with either vendor.");
   } else {
@@ -126,6 +127,7 @@ Command parse_command_line(int argc, char** argv) {
         "examples:\n  sonard render my.yaml --out pings --pings 5 --format npy,png\n  sonard render my.yaml "
         "--check-expectations");
     add_render_options(render_app, render);
+    add_replay_options(*app.add_subcommand("replay", "serve a recording to a driver, byte for byte"), replay);
   }
   const std::vector<std::string> typed(argv + std::min(argc, 1), argv + argc);
   if (const std::string wrong = bare && argc > 1 ? unknown_command(argv[1]) : ""; !wrong.empty())
@@ -139,6 +141,7 @@ Command parse_command_line(int argc, char** argv) {
     return Leave{0};
   }
   if (!bare && app.got_subcommand("check")) return check;
+  if (!bare && app.got_subcommand("replay")) return replay;
   if (!bare && app.got_subcommand("render")) {
     const std::string wrong = complaint(render);
     if (wrong.empty()) return render;

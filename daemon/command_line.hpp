@@ -10,6 +10,7 @@
 #include "core/base/result.hpp"
 #include "daemon/config.hpp"
 #include "daemon/engine_options.hpp"
+#include "daemon/replay/replay_command.hpp"
 
 namespace sonar {
 
@@ -41,7 +42,7 @@ struct BenchCommand {
 struct Leave {  // help, version or a usage error, already printed
   int exit_code = 0;
 };
-using Command = std::variant<RunCommand, CheckCommand, RenderCommand, BenchCommand, Leave>;
+using Command = std::variant<RunCommand, CheckCommand, RenderCommand, ReplayCommand, BenchCommand, Leave>;
 
 Command parse_command_line(int argc, char** argv);
 /// What was given on the command line, or stands for it in the environment, wins over the file.

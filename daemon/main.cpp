@@ -167,6 +167,11 @@ int main(int argc, char** argv) {
     if (const auto* check = std::get_if<sonar::CheckCommand>(&command)) return sonar::check(*check);
     if (const auto* render = std::get_if<sonar::RenderCommand>(&command)) return sonar::render::run_render(*render);
     if (const auto* bench = std::get_if<sonar::BenchCommand>(&command)) return sonar::bench(*bench);
+    if (const auto* replay = std::get_if<sonar::ReplayCommand>(&command)) {
+      json = replay->json;
+      const auto served = sonar::run_replay(*replay);
+      return served ? 0 : sonar::complain(served.error(), json);
+    }
     return sonar::run(std::get<sonar::RunCommand>(command), begin, json);
   } catch (const std::bad_alloc&) {
     return sonar::complain({sonar::ErrorKind::unavailable, "not enough memory; use a smaller scene or free some"}, json);

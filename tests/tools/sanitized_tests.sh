@@ -37,7 +37,7 @@ esac
 #   bench                                              measures speed, by the same engine as the others
 #   the Python client alone and without numpy          no program of ours takes part
 acceptance=(commands protocol mirror blueview_link demo life_cycle control reload status doctor view completion scene_command
-  dissector driver_example first_minutes)
+  dissector driver_example first_minutes recording)
 programs="^acceptance\.($(IFS='|'; echo "${acceptance[*]}"))\$"
 programs+='|^load\.(descriptors|real_pings)$|^python_client\.with_daemon$|^bvtsdk\.sequences$'
 [ "$kind" != tsan ] || programs='^bvtsdk\.sequences$'

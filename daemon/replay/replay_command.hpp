@@ -1,0 +1,28 @@
+// `sonard replay` on the command line.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace sonar {
+
+struct ReplayCommand {
+  std::string file, ip = "127.0.0.2", sonar;
+  std::uint16_t port = 52100, part_number = 1042;
+  std::vector<std::string> status_to;
+  double speed = 1, rate_hz = 10;
+  bool stepped = false, loop = false, json = false;
+};
+
+void add_replay_options(CLI::App& app, ReplayCommand& replay);
+/// Serves until the recording is over or a signal comes.
+Result<void> run_replay(const ReplayCommand& command);
+
+}  // namespace sonar

@@ -1,0 +1,250 @@
+"""Recorded by sonarctl, replayed by sonard: the same bytes, whatever kind of file lies between; files judged by other readers."""
+import os
+import pathlib
+import resource
+import signal
+import socket
+import struct
+import subprocess
+import tempfile
+import time
+import unittest
+
+import mcap_checker
+from oculus_reader import HEADER, Ping
+from running_sonard import ROOT, SONARCTL, SONARD, Sonard, free_address, run
+from tshark import messages, why_not
+
+KINDS = ["pcap", "mcap", "oculus", "raw"]
+SEEDS = ROOT / "tests/fuzz/corpus"
+
+
+def split(stream):
+    """Messages of a device's stream."""
+    found = []
+    while stream:
+        magic, _, _, _, _, payload, _ = HEADER.unpack_from(stream)
+        assert magic == 0x4F53 and len(stream) >= 16 + payload, "a message"
+        found.append(stream[:16 + payload])
+        stream = stream[16 + payload:]
+    return found
+
+
+def oculus_log_messages(data):
+    """Type 10 of an .oculus file, by the table of docs/recording.md."""
+    assert struct.unpack_from("<II6s", data) == (0x11223344, 48, b"Oculus")
+    at, found = 48, []
+    while at < len(data):
+        magic, size, kind, _, _, compression, original, payload = struct.unpack_from("<IIHH4xdH2xII", data, at)
+        assert (magic, size, compression, original) == (0xAABBCCDD, 40, 0, payload)
+        if kind == 10:
+            found.append(data[at + 40:at + 40 + payload])
+        at += 40 + payload
+    return found
+
+
+class Replay:
+    """sonard replay FILE at an address of its own."""
+
+    def __init__(self, path, *arguments):
+        for _ in range(5):
+            self.address = free_address()
+            self.log = tempfile.TemporaryFile()
+            self.process = subprocess.Popen([str(SONARD), "replay", str(path), "--ip", self.address, "--status-to", self.address,
+                                             *arguments], stdin=subprocess.DEVNULL, stdout=self.log, stderr=self.log)
+            deadline = time.monotonic() + 60
+            while "Ctrl-C stops" not in self.text() and self.process.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.01)
+            if self.process.poll() != 69:  # 69: somebody has that address
+                return
+
+    def text(self):
+        self.log.seek(0)
+        return self.log.read().decode()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        self.log.close()
+
+    def everything(self):
+        with socket.create_connection((self.address, 52100), timeout=60) as driver:
+            got = b""
+            while block := driver.recv(1 << 20):
+                got += block
+            return got
+
+
+class Files(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def path(self, kind):
+        return self.folder / f"run.{kind}"
+
+    def read(self, kind):
+        return self.path(kind).read_bytes()
+
+    def outputs(self, kinds=KINDS):
+        return [word for kind in kinds for word in (f"--{kind}", self.path(kind))]
+
+
+class Recorded(Files):
+    def test_a_run_in_every_kind_of_file(self):
+        with Sonard(scene="tank-rod.yaml") as daemon:
+            done = daemon.ctl("record", "--pings", 6, "--range", 1, "--beams", 256, "--control", f"{daemon.address}:14770",
+                              *self.outputs())
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertRegex(done.stdout, r"recorded 6 pings, \d+ messages, .* MB, .* s: .*run\.pcap .*run\.mcap ")
+        sent = split(self.read("raw"))
+        pings = [Ping(message) for message in sent if struct.unpack_from("<H", message, 6)[0] == 0x23]
+        self.assertEqual([ping.id for ping in pings], list(range(pings[0].id, pings[0].id + 6)))
+        self.assertEqual(oculus_log_messages(self.read("oculus")), sent)
+        self.expect_mcap(sent)
+        with self.subTest("tshark"):
+            self.expect_capture(sent)
+        for kind in KINDS:
+            with self.subTest(kind), Replay(self.path(kind), "--stepped") as replay:
+                self.assertEqual(replay.everything(), self.read("raw"))
+                self.assertEqual(replay.process.wait(60), 0, replay.text())
+        with Replay(self.path("oculus"), "--speed", "3") as replay:
+            again = self.folder / "again.raw"
+            done = run(SONARCTL, "listen", replay.address, "--as-it-is", "--pings", 6, "--quiet", "--record", again)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr + replay.text())
+            self.assertTrue(self.read("raw").startswith(again.read_bytes()))
+            self.assertEqual(len([m for m in split(again.read_bytes()) if m[6] == 0x23]), 6)
+
+    def expect_mcap(self, sent):
+        checked = mcap_checker.check(self.read("mcap"))
+        by_topic = {}
+        for topic, _, data in checked.messages:
+            by_topic.setdefault(topic, []).append(data)
+        self.assertEqual(by_topic["/front/device"], sent)
+        self.assertEqual(len(by_topic["/front/client"]), 1)
+        self.assertEqual(len(by_topic["/front/image"]), 6)
+        self.assertGreaterEqual(len(by_topic["/front/pose"]), 1)
+
+    def expect_capture(self, sent):
+        if why_not():
+            self.skipTest(why_not())
+        found = messages(self.path("pcap"))
+        self.assertFalse([m.title for m in found if m.is_junk() or m.experts])
+        titles = [m for m in found if not m.title.startswith(("Oculus, fire", "Oculus, status"))]
+        self.assertEqual([int(m.shown("length")[0]) for m in titles], [len(m) for m in sent])
+        self.assertEqual(len([m for m in found if m.title.startswith("Oculus, fire")]), 1)
+
+    def test_ctrl_c_leaves_whole_files(self):
+        with Sonard(scene="tank-rod.yaml") as daemon:
+            process = subprocess.Popen([str(SONARCTL), "record", daemon.address, "--range", "1", "--beams", "256",
+                                        *map(str, self.outputs())], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            deadline = time.monotonic() + 60
+            while time.monotonic() < deadline and not (self.path("raw").exists() and self.path("raw").stat().st_size > 200_000):
+                time.sleep(0.05)
+            process.send_signal(signal.SIGINT)
+            said = process.communicate(timeout=60)[0]
+        self.assertEqual(process.returncode, 0, said)
+        sent = split(self.read("raw"))
+        self.assertEqual(oculus_log_messages(self.read("oculus")), sent)
+        topics = [(topic, data) for topic, _, data in mcap_checker.check(self.read("mcap")).messages]
+        self.assertEqual([data for topic, data in topics if topic == "/sonar/device"], sent)
+
+
+class OneIntoAnother(Files):
+    """Without a sonar: recordings out of recordings."""
+
+    def made(self, pings=4, rows=40):
+        body = struct.pack("<BBBBBdddd", 2, 0, 255, 127, 9, 1.0, 50.0, 0.0, 0.0)
+        stream = b""
+        for number in range(pings):
+            image = bytes((number + i) % 255 for i in range(256 * rows))
+            fixed = struct.pack("<IIddddIBdHHIII", number + 1, 0, 2.1e6, 15.0, 1.2, 1500.0, 0, 0, 0.01, rows, 256, 2048, len(image),
+                                2048 + len(image))
+            message = HEADER.pack(0x4F53, 7001, 0, 0x23, 0, 2032 + len(image), 0) + body + fixed
+            stream += message + bytes(2048 - len(message)) + image
+        return stream
+
+    def convert(self, source, *arguments, **options):
+        return run(SONARCTL, "record", "--from", source, *arguments, **options)
+
+    def test_every_kind_into_every_kind(self):
+        self.path("raw").write_bytes(self.made())
+        self.assertEqual(self.convert(self.path("raw"), *self.outputs(["pcap", "mcap", "oculus"])).returncode, 0)
+        for kind in KINDS:
+            out = self.folder / f"from-{kind}.raw"
+            done = self.convert(self.path(kind), "--raw", out)
+            self.assertEqual((done.returncode, out.read_bytes() == self.read("raw")), (0, True), done.stderr)
+        self.assertEqual(oculus_log_messages(self.read("oculus")), split(self.made()))
+        mcap_checker.check(self.read("mcap"))
+
+    def test_a_damaged_file_gives_what_it_has(self):
+        self.path("raw").write_bytes(self.made()[:-100])
+        done = self.convert(self.path("raw"), "--oculus", self.path("oculus"))
+        self.assertEqual(done.returncode, 65)
+        self.assertIn("within a message, of which", done.stderr)
+        self.assertEqual(done.stderr.count("\n"), 1)
+        self.assertEqual(oculus_log_messages(self.read("oculus")), split(self.made(3)))
+        with Replay(self.path("raw"), "--stepped") as replay:
+            self.assertEqual(replay.everything(), self.made(3))
+            self.assertEqual(replay.process.wait(60), 0)
+            self.assertIn("within a message, of which", replay.text())
+
+    def test_a_full_disk_ends_it_with_one_sentence(self):
+        def small_disk():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (1_500_000, 1_500_000))
+
+        self.path("raw").write_bytes(self.made(pings=12, rows=700))
+        for kind in ("pcap", "mcap", "oculus"):
+            done = subprocess.run([str(SONARCTL), "record", "--from", str(self.path("raw")), f"--{kind}", str(self.path(kind))],
+                                  preexec_fn=small_disk, capture_output=True, text=True, timeout=60, check=False)
+            self.assertEqual(done.returncode, 74, done.stdout + done.stderr)
+            self.assertRegex(done.stderr, r"^sonarctl: cannot write on to .*: File too large; its first \d+ bytes are whole\n$")
+            out = self.folder / "rest.raw"
+            self.assertEqual(self.convert(self.path(kind), "--raw", out).returncode, 0)
+            kept = out.read_bytes()
+            self.assertTrue(kept and self.read("raw").startswith(kept), kind)
+        mcap_checker.check(self.read("mcap"))  # its end found room
+
+    def test_captured_pings(self):
+        folder = pathlib.Path(os.environ.get("SONARD_CAPTURES", self.folder))
+        found = [p for p in (folder / "three_pings_8bit.raw", folder / "oculus/three_pings_8bit.raw") if p.exists()]
+        if not found:
+            self.skipTest("SONARD_CAPTURES names no folder with three_pings_8bit.raw")
+        self.assertEqual(self.convert(found[0], *self.outputs(["pcap", "mcap", "oculus"])).returncode, 0)
+        for path in (found[0], *map(self.path, ["pcap", "mcap", "oculus"])):
+            with self.subTest(path.name), Replay(path, "--stepped") as replay:
+                self.assertEqual(replay.everything(), found[0].read_bytes())
+
+    def test_refusals(self):
+        self.path("raw").write_bytes(b"nothing of the kind")
+        for code, words in [(64, ["record", "127.0.0.2"]), (66, ["record", "--from", self.folder / "none", "--raw", "x"]),
+                            (65, ["record", "--from", self.path("raw"), "--oculus", self.path("oculus")]),
+                            (64, ["record", "--from", self.path("raw"), "--raw", self.path("raw")])]:
+            done = run(SONARCTL, *words)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (code, 1), done.stderr)
+        self.assertEqual(self.read("raw"), b"nothing of the kind")
+        for code, words in [(66, [self.folder / "none"]), (65, [self.path("raw")]), (64, [self.path("raw"), "--ip", "nowhere"])]:
+            done = run(SONARD, "replay", *words)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (code, 1), done.stderr)
+
+
+class Checker(unittest.TestCase):
+    def test_no_wrong_byte_escapes_it(self):
+        for name in ("conversation", "with_truth"):
+            sound = (SEEDS / f"mcap/{name}.mcap").read_bytes()
+            mcap_checker.check(sound)
+            for place in range(0, len(sound), 3):
+                damaged = bytearray(sound)
+                damaged[place] ^= 0x41
+                with self.assertRaises(mcap_checker.Broken, msg=f"byte {place}"):
+                    mcap_checker.check(damaged)
+
+
+if __name__ == "__main__":
+    unittest.main()
