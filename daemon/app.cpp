@@ -14,11 +14,12 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       options_(std::move(options)),
       log_(log),
       clock_(config_.clock == ClockMode::stepped),
-      world_(pose_rules(config_), vehicles_of(config_), bodies_of(*scene), clock_.now()),
+      world_(pose_rules(config_), vehicles_of(config_), bodies_of(*scene, config_), clock_.now()),
       simulator_(io_, make_engine(scene), compute_niceness),
       changes_(
           io_, simulator_, std::move(scene), make_engine, compute_niceness,
-          [this](const ScenePointer& now) { world_.use_objects(bodies_of(*now)); }, [this] { on_change(); }),
+          [this](const ScenePointer& now) { world_.use_objects(bodies_of(*now, config_), clock_.now()); },
+          [this] { on_change(); }),
       admission_(config_.limits, log_),
       pose_intake_(
           world_, clock_, log_, [this] { on_change(); }, &events_),
@@ -40,9 +41,8 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                  stop("the engine failed");
                }},
       fleet_(context_),
-      operations_(
-          {config_, clock_, world_, simulator_, changes_, admission_, pose_intake_, fleet_, events_, control_, log_,
-           options_.load_scene}),
+      operations_({config_, clock_, world_, simulator_, changes_, admission_, pose_intake_, fleet_, events_, control_, log_,
+                   options_.load_scene}),
       control_(io_, config_.control, config_.limits, operations_, events_, pose_intake_, log_),
       signals_(io_),
       house_timer_(io_),

@@ -42,6 +42,8 @@ void AppOperations::perform(const control::Operation& operation, const Sender& s
     done(carry_out(*sonar, sender));
   } else if (const auto* environment = std::get_if<control::SetEnvironment>(&operation)) {
     done(carry_out(*environment, sender));
+  } else if (const auto* trajectory = std::get_if<control::SetTrajectory>(&operation)) {
+    done(carry_out(*trajectory, sender));
   } else if (const auto* scene = std::get_if<control::LoadScene>(&operation)) {
     load(*scene, sender, std::move(done));
   } else if (const auto* added = std::get_if<control::AddObject>(&operation)) {
@@ -80,6 +82,16 @@ OperationResult AppOperations::carry_out(const control::SetEnvironment& asked, c
   char text[96];
   std::snprintf(text, sizeof text, "water: %g C, %g psu, pH %g, sound speed %s", water.temperature_c, water.salinity_psu,
                 water.ph, water.sound_speed_mps == 0 ? "computed" : std::to_string(water.sound_speed_mps).c_str());
+  parts_.log.info(text, {{"client", sender.id}});
+  return {};
+}
+
+OperationResult AppOperations::carry_out(const control::SetTrajectory& asked, const Sender& sender) {
+  if (const std::string why = parts_.world.steer(asked, parts_.clock.now()); !why.empty()) return refused(why);
+  std::string text = "trajectory" + (asked.name.empty() ? std::string() : " of " + asked.name) + ":";
+  if (asked.position_s) text += " at " + std::to_string(*asked.position_s) + " s";
+  if (asked.speed) text += " speed " + std::to_string(*asked.speed);
+  if (asked.paused) text += *asked.paused ? " paused" : " playing";
   parts_.log.info(text, {{"client", sender.id}});
   return {};
 }

@@ -42,6 +42,7 @@ class AppOperations final : public Operations {
 
   OperationResult carry_out(const control::SetSonar& asked, const Sender& sender);
   OperationResult carry_out(const control::SetEnvironment& asked, const Sender& sender);
+  OperationResult carry_out(const control::SetTrajectory& asked, const Sender& sender);
   void load(const control::LoadScene& asked, const Sender& sender, Done done);
   OperationResult without_words(const Error& error, const SceneFile& file, const Sender& sender);
   void set(const control::SetObject& asked, const Sender& sender, Done done);

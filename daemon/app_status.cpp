@@ -20,6 +20,7 @@ std::vector<control::ObjectStatus> objects_of(const Scene& scene, const World& w
     object.triangles = static_cast<std::uint32_t>(o.mesh->triangles.size());
     if (!o.mesh->material.empty()) object.material = scene.materials.at(o.mesh->material.front()).name;
     object.in_world = scene.in_world(o, bodies);
+    if (o.body >= 0) object.trajectory = world.object_plays(static_cast<std::size_t>(o.body), now);
     all.push_back(std::move(object));
   }
   return all;
@@ -67,8 +68,8 @@ control::DaemonStatus AppOperations::status() const {
   s.resident_mb = static_cast<double>(figures_of_this_process().resident_bytes) / 1e6;
   for (const Device& d : parts_.fleet.devices()) s.sonars.push_back(d.status(now));
   for (std::size_t v = 0; v < config.vehicles.size(); ++v)
-    s.vehicles.push_back(
-        {config.vehicles[v].name, std::string(world.source_of(v)), world.is_stale(v, now), world.vehicle_at(v, now)});
+    s.vehicles.push_back({config.vehicles[v].name, std::string(world.source_of(v)), world.is_stale(v, now),
+                          world.vehicle_at(v, now), world.vehicle_plays(v, now)});
   s.objects = objects_of(scene, world, now);
   const PoseCounters& p = world.counters();
   s.poses = {p.accepted, p.refused, p.late, p.replaced, p.over_rate};

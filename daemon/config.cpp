@@ -7,6 +7,7 @@
 #include "core/text/decimal.hpp"
 #include "core/text/strict_yaml.hpp"
 #include "daemon/config_parts.hpp"
+#include "daemon/read_trajectory.hpp"
 
 namespace sonar {
 namespace {
@@ -41,7 +42,7 @@ void read_world(Map map, Config& config, const std::filesystem::path& directory)
   config.water = read_water(map.optional("water"), &config.allow_hot);
 }
 
-void read_vehicles(const Node& node, Config& config) {
+void read_vehicles(const Node& node, TrajectoryFiles& files, Config& config) {
   std::set<std::string> names;
   for (const Node& item : node.items(1, 64)) {
     Map map = item.map();
@@ -50,8 +51,22 @@ void read_vehicles(const Node& node, Config& config) {
     vehicle.name = name.text(64);
     if (!names.insert(vehicle.name).second) name.fail("\"" + vehicle.name + "\" is used twice");
     vehicle.initial_pose = read_world_pose(map.optional("initial_pose"));
-    vehicle.orbits = map.optional("trajectory").choice_or<bool>(false, {{"none", false}, {"orbit", true}});
+    vehicle.plan = files.read_plan(map.optional("trajectory"), vehicle.name, &vehicle.orbits);
     config.vehicles.push_back(std::move(vehicle));
+  }
+}
+
+void read_objects(const Node& node, TrajectoryFiles& files, Config& config) {
+  std::set<std::string> names;
+  for (const Node& item : node.items(0, 256)) {
+    Map map = item.map();
+    ObjectConfig object;
+    const Node name = map.required("name");
+    object.name = name.text(256);
+    object.place = name.location() + ": " + name.path();
+    if (!names.insert(object.name).second) name.fail("\"" + object.name + "\" is used twice");
+    object.plan = files.read_plan(map.required("trajectory"), object.name);
+    config.objects.push_back(std::move(object));
   }
 }
 
@@ -174,7 +189,9 @@ Result<Config> read(const text::Document& document, const std::string& name, con
     return failure(ErrorKind::config,
                    name + ": this is a render file, not a configuration: sonard render " + name + " --out DIR (docs/render.md)");
   read_world(root.required("world").map(), config, directory);
-  read_vehicles(root.required("vehicles"), config);
+  TrajectoryFiles files(directory);
+  read_vehicles(root.required("vehicles"), files, config);
+  read_objects(root.optional("objects"), files, config);
   std::size_t index = 0;
   for (const Node& item : root.required("sonars").items(1, 64)) config.sonars.push_back(read_sonar(item.map(), config, index++));
   read_poses(root.optional("poses"), config.vehicles, config.poses);

@@ -13,6 +13,7 @@
 #include "core/base/geodesy.hpp"
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
+#include "core/motion/playback.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/sonar/water.hpp"
 #include "daemon/log.hpp"
@@ -45,6 +46,13 @@ struct VehicleConfig {
   std::string name;
   Pose initial_pose;  // in world
   bool orbits = false;
+  motion::Plan plan{};  // instead
+};
+/// A moving object of the scene that follows a trajectory.
+struct ObjectConfig {
+  std::string name;
+  motion::Plan plan;
+  std::string place;  // file:line:col: key.path, for what only the scene can tell
 };
 struct SonarConfig {
   std::string name;
@@ -116,6 +124,7 @@ struct Config {
   Water water;
   bool allow_hot = false;  // water of 30 C or more is meant
   std::vector<VehicleConfig> vehicles;
+  std::vector<ObjectConfig> objects;
   std::vector<SonarConfig> sonars;
   PoseConfig poses;
   ControlConfig control;

@@ -18,6 +18,7 @@
 #include "daemon/real_time.hpp"
 #include "daemon/render/render_command.hpp"
 #include "daemon/standard_streams.hpp"
+#include "daemon/world_parts.hpp"
 
 namespace sonar {
 namespace {
@@ -85,6 +86,7 @@ int run(const RunCommand& command, Steady::time_point begin, bool& json) {
   const auto scene_begin = Steady::now();
   const auto scene = load_scene(config.scene);
   if (!scene) return complain(scene.error(), json);
+  if (const std::string why = why_not_movable(**scene, config); !why.empty()) return complain({ErrorKind::config, why}, json);
 
   Log log(config.log);
   for (const std::string& note : (*scene)->notes) log.info(note);
@@ -141,8 +143,13 @@ int check(const CheckCommand& command) {
   }
   const auto scene = load_scene(config->scene);
   if (!scene) return complain(scene.error());
+  if (const std::string why = why_not_movable(**scene, *config); !why.empty()) return complain({ErrorKind::config, why});
   std::printf("%s: ok, %zu sonar(s); scene %s: ok, %zu triangles\n", command.config.c_str(), config->sonars.size(),
               config->scene.name().c_str(), (*scene)->triangle_count());
+  for (const VehicleConfig& v : config->vehicles)
+    if (v.plan) std::printf("vehicle %s follows %s\n", v.name.c_str(), v.plan.about.c_str());
+  for (const ObjectConfig& o : config->objects)
+    if (o.plan) std::printf("object %s follows %s\n", o.name.c_str(), o.plan.about.c_str());
   return 0;
 }
 

@@ -9,24 +9,6 @@ namespace {
 constexpr std::chrono::nanoseconds shortest_difference = std::chrono::milliseconds(1);
 }  // namespace
 
-Quatd quat_from_rotation(Vec3d r) {
-  const double angle = length(r);
-  if (angle < 1e-12) return normalized(Quatd{1, r.x / 2, r.y / 2, r.z / 2});
-  const double s = std::sin(angle / 2) / angle;
-  return {std::cos(angle / 2), r.x * s, r.y * s, r.z * s};
-}
-
-Vec3d rotation_between(Quatd a, Quatd b) {
-  Quatd d = conjugate(a) * b;
-  if (d.w < 0) d = {-d.w, -d.x, -d.y, -d.z};
-  const double sine = std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
-  if (sine < 1e-12) return {2 * d.x, 2 * d.y, 2 * d.z};
-  const double factor = 2 * std::atan2(sine, d.w) / sine;
-  return {factor * d.x, factor * d.y, factor * d.z};
-}
-
-Quatd slerp(Quatd a, Quatd b, double u) { return normalized(a * quat_from_rotation(u * rotation_between(a, b))); }
-
 void PoseHistory::put(const Sample& sample) {
   if (!samples_.empty() && samples_.back().at == sample.at) {
     samples_.back() = sample;

@@ -7,6 +7,8 @@
 
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
+#include "core/motion/trajectory.hpp"
+#include "core/motion/turning.hpp"
 
 namespace sonar {
 
@@ -18,11 +20,7 @@ class PoseHistory {
     std::optional<Vec3d> velocity_mps;            // body axes
     std::optional<Vec3d> angular_velocity_radps;  // body axes
   };
-  /// How a body moves; at rest by default.
-  struct Motion {
-    Vec3d velocity_mps;              // world axes
-    Vec3d angular_velocity_radps{};  // body axes
-  };
+  using Motion = motion::Motion;
   static constexpr std::chrono::nanoseconds length = std::chrono::seconds(2);
   static constexpr std::size_t most_samples = 2048;  // two seconds at the rate limit of 1 kHz
 
@@ -53,11 +51,8 @@ class PoseHistory {
   Samples samples_;
 };
 
-/// Shortest way from a (u = 0) to b (u = 1) at constant turn rate.
-Quatd slerp(Quatd a, Quatd b, double u);
-/// The rotation vector [rad] that turns a into b, in a's own axes; shortest way.
-Vec3d rotation_between(Quatd a, Quatd b);
-/// Rotation by a vector [rad].
-Quatd quat_from_rotation(Vec3d rotation_rad);
+using motion::quat_from_rotation;
+using motion::rotation_between;
+using motion::slerp;
 
 }  // namespace sonar

@@ -1,10 +1,13 @@
-// The keys by which configurations and render files name a trajectory file, and the file itself.
-// Readers over strict_yaml cursors; what is wrong, in the file too, is told by the document's finish().
+// The keys by which configurations and render files name trajectory files, and the files themselves.
+// Readers over strict_yaml cursors; what is wrong, in the files too, is told by the document's finish().
 #pragma once
 
 #include <filesystem>
+#include <list>
+#include <memory>
 #include <string>
 
+#include "core/motion/playback.hpp"
 #include "core/motion/trajectory_file.hpp"
 #include "core/text/strict_yaml.hpp"
 
@@ -16,13 +19,34 @@ struct TrajectoryKeys {
   text::Node file, format, frame, rate_hz, body;
 };
 
-struct NamedTrajectoryFile {
-  std::filesystem::path path;
-  motion::TrajectoryFile file;  // no bodies when it could not be read
-  std::string body;             // asked for by name; empty = not
-};
+/// Reads each file once, however many bodies are in it.
+class TrajectoryFiles {
+ public:
+  /// Relative files start in `folder`.
+  explicit TrajectoryFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-/// Relative files start in `folder`. `keys.file` is there.
-NamedTrajectoryFile read_trajectory_file(const TrajectoryKeys& keys, const std::filesystem::path& folder);
+  struct Named {
+    std::string name;                                    // as the errors have it
+    std::shared_ptr<const motion::TrajectoryFile> file;  // null when it could not be read: that has been said
+  };
+  Named read(const text::Node& file, const motion::ReadOptions& options);
+  Named read(const TrajectoryKeys& keys);
+
+  /// What a body is to follow: `none`, a file, or a map of the keys above with `speed`, `loop` and `start_s`. `body` is who asks:
+  /// the body taken from a file of several when none is named. With `orbits`, `orbit` is a word too, and sets it.
+  motion::Plan read_plan(const text::Node& node, const std::string& body, bool* orbits = nullptr);
+
+ private:
+  struct Known {
+    std::filesystem::path path;
+    motion::ReadOptions options;
+    Named named;
+  };
+  motion::Plan read_words(const text::Node& node, const std::string& body, bool* orbits);
+  motion::Plan plan_of(const text::Node& file, const Named& named, const std::string& asked, const std::string& body);
+
+  std::filesystem::path folder_;
+  std::list<Known> known_;
+};
 
 }  // namespace sonar

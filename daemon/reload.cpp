@@ -73,7 +73,11 @@ void App::reload() {
                      auto config = read();
                      if (!config) return tl::make_unexpected(config.error());
                      *next = *std::move(config);
-                     return load(next->scene);
+                     auto scene = load(next->scene);
+                     if (scene)
+                       if (const std::string why = why_not_movable(**scene, *next); !why.empty())
+                         return failure(ErrorKind::config, why);
+                     return scene;
                    },
                    [this, next](const Result<void>& outcome) {
                      if (outcome)
@@ -91,7 +95,8 @@ void App::take_over(Config next) {
   std::swap(config_, next);  // devices read it through their context
   const Config& before = next;
   world_.use_rules(pose_rules(config_));
-  world_.use_vehicles(vehicles_of(config_));
+  world_.use_vehicles(vehicles_of(config_), clock_.now());
+  world_.use_objects(bodies_of(scene(), config_), clock_.now());
   world_.show_again();
   const Fleet::Change change = fleet_.take_over(before, config_);
   if (other_water)

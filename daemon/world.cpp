@@ -27,14 +27,14 @@ std::string joined_names(const std::vector<std::string>& names) {
 
 World::World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start)
     : rules_(rules), start_(start) {
-  use_vehicles(std::move(vehicles));
-  use_objects(std::move(objects));
+  use_vehicles(std::move(vehicles), start);
+  use_objects(std::move(objects), start);
 }
 
-void World::use_vehicles(std::vector<BodyStart> vehicles) { vehicles_ = taken_over(vehicles_, vehicles); }
-void World::use_objects(std::vector<BodyStart> objects) { objects_ = taken_over(objects_, objects); }
+void World::use_vehicles(std::vector<BodyStart> vehicles, Time now) { vehicles_ = taken_over(vehicles_, vehicles, now); }
+void World::use_objects(std::vector<BodyStart> objects, Time now) { objects_ = taken_over(objects_, objects, now); }
 
-std::vector<World::Track> World::taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies) const {
+std::vector<World::Track> World::taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const {
   std::vector<Track> tracks;
   for (BodyStart& b : bodies) {
     const auto known = std::find_if(old.begin(), old.end(), [&](const Track& t) { return t.body.name == b.name; });
@@ -45,26 +45,26 @@ std::vector<World::Track> World::taken_over(std::vector<Track>& old, std::vector
       t.allowance = rules_.burst;
       t.allowance_at = start_;
     }
-    if (t.history.empty()) t.source = b.orbits ? "demo orbit" : "initial pose";
+    if (t.history.empty()) t.source = b.plan ? "trajectory " + b.plan.file : b.orbits ? "demo orbit" : "initial pose";
+    if (b.plan && !motion::is_same(t.body.plan, b.plan)) t.playback = {b.plan.trajectory->duration(), b.plan.rules, now};
     t.body = std::move(b);
     tracks.push_back(std::move(t));
   }
   return tracks;
 }
 
-World::Track* World::find(const PoseSample& sample, std::string& refusal) {
-  const bool vehicle = sample.of == PoseSample::Of::vehicle;
+World::Track* World::find(PoseSample::Of of, const std::string& name, std::string& refusal) {
+  const bool vehicle = of == PoseSample::Of::vehicle;
   std::vector<Track>& tracks = vehicle ? vehicles_ : objects_;
-  if (sample.name.empty() && tracks.size() == 1) return &tracks.front();
+  if (name.empty() && tracks.size() == 1) return &tracks.front();
   std::vector<std::string> names;
   for (Track& t : tracks) {
-    if (!sample.name.empty() && t.body.name == sample.name) return &t;
+    if (!name.empty() && t.body.name == name) return &t;
     names.push_back(t.body.name);
   }
   const std::string kind = vehicle ? "vehicle" : "moving object";
-  refusal = sample.name.empty()
-                ? "the message names no " + kind + " and there is not exactly one; known: " + joined_names(names)
-                : "no " + kind + " is called \"" + sample.name.substr(0, 64) + "\"; known: " + joined_names(names);
+  refusal = name.empty() ? "the message names no " + kind + " and there is not exactly one; known: " + joined_names(names)
+                         : "no " + kind + " is called \"" + name.substr(0, 64) + "\"; known: " + joined_names(names);
   return nullptr;
 }
 
@@ -86,7 +86,7 @@ bool World::over_rate(Track& track, Time now) const {
 
 PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time now) {
   PoseOutcome out;
-  Track* const found = find(sample, out.refusal);
+  Track* const found = find(sample.of, sample.name, out.refusal);
   if (found == nullptr) {
     ++counters_.refused;
     out.verdict = PoseVerdict::unknown_name;
@@ -184,6 +184,7 @@ std::vector<World::Stale> World::newly_stale(Time now) {
 Pose World::pose_at(const Track& track, Time t) const {
   if (track.hidden) return {{0, 0, hidden_height_m}, {}};
   if (!track.history.empty()) return track.history.at(t - track.offset, rules_.extrapolate_max);
+  if (track.body.plan) return played(track, t).body_in_world;
   return track.body.orbits ? orbit(track.body.initial_pose, t) : track.body.initial_pose;
 }
 
@@ -198,13 +199,14 @@ Pose World::orbit(const Pose& initial, Time t) const {
 PoseHistory::Motion World::vehicle_moves(std::size_t vehicle, Time t) const {
   const Track& track = vehicles_[vehicle];
   if (track.hidden) return {};
-  if (track.history.empty()) {
+  if (track.history.empty() && !track.body.plan) {
     if (!track.body.orbits) return {};
     const Vec3d p = orbit(track.body.initial_pose, t).position_m;
     const double per_s = orbit_speed_mps / std::hypot(p.x, p.y);
     return {{-per_s * p.y, per_s * p.x, 0}, {0, 0, per_s}};
   }
-  const PoseHistory::Motion moves = track.history.motion_at(t - track.offset, rules_.extrapolate_max);
+  const PoseHistory::Motion moves =
+      track.history.empty() ? played(track, t).moves : track.history.motion_at(t - track.offset, rules_.extrapolate_max);
   // Written so that what is not a number is no movement either.
   const bool sane = length(moves.velocity_mps) <= fastest_mps && length(moves.angular_velocity_radps) <= fastest_radps;
   return sane ? moves : PoseHistory::Motion{};

@@ -8,8 +8,10 @@
 #include <string_view>
 #include <vector>
 
+#include "core/motion/playback.hpp"
 #include "core/sonar/ping.hpp"
 #include "daemon/pose_history.hpp"
+#include "protocol/control/operations.hpp"
 #include "protocol/control/pose_sample.hpp"
 
 namespace sonar {
@@ -28,6 +30,7 @@ struct BodyStart {
   std::string name;
   Pose initial_pose;    // in world
   bool orbits = false;  // circles the world's z axis until the first accepted pose
+  motion::Plan plan{};  // followed until the first accepted pose
 };
 
 /// Who sent a pose. A different `id` starts a new history; a different `source` is worth a log line.
@@ -64,13 +67,24 @@ class World {
  public:
   World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start);
 
-  // When the configuration is read again or the scene changes. Bodies that are there under the same name keep their poses.
+  // When the configuration is read again or the scene changes. Bodies that are there under the same name keep their poses, and
+  // trajectories that are the same play on; others begin at `now`.
   void use_rules(const PoseRules& rules) { rules_ = rules; }
-  void use_vehicles(std::vector<BodyStart> vehicles);
-  void use_objects(std::vector<BodyStart> objects);
+  void use_vehicles(std::vector<BodyStart> vehicles, Time now);
+  void use_objects(std::vector<BodyStart> objects, Time now);
 
   PoseOutcome accept(const control::PoseSample& sample, const Sender& sender, Time now);
   void count_refused() { ++counters_.refused; }
+
+  /// Pauses, resumes, seeks a trajectory or changes its speed, from `now` on. Empty, or one sentence why not.
+  std::string steer(const control::SetTrajectory& asked, Time now);
+  /// What of a trajectory is shown; nothing where none is played.
+  std::optional<control::TrajectoryStatus> vehicle_plays(std::size_t vehicle, Time now) const {
+    return plays(vehicles_[vehicle], now);
+  }
+  std::optional<control::TrajectoryStatus> object_plays(std::size_t object, Time now) const {
+    return plays(objects_[object], now);
+  }
 
   Pose vehicle_at(std::size_t vehicle, Time t) const { return pose_at(vehicles_[vehicle], t); }
   /// How it moves then, as vehicle_at() carries it on; at rest where that is faster than anything that carries a sonar.
@@ -96,6 +110,7 @@ class World {
   struct Track {
     BodyStart body;
     PoseHistory history;
+    motion::Playback playback{};  // of body.plan
     std::string sender_id, source;
     std::uint64_t seq = 0;
     std::uint32_t reset_counter = 0;
@@ -108,13 +123,16 @@ class World {
   };
   using Ns = std::chrono::nanoseconds;
 
-  std::vector<Track> taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies) const;
-  Track* find(const control::PoseSample& sample, std::string& refusal);
+  std::vector<Track> taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const;
+  Track* find(control::PoseSample::Of kind, const std::string& name, std::string& refusal);
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time now) const;
   bool over_rate(Track& track, Time now) const;
   bool is_stale(const Track& track, Time now) const;
   Pose pose_at(const Track& track, Time t) const;
   Pose orbit(const Pose& initial, Time t) const;
+  /// Of a body that follows its trajectory; moving as fast as it is played.
+  static motion::Moment played(const Track& track, Time t);
+  static std::optional<control::TrajectoryStatus> plays(const Track& track, Time now);
 
   PoseRules rules_;
   std::vector<Track> vehicles_, objects_;

@@ -17,6 +17,11 @@ std::optional<Speed> Speed::from(double factor) {
   return Speed{std::llround(factor * static_cast<double>(one))};
 }
 
+bool is_same(const Plan& a, const Plan& b) {
+  if (!a || !b) return !a && !b;
+  return a.rules == b.rules && (a.trajectory == b.trajectory || *a.trajectory == *b.trajectory);
+}
+
 Ns Playback::line(Time clock) const {
   if (paused_) return place_at_;
   const Wide product = static_cast<Wide>((clock - clock_at_).count()) * rules_.speed.millionths;

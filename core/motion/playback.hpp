@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <string>
 
 #include "core/base/units.hpp"
 #include "core/motion/trajectory.hpp"
@@ -26,6 +28,17 @@ struct PlaybackRules {
   Ns start{0};  // of the trajectory, where playing begins; before 0: so long it waits at the first pose
   bool operator==(const PlaybackRules&) const = default;
 };
+
+/// What a body is to follow: a trajectory, how it is played, and where it is from.
+struct Plan {
+  std::shared_ptr<const Trajectory> trajectory = {};  // null = nothing
+  PlaybackRules rules = {};
+  std::string file = {};   // as it was named
+  std::string about = {};  // format, frame, length, for people
+  explicit operator bool() const { return trajectory != nullptr; }
+};
+/// Whether one who follows the one need not notice the other: the same points, played in the same way.
+bool is_same(const Plan& a, const Plan& b);
 
 class Playback {
  public:

@@ -23,6 +23,7 @@ struct ReadOptions {
   Format format = Format::automatic;   // told by the first line with numbers or names
   std::optional<Frame> frame = {};     // needed when the file does not say; a file that says otherwise is refused
   std::optional<double> rate_hz = {};  // lines a second; of KITTI files, which have no times, and of no others
+  bool operator==(const ReadOptions&) const = default;
 };
 
 struct TrajectoryFile {

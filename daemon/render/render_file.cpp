@@ -8,6 +8,7 @@
 #include "daemon/read_trajectory.hpp"
 #include "daemon/render/render_job.hpp"
 #include "daemon/render/sonar_keys.hpp"
+#include "daemon/world_parts.hpp"
 
 namespace sonar::render {
 namespace {
@@ -51,9 +52,10 @@ void read_path(const Node& node, const std::filesystem::path& folder, RenderJob&
   job.path.orbits = keys.optional("orbit").boolean_or(false);
   const TrajectoryKeys trajectory(keys);
   if (!trajectory.file) return;
-  const NamedTrajectoryFile named = read_trajectory_file(trajectory, folder);
-  if (named.file.bodies.empty()) return;
-  auto path = path_in(named.file, named.path.string(), named.body);
+  const TrajectoryFiles::Named named = TrajectoryFiles(folder).read(trajectory);
+  const std::string body = trajectory.body.text_or({}, 64);
+  if (!named.file) return;
+  auto path = path_in(*named.file, named.name, body);
   if (!path) return trajectory.file.fail(path.error().text);
   job.path = *std::move(path);
 }
@@ -179,7 +181,9 @@ Result<RenderInput> from_config(const std::filesystem::path& file, const std::st
   job.seed = config->seed;
   job.engine = config->engine;
   job.mount = s.mount;
-  job.path = {vehicle.initial_pose, vehicle.orbits, {}, {}};
+  job.path = {vehicle.initial_pose, vehicle.orbits, vehicle.plan.trajectory, {}};
+  if (const std::string why = why_not_movable(*job.scene, *config); !why.empty()) return failure(ErrorKind::config, why);
+  for (const BodyStart& body : bodies_of(*job.scene, *config)) job.body_paths.push_back(body.plan.trajectory);
   const double depth_m = depth_from_z(compose(vehicle_at(job.path, Time{}), job.mount).position_m.z);
   job.settings = device_settings(s.profile, s.options, job.water, depth_m);
   RenderInput input{file.string(), {}, text};

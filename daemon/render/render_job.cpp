@@ -23,6 +23,8 @@ PingRequest make_request(const RenderJob& job, PingNumber number, Time at) {
   request.sonar_in_world = compose(request.vehicle_in_world, job.mount);
   request.sonar_moves = sonar_twist_at(job.path, job.mount, at);
   request.bodies_in_world = job.scene->bodies_in_world;
+  for (std::size_t i = 0; i < job.body_paths.size(); ++i)
+    if (job.body_paths[i]) request.bodies_in_world.at(i) = job.body_paths[i]->at(at - job.path.begins_at).body_in_world;
   request.water = job.water;
   request.settings = job.settings;
   request.sonar_id = job.sonar_id;

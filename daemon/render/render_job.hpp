@@ -29,6 +29,8 @@ struct RenderJob {
   EngineConfig engine;
   Pose mount;  // sonar in vehicle
   VehiclePath path;
+  /// Of the scene's moving objects, in its order, on the same clock; null or not there: it rests.
+  std::vector<std::shared_ptr<const motion::Trajectory>> body_paths;
   Values values;  // what the sweep set, and what `let` made of it
   std::vector<Expectation> expectations;
 

@@ -115,10 +115,10 @@ void add(Sha256& hash, const json& value) {
   hash.add(std::as_bytes(std::span(text.data(), text.size())));
 }
 
-void add_path(Sha256& hash, const VehiclePath& path) {
-  if (!path.trajectory) return;
-  const motion::Points& p = path.trajectory->points();
-  add(hash, {path.begins_at.time_since_epoch().count(), p.times.size()});
+void add_way(Sha256& hash, const std::shared_ptr<const motion::Trajectory>& way, Time begins_at) {
+  if (!way) return;
+  const motion::Points& p = way->points();
+  add(hash, {begins_at.time_since_epoch().count(), p.times.size()});
   hash.add(std::as_bytes(std::span(p.times)));
   hash.add(std::as_bytes(std::span(p.poses)));
   hash.add(std::as_bytes(std::span(p.velocities_mps)));
@@ -185,7 +185,11 @@ std::string digest_of(const RenderInput& input, double rate_hz) {
     hash.add(std::as_bytes(std::span(job.mode().waveform.samples)));
     add(hash, {json_of(job.settings), json_of(job.water), json_of(job.engine.switches), job.seed, job.sonar_id, job.values,
                static_cast<int>(job.engine.simd), json_of(job.mount), json_of(job.path.initial), job.path.orbits});
-    add_path(hash, job.path);
+    add_way(hash, job.path.trajectory, job.path.begins_at);
+    for (std::size_t i = 0; i < job.body_paths.size(); ++i) {
+      if (job.body_paths[i]) add(hash, i);
+      add_way(hash, job.body_paths[i], job.path.begins_at);
+    }
     add_scene(hash, *job.scene);
   }
   return hash.hex();

@@ -42,12 +42,20 @@ struct SetObject {
   std::optional<bool> visible;
   std::optional<Pose> in_world;
 };
+/// Of a trajectory that a vehicle or a moving object plays. What is not given stays as it is.
+struct SetTrajectory {
+  PoseSample::Of of = PoseSample::Of::vehicle;
+  std::string name;  // empty = the only vehicle there is
+  std::optional<bool> paused;
+  std::optional<double> position_s, speed;
+};
 struct Subscribe {
   bool pings = false, clients = false, poses = false, scene = false;
 };
 
 /// What the daemon does for whoever may ask; Hello and Subscribe are the connection's own business.
-using Operation = std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject>;
+using Operation =
+    std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject, SetTrajectory>;
 
 // ---- answers
 
@@ -70,16 +78,23 @@ struct SonarStatus {
   std::vector<ClientStatus> clients;
   SonarFigures figures;
 };
+struct TrajectoryStatus {
+  std::string file;
+  double position_s = 0, duration_s = 0, speed = 1;
+  bool paused = false, loop = false;
+};
 struct VehicleStatus {
   std::string name, source;
   bool stale = false;
   Pose in_world;
+  std::optional<TrajectoryStatus> trajectory = {};  // when it plays one
 };
 struct ObjectStatus {
   std::string name, material;
   bool moving = false, visible = true;
   std::uint32_t triangles = 0;
   Pose in_world;
+  std::optional<TrajectoryStatus> trajectory = {};
 };
 struct PoseFigures {
   std::uint64_t accepted = 0, refused = 0, late = 0, replaced = 0, over_rate = 0;

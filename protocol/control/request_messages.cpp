@@ -95,6 +95,20 @@ Result<SetObject> from(const v1::SetObject& m) {
   return set;
 }
 
+Result<SetTrajectory> from(const v1::SetTrajectory& m) {
+  SetTrajectory set;
+  const bool object = !m.object().empty();
+  if (object && !m.vehicle().empty()) return refused("give a vehicle or an object, not both");
+  const auto name = object ? checked_text(m.object(), "object", true) : checked_text(m.vehicle(), "vehicle", false);
+  if (!name) return tl::make_unexpected(name.error());
+  set.of = object ? PoseSample::Of::object : PoseSample::Of::vehicle;
+  set.name = *name;
+  if (m.has_paused()) set.paused = m.paused().value();
+  if (m.has_position_s()) set.position_s = m.position_s().value();
+  if (m.has_speed()) set.speed = m.speed().value();
+  return set;
+}
+
 Result<Request> with_op(const v1::Request& message) {
   Request request{message.id(), Unsupported{}};
   std::string refusal;
@@ -138,6 +152,9 @@ Result<Request> with_op(const v1::Request& message) {
       break;
     case v1::Request::kSetObject:
       take(from(message.set_object()));
+      break;
+    case v1::Request::kSetTrajectory:
+      take(from(message.set_trajectory()));
       break;
     case v1::Request::OP_NOT_SET:
       break;
@@ -188,6 +205,13 @@ struct Fill {
     m.set_object(op.object);
     if (op.visible) m.mutable_visible()->set_value(*op.visible);
     if (op.in_world) fill(*m.mutable_at(), *op.in_world);
+  }
+  void operator()(const SetTrajectory& op) const {
+    v1::SetTrajectory& m = *out.mutable_set_trajectory();
+    (op.of == PoseSample::Of::object ? *m.mutable_object() : *m.mutable_vehicle()) = op.name;
+    if (op.paused) m.mutable_paused()->set_value(*op.paused);
+    if (op.position_s) m.mutable_position_s()->set_value(*op.position_s);
+    if (op.speed) m.mutable_speed()->set_value(*op.speed);
   }
   void operator()(const Subscribe& op) const {
     v1::Subscribe& m = *out.mutable_subscribe();

@@ -73,15 +73,31 @@ SonarStatus from(const v1::SonarStatus& m) {
   return s;
 }
 
+void fill(v1::TrajectoryStatus& out, const TrajectoryStatus& s) {
+  out.set_file(s.file);
+  out.set_position_s(s.position_s);
+  out.set_duration_s(s.duration_s);
+  out.set_speed(s.speed);
+  out.set_paused(s.paused);
+  out.set_loop(s.loop);
+}
+template <class M>
+std::optional<TrajectoryStatus> trajectory_of(const M& message) {
+  if (!message.has_trajectory()) return std::nullopt;
+  const v1::TrajectoryStatus& m = message.trajectory();
+  return TrajectoryStatus{m.file(), m.position_s(), m.duration_s(), m.speed(), m.paused(), m.loop()};
+}
+
 void fill(v1::VehicleStatus& out, const VehicleStatus& s) {
   out.set_name(s.name);
   out.set_source(s.source);
   out.set_stale(s.stale);
   control::fill(*out.mutable_position(), s.in_world.position_m);
   control::fill(*out.mutable_orientation(), s.in_world.orientation);
+  if (s.trajectory) fill(*out.mutable_trajectory(), *s.trajectory);
 }
 VehicleStatus from(const v1::VehicleStatus& m) {
-  return {m.name(), m.source(), m.stale(), pose_from(m.position(), m.orientation())};
+  return {m.name(), m.source(), m.stale(), pose_from(m.position(), m.orientation()), trajectory_of(m)};
 }
 
 void fill(v1::ObjectStatus& out, const ObjectStatus& s) {
@@ -92,9 +108,11 @@ void fill(v1::ObjectStatus& out, const ObjectStatus& s) {
   out.set_triangles(s.triangles);
   control::fill(*out.mutable_position(), s.in_world.position_m);
   control::fill(*out.mutable_orientation(), s.in_world.orientation);
+  if (s.trajectory) fill(*out.mutable_trajectory(), *s.trajectory);
 }
 ObjectStatus from(const v1::ObjectStatus& m) {
-  return {m.name(), m.material(), m.moving(), m.visible(), m.triangles(), pose_from(m.position(), m.orientation())};
+  return {m.name(),        m.material(), m.moving(), m.visible(), m.triangles(), pose_from(m.position(), m.orientation()),
+          trajectory_of(m)};
 }
 
 void fill(v1::PoseFigures& out, const PoseFigures& f) {

@@ -71,6 +71,8 @@ TEST(StatusText, NamesEverything) {
   sonar.clients.push_back({"10.0.0.9:4000", 12, 1, 2500000, 130});
   status.sonars.push_back(sonar);
   status.vehicles.push_back({"rov", "json 127.0.0.1", true, {}});
+  status.vehicles.push_back(
+      {"auv", "trajectory dive.tum", false, {}, control::TrajectoryStatus{"dive.tum", 12.34, 60, 2.5, true, true}});
   status.objects.push_back({"wall", "concrete", true, false, 12, {}});
   const std::string text = text_from(status);
   for (const char* part :
@@ -79,7 +81,8 @@ TEST(StatusText, NamesEverything) {
         "sonar     front  oculus-m1200d  2.1 MHz  10 m  standby  gain 0 dB  512 beams x 437 rows  transmitter off\n",
         "tcp 0.0.0.0:52100  advertised as 10.0.0.5  status -> 10.0.0.255:52102\n",
         "place   -6.00 0.00 -3.00 m, heading 90.0, pitch -10.0, roll 0.0 deg\n",
-        "10.0.0.9:4000  12 pings, 1 dropped, 2.5 MB, 2 min\n", "from json 127.0.0.1  stale\n", "moving  hidden\n"})
+        "10.0.0.9:4000  12 pings, 1 dropped, 2.5 MB, 2 min\n", "from json 127.0.0.1  stale\n",
+        "from trajectory dive.tum  at 12.3 of 60.0 s x2.5 looped paused\n", "moving  hidden\n"})
     EXPECT_THAT(text, HasSubstr(part));
 }
 

@@ -295,7 +295,7 @@ TEST(World, AVehicleMovesByItsPosesAndNotByAJump) {
 TEST(World, VehiclesOfAnotherConfigurationKeepTheirPosesByName) {
   World w = one_rov();
   w.accept(at_x(7), json, t0);
-  w.use_vehicles({{"buoy", {{1, 1, 0}, {}}, false}, {"rov", {{0, 0, -9}, {}}, true}});
+  w.use_vehicles({{"buoy", {{1, 1, 0}, {}}, false}, {"rov", {{0, 0, -9}, {}}, true}}, t0);
   EXPECT_EQ(w.vehicle_at(0, t0).position_m.x, 1);
   EXPECT_EQ(w.source_of(0), "initial pose");
   EXPECT_EQ(w.vehicle_at(1, t0).position_m.x, 7) << "where its sender put it";
@@ -307,7 +307,7 @@ TEST(World, VehiclesOfAnotherConfigurationKeepTheirPosesByName) {
 
 TEST(World, AVehicleWithoutPosesFollowsTheConfiguration) {
   World w = one_rov();
-  w.use_vehicles({{"rov", {{0, -8, -2}, {}}, true}});
+  w.use_vehicles({{"rov", {{0, -8, -2}, {}}, true}}, t0);
   EXPECT_EQ(w.source_of(0), "demo orbit");
   EXPECT_NEAR(w.vehicle_at(0, t0).position_m.y, -8, 1e-9);
 }
@@ -319,7 +319,7 @@ TEST(World, ObjectsOfAnotherSceneKeepTheirPosesAndStayHidden) {
   s.name = "crate";
   w.accept(s, json, t0);
   w.hide(0, true);
-  w.use_objects({{"seal", {{2, 0, 0}, {}}, false}, {"crate", {{9, 0, 0}, {}}, false}});
+  w.use_objects({{"seal", {{2, 0, 0}, {}}, false}, {"crate", {{9, 0, 0}, {}}, false}}, t0);
   EXPECT_EQ(w.objects_at(t0).size(), 2u);
   EXPECT_EQ(w.object_at(0, t0).position_m.x, 2);
   EXPECT_TRUE(w.is_hidden(1));

@@ -57,6 +57,12 @@ std::string water_text(const control::SetEnvironment& e) {
   return text + (speed > 0 ? format(", sound speed %g m/s", speed) : std::string(", sound speed computed"));
 }
 
+std::string trajectory_text(const std::optional<control::TrajectoryStatus>& t) {
+  if (!t) return {};
+  return format("  at %.1f of %.1f s x%g%s%s", t->position_s, t->duration_s, t->speed, t->loop ? " looped" : "",
+                t->paused ? " paused" : "");
+}
+
 std::string event_text(const control::PingEvent& e) {
   return format("ping %u  %s  %g m  %u beams x %u rows  %.1f ms  %u clients", e.number, e.sonar.c_str(), e.range_m, e.beams,
                 e.rows, e.simulation_ms, e.clients);
@@ -83,6 +89,7 @@ std::string text_from(const control::ObjectStatus& o) {
                             o.in_world.position_m.x, o.in_world.position_m.y, o.in_world.position_m.z);
   if (o.moving) text += "  moving";
   if (!o.visible) text += "  hidden";
+  if (o.trajectory) text += "  trajectory " + o.trajectory->file + trajectory_text(o.trajectory);
   return text;
 }
 
@@ -96,7 +103,8 @@ std::string text_from(const control::DaemonStatus& s) {
   text += line("water", water_text(s.environment));
   for (const control::SonarStatus& sonar : s.sonars) text += sonar_text(sonar);
   for (const control::VehicleStatus& v : s.vehicles)
-    text += line("vehicle", v.name + "  " + place_text(v.in_world) + "  from " + v.source + (v.stale ? "  stale" : ""));
+    text += line("vehicle", v.name + "  " + place_text(v.in_world) + "  from " + v.source + (v.stale ? "  stale" : "") +
+                                trajectory_text(v.trajectory));
   text +=
       line("poses", format("%llu accepted, %llu refused, %llu late, %llu replaced, %llu over the rate", wide(s.poses.accepted),
                            wide(s.poses.refused), wide(s.poses.late), wide(s.poses.replaced), wide(s.poses.over_rate)));

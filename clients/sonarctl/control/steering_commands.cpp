@@ -136,6 +136,47 @@ void add_set_water(CLI::App& set, const std::shared_ptr<Steering>& steering) {
   });
 }
 
+struct TrajectoryArguments {
+  control::SetTrajectory wanted;
+  bool object = false, pause = false, resume = false;
+
+  Result<control::SetTrajectory> finish() const {
+    control::SetTrajectory finished = wanted;
+    if (object) finished.of = control::PoseSample::Of::object;
+    if (object && finished.name.empty()) return failure(ErrorKind::usage, "say which object");
+    if (pause && resume) return failure(ErrorKind::usage, "either --pause or --resume");
+    if (pause || resume) finished.paused = pause;
+    if (!finished.paused && !finished.position_s && !finished.speed)
+      return failure(ErrorKind::usage, "say what to do: --pause, --resume, --seek or --speed");
+    return finished;
+  }
+};
+
+void add_set_trajectory(CLI::App& set, const std::shared_ptr<Steering>& steering) {
+  CLI::App& command = *set.add_subcommand("trajectory", "pause, resume, seek or speed of what a body plays from a file");
+  command.footer(
+      "examples:\n"
+      "  sonarctl set trajectory --pause\n"
+      "  sonarctl set trajectory rov --seek 90 --speed 4 --resume\n"
+      "  sonarctl set trajectory buoy --object --seek 0");
+  const auto arguments = std::make_shared<TrajectoryArguments>();
+  add_control_options(command, steering->control);
+  command.add_option("NAME", arguments->wanted.name, "of the vehicle; may be left out when there is one");
+  command.add_flag("--object", arguments->object, "NAME is a moving object of the scene");
+  command.add_flag("--pause", arguments->pause, "it stands still");
+  command.add_flag("--resume", arguments->resume, "it goes on");
+  add_optional(command, "--seek", arguments->wanted.position_s, "seconds from the start of the trajectory")->check(number(0));
+  add_optional(command, "--speed", arguments->wanted.speed, "seconds of the trajectory for one of the clock")
+      ->check(number(0.001, 1000));
+  command.callback([steering, arguments] {
+    steering->what = [steering, arguments]() -> Result<void> {
+      const Result<control::SetTrajectory> wanted = arguments->finish();
+      if (!wanted) return tl::unexpected(wanted.error());
+      return steer(steering->control, *wanted, "done; sonarctl status shows where it is");
+    };
+  });
+}
+
 Run run_of(const std::shared_ptr<Steering>& steering) {
   return [steering] { return steering->what(); };
 }
@@ -182,15 +223,17 @@ Run add_events(CLI::App& app) {
 }
 
 Run add_set(CLI::App& app) {
-  CLI::App& set = *app.add_subcommand("set", "change a sonar or the water of a running sonard");
+  CLI::App& set = *app.add_subcommand("set", "change a sonar, the water or a trajectory of a running sonard");
   set.require_subcommand(1);
   set.footer(
       "examples:\n"
       "  sonarctl set sonar --range 5 --rate 5\n"
-      "  sonarctl set water --temperature 8");
+      "  sonarctl set water --temperature 8\n"
+      "  sonarctl set trajectory --seek 90 --speed 4");
   const auto steering = std::make_shared<Steering>();
   add_set_sonar(set, steering);
   add_set_water(set, steering);
+  add_set_trajectory(set, steering);
   return run_of(steering);
 }
 

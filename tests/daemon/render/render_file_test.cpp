@@ -157,6 +157,18 @@ TEST(Npy, HeadersAreAlignedAndTellTypeAndShape) {
   EXPECT_EQ(static_cast<unsigned char>(header[8]) + 256u * static_cast<unsigned char>(header[9]), header.size() - 10);
 }
 
+TEST(RenderJob, PutsMovingObjectsWhereTheirFilesHaveThem) {
+  RenderJob job =
+      parsed(
+          "scene: {materials: {a: {lambert_db: -20}}, objects: [{name: ball, type: sphere, moving: true, material: a, "
+          "radius_m: 1, pose: {xyz_m: [5, 0, 0]}}]}\n")
+          .jobs.at(0);
+  EXPECT_EQ(make_request(job, PingNumber{1}, Time{}).bodies_in_world.at(0).position_m.x, 5);
+  motion::Points points{{motion::Ns{0}, std::chrono::seconds(10)}, {{{0, 0, 0}, {}}, {{10, 0, 0}, {}}}, {}, {}};
+  job.body_paths = {std::make_shared<const motion::Trajectory>(std::move(points))};
+  EXPECT_EQ(make_request(job, PingNumber{1}, Time{} + std::chrono::seconds(4)).bodies_in_world.at(0).position_m.x, 4);
+}
+
 TEST(Digest, FollowsEverythingThatChangesAPing) {
   const RenderInput input = parsed(point);
   const std::string digest = digest_of(input, 0);
@@ -174,6 +186,7 @@ TEST(Digest, FollowsEverythingThatChangesAPing) {
     return std::make_shared<const motion::Trajectory>(motion::Points{{motion::Ns{0}}, {{{0, 0, z_m}, {}}}, {}, {}});
   };
   EXPECT_TRUE(changed([&](RenderJob& j) { j.path.trajectory = way(0); }));
+  EXPECT_TRUE(changed([&](RenderJob& j) { j.body_paths = {way(0)}; }));
   RenderInput follows = input, elsewhere = input;
   follows.jobs[0].path.trajectory = way(0);
   elsewhere.jobs[0].path.trajectory = way(1);

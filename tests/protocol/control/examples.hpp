@@ -39,7 +39,9 @@ inline std::vector<Request> every_request() {
           {8, AddObject{"crate2", "crate", "steel", tilted, true}},
           {9, RemoveObject{"crate2"}},
           {10, SetObject{"crate", true, tilted}},
-          {11, Subscribe{true, false, true, false}}};
+          {11, Subscribe{true, false, true, false}},
+          {12, SetTrajectory{PoseSample::Of::object, "crate", true, 1.5, 2.5}},
+          {13, SetTrajectory{PoseSample::Of::vehicle, "rov", {}, 0.25, {}}}};
 }
 
 inline DaemonStatus full_status() {
@@ -71,7 +73,8 @@ inline DaemonStatus full_status() {
   sonar.clients = {{"127.0.0.1:40000", 1, 2, 3, 4.5}, {"127.0.0.1:40001", 5, 6, 7, 8.5}};
   sonar.figures = {1, 2, 3, 4, 5, 6, 7, 8.5, 9.5, 10.5, 11.5};
   s.sonars = {sonar};
-  s.vehicles = {{"rov", "demo orbit", true, tilted}};
+  s.vehicles = {{"rov", "demo orbit", true, tilted},
+                {"auv", "trajectory dive.tum", false, tilted, TrajectoryStatus{"dive.tum", 1.5, 60, 2.5, true, true}}};
   s.objects = {{"crate", "steel", true, false, 12, tilted}};
   s.poses = {21, 22, 23, 24, 25};
   s.environment = {12, 30, 8, 0};

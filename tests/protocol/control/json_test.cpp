@@ -42,6 +42,10 @@ TEST(ControlJson, ReadsEveryRequestLikeItsBytes) {
   const auto add = request_from_json("add_object", R"({"name":"a","like":"b",)" + at + "}");
   ASSERT_TRUE(add) << add.error().text;
   EXPECT_EQ(std::get<AddObject>(add->op).in_world.position_m.x, 2) << "north and east change places";
+  const auto plays = request_from_json("set_trajectory", R"({"vehicle":"rov","paused":true,"speed":2})");
+  ASSERT_TRUE(plays) << plays.error().text;
+  EXPECT_EQ(std::get<SetTrajectory>(plays->op).speed, 2.0);
+  EXPECT_THAT(request_from_json("set_trajectory", R"({"vehicle":"a","object":"b"})").error().text, HasSubstr("not both"));
   const auto set = request_from_json("set_object", R"({"object":"a","visible":false})");
   ASSERT_TRUE(set);
   EXPECT_EQ(std::get<SetObject>(set->op).visible, false);

@@ -70,6 +70,11 @@ TEST(ControlRequests, TheOthersArriveAsAskedFor) {
   expect_near(*set.in_world, std::get<AddObject>(all[7].op).in_world);
   const auto subscribe = std::get<Subscribe>(round_trip(all[10]).op);
   EXPECT_TRUE(subscribe.pings && !subscribe.clients && subscribe.poses && !subscribe.scene);
+  const auto plays = std::get<SetTrajectory>(round_trip(all[11]).op), goes_on = std::get<SetTrajectory>(round_trip(all[12]).op);
+  EXPECT_TRUE(plays.of == PoseSample::Of::object && plays.name == "crate");
+  EXPECT_TRUE(plays.paused == true && plays.position_s == 1.5 && plays.speed == 2.5);
+  EXPECT_TRUE(goes_on.of == PoseSample::Of::vehicle && goes_on.name == "rov");
+  EXPECT_TRUE(!goes_on.paused && goes_on.position_s == 0.25 && !goes_on.speed);
 }
 
 /// Request{id 3, sonar: SetSonar{range_m: 5, transmit: false}}, by hand: wrappers are messages of their own.
@@ -108,6 +113,8 @@ TEST(ControlRequests, RefusedWithASentenceThatNamesTheKey) {
   EXPECT_EQ(refusal_of(RemoveObject{}), "object is missing");
   EXPECT_EQ(refusal_of(RemoveObject{std::string(300, 'x')}), "object is longer than 256 bytes");
   EXPECT_THAT(refusal_of(SetObject{"a", {}, Pose{{nan, 0, 0}, {}}}), HasSubstr("at: position has a NaN"));
+  EXPECT_EQ(refusal_of(SetTrajectory{PoseSample::Of::vehicle, "", {}, nan, {}}), "set_trajectory.position_s is NaN or infinite");
+  EXPECT_EQ(refusal_of(SetTrajectory{PoseSample::Of::object, "a\nb", {}, {}, {}}), "object has control characters");
   PoseSample pose;
   pose.name = "rov\x7f";
   EXPECT_EQ(refusal_of(pose), "vehicle has control characters");

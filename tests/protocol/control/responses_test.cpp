@@ -23,6 +23,11 @@ TEST(ControlResponses, AStatusArrivesWhole) {
   EXPECT_EQ(status.sonars.at(0).status_to.at(1), "10.0.0.7:52102");
   EXPECT_FALSE(status.sonars.at(0).transmits);
   EXPECT_EQ(status.vehicles.at(0).source, "demo orbit");
+  EXPECT_FALSE(status.vehicles.at(0).trajectory);
+  ASSERT_TRUE(status.vehicles.at(1).trajectory);
+  EXPECT_EQ(status.vehicles.at(1).trajectory->file, "dive.tum");
+  EXPECT_EQ(status.vehicles.at(1).trajectory->position_s, 1.5);
+  EXPECT_TRUE(status.vehicles.at(1).trajectory->paused && status.vehicles.at(1).trajectory->loop);
   EXPECT_FALSE(status.objects.at(0).visible);
   EXPECT_EQ(status.poses.over_rate, 25u);
   EXPECT_EQ(status.environment.sound_speed_mps, 0.0);
