@@ -10,6 +10,7 @@ namespace sonar {
 namespace {
 
 namespace http = boost::beast::http;
+constexpr std::size_t shortest_last_chunk = 5;     // "0", twice the end of a line
 constexpr std::size_t longest_unread = 64u << 10;  // chunk headers and trailers have no limit of Beast's
 
 std::string text_of(boost::beast::string_view view) { return {view.data(), view.size()}; }
@@ -60,9 +61,12 @@ void HttpReader::feed(std::span<const std::byte> received) {
 bool HttpReader::begun() const { return !buffer_.empty() || parser_->beast.got_some(); }
 
 tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
-  while (!buffer_.empty() && !parser_->beast.is_done()) {
+  auto& beast = parser_->beast;
+  while (!buffer_.empty() && !beast.is_done()) {
+    // Beast 1.74 takes for granted that a last chunk which it looks at again has five bytes by then. All do that end.
+    if (beast.is_header_done() && beast.chunked() && buffer_.size() < shortest_last_chunk) break;
     boost::beast::error_code ec;
-    const std::size_t used = parser_->beast.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), ec);
+    const std::size_t used = beast.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), ec);
     buffer_.erase(0, used);
     if (ec == http::error::need_more) {
       if (buffer_.size() > longest_unread) return tl::unexpected(HttpRefusal{400, "a chunk's header never ends"});
@@ -71,8 +75,8 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
     if (ec) return tl::unexpected(refusal_of(ec, most_body_));
     if (used == 0) break;
   }
-  if (!parser_->beast.is_done()) return std::optional<HttpRequest>{};
-  auto message = parser_->beast.release();
+  if (!beast.is_done()) return std::optional<HttpRequest>{};
+  auto message = beast.release();
   parser_ = std::make_unique<Parser>(most_body_);
   continued_ = false;
   return request_from(std::move(message));

@@ -43,13 +43,14 @@ const std::string post =
     "13\r\n\r\n{\"range_m\":5}";
 const std::string chunked =
     "POST /x HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n5;a=b\r\nhello\r\n1\r\n!\r\n0\r\nTrailer: x\r\n\r\n";
+const std::string no_chunk = "POST /y HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n";
 const std::string old = "GET / HTTP/1.0\r\n\r\n";
 
 TEST(HttpReader, EverySplitGivesTheSameRequests) {
-  const std::string stream = get + post + chunked + old;
+  const std::string stream = get + post + chunked + no_chunk + old;
   for (std::size_t piece = 1; piece <= stream.size(); ++piece) {
     const Taken t = take(stream, piece);
-    ASSERT_EQ(t.requests.size(), 4u) << "pieces of " << piece << ": " << t.why;
+    ASSERT_EQ(t.requests.size(), 5u) << "pieces of " << piece << ": " << t.why;
     EXPECT_EQ(t.requests[0].method, "GET");
     EXPECT_EQ(t.requests[0].target, "/api/v1/status");
     EXPECT_EQ(t.requests[0].host, "127.0.0.1:8088");
@@ -60,9 +61,10 @@ TEST(HttpReader, EverySplitGivesTheSameRequests) {
     EXPECT_EQ(t.requests[1].content_type, "application/json");
     EXPECT_TRUE(t.requests[1].has_origin);
     EXPECT_EQ(t.requests[2].body, "hello!");
-    EXPECT_TRUE(t.requests[3].http_1_0);
-    EXPECT_FALSE(t.requests[3].keep_alive);
-    EXPECT_FALSE(t.requests[3].has_host);
+    EXPECT_EQ(t.requests[3].body, "");
+    EXPECT_TRUE(t.requests[4].http_1_0);
+    EXPECT_FALSE(t.requests[4].keep_alive);
+    EXPECT_FALSE(t.requests[4].has_host);
   }
 }
 
