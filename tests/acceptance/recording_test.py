@@ -2,6 +2,7 @@
 import os
 import pathlib
 import resource
+import shutil
 import signal
 import socket
 import struct
@@ -13,7 +14,7 @@ import unittest
 import mcap_checker
 from oculus_reader import HEADER, Ping
 from running_sonard import ROOT, SONARCTL, SONARD, Sonard, free_address, run
-from tshark import messages, why_not
+from tshark import messages, tshark, why_not
 
 KINDS = ["pcap", "mcap", "oculus", "raw"]
 SEEDS = ROOT / "tests/fuzz/corpus"
@@ -138,6 +139,16 @@ class Recorded(Files):
         titles = [m for m in found if not m.title.startswith(("Oculus, fire", "Oculus, status"))]
         self.assertEqual([int(m.shown("length")[0]) for m in titles], [len(m) for m in sent])
         self.assertEqual(len([m for m in found if m.title.startswith("Oculus, fire")]), 1)
+        checks = [word for name in ("ip", "tcp", "udp") for word in ("-o", f"{name}.check_checksum:TRUE")]
+        bad = 'ip.checksum.status!="Good" || tcp.checksum.status=="Bad" || udp.checksum.status=="Bad" || tcp.analysis.flags'
+        self.assertEqual(tshark("-r", self.path("pcap"), *checks, "-Y", bad), "")
+        good = tshark("-r", self.path("pcap"), *checks, "-Y", 'tcp.checksum.status=="Good"').splitlines()
+        self.assertGreater(len(good), len(sent))
+        if shutil.which("editcap"):  # somebody else's pcapng
+            subprocess.run(["editcap", "-F", "pcapng", self.path("pcap"), self.folder / "again.pcapng"], check=True, timeout=60)
+            done = run(SONARCTL, "record", "--from", self.folder / "again.pcapng", "--raw", self.folder / "again.raw")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual((self.folder / "again.raw").read_bytes(), b"".join(sent))
 
     def test_ctrl_c_leaves_whole_files(self):
         with Sonard(scene="tank-rod.yaml") as daemon:
