@@ -22,7 +22,7 @@ preset=${kind%-all}
 # Paths under tests/ of what runs, and of what does not.
 left_out='^$'
 case $kind in
-  asan) wanted='^tests/(protocol|daemon|clients)/.*_test$|^tests/core/text/.*_test$|/core_load_scene_test$|/core_shapes_test$|^tests/fuzz/.*_fuzz$' ;;
+  asan) wanted='^tests/(protocol|daemon|clients)/.*_test$|^tests/core/(text|motion)/.*_test$|/core_load_scene_test$|/core_shapes_test$|^tests/fuzz/.*_fuzz$' ;;
   asan-all)
     wanted='^tests/.*(_test|_fuzz)$'
     # What computes for long. The stages it sounds are run by the other tests of its folder; these repeat them over thousands of
@@ -32,7 +32,8 @@ case $kind in
   tsan) wanted='^tests/(protocol|daemon|clients)/.*_test$|/base_test$|/analytic_rays_test$' ;;
 esac
 # Through ctest: the shipped programs. Not among them, with the reasons:
-#   render, determinism, picture, capture_comparison   compute for long; rendering and pictures are sounded by the test programs
+#   render, determinism, picture, capture_comparison, trajectory   compute for long; rendering, pictures and what is played are
+#                                                      sounded by the test programs
 #   service, package, container                        judge unit, archive and image files, not a program of ours at run time
 #   bench                                              measures speed, by the same engine as the others
 #   the Python client alone and without numpy          no program of ours takes part
