@@ -103,16 +103,16 @@ Result<Socket> connect_udp(const Endpoint& to) {
   return socket;
 }
 
-Result<Socket> listen_udp(std::uint16_t port) {
+Result<Socket> listen_udp(const Endpoint& at) {
   auto socket = open_socket(SOCK_DGRAM);
   if (!socket) return socket;
   const int yes = 1;
   ::setsockopt(socket->fd(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  auto any = resolve({"0.0.0.0", port}, SOCK_DGRAM);
-  if (!any) return tl::unexpected(any.error());
-  if (::bind(socket->fd(), (*any)->ai_addr, (*any)->ai_addrlen) != 0)
+  auto place = resolve(at, SOCK_DGRAM);
+  if (!place) return tl::unexpected(place.error());
+  if (::bind(socket->fd(), (*place)->ai_addr, (*place)->ai_addrlen) != 0)
     return failure(ErrorKind::unavailable,
-                   "cannot listen on udp " + std::to_string(port) + ": " + std::strerror(errno) +
+                   "cannot listen on udp " + std::to_string(at.port) + ": " + std::strerror(errno) +
                        ". A driver that shares no ports may hold it: stop it, or give the address instead");
   return socket;
 }

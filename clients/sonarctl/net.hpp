@@ -42,7 +42,8 @@ class Socket {
 Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patience);
 Result<Socket> connect_udp(const Endpoint& to);
 /// Bound with address reuse: other listeners on this machine keep their share of broadcasts.
-Result<Socket> listen_udp(std::uint16_t port);
+Result<Socket> listen_udp(const Endpoint& at);
+inline Result<Socket> listen_udp(std::uint16_t port) { return listen_udp(Endpoint{"0.0.0.0", port}); }
 
 enum class Wait { data, timed_out, interrupted, closed };
 struct Read {

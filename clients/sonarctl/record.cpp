@@ -200,7 +200,7 @@ Result<void> record_device(const RecordOptions& options) {
   }
   std::optional<Socket> status;
   if (options.status && !(options.pcap.empty() && options.mcap.empty())) {
-    auto listening = listen_udp(oculus::status_port);
+    auto listening = listen_udp(options.status_on);
     if (listening) status = std::move(*listening);
     if (!listening) std::fprintf(stderr, "sonarctl: no status datagrams will be recorded: %s\n", listening.error().text.c_str());
   }

@@ -17,6 +17,7 @@ struct RecordOptions {
   double seconds = 0;                             // 0 = no limit
   std::uint64_t pings = 0;                        // 0 = no limit
   bool status = true;                             // listen for the device's status datagrams, too
+  Endpoint status_on{"0.0.0.0", 52102};           // where
   std::string sonar;                              // which of a recording's
   std::optional<ControlOptions> control;          // ask this sonard for the sonar's name and poses, for the MCAP file
 };

@@ -20,7 +20,7 @@ Run add_record(CLI::App& app) {
       "`sonard replay FILE` serves any of these files to a driver");
   struct Arguments {
     RecordOptions options;
-    std::string address, control;
+    std::string address, control, status_on;
     std::uint16_t port = 52100;
     bool as_it_is = false, no_status = false;
     FireArguments fire;
@@ -42,7 +42,9 @@ Run add_record(CLI::App& app) {
   command.add_option("--raw", options.raw, "the bytes of the sonar, nothing else");
   command.add_option("--seconds", options.seconds, "stop after this time")->check(text::number(0));
   command.add_option("--pings", options.pings, "stop after so many pings")->check(text::whole_number());
-  command.add_flag("--no-status", arguments->no_status, "do not listen on udp 52102");
+  command.add_option("--status-on", arguments->status_on, "where to listen for status messages (default 0.0.0.0:52102)")
+      ->check(address());
+  command.add_flag("--no-status", arguments->no_status, "do not listen for them");
   CLI::Option* control = command.add_option("--control", arguments->control,
                                             "HOST:PORT of the sonard's control stream: its poses go into the MCAP file");
   command.add_option("--token-file", options.control.emplace().token_file, "the daemon's secret, when it wants one")
@@ -58,6 +60,9 @@ Run add_record(CLI::App& app) {
     const Result<Endpoint> device = parse_endpoint(arguments->address, {"127.0.0.2", arguments->port});
     if (!device) return tl::unexpected(device.error());
     wish.source.device = *device;
+    const Result<Endpoint> status_on = parse_endpoint(arguments->status_on, wish.status_on);
+    if (!status_on) return tl::unexpected(status_on.error());
+    wish.status_on = *status_on;
     if (!arguments->as_it_is) wish.source.asked = arguments->fire.request();
     wish.triggered = arguments->fire.triggered();
     wish.status = !arguments->no_status;

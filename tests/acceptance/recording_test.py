@@ -100,6 +100,7 @@ class Recorded(Files):
     def test_a_run_in_every_kind_of_file(self):
         with Sonard(scene="tank-rod.yaml") as daemon:
             done = daemon.ctl("record", "--pings", 6, "--range", 1, "--beams", 256, "--control", f"{daemon.address}:14770",
+                              "--status-on", daemon.address,
                               *self.outputs())
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertRegex(done.stdout, r"recorded 6 pings, \d+ messages, .* MB, .* s: .*run\.pcap .*run\.mcap ")
@@ -130,6 +131,7 @@ class Recorded(Files):
         self.assertEqual(len(by_topic["/front/client"]), 1)
         self.assertEqual(len(by_topic["/front/image"]), 6)
         self.assertGreaterEqual(len(by_topic["/front/pose"]), 1)
+        self.assertTrue(all(len(status) == 142 for status in by_topic.get("/front/status", [])))
 
     def expect_capture(self, sent):
         if why_not():
@@ -152,7 +154,7 @@ class Recorded(Files):
 
     def test_ctrl_c_leaves_whole_files(self):
         with Sonard(scene="tank-rod.yaml") as daemon:
-            process = subprocess.Popen([str(SONARCTL), "record", daemon.address, "--range", "1", "--beams", "256",
+            process = subprocess.Popen([str(SONARCTL), "record", daemon.address, "--range", "1", "--beams", "256", "--no-status",
                                         *map(str, self.outputs())], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
             deadline = time.monotonic() + 60
             while time.monotonic() < deadline and not (self.path("raw").exists() and self.path("raw").stat().st_size > 200_000):
