@@ -64,7 +64,9 @@ class Page(unittest.TestCase):
     """The examples, all on one daemon, in the order in which they stand."""
 
     def run_examples(self, run_one):
-        with Sonard(profile="oculus-m1200d") as daemon:
+        daemon = Sonard(profile="oculus-m1200d", trajectory="way.csv")
+        (pathlib.Path(daemon.folder.name) / "way.csv").write_text("# frame: ENU_FLU\nt,x,y,z\n0,-7,0,-3\n100,-5,0,-3\n", encoding="utf-8")
+        with daemon:
             host = f"{daemon.address}:8088"
             for example in examples():
                 with self.subTest(example):
