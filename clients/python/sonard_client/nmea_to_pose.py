@@ -23,7 +23,8 @@ SLOWEST_WAIT_S = 10.0  # of a gap in a file
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python3 -m sonard_client.nmea_to_pose", description=__doc__)
     parser.add_argument("file", nargs="?", default=None, help="a log; - is standard input; without it UDP is listened to")
-    parser.add_argument("--listen", default=f"0.0.0.0:{UDP_PORT}", metavar="HOST:PORT", help="(%(default)s)")
+    parser.add_argument("--listen", default=f"0.0.0.0:{UDP_PORT}", metavar="HOST:PORT",
+                        help="(%(default)s); port 0 is any free one, named on stderr")
     parser.add_argument("--to", default="127.0.0.1", help="sonard's poses.json: host or host:port")
     parser.add_argument("--vehicle", default="")
     parser.add_argument("--origin", metavar="LAT,LON", help="where the world's 0, 0 is; without it at the first fix")
@@ -135,7 +136,7 @@ def run(options: argparse.Namespace, log: TextIO) -> int:
         bridge = Bridge(NmeaPoses(assumed), sender, log, options.without_checksum)
         try:
             if options.file is None:
-                _live(_from_udp(endpoint(options.listen, UDP_PORT), bridge), bridge, options.count)
+                _live(_from_udp(endpoint(options.listen, UDP_PORT, lowest=0), bridge), bridge, options.count)
             elif options.file == "-":
                 _live(iter(sys.stdin), bridge, options.count)
             else:

@@ -12,13 +12,13 @@ from .ping import Ping, ping_from
 from .stream import Message, MessageReader
 
 
-def endpoint(address: str, port: int) -> Tuple[str, int]:
-    """("host", port) of "host" or "host:port"."""
+def endpoint(address: str, port: int, lowest: int = 1) -> Tuple[str, int]:
+    """("host", port) of "host" or "host:port". lowest: 0 where one listens, and 0 means any free port."""
     host, colon, number = address.rpartition(":")
     if not colon:
         return address, port
-    if not number.isdigit() or not 0 < int(number) < 65536:
-        raise ValueError(f"{address}: the port must be a number from 1 to 65535")
+    if not number.isdigit() or not lowest <= int(number) < 65536:
+        raise ValueError(f"{address}: the port must be a number from {lowest} to 65535")
     return host, int(number)
 
 

@@ -160,18 +160,16 @@ class Command(unittest.TestCase):
         self.assertGreater(time.monotonic() - began, 0.45)
 
     def test_by_udp_every_attitude_and_every_fix_is_a_pose(self):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-            free.bind(("127.0.0.1", 0))
-            listen = "127.0.0.1:%d" % free.getsockname()[1]
-        command = [sys.executable, "-B", "-m", "sonard_client.nmea_to_pose", "--listen", listen, "--to", self.to, "--count", "3"]
+        command = [sys.executable, "-B", "-m", "sonard_client.nmea_to_pose", "--listen", "127.0.0.1:0", "--to", self.to,
+                   "--count", "3"]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
                                    env=dict(os.environ, PYTHONPATH=str(common.PACKAGE)))
         try:
-            self.assertIn("listens on", process.stderr.readline())
-            host, port = listen.split(":")
+            self.assertRegex(said := process.stderr.readline(), r"listens on UDP 127\.0\.0\.1:[1-9]")
+            instruments_to = "127.0.0.1", int(said.rpartition(":")[2])
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as instruments:
                 for datagram in ("HEHDT,10.0,T", Poses.FIX, "HEHDT,20.0,T", "HEHDT,30.0,T"):
-                    instruments.sendto(made.sentence(datagram).encode(), (host, int(port)))
+                    instruments.sendto(made.sentence(datagram).encode(), instruments_to)
             yaws = []
             for _ in range(3):
                 pose = json.loads(self.there.recv(4096))
@@ -196,6 +194,7 @@ class Command(unittest.TestCase):
         self.assertEqual(self.said(self.log, "--bottom", "3", "--depth-is-vehicle")[0], 64)
         self.assertEqual(self.said(str(self.log) + ".none")[0], 66)
         self.assertEqual(self.said("--listen", "203.0.113.1:9")[0], 69)
+        self.assertEqual(self.said("--listen", "127.0.0.1:65536")[0], 64)
 
 
 if __name__ == "__main__":
