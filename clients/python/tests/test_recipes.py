@@ -25,7 +25,7 @@ def logs():
     told = [(100 + i, made.odometry(i, ros1=True)) for i in range(4)]
     return {"flight.bin": made.dataflash_log(("SIM", "ATT", "POS"), 4),
             "flight.tlog": made.telemetry_log(("ODOMETRY", "SIM_STATE"), 4),
-            "second.tlog": made.telemetry_log(("ODOMETRY",), 4),
+            "second.tlog": made.telemetry_log(("ODOMETRY",), 5),
             "dive.mcap": made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", odometry),
                                     ("/tf", "cdr", "tf2_msgs/msg/TFMessage", [(100 + i, made.transforms(i)) for i in range(4)])]),
             "dive.bag": made.bag([("/odom", "nav_msgs/Odometry", told)]), "nmea.log": made.nmea_log(4).encode(),
@@ -50,19 +50,24 @@ class Recipes(unittest.TestCase):
             for csv in ("flight", "truth", "dive", "dive-tf", "dive-bag", "ship", "both"):
                 self.assertIn("# frame: ", (folder / f"{csv}.csv").read_text(encoding="utf-8"))
             both = (folder / "both.csv").read_text(encoding="utf-8").splitlines()
-            self.assertEqual([sum(line.endswith(b) for line in both) for b in (",rov", ",buoy")], [4, 4])
+            self.assertEqual([sum(line.endswith(b) for line in both) for b in (",rov", ",buoy")], [4, 5])
             self.assert_file_of_two_is_read(folder, environment)
             self.assertIn("json", daemon.log())
 
     def assert_file_of_two_is_read(self, folder, environment):
-        """`both.csv` by the reader of sonard: with another body than these it names them."""
-        text = (folder / "dive.yaml").read_text(encoding="utf-8").replace("name: rov", "name: other")
-        (folder / "other.yaml").write_text(text, encoding="utf-8")
-        done = subprocess.run([str(SONARD), "render", "other.yaml", "--poses", "both.csv", "--out", "other", "--pings", "1"],
-                              cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120,
-                              check=False)
-        self.assertNotEqual(done.returncode, 0)
-        self.assertIn("buoy", done.stderr)
+        """`both.csv` by the reader of sonard: each body has its own lines, and another one is answered with their names."""
+        dive = (folder / "dive.yaml").read_text(encoding="utf-8")
+        text, changed = re.subn(r"initial_pose: \{.*?\}", "trajectory: {file: both.csv, body: BODY}", dive)
+        self.assertEqual(changed, 1)
+        for body, code, answer in (("rov", 0, "vehicle rov follows both.csv: csv, NED_FRD, 4 poses"),
+                                   ("buoy", 0, "vehicle rov follows both.csv: csv, NED_FRD, 5 poses"),
+                                   ("kayak", 78, 'no body is called "kayak"; there are: rov, buoy')):
+            with self.subTest(body):
+                (folder / "two.yaml").write_text(text.replace("BODY", body), encoding="utf-8")
+                done = subprocess.run([str(SONARD), "check", "two.yaml"], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
+                                      capture_output=True, text=True, timeout=120, check=False)
+                self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+                self.assertIn(answer, done.stdout + done.stderr)
 
 
 class Axes(unittest.TestCase):
