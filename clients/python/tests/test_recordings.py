@@ -2,6 +2,7 @@
 import bz2
 import json
 import struct
+import tracemalloc
 import unittest
 from unittest import mock
 
@@ -9,6 +10,64 @@ import made_logs as made
 from converted import WithFolder
 
 from sonard_client.convert import ConvertError, compression
+
+
+class ModuleStandIn:
+    """For lz4.frame and compression.zstd, which may not be here: unpacks by turning round."""
+    class LZ4FrameDecompressor:
+        eof = True
+
+        @staticmethod
+        def decompress(data, max_length=-1):
+            return data[::-1] if max_length < 0 else data[::-1][:max_length]
+
+    ZstdDecompressor = LZ4FrameDecompressor
+
+
+class Unpacking(unittest.TestCase):
+    BOMB = bytes(64 << 20)
+
+    def refused(self, kind, packed):
+        """Told of far fewer bytes than there are, it takes memory for these few, and for the unpacker itself."""
+        tracemalloc.start()
+        try:
+            with self.assertRaisesRegex(compression.Unreadable, "unpacks to more than the 1000 bytes that were promised"):
+                compression.unpack(kind, packed, 1000)
+            self.assertLess(tracemalloc.get_traced_memory()[1], 16 << 20)
+        finally:
+            tracemalloc.stop()
+
+    def whole_broken_off_or_too_short(self, kind, pack):
+        data = bytes(range(250)) * 4
+        self.assertEqual(compression.unpack(kind, pack(data), 1000), data)
+        for packed in (pack(data)[:-5], pack(data[:-1]), b"", b"nothing that was ever packed"):
+            with self.subTest(kind, packed=packed[-10:]), self.assertRaises(compression.Unreadable):
+                compression.unpack(kind, packed, 1000)
+
+    def test_bz2(self):
+        self.whole_broken_off_or_too_short("bz2", bz2.compress)
+        self.refused("bz2", bz2.compress(self.BOMB))
+
+    def test_lz4(self):
+        lz4 = compression._module("lz4.frame")
+        if lz4 is None:
+            self.skipTest("python3-lz4 is not here")
+        self.whole_broken_off_or_too_short("lz4", lz4.compress)
+        self.refused("lz4", lz4.compress(self.BOMB))
+
+    def test_zstd(self):
+        zstd = compression._module("compression.zstd", "zstandard")
+        if zstd is None:
+            self.skipTest("python3-zstandard is not here")
+        self.whole_broken_off_or_too_short("zstd", zstd.compress)
+        self.refused("zstd", zstd.compress(self.BOMB))
+
+    def test_modules_are_asked_for_no_more_than_was_promised(self):
+        for kind, module in (("lz4", "lz4.frame"), ("zstd", "compression.zstd")):
+            with self.subTest(kind), \
+                    mock.patch.object(compression, "_module", lambda *names, m=module: ModuleStandIn if m in names else None):
+                self.assertEqual(compression.unpack(kind, b"cba", 3), b"abc")
+                self.refused(kind, bytes(2000))
 
 
 class Recordings(WithFolder):
@@ -114,12 +173,8 @@ class Recordings(WithFolder):
         self.assertRegex(self.warned[0], "at byte [0-9]+, topic /odom: ends after 60 bytes")
 
     def test_compressed_chunks_need_their_module(self):
-        class Backwards:  # stands for a module that may not be here
-            @staticmethod
-            def decompress(data):
-                return data[::-1]
         data = made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], compress=("lz4", lambda d: d[::-1]))
-        with mock.patch.object(compression, "_module", lambda *names: Backwards if names == ("lz4.frame",) else None):
+        with mock.patch.object(compression, "_module", lambda *names: ModuleStandIn if names == ("lz4.frame",) else None):
             self.assertEqual(len(self.convert(data).rows), 30)
         for kind, package in (("lz4", "python3-lz4"), ("zstd", "python3-zstandard")):
             data = made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], compress=(kind, lambda d: d[::-1]))

@@ -21,20 +21,39 @@ def _module(*names: str) -> Any:
     return None
 
 
+def _bounded(stream: Any, data: bytes, size: int) -> bytes:
+    """At most one byte more than was promised: a few bytes can unpack to more than there is memory."""
+    out = bytes(stream.decompress(data, max_length=size + 1))
+    if len(out) <= size and not stream.eof:
+        raise EOFError("they break off")
+    return out
+
+
+def _read(reader: Any, size: int) -> bytes:
+    """The same from a file-like object, which may answer with less than was asked for."""
+    out = b""
+    while len(out) <= size:
+        part = reader.read(size + 1 - len(out))
+        if not part:
+            break
+        out += part
+    return out
+
+
 def _unpacker(kind: str) -> Optional[Callable[[bytes, int], bytes]]:
     if kind in ("", "none"):
         return lambda data, _: data
     if kind == "bz2":
-        return lambda data, _: bz2.decompress(data)
+        return lambda data, size: _bounded(bz2.BZ2Decompressor(), data, size)
     if kind == "lz4":
         lz4 = _module("lz4.frame")
-        return None if lz4 is None else lambda data, _: bytes(lz4.decompress(data))
+        return None if lz4 is None else lambda data, size: _bounded(lz4.LZ4FrameDecompressor(), data, size)
     if kind == "zstd":
         newer = _module("compression.zstd")
         if newer is not None:
-            return lambda data, _: bytes(newer.decompress(data))
+            return lambda data, size: _bounded(newer.ZstdDecompressor(), data, size)
         older = _module("zstandard")
-        return None if older is None else lambda data, size: bytes(older.ZstdDecompressor().decompress(data, size))
+        return None if older is None else lambda data, size: _read(older.ZstdDecompressor().stream_reader(data), size)
     raise Unreadable(f"compressed by {kind!r}, which is not known here")
 
 
@@ -51,6 +70,8 @@ def unpack(kind: str, data: bytes, size: int) -> bytes:
         out = unpacker(data, size)
     except Exception as error:  # each module has its own kinds
         raise Unreadable(f"its {kind} data cannot be unpacked: {error}") from None
+    if len(out) > size:
+        raise Unreadable(f"unpacks to more than the {size} bytes that were promised")
     if len(out) != size:
         raise Unreadable(f"unpacks to {len(out)} bytes where {size} were promised")
     return out
