@@ -14,11 +14,13 @@ def moment(step):
     return t, 0.5 * t, 0.25 * t, 2 + 0.1 * t, 0.02 * math.sin(t), -0.1, 0.5 + 0.05 * t
 
 
+def times(a, b):
+    return (a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0])
+
+
 def quaternion(roll, pitch, yaw):
     """w, x, y, z, by rotations about one axis after the other."""
-    def times(a, b):
-        return (a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-                a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0])
     about = [(math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)), (math.cos(pitch / 2), 0, math.sin(pitch / 2), 0),
              (math.cos(roll / 2), math.sin(roll / 2), 0, 0)]
     return functools.reduce(times, about)
@@ -114,7 +116,9 @@ def mavlink_frame(name, values, version=2, system=1, sequence=0, signed=False):
     return b"\xfd" + body + struct.pack("<H", crc16(body + bytes((seed,)))) + (b"thirteenbytes" if signed else b"")
 
 
-def telemetry_log(kinds=("ATTITUDE", "LOCAL_POSITION_NED"), steps=50, version=2, began_s=1_700_000_000, boot_s=25):
+def telemetry_log(kinds=("ATTITUDE", "LOCAL_POSITION_NED"), steps=50, version=2, began_s=1_700_000_000, boot_s=25, frames=(1, 8),
+                  turned=(1, 0, 0, 0)):
+    """frames: of ODOMETRY; turned: the axes of its body, in FRD."""
     out = b""
 
     def put(step, name, *values, system=1):
@@ -141,7 +145,8 @@ def telemetry_log(kinds=("ATTITUDE", "LOCAL_POSITION_NED"), steps=50, version=2,
             put(step, "SIM_STATE", *q, roll, pitch, yaw, *[0] * 6, lat, lon, alt, *[0] * 5,
                 *([round(1e7 * lat), round(1e7 * lon)] if version == 2 else []))
         if "ODOMETRY" in kinds:
-            put(step, "ODOMETRY", 1000 * boot_ms, north, east, down, *q, *[0] * 6, 1, 8, *([0] * 3 if version == 2 else []))
+            put(step, "ODOMETRY", 1000 * boot_ms, north, east, down, *times(q, turned), *[0] * 6, *frames,
+                *([0] * 3 if version == 2 else []))
     return out
 
 

@@ -172,11 +172,28 @@ class Telemetry(WithFolder):
         self.assertEqual(len(track.rows), 48)
         self.assertIn("ends within a frame", self.warned[0])
 
+    def test_odometry_of_a_body_in_frd_or_flu(self):
+        for frames in ((1, 1), (1, 8), (1, 12), (20, 20), (20, 8), (20, 12), (1, 13), (20, 13)):
+            with self.subTest(frames):
+                turned = (0, 1, 0, 0) if frames[1] == 13 else (1, 0, 0, 0)
+                track = self.convert(made.telemetry_log(("ODOMETRY",), frames=frames, turned=turned))
+                self.assert_way(track, range(50), t0=25, metres=1e-5, radians=1e-5)
+                self.assertEqual(["x is taken as north" in text for text in self.warned], [True] * (frames[0] == 20))
+
+    def test_a_level_body_in_flu_is_level(self):
+        values = 1000, 1, 2, 3, 0, 1, 0, 0, *[0] * 6, 1, 13, 0, 0, 0  # to NED: half a turn about the axis ahead
+        row, = self.convert(bytes(8) + made.mavlink_frame("ODOMETRY", values)).rows
+        self.assertEqual([abs(part) for part in row.orientation], [1, 0, 0, 0])
+
     def test_odometry_in_other_frames_is_left_out_and_told(self):
-        t, north, east, down, *angles = made.moment(3)
-        values = (3, north, east, down, *made.quaternion(*angles), *[0] * 6, 21, 8, 0, 0, 0)
-        with self.assertRaises(ConvertError):
-            self.convert(bytes(8) + made.mavlink_frame("ODOMETRY", values))
+        for frames in ((21, 8), (1, 20), (20, 1), (1, 0), (12, 12)):
+            with self.subTest(frames):
+                told = "frame_id %d and child_frame_id %d" % frames
+                self.convert(made.telemetry_log(("ODOMETRY",), 3) + made.telemetry_log(("ODOMETRY",), 2, frames=frames))
+                self.assertIn(f"ODOMETRY with {told} (2 messages) was left out", self.warned[0])
+                with self.assertRaises(ConvertError):
+                    self.convert(made.telemetry_log(("ODOMETRY",), 2, frames=frames))
+                self.assertIn(told, self.warned[0])
 
 
 class Nmea(WithFolder):

@@ -42,8 +42,9 @@ MESSAGES: Dict[int, Message] = {
                  _names("time_usec x y z q1 q2 q3 q4 vx vy vz rollspeed pitchspeed yawspeed frame_id child_frame_id "
                         "reset_counter estimator_type quality")),
 }
-# MAV_FRAME, as frame_id of ODOMETRY.
+# MAV_FRAME, as frame_id and child_frame_id of ODOMETRY.
 LOCAL_NED, LOCAL_FRD = 1, 20
+BODY_NED, BODY_FRD, BODY_FLU = 8, 12, 13  # the first as old as MAVLink, and meant as FRD
 
 
 def _crc_of_byte(value: int) -> int:

@@ -9,7 +9,8 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 from ..geodesy import Geodetic
 from ..rotations import Quaternion, quaternion_from_rpy, unit
-from .mavlink import LOCAL_FRD, LOCAL_NED, MESSAGES, Frame, fields_of, frame_length, read_frame
+from .mavlink import (BODY_FLU, BODY_FRD, BODY_NED, LOCAL_FRD, LOCAL_NED, MESSAGES, Frame, fields_of, frame_length,
+                      read_frame)
 from .track import ConvertError, Source, Stream, Track, Warn, chosen, track_of
 
 STAMP_BYTES = 8
@@ -56,6 +57,16 @@ def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
     return unit(parts) if abs(sum(p * p for p in parts) - 1) < 1e-3 else None
 
 
+def _is_served(f: Dict[str, float]) -> bool:
+    """An ODOMETRY. The frame of the world, said for the body, is that of the velocity: the attitude is that of FRD then."""
+    return f["frame_id"] in (LOCAL_NED, LOCAL_FRD) and f["child_frame_id"] in (BODY_NED, BODY_FRD, BODY_FLU, f["frame_id"])
+
+
+def _of_frd(q: Quaternion) -> Quaternion:
+    """From that of FLU: half a turn about the axis ahead comes before it, q (0, 1, 0, 0)."""
+    return -q[1], q[0], q[3], -q[2]
+
+
 def _angles(f: Dict[str, float]) -> Optional[Quaternion]:
     three = f["roll"], f["pitch"], f["yaw"]
     return quaternion_from_rpy(*three) if all(map(math.isfinite, three)) else None
@@ -80,7 +91,8 @@ class _Vehicle:
         self.attitudes: Dict[str, Stream[Quaternion]] = {}
         self.positions: "Dict[str, Stream]" = {}
         self.origin: Optional[Geodetic] = None
-        self.frames: Dict[str, int] = {}  # frame_ids of ODOMETRY that are passed over, and FRD
+        self.left_out: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id
+        self.heading_is_local = False
         self.restarts = 0
         self._boot: "Optional[Tuple[float, float]]" = None  # the last time since start, and when it arrived
         self._before_s = 0.0  # what times since start are counted from, after a restart
@@ -99,14 +111,14 @@ class _Vehicle:
             1e-6 * fields["time_usec"] if fields.get("time_usec") else logged.arrived_s
         attitude: Optional[Quaternion] = None
         position: "Optional[tuple]" = None
-        if name == "ODOMETRY" and fields["frame_id"] not in (LOCAL_NED, LOCAL_FRD):
-            key = f"{fields['frame_id']:.0f}"
-            self.frames[key] = self.frames.get(key, 0) + 1
+        if name == "ODOMETRY" and not _is_served(fields):
+            frames = fields["frame_id"], fields["child_frame_id"]
+            self.left_out[frames] = self.left_out.get(frames, 0) + 1
             return
-        if name == "ODOMETRY" and fields["frame_id"] == LOCAL_FRD:
-            self.frames["frd"] = self.frames.get("frd", 0) + 1
         if name in ("ODOMETRY", "ATT_POS_MOCAP", "ATTITUDE_QUATERNION", "SIM_STATE"):
             attitude = _quaternion(fields)
+            if attitude is not None and fields.get("child_frame_id") == BODY_FLU:
+                attitude = _of_frd(attitude)
         elif name in ("ATTITUDE", "VISION_POSITION_ESTIMATE"):
             attitude = _angles(fields)
         if name in ("ODOMETRY", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE", "LOCAL_POSITION_NED"):
@@ -117,6 +129,7 @@ class _Vehicle:
             position = place if place.is_fix else None
         if name in FULL and (attitude is None or position is None):
             return
+        self.heading_is_local |= fields.get("frame_id") == LOCAL_FRD
         if attitude is not None:
             self.attitudes.setdefault(name, []).append((t, attitude))
         if position is not None:
@@ -149,7 +162,9 @@ def _vehicle(vehicles: Dict[int, _Vehicle], system: Optional[int], name: str, wa
     if len(with_poses) > 1:
         warn(f"poses of systems {', '.join(map(str, sorted(with_poses)))}; taking {with_poses[0]}, which has most: --system N "
              "takes another")
-    return vehicles[with_poses[0]] if with_poses else _Vehicle()
+    if with_poses:
+        return vehicles[with_poses[0]]
+    return next((v for v in vehicles.values() if v.left_out), _Vehicle())  # which can say why
 
 
 def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None,
@@ -164,12 +179,13 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
     if not frames:
         raise ConvertError(f"{path}: at byte 0: no telemetry log: it holds no MAVLink frame behind a time of eight bytes")
     vehicle = _vehicle(vehicles, system, str(path), warn)
+    if vehicle.left_out:
+        warn("ODOMETRY with " + ", ".join(f"frame_id {world:.0f} and child_frame_id {body:.0f} ({n} messages)"
+                                          for (world, body), n in sorted(vehicle.left_out.items())) +
+             " was left out: local NED and FRD (1, 20) are read, with bodies in FRD (12, 8 or that of the world) or FLU (13)")
     wanted = chosen(vehicle.sources(), source, str(path))
-    if wanted.name == "ODOMETRY" and vehicle.frames.pop("frd", 0):
+    if wanted.name == "ODOMETRY" and vehicle.heading_is_local:
         warn("ODOMETRY is in a local frame whose heading need not be north; x is taken as north")
-    if vehicle.frames:
-        warn("ODOMETRY of frames " + ", ".join(f"{k} ({n} messages)" for k, n in sorted(vehicle.frames.items())) +
-             " was left out: only local NED and FRD (1 and 20) are read")
     if vehicle.restarts:
         warn(f"the vehicle started again ({vehicle.restarts} x); its clock is carried on by the times of arrival")
     local = not isinstance(wanted.positions[0][1], Geodetic)
