@@ -105,14 +105,14 @@ def crc16(data):
     return value
 
 
-def mavlink_frame(name, values, version=2, system=1, sequence=0, signed=False):
+def mavlink_frame(name, values, version=2, system=1, sequence=0, signed=False, component=1):
     number, seed, fixed, extensions = MAVLINK[name]
     full = struct.pack("<" + fixed + (extensions if version == 2 else ""), *values)
     if version == 1:
-        body = struct.pack("<BBBBB", len(full), sequence, system, 1, number) + full
+        body = struct.pack("<BBBBB", len(full), sequence, system, component, number) + full
         return b"\xfe" + body + struct.pack("<H", crc16(body + bytes((seed,))))
     full = full.rstrip(b"\0") or b"\0"
-    body = struct.pack("<BBBBBB", len(full), signed, 0, sequence, system, 1) + number.to_bytes(3, "little") + full
+    body = struct.pack("<BBBBBB", len(full), signed, 0, sequence, system, component) + number.to_bytes(3, "little") + full
     return b"\xfd" + body + struct.pack("<H", crc16(body + bytes((seed,)))) + (b"thirteenbytes" if signed else b"")
 
 

@@ -149,6 +149,44 @@ class Telemetry(WithFolder):
         with self.assertRaisesRegex(ConvertError, "system 9 does not occur; there are 1, 2, 255"):
             self.convert(both, system=9)
 
+    @staticmethod
+    def told_by(component, first, steps, away_m):
+        """[(time of arrival, record)] of ODOMETRY and ATTITUDE with LOCAL_POSITION_NED; places are away_m too deep."""
+        out = []
+        for step in range(first, first + steps):
+            t, north, east, down, *angles = made.moment(step)
+            place = north, east, down + away_m
+            stamp_us = round(1e6 * (1_700_000_000 + t)) + component  # the others' behind component 1's
+            for name, values in (("ODOMETRY", (stamp_us, *place, *made.quaternion(*angles), *[0] * 6, 1, 8, 0, 0, 0)),
+                                 ("ATTITUDE", (round(1e3 * t), *angles, 0, 0, 0)),
+                                 ("LOCAL_POSITION_NED", (round(1e3 * t), *place, 0, 0, 0))):
+                out.append((stamp_us, stamp_us.to_bytes(8, "big") + made.mavlink_frame(name, values, component=component)))
+        return out
+
+    def test_of_several_components_one_is_listened_to_and_the_choice_is_told(self):
+        both = sorted(self.told_by(1, 0, 20, 0) + self.told_by(197, 0, 20, 50), key=lambda record: record[0])
+        for source in ("ODOMETRY", "ATTITUDE+LOCAL_POSITION_NED"):
+            with self.subTest(source):
+                track = self.convert(b"".join(record for _, record in both), source=source)
+                self.assert_way(track, range(20), t0=1_700_000_000 if source == "ODOMETRY" else 0, metres=1e-5, radians=1e-5)
+                self.assertEqual(len(self.warned), 1)
+                for name in ("ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY"):
+                    self.assertIn(f"{name}: component 1 (left out: 20 messages of 197)", self.warned[0])
+
+    def test_after_silence_another_component_is_listened_to(self):
+        for gap_steps, taken, left_out in ((40, "1", "10 messages of 197"), (52, "1, later 197", "none")):
+            with self.subTest(gap_steps):
+                records = self.told_by(1, 0, 10, 0) + self.told_by(197, 9 + gap_steps, 10, 50)
+                track = self.convert(b"".join(record for _, record in records))
+                self.assertEqual(len(track.rows), 10 if left_out != "none" else 20)
+                self.assertIn(f"ODOMETRY: component {taken} (left out: {left_out})", self.warned[0])
+
+    def test_components_that_send_different_messages_are_no_choice(self):
+        mixed = [record for _, record in self.told_by(1, 0, 10, 0)]
+        mixed[2::3] = [record for _, record in self.told_by(197, 0, 10, 0)][2::3]  # positions
+        track = self.convert(b"".join(mixed), source="ATTITUDE+LOCAL_POSITION_NED")
+        self.assertEqual((len(track.rows), self.warned), (10, []))
+
     def test_the_known_value_of_the_checksum(self):
         self.assertEqual(crc(b"12345678", ord("9")), 0x6F91)  # of CRC-16/MCRF4XX
 

@@ -15,6 +15,7 @@ from .track import ConvertError, Source, Stream, Track, Warn, chosen, track_of
 
 STAMP_BYTES = 8
 RESTART_S = 5.0  # frames that come late by less are only late
+SILENCE_S = 5.0  # of a component, after which another one that sends the same message is listened to, as the daemon does
 FULL = ("ODOMETRY", "SIM_STATE", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE")
 ATTITUDES, POSITIONS = ("ATTITUDE_QUATERNION", "ATTITUDE"), ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
 
@@ -96,12 +97,15 @@ class _Vehicle:
         self.restarts = 0
         self._boot: "Optional[Tuple[float, float]]" = None  # the last time since start, and when it arrived
         self._before_s = 0.0  # what times since start are counted from, after a restart
+        self._heard: "Dict[str, Tuple[int, float]]" = {}  # of each message its component, and when that was last heard
+        self.components: Dict[str, List[int]] = {}  # of each message those listened to, one after the other
+        self.unheard: "Dict[str, Dict[int, int]]" = {}  # of each message those that were not, and how often
 
     def take(self, logged: Logged) -> None:
         fields = fields_of(logged.frame)
-        if fields is None:
+        name = MESSAGES[logged.frame.message_id].name if fields is not None else "HEARTBEAT"
+        if fields is None or name == "HEARTBEAT" or not self._is_heard(name, logged):
             return
-        name = MESSAGES[logged.frame.message_id].name
         if name == "GPS_GLOBAL_ORIGIN":
             place = Geodetic(1e-7 * fields["latitude"], 1e-7 * fields["longitude"], 1e-3 * fields["altitude"])
             self.origin = self.origin or (place if place.is_fix else None)
@@ -134,6 +138,25 @@ class _Vehicle:
             self.attitudes.setdefault(name, []).append((t, attitude))
         if position is not None:
             self.positions.setdefault(name, []).append((t, position))
+
+    def _is_heard(self, name: str, logged: Logged) -> bool:
+        """Of several components that send the same message one is listened to: tracks of two are never woven into one."""
+        component = logged.frame.component
+        known = self._heard.get(name)
+        if known is not None and known[0] != component and logged.arrived_s - known[1] <= SILENCE_S:
+            counts = self.unheard.setdefault(name, {})
+            counts[component] = counts.get(component, 0) + 1
+            return False
+        self._heard[name] = component, logged.arrived_s
+        if known is None or known[0] != component:
+            self.components.setdefault(name, []).append(component)
+        return True
+
+    def choices(self) -> List[str]:
+        """Of components, where there was one."""
+        return [f"{name}: component {', later '.join(map(str, taken))} (left out: " +
+                (", ".join(f"{n} messages of {c}" for c, n in sorted(self.unheard.get(name, {}).items())) or "none") + ")"
+                for name, taken in sorted(self.components.items()) if name in self.unheard or len(taken) > 1]
 
     def _since_start(self, boot_s: float, arrived_s: float) -> float:
         """Goes on by the time of arrival when the vehicle starts again."""
@@ -183,6 +206,10 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
         warn("ODOMETRY with " + ", ".join(f"frame_id {world:.0f} and child_frame_id {body:.0f} ({n} messages)"
                                           for (world, body), n in sorted(vehicle.left_out.items())) +
              " was left out: local NED and FRD (1, 20) are read, with bodies in FRD (12, 8 or that of the world) or FLU (13)")
+    choices = vehicle.choices()
+    if choices:
+        warn("several components send the same message; taking the one heard first, another one after "
+             f"{SILENCE_S:.0f} s of silence: {'; '.join(choices)}")
     wanted = chosen(vehicle.sources(), source, str(path))
     if wanted.name == "ODOMETRY" and vehicle.heading_is_local:
         warn("ODOMETRY is in a local frame whose heading need not be north; x is taken as north")
