@@ -47,7 +47,7 @@ template <class Coroutine>
 void ReplayServer::spawn(Coroutine coroutine) {
   asio::co_spawn(io_, std::move(coroutine), [this](std::exception_ptr fault) {
     if (!fault) return;
-    log_.error("an internal fault ends the replay", {{"what", text_of(fault)}});
+    outcome_ = failure(ErrorKind::bug, "internal fault: " + text_of(fault) + " (please report it); it ended the replay");
     end();
   });
 }
@@ -65,6 +65,7 @@ asio::awaitable<void> ReplayServer::watch_signals() {
   co_await signals_.async_wait(into(ec));
   if (ec || over_) co_return;
   stop();
+  if (over_) co_return;  // nobody was there
   co_await signals_.async_wait(into(ec));
   if (!ec && !over_) std::_Exit(EXIT_FAILURE);  // asked twice
 }
@@ -114,9 +115,8 @@ asio::awaitable<void> ReplayServer::accept() {
     client->name = peer.address().to_string() + ":" + std::to_string(peer.port());
     if (client_) {
       ++figures_.turned_away;
-      std::uint64_t unsaid = 0;
-      if (turned_away_limit_.allows(Steady::now(), unsaid))
-        log_.info("client turned away: another one is being served", {{"client", client->name}, {"unsaid", unsaid}});
+      say_at_times(log_, turned_away_limit_, LogLevel::info, "client turned away: another one is being served",
+                   {{"client", client->name}});
       continue;  // closes it
     }
     client->ip = peer.address().to_v4().to_bytes();

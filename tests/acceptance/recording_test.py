@@ -207,6 +207,19 @@ class OneIntoAnother(Files):
             self.assertEqual(replay.process.wait(60), 0)
             self.assertIn("within a message, of which", replay.text())
 
+    def test_replay_ends_by_signals(self):
+        self.path("raw").write_bytes(self.made())
+        for with_driver in (False, True):
+            with Replay(self.path("raw"), "--loop") as replay:
+                with socket.create_connection((replay.address, 52100), timeout=60) as driver:
+                    driver.recv(1)
+                    if not with_driver:
+                        driver.close()
+                        time.sleep(0.2)
+                    replay.process.send_signal(signal.SIGTERM)
+                    self.assertEqual(replay.process.wait(30), 0, replay.text())
+                self.assertIn("served ", replay.text())
+
     def test_a_full_disk_ends_it_with_one_sentence(self):
         def small_disk():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
