@@ -93,7 +93,7 @@ Result<void> run_replay(const ReplayCommand& command) {
   const ReplayServer::Figures& done = server.figures();
   log.announce("served " + std::to_string(done.messages) + " messages, " + std::to_string(done.bytes) + " bytes, to " +
                std::to_string(done.clients) + " client(s)\n");
-  return {};
+  return server.outcome();
 }
 
 }  // namespace sonar

@@ -38,6 +38,8 @@ class ReplayServer {
   void stop();
 
   const Figures& figures() const { return figures_; }
+  /// After io.run(). bug, when an exception in one of its parts ended it.
+  const Result<void>& outcome() const { return outcome_; }
   Endpoint at() const { return at_; }
 
  private:
@@ -79,6 +81,7 @@ class ReplayServer {
   ClientPointer client_;
   LogLimiter turned_away_limit_;
   Figures figures_;
+  Result<void> outcome_;
   bool stopping_ = false, over_ = false, damage_told_ = false;
 };
 
