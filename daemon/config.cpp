@@ -49,7 +49,7 @@ void read_vehicles(const Node& node, TrajectoryFiles& files, Config& config) {
     VehicleConfig vehicle;
     const Node name = map.required("name");
     vehicle.name = name.text(64);
-    if (!names.insert(vehicle.name).second) name.fail("\"" + vehicle.name + "\" is used twice");
+    if (!names.insert(vehicle.name).second && name.present()) name.fail("\"" + vehicle.name + "\" is used twice");
     vehicle.initial_pose = read_world_pose(map.optional("initial_pose"));
     vehicle.plan = files.read_plan(map.optional("trajectory"), vehicle.name, &vehicle.orbits);
     config.vehicles.push_back(std::move(vehicle));
@@ -64,7 +64,7 @@ void read_objects(const Node& node, TrajectoryFiles& files, Config& config) {
     const Node name = map.required("name");
     object.name = name.text(256);
     object.place = name.location() + ": " + name.path();
-    if (!names.insert(object.name).second) name.fail("\"" + object.name + "\" is used twice");
+    if (!names.insert(object.name).second && name.present()) name.fail("\"" + object.name + "\" is used twice");
     object.plan = files.read_plan(map.required("trajectory"), object.name);
     config.objects.push_back(std::move(object));
   }
@@ -132,9 +132,9 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
   } else if (options.present()) {
     options.map().entries();
   }
-  for (const SonarConfig& other : config.sonars) {
-    if (other.name == sonar.name) name.fail("\"" + sonar.name + "\" is used twice");
-    if (other.bind_ip == sonar.bind_ip)
+  for (const SonarConfig& other : config.sonars) {  // what is not there is the fault to be told, not that it is not there twice
+    if (name.present() && other.name == sonar.name) name.fail("\"" + sonar.name + "\" is used twice");
+    if (map.has("bind_ip") && other.bind_ip == sonar.bind_ip)
       map.required("bind_ip").fail(text_of(sonar.bind_ip) + " is already used by sonar \"" + other.name +
                                    "\"; each sonar needs its own address");
     if (other.device_id == sonar.device_id)

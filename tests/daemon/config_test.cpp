@@ -358,6 +358,18 @@ TEST(ConfigControl, ReadsItsKeysAndRefusesStrangersWithoutAToken) {
   EXPECT_THAT(refusal("{http: '127.0.0.1'}"), HasSubstr("is not an address"));
 }
 
+TEST(Config, NamesAMistypedKeyThatSeveralSonarsShare) {
+  const auto two_with = [&](const std::string& key) {
+    const std::string rest = "profile: oculus-m1200d, " + key + ": 127.0.0.";
+    return why(world + vehicles + "sonars:\n  - {name: a, " + rest + "2}\n  - {name: b, " + rest + "3}\n");
+  };
+  EXPECT_THAT(two_with("bind_ipp"), HasSubstr("did you mean \"bind_ip\"?"));
+  EXPECT_THAT(why(world + vehicles + "sonars:\n  - {nmae: a, profile: oculus-m1200d, bind_ip: 127.0.0.2}\n" +
+                  "  - {nmae: b, profile: oculus-m1200d, bind_ip: 127.0.0.3}\n"),
+              HasSubstr("did you mean \"name\"?"));
+  EXPECT_THAT(why(world + "vehicles: [{nmae: a}, {nmae: b}]\n" + sonar), HasSubstr("did you mean \"name\"?"));
+}
+
 TEST(Config, PointsRenderFilesToTheirCommand) {
   const auto config = parse_config("scene: demo.yaml\nsonar: {}\n", "r.yaml", {});
   ASSERT_FALSE(config);
