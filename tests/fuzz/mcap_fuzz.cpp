@@ -1,4 +1,5 @@
-// MCAP files of anybody: every message, and the sonar's among them.
+// MCAP files of anybody: every message, and the sonar's among them, which replay paces by their times.
+#include "daemon/replay/replay_pace.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 
@@ -10,7 +11,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (!reader->channels().contains(message->channel) || message->data.size() > size) std::abort();
   auto reader = recording::read_mcap(recording::source_from("input", bytes));
   if (!reader) return 0;
-  while (const auto piece = (*reader)->next())
+  const auto pace = std::make_unique<ReplayPace>(1, std::nullopt);  // on the stack GCC 12 takes it for uninitialized
+  ReplayPace::Steady::time_point now{}, last{};
+  while (const auto piece = (*reader)->next()) {
     if (piece->bytes.size() > size) std::abort();
+    now = pace->due(piece->at, now);
+    if (now < last || now - last > ReplayPace::longest_gap) std::abort();
+    last = now;
+  }
   return 0;
 }

@@ -8,6 +8,7 @@ namespace sonar::recording::mcap {
 namespace {
 
 constexpr std::size_t most_channels = 4096;
+constexpr std::uint64_t most_described_bytes = 16 << 20;  // of all schemas and channels that are kept
 
 std::string at_byte(std::uint64_t at) { return " at byte " + std::to_string(at); }
 
@@ -29,6 +30,7 @@ void Reader::rewind() {
   scan_.seek(magic.size());
   schemas_.clear();
   channels_.clear();
+  described_bytes_ = 0;
   damages_.clear();
   chunk_end_ = 0;
   ended_ = false;
@@ -85,24 +87,37 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
     enter_chunk(at, length, false);
     if (chunk_end_ != 0) return std::nullopt;
   } else if (code == Opcode::message || code == Opcode::schema || code == Opcode::channel) {
-    const BytesView content = length <= longest_record ? scan_.take(static_cast<std::size_t>(length)) : BytesView{};
-    if (length > longest_record) {
+    const bool is_message = code == Opcode::message, is_long = length > (is_message ? longest_record : longest_description);
+    const BytesView content = is_long ? BytesView{} : scan_.take(static_cast<std::size_t>(length));
+    if (is_long) {
       damages_.add("the record" + at_byte(at) + " is too long, " + std::to_string(length) + " bytes");
-    } else if (code == Opcode::message) {
+    } else if (is_message) {
       auto message = take_message(content, at);
       scan_.seek(behind);
       return message;
-    } else if (code == Opcode::schema) {
-      if (auto schema = read_schema(content); schema && schemas_.size() < most_channels)
-        schemas_.insert_or_assign(schema->id, std::move(*schema));
-    } else if (auto channel = read_channel(content)) {
-      if (channels_.size() < most_channels) channels_.insert_or_assign(channel->id, std::move(*channel));
     } else {
-      damages_.add("the channel" + at_byte(at) + " cannot be read");
+      take_description(code, content, at);
     }
   }
   scan_.seek(behind);
   return std::nullopt;
+}
+
+/// A schema or a channel. Files may say the same ones again and again; the first counts.
+void Reader::take_description(Opcode code, BytesView content, std::uint64_t at) {
+  bool is_new = false;
+  if (code == Opcode::schema) {
+    auto schema = read_schema(content);
+    is_new = schema && schemas_.size() < most_channels && schemas_.try_emplace(schema->id, std::move(*schema)).second;
+  } else if (auto channel = read_channel(content)) {
+    if (channels_.contains(channel->id)) return;
+    if (channels_.size() >= most_channels || described_bytes_ + content.size() > most_described_bytes)
+      return damages_.add("the channel" + at_byte(at) + " is one too many");
+    is_new = channels_.try_emplace(channel->id, std::move(*channel)).second;
+  } else {
+    damages_.add("the channel" + at_byte(at) + " cannot be read");
+  }
+  if (is_new) described_bytes_ += content.size();
 }
 
 std::optional<Message> Reader::take_message(BytesView content, std::uint64_t at) {

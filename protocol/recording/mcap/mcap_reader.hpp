@@ -26,6 +26,7 @@ class Reader {
   explicit Reader(std::unique_ptr<Source> source);
   std::optional<Message> take_record(std::uint64_t end, bool in_chunk);
   std::optional<Message> take_message(BytesView content, std::uint64_t at);
+  void take_description(Opcode code, BytesView content, std::uint64_t at);
   void enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut);
   bool is_chunk_sound(std::uint64_t from, std::uint64_t size, std::uint32_t crc);
   void stop(std::string why);
@@ -34,6 +35,7 @@ class Reader {
   Scan scan_;
   std::map<std::uint16_t, Schema> schemas_;
   std::map<std::uint16_t, Channel> channels_;
+  std::uint64_t described_bytes_ = 0;  // read for those
   Damages damages_;
   std::uint64_t chunk_end_ = 0;  // 0 = not in a chunk
   bool ended_ = false;

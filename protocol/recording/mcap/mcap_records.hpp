@@ -28,13 +28,15 @@ enum class Opcode : std::uint8_t {
   summary_offset = 0x0E,
   data_end = 0x0F,
 };
-inline constexpr std::size_t record_front_bytes = 9;     // opcode and length
-inline constexpr std::size_t message_front_bytes = 22;   // channel, sequence, two times
-inline constexpr std::size_t longest_record = 64 << 20;  // of a foreign file; chunks are not read whole
+inline constexpr std::size_t record_front_bytes = 9;                         // opcode and length
+inline constexpr std::size_t message_front_bytes = 22;                       // channel, sequence, two times
+inline constexpr std::size_t longest_record = 64 << 20;                      // of a foreign file; chunks are not read whole
+inline constexpr std::size_t longest_description = 1 << 20;                  // of a schema or channel
+inline constexpr std::uint64_t latest_time_ns = 4'000'000'000'000'000'000u;  // in 2096; what is later is damage
 
 struct Schema {
-  std::uint16_t id = 0;  // not 0
-  std::string name, encoding, text;
+  std::uint16_t id = 0;              // not 0
+  std::string name, encoding, text;  // text: written, not read back
 };
 struct Channel {
   std::uint16_t id = 0, schema = 0;  // schema 0 = none
@@ -81,7 +83,11 @@ class RecordReader {
     reader_("number", value);
     return value;
   }
-  Time time() { return Time(std::chrono::nanoseconds(static_cast<std::int64_t>(number<std::uint64_t>()))); }
+  /// 1970 for what is no time: differences of two are never too large to hold.
+  Time time() {
+    const auto since_1970_ns = number<std::uint64_t>();
+    return since_1970_ns > latest_time_ns ? Time{} : Time(std::chrono::nanoseconds(static_cast<std::int64_t>(since_1970_ns)));
+  }
   std::string string();
   std::map<std::string, std::string> strings();
   BytesView bytes(std::size_t count) { return reader_.block("bytes", count); }

@@ -116,6 +116,40 @@ TEST(Mcap, SaysThatItReadsNoCompression) {
   EXPECT_THAT(opened->reader->damage()->text, HasSubstr("is compressed (zstd), which is not read"));
 }
 
+TEST(Mcap, TimesThatAreNoneAreTheBeginning) {
+  constexpr std::uint64_t top = std::uint64_t{1} << 63;
+  for (const auto& [told, expected] :
+       std::initializer_list<std::pair<std::uint64_t, std::int64_t>>{{0, 0},
+                                                                     {4'000'000'000'000'000'000u, 4'000'000'000'000'000'000},
+                                                                     {4'000'000'000'000'000'001u, 0},
+                                                                     {top - 1, 0},
+                                                                     {top, 0},
+                                                                     {~std::uint64_t{0}, 0}}) {
+    Bytes bytes;
+    mcap::RecordWriter(bytes).number(told);
+    EXPECT_EQ(mcap::RecordReader(bytes).time(), Time(std::chrono::nanoseconds(expected))) << told;
+  }
+}
+
+TEST(Mcap, DescriptionsAreKeptWithinBounds) {
+  Bytes file;
+  for (const std::uint8_t b : mcap::magic) file.push_back(static_cast<std::byte>(b));
+  mcap::append(file, mcap::Schema{1, "too long", "jsonschema", std::string(mcap::longest_description, 'x')});
+  mcap::append(file, mcap::Schema{2, "long", "jsonschema", std::string(mcap::longest_description - 100, 'x')});
+  for (std::uint16_t id = 0; id < 20; ++id)  // 19 MB
+    mcap::append(file, mcap::Channel{id, 0, std::string(mcap::longest_description - 100, 'x'), "json", {}});
+  auto reader = mcap::Reader::open(source_from("a file", std::move(file)));
+  ASSERT_TRUE(reader);
+  EXPECT_FALSE(reader->next());
+  ASSERT_EQ(reader->schemas().size(), 1u);
+  EXPECT_EQ(reader->schemas().at(2).name, "long");
+  EXPECT_EQ(reader->schemas().at(2).text, "") << "nobody needs it";
+  EXPECT_EQ(reader->channels().size(), 15u);
+  ASSERT_TRUE(reader->damage());
+  EXPECT_THAT(reader->damage()->text, HasSubstr("the record at byte 8 is too long, 10486"));
+  EXPECT_THAT(reader->damage()->text, HasSubstr("; 5 more such places"));  // channels
+}
+
 TEST(Mcap, OneOfSeveralSonars) {
   Bytes file;
   mcap::Writer writer(sink_into(file));
