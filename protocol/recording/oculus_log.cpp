@@ -42,10 +42,16 @@ class LogReader final : public PieceReader {
       if (front.size() < item_bytes) return cut(at, "the header of an item");
       const auto item = read_as<OculusLogItem>(front);
       if (!is_item(item)) {
+        damages_.add("no item begins at byte " + std::to_string(at));
         if (!find_item(at)) return std::nullopt;
         continue;
       }
-      if (item.payload_size > scan_.left()) return cut(at, "an item of " + std::to_string(item.payload_size) + " bytes");
+      if (item.payload_size > scan_.left()) {
+        const std::string size = std::to_string(item.payload_size) + " bytes";
+        if (!find_item(at)) return cut(at, "an item of " + size);
+        damages_.add("the item at byte " + std::to_string(at) + " is damaged: it would have " + size + ", more than follow");
+        continue;
+      }
       if (item.type != oculus_message_item) {
         scan_.skip(item.payload_size);
         continue;
@@ -67,9 +73,8 @@ class LogReader final : public PieceReader {
     return std::nullopt;
   }
 
-  /// Somebody else's bytes, or damaged ones: on to the next item.
+  /// Somebody else's bytes, or damaged ones: on to the next item, or to the end.
   bool find_item(std::uint64_t at) {
-    damages_.add("no item begins at byte " + std::to_string(at));
     for (std::uint64_t from = at + 1; from + item_bytes <= source_->size(); ++from) {
       scan_.seek(from);
       const BytesView front = scan_.peek(item_bytes);
@@ -86,7 +91,7 @@ class LogReader final : public PieceReader {
       return std::nullopt;
     };
     if (item.payload_size > most_payload) {
-      scan_.skip(item.payload_size);
+      find_item(at);
       return refuse("has " + std::to_string(item.payload_size) + " bytes, more than any message");
     }
     const BytesView payload = scan_.take(item.payload_size);

@@ -104,6 +104,25 @@ TEST(OculusLog, SaysWhichItemsItCannotRead) {
   }
 }
 
+TEST(OculusLog, AnImpossibleSizeCostsItsItemOnly) {
+  const Bytes whole = recorded(Format::oculus_log, conversation());
+  Bytes expected = device_stream(conversation());
+  expected.erase(expected.begin(), expected.begin() + static_cast<std::ptrdiff_t>(dummy_message().size()));
+  Bytes damaged = whole;
+  damaged[83] ^= std::byte{0x10};  // top of the first payload's size
+  auto opened = open_bytes(damaged);
+  ASSERT_TRUE(opened);
+  EXPECT_EQ(device_stream(read_all(*opened->reader)), expected);
+  ASSERT_TRUE(opened->reader->damage());
+  EXPECT_THAT(opened->reader->damage()->text, HasSubstr("the item at byte 48 is damaged: it would have 268435472 bytes"));
+
+  auto cut = open_bytes({whole.begin(), whole.begin() + 95});
+  ASSERT_TRUE(cut);
+  EXPECT_TRUE(read_all(*cut->reader).empty());
+  ASSERT_TRUE(cut->reader->damage());
+  EXPECT_THAT(cut->reader->damage()->text, HasSubstr("an item of 16 bytes at byte 48 is cut short by the end of the file"));
+}
+
 TEST(OculusLog, RefusesWhatItCannotRead) {
   Bytes newer = log_of({}), secret = log_of({});
   newer[24] = std::byte{2};
