@@ -54,8 +54,13 @@ class Damages {
   void add(std::string where_and_what) {
     if (count_++ == 0) first_ = std::move(where_and_what);
   }
+  void add(const Damages& others) {
+    if (count_ == 0) first_ = others.first_;
+    count_ += others.count_;
+  }
   void clear() { *this = {}; }
   bool any() const { return count_ > 0; }
+  const std::string& first() const { return first_; }
   std::optional<Error> error(const std::string& file) const {
     if (count_ == 0) return std::nullopt;
     const std::string others = count_ == 1 ? "" : "; " + std::to_string(count_ - 1) + " more such places";

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "protocol/recording/pcap/numbers_at.hpp"
+
 namespace sonar::recording {
 namespace {
 
@@ -14,12 +16,6 @@ constexpr unsigned tcp_protocol = 6, udp_protocol = 17;
 
 unsigned u8_at(BytesView bytes, std::size_t offset) {
   return offset < bytes.size() ? std::to_integer<unsigned>(bytes[offset]) : 0;
-}
-std::uint16_t u16_at(BytesView bytes, std::size_t offset) {
-  return static_cast<std::uint16_t>(u8_at(bytes, offset) << 8 | u8_at(bytes, offset + 1));
-}
-std::uint32_t u32_at(BytesView bytes, std::size_t offset) {
-  return std::uint32_t{u16_at(bytes, offset)} << 16 | u16_at(bytes, offset + 2);
 }
 
 std::optional<BytesView> behind_ethernet(BytesView frame) {

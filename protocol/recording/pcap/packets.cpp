@@ -1,5 +1,7 @@
 #include "protocol/recording/pcap/packets.hpp"
 
+#include "protocol/recording/pcap/numbers_at.hpp"
+
 namespace sonar::recording {
 namespace {
 
@@ -8,19 +10,6 @@ constexpr std::size_t most_interfaces = 1024;
 constexpr std::size_t most_block = PacketReader::longest_packet + 4096;  // a packet with its options
 constexpr std::uint32_t interface_block = 1, simple_block = 3, enhanced_block = 6;
 constexpr std::uint16_t end_option = 0, resolution_option = 9;
-
-std::uint32_t u32_at(BytesView bytes, std::size_t offset, wire::Endian endian) {
-  std::uint32_t value = 0;
-  wire::Reader reader(bytes.subspan(std::min(offset, bytes.size())), endian);
-  reader("u32", value);
-  return value;
-}
-std::uint16_t u16_at(BytesView bytes, std::size_t offset, wire::Endian endian) {
-  std::uint16_t value = 0;
-  wire::Reader reader(bytes.subspan(std::min(offset, bytes.size())), endian);
-  reader("u16", value);
-  return value;
-}
 
 Time time_of(std::uint64_t ticks, std::uint64_t ticks_per_s) {
   const std::uint64_t whole_s = ticks / ticks_per_s, rest = ticks % ticks_per_s;
@@ -43,7 +32,7 @@ std::uint64_t ticks_per_s(unsigned resolution) {
 }  // namespace
 
 std::nullopt_t PacketReader::stop(std::string why) {
-  damage_ = std::move(why);
+  damages_.add(std::move(why));
   scan_.seek(scan_.position() + scan_.left());
   return std::nullopt;
 }
@@ -56,7 +45,7 @@ Result<PacketReader> PacketReader::open(Source& source) {
 
 void PacketReader::rewind() {
   scan_.seek(0);
-  damage_.reset();
+  damages_.clear();
   read_front();
 }
 
@@ -121,18 +110,16 @@ void PacketReader::add_interface(BytesView body) {
   interfaces_.push_back(made);
 }
 
-std::optional<Packet> PacketReader::enhanced(BytesView body, std::uint64_t at) {
+std::optional<Packet> PacketReader::enhanced(BytesView body) const {
   const std::uint32_t interface = u32_at(body, 0, endian_), size = u32_at(body, 12, endian_);
-  if (body.size() < 20 || interface >= interfaces_.size() || size > body.size() - 20)
-    return stop("the packet block at byte " + std::to_string(at) + " does not hold what it says");
+  if (body.size() < 20 || interface >= interfaces_.size() || size > body.size() - 20) return std::nullopt;
   const std::uint64_t ticks = std::uint64_t{u32_at(body, 4, endian_)} << 32 | u32_at(body, 8, endian_);
   const Interface& from = interfaces_[interface];
   return Packet{time_of(ticks, from.ticks_per_s), from.link_type, body.subspan(20, size)};
 }
 
-std::optional<Packet> PacketReader::simple(BytesView body, std::uint64_t at) {
-  if (body.size() < 4 || interfaces_.empty())
-    return stop("the packet block at byte " + std::to_string(at) + " does not hold what it says");
+std::optional<Packet> PacketReader::simple(BytesView body) const {
+  if (body.size() < 4 || interfaces_.empty()) return std::nullopt;
   const std::size_t size = std::min<std::size_t>(u32_at(body, 0, endian_), body.size() - 4);
   return Packet{{}, interfaces_.front().link_type, body.subspan(4, size)};
 }
@@ -158,7 +145,8 @@ std::optional<Packet> PacketReader::next_block() {
       add_interface(body);
       continue;
     }
-    return type == enhanced_block ? enhanced(body, at) : simple(body, at);
+    if (auto packet = type == enhanced_block ? enhanced(body) : simple(body)) return packet;
+    damages_.add("the packet block at byte " + std::to_string(at) + " does not hold what it says");
   }
   return std::nullopt;
 }

@@ -26,8 +26,8 @@ class PacketReader {
   static Result<PacketReader> open(Source& source);
 
   std::optional<Packet> next();
-  /// Where the file could not be read any further.
-  const std::optional<std::string>& damage() const { return damage_; }
+  /// Blocks that were left out, and where the file could not be read any further.
+  const Damages& damages() const { return damages_; }
   void rewind();
 
  private:
@@ -39,8 +39,8 @@ class PacketReader {
   bool read_front();
   std::optional<Packet> next_classic();
   std::optional<Packet> next_block();
-  std::optional<Packet> enhanced(BytesView body, std::uint64_t at);
-  std::optional<Packet> simple(BytesView body, std::uint64_t at);
+  std::optional<Packet> enhanced(BytesView body) const;
+  std::optional<Packet> simple(BytesView body) const;
   bool begin_section(std::uint64_t at);
   void add_interface(BytesView body);
   std::nullopt_t stop(std::string why);
@@ -49,7 +49,7 @@ class PacketReader {
   bool ng_ = false;
   wire::Endian endian_ = wire::Endian::little;
   std::vector<Interface> interfaces_;
-  std::optional<std::string> damage_;
+  Damages damages_;
 };
 
 }  // namespace sonar::recording

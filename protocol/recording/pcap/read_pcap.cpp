@@ -11,6 +11,7 @@ namespace sonar::recording {
 namespace {
 
 constexpr std::size_t most_senders = 4096, most_connections = 64;
+constexpr std::size_t most_held_bytes = 64u << 20;  // of all connections: early segments and messages under way
 
 bool begins_message(BytesView payload) {
   if (payload.size() < oculus::header_size) return false;
@@ -51,7 +52,7 @@ Result<Found> find_device(Source& source, const PcapReading& reading) {
   if (!best) {
     std::string why = source.name() + " holds no TCP stream of an Oculus" + (reading.device ? " with that address" : "");
     for (const std::uint32_t type : unknown_links) why += "; packets of link type " + std::to_string(type) + " are not read";
-    if (packets->damage()) why += "; " + *packets->damage();
+    if (packets->damages().any()) why += "; " + packets->damages().first();
     return failure(ErrorKind::bad_data, why);
   }
   for (const auto& [end, sender] : senders)
@@ -65,6 +66,10 @@ struct Connection {
   TcpStream device_stream, client_stream;
   MessageSplitter device{Origin::device}, client{Origin::client};
   std::uint64_t last_packet = 0;
+
+  std::size_t held_bytes() const {
+    return device_stream.held_bytes() + client_stream.held_bytes() + device.waiting_bytes() + client.waiting_bytes();
+  }
 };
 
 class PcapReader final : public PieceReader {
@@ -91,7 +96,7 @@ class PcapReader final : public PieceReader {
 
   std::optional<Error> damage() const override {
     Damages all = damages_;
-    if (packets_.damage()) all.add(*packets_.damage());
+    all.add(packets_.damages());
     return all.error(source_->name());
   }
   std::string note() const override { return found_.note; }
@@ -128,17 +133,23 @@ class PcapReader final : public PieceReader {
     }
     if (place == connections_.end()) {
       if (!syn && segment.payload.empty()) return;
-      make_room();
+      if (connections_.size() >= most_connections) finish_oldest();
       place = connections_.try_emplace(client).first;
     }
     place->second.last_packet = packet_number_;
     stream_of(place->second, from).add(at, segment.sequence, segment.payload, syn);
     drain(place->second, client, from);
     if ((segment.flags & tcp_flag::rst) != 0) finish(place);
+    while (held_bytes() > most_held_bytes) finish_oldest();
   }
 
-  void make_room() {
-    if (connections_.size() < most_connections) return;
+  std::size_t held_bytes() const {
+    std::size_t bytes = 0;
+    for (const auto& [client, connection] : connections_) bytes += connection.held_bytes();
+    return bytes;
+  }
+
+  void finish_oldest() {
     Place oldest = connections_.begin();
     for (Place each = oldest; each != connections_.end(); ++each)
       if (each->second.last_packet < oldest->second.last_packet) oldest = each;

@@ -28,6 +28,8 @@ class TcpStream {
   /// The connection or the capture is over: what waits comes out.
   void finish();
   std::optional<Run> next();
+  /// For early segments, with what keeping each of them costs.
+  std::size_t held_bytes() const { return waiting_bytes_ + waiting_.size() * 128; }
   /// True when a SYN with this number begins another connection than the one that is being read.
   bool is_other(std::uint32_t syn_sequence) const { return begun_ && (!saw_syn_ || first_ != syn_sequence + 1); }
 

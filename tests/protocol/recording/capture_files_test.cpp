@@ -249,8 +249,45 @@ TEST(CaptureFiles, Pcapng) {
   ASSERT_FALSE(pieces.empty());
   EXPECT_EQ(pieces[0].at, Time(std::chrono::nanoseconds(at_ns)));
   EXPECT_FALSE(opened->reader->damage());
+  Bytes damaged = file;  // the first packet names an interface that is not there
+  const Bytes first = numbers(little, {{4, 1}, {4, static_cast<std::uint32_t>(at_ns >> 32)}});
+  const auto place = std::search(damaged.begin(), damaged.end(), first.begin(), first.end());
+  ASSERT_NE(place, damaged.end());
+  *place = std::byte{9};
+  const Told told = read(damaged);
+  EXPECT_EQ(told.stream, ping_message(2)) << "only what it belongs to is lost";
+  EXPECT_THAT(told.damage, HasSubstr("begins within a message"));
+  EXPECT_THAT(told.damage, HasSubstr("; 1 more such places"));
   for (std::size_t size = 12; size < file.size(); size += 7)
     static_cast<void>(read({file.begin(), file.begin() + static_cast<std::ptrdiff_t>(size)}));
+}
+
+TEST(CaptureFiles, ConnectionsShareWhatMayWait) {
+  constexpr std::size_t early_bytes = 65'000;
+  std::vector<Bytes> frames;
+  const auto add = [&frames](std::uint8_t client, const Sent& sent) {
+    frames.push_back(ip_packet(sent));
+    frames.back()[23] = std::byte{client};  // low byte of its port
+  };
+  for (std::uint8_t client = 0; client < 20; ++client) {  // 78 MB that wait for 500 bytes each
+    add(client, {dummy_message(), 1});
+    for (std::uint32_t i = 0; i < 60; ++i) add(client, {Bytes(early_bytes), 517 + i * static_cast<std::uint32_t>(early_bytes)});
+  }
+  Bytes file = pcap_of({}, 101);
+  file.reserve(frames.size() * (early_bytes + 100));
+  for (const Bytes& frame : frames) {
+    const auto size = static_cast<std::uint32_t>(frame.size());
+    for (const Bytes& part : {numbers(wire::Endian::little, {{4, 1000}, {4, 0}, {4, size}, {4, size}}), frame})
+      file.insert(file.end(), part.begin(), part.end());
+  }
+  const std::string told = read(file).damage;
+  const std::string before = "before packet ";
+  const std::size_t at = told.find(before);
+  ASSERT_NE(at, std::string::npos) << told;
+  const std::size_t packet = std::stoul(told.substr(at + before.size()));
+  EXPECT_GT(packet, 900u) << told;
+  EXPECT_LT(packet, 1100u) << "the first is given up long before the end: " << told;
+  EXPECT_THAT(told, HasSubstr("; 19 more such places"));
 }
 
 TEST(TcpStream, WhatWaitsTooLongIsGivenWithItsGap) {
