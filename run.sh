@@ -18,8 +18,8 @@ case "${1:-}" in
     exec tests/tools/check_demo.sh build/release
     ;;
   --package)
-    # What the packages depend on is read from the programs by tools of dpkg-dev; without them it would be left out.
-    setup_and_build installed && need_packages dpkg-dev && cd build/release && cpack -G DEB && say "packages" && ls -1 "$PWD"/*.deb
+    # What the packages depend on is read from the programs by tools of dpkg-dev and by file; without them it would be left out.
+    setup_and_build installed && need_packages dpkg-dev file && cd build/release && cpack -G DEB && say "packages" && ls -1 "$PWD"/*.deb
     exit
     ;;
 esac

@@ -25,7 +25,7 @@ WANTED = {
 
 
 def why_not():
-    missing = [p for p in ("cpack", "dpkg-deb", "dpkg-shlibdeps", "gzip") if shutil.which(p) is None]
+    missing = [p for p in ("cpack", "dpkg-deb", "dpkg-shlibdeps", "file", "gzip") if shutil.which(p) is None]
     if missing:
         return "not here: " + ", ".join(missing)
     cache = (BUILD / "CMakeCache.txt").read_text(encoding="utf-8")

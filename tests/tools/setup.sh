@@ -10,7 +10,7 @@ build_packages=(
 
 # What only tests use: without it some are skipped, saying so.
 test_packages=(
-  tshark systemd dpkg-dev strace python3-numpy
+  tshark systemd dpkg-dev file strace python3-numpy
 )
 
 say() { printf '\n== %s\n' "$*"; }
