@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "daemon/effective_switches.hpp"
+#include "daemon/nearest_scene.hpp"
 
 namespace sonar {
 namespace {
@@ -44,7 +45,9 @@ Pose read_mount(const Node& node) {
 SceneFile read_scene_file(const Node& node, const std::filesystem::path& directory) {
   const std::string given = node.text();
   if (auto found = find_scene(given, directory)) return *std::move(found);
-  node.fail("no such file; looked in " + scene_folders(directory));
+  const std::string near = nearest_scene(given, directory);
+  const std::string meant = near.empty() ? "; looked in " : "; did you mean \"" + near + "\"? Looked in ";
+  node.fail("no such file: \"" + given.substr(0, 256) + "\"" + meant + scene_folders(directory));
   return {given};
 }
 

@@ -1,10 +1,13 @@
 #include "daemon/scene_file.hpp"
 
 #include <algorithm>
+#include <fstream>
 #include <system_error>
 #include <vector>
 
 #include "core/scene/files/built_in_scenes.hpp"
+#include "core/text/nearest.hpp"
+#include "daemon/nearest_scene.hpp"
 
 namespace sonar {
 namespace {
@@ -37,6 +40,44 @@ bool is_below(const std::filesystem::path& file, const std::filesystem::path& fo
   return std::mismatch(top.begin(), top.end(), real.begin(), real.end()).first == top.end();
 }
 
+constexpr int most_looked_at = 256;  // files of a folder: somebody's home is one too
+
+/// By its first column: configurations and libraries of materials lie beside scenes.
+bool is_like_a_scene(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  bool has_objects = false;
+  std::string line;
+  for (int i = 0; i < 4096 && std::getline(in, line); ++i) {
+    if (line.starts_with("sonars:") || line.starts_with("world:")) return false;
+    has_objects = has_objects || line.starts_with("objects:");
+  }
+  return has_objects;
+}
+
+std::vector<std::string> scenes_in(const std::filesystem::path& folder) {
+  std::error_code ec;
+  std::vector<std::string> names;
+  int looked_at = 0;
+  for (std::filesystem::directory_iterator it(folder.empty() ? "." : folder, ec), end; !ec && it != end; it.increment(ec)) {
+    if (++looked_at > most_looked_at) break;
+    if (has_scene_name(it->path()) && it->is_regular_file(ec) && is_like_a_scene(it->path()))
+      names.push_back(it->path().filename().string());
+  }
+  std::sort(names.begin(), names.end());  // the folder's own order is anybody's
+  return names;
+}
+
+/// Of these; the ending counts nothing, left out or another.
+std::string nearest_of(const std::vector<std::string>& names, const std::filesystem::path& given) {
+  std::vector<std::string> stems;
+  for (const std::string& name : names) stems.push_back(std::filesystem::path(name).stem().string());
+  const std::vector<std::string_view> candidates(stems.begin(), stems.end());
+  const std::string_view near = text::nearest(given.stem().string(), candidates);
+  for (std::size_t i = 0; i < candidates.size() && !near.empty(); ++i)
+    if (candidates[i] == near) return names[i];
+  return {};
+}
+
 }  // namespace
 
 bool has_scene_name(const std::filesystem::path& given) { return given.extension() == ".yaml" || given.extension() == ".yml"; }
@@ -56,6 +97,16 @@ std::optional<SceneFile> find_scene(const std::filesystem::path& given, const st
       if (is_file(place)) return SceneFile{place.lexically_normal()};
   if (is_built_in_scene(given.string())) return SceneFile{given, true};
   return std::nullopt;
+}
+
+std::string nearest_scene(const std::filesystem::path& given, const std::filesystem::path& directory) {
+  const std::filesystem::path folder = given.parent_path();
+  if (const std::string beside = nearest_of(scenes_in(directory / folder), given); !beside.empty())
+    return (folder / beside).string();
+  std::vector<std::string> known(built_in_scenes.begin(), built_in_scenes.end());
+  for (const auto& shipped : shipped_folders())
+    for (std::string& name : scenes_in(shipped)) known.push_back(std::move(name));
+  return nearest_of(known, given);
 }
 
 std::string scene_folders(const std::filesystem::path& directory) {

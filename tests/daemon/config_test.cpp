@@ -216,7 +216,7 @@ TEST(Config, OptionsReachTheModel) {
 TEST(Config, EveryRefusalSaysWhatAndWhere) {
   const auto with = [&](const std::string& more) { return why(world + vehicles + sonar + more); };
   EXPECT_THAT(why("world: {scene: nowhere.yaml}\n" + vehicles + sonar),
-              HasSubstr("sonard.yaml:1:16: world.scene: no such file; looked in"));
+              HasSubstr("sonard.yaml:1:16: world.scene: no such file: \"nowhere.yaml\"; looked in "));
   EXPECT_THAT(why(vehicles + sonar), HasSubstr("world"));
   EXPECT_THAT(why(world + sonar), HasSubstr("vehicles"));
   EXPECT_THAT(why(world + vehicles), HasSubstr("sonars"));
@@ -356,6 +356,16 @@ TEST(ConfigControl, ReadsItsKeysAndRefusesStrangersWithoutAToken) {
   EXPECT_THAT(refusal("{stream: '127.0.0.1:8088', http: '127.0.0.1:8088'}"), HasSubstr("the same address as control.stream"));
   EXPECT_THAT(refusal("{htpp: off}"), HasSubstr("did you mean \"http\""));
   EXPECT_THAT(refusal("{http: '127.0.0.1'}"), HasSubstr("is not an address"));
+}
+
+TEST(Config, NamesTheNearestSceneToOneThatIsNot) {
+  std::ofstream(directory() + "/harbour.yaml") << "objects: []\n";
+  std::ofstream(directory() + "/harbours.yaml") << "world: {scene: harbour.yaml}\nobjects: []\nsonars: []\n";  // no scene
+  const auto refusal = [&](const std::string& scene) { return why("world: {scene: " + scene + "}\n" + vehicles + sonar); };
+  EXPECT_THAT(refusal("harbuors.yaml"), HasSubstr("no such file: \"harbuors.yaml\"; did you mean \"harbour.yaml\"? Looked in "));
+  EXPECT_THAT(refusal("demoo.yaml"), HasSubstr("did you mean \"demo.yaml\"?"));  // part of the program
+  EXPECT_THAT(refusal("local-search"), HasSubstr("did you mean \"local-search.yaml\"?"));
+  EXPECT_THAT(refusal("scenes/demo.yml"), HasSubstr("did you mean \"demo.yaml\"?"));
 }
 
 TEST(Config, NamesAMistypedKeyThatSeveralSonarsShare) {
