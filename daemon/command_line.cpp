@@ -147,6 +147,8 @@ Command parse_command_line(int argc, char** argv) {
     if (wrong.empty()) return render;
     return complain(wrong + text::where_help_is(app));
   }
+  if (run.demo && !run.config.empty())
+    return complain("--demo runs the built-in demo, not " + run.config + ": leave out one of the two" + text::where_help_is(app));
   return run;
 }
 

@@ -71,6 +71,7 @@ class Mistakes(unittest.TestCase):
                  (["run", "--threds", "2"], "--threds", 'did you mean "--threads"?'),
                  (["run", "a.yaml", "b.yaml"], '"b.yaml" is a word too many'),
                  (["run", "--clock"], "--clock needs a value: realtime, or stepped"),
+                 (["--demo", "my.yaml"], "--demo runs the built-in demo, not my.yaml"),
                  (["--demo=maybe"], "--demo is a switch"),
                  (["chekc"], 'no command or file "chekc"; did you mean "check"?'),
                  (["check"], "sonard: check needs config, the configuration file", "sonard check --help"),

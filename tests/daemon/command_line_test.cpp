@@ -53,6 +53,12 @@ TEST(CommandLine, EveryNamedPartIsSwitchedByItsNameAndNothingElse) {
     }
 }
 
+TEST(CommandLine, TheDemoTakesNoConfiguration) {
+  EXPECT_EQ(usage_error({"--demo", "my.yaml"}), 64);
+  EXPECT_EQ(usage_error({"run", "my.yaml", "--demo"}), 64);
+  EXPECT_EQ(usage_error({"run", "--demo"}), 0);
+}
+
 TEST(CommandLine, TheModeReachesTheEngine) {
   EXPECT_EQ(overridden({"--mode", "paper"}).engine.switches.mode, Mode::paper);
   EXPECT_EQ(overridden({"--mode", "raster"}).engine.switches.mode, Mode::raster);
