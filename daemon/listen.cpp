@@ -70,4 +70,11 @@ Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast) {
   return {};
 }
 
+bool is_admitted(const std::vector<AddressRange>& allow_from, const asio::ip::address& from) {
+  if (!from.is_v4()) return false;
+  const Ipv4 ip = from.to_v4().to_bytes();
+  if (allow_from.empty()) return is_loopback(ip);
+  return std::any_of(allow_from.begin(), allow_from.end(), [&](const AddressRange& r) { return r.contains(ip); });
+}
+
 }  // namespace sonar

@@ -17,6 +17,10 @@ Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast);
 /// asio::error::timed_out. Whole seconds; at least 3.
 void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit);
 
+/// Whether poses from there are taken. Without ranges only this computer's: the ranges may go by a reload while the listener
+/// stays.
+bool is_admitted(const std::vector<AddressRange>& allow_from, const asio::ip::address& from);
+
 asio::ip::address_v4 address_of(Ipv4 ip);
 
 }  // namespace sonar

@@ -1,7 +1,5 @@
 #include "daemon/mavlink_server.hpp"
 
-#include <algorithm>
-
 #include "daemon/listen.hpp"
 
 namespace sonar {
@@ -30,6 +28,7 @@ Result<void> MavlinkServer::open() {
                                           udp::socket(io_),
                                           asio::steady_timer(io_),
                                           std::nullopt,
+                                          {},
                                           {}});
     const Endpoint at = wanted.dials ? Endpoint{} : wanted.at;
     if (auto r = bind_udp(link.socket, at, false); !r)
@@ -71,9 +70,7 @@ Endpoint MavlinkServer::listens_at(std::size_t link) const {
 }
 
 void MavlinkServer::say_fault(const std::exception_ptr& fault, const Link& link) {
-  std::uint64_t unsaid = 0;
-  if (faults_.allows(LogLimiter::Clock::now(), unsaid))
-    log_.error("internal fault: " + text_of(fault) + " (please report it)", {{"at", link.name}, {"unsaid", unsaid}});
+  say_at_times(log_, faults_, LogLevel::error, "internal fault: " + text_of(fault) + " (please report it)", {{"at", link.name}});
 }
 
 /// A link outlives whatever one datagram does to us.
@@ -98,12 +95,8 @@ void MavlinkServer::keep_ticking(Link& link) {
 
 /// Whom we dialled may answer; of those who come by themselves, whom the configuration names.
 bool MavlinkServer::is_allowed(const Link& link, const asio::ip::address& from) const {
-  if (!from.is_v4()) return false;
-  const protocol::Ipv4 ip = from.to_v4().to_bytes();
-  if (link.config.dials) return ip == link.config.at.ip;
-  const auto& ranges = config_.poses.allow_from;
-  if (ranges.empty()) return true;  // then the link is on loopback: the configuration sees to that
-  return std::any_of(ranges.begin(), ranges.end(), [&](const AddressRange& r) { return r.contains(ip); });
+  if (link.config.dials) return from == address_of(link.config.at.ip);
+  return is_admitted(config_.poses.allow_from, from);
 }
 
 asio::awaitable<void> MavlinkServer::receive(Link& link) {
@@ -144,10 +137,7 @@ void MavlinkServer::act_on(Link& link, const mavlink::Reaction& reaction, const 
     const std::string source = link.name + " " + pose.source;  // a router may send from any port: the link is the sender
     intake_.take(pose.sample, {source, source});
   }
-  for (const std::string& notice : reaction.notices) {
-    std::uint64_t unsaid = 0;
-    if (notices_.allows(LogLimiter::Clock::now(), unsaid)) log_.info(link.name + ": " + notice, {{"unsaid", unsaid}});
-  }
+  for (const std::string& notice : reaction.notices) say_at_times(log_, link.notices, LogLevel::info, link.name + ": " + notice);
   error_code ignored;
   if (link.peer)
     for (const mavlink::Bytes& reply : reaction.replies) link.socket.send_to(asio::buffer(reply), *link.peer, 0, ignored);

@@ -37,6 +37,7 @@ class MavlinkServer {
     asio::steady_timer timer;
     std::optional<udp::endpoint> peer;  // whom we answer
     std::string name;                   // "mavlink udpin:127.0.0.1:14551"
+    LogLimiter notices = {};
   };
 
   void keep_receiving(Link& link);
@@ -52,7 +53,7 @@ class MavlinkServer {
   const Config& config_;
   PoseIntake& intake_;
   Log& log_;
-  LogLimiter faults_, notices_;
+  LogLimiter faults_;
   std::list<Link> links_;
   bool stopping_ = false;
 };

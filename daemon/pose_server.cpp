@@ -1,6 +1,5 @@
 #include "daemon/pose_server.hpp"
 
-#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -93,12 +92,6 @@ void PoseServer::stop() {
   connections_.close_all();
 }
 
-bool PoseServer::allowed(const asio::ip::address& from) {
-  if (config_.allow_from.empty()) return true;  // then the listener is on loopback: the configuration sees to that
-  const protocol::Ipv4 ip = from.is_v4() ? from.to_v4().to_bytes() : protocol::Ipv4{};
-  return std::any_of(config_.allow_from.begin(), config_.allow_from.end(), [&](const AddressRange& r) { return r.contains(ip); });
-}
-
 // ---- what arrives
 
 void PoseServer::on_line(const std::string& text, const Sender& sender) {
@@ -132,7 +125,7 @@ asio::awaitable<void> PoseServer::receive(Listener& listener) {
     const std::size_t n = co_await listener.datagrams.async_receive_from(asio::buffer(buffer), from, into(ec));
     if (stopping_) co_return;
     if (ec) continue;  // an ICMP answer to nothing we sent
-    if (!allowed(from.address())) {
+    if (!is_admitted(config_.allow_from, from.address())) {
       intake_.refuse("address is not in poses.allow_from", sender_of(false, "udp", from.address(), from.port()));
       continue;
     }
@@ -161,7 +154,8 @@ void PoseServer::admit(tcp::socket socket) {
   const auto peer = socket.remote_endpoint(ec);
   if (ec) return;  // gone already
   const Sender sender = sender_of(true, "tcp", peer.address(), peer.port());
-  if (!allowed(peer.address())) return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
+  if (!is_admitted(config_.allow_from, peer.address()))
+    return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
   const bool room = connections_.make_room([this](const Connection& evicted) {
     say_at_times(log_, notices_, LogLevel::info, "pose connection closed: silent for longest, and its place was needed",
                  {{"from", evicted.sender.id}});

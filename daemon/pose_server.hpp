@@ -48,7 +48,6 @@ class PoseServer {
   using ConnectionPointer = std::shared_ptr<Connection>;
 
   Result<Endpoint> open(Listener& listener, Endpoint at);
-  bool allowed(const asio::ip::address& from);
   void keep_receiving(Listener& listener);
   void keep_accepting(Listener& listener);
   void say_fault(const std::exception_ptr& fault, const std::string& at);

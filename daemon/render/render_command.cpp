@@ -57,13 +57,11 @@ class ProgressLine {
   Clock::time_point begin_ = Clock::now(), told_ = begin_;
 };
 
-Result<VehiclePath> path_of(const RenderCommand& command) {
+Result<motion::TrajectoryFile> poses_of(const RenderCommand& command) {
   motion::ReadOptions options;
   if (!command.pose_frame.empty())
     options.frame = command.pose_frame == "NED_FRD" ? motion::Frame::ned_frd : motion::Frame::enu_flu;
-  const auto file = motion::load_trajectories(command.poses, options);
-  if (!file) return tl::make_unexpected(file.error());
-  return path_in(*file, command.poses, {});
+  return motion::load_trajectories(command.poses, options);
 }
 
 Result<RenderInput> input_of(const RenderCommand& command) {
@@ -72,9 +70,13 @@ Result<RenderInput> input_of(const RenderCommand& command) {
   for (RenderJob& job : input->jobs)
     if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return tl::make_unexpected(r.error());
   if (!command.poses.empty()) {
-    const auto path = path_of(command);
-    if (!path) return tl::make_unexpected(path.error());
-    for (RenderJob& job : input->jobs) job.path = *path;
+    const auto file = poses_of(command);
+    if (!file) return tl::make_unexpected(file.error());
+    for (RenderJob& job : input->jobs) {  // of several bodies the vehicle's own, as where the daemon plays it
+      const auto path = path_in(*file, command.poses, file->bodies.size() > 1 ? job.vehicle_name : "");
+      if (!path) return tl::make_unexpected(path.error());
+      job.path = *path;
+    }
   }
   return input;
 }

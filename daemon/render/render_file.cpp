@@ -181,6 +181,7 @@ Result<RenderInput> from_config(const std::filesystem::path& file, const std::st
   job.seed = config->seed;
   job.engine = config->engine;
   job.mount = s.mount;
+  job.vehicle_name = vehicle.name;
   job.path = {vehicle.initial_pose, vehicle.orbits, vehicle.plan.trajectory, {}};
   if (const std::string why = why_not_movable(*job.scene, *config); !why.empty()) return failure(ErrorKind::config, why);
   for (const BodyStart& body : bodies_of(*job.scene, *config)) job.body_paths.push_back(body.plan.trajectory);

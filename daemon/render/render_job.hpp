@@ -28,6 +28,7 @@ struct RenderJob {
   std::uint64_t seed = 1;
   EngineConfig engine;
   Pose mount;  // sonar in vehicle
+  std::string vehicle_name;  // of a configuration; empty in render files
   VehiclePath path;
   /// Of the scene's moving objects, in its order, on the same clock; null or not there: it rests.
   std::vector<std::shared_ptr<const motion::Trajectory>> body_paths;

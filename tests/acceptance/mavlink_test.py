@@ -2,8 +2,8 @@
 
 The vehicle is mavlink_frames.py, written from the message definitions; pings are read by the Python client, and the moment of each
 ping comes from the daemon's events. Only pings are judged whose pose had left in time: what a busy computer sends late is another
-question (tests/daemon/world_test.cpp). A computer that stalls the daemon itself cannot be seen from outside, so three drives may be
-tried; one must be right from end to end.
+question (tests/daemon/world_test.cpp). A computer that stalls the daemon itself cannot be seen from outside, so a few pings may be
+off by what the vehicle moves meanwhile, and no more.
 """
 import math
 import pathlib
@@ -26,7 +26,8 @@ SALINITY = 30.0  # as the water's, so that the device believes the water's sound
 RANGE_M, FIELD_DEG = 8.0, 50  # targets farther to the side are left out
 RING_M, TARGETS = 4.5, 10  # round the square's middle
 OLDEST_POSE_S, UNDER_WAY_S = 0.05, 0.02  # of a pose at a ping: its age, and the time it has had to arrive
-DRIVES = 3
+MOST_STALLED = 0.05  # of the echoes; none of them beyond STALL_FACTOR times the limits
+STALL_FACTOR = 10
 GOLDEN = ROOT / "tests/protocol/mavlink/golden/frames.txt"
 
 
@@ -160,17 +161,11 @@ class Mavlink(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             ring = pathlib.Path(folder) / "ring.yaml"
             ring.write_text(scene(), encoding="utf-8")
-            for last in [False] * (DRIVES - 1) + [True]:
-                # Without motion within a ping, so that one pose says where everything is.
-                with Sonard(scene=ring, pose=f"{{frame: ENU_FLU, xyz_m: [0, 0, {-DEPTH_M}]}}",
-                            more="engine: {noise: off, motion: off}", poses=", mavlink: 'udpin:ADDRESS:14551'") as daemon:
-                    vehicle, pings, fired_at = self.drive(daemon)
-                try:
-                    return self.judge(vehicle, pings, fired_at)
-                except AssertionError as stalled:
-                    if last:
-                        raise
-                    print(f"once more: {stalled}")
+            # Without motion within a ping, so that one pose says where everything is.
+            with Sonard(scene=ring, pose=f"{{frame: ENU_FLU, xyz_m: [0, 0, {-DEPTH_M}]}}",
+                        more="engine: {noise: off, motion: off}", poses=", mavlink: 'udpin:ADDRESS:14551'") as daemon:
+                vehicle, pings, fired_at = self.drive(daemon)
+            self.judge(vehicle, pings, fired_at)
 
     def drive(self, daemon):
         fired_at, pings = {}, []
@@ -209,7 +204,7 @@ class Mavlink(unittest.TestCase):
             pass  # closed
 
     def judge(self, vehicle, pings, fired_at):
-        judged, seen, headings = 0, [], set()
+        judged, seen, stalled, headings = 0, [], [], set()
         for ping in pings:
             if ping.number not in fired_at:
                 continue
@@ -218,7 +213,7 @@ class Mavlink(unittest.TestCase):
                 continue
             pose = vehicle.path(t)
             off_deg = math.degrees(math.remainder(math.radians(ping.heading_deg) - pose[2], 2 * math.pi))
-            self.assertLess(abs(off_deg), 0.3, f"heading at {t:.3f} s")
+            self.assertLess(abs(off_deg), 0.3 * STALL_FACTOR, f"heading at {t:.3f} s")
             judged += 1
             headings.add(round(pose[2] / (math.pi / 2)) % 4)
             for i in range(TARGETS):
@@ -229,11 +224,14 @@ class Mavlink(unittest.TestCase):
                 where = f"target {i} at {t:.3f} s: row {row:.2f}, beam {beam:.2f}; by the true pose {place[0]:.2f}, {place[1]:.2f}"
                 self.assertGreater(value, 0, where)
                 seen.append((abs(row - place[0]), abs(beam - place[1])))
-                self.assertLessEqual(seen[-1][0], 1.0, where)
-                self.assertLessEqual(seen[-1][1], 0.5, where)
+                if seen[-1][0] > 1.0 or seen[-1][1] > 0.5 or abs(off_deg) > 0.3:
+                    stalled.append(where)
+                self.assertLessEqual(seen[-1][0], 1.0 * STALL_FACTOR, where)
+                self.assertLessEqual(seen[-1][1], 0.5 * STALL_FACTOR, where)
         self.assertGreaterEqual(len(seen), 40)
         print(f"{judged} of {len(pings)} pings, {len(seen)} echoes: rows off by {max(r for r, _ in seen):.2f} at most, "
-              f"beams by {max(b for _, b in seen):.2f}")
+              f"beams by {max(b for _, b in seen):.2f}; {len(stalled)} beyond one row and half a beam")
+        self.assertLessEqual(len(stalled), MOST_STALLED * len(seen), stalled)
         self.assertGreaterEqual(judged, 20)
         self.assertEqual(headings, {0, 1, 2, 3}, "every side of the square")
 

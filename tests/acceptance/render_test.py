@@ -150,6 +150,15 @@ class Render(unittest.TestCase):
         poses.write_text("t,x,y,z\n0,0,0,0\n", encoding="utf-8")
         self.expect(self.render("--poses", poses, "--pose-frame", "ENU_FLU", "--format", "raw", out=self.path / "third"), 0, "1 of 1")
 
+    def test_of_several_bodies_the_vehicles_own(self):
+        poses = self.path / "both.csv"
+        poses.write_text("# frame: ENU_FLU\nbody,t,x,y,z\nboat,0,9,0,0\nrov,0,0.25,0,0\n", encoding="utf-8")
+        self.expect(self.render("--poses", poses, "--format", "raw"), 0, "1 of 1")
+        side = json.loads((self.out / "000001.json").read_text(encoding="utf-8"))
+        self.assertAlmostEqual(side["sonar_in_world"]["xyz_m"][0], 0.25)
+        poses.write_text(poses.read_text(encoding="utf-8").replace("rov", "auv"), encoding="utf-8")
+        self.expect(self.render("--poses", poses, out=self.path / "other"), 65, "both.csv", "auv", "boat")
+
     def test_mistakes_are_one_sentence(self):
         self.expect(self.render(config=self.path / "none.yaml"), 66, "none.yaml")
         self.expect(self.render("--sonar", "back"), 64, "front")

@@ -5,6 +5,7 @@
 #include <limits>
 #include <list>
 
+#include "daemon/listen.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 #include "tests/daemon/loopback.hpp"
@@ -48,6 +49,15 @@ struct Poses : ::testing::Test {
   Client client;
   std::uint16_t protobuf_port = 0, stream_port = 0, json_port = 0;
 };
+
+TEST(PoseSenders, WithoutRangesOnlyThisComputerIsHeard) {
+  const auto from = [](const char* text) { return asio::ip::make_address(text); };
+  EXPECT_TRUE(is_admitted({}, from("127.0.0.1")) && is_admitted({}, from("127.9.8.7")));
+  EXPECT_FALSE(is_admitted({}, from("192.168.2.2"))) << "the ranges of a listener for others may be gone after a reload";
+  const std::vector<AddressRange> lab{{{192, 168, 2, 0}, 24}};
+  EXPECT_TRUE(is_admitted(lab, from("192.168.2.2")));
+  EXPECT_FALSE(is_admitted(lab, from("192.168.3.2")) || is_admitted(lab, from("127.0.0.1")) || is_admitted(lab, from("::1")));
+}
 
 TEST_F(Poses, ProtobufDatagram) {
   send_udp(daemon.address(), protobuf_port, control::encode_pose_datagram(at_x(11)));

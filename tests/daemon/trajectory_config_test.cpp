@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -20,7 +21,8 @@ using ::testing::StartsWith;
 /// A folder with files of every kind.
 std::string directory() {
   static const std::string made = [] {
-    const std::string d = ::testing::TempDir() + "trajectories";
+    std::string d = ::testing::TempDir() + "trajectoriesXXXXXX";  // of this process: others run beside it
+    EXPECT_NE(mkdtemp(d.data()), nullptr);
     std::filesystem::create_directories(d + "/missions");
     std::ofstream(d + "/scene.yaml") << "name: test\n";
     std::ofstream(d + "/missions/dive.tum") << "# frame: ENU_FLU\n0 1 2 -3 0 0 0 1\n60 1 2 -9 0 0 0 1\n";

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -208,7 +209,7 @@ TEST(TrajectoryFile, TheManualsExamplesAreRead) {
 /// An hour at 100 Hz; the deadline is some twenty times what a slow computer takes.
 TEST(TrajectoryFile, AnHourIsReadInNoTime) {
   constexpr int lines = 360000;
-  const std::string name = testing::TempDir() + "hour.tum";
+  const std::string name = testing::TempDir() + "hour" + std::to_string(getpid()) + ".tum";
   {
     std::FILE* const out = std::fopen(name.c_str(), "w");
     ASSERT_NE(out, nullptr);
