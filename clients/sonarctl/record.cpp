@@ -22,6 +22,8 @@ using recording::Origin;
 using recording::Piece;
 using Steady = std::chrono::steady_clock;
 
+constexpr int most_status_at_once = 32;
+
 double seconds_since(Steady::time_point start) { return std::chrono::duration<double>(Steady::now() - start).count(); }
 
 /// UNIX time that never goes back, whoever sets the clock.
@@ -134,9 +136,9 @@ class Recorder {
     return {};
   }
 
-  /// Broadcasts of this device; others pass by.
+  /// Broadcasts of this device; others pass by. A flood of them must not keep the sonar's bytes waiting.
   Result<void> take_status() {
-    while (status_) {
+    for (int taken = 0; status_ && taken < most_status_at_once; ++taken) {
       std::array<std::byte, 2048> datagram;
       const Read read = read_some(*status_, datagram, 0ms);
       if (read.what != Wait::data) return {};
@@ -249,6 +251,17 @@ Result<void> convert(const RecordOptions& options) {
   return {};
 }
 
+/// Also of files that are not there yet.
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code ec;
+  if (a == b || std::filesystem::equivalent(a, b, ec)) return true;
+  const auto place = [&ec](const auto& path) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(path, ec), ec);
+  };
+  const std::filesystem::path first = place(a);
+  return !first.empty() && first == place(b);
+}
+
 }  // namespace
 
 Result<void> record(const RecordOptions& options) {
@@ -256,6 +269,10 @@ Result<void> record(const RecordOptions& options) {
   if (std::all_of(std::begin(paths), std::end(paths), [](const auto* path) { return path->empty(); }))
     return failure(ErrorKind::usage,
                    "say what to write: --pcap, --mcap, --oculus or --raw FILE, any of them (sonarctl record --help)");
+  for (std::size_t i = 0; i < std::size(paths); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (!paths[i]->empty() && is_same_file(*paths[i], *paths[k]))
+        return failure(ErrorKind::usage, paths[i]->string() + " is named for two kinds of files: give each its own name");
   const std::filesystem::path& from = options.source.recording;
   for (const auto* path : paths) {
     std::error_code ec;

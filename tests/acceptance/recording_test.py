@@ -255,6 +255,11 @@ class OneIntoAnother(Files):
             done = run(SONARCTL, *words)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, 1), done.stderr)
         self.assertEqual(self.read("raw"), b"nothing of the kind")
+        once, again = self.folder / "w", self.folder / "sub/../w"  # one file for two kinds
+        done = run(SONARCTL, "record", "--raw", once, "--oculus", again)
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (64, 1), done.stderr)
+        self.assertIn("named for two kinds of files", done.stderr)
+        self.assertFalse(once.exists())
         for code, words in [(66, [self.folder / "none"]), (65, [self.path("raw")]), (64, [self.path("raw"), "--ip", "nowhere"])]:
             done = run(SONARD, "replay", *words)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, 1), done.stderr)
