@@ -1,6 +1,7 @@
 // Replay on loopback: a driver gets the recording's bytes, all of them and nothing else, at the pace asked for.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -110,6 +111,13 @@ class Replay {
   std::future<void> done_;
 };
 
+/// True when there is something to receive, or the end, in good time: Asio's own receiving waits for ever.
+template <class Socket>
+bool readable(Socket& socket) {
+  pollfd waited{socket.native_handle(), POLLIN, 0};
+  return ::poll(&waited, 1, static_cast<int>(patience.count())) > 0;
+}
+
 class Driver {
  public:
   explicit Driver(const Replay& replay) : socket_(io_) { socket_.connect(replay.at()); }
@@ -118,6 +126,10 @@ class Driver {
     Bytes bytes, block(1 << 16);
     error_code ec;
     while (!ec && bytes.size() < most) {
+      if (!readable(socket_)) {
+        ADD_FAILURE() << "not a byte from the replay for " << patience.count() << " ms";
+        break;
+      }
       const std::size_t n = socket_.read_some(asio::buffer(block.data(), std::min(block.size(), most - bytes.size())), ec);
       bytes.insert(bytes.end(), block.begin(), block.begin() + static_cast<std::ptrdiff_t>(n));
     }
@@ -242,6 +254,7 @@ TEST(Replay, StatusLeadsDriversHere) {
     ReplayOptions options;
     options.status_to = {{ip, listener.local_endpoint().port()}};
     Replay replay(file_of(pcap, pieces), options);
+    ASSERT_TRUE(readable(listener)) << "no status datagram for " << patience.count() << " ms; one a second is sent";
     Bytes datagram(2000);
     datagram.resize(listener.receive(asio::buffer(datagram)));
     const auto status = oculus::decode_status(datagram);
@@ -252,6 +265,34 @@ TEST(Replay, StatusLeadsDriversHere) {
     EXPECT_EQ(status->part_number, with_status ? 1032 : 1042);
     EXPECT_EQ(status->arm0_version, with_status ? 0x01020003u : 0u);
   }
+}
+
+/// As if one of the server's parts had a bug.
+class BrokenReader final : public recording::PieceReader {
+ public:
+  std::optional<Piece> next() override { throw std::runtime_error("out of order"); }
+  std::optional<Error> damage() const override { return {}; }
+  void rewind() override {}
+};
+
+TEST(Replay, AnInternalFaultIsTold) {
+  LogOptions quiet;
+  quiet.sink = [](LogLevel, const std::string&) {};
+  Log log(quiet);
+  asio::io_context io;
+  BrokenReader reader;
+  ReplayOptions options = as_fast_as_read();
+  options.at = {own_address(), 0};
+  ReplayServer server(io, reader, {}, options, log);
+  ASSERT_TRUE(server.open());
+  server.start();
+  tcp::socket driver(io);
+  driver.connect({asio::ip::address_v4(server.at().ip), server.at().port});
+  io.run_for(patience);
+  EXPECT_TRUE(io.stopped());
+  ASSERT_FALSE(server.outcome());
+  EXPECT_EQ(server.outcome().error().kind, ErrorKind::bug);
+  EXPECT_THAT(server.outcome().error().text, ::testing::HasSubstr("out of order"));
 }
 
 TEST(Replay, NeedsAMessageOfADevice) {
