@@ -93,6 +93,13 @@ class Steering(unittest.TestCase):
         self.assertEqual(result.returncode, 69)
         self.assertIn("no sonard answers on the control stream", result.stderr)
 
+    def test_other_ports_are_named(self):
+        for port, word in [(8088, "it speaks HTTP"), (52100, "not sonard's control stream")]:
+            result = run(SONARCTL, "status", "--control", f"{self.daemon.address}:{port}")
+            self.assertEqual(result.returncode, 65, result.stderr)
+            for expected in (f"{self.daemon.address}:{port}", word, "--control HOST:PORT", "14770"):
+                self.assertIn(expected, result.stderr)
+
 
 class Secrets(unittest.TestCase):
     def test_a_token_opens(self):
@@ -104,7 +111,7 @@ class Secrets(unittest.TestCase):
                 control = ("--control", f"{daemon.address}:14770")
                 refused = run(SONARCTL, "status", *control)
                 self.assertNotEqual(refused.returncode, 0)
-                self.assertIn("token", refused.stderr)
+                self.assertIn(f"{daemon.address}:14770 wants a token: give --token-file FILE", refused.stderr)
                 opened = run(SONARCTL, "status", *control, "--token-file", token)
                 self.assertEqual(opened.returncode, 0, opened.stderr)
                 self.assertEqual(run(SONARCTL, "status", *control, "--token-file", "none").returncode, 66)

@@ -1,6 +1,7 @@
 #include "clients/sonarctl/control/control_client.hpp"
 
 #include <array>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 
@@ -24,6 +25,11 @@ Result<std::string> token_from(const std::filesystem::path& file) {
     return failure(ErrorKind::missing_file, "cannot read a token from " + file.string() +
                                                 ": it should be the file that control.token_file of sonard names");
   return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+bool starts_as_http(std::span<const std::byte> received) {
+  constexpr std::string_view http = "HTTP/";
+  return received.size() >= http.size() && std::memcmp(received.data(), http.data(), http.size()) == 0;
 }
 
 Result<void> judge(const control::Response& answer) {
@@ -56,6 +62,9 @@ Result<ControlClient> ControlClient::open(const ControlOptions& options) {
   if (!socket) return tl::unexpected(socket.error());
   ControlClient client(std::move(*socket), *at);
   const Result<control::Response> met = client.request(control::Hello{control::protocol_version, "sonarctl", *token});
+  if (!met && token->empty() && met.error().text.find("wants a token") != std::string::npos)
+    return failure(met.error().kind, "sonard at " + text_from(*at) +
+                                         " wants a token: give --token-file FILE, the file that its control.token_file names");
   if (!met) return tl::unexpected(met.error());
   return client;
 }
@@ -103,14 +112,20 @@ Result<std::optional<control::Event>> ControlClient::next_event(std::chrono::mil
   return first;
 }
 
+Error ControlClient::no_control_stream(const std::string& why) const {
+  return {ErrorKind::bad_data, "what answers at tcp " + text_from(at_) + " is not sonard's control stream (" + why +
+                                   "); that is on tcp " + std::to_string(control_port) +
+                                   " if the configuration says nothing else, and sonard's banner names it: --control HOST:PORT"};
+}
+
 /// Nothing when the time is over, or, `until_signal`, when a signal came.
 Result<std::optional<control::Response>> ControlClient::next_message(Clock::time_point deadline, bool until_signal) {
   for (;;) {
     auto message = parser_.next();
-    if (!message) return tl::unexpected(message.error());
+    if (!message) return tl::unexpected(no_control_stream(message.error().text));
     if (*message) {
       Result<control::Response> response = control::decode_response(**message);
-      if (!response) return tl::unexpected(response.error());
+      if (!response) return tl::unexpected(no_control_stream(response.error().text));
       return std::optional<control::Response>(std::move(*response));
     }
     std::array<std::byte, 16384> chunk;
@@ -121,7 +136,11 @@ Result<std::optional<control::Response>> ControlClient::next_message(Clock::time
                                                  "; its log says why (not a control port, a token, a stop)");
     if (read.what == Wait::timed_out || (read.what == Wait::interrupted && until_signal))
       return std::optional<control::Response>{};
-    if (read.what == Wait::data) parser_.feed(std::span<const std::byte>(chunk).first(read.size));
+    if (read.what != Wait::data) continue;
+    const auto received = std::span<const std::byte>(chunk).first(read.size);
+    if (!heard_ && starts_as_http(received)) return tl::unexpected(no_control_stream("it speaks HTTP"));
+    heard_ = true;
+    parser_.feed(received);
   }
 }
 

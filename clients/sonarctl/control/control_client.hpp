@@ -41,10 +41,12 @@ class ControlClient {
  private:
   ControlClient(Socket socket, Endpoint at) : socket_(std::move(socket)), at_(std::move(at)) {}
   Result<std::optional<control::Response>> next_message(std::chrono::steady_clock::time_point deadline, bool until_signal);
+  Error no_control_stream(const std::string& why) const;
 
   Socket socket_;
   Endpoint at_;
   control::DelimitedParser parser_;
+  bool heard_ = false;  // a byte
   std::deque<control::Event> events_;
   std::uint64_t last_id_ = 0;
 };
