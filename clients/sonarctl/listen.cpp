@@ -23,8 +23,8 @@ std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_
 
 class Listener {
  public:
-  Listener(const ListenOptions& options, PingStream stream)
-      : options_(options), stream_(std::move(stream)), log_(options.source.asked) {}
+  Listener(const ListenOptions& options, Endpoint device, PingStream stream)
+      : options_(options), device_(std::move(device)), stream_(std::move(stream)), log_(options.source.asked) {}
 
   /// Until the wished time or number of pings is over; a sentence when the device stops before.
   Result<void> run() {
@@ -33,10 +33,11 @@ class Listener {
       if (item.what == Wait::closed) return failure(ErrorKind::io, closed_text(item.error));
       if (item.what == Wait::data) {
         last_message_ = Clock::now();
+        heard_ = true;
         if (Result<void> taken = take(*item.message); !taken) return taken;
       } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
-        return failure(ErrorKind::io, "not a byte from the device for " + std::to_string(options_.source.silence_limit_s) +
-                                          " s: drivers give up after 10 s; is the daemon stopped or stuck?");
+        return tl::unexpected(silence(options_.source, device_, heard_, "nothing more",
+                                      "drivers give up after 10 s; is the daemon stopped or stuck?"));
       }
     }
     return {};
@@ -89,6 +90,8 @@ class Listener {
   }
 
   const ListenOptions& options_;
+  Endpoint device_;
+  bool heard_ = false;
   PingStream stream_;
   PingLog log_;
   Clock::time_point start_ = Clock::now(), last_message_ = start_;
@@ -128,7 +131,7 @@ Result<void> listen(const ListenOptions& options) {
   if (!options.record.empty())
     if (Result<void> recording = stream->record_to(options.record); !recording) return recording;
   if (!options.json) std::printf("connected to %s\n", text_from(*device).c_str());
-  Listener listener(options, std::move(*stream));
+  Listener listener(options, *device, std::move(*stream));
   const Result<void> ran = listener.run();
   const Result<void> reported = report(options, listener);
   return ran ? reported : ran;

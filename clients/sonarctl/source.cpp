@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "core/text/format.hpp"
+
 namespace sonar::clients {
 
 volatile int interrupted = 0;
@@ -26,6 +28,7 @@ Result<oculus::DecodedPing> fetch_live(const SourceOptions& source) {
   auto stream = PingStream::open(*device, source.asked, milliseconds_from(source.connect_patience_s));
   if (!stream) return tl::unexpected(stream.error());
   const auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
+  bool heard = false;
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
     PingStream::Item item = stream->next(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(500)));
@@ -33,8 +36,8 @@ Result<oculus::DecodedPing> fetch_live(const SourceOptions& source) {
       return failure(ErrorKind::io,
                      "the device closed the connection before a ping came: another client may hold it (clients.max)");
     if (item.what != Wait::data && left.count() <= 0)
-      return failure(ErrorKind::io,
-                     "no ping came within " + std::to_string(source.silence_limit_s) + " s: is the sonar in standby?");
+      return tl::unexpected(silence(source, *device, heard, "no ping", "is the sonar in standby?"));
+    heard = heard || item.what == Wait::data;
     auto* ping = item.what == Wait::data ? std::get_if<oculus::DecodedPing>(&*item.message) : nullptr;
     if (ping == nullptr) continue;
     if (!source.asked || oculus::echo_violations(*source.asked, *ping).empty() || ++stale > stale_pings) return std::move(*ping);
@@ -45,6 +48,15 @@ Result<oculus::DecodedPing> fetch_live(const SourceOptions& source) {
 }  // namespace
 
 std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::milliseconds(static_cast<std::int64_t>(s * 1000)); }
+
+Error silence(const SourceOptions& source, const Endpoint& device, bool heard, const std::string& what, const std::string& hint) {
+  const std::string limit = text::format("%g s", source.silence_limit_s);
+  if (heard) return {ErrorKind::io, what + " came within " + limit + ": " + hint};
+  return {ErrorKind::unavailable, "not one Oculus message came from tcp " + text_from(device) + " within " + limit +
+                                      ": is that an Oculus sonar?" +
+                                      (source.asked ? "" : " Some send nothing before settings come (--as-it-is sends none).") +
+                                      " sonard's banner names the address of each sonar"};
+}
 
 Result<Endpoint> find_device(const SourceOptions& source, bool say) {
   if (!source.discover) return source.device;

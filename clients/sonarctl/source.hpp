@@ -14,6 +14,9 @@ std::chrono::milliseconds milliseconds_from(double s);
 /// The address given, or the one a status broadcast names; `say` prints what was found.
 Result<Endpoint> find_device(const SourceOptions& source, bool say);
 
+/// `what` did not come within source.silence_limit_s, or, when not one Oculus message ever came (`heard`), that it did not.
+Error silence(const SourceOptions& source, const Endpoint& device, bool heard, const std::string& what, const std::string& hint);
+
 /// Ping `number` of a recording, or the first of a device that was made with the settings asked for.
 Result<oculus::DecodedPing> fetch_ping(const SourceOptions& source, std::size_t number);
 

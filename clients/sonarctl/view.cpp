@@ -63,21 +63,23 @@ Result<void> view_one(const ViewOptions& options) {
 
 class LiveView {
  public:
-  LiveView(const ViewOptions& options, PingStream stream) : options_(options), stream_(std::move(stream)) {}
+  LiveView(const ViewOptions& options, Endpoint device, PingStream stream)
+      : options_(options), device_(std::move(device)), stream_(std::move(stream)) {}
 
   /// Ends well when interrupted, when enough pings were seen, or when nobody reads the output any more.
   Result<void> run() {
     const LiveScreen screen(options_.terminal && terminal_facts().is_terminal);
     double heard_s = now_s();
+    bool heard = false;
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
       PingStream::Item item = stream_.next(std::chrono::milliseconds(500));
       if (item.what == Wait::closed)
         return failure(ErrorKind::io, "the device ended the connection" + (item.error.empty() ? "" : ": " + item.error) +
                                           "; it stopped, or another client holds it (clients.max)");
       if (item.what == Wait::data) heard_s = now_s();
+      heard = heard || item.what == Wait::data;
       if (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s)
-        return failure(ErrorKind::io, "not a byte from the device for " + std::to_string(options_.source.silence_limit_s) +
-                                          " s: is the daemon stopped or stuck?");
+        return tl::unexpected(silence(options_.source, device_, heard, "nothing more", "is the daemon stopped or stuck?"));
       const auto* ping = item.what == Wait::data ? std::get_if<oculus::DecodedPing>(&*item.message) : nullptr;
       if (ping == nullptr) continue;
       const Result<bool> read = show(*ping, screen);
@@ -107,6 +109,7 @@ class LiveView {
   }
 
   const ViewOptions& options_;
+  Endpoint device_;
   PingStream stream_;
   ViewFigures figures_;
 };
@@ -116,7 +119,7 @@ Result<void> view_live(const ViewOptions& options) {
   if (!device) return tl::unexpected(device.error());
   auto stream = PingStream::open(*device, options.source.asked, milliseconds_from(options.source.connect_patience_s));
   if (!stream) return tl::unexpected(stream.error());
-  const Result<void> ran = LiveView(options, std::move(*stream)).run();
+  const Result<void> ran = LiveView(options, *device, std::move(*stream)).run();
   if (!options.terminal && terminal_facts().is_terminal) std::puts("");
   return ran;
 }

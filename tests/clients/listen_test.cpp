@@ -14,6 +14,7 @@
 #include "protocol/control/control.hpp"
 #include "protocol/control/json_pose.hpp"
 #include "protocol/oculus/encode_ping.hpp"
+#include "protocol/oculus/replies.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -153,7 +154,10 @@ TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
   FakeDevice silent(0, [](std::uint32_t, const oculus::FireSettings&) { return wire::Bytes{}; });
   ListenOptions options = quiet(silent.endpoint(), 1);
   options.source.silence_limit_s = 0.3;
-  EXPECT_THAT(listen(options).error().text, HasSubstr("not a byte"));
+  const Result<void> nothing = listen(options);
+  EXPECT_EQ(nothing.error().kind, ErrorKind::unavailable);
+  EXPECT_THAT(nothing.error().text, HasSubstr("not one Oculus message came from tcp " + text_from(silent.endpoint()) +
+                                              " within 0.3 s: is that an Oculus sonar?"));
 
   std::uint16_t free_port = 0;
   { const Socket briefly = bound(SOCK_STREAM, free_port); }
@@ -162,6 +166,37 @@ TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
   const Result<void> absent = listen(options);
   EXPECT_EQ(absent.error().kind, ErrorKind::unavailable);
   EXPECT_THAT(absent.error().text, HasSubstr("Is sonard running there?"));
+}
+
+TEST(Listen, SaysWhenTheDeviceFallsSilent) {
+  FakeDevice device(1, [](std::uint32_t, const oculus::FireSettings& echo) { return ping_bytes(1, echo); });
+  ListenOptions options = quiet(device.endpoint(), 2);
+  options.source.silence_limit_s = 0.3;
+  const Result<void> done = listen(options);
+  EXPECT_EQ(done.error().kind, ErrorKind::io);
+  EXPECT_THAT(done.error().text, HasSubstr("nothing more came within 0.3 s"));
+}
+
+TEST(View, TellsAnotherServiceFromASonarInStandby) {
+  ViewOptions options;
+  options.terminal = true;
+  options.source.asked = asked();
+  options.source.silence_limit_s = 0.3;
+  for (const bool live : {false, true}) {
+    SCOPED_TRACE(live);
+    FakeDevice other(1, [](std::uint32_t, const oculus::FireSettings&) { return wire::Bytes(20, std::byte{'x'}); });
+    options.source.device = other.endpoint();
+    options.live = live;
+    const Result<void> done = view(options);
+    EXPECT_EQ(done.error().kind, ErrorKind::unavailable);
+    EXPECT_THAT(done.error().text, HasSubstr("is that an Oculus sonar?"));
+  }
+  FakeDevice standby(1, [](std::uint32_t, const oculus::FireSettings&) { return oculus::make_dummy(7001); });
+  options.source.device = standby.endpoint();
+  options.live = false;
+  const Result<void> done = view(options);
+  EXPECT_EQ(done.error().kind, ErrorKind::io);
+  EXPECT_THAT(done.error().text, HasSubstr("no ping came within 0.3 s: is the sonar in standby?"));
 }
 
 TEST(Endpoints, TakeWhatIsMissingFromTheDefault) {
