@@ -144,8 +144,8 @@ int check(const CheckCommand& command) {
   const auto scene = load_scene(config->scene);
   if (!scene) return complain(scene.error());
   if (const std::string why = why_not_movable(**scene, *config); !why.empty()) return complain({ErrorKind::config, why});
-  std::printf("%s: ok, %zu sonar(s); scene %s: ok, %zu triangles\n", command.config.c_str(), config->sonars.size(),
-              config->scene.name().c_str(), (*scene)->triangle_count());
+  std::printf("%s: ok, %zu sonar%s; scene %s: ok, %zu triangles\n", command.config.c_str(), config->sonars.size(),
+              config->sonars.size() == 1 ? "" : "s", config->scene.name().c_str(), (*scene)->triangle_count());
   for (const VehicleConfig& v : config->vehicles)
     if (v.plan) std::printf("vehicle %s follows %s\n", v.name.c_str(), v.plan.about.c_str());
   for (const ObjectConfig& o : config->objects)

@@ -73,7 +73,7 @@ int follow(const Options& options) {
   std::fprintf(stderr, "gazebo_bridge: %s to %s\n", topic.c_str(), text_from(*to).c_str());
   ignition::transport::waitForShutdown();
   node.Unsubscribe(topic);
-  std::fprintf(stderr, "gazebo_bridge: %zu poses sent\n", following.sent);
+  std::fprintf(stderr, "gazebo_bridge: %zu pose%s sent\n", following.sent, following.sent == 1 ? "" : "s");
   return 0;
 }
 

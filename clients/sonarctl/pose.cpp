@@ -147,8 +147,8 @@ Result<void> send_poses(const PoseOptions& options) {
     if (Result<void> done = (*send)(sample_of(options, moment_at(options, time_s), ++sent)); !done) return done;
     if (time_s >= duration_s(options)) break;
   }
-  std::printf("%llu poses sent to %s %s as %s\n", static_cast<unsigned long long>(sent), stream ? "tcp" : "udp",
-              text_from(*to).c_str(), std::string(control::name_of(options.frame)).c_str());
+  std::printf("%llu pose%s sent to %s %s as %s\n", static_cast<unsigned long long>(sent), sent == 1 ? "" : "s",
+              stream ? "tcp" : "udp", text_from(*to).c_str(), std::string(control::name_of(options.frame)).c_str());
   return {};
 }
 

@@ -92,7 +92,7 @@ Result<void> run_replay(const ReplayCommand& command) {
   io.run();
   const ReplayServer::Figures& done = server.figures();
   log.announce("served " + std::to_string(done.messages) + " messages, " + std::to_string(done.bytes) + " bytes, to " +
-               std::to_string(done.clients) + " client(s)\n");
+               std::to_string(done.clients) + (done.clients == 1 ? " client\n" : " clients\n"));
   return server.outcome();
 }
 

@@ -94,7 +94,7 @@ TEST(StatusText, TellsEvents) {
   EXPECT_EQ(text_from(control::Event{control::PoseEvent{"rov", true, "no pose for 1 s"}, 0}), "pose rov stale: no pose for 1 s");
   EXPECT_EQ(text_from(control::Event{control::SceneEvent{"demo", "loaded"}, 0}), "scene demo: loaded");
   EXPECT_THAT(text_from(control::Event{control::PingEvent{"front", 5, 0, {}, 10, 512, 437, 1, 20.04}, 0}),
-              "ping 5  front  10 m  512 beams x 437 rows  20.0 ms  1 clients");
+              "ping 5  front  10 m  512 beams x 437 rows  20.0 ms  1 client");
 }
 
 TEST(LoadScene, NamesFilesOfThisComputerInFull) {

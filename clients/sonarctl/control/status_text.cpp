@@ -64,8 +64,8 @@ std::string trajectory_text(const std::optional<control::TrajectoryStatus>& t) {
 }
 
 std::string event_text(const control::PingEvent& e) {
-  return format("ping %u  %s  %g m  %u beams x %u rows  %.1f ms  %u clients", e.number, e.sonar.c_str(), e.range_m, e.beams,
-                e.rows, e.simulation_ms, e.clients);
+  return format("ping %u  %s  %g m  %u beams x %u rows  %.1f ms  %u client%s", e.number, e.sonar.c_str(), e.range_m, e.beams,
+                e.rows, e.simulation_ms, e.clients, e.clients == 1 ? "" : "s");
 }
 std::string event_text(const control::ClientEvent& e) {
   return "client " + e.client + (e.connected ? " connected to " : " left ") + e.sonar + (e.why.empty() ? "" : ": " + e.why);
