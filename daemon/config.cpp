@@ -188,6 +188,10 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   if (root.has("scene") && !root.has("world"))
     return failure(ErrorKind::config,
                    name + ": this is a render file, not a configuration: sonard render " + name + " --out DIR (docs/render.md)");
+  if (root.has("objects") && !root.has("world") && !root.has("vehicles") && !root.has("sonars"))
+    return failure(ErrorKind::config, name +
+                                          ": this looks like a scene, not a configuration, which names its scene: world: "
+                                          "{scene: FILE} (docs/configuration.md)");
   read_world(root.required("world").map(), config, directory);
   TrajectoryFiles files(directory);
   read_vehicles(root.required("vehicles"), files, config);

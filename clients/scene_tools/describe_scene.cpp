@@ -43,6 +43,12 @@ Outline outline_of(const text::Document& document) {
   return outline;
 }
 
+/// Both are YAML, and lie in the same folder.
+bool is_configuration(const fs::path& file) {
+  const auto document = text::parse_yaml_file(file);
+  return document && document->root().has("world") && document->root().has("sonars");
+}
+
 struct Loaded {
   std::shared_ptr<const Scene> scene;
   Outline outline;
@@ -52,6 +58,9 @@ Result<Loaded> load(const fs::path& file) {
   const std::string name = file.string();
   const bool built_in = !fs::exists(file, error) && is_built_in_scene(name);
   auto scene = built_in ? load_built_in_scene(name) : load_scene(file);
+  if (!scene && is_configuration(file))
+    return failure(ErrorKind::bad_data,
+                   name + ": this is a configuration of sonard, not a scene: sonard check " + name + " looks at both of them");
   if (!scene) return tl::make_unexpected(scene.error());
   std::string_view contents;
   for (const BuiltInFile& f : built_in_files())

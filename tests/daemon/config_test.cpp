@@ -387,5 +387,14 @@ TEST(Config, PointsRenderFilesToTheirCommand) {
   EXPECT_THAT(config.error().text, ::testing::HasSubstr("sonard render r.yaml"));
 }
 
+TEST(Config, KnowsAScene) {
+  const auto config = load_config(std::filesystem::path(SONARD_SOURCE_DIR) / "scenes/tank-rod.yaml");
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().kind, ErrorKind::config);
+  EXPECT_THAT(config.error().text, HasSubstr("tank-rod.yaml: this looks like a scene, not a configuration"));
+  EXPECT_THAT(config.error().text, HasSubstr("world: {scene: FILE}"));
+  EXPECT_THAT(why(vehicles + sonar + "objects: []\n"), HasSubstr("world: required key"));  // a configuration that lacks one
+}
+
 }  // namespace
 }  // namespace sonar

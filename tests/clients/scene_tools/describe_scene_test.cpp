@@ -103,6 +103,14 @@ TEST_F(DescribeScene, ErrorsAreTheLoadersOwn) {
   EXPECT_EQ(describe_scene(files.path("none.yaml")).error().kind, ErrorKind::missing_file);
 }
 
+TEST_F(DescribeScene, KnowsAConfiguration) {
+  const auto config = files.write("sonard.yaml", "world: {scene: s.yaml}\nvehicles: [{name: rov}]\nsonars: []\n");
+  const auto scene = describe_scene(config);
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().kind, ErrorKind::bad_data);
+  EXPECT_THAT(scene.error().text, HasSubstr("this is a configuration of sonard, not a scene: sonard check "));
+}
+
 TEST(DescribeShippedScenes, NothingIsWrongWithThem) {
   for (const char* name : {"demo", "local-search", "tank-rod", "tank-two-cylinders"}) {
     const auto scene = describe_scene(std::filesystem::path(SONARD_SOURCE_DIR "/scenes") / (std::string(name) + ".yaml"));
