@@ -358,43 +358,5 @@ TEST(ConfigControl, ReadsItsKeysAndRefusesStrangersWithoutAToken) {
   EXPECT_THAT(refusal("{http: '127.0.0.1'}"), HasSubstr("is not an address"));
 }
 
-TEST(Config, NamesTheNearestSceneToOneThatIsNot) {
-  std::ofstream(directory() + "/harbour.yaml") << "objects: []\n";
-  std::ofstream(directory() + "/harbours.yaml") << "world: {scene: harbour.yaml}\nobjects: []\nsonars: []\n";  // no scene
-  const auto refusal = [&](const std::string& scene) { return why("world: {scene: " + scene + "}\n" + vehicles + sonar); };
-  EXPECT_THAT(refusal("harbuors.yaml"), HasSubstr("no such file: \"harbuors.yaml\"; did you mean \"harbour.yaml\"? Looked in "));
-  EXPECT_THAT(refusal("demoo.yaml"), HasSubstr("did you mean \"demo.yaml\"?"));  // part of the program
-  EXPECT_THAT(refusal("local-search"), HasSubstr("did you mean \"local-search.yaml\"?"));
-  EXPECT_THAT(refusal("scenes/demo.yml"), HasSubstr("did you mean \"demo.yaml\"?"));
-}
-
-TEST(Config, NamesAMistypedKeyThatSeveralSonarsShare) {
-  const auto two_with = [&](const std::string& key) {
-    const std::string rest = "profile: oculus-m1200d, " + key + ": 127.0.0.";
-    return why(world + vehicles + "sonars:\n  - {name: a, " + rest + "2}\n  - {name: b, " + rest + "3}\n");
-  };
-  EXPECT_THAT(two_with("bind_ipp"), HasSubstr("did you mean \"bind_ip\"?"));
-  EXPECT_THAT(why(world + vehicles + "sonars:\n  - {nmae: a, profile: oculus-m1200d, bind_ip: 127.0.0.2}\n" +
-                  "  - {nmae: b, profile: oculus-m1200d, bind_ip: 127.0.0.3}\n"),
-              HasSubstr("did you mean \"name\"?"));
-  EXPECT_THAT(why(world + "vehicles: [{nmae: a}, {nmae: b}]\n" + sonar), HasSubstr("did you mean \"name\"?"));
-}
-
-TEST(Config, PointsRenderFilesToTheirCommand) {
-  const auto config = parse_config("scene: demo.yaml\nsonar: {}\n", "r.yaml", {});
-  ASSERT_FALSE(config);
-  EXPECT_EQ(config.error().kind, ErrorKind::config);
-  EXPECT_THAT(config.error().text, ::testing::HasSubstr("sonard render r.yaml"));
-}
-
-TEST(Config, KnowsAScene) {
-  const auto config = load_config(std::filesystem::path(SONARD_SOURCE_DIR) / "scenes/tank-rod.yaml");
-  ASSERT_FALSE(config);
-  EXPECT_EQ(config.error().kind, ErrorKind::config);
-  EXPECT_THAT(config.error().text, HasSubstr("tank-rod.yaml: this looks like a scene, not a configuration"));
-  EXPECT_THAT(config.error().text, HasSubstr("world: {scene: FILE}"));
-  EXPECT_THAT(why(vehicles + sonar + "objects: []\n"), HasSubstr("world: required key"));  // a configuration that lacks one
-}
-
 }  // namespace
 }  // namespace sonar
