@@ -27,7 +27,7 @@ struct RenderJob {
   Water water;
   std::uint64_t seed = 1;
   EngineConfig engine;
-  Pose mount;  // sonar in vehicle
+  Pose mount;                // sonar in vehicle
   std::string vehicle_name;  // of a configuration; empty in render files
   VehiclePath path;
   /// Of the scene's moving objects, in its order, on the same clock; null or not there: it rests.
