@@ -114,7 +114,7 @@ class TheReaderOfTheLogEnds(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             config = pathlib.Path(folder) / "sonard.yaml"
             config.write_text(CONFIG.format(address=address, scene=ROOT / "scenes/tank-rod.yaml", profile="oculus-m1200d",
-                                            pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}", mount="{frame: FLU}", trajectory="", more="", control=""),
+                                            pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}", mount="{frame: FLU}", trajectory="", more="", control="", poses=""),
                               encoding="utf-8")
             daemon = subprocess.Popen([str(SONARD), "run", str(config)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                       stderr=subprocess.STDOUT)
