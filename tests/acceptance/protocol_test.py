@@ -3,12 +3,11 @@ import os
 import pathlib
 import signal
 import subprocess
-import tempfile
 import time
 import unittest
 
 from oculus_reader import Client, Ping, expected_bearings, fire_message
-from running_sonard import CONFIG, ROOT, SONARD, Sonard, free_address
+from running_sonard import SONARD, Sonard, free_address
 
 
 class Served(unittest.TestCase):
@@ -110,26 +109,23 @@ class TheReaderOfTheLogEnds(unittest.TestCase):
     """sonard 2>&1 | head: the log goes nowhere, the service goes on."""
 
     def test_clients_are_served_all_the_same(self):
-        address = free_address()
-        with tempfile.TemporaryDirectory() as folder:
-            config = pathlib.Path(folder) / "sonard.yaml"
-            config.write_text(CONFIG.format(address=address, scene=ROOT / "scenes/tank-rod.yaml", profile="oculus-m1200d",
-                                            pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}", mount="{frame: FLU}", trajectory="", more="", control="", poses=""),
-                              encoding="utf-8")
-            daemon = subprocess.Popen([str(SONARD), "run", str(config)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                      stderr=subprocess.STDOUT)
-            try:
-                self.assertTrue(any(b"ready in" in line for line in daemon.stdout))
-                daemon.stdout.close()
-                for _ in range(2):  # each is worth some lines of log
-                    with Client(address) as client:
-                        client.ping_made_with(fire_message(range_=4.0))
-                self.assertIsNone(daemon.poll())
-                daemon.send_signal(signal.SIGTERM)
-                self.assertEqual(daemon.wait(20), 0)
-            finally:
-                daemon.kill()
-                daemon.wait()
+        configured = Sonard("tank-rod.yaml", pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}")
+        configured.address = free_address()
+        self.addCleanup(configured.folder.cleanup)
+        daemon = subprocess.Popen([str(SONARD), "run", str(configured.write_config())], stdin=subprocess.DEVNULL,
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        try:
+            self.assertTrue(any(b"ready in" in line for line in daemon.stdout))
+            daemon.stdout.close()
+            for _ in range(2):  # each is worth some lines of log
+                with Client(configured.address) as client:
+                    client.ping_made_with(fire_message(range_=4.0))
+            self.assertIsNone(daemon.poll())
+            daemon.send_signal(signal.SIGTERM)
+            self.assertEqual(daemon.wait(20), 0)
+        finally:
+            daemon.kill()
+            daemon.wait()
 
 
 if __name__ == "__main__":

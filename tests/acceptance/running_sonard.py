@@ -67,16 +67,21 @@ class Sonard:
 
     def _start(self):
         self.address = free_address()
+        config = self.write_config()
+        self.log_path = pathlib.Path(self.folder.name) / "log"
+        with open(self.log_path, "wb") as log:
+            self.process = subprocess.Popen([str(SONARD), "run", str(config), *self.arguments], stdin=subprocess.DEVNULL,
+                                            stdout=log, stderr=subprocess.STDOUT)
+
+    def write_config(self):
+        """For self.address; returns where it is."""
         config = pathlib.Path(self.folder.name) / "sonard.yaml"
         config.write_text(CONFIG.format(address=self.address, scene=self.scene, profile=self.profile, pose=self.pose,
                                         mount=self.mount, trajectory=self.trajectory, more=self.more, control=self.control,
                                         http=self.http or f"{self.address}:8088",
                                         poses=self.poses.replace("ADDRESS", self.address)),
                           encoding="utf-8")
-        self.log_path = pathlib.Path(self.folder.name) / "log"
-        with open(self.log_path, "wb") as log:
-            self.process = subprocess.Popen([str(SONARD), "run", str(config), *self.arguments], stdin=subprocess.DEVNULL,
-                                            stdout=log, stderr=subprocess.STDOUT)
+        return config
 
     def _ready(self, patience_s=60):
         deadline = time.monotonic() + patience_s
