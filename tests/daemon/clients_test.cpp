@@ -231,7 +231,11 @@ TEST(Admission, WhoHangsUpWhileWaitingLosesThePlaceInTheQueue) {
   stays.fire(fire_at(PingRate::hz40, 3));
   EXPECT_FALSE(stays.next(milliseconds(200)));
   EXPECT_FALSE(stays.ended);
-  EXPECT_TRUE(eventually([&] { return daemon.figures().clients_queued == 1; }));
+  EXPECT_TRUE(eventually([&] {
+    std::uint64_t queued = 0;
+    daemon.on_io_thread([&] { queued = daemon.figures().clients_queued; });
+    return queued == 1;
+  }));
   first.reset();
   const auto ping = stays.next_ping();
   ASSERT_TRUE(ping);
