@@ -42,14 +42,20 @@ void read_world(Map map, Config& config, const std::filesystem::path& directory)
   config.water = read_water(map.optional("water"), &config.allow_hot);
 }
 
+/// The name of the next of several; `taken` has those before it.
+Node read_name(Map& map, std::size_t longest, std::set<std::string>& taken, std::string& name) {
+  const Node node = map.required("name");
+  name = node.text(longest);
+  if (!taken.insert(name).second && node.present()) node.fail("\"" + name + "\" is used twice");
+  return node;
+}
+
 void read_vehicles(const Node& node, TrajectoryFiles& files, Config& config) {
   std::set<std::string> names;
   for (const Node& item : node.items(1, 64)) {
     Map map = item.map();
     VehicleConfig vehicle;
-    const Node name = map.required("name");
-    vehicle.name = name.text(64);
-    if (!names.insert(vehicle.name).second && name.present()) name.fail("\"" + vehicle.name + "\" is used twice");
+    read_name(map, 64, names, vehicle.name);
     vehicle.initial_pose = read_world_pose(map.optional("initial_pose"));
     vehicle.plan = files.read_plan(map.optional("trajectory"), vehicle.name, &vehicle.orbits);
     config.vehicles.push_back(std::move(vehicle));
@@ -61,10 +67,8 @@ void read_objects(const Node& node, TrajectoryFiles& files, Config& config) {
   for (const Node& item : node.items(0, 256)) {
     Map map = item.map();
     ObjectConfig object;
-    const Node name = map.required("name");
-    object.name = name.text(256);
+    const Node name = read_name(map, 256, names, object.name);
     object.place = name.location() + ": " + name.path();
-    if (!names.insert(object.name).second && name.present()) name.fail("\"" + object.name + "\" is used twice");
     object.plan = files.read_plan(map.required("trajectory"), object.name);
     config.objects.push_back(std::move(object));
   }

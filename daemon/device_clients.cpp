@@ -28,10 +28,7 @@ void Device::say_visit(const std::string& what, std::vector<LogField> fields) {
 }
 
 /// A mistake of ours, not of a client: it may cost that client its connection, never the others.
-void Device::say_fault(const std::string& what) {
-  say_at_times(context_.log, faults_, LogLevel::error, "internal fault: " + what + " (please report it)",
-               {{"sonar", config_.name}});
-}
+void Device::say_fault(const std::string& what) { sonar::say_fault(context_.log, faults_, what, {"sonar", config_.name}); }
 
 void Device::on_fault(Session&, const std::string& what) { say_fault(what); }
 

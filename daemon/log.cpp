@@ -126,4 +126,8 @@ void say_at_times(Log& log, LogLimiter& limiter, LogLevel level, std::string_vie
   log.write(level, phrase, fields);
 }
 
+void say_fault(Log& log, LogLimiter& limiter, const std::string& what, const LogField& where) {
+  say_at_times(log, limiter, LogLevel::error, "internal fault: " + what + " (please report it)", {where});
+}
+
 }  // namespace sonar

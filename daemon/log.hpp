@@ -60,5 +60,7 @@ class LogLimiter {
 
 /// Says a line as often as its limiter allows; one after others that were swallowed says how many.
 void say_at_times(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields = {});
+/// A mistake of ours that somebody met; `where` it was.
+void say_fault(Log& log, LogLimiter& limiter, const std::string& what, const LogField& where);
 
 }  // namespace sonar

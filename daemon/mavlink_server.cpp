@@ -70,7 +70,7 @@ Endpoint MavlinkServer::listens_at(std::size_t link) const {
 }
 
 void MavlinkServer::say_fault(const std::exception_ptr& fault, const Link& link) {
-  say_at_times(log_, faults_, LogLevel::error, "internal fault: " + text_of(fault) + " (please report it)", {{"at", link.name}});
+  sonar::say_fault(log_, faults_, text_of(fault), {"at", link.name});
 }
 
 /// A link outlives whatever one datagram does to us.

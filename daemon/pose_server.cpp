@@ -59,7 +59,7 @@ void PoseServer::start() {
 }
 
 void PoseServer::say_fault(const std::exception_ptr& fault, const std::string& at) {
-  say_at_times(log_, faults_, LogLevel::error, "internal fault: " + text_of(fault) + " (please report it)", {{"at", at}});
+  sonar::say_fault(log_, faults_, text_of(fault), {"at", at});
 }
 
 /// A listener outlives whatever one message does to us.

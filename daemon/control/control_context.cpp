@@ -7,8 +7,7 @@ void say_refused(ControlContext& context, const std::string& why, const std::str
 }
 
 void say_fault(ControlContext& context, const std::exception_ptr& fault, const std::string& at) {
-  say_at_times(context.log, context.faults, LogLevel::error, "internal fault: " + text_of(fault) + " (please report it)",
-               {{"at", at}});
+  say_fault(context.log, context.faults, text_of(fault), {"at", at});
 }
 
 asio::awaitable<bool> write_whole(ControlContext& context, tcp::socket& socket, Deadline& stall, const Sender& to,

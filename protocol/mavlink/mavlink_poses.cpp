@@ -10,8 +10,7 @@ using control::ClockDomain;
 using control::RawPose;
 using control::Stamp;
 
-constexpr std::uint8_t no_autopilot = 8;  // MAV_AUTOPILOT_INVALID: ground stations, cameras, ourselves
-constexpr std::int64_t late_ms = 1000;    // a clock that goes back further than this has been restarted
+constexpr std::int64_t late_ms = 1000;  // a clock that goes back further than this has been restarted
 constexpr std::int64_t late_ns = late_ms * 1'000'000;
 constexpr double farthest_m = 100e3;  // from the origin; beyond, the tangent plane means nothing
 constexpr double moved_origin_m = 0.01;
@@ -80,7 +79,7 @@ bool MavlinkPoses::is_meant(const Frame& frame, Time now) {
   if (system_ && frame.system == *system_) return true;
   if (system_ && now - last_heard_ <= system_silence) return false;
   const bool shows_itself =
-      frame.id == Heartbeat::id ? message_in<Heartbeat>(frame).autopilot != no_autopilot : bears_a_pose(frame.id);
+      frame.id == Heartbeat::id ? message_in<Heartbeat>(frame).autopilot != Heartbeat::no_autopilot : bears_a_pose(frame.id);
   if (shows_itself) begin(frame.system, now);
   return shows_itself;
 }
@@ -162,7 +161,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
 }
 
 void MavlinkPoses::take(const Heartbeat& m, const Frame& frame) {
-  if (m.autopilot == no_autopilot) return;
+  if (m.autopilot == Heartbeat::no_autopilot) return;
   has_autopilot_ = true;
   autopilot_ = m.autopilot;
   autopilot_component_ = frame.component;

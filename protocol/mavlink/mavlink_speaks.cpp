@@ -12,7 +12,7 @@ constexpr std::chrono::nanoseconds listen_before_report = std::chrono::seconds(1
 constexpr std::chrono::nanoseconds request_period = std::chrono::seconds(5);
 
 // Values of minimal.xml and common.xml.
-constexpr std::uint8_t onboard_controller = 18, no_autopilot = 8, state_active = 4;
+constexpr std::uint8_t onboard_controller = 18, state_active = 4;
 constexpr std::uint16_t set_message_interval = 511;
 constexpr std::uint8_t ardupilot = 3, px4 = 12;
 
@@ -31,7 +31,7 @@ Reaction MavlinkPoses::on_tick(Time now) {
     next_heartbeat_ = (in_step ? next_heartbeat_ : now) + heartbeat_period;
     Heartbeat beat;
     beat.type = onboard_controller;
-    beat.autopilot = no_autopilot;
+    beat.autopilot = Heartbeat::no_autopilot;
     beat.system_status = state_active;
     out.replies.push_back(framed(beat, us_));
   }

@@ -19,6 +19,7 @@ struct Heartbeat {
   static constexpr std::uint32_t id = 0;
   static constexpr std::uint8_t crc_extra = 50;
   static constexpr std::string_view name = "HEARTBEAT";
+  static constexpr std::uint8_t no_autopilot = 8;  // MAV_AUTOPILOT_INVALID: ground stations, cameras, ourselves
   std::uint32_t custom_mode = 0;
   std::uint8_t type = 0, autopilot = 0, base_mode = 0, system_status = 0, mavlink_version = 3;
 };
