@@ -173,6 +173,18 @@ class Telemetry(WithFolder):
                 for name in ("ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY"):
                     self.assertIn(f"{name}: component 1 (left out: 20 messages of 197)", self.warned[0])
 
+    def test_one_component_can_be_asked_for(self):
+        both = b"".join(record for _, record in
+                        sorted(self.told_by(1, 0, 20, 0) + self.told_by(197, 0, 20, 50), key=lambda record: record[0]))
+        for source in ("ODOMETRY", "ATTITUDE+LOCAL_POSITION_NED"):
+            for component, away_m in ((1, 0), (197, 50)):
+                track = self.convert(both, source=source, component=component)
+                self.assertEqual((len(track.rows), self.warned), (20, []))
+                for step, row in enumerate(track.rows):
+                    self.assertAlmostEqual(row.position_m[2], made.moment(step)[3] + away_m, places=4)
+        with self.assertRaisesRegex(ConvertError, "component 7 tells no pose; such messages come from 1, 197"):
+            self.convert(both, component=7)
+
     def test_after_silence_another_component_is_listened_to(self):
         for gap_steps, taken, left_out in ((40, "1", "10 messages of 197"), (52, "1, later 197", "none")):
             with self.subTest(gap_steps):
@@ -337,6 +349,7 @@ class Command(WithFolder):
         self.assertEqual(self.said(self.folder / "none.bin", "-o", "-")[0], 66)
         self.assertEqual(self.said(log, "-o", self.folder / "no" / "folder.csv")[0], 66)
         self.assertEqual(self.said(log, "-o", "-", "--origin", "x")[0], 64)
+        self.assertEqual(self.said(log, "-o", "-", "--component", "256")[0], 64)
         self.assertEqual(self.said(log, "-o", "-", "--body", "a b")[0], 64)
         self.assertEqual(self.said(self.file(b"\x7fELF"), "-o", "-")[0], 65)
 

@@ -26,6 +26,7 @@ def _parser() -> argparse.ArgumentParser:
                         "tlog: ODOMETRY, SIM_STATE, ATTITUDE+LOCAL_POSITION_NED, ..")
     parser.add_argument("--topic", help="of a recording; transforms are called '/tf parent->child'")
     parser.add_argument("--system", type=int, help="MAVLink system of a telemetry log")
+    parser.add_argument("--component", type=int, help="of that system: take its messages only (autopilots are 1)")
     parser.add_argument("--origin", metavar="LAT,LON[,ALT]", help="degrees and m: the world's 0, 0, 0; without it the first fix")
     parser.add_argument("--frame", choices=("ENU_FLU", "NED_FRD"), help="of a recording that does not keep to ROS's ENU_FLU")
     parser.add_argument("--body", help="name for a column `body`, to put several files together")
@@ -66,11 +67,14 @@ def _run(options: argparse.Namespace) -> None:
         warned.append(text)
         _say(f"{options.file}: {text}")
 
+    if options.component is not None and not 0 <= options.component <= 255:
+        raise ValueError(f"component {options.component}: they are numbered from 0 to 255")
     origin = parse_origin(options.origin) if options.origin else None
     kind = options.format or format_of(options.file)
     assumed = Assumptions(heading_deg=options.heading, depth_m=options.depth, depth_is_vehicle=options.depth_is_vehicle,
                           bottom_m=options.bottom)
-    track = convert(options.file, kind, options.source, options.topic, origin, options.system, assumed, warn)
+    track = convert(options.file, kind, options.source, options.topic, origin, options.system, assumed, warn,
+                    options.component)
     if options.frame:
         if kind not in ("mcap", "rosbag"):
             raise ValueError(f"--frame is for recordings: {kind} is always {track.frame}")

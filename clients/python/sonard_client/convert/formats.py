@@ -38,14 +38,15 @@ def format_of(path: pathlib.Path) -> str:
 
 def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source: Optional[str] = None,
             topic: Optional[str] = None, origin: Optional[Geodetic] = None, system: Optional[int] = None,
-            assumed: Assumptions = Assumptions(), warn: Warn = lambda text: None) -> Track:
+            assumed: Assumptions = Assumptions(), warn: Warn = lambda text: None, component: Optional[int] = None) -> Track:
     """The way of one vehicle. kind: one of FORMATS, told by the file without it. source: which messages of a dataflash or
-    telemetry log; topic: which topic of a recording; system: which vehicle of a telemetry log. ConvertError, OSError."""
+    telemetry log; topic: which topic of a recording; system: which vehicle of a telemetry log, component:
+    as which of its components tells. ConvertError, OSError."""
     file = pathlib.Path(path)
     chosen = kind or format_of(file)
     readers: "dict[str, Callable[[], Track]]" = {
         "dataflash": lambda: read_dataflash(file, warn, source, origin),
-        "tlog": lambda: read_tlog(file, warn, source, origin, system),
+        "tlog": lambda: read_tlog(file, warn, source, origin, system, component),
         "mcap": lambda: read_mcap(file, warn, topic),
         "rosbag": lambda: read_rosbag(file, warn, topic),
         "nmea": lambda: read_nmea(file, warn, origin, assumed)}

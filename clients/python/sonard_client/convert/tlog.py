@@ -86,9 +86,11 @@ def _simulated_place(f: Dict[str, float]) -> Geodetic:
 
 
 class _Vehicle:
-    """What one system of the network said of itself."""
+    """What one system of the network said of itself; `component`: the only one of its components that is listened to."""
 
-    def __init__(self) -> None:
+    def __init__(self, component: Optional[int] = None) -> None:
+        self.component = component
+        self.there: "set[int]" = set()  # components that sent anything
         self.attitudes: Dict[str, Stream[Quaternion]] = {}
         self.positions: "Dict[str, Stream]" = {}
         self.origin: Optional[Geodetic] = None
@@ -142,6 +144,9 @@ class _Vehicle:
     def _is_heard(self, name: str, logged: Logged) -> bool:
         """Of several components that send the same message one is listened to: tracks of two are never woven into one."""
         component = logged.frame.component
+        self.there.add(component)
+        if self.component is not None and component != self.component:
+            return name == "GPS_GLOBAL_ORIGIN"  # is the whole system's, whoever tells it
         known = self._heard.get(name)
         if known is not None and known[0] != component and logged.arrived_s - known[1] <= SILENCE_S:
             counts = self.unheard.setdefault(name, {})
@@ -191,17 +196,22 @@ def _vehicle(vehicles: Dict[int, _Vehicle], system: Optional[int], name: str, wa
 
 
 def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None,
-              system: Optional[int] = None) -> Track:
-    """The vehicle's way: NED_FRD."""
+              system: Optional[int] = None, component: Optional[int] = None) -> Track:
+    """The vehicle's way, NED_FRD; as one component of it tells, where that is named."""
     data = path.read_bytes()
     vehicles: Dict[int, _Vehicle] = {}
     frames = 0
     for logged in records(data, warn):
         frames += 1
-        vehicles.setdefault(logged.frame.system, _Vehicle()).take(logged)
+        vehicles.setdefault(logged.frame.system, _Vehicle(component)).take(logged)
     if not frames:
         raise ConvertError(f"{path}: at byte 0: no telemetry log: it holds no MAVLink frame behind a time of eight bytes")
     vehicle = _vehicle(vehicles, system, str(path), warn)
+    if component is not None and not vehicle.weight and not vehicle.left_out:
+        there = sorted(set().union(*(v.there for n, v in vehicles.items() if system in (None, n))))
+        if component not in there:
+            raise ConvertError(f"{path}: component {component} tells no pose; such messages come from " +
+                               (", ".join(map(str, there)) or "none"))
     if vehicle.left_out:
         warn("ODOMETRY with " + ", ".join(f"frame_id {world:.0f} and child_frame_id {body:.0f} ({n} messages)"
                                           for (world, body), n in sorted(vehicle.left_out.items())) +
