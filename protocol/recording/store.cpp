@@ -137,11 +137,21 @@ std::unique_ptr<Source> source_from(std::string name, Bytes bytes) {
   return std::make_unique<MemorySource>(std::move(name), std::move(bytes));
 }
 
-Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file) {
-  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (fd < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(errno));
+namespace {
+
+Result<std::unique_ptr<Sink>> sink_to(const std::filesystem::path& file, int more_flags) {
+  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | more_flags, 0666);
+  const int error = errno;
+  if (fd < 0 && error == EEXIST) return failure(ErrorKind::io, file.string() + " is there already: give another name");
+  if (fd < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(error));
   return std::make_unique<FileSink>(file.string(), fd);
 }
+
+}  // namespace
+
+Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file) { return sink_to(file, O_TRUNC); }
+
+Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file) { return sink_to(file, O_EXCL); }
 
 std::unique_ptr<Sink> sink_into(Bytes& bytes) { return std::make_unique<MemorySink>(bytes); }
 

@@ -42,6 +42,8 @@ class Sink {
 };
 /// Makes the file, or empties the one that is there. io.
 Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file);
+/// The same of a file that is not there yet; one that is stays as it is. io.
+Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file);
 /// Appends to `bytes`, which must outlive it.
 std::unique_ptr<Sink> sink_into(Bytes& bytes);
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 namespace sonar::recording::mcap {
 namespace {
@@ -41,24 +42,67 @@ std::string pose_text(const Pose& pose) {
   return text.append(",\"z\":").append(number(q.z)).append(",\"w\":").append(number(q.w)).append("}}");
 }
 
-wire::Bytes as_floats(const oculus::DecodedPing& ping) {
+/// Rows by range, little-endian, of `width` bytes a sample.
+struct Picture {
+  std::size_t beams = 0, rows = 0, width = 1;
+  wire::Bytes samples;
+};
+
+Picture picture_of(const oculus::DecodedPing& ping) {
+  Picture picture{ping.beams(), ping.rows(), ping.bytes_per_sample(), {}};
+  for (std::size_t row = 0; row < ping.rows(); ++row) {
+    const wire::BytesView samples = ping.row_samples(row);
+    picture.samples.insert(picture.samples.end(), samples.begin(), samples.end());
+  }
+  return picture;
+}
+
+Picture picture_of(const Ping& ping) {
+  const PingSettings& s = ping.request.settings;
+  return {static_cast<std::size_t>(s.beam_count), static_cast<std::size_t>(s.range_bin_count),
+          static_cast<std::size_t>(s.format.bits / 8), ping.samples};
+}
+
+wire::Bytes as_floats(const Picture& picture) {
   wire::Bytes out;
   wire::Writer writer(out);
-  for (std::size_t row = 0; row < ping.rows(); ++row)
-    for (std::size_t beam = 0; beam < ping.beams(); ++beam) {
-      const auto sample = static_cast<float>(ping.sample(row, beam));
-      writer("sample", sample);
-    }
+  for (std::size_t at = 0; at + picture.width <= picture.samples.size(); at += picture.width) {
+    std::uint32_t value = 0;
+    for (std::size_t i = picture.width; i-- > 0;) value = value << 8 | std::to_integer<std::uint32_t>(picture.samples[at + i]);
+    const auto sample = static_cast<float>(value);
+    writer("sample", sample);
+  }
   return out;
 }
 
-wire::Bytes as_sent(const oculus::DecodedPing& ping) {
-  wire::Bytes out;
-  for (std::size_t row = 0; row < ping.rows(); ++row) {
-    const wire::BytesView samples = ping.row_samples(row);
-    out.insert(out.end(), samples.begin(), samples.end());
-  }
-  return out;
+std::string image_text(Time at, const std::string& frame, const Picture& picture) {
+  const std::size_t width = picture.width;
+  const char* const encoding = width == 1 ? "mono8" : width == 2 ? "16UC1" : "32FC1";
+  std::string text = "{\"timestamp\":";
+  text.append(timestamp(at)).append(",\"frame_id\":").append(quoted(frame)).append(",\"width\":").append(number(picture.beams));
+  text.append(",\"height\":").append(number(picture.rows)).append(",\"encoding\":\"").append(encoding).append("\",\"step\":");
+  text.append(number(picture.beams * (width <= 2 ? width : 4)));
+  return text.append(",\"data\":\"").append(base64(width <= 2 ? picture.samples : as_floats(picture))).append("\"}");
+}
+
+/// The objects that a beam met, each once.
+std::string objects_met(const PingTruth& truth) {
+  std::set<std::uint32_t> met;
+  for (const BeamTruth& beam : truth.beams)
+    if (truth.names != nullptr && beam.object < truth.names->objects.size()) met.insert(beam.object);
+  std::string text;
+  for (const std::uint32_t object : met)
+    text.append(text.empty() ? "" : ",").append("{\"index\":").append(number(object)).append(",\"name\":") +=
+        quoted(truth.names->objects[object]) + "}";
+  return text;
+}
+
+std::string bodies_there(const PingTruth& truth) {
+  std::string text;
+  for (std::size_t i = 0; truth.names != nullptr && i < truth.names->bodies.size() && i < truth.bodies_in_world.size(); ++i)
+    text.append(text.empty() ? "" : ",").append("{\"name\":").append(quoted(truth.names->bodies[i])).append(",\"pose\":") +=
+        pose_text(truth.bodies_in_world[i]) + "}";
+  return text;
 }
 
 }  // namespace
@@ -77,15 +121,10 @@ std::string base64(wire::BytesView bytes) {
 }
 
 std::string image_json(Time at, const std::string& frame, const oculus::DecodedPing& ping) {
-  const std::size_t width = ping.bytes_per_sample();
-  const char* const encoding = width == 1 ? "mono8" : width == 2 ? "16UC1" : "32FC1";
-  const wire::Bytes samples = width <= 2 ? as_sent(ping) : as_floats(ping);
-  std::string text = "{\"timestamp\":";
-  text.append(timestamp(at)).append(",\"frame_id\":").append(quoted(frame)).append(",\"width\":").append(number(ping.beams()));
-  text.append(",\"height\":").append(number(ping.rows())).append(",\"encoding\":\"").append(encoding).append("\",\"step\":");
-  text.append(number(ping.beams() * (width <= 2 ? width : 4)));
-  return text.append(",\"data\":\"").append(base64(samples)).append("\"}");
+  return image_text(at, frame, picture_of(ping));
 }
+
+std::string image_json(Time at, const std::string& frame, const Ping& ping) { return image_text(at, frame, picture_of(ping)); }
 
 std::string pose_json(Time at, const std::string& frame, const Pose& pose) {
   std::string text = "{\"timestamp\":";
@@ -103,6 +142,7 @@ std::string truth_json(const PingTruth& truth) {
   std::string text = "{\"timestamp\":";
   text.append(timestamp(truth.fired_at)).append(",\"ping\":").append(number(truth.ping)).append(",\"sonar_in_world\":");
   text.append(pose_text(truth.sonar_in_world)).append(",\"range_m\":[").append(ranges).append("],\"object\":[").append(objects);
+  text.append("],\"objects\":[").append(objects_met(truth)).append("],\"bodies\":[").append(bodies_there(truth));
   return text.append("]}");
 }
 
@@ -131,12 +171,16 @@ JsonSchema pose_schema() {
 JsonSchema truth_schema() {
   return {
       "sonard.PingTruth",
-      R"({"title":"sonard.PingTruth","description":"Where the sonar was, and per beam (port first) range and index of the first object; -1 = none",)"
+      R"({"title":"sonard.PingTruth","description":"Where the sonar and what moves were, and per beam (port first) range and index of the first object; -1 = none",)"
       R"("type":"object","properties":{)"
       R"("timestamp":{"type":"object","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},"ping":{"type":"integer"},"sonar_in_world":)"
       R"({"type":"object","properties":{"position":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},)"
       R"("orientation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}},)"
-      R"("range_m":{"type":"array","items":{"type":"number"}},"object":{"type":"array","items":{"type":"integer"}}}})"};
+      R"("range_m":{"type":"array","items":{"type":"number"}},"object":{"type":"array","items":{"type":"integer"}},"objects":{"type":"array","items":{"type":"object","properties":)"
+      R"({"index":{"type":"integer"},"name":{"type":"string"}}}},"bodies":{"type":"array","items":{"type":"object","properties":)"
+      R"({"name":{"type":"string"},"pose":{"type":"object","properties":{"position":{"type":"object","properties":)"
+      R"({"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},"orientation":{"type":"object","properties":)"
+      R"({"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}}}}}}})"};
 }
 
 }  // namespace sonar::recording::mcap

@@ -4,6 +4,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
@@ -23,12 +24,23 @@ JsonSchema truth_schema();  // sonard.PingTruth
 std::string image_json(Time at, const std::string& frame, const oculus::DecodedPing& ping);
 std::string pose_json(Time at, const std::string& frame, const Pose& pose);
 
-/// What a ping should show: pose when it was fired, and per beam the first thing in its way.
+/// The same of a ping of any vendor, from the samples that went into its message.
+std::string image_json(Time at, const std::string& frame, const Ping& ping);
+
+struct SceneNames {
+  std::vector<std::string> objects;  // by BeamTruth::object
+  std::vector<std::string> bodies;   // that move, by PingRequest::bodies_in_world
+};
+
+/// What a ping should show: where the sonar and everything that moves were when it was fired, and per beam the first thing in its
+/// way.
 struct PingTruth {
   std::uint32_t ping = 0;
   Time fired_at{};
   Pose sonar_in_world;
-  std::span<const BeamTruth> beams;  // beam 0 most to port
+  std::span<const BeamTruth> beams = {};       // beam 0 most to port
+  std::span<const Pose> bodies_in_world = {};  // named by `names`, as objects are
+  const SceneNames* names = nullptr;           // null: nothing is named, and no bodies are told
 };
 std::string truth_json(const PingTruth& truth);
 

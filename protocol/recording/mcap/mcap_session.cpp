@@ -6,7 +6,7 @@
 namespace sonar::recording {
 namespace {
 
-constexpr const char* vendor_encoding = "oculus";  // of opaque messages; what tells them from others
+constexpr const char* replayed_encoding = "oculus";  // of opaque messages: the vendor whose recordings are read
 constexpr std::size_t most_names = 16;
 
 class McapPieceReader final : public PieceReader {
@@ -17,7 +17,7 @@ class McapPieceReader final : public PieceReader {
   std::optional<Piece> next() override {
     while (auto message = reader_.next()) {
       const mcap::Channel& channel = reader_.channels().at(message->channel);
-      if (channel.message_encoding != vendor_encoding) continue;
+      if (channel.message_encoding != replayed_encoding) continue;
       const auto told = [&channel](const char* key) {
         const auto found = channel.metadata.find(key);
         return found == channel.metadata.end() ? std::string() : found->second;
@@ -51,7 +51,8 @@ class McapPieceReader final : public PieceReader {
 
 }  // namespace
 
-McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar) : writer_(std::move(sink)), sonar_(std::move(sonar)) {
+McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::string vendor)
+    : writer_(std::move(sink)), sonar_(std::move(sonar)), vendor_(std::move(vendor)) {
   device_ = vendor_channel("device", "device", "tcp");
   client_ = vendor_channel("client", "client", "tcp");
   status_ = vendor_channel("status", "device", "udp");
@@ -63,8 +64,8 @@ McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar) : writer
 std::uint16_t McapSession::vendor_channel(const char* topic, const char* from, const char* carrier) {
   mcap::Channel channel;
   channel.topic = std::string("/") + sonar_ + "/" + topic;
-  channel.message_encoding = vendor_encoding;
-  channel.metadata = {{"vendor", "oculus"}, {"sonar", sonar_}, {"from", from}, {"carrier", carrier}};
+  channel.message_encoding = vendor_;
+  channel.metadata = {{"vendor", vendor_}, {"sonar", sonar_}, {"from", from}, {"carrier", carrier}};
   return writer_.add_channel(std::move(channel));
 }
 
@@ -79,7 +80,7 @@ std::uint16_t McapSession::json_channel(const char* topic, const mcap::JsonSchem
 Result<void> McapSession::write(const Piece& piece) {
   const std::uint16_t channel = piece.from == Origin::client ? client_ : piece.by == Carrier::datagram ? status_ : device_;
   if (Result<void> written = writer_.write(channel, piece.at, piece.bytes); !written) return written;
-  if (channel != device_ || piece.bytes.size() < oculus::header_size) return {};
+  if (vendor_ != replayed_encoding || channel != device_ || piece.bytes.size() < oculus::header_size) return {};
   if (oculus::header_of(piece.bytes).type != oculus::MessageType::ping_result) return {};
   const auto ping = oculus::decode_ping(piece.bytes);
   return ping && ping->has_image ? write_json(image_, piece.at, mcap::image_json(piece.at, sonar_, *ping)) : Result<void>{};
@@ -87,6 +88,10 @@ Result<void> McapSession::write(const Piece& piece) {
 
 Result<void> McapSession::write_pose(Time at, Time of, const Pose& sonar_in_world) {
   return write_json(pose_, at, mcap::pose_json(of, "world", sonar_in_world));
+}
+
+Result<void> McapSession::write_image(Time at, const Ping& ping) {
+  return write_json(image_, at, mcap::image_json(at, sonar_, ping));
 }
 
 Result<void> McapSession::write_truth(Time at, const mcap::PingTruth& truth) {

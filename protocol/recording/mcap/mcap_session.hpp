@@ -14,11 +14,14 @@ namespace sonar::recording {
 /// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose, /NAME/truth in JSON.
 class McapSession final : public PieceWriter {
  public:
-  McapSession(std::unique_ptr<Sink> sink, std::string sonar);
+  /// `vendor`: whose messages these are; only pings of "oculus" become pictures by themselves.
+  McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::string vendor = "oculus");
 
   Result<void> write(const Piece& piece) override;
   /// Where the sonar was, and when. `at` as in Piece: never before what was written last.
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
+  /// Of a ping whose message is no Oculus message.
+  Result<void> write_image(Time at, const Ping& ping);
   Result<void> write_truth(Time at, const mcap::PingTruth& truth);
   Result<void> close() override { return writer_.close(); }
 
@@ -28,7 +31,7 @@ class McapSession final : public PieceWriter {
   Result<void> write_json(std::uint16_t channel, Time at, const std::string& text);
 
   mcap::Writer writer_;
-  std::string sonar_;
+  std::string sonar_, vendor_;
   std::uint16_t device_, client_, status_, image_, pose_, truth_;
 };
 

@@ -21,7 +21,9 @@ Bytes session(const std::vector<Piece>& pieces, bool closed = true) {
   for (const Piece& piece : pieces) EXPECT_TRUE(writer.write(piece));
   EXPECT_TRUE(writer.write_pose(after_ms(9000), after_ms(9000), {{1.5, -2, -3.25}, {1, 0, 0, 0}}));
   const std::vector<BeamTruth> beams{{12.5f, 3}, {}, {0.25f, 0}};
-  EXPECT_TRUE(writer.write_truth(after_ms(9000), {7, after_ms(8999), {}, beams}));
+  const mcap::SceneNames names{{"floor", "a", "b", "wreck \"Ann\""}, {"boat", "gone"}};
+  const std::vector<Pose> bodies{{{4, 2, -1}, {0, 0, 0, 1}}};
+  EXPECT_TRUE(writer.write_truth(after_ms(9000), {7, after_ms(8999), {}, beams, bodies, &names}));
   if (closed) {
     EXPECT_TRUE(writer.close());
   }
@@ -64,7 +66,9 @@ TEST(Mcap, ChannelsForViewers) {
       R"("orientation":{"x":0,"y":0,"z":0,"w":1}}})");
   EXPECT_EQ(text_of(found["/front/truth"][0].data),
             R"({"timestamp":{"sec":1700000009,"nsec":122456789},"ping":7,"sonar_in_world":{"position":{"x":0,"y":0,"z":0},)"
-            R"("orientation":{"x":0,"y":0,"z":0,"w":1}},"range_m":[12.5,0,0.25],"object":[3,-1,0]})");
+            R"("orientation":{"x":0,"y":0,"z":0,"w":1}},"range_m":[12.5,0,0.25],"object":[3,-1,0],)"
+            R"("objects":[{"index":0,"name":"floor"},{"index":3,"name":"wreck \"Ann\""}],)"
+            R"("bodies":[{"name":"boat","pose":{"position":{"x":4,"y":2,"z":-1},"orientation":{"x":0,"y":0,"z":1,"w":0}}}]})");
 }
 
 TEST(Mcap, ImagesOfWiderSamples) {
@@ -72,6 +76,32 @@ TEST(Mcap, ImagesOfWiderSamples) {
   ASSERT_TRUE(wide && widest);
   EXPECT_THAT(mcap::image_json({}, "front", *wide), HasSubstr(R"("encoding":"16UC1","step":4,"data":"AQgPFg==")"));
   EXPECT_THAT(mcap::image_json({}, "front", *widest), HasSubstr(R"("encoding":"32FC1","step":4,)"));
+}
+
+TEST(Mcap, PingsOfOtherVendorsAreKeptAndSeenButNotReplayed) {
+  Bytes file;
+  McapSession writer(sink_into(file), "head", "blueview");
+  Ping ping;
+  ping.request.settings.beam_count = 2;
+  ping.request.settings.range_bin_count = 1;
+  ping.request.settings.format.bits = 16;
+  ping.samples = bytes_of("abcd");
+  EXPECT_TRUE(writer.write({after_ms(0), Origin::device, Carrier::stream, ping_message(1, 2, 1, 8)}));
+  EXPECT_TRUE(writer.write_image(after_ms(0), ping));
+  EXPECT_TRUE(writer.close());
+  auto reader = mcap::Reader::open(source_from("a file", file));
+  ASSERT_TRUE(reader);
+  std::vector<std::string> topics;
+  while (const auto message = reader->next()) {
+    const mcap::Channel& channel = reader->channels().at(message->channel);
+    topics.push_back(channel.topic + " " + channel.message_encoding);
+    if (channel.topic != "/head/image") continue;
+    EXPECT_THAT(text_of(message->data), HasSubstr(R"("width":2,"height":1,"encoding":"16UC1","step":4,"data":"YWJjZA==")"));
+  }
+  EXPECT_THAT(topics, ElementsAre("/head/device blueview", "/head/image json"));
+  auto pieces = read_mcap(source_from("a file", file));
+  ASSERT_TRUE(pieces);
+  EXPECT_FALSE((*pieces)->next());
 }
 
 TEST(Mcap, WithoutItsEndEverythingButTheLastChunkIsThere) {
