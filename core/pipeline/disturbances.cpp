@@ -106,22 +106,25 @@ std::vector<PulseHeard> hear_other_sonars(const RayScene& scene, const PingPlan&
   return heard;
 }
 
+Tone tone_of(const PulseHeard& pulse, int from, int to) {
+  const double soft = edge_widths / pulse.edge_per_sample;
+  Tone tone;
+  tone.first_sample = std::max(from, static_cast<int>(std::ceil(std::max(pulse.from_sample - soft, 0.0))));
+  const int end = static_cast<int>(std::min(std::floor(pulse.to_sample + soft) + 1, static_cast<double>(to)));
+  for (int n = tone.first_sample; n < end; ++n) {
+    const double level =
+        rise((n - pulse.from_sample) * pulse.edge_per_sample) * rise((pulse.to_sample - n) * pulse.edge_per_sample);
+    const double turns = pulse.phase_turns + (n - pulse.from_sample) * pulse.turns_per_sample;
+    tone.values.push_back(std::polar(pulse.amplitude_upa * level, 2 * pi * turns));
+  }
+  return tone;
+}
+
 void add_pulses(std::span<const PulseHeard> pulses, const PingPlan& plan, BeamSignals& beams) {
   const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
-  std::vector<std::complex<double>> tone;
   for (const PulseHeard& pulse : pulses) {
-    const double soft = edge_widths / pulse.edge_per_sample;
-    const int from = std::max(beams.first_sample, static_cast<int>(std::ceil(std::max(pulse.from_sample - soft, 0.0))));
-    const int to = static_cast<int>(
-        std::min(std::floor(pulse.to_sample + soft) + 1, static_cast<double>(beams.first_sample + beams.samples)));
-    if (from >= to) continue;
-    tone.clear();
-    for (int n = from; n < to; ++n) {
-      const double level =
-          rise((n - pulse.from_sample) * pulse.edge_per_sample) * rise((pulse.to_sample - n) * pulse.edge_per_sample);
-      const double turns = pulse.phase_turns + (n - pulse.from_sample) * pulse.turns_per_sample;
-      tone.push_back(std::polar(pulse.amplitude_upa * level, 2 * pi * turns));
-    }
+    const auto [from, tone] = tone_of(pulse, beams.first_sample, beams.first_sample + beams.samples);
+    if (tone.empty()) continue;
     for (int j = 0; j < beams.beams; ++j) {
       const double weight = pattern(pulse.sine - plan.beam_sine[static_cast<std::size_t>(j)]);
       float* out = beams.beam(j) + 2 * (from - beams.first_sample);
@@ -151,6 +154,11 @@ Crosstalk::Crosstalk(const PingPlan& plan, const Switches& switches) {
   own_in_power_ = 2 * sum / squares;
 }
 
+Crosstalk::Mix Crosstalk::mix(bool expected_power) const {
+  return {static_cast<float>(expected_power ? 1 + amplitude_ * own_in_power_ : 1.0),
+          static_cast<float>((expected_power ? amplitude_ * amplitude_ : amplitude_) * share_)};
+}
+
 void Crosstalk::add(const PingPlan& plan, BeamSignals& beams) const {
   const auto floats = static_cast<std::size_t>(2 * beams.samples);
   std::vector<float> sum(floats, 0.0f);
@@ -158,8 +166,7 @@ void Crosstalk::add(const PingPlan& plan, BeamSignals& beams) const {
     const float* from = beams.beam(j);
     for (std::size_t i = 0; i < floats; ++i) sum[i] += from[i];
   }
-  const auto leaked = static_cast<float>((plan.expected_power ? amplitude_ * amplitude_ : amplitude_) * share_);
-  const auto own = static_cast<float>(plan.expected_power ? 1 + amplitude_ * own_in_power_ : 1.0);
+  const auto [own, leaked] = mix(plan.expected_power);
   for (int j = 0; j < beams.beams; ++j) {
     float* to = beams.beam(j);
     for (std::size_t i = 0; i < floats; ++i) to[i] = own * to[i] + leaked * sum[i];

@@ -29,13 +29,14 @@ class Leak {
   Leak() = default;
   Leak(const PingPlan& plan, const Switches& switches);
   bool is_heard() const { return !rms_upa_.empty(); }
+  const std::vector<float>& rms_upa() const { return rms_upa_; }  // of a column, per sample
   /// Adds it to columns [first, last). `noise` must be prepared with the request's seed and the plan's filter; unused in expected
   /// power.
   void add(const PingPlan& plan, const NoiseTable& noise, std::uint32_t sonar, std::uint32_t ping, int first, int last,
            ColumnSignals& signals) const;
 
  private:
-  std::vector<float> rms_upa_;  // of a column, per sample
+  std::vector<float> rms_upa_;
 };
 
 /// A pulse of another sonar while we listen: a tone through our receiver, somewhere on the sample grid.
@@ -51,6 +52,12 @@ struct PulseHeard {
 /// sound travels one way; a surface in between hides it.
 std::vector<PulseHeard> hear_other_sonars(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars,
                                           const PingRequest& request);
+/// What a pulse is on the samples [from, to) in a beam that looks at it, as far as it reaches.
+struct Tone {
+  int first_sample = 0;
+  std::vector<std::complex<double>> values;
+};
+Tone tone_of(const PulseHeard& pulse, int from, int to);
 /// On top of the beams, through the receive pattern with all its side lobes. In expected power, its power.
 void add_pulses(std::span<const PulseHeard> pulses, const PingPlan& plan, BeamSignals& beams);
 
@@ -61,6 +68,11 @@ class Crosstalk {
   Crosstalk(const PingPlan& plan, const Switches& switches);
   bool is_heard() const { return amplitude_ > 0; }
   void add(const PingPlan& plan, BeamSignals& beams) const;
+  /// A beam becomes `own` times itself plus `leaked` times the sum of all beams.
+  struct Mix {
+    float own = 1, leaked = 0;
+  };
+  Mix mix(bool expected_power) const;
 
  private:
   double amplitude_ = 0;

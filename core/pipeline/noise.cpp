@@ -4,12 +4,13 @@
 #include <cmath>
 
 #include "core/base/random.hpp"
+#include "core/pipeline/arithmetic/noise_place.hpp"
 
 namespace sonar {
 namespace {
 
-constexpr std::uint32_t table_samples = 1u << 18;
-constexpr std::uint32_t table_key = 0x6e6f6973u, place_key = 0x706c6163u;  // keep these draws apart
+constexpr std::uint32_t table_samples = noise_table_samples;
+constexpr std::uint32_t table_key = 0x6e6f6973u;  // keeps these draws apart
 
 }  // namespace
 
@@ -41,17 +42,15 @@ void NoiseTable::prepare(Seed seed, const std::vector<float>& filter) {
 
 void NoiseTable::add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const {
   const auto bits = static_cast<std::uint64_t>(seed_);
-  const Random4 place = philox(static_cast<std::uint32_t>(column_index), ping, sonar, place_key, static_cast<std::uint32_t>(bits),
-                               static_cast<std::uint32_t>(bits >> 32));
-  // A random start and one of four quarter turns: the table's own pattern never stands still.
-  std::size_t at = place.v[0] % table_samples;
-  const float sign = place.v[1] & 1u ? -rms : rms;
-  const bool quarter = (place.v[1] & 2u) != 0;
+  const NoisePlace place = noise_place(static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32), sonar, ping,
+                                       static_cast<std::uint32_t>(column_index));
+  std::size_t at = place.first;
+  const float sign = place.negative ? -rms : rms;
   for (int done = 0; done < samples;) {
     const int run = static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(samples - done), table_samples - at));
     const float* __restrict from = shaped_.data() + 2 * at;
     float* __restrict to = column + 2 * static_cast<std::ptrdiff_t>(done);
-    if (quarter)
+    if (place.quarter)
       for (int i = 0; i < run; ++i) {
         to[2 * i] -= sign * from[2 * i + 1];
         to[2 * i + 1] += sign * from[2 * i];

@@ -8,13 +8,6 @@
 namespace sonar {
 namespace {
 
-/// Half the -3 dB width of the two-way elevation pattern.
-float half_width_rad(const PingPlan& plan) {
-  const BeamPattern& pattern = plan.mode.pattern;
-  if (pattern.elevation_taper == Taper::unit) return pattern.elevation_width_rad / 2;
-  return static_cast<float>(elevation_reach_rad(pattern, std::sqrt(0.5)));
-}
-
 void note(float range_m, std::uint32_t object, BeamTruth& nearest) {
   if (nearest.object != BeamTruth::nothing && nearest.range_m <= range_m) return;
   nearest = {range_m, object};
@@ -22,8 +15,14 @@ void note(float range_m, std::uint32_t object, BeamTruth& nearest) {
 
 }  // namespace
 
+float truth_half_width_rad(const PingPlan& plan) {
+  const BeamPattern& pattern = plan.mode.pattern;
+  if (pattern.elevation_taper == Taper::unit) return pattern.elevation_width_rad / 2;
+  return static_cast<float>(elevation_reach_rad(pattern, std::sqrt(0.5)));
+}
+
 void note_first_hits(const FanScratch& fan, const PingPlan& plan, int first, int last, std::span<BeamTruth> by_column) {
-  const float widest = half_width_rad(plan);
+  const float widest = truth_half_width_rad(plan);
   const auto elevations = static_cast<std::int32_t>(plan.fan.elevation_rad.size());
   for (int k = first; k < last; ++k) {
     BeamTruth& nearest = by_column[static_cast<std::size_t>(k)];
@@ -35,7 +34,7 @@ void note_first_hits(const FanScratch& fan, const PingPlan& plan, int first, int
 }
 
 void note_first_hits(std::span<const FanHit> hits, const PingPlan& plan, std::span<BeamTruth> by_column) {
-  const float widest = half_width_rad(plan);
+  const float widest = truth_half_width_rad(plan);
   for (const FanHit& hit : hits)
     if (std::abs(hit.elevation_rad) <= widest) note(hit.range_m, hit.object, by_column[static_cast<std::size_t>(hit.column)]);
 }

@@ -9,6 +9,9 @@
 
 namespace sonar {
 
+/// Half the -3 dB width of the two-way elevation pattern.
+float truth_half_width_rad(const PingPlan& plan);
+
 /// The nearest hit within the -3 dB elevation width of every column of [first, last), which the fan has just traced.
 void note_first_hits(const FanScratch& fan, const PingPlan& plan, int first, int last, std::span<BeamTruth> by_column);
 /// The same from the fixed fan's hits.

@@ -13,14 +13,14 @@ namespace {
 constexpr int most_slices = 256;
 constexpr int noise_columns = 1 << 24;  // the receiver's noise has the columns below, this is ours: draws apart
 
-/// Solid angle of a column per radian about the array: du dpsi for cones; flat beams are cos(phi) dtheta dphi, u = sin(theta).
-double column_width(const PingPlan& plan, int column) {
+}  // namespace
+
+// du dpsi for cones; flat beams are cos(phi) dtheta dphi, u = sin(theta).
+double volume_column_width(const PingPlan& plan, int column) {
   const double u = plan.columns.sine(column), across = 1 - u * u;
   if (!(across > 0)) return 0;
   return plan.switches.conical ? plan.columns.spacing : plan.columns.spacing / std::sqrt(across);
 }
-
-}  // namespace
 
 Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars) : plan_(plan), scalars_(scalars) {
   if (!plan.switches.volume || !water.has_volume()) return;
@@ -67,7 +67,7 @@ void Volume::add(const DepthMap* seen, const NoiseTable& noise, std::uint32_t so
   scratch.rms.resize(samples);
   for (int k = first; k < last; ++k) {
     if (seen) find_blocked(*seen, k, scratch.blocked);
-    const double width = column_width(plan_, k);
+    const double width = volume_column_width(plan_, k);
     double open = open_fan_;
     float* at = signals.column(k) + 2 * signals.lead;
     for (std::size_t n = 0; n < samples; ++n) {

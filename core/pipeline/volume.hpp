@@ -19,10 +19,19 @@ struct VolumeScratch {
   std::vector<float> rms, grains;  // by sample; grains are complex
 };
 
+/// Solid angle of a column per radian about the array.
+double volume_column_width(const PingPlan& plan, int column);
+
 /// One ping's volume reverberation. Silent in clear water, and when switched off.
 class Volume {
  public:
   Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars);
+
+  /// A slice of the fan: its tangent, and the integral of the two-way power pattern over it [rad].
+  struct Slice {
+    int bin;
+    double range_per_x, weight;
+  };
 
   bool is_heard() const { return !open_power_.empty(); }
   /// Adds to columns [first, last), before the transmitter's pattern is applied. `seen`: what the rays saw of these columns; null
@@ -31,12 +40,12 @@ class Volume {
   void add(const DepthMap* seen, const NoiseTable& noise, std::uint32_t sonar, std::uint32_t ping, int first, int last,
            VolumeScratch& scratch, ColumnSignals& signals) const;
 
+  // What add() works with, for who does the same elsewhere.
+  const std::vector<Slice>& slices() const { return slices_; }
+  double open_fan() const { return open_fan_; }
+  const std::vector<double>& open_power_upa2() const { return open_power_; }
+
  private:
-  /// A slice of the fan: its tangent, and the integral of the two-way power pattern over it [rad].
-  struct Slice {
-    int bin;
-    double range_per_x, weight;
-  };
   void find_blocked(const DepthMap& seen, int column, std::vector<double>& blocked) const;
 
   const PingPlan& plan_;

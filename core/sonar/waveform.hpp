@@ -23,7 +23,9 @@ struct Waveform {
   double sample_rate_hz = 0;
   /// Frequency-domain synthesis (exact up to the band limit) where the tabulated pulse would do; `measured` always uses it.
   bool exact = false;
+#if __cplusplus >= 202002L  // device code is C++17 and compares none
   bool operator==(const Waveform&) const = default;
+#endif
 };
 
 }  // namespace sonar
