@@ -1,15 +1,18 @@
-// The CUDA side of the seam in core/pipeline/ping_engine.hpp: the place where a device engine is made.
-// This version finds devices and explains why there is no engine; pings are computed by the CPU engine.
+// The CUDA side of the seam in core/pipeline/ping_engine.hpp: the place where an engine is made for a device, if there is one.
+// How it works: device_engine.hpp; what it does and what it leaves to the CPU: docs/cuda.md.
 #pragma once
 
 #include <memory>
 
 #include "core/base/result.hpp"
 #include "core/pipeline/ping_engine.hpp"
+#include "cuda/device_engine.hpp"
 
 namespace sonar {
 
-/// Always an error of kind `unavailable` in this version; the sentence says which of the reasons of cuda_status() holds.
-Result<std::unique_ptr<PingEngine>> make_cuda_engine(std::shared_ptr<const Scene> scene);
+/// Unavailable, in one sentence: no module, no driver, no device, not enough memory on it. The pool must outlive the engine.
+Result<std::unique_ptr<PingEngine>> make_cuda_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
+                                                     const EngineOptions& options = {},
+                                                     cuda::DeviceEngineOptions device_options = {});
 
 }  // namespace sonar

@@ -6,7 +6,8 @@
 
 namespace sonar {
 
-/// "not built", "no device", "no device (<the driver's reason>)" or "NVIDIA H200, 139.8 GiB, compute 9.0".
+/// "not installed" (there is no CUDA module), "no device", "no device (<the driver's reason>)", what is wrong with the module, or
+/// "NVIDIA H200, 139.8 GiB, compute 9.0". Asks every time: a device can go.
 std::string cuda_status();
 
 }  // namespace sonar

@@ -1,6 +1,8 @@
-// The seam answers on every machine: without nvcc, without a device, and with one.
+// The seam answers on every machine: without the module, with one that is none, without a device, and with one.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <cstdlib>
 
 #include "cuda/cuda_engine.hpp"
 #include "cuda/cuda_status.hpp"
@@ -12,24 +14,37 @@ using testing::AnyOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-TEST(CudaSeam, SaysWhatThisBuildAndMachineCanDo) {
-#ifdef SONAR_CUDA_BUILT
-  EXPECT_THAT(cuda_status(), AnyOf(StartsWith("no device"), HasSubstr("GiB, compute ")));
-#else
-  EXPECT_EQ(cuda_status(), "not built");
-#endif
-}
+// What is loaded stays loaded, so that each test, which ctest gives a process of its own, sees one module only.
+void look_at(const char* module) { setenv("SONARD_CUDA_MODULE", module, 1); }
 
-TEST(CudaSeam, RefusesAnEngineWithThatReason) {
-  const auto engine = make_cuda_engine(std::make_shared<const Scene>());
+void expect_no_engine() {
+  Parallel pool;
+  const auto engine = make_cuda_engine(std::make_shared<const Scene>(), pool);
   ASSERT_FALSE(engine);
   EXPECT_EQ(engine.error().kind, ErrorKind::unavailable);
   EXPECT_THAT(engine.error().text, HasSubstr("CUDA: " + cuda_status()));
 }
 
-TEST(CudaSeam, NamesTheDeviceWhereThereIsOne) {
-  if (cuda_status() == "not built" || cuda_status().starts_with("no device")) GTEST_SKIP() << "CUDA: " << cuda_status();
-  EXPECT_THAT(cuda_status(), HasSubstr(", compute "));
+TEST(CudaSeam, SaysThatThereIsNoModule) {
+  look_at("/nowhere/libsonard_cuda.so");
+  EXPECT_EQ(cuda_status(), "not installed");
+  expect_no_engine();
+}
+
+TEST(CudaSeam, SaysThatAModuleIsNone) {
+  look_at(SONARD_SOURCE_DIR "/LICENSE");
+  EXPECT_THAT(cuda_status(), StartsWith("not loadable: "));
+  expect_no_engine();
+}
+
+TEST(CudaSeam, NamesTheDeviceOrSaysThatThereIsNone) {
+#ifdef SONARD_CUDA_MODULE
+  look_at(SONARD_CUDA_MODULE);
+  EXPECT_THAT(cuda_status(), AnyOf(StartsWith("no device"), HasSubstr("GiB, compute ")));
+  if (cuda_status().starts_with("no device")) expect_no_engine();
+#else
+  GTEST_SKIP() << "this build has no CUDA module: nvcc was not found";
+#endif
 }
 
 }  // namespace

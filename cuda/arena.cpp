@@ -1,0 +1,56 @@
+#include "cuda/arena.hpp"
+
+#include <algorithm>
+
+namespace sonar::cuda {
+namespace {
+
+constexpr std::size_t alignment = 256;
+
+}  // namespace
+
+Arena::~Arena() {
+  for (const Chunk& c : chunks_) {
+    if (c.device) machine_.release(c.device);
+    if (c.host) machine_.release_host(c.host);
+  }
+}
+
+Arena::Place Arena::take_bytes(std::size_t bytes) {
+  const std::size_t wanted = (bytes + alignment - 1) / alignment * alignment;
+  auto it = std::find_if(chunks_.begin(), chunks_.end(), [&](const Chunk& c) { return c.size - c.used >= wanted; });
+  if (it == chunks_.end()) {
+    chunks_.push_back({});
+    Chunk& c = chunks_.back();  // from here on ours: what is allocated is released, even if the second half fails
+    const std::size_t size = std::max(chunk_bytes_, wanted);
+    if (where_ != Where::host) c.device = static_cast<std::byte*>(machine_.allocate(size));
+    if (where_ != Where::device) c.host = static_cast<std::byte*>(machine_.allocate_host(size));
+    c.size = size;
+    it = chunks_.end() - 1;
+  }
+  const Place at{it->device ? it->device + it->used : nullptr, it->host ? it->host + it->used : nullptr};
+  it->used += wanted;
+  return at;
+}
+
+void Arena::upload(int lane) {
+  for (const Chunk& c : chunks_)
+    if (c.used > 0) machine_.upload(lane, c.device, c.host, c.used);
+}
+
+void Arena::download(int lane) {
+  for (const Chunk& c : chunks_)
+    if (c.used > 0) machine_.download(lane, c.host, c.device, c.used);
+}
+
+void Arena::clear() {
+  for (Chunk& c : chunks_) c.used = 0;
+}
+
+std::size_t Arena::taken_bytes() const {
+  std::size_t bytes = 0;
+  for (const Chunk& c : chunks_) bytes += c.used;
+  return bytes;
+}
+
+}  // namespace sonar::cuda

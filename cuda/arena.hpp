@@ -1,0 +1,72 @@
+// Memory of one batch of pings, taken piece by piece and given back all at once: on the device, on the host, or on both alike,
+// so that many small tables travel in one copy. Pieces stay where they are until clear().
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "cuda/machine.hpp"
+
+namespace sonar::cuda {
+
+class Arena {
+ public:
+  enum class Where { device, host, both };
+  Arena(Machine& machine, Where where, std::size_t chunk_bytes) : machine_(machine), where_(where), chunk_bytes_(chunk_bytes) {}
+  ~Arena();
+  Arena(const Arena&) = delete;
+  Arena& operator=(const Arena&) = delete;
+
+  template <class T>
+  struct Piece {
+    T* device = nullptr;  // null on Where::host
+    T* host = nullptr;    // null on Where::device
+    std::size_t count = 0;
+  };
+  /// Not initialised; of nothing, null.
+  template <class T>
+  Piece<T> take(std::size_t count) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    if (count == 0) return {};
+    const Place at = take_bytes(count * sizeof(T));
+    return {static_cast<T*>(at.device), static_cast<T*>(at.host), count};
+  }
+  /// The device's copy of `values`, which upload() will send. Where::both only.
+  template <class T>
+  T* put(std::span<const T> values) {
+    const Piece<T> piece = take<T>(values.size());
+    if (!values.empty()) std::memcpy(static_cast<void*>(piece.host), values.data(), values.size_bytes());
+    return piece.device;
+  }
+  template <class T>
+  T* put(const std::vector<T>& values) {
+    return put(std::span<const T>(values));
+  }
+
+  void upload(int lane);    // all that was taken; Where::both only
+  void download(int lane);  // likewise
+  void clear();
+  std::size_t taken_bytes() const;
+
+ private:
+  struct Chunk {
+    std::byte* device = nullptr;
+    std::byte* host = nullptr;
+    std::size_t size = 0, used = 0;
+  };
+  struct Place {
+    void* device;
+    void* host;
+  };
+  Place take_bytes(std::size_t bytes);
+
+  Machine& machine_;
+  Where where_;
+  std::size_t chunk_bytes_;
+  std::vector<Chunk> chunks_;
+};
+
+}  // namespace sonar::cuda

@@ -1,0 +1,102 @@
+// Kernel bodies from columns to codes: the receive pattern, points and other sonars on top, crosstalk, envelope, gain and
+// quantisation, as couple, disturbances and receive do it (core/pipeline).
+#pragma once
+
+#include <cmath>
+
+#include "cuda/device_types.hpp"
+#include "cuda/fast_math.hpp"
+
+namespace sonar::cuda {
+
+/// Weight `i` of [points and pulses][beams].
+SONAR_HD inline void point_weights(const PingView& p, std::uint32_t i) {
+  const auto beams = static_cast<std::uint32_t>(p.beams);
+  const std::uint32_t point = i / beams;
+  const auto points = static_cast<std::uint32_t>(p.point_count);
+  const PulseInBeams& from = point < points ? p.points[point] : p.pulses[point - points];
+  p.point_weights[i] = p.pattern(from.sine - p.beam_sines[i % beams]);
+}
+
+/// Sample `i` of [beams][samples].
+SONAR_HD inline void couple(const PingView& p, std::uint32_t i) {
+  const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
+  const std::uint32_t j = i / samples;
+  const auto n = static_cast<std::int32_t>(i % samples);
+  const CouplingRow& row = p.panels[j / 4];
+  const float* weight = p.weights + row.weights + j % 4;
+  const float* column = p.signals + 2 * (static_cast<std::int64_t>(row.first_column) * p.samples + n);
+  float re = 0, im = 0;
+  for (int k = 0; k < row.count; ++k) {
+    re += weight[4 * k] * column[0];
+    im += weight[4 * k] * column[1];
+    column += 2 * static_cast<std::int64_t>(p.samples);
+  }
+  const bool power = p.sea.expected_power != 0;
+  double sum_re = 0, sum_im = 0;
+  for (int q = 0; q < p.point_count; ++q) {
+    const PulseInBeams& point = p.points[q];
+    if (n < point.from || n >= point.to) continue;
+    const double w = p.point_weights[static_cast<std::uint32_t>(q) * beams + j];
+    sum_re += w * point.values[2 * (n - point.from)];
+    sum_im += w * point.values[2 * (n - point.from) + 1];
+  }
+  re += static_cast<float>(power ? sum_re * sum_re + sum_im * sum_im : sum_re);
+  if (!power) im += static_cast<float>(sum_im);
+  for (int q = 0; q < p.pulse_count; ++q) {
+    const PulseInBeams& pulse = p.pulses[q];
+    if (n < pulse.from || n >= pulse.to) continue;
+    const double w = p.point_weights[static_cast<std::uint32_t>(p.point_count + q) * beams + j];
+    const double a = pulse.values[2 * (n - pulse.from)], b = pulse.values[2 * (n - pulse.from) + 1];
+    re += static_cast<float>(power ? w * w * (a * a + b * b) : w * a);
+    if (!power) im += static_cast<float>(w * b);
+  }
+  p.beam_signals[2 * static_cast<std::int64_t>(i)] = re;
+  p.beam_signals[2 * static_cast<std::int64_t>(i) + 1] = im;
+}
+
+/// Sample `n`: the sum over all beams.
+SONAR_HD inline void crosstalk_sum(const PingView& p, std::uint32_t n) {
+  float re = 0, im = 0;
+  for (int j = 0; j < p.beams; ++j) {
+    const float* s = p.beam_signals + 2 * (static_cast<std::int64_t>(j) * p.samples + n);
+    re += s[0];
+    im += s[1];
+  }
+  p.crosstalk[2 * n] = re;
+  p.crosstalk[2 * n + 1] = im;
+}
+/// Sample `i` of [beams][samples].
+SONAR_HD inline void crosstalk_add(const PingView& p, std::uint32_t i) {
+  const std::uint32_t n = i % static_cast<std::uint32_t>(p.samples);
+  float* s = p.beam_signals + 2 * static_cast<std::int64_t>(i);
+  s[0] = p.crosstalk_own * s[0] + p.crosstalk_leaked * p.crosstalk[2 * n];
+  s[1] = p.crosstalk_own * s[1] + p.crosstalk_leaked * p.crosstalk[2 * n + 1];
+}
+
+/// Sample `i` of [rows][beams].
+SONAR_HD inline void receive(const PingView& p, std::uint32_t i) {
+  const auto beams = static_cast<std::uint32_t>(p.beams);
+  const std::uint32_t row = i / beams, j = i % beams;
+  const std::int64_t first = static_cast<std::int64_t>(row) * p.per_row;
+  const float* s = p.beam_signals + 2 * (static_cast<std::int64_t>(j) * p.samples + first);
+  float sum = 0;
+  for (int q = 0; q < p.per_row; ++q) {
+    sum += p.sea.expected_power != 0 ? s[2 * q] : s[2 * q] * s[2 * q] + s[2 * q + 1] * s[2 * q + 1];
+    if (p.kept_beams == nullptr) continue;
+    float* kept = p.kept_beams + 2 * ((first + q) * p.beams + j);
+    kept[0] = s[2 * q];
+    kept[1] = s[2 * q + 1];
+  }
+  const float power = sum / static_cast<float>(p.per_row);
+  if (p.pressure != nullptr) p.pressure[i] = std::sqrt(power);
+  const auto max_code = static_cast<float>(p.max_code);
+  const float v = exp2_of(p.half_gamma * log2_of(larger(power * p.row_power_factor[row], 1e-30f)));
+  const float code = smaller(std::floor(v * max_code + 0.5f), max_code);
+  // 2^32 - 1 is no float: compare before the conversion can overflow.
+  const std::uint32_t whole = code >= max_code ? p.max_code : static_cast<std::uint32_t>(code);
+  std::uint8_t* out = p.codes + static_cast<std::int64_t>(i) * p.bytes_a_sample;
+  for (int b = 0; b < p.bytes_a_sample; ++b) out[b] = static_cast<std::uint8_t>(whole >> (8 * b) & 0xFFu);
+}
+
+}  // namespace sonar::cuda

@@ -1,0 +1,184 @@
+// Kernel bodies between the depth map and the columns' signals: every cell in view becomes an echo or none, echoes are sorted
+// into columns in the order of tiles and cells, and each column adds its own up in that order. So a sum is the CPU's, addition by
+// addition, and needs no atomic on floats.
+#pragma once
+
+#include <cmath>
+
+#include "cuda/counting.hpp"
+#include "cuda/device_types.hpp"
+#include "cuda/fast_math.hpp"
+
+namespace sonar::cuda {
+
+enum CellColumn { cell_x, cell_y, cell_z, cell_normal_x, cell_normal_y, cell_normal_z, cell_weight_re, cell_weight_im };
+inline constexpr float cell_normal_unit = 1.0f / 32767.0f;  // as CellTile::normal_unit
+
+SONAR_HD inline float cell_value(const TileView& t, int column, int cell) {
+  return static_cast<float>(t.cells[static_cast<std::int64_t>(column) * t.count + cell]);
+}
+
+/// Where a cell is, and whether the sonar sees it.
+struct CellPlace {
+  float range, offset, cosine, sine2, sample;
+  std::int32_t column;
+};
+SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, CellPlace& at) {
+  const SeaView& g = p.sea;
+  const float dx = t.position_unit_m * cell_value(t, cell_x, cell), dy = t.position_unit_m * cell_value(t, cell_y, cell),
+              dz = t.position_unit_m * cell_value(t, cell_z, cell);
+  const float qx = t.from_sonar_object[0], qy = t.from_sonar_object[1], qz = t.from_sonar_object[2];
+  const float e = dx * (2 * qx + dx) + dy * (2 * qy + dy) + dz * (2 * qz + dz);
+  const float r = std::sqrt(larger(t.range_m * t.range_m + e, 1e-6f));
+  const float inverse_r = 1.0f / r;
+  const float x = t.from_sonar[0] + t.turn[0] * dx + t.turn[1] * dy + t.turn[2] * dz;
+  const float y = t.from_sonar[1] + t.turn[3] * dx + t.turn[4] * dy + t.turn[5] * dz;
+  const float z = t.from_sonar[2] + t.turn[6] * dx + t.turn[7] * dy + t.turn[8] * dz;
+  const float h = g.conical != 0 ? x : std::sqrt(x * x + y * y);
+  const float inverse_h = 1.0f / larger(h, 1e-6f);
+  const float column = (g.first_edge_sine - y * (g.conical != 0 ? inverse_r : inverse_h)) * g.columns_per_sine;
+  const float bin = (z * inverse_h - g.first_tangent) * g.bins_per_tangent;
+  const float sample = r * g.samples_per_m - g.sample_offset + t.sample_shift;
+  if (!(column >= 0 && column < static_cast<float>(g.columns) && bin >= 0 && bin < static_cast<float>(g.bins) && x > 1e-6f &&
+        sample > g.first_sample && sample < g.last_sample && r >= t.fade_in_from_m && r < t.fade_out_to_m))
+    return false;
+  at.column = static_cast<std::int32_t>(column);
+  const auto below = static_cast<std::int32_t>(bin);
+  const float* map = p.depth + static_cast<std::int64_t>(at.column) * (g.bins + 1) + below;
+  const float seen = map[0] + (bin - static_cast<float>(below)) * (map[1] - map[0]);
+  if (!(inverse_h * (1.0f + g.depth_tolerance_m * inverse_r) >= seen)) return false;
+  const float along = cell_value(t, cell_normal_x, cell) * (qx + dx) + cell_value(t, cell_normal_y, cell) * (qy + dy) +
+                      cell_value(t, cell_normal_z, cell) * (qz + dz);
+  at.range = r;
+  at.offset = e / (t.range_m + r);
+  at.cosine = std::fabs(along) * (cell_normal_unit * inverse_r);
+  at.sine2 = z * z / (h * h + z * z);
+  at.sample = sample;
+  return true;
+}
+
+SONAR_HD inline float cross_fade(const TileView& t, float r) {
+  const float in = (r - t.fade_in_from_m) * t.fade_in_per_m, out = (t.fade_out_to_m - r) * t.fade_out_per_m;
+  return larger(smaller(smaller(in, out), 1.0f), 0.0f);
+}
+SONAR_HD inline float elevation_pattern(const float* e, float w) {
+  return e[0] + w * (e[1] + w * (e[2] + w * (e[3] + w * (e[4] + w * (e[5] + w * (e[6] + w * (e[7] + w * e[8])))))));
+}
+SONAR_HD inline float law_at(const float* law, float cosine) {
+  const float at = static_cast<float>(law_steps) * std::sqrt(larger(1.0f - cosine, 0.0f));
+  const auto step = static_cast<std::int32_t>(at);
+  return law[step] + (at - static_cast<float>(step)) * (law[step + 1] - law[step]);
+}
+
+SONAR_HD inline Echo sound_cell(const PingView& p, const TileView& t, int cell) {
+  Echo echo{0, 0, 0, -1};
+  CellPlace at{};
+  if (!place_cell(p, t, cell, at)) return echo;
+  const SeaView& g = p.sea;
+  const float law = t.law != nullptr ? law_at(t.law, at.cosine) : at.cosine;
+  const float re = cell_value(t, cell_weight_re, cell), im = cell_value(t, cell_weight_im, cell);
+  echo.sample = at.sample;
+  echo.column = at.column;
+  if (g.expected_power != 0) {
+    const float slope = std::fabs(cell_value(t, cell_normal_x + t.axis, cell)) * cell_normal_unit;
+    const float per_area = re != 0 || im != 0 ? 1.0f / slope : 0.0f;  // padding is no cell
+    const float amplitude = t.area_amplitude * law * elevation_pattern(g.elevation, at.sine2) *
+                            std::exp(-g.decay_per_m * at.offset) / (at.range * at.range);
+    echo.re = amplitude * amplitude * cross_fade(t, at.range) * per_area;
+    return echo;
+  }
+  const float d = -g.decay_per_m * at.offset;
+  const float loss = 1.0f + d * (1.0f + d * (0.5f + d * (1.0f / 6.0f + d * (1.0f / 24.0f))));
+  const float amplitude = t.amplitude * std::sqrt(cross_fade(t, at.range)) * law * elevation_pattern(g.elevation, at.sine2) *
+                          loss / (at.range * at.range);
+  const float turns = -(t.phase_turns + g.turns_per_m * at.offset);
+  const float cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
+  echo.re = re * cs - im * sn;
+  echo.im = re * sn + im * cs;
+  return echo;
+}
+
+/// The tile that slot `i` belongs to.
+SONAR_HD inline std::uint32_t tile_of(const PingView& p, std::uint32_t i) {
+  std::uint32_t low = 0, high = p.tile_count;
+  while (high - low > 1) {
+    const std::uint32_t middle = low + (high - low) / 2;
+    if (p.tile_first_slot[middle] <= i)
+      low = middle;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+SONAR_HD inline void scatter(const PingView& p, std::uint32_t i) {
+  const std::uint32_t tile = tile_of(p, i);
+  p.echoes[i] = sound_cell(p, p.tiles[tile], static_cast<int>(i - p.tile_first_slot[tile]));
+}
+
+/// How many of a slot's chunk come before it in the same column, and how many the chunk has there.
+SONAR_HD inline void rank(const PingView& p, std::uint32_t i) {
+  const std::int32_t column = p.echoes[i].column;
+  if (column < 0) return;
+  const std::uint32_t chunk = i / slots_a_chunk;
+  std::uint32_t before = 0;
+  for (std::uint32_t j = chunk * slots_a_chunk; j < i; ++j) before += p.echoes[j].column == column ? 1u : 0u;
+  p.rank[i] = before;
+  add_count(p.in_chunk[chunk * static_cast<std::uint32_t>(p.sea.columns) + static_cast<std::uint32_t>(column)], 1u);
+}
+
+/// Column `k`: counts of the chunks become sums over the chunks before.
+SONAR_HD inline void scan_chunks(const PingView& p, std::uint32_t k) {
+  const auto columns = static_cast<std::uint32_t>(p.sea.columns);
+  std::uint32_t before = 0;
+  for (std::uint32_t chunk = 0; chunk < p.chunks; ++chunk) {
+    std::uint32_t& here = p.in_chunk[chunk * columns + k];
+    const std::uint32_t count = here;
+    here = before;
+    before += count;
+  }
+  p.in_column[k] = before;
+}
+SONAR_HD inline void scan_columns(const PingView& p, std::uint32_t k) {
+  std::uint32_t before = 0;
+  for (std::uint32_t column = 0; column < k; ++column) before += p.in_column[column];
+  p.column_at[k] = before;
+  if (k + 1 == static_cast<std::uint32_t>(p.sea.columns)) p.counters[1] = before + p.in_column[k];
+}
+SONAR_HD inline void place(const PingView& p, std::uint32_t i) {
+  const Echo echo = p.echoes[i];
+  if (echo.column < 0) return;
+  const auto column = static_cast<std::uint32_t>(echo.column);
+  const std::uint32_t chunk = i / slots_a_chunk;
+  p.sorted[p.column_at[column] + p.in_chunk[chunk * static_cast<std::uint32_t>(p.sea.columns) + column] + p.rank[i]] = echo;
+}
+
+/// The pulses of a column's echoes, at the samples n = part modulo sum_parts: i = column * sum_parts + part.
+SONAR_HD inline void sum_columns(const PingView& p, std::uint32_t i) {
+  const std::uint32_t k = i / sum_parts;
+  const int part = static_cast<int>(i % sum_parts), parts = static_cast<int>(sum_parts);
+  float* signal = p.signals + 2 * static_cast<std::int64_t>(k) * p.samples;
+  for (int n = part; n < p.samples; n += parts) signal[2 * n] = signal[2 * n + 1] = 0;
+  if (p.slots == 0) return;
+  const int reach = p.taps / 2 - 1;
+  const float steps = static_cast<float>(p.pulse_steps);
+  const Echo* echo = p.sorted + p.column_at[k];
+  const Echo* const end = echo + p.in_column[k];
+  for (; echo != end; ++echo) {
+    const float whole = std::floor(echo->sample);
+    const int first = static_cast<int>(whole) - reach;
+    const float position = (echo->sample - whole) * steps;
+    const int step = static_cast<int>(position);
+    const float fraction = position - static_cast<float>(step);
+    const float* row = p.pulse_rows + static_cast<std::int64_t>(step) * 2 * p.taps;
+    for (int tap = (part - first) & (parts - 1); tap < p.taps; tap += parts) {
+      const int n = first + tap;
+      if (n < 0 || n >= p.samples) continue;
+      const float pulse = row[tap] + fraction * row[p.taps + tap];
+      signal[2 * n] += pulse * echo->re;
+      signal[2 * n + 1] += pulse * echo->im;
+    }
+  }
+}
+
+}  // namespace sonar::cuda

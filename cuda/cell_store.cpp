@@ -1,0 +1,62 @@
+#include "cuda/cell_store.hpp"
+
+namespace sonar::cuda {
+namespace {
+
+constexpr std::size_t chunk_bytes = 16u << 20;
+
+std::size_t values(const CellTile& t) { return static_cast<std::size_t>(t.stride) * CellTile::columns; }
+
+}  // namespace
+
+CellStore::CellStore(Machine& machine, std::size_t budget_bytes)
+    : machine_(machine), budget_bytes_(budget_bytes), memory_(machine, Arena::Where::device, chunk_bytes) {}
+
+const CellStore::Held* CellStore::held(const CellTile& t) const {
+  const auto it = tiles_.find(t.data.get());
+  if (it == tiles_.end()) return nullptr;
+  const Held& h = it->second;
+  const bool same = h.weight_unit == t.weight_unit && h.object == t.object && h.axis == t.axis && h.level == t.level &&
+                    h.count == t.count && h.centre_m.x == t.centre_m.x && h.centre_m.y == t.centre_m.y &&
+                    h.centre_m.z == t.centre_m.z;
+  return same ? &h : nullptr;
+}
+
+bool CellStore::has_room(std::span<const TileInView> tiles) const {
+  std::size_t more = 0;
+  for (const TileInView& t : tiles)
+    if (!held(*t.tile)) more += t.tile->bytes();
+  return more == 0 || tiles_.empty() || bytes() + more <= budget_bytes_;
+}
+
+void CellStore::clear() {
+  tiles_.clear();
+  memory_.clear();
+}
+
+void CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells) {
+  cells.assign(tiles.size(), nullptr);
+  std::size_t more = 0;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const CellTile& t = *tiles[i].tile;
+    if (const Held* h = held(t))
+      cells[i] = h->device;
+    else
+      more += values(t);
+  }
+  if (more == 0) return;
+  const auto host = staging.take<std::int16_t>(more);
+  const auto device = memory_.take<std::int16_t>(more);
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (cells[i]) continue;
+    const CellTile& t = *tiles[i].tile;
+    std::memcpy(host.host + at, t.data.get(), values(t) * sizeof(std::int16_t));
+    cells[i] = device.device + at;
+    tiles_[t.data.get()] = {t.weight_unit, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]};
+    at += values(t);
+  }
+  machine_.upload(lane, device.device, host.host, more * sizeof(std::int16_t));
+}
+
+}  // namespace sonar::cuda

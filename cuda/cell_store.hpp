@@ -1,0 +1,45 @@
+// The tiles of surface cells that the device holds: each is sent once, when a ping first sees it, and stays. They are the CPU's
+// own bytes (core/scene/cells), so position and speckle are the same by construction; a tile that the CPU has forgotten and made
+// again is recognised by what it is.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "core/scene/cells/surface_cells.hpp"
+#include "cuda/arena.hpp"
+
+namespace sonar::cuda {
+
+class CellStore {
+ public:
+  /// `budget_bytes`: of the device's memory; what one ping sees is kept whatever it takes.
+  CellStore(Machine& machine, std::size_t budget_bytes);
+
+  /// Whether the tiles fit in beside those that are held; if not, clear() first, when no ping under way needs them.
+  bool has_room(std::span<const TileInView> tiles) const;
+  void clear();
+  /// Where each tile's cells lie on the device, in the order of `tiles`. What was not there is queued on `lane`; it travels by
+  /// way of `staging`, which must live until that is done.
+  void find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells);
+
+  std::size_t bytes() const { return memory_.taken_bytes(); }
+
+ private:
+  struct Held {
+    float weight_unit = 0;  // of the strongest speckle in it: a name that no other tile of the scene has, but by chance
+    std::int32_t object = 0, axis = 0, level = 0, count = 0;
+    Vec3d centre_m;
+    const std::int16_t* device = nullptr;
+  };
+  const Held* held(const CellTile& tile) const;
+
+  Machine& machine_;
+  std::size_t budget_bytes_;
+  Arena memory_;
+  std::unordered_map<const std::int16_t*, Held> tiles_;  // by where the CPU has them
+};
+
+}  // namespace sonar::cuda

@@ -1,0 +1,18 @@
+// Counting by many threads at once: whole numbers only, whose sum no order can change.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.hpp"
+
+namespace sonar::cuda {
+
+SONAR_HD inline void add_count(std::uint32_t& counter, std::uint32_t by) {
+#if defined(__CUDA_ARCH__)
+  atomicAdd(&counter, by);
+#else
+  counter += by;
+#endif
+}
+
+}  // namespace sonar::cuda

@@ -1,0 +1,135 @@
+// The device by way of the module, which is looked for beside the program and where packages put it.
+#include <dlfcn.h>
+
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+#include <vector>
+
+#include "cuda/cuda_module.hpp"
+#include "cuda/cuda_status.hpp"
+#include "cuda/machine.hpp"
+
+namespace sonar::cuda {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// SONARD_CUDA_MODULE alone where it is set; else beside the program, then in the lib folder of where it is installed.
+std::vector<fs::path> module_places() {
+  if (const char* given = std::getenv("SONARD_CUDA_MODULE")) return {given};
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (error) return {module_file};
+  const fs::path folder = program.parent_path();
+  return {folder / module_file, folder.parent_path() / "lib" / "sonard" / module_file};
+}
+
+struct Loaded {
+  const CudaModule* module = nullptr;
+  std::string why_not;  // "not installed", or what is wrong with it
+};
+
+Loaded load() {
+  for (const fs::path& place : module_places()) {
+    std::error_code error;
+    if (!fs::exists(place, error)) continue;
+    // Stays loaded as long as the program: the runtime in it has threads and handlers of its own.
+    void* library = dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (!library) return {nullptr, std::string("not loadable: ") + dlerror()};
+    const auto entry = reinterpret_cast<CudaModuleEntry>(dlsym(library, module_entry));
+    const CudaModule* module = entry ? entry() : nullptr;
+    if (!module || module->version != module_version || module->view_bytes != sizeof(PingView) ||
+        module->tile_bytes != sizeof(TileView) || module->steps != static_cast<std::uint32_t>(Step::steps))
+      return {nullptr, place.string() + " belongs to another version of sonard"};
+    return {module, ""};
+  }
+  return {nullptr, "not installed"};
+}
+const Loaded& loaded() {
+  static const Loaded once = load();
+  return once;
+}
+
+struct Found {
+  int devices = 0;
+  std::string status;  // see cuda_status()
+};
+Found find_device() {
+  const CudaModule* module = loaded().module;
+  if (!module) return {0, loaded().why_not};
+  std::array<char, 256> name{};
+  Found found;
+  const int code = module->query(&found.devices, name.data(), name.size());
+  if (code != 0)
+    found.status = std::string("no device (") + module->reason(code) + ")";
+  else
+    found.status = found.devices > 0 ? name.data() : "no device";
+  return found;
+}
+
+class CudaMachine final : public Machine {
+ public:
+  CudaMachine(const CudaModule& module, std::string name) : module_(module), name_(std::move(name)) { check(module_.open(&at_)); }
+  ~CudaMachine() override {
+    if (at_) module_.close(at_);
+  }
+  CudaMachine(const CudaMachine&) = delete;
+  CudaMachine& operator=(const CudaMachine&) = delete;
+
+  std::string name() const override { return name_; }
+  void* allocate(std::size_t bytes) override {
+    void* device = nullptr;
+    check(module_.allocate(at_, &device, bytes));
+    return device;
+  }
+  // What fails while things are given back has failed before, and been told.
+  void release(void* device) override { static_cast<void>(module_.release(at_, device)); }
+  void* allocate_host(std::size_t bytes) override {
+    void* host = nullptr;
+    check(module_.allocate_host(at_, &host, bytes));
+    return host;
+  }
+  void release_host(void* host) override { static_cast<void>(module_.release_host(at_, host)); }
+  void upload(int lane, void* to_device, const void* from, std::size_t bytes) override {
+    check(module_.upload(at_, lane, to_device, from, bytes));
+  }
+  void download(int lane, void* to, const void* from_device, std::size_t bytes) override {
+    check(module_.download(at_, lane, to, from_device, bytes));
+  }
+  void zero(int lane, void* device, std::size_t bytes) override { check(module_.zero(at_, lane, device, bytes)); }
+  void run(int lane, Step step, const PingView* views, int pings, std::uint32_t largest) override {
+    check(module_.run(at_, lane, static_cast<int>(step), views, pings, largest));
+  }
+  void order(int lane, int earlier) override { check(module_.order(at_, lane, earlier)); }
+  void wait(int lane) override { check(module_.wait(at_, lane)); }
+
+ private:
+  void check(int code) const {
+    if (code != 0) throw std::runtime_error(name_ + ": " + module_.reason(code));
+  }
+  const CudaModule& module_;
+  std::string name_;
+  void* at_ = nullptr;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Machine>> open_cuda_machine() {
+  const Found found = find_device();
+  if (found.devices == 0) return failure(ErrorKind::unavailable, found.status);
+  try {
+    return std::make_unique<CudaMachine>(*loaded().module, found.status);
+  } catch (const std::runtime_error& e) {
+    return failure(ErrorKind::unavailable, e.what());
+  }
+}
+
+}  // namespace sonar::cuda
+
+namespace sonar {
+
+std::string cuda_status() { return cuda::find_device().status; }
+
+}  // namespace sonar

@@ -1,0 +1,37 @@
+// The seam between the program and the CUDA module, which is built by another compiler and loaded by name: plain C, checked for
+// its version and for the layout of what crosses it. cuda_machine.cpp is on this side, cuda_module.cu on the other.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "cuda/device_types.hpp"
+
+namespace sonar::cuda {
+
+inline constexpr std::uint32_t module_version = 1;  // of this file, of device_types.hpp and of the steps
+inline constexpr const char* module_file = "libsonard_cuda.so";
+inline constexpr const char* module_entry = "sonard_cuda_module";
+
+/// Calls return 0, or a code that `reason` explains. `machine` comes from open.
+struct CudaModule {
+  std::uint32_t version, view_bytes, tile_bytes, steps;
+  const char* (*reason)(int code);
+  /// Devices that there are; the name of the first, if any: "NVIDIA H200, 139.8 GiB, compute 9.0".
+  int (*query)(int* devices, char* name, std::size_t room);
+  int (*open)(void** machine);
+  void (*close)(void* machine);
+  int (*allocate)(void* machine, void** device, std::size_t bytes);
+  int (*release)(void* machine, void* device);
+  int (*allocate_host)(void* machine, void** host, std::size_t bytes);
+  int (*release_host)(void* machine, void* host);
+  int (*upload)(void* machine, int lane, void* to_device, const void* from, std::size_t bytes);
+  int (*download)(void* machine, int lane, void* to, const void* from_device, std::size_t bytes);
+  int (*zero)(void* machine, int lane, void* device, std::size_t bytes);
+  int (*run)(void* machine, int lane, int step, const PingView* views, int pings, std::uint32_t largest);
+  int (*order)(void* machine, int lane, int earlier);
+  int (*wait)(void* machine, int lane);
+};
+using CudaModuleEntry = const CudaModule* (*)();
+
+}  // namespace sonar::cuda

@@ -1,0 +1,213 @@
+#include "cuda/device_engine.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "core/pipeline/simulate.hpp"
+#include "cuda/prepare_ping.hpp"
+#include "cuda/steps.hpp"
+
+namespace sonar::cuda {
+namespace {
+
+constexpr std::size_t most_plans = 8;
+constexpr int keeping_lane = 2;  // of what stays on the device: plans and cells; rooms have 0 and 1
+
+class DeviceEngine final : public PingEngine {
+ public:
+  DeviceEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options, std::unique_ptr<Machine> machine,
+               DeviceEngineOptions device_options)
+      : machine_(std::move(machine)),
+        device_options_(std::move(device_options)),
+        options_(options),
+        scene_(scene),
+        pool_(pool),
+        kernels_(simd::kernels_for(options.simd)),
+        rays_(scene, pool.threads()),
+        preparer_(*machine_, scene, rays_, kernels_, pool, device_options_.cell_bytes),
+        rooms_{BatchRoom(*machine_, 0), BatchRoom(*machine_, 1)} {
+    work_.now_s = options.now_s;
+  }
+  ~DeviceEngine() override {
+    for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);  // memory goes when nothing uses it any more
+  }
+
+  std::vector<Ping> run(std::span<const PingRequest> requests) override {
+    for (const PingRequest& request : requests)
+      if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
+    std::vector<Ping> pings(requests.size());
+    if (!failed_) try {
+        run_on_device(requests, pings);
+        return pings;
+      } catch (const std::runtime_error& e) {
+        failed_ = true;
+        say(std::string("the CUDA engine stopped: ") + e.what() + "; from here on the CPU computes");
+        for (BatchRoom& room : rooms_) empty(room);
+      }
+    for (std::size_t i = 0; i < requests.size(); ++i) pings[i] = by_cpu(requests[i]);
+    return pings;
+  }
+
+  std::string description() const override {
+    return (failed_ ? "cpu, after a failure of " : "cuda, ") + machine_->name() + ", " + kernels_.name + ", " +
+           std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
+  }
+  PingStatistics statistics() const override { return statistics_; }
+
+ private:
+  void run_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
+    std::size_t which = 0;
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+      if (const std::string why = why_not_on_device(requests[i]); !why.empty()) {
+        if (told_.insert(why).second) say("CUDA: " + why + " are computed by the CPU");
+        pings[i] = by_cpu(requests[i]);
+        continue;
+      }
+      if (!prepare(requests[i], i, rooms_[which])) {
+        launch(rooms_[which]);
+        for (BatchRoom& room : rooms_) finish(room, pings);
+        preparer_.forget_cells();
+        if (!prepare(requests[i], i, rooms_[which])) throw std::runtime_error("the tiles of one ping do not fit an empty store");
+      }
+      if (rooms_[which].pings.size() < static_cast<std::size_t>(device_options_.batch)) continue;
+      launch(rooms_[which]);
+      which = 1 - which;
+      finish(rooms_[which], pings);  // the other one: it has had the time it took to prepare this one
+    }
+    launch(rooms_[which]);
+    finish(rooms_[1 - which], pings);
+    finish(rooms_[which], pings);
+  }
+
+  bool prepare(const PingRequest& request, std::size_t index, BatchRoom& room) {
+    place(request);
+    return preparer_.add(request, index, plan_for(request), *cells_, keeping_lane, room);
+  }
+  /// What device and CPU share: the scene as this request finds it.
+  void place(const PingRequest& request) {
+    if (!cells_ || !cells_->serves(request.seed, request.switches.texture))
+      cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, request.switches.texture);
+    if (!scene_->bodies_in_world.empty())
+      rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
+  }
+  Ping by_cpu(const PingRequest& request) {
+    place(request);
+    Ping ping = simulate(rays_, *cells_, request, kernels_, work_, pool_);
+    statistics_ = work_.statistics;
+    return ping;
+  }
+
+  std::shared_ptr<PlanTables> plan_for(const PingRequest& request) {
+    const auto it = std::find_if(plans_.begin(), plans_.end(), [&](const auto& p) { return p->serves(request); });
+    if (it != plans_.end()) {
+      std::rotate(plans_.begin(), it, it + 1);  // newest first
+      return plans_.front();
+    }
+    if (plans_.size() >= most_plans) plans_.pop_back();
+    plans_.insert(plans_.begin(), std::make_shared<PlanTables>(*machine_, keeping_lane, request));
+    return plans_.front();
+  }
+
+  void launch(BatchRoom& room) {
+    if (room.pings.empty()) return;
+    const PingView* views = room.tables.put(room.views);
+    machine_->order(room.lane, keeping_lane);
+    room.tables.upload(room.lane);
+    for (const PingView& view : room.views) {
+      machine_->zero(room.lane, view.counters, 2 * sizeof(std::uint32_t));
+      if (view.slots > 0)
+        machine_->zero(room.lane, view.in_chunk,
+                       sizeof(std::uint32_t) * view.chunks * static_cast<std::size_t>(view.sea.columns));
+    }
+    const auto pings = static_cast<int>(room.views.size());
+    for (int s = 0; s < static_cast<int>(Step::steps); ++s) {
+      const auto step = static_cast<Step>(s);
+      std::uint32_t largest = 0;
+      for (const PingView& view : room.views) largest = std::max(largest, step_size(step, view));
+      if (largest > 0) machine_->run(room.lane, step, views, pings, largest);
+    }
+    room.results.download(room.lane);
+  }
+
+  void finish(BatchRoom& room, std::vector<Ping>& pings) {
+    if (room.pings.empty()) return;
+    machine_->wait(room.lane);
+    for (std::size_t i = 0; i < room.pings.size(); ++i) pings[room.pings[i].index] = take(room.pings[i], room.views[i]);
+    empty(room);
+  }
+  Ping take(BatchRoom::Ping& from, const PingView& view) {
+    Ping ping = std::move(from.ping);
+    const auto copy = [](void* to, const void* host, std::size_t bytes) {
+      if (bytes > 0) std::memcpy(to, host, bytes);
+    };
+    copy(ping.samples.data(), from.codes.host, ping.samples.size());
+    copy(ping.pressure_upa.data(), from.pressure.host, ping.pressure_upa.size() * sizeof(float));
+    copy(ping.beam_signal_upa.data(), from.beams.host, ping.beam_signal_upa.size() * sizeof(std::complex<float>));
+    if (ping.request.switches.keep_truth) {
+      std::vector<BeamTruth> by_column(static_cast<std::size_t>(view.sea.columns));
+      if (view.first_hits)
+        for (std::size_t k = 0; k < by_column.size(); ++k)
+          if (from.truth.host[k].object != no_object) by_column[k] = {from.truth.host[k].range_m, from.truth.host[k].object};
+      ping.truth = truth_of_beams(from.plan->plan(), by_column);
+    }
+    statistics_ = from.statistics;
+    if (view.has_scene != 0) {
+      statistics_.rays +=
+          from.counters.host[0] + static_cast<std::size_t>(view.sea.columns) * static_cast<std::size_t>(view.sea.elevations);
+      statistics_.echoes += from.counters.host[1];
+    }
+    return ping;
+  }
+  static void empty(BatchRoom& room) {
+    room.views.clear();
+    room.pings.clear();
+    for (Arena* arena : {&room.tables, &room.work, &room.results, &room.cells}) arena->clear();
+  }
+
+  void say(const std::string& what) const {
+    if (device_options_.say) device_options_.say(what);
+  }
+  void try_to_wait(int lane) const {
+    try {
+      machine_->wait(lane);
+    } catch (const std::runtime_error&) {  // it has failed, and what it had to do with it
+    }
+  }
+
+  std::unique_ptr<Machine> machine_;  // goes last
+  DeviceEngineOptions device_options_;
+  EngineOptions options_;
+  std::shared_ptr<const Scene> scene_;
+  Parallel& pool_;
+  const simd::Kernels& kernels_;
+  RayScene rays_;
+  std::unique_ptr<SurfaceCells> cells_;
+  std::vector<std::shared_ptr<PlanTables>> plans_;
+  PingPreparer preparer_;
+  BatchRoom rooms_[2];
+  Workspace work_;  // of the CPU
+  std::set<std::string> told_;
+  PingStatistics statistics_;
+  bool failed_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<PingEngine> make_device_engine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options,
+                                               std::unique_ptr<Machine> machine, DeviceEngineOptions device_options) {
+  return std::make_unique<DeviceEngine>(std::move(scene), pool, options, std::move(machine), std::move(device_options));
+}
+
+std::string why_not_on_device(const PingRequest& request) {
+  const Waveform& w = request.model->modes[static_cast<std::size_t>(request.settings.mode)].waveform;
+  if (request.switches.mode != Mode::canonical) return "pings of the comparison modes";
+  if (request.switches.fixed_fan > 0) return "pings of a fixed fan";
+  if (request.switches.expected_power) return "";
+  if (w.shape == Waveform::Shape::measured) return "pings with a measured pulse";
+  if (w.exact) return "pings with an exact pulse";
+  return "";
+}
+
+}  // namespace sonar::cuda

@@ -1,0 +1,31 @@
+// The ping engine that computes on a device: requests in batches, two of them under way at a time, only finished images come
+// back. Any Machine will do; with host loops it is the same engine without a device.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/pipeline/ping_engine.hpp"
+#include "cuda/machine.hpp"
+
+namespace sonar::cuda {
+
+struct DeviceEngineOptions {
+  std::size_t cell_bytes = std::size_t{2} << 30;  // of the device's memory for surface cells; what one ping needs, it gets
+  int batch = 8;                                  // pings that are launched together
+  /// Told, once each: what the CPU computes instead, and why. May be empty.
+  std::function<void(const std::string&)> say = {};
+};
+
+/// The pool must outlive the engine. Pings that the device does not do (why_not_on_device) are computed here by the CPU; so is
+/// everything from the moment the device fails. Throws std::runtime_error when the device cannot hold the scene.
+std::unique_ptr<PingEngine> make_device_engine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options,
+                                               std::unique_ptr<Machine> machine, DeviceEngineOptions device_options = {});
+
+/// The part of the model that only the CPU does, as the beginning of a sentence ("pings of a fixed fan"); empty when there is
+/// none. docs/cuda.md lists them.
+std::string why_not_on_device(const PingRequest& request);
+
+}  // namespace sonar::cuda

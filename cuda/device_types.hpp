@@ -1,0 +1,208 @@
+// What lies in the device's memory: plain structs that the host fills and the kernel bodies read. C++17 and fixed-width members
+// only; both sides are compiled from this file, and cuda_module.hpp checks that they agree on it.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/geometry.hpp"
+#include "core/base/host_device.hpp"
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+
+namespace sonar::cuda {
+
+inline constexpr std::uint32_t no_object = 0xFFFFFFFFu;  // what a ray that hits nothing has met
+inline constexpr int elevation_terms = 9;                // of the elevation pattern, as simd::elevation_terms
+inline constexpr int law_steps = 128;                    // of a tabulated scattering law, as simd::law_steps
+inline constexpr std::uint32_t slots_a_chunk = 256;      // cells that are sorted into columns together
+inline constexpr std::uint32_t sum_parts = 32;           // threads that share the sum of one column: a warp
+
+/// Boxes of both children, one line of the cache. Links as in bvh_link.
+struct alignas(64) BvhNode {
+  float low[2][3], high[2][3];
+  std::int32_t link[2];
+  std::int32_t unused[2];
+};
+/// A link is the index of a node, or of a leaf: its first item and how many there are, 1 to 8.
+struct BvhLeaf {
+  std::uint32_t first, count;
+};
+SONAR_HD constexpr std::int32_t bvh_link(BvhLeaf leaf) { return ~static_cast<std::int32_t>(leaf.first * 8u + (leaf.count - 1u)); }
+SONAR_HD constexpr bool is_leaf(std::int32_t link) { return link < 0; }
+SONAR_HD constexpr BvhLeaf bvh_leaf(std::int32_t link) {
+  const auto bits = static_cast<std::uint32_t>(~link);
+  return {bits / 8u, bits % 8u + 1u};
+}
+
+/// Corners relative to the scene's origin, or in the axes of a body.
+struct alignas(16) FlatTriangle {
+  float a[3];
+  std::uint32_t object;
+  float b[3];
+  std::uint32_t triangle;  // in the object's mesh
+  float c[3];
+  std::uint32_t unused;
+};
+/// A moving body where this ping finds it.
+struct PlacedBody {
+  float turn[9];      // body to world axes, row-major
+  float position[3];  // relative to the scene's origin [m]
+  std::int32_t root;  // of its hierarchy
+};
+struct TracerView {
+  const BvhNode* nodes = nullptr;  // of everything that stands still and of all bodies
+  const FlatTriangle* triangles = nullptr;
+  const BvhNode* top = nullptr;  // over `bodies`
+  const PlacedBody* bodies = nullptr;
+  std::int32_t still_root = -1, has_still = 0, body_count = 0, unused = 0;
+};
+
+/// One ray of the fan, as FanSample with its SurfaceMet (core/pipeline/fan_refinement.hpp).
+struct FanRay {
+  float elevation_rad, tangent, forward;
+  std::uint32_t object;
+  float range_m, inverse_x;
+  Vec3 normal;
+  float offset;
+};
+struct ColumnSine {
+  float along, across;
+};
+struct BaseElevation {
+  float angle_rad, cosine, sine;
+};
+/// What a beam or a column meets first; range 0 = nothing.
+struct FirstHit {
+  float range_m;
+  std::uint32_t object;
+};
+
+/// simd::TileSeen, with the tile's own numbers.
+struct TileView {
+  const std::int16_t* cells;  // eight columns of `count`, in the order of CellTile::Column
+  const float* law;           // null = Lambert's cosine
+  std::int32_t count, axis;
+  float position_unit_m;
+  float from_sonar_object[3], from_sonar[3], turn[9];
+  float range_m, sample_shift, phase_turns, amplitude, area_amplitude;
+  float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
+  float unused;
+};
+
+struct alignas(16) Echo {
+  float sample, re, im;
+  std::int32_t column;  // -1 = not heard
+};
+
+/// simd::GroupView for all columns at once, and the fan.
+struct SeaView {
+  std::int32_t conical, columns, elevations, bins, expected_power, unused;
+  float first_edge_sine, columns_per_sine, first_tangent, bins_per_tangent, depth_tolerance_m;
+  float turns_per_m, decay_per_m, samples_per_m, sample_offset, first_sample, last_sample;
+  float elevation[elevation_terms];
+  // the fan
+  float origin[3], world_from_sonar[9], far_m, pulse_width_m, truth_half_width_rad;
+};
+
+struct CouplingRow {  // four beams, see CouplingPanel
+  std::int32_t first_column, count;
+  std::uint32_t weights, unused;
+};
+struct VolumeSlice {
+  double range_per_x, weight;
+  std::int32_t bin, unused;
+};
+/// A point's pulse on the sample grid, or another sonar's; values[from, to) are complex doubles.
+struct PulseInBeams {
+  double sine;
+  const double* values;
+  std::int32_t from, to;
+};
+
+struct NoiseKey {
+  std::uint32_t seed_low, seed_high, sonar, ping;
+};
+
+/// Everything about one ping. Pointers into the device's memory; null = that part is not heard.
+struct PingView {
+  TracerView tracer;
+  SeaView sea;
+  // plan
+  const ColumnSine* column_sines;        // [columns]
+  const BaseElevation* base_elevations;  // [elevations]
+  const float* pulse_rows;
+  const float* transmit;  // [columns]
+  const float* weights;
+  const CouplingRow* panels;  // [beams / 4, rounded up]
+  const double* beam_sines;   // [beams]
+  const double* column_u;     // [columns], in double
+  const float* noise_table;   // complex, table_samples of them
+  ReceivePattern pattern;
+  std::int32_t taps, pulse_steps, samples, per_row, rows, beams;
+  // surfaces
+  const TileView* tiles;
+  const std::uint32_t* tile_first_slot;  // [tiles + 1]
+  std::uint32_t tile_count, slots, chunks, has_scene;
+  FanRay* fan_rays;          // [elevations][columns]
+  float* depth;              // [columns][bins + 1]
+  FirstHit* first_hits;      // [elevations - 1][columns], null = not wanted
+  FirstHit* column_truth;    // [columns], a result
+  Echo* echoes;              // [slots]
+  std::uint32_t* rank;       // [slots]: how many of the chunk came before in the same column
+  std::uint32_t* in_chunk;   // [chunks][columns]: how many; then, how many in the chunks before
+  std::uint32_t* in_column;  // [columns]
+  std::uint32_t* column_at;  // [columns]: where the column's echoes begin
+  Echo* sorted;              // [slots]
+  // columns
+  float* signals;       // complex [columns][samples]
+  const float* ghosts;  // complex [columns][ghost_stride]
+  std::int64_t ghost_stride;
+  const VolumeSlice* slices;
+  const double* open_power;    // [samples]
+  const double* column_width;  // [columns]
+  double* blocked;             // [samples][columns]
+  double open_fan, volume_samples_per_m, volume_sample_offset;
+  const float* leak_rms;  // [leak_samples]
+  std::int32_t slice_count, leak_samples, has_noise, unused;
+  float noise_rms, leak_steady, leak_changing, crosstalk_own, crosstalk_leaked;
+  NoiseKey noise_key;
+  // beams
+  float* beam_signals;         // complex [beams][samples]
+  const PulseInBeams* points;  // [point_count]
+  const PulseInBeams* pulses;  // [pulse_count], of other sonars
+  double* point_weights;       // [point_count + pulse_count][beams]
+  float* crosstalk;            // complex [samples], null = none
+  std::int32_t point_count, pulse_count;
+  // samples
+  const float* row_power_factor;  // [rows]
+  float half_gamma;
+  std::uint32_t max_code;
+  std::int32_t bytes_a_sample, unused_too;
+  std::uint8_t* codes;      // [rows][beams][bytes]
+  float* pressure;          // [rows][beams], null = not wanted
+  float* kept_beams;        // complex [samples][beams], null = not wanted
+  std::uint32_t* counters;  // [0] rays, [1] echoes
+};
+
+/// The kernels of a ping, in order. What each does: steps.hpp.
+enum class Step : std::int32_t {
+  trace_base,
+  refine,
+  first_hits,
+  scatter,
+  rank,
+  scan_chunks,
+  scan_columns,
+  place,
+  sum_columns,
+  ghosts,
+  volume,
+  finish_columns,
+  point_weights,
+  couple,
+  crosstalk_sum,
+  crosstalk_add,
+  receive,
+  steps
+};
+
+}  // namespace sonar::cuda

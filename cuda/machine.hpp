@@ -1,0 +1,43 @@
+// What the device engine needs of a device: memory, copies and the steps of a ping. Two of them: CUDA, in a module of its own
+// that is loaded when there is one (open_cuda_machine), and plain loops on the host, which run the same bodies (HostLoops).
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "cuda/device_types.hpp"
+
+namespace sonar::cuda {
+
+/// Lanes are queues of work: in order within one, at the same time between two. Whatever fails throws std::runtime_error.
+class Machine {
+ public:
+  static constexpr int lanes = 3;
+  virtual ~Machine() = default;
+  virtual std::string name() const = 0;  // "NVIDIA H200, 139.8 GiB, compute 9.0"
+
+  virtual void* allocate(std::size_t bytes) = 0;  // in the device's memory
+  virtual void release(void* device) = 0;
+  virtual void* allocate_host(std::size_t bytes) = 0;  // where copies to and from the device are fast
+  virtual void release_host(void* host) = 0;
+
+  /// Queued; `from` must stay as it is until the lane has been waited for.
+  virtual void upload(int lane, void* to_device, const void* from, std::size_t bytes) = 0;
+  virtual void download(int lane, void* to, const void* from_device, std::size_t bytes) = 0;
+  virtual void zero(int lane, void* device, std::size_t bytes) = 0;
+  /// Runs a step for `pings` pings, whose views lie in the device's memory; `largest` is the largest of their step_size.
+  virtual void run(int lane, Step step, const PingView* views, int pings, std::uint32_t largest) = 0;
+  /// What is queued on `lane` from now on begins after what is queued on `earlier` already.
+  virtual void order(int lane, int earlier) = 0;
+  virtual void wait(int lane) = 0;
+};
+
+/// Loops on the calling thread; for tests, which so run what the device runs.
+std::unique_ptr<Machine> make_host_loops();
+
+/// Loads the module and takes the first device. The error says what is missing and where was looked.
+Result<std::unique_ptr<Machine>> open_cuda_machine();
+
+}  // namespace sonar::cuda

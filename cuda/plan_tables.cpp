@@ -1,0 +1,66 @@
+#include "cuda/plan_tables.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/pipeline/volume.hpp"
+#include "cuda/fan_steps.hpp"
+
+namespace sonar::cuda {
+
+static_assert(elevation_terms == simd::elevation_terms && law_steps == simd::law_steps);
+
+PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
+    : model_(request.model),
+      seed_(request.seed),
+      plan_(make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings, request.switches)),
+      memory_(machine, Arena::Where::both, 1u << 20),
+      noise_memory_(machine, Arena::Where::both, 0) {
+  const PingPlan& p = plan_;
+  std::vector<ColumnSine> sines;
+  std::vector<double> u;
+  for (int k = 0; k < p.columns.count; ++k) {
+    u.push_back(p.columns.sine(k));
+    sines.push_back({static_cast<float>(u.back()), static_cast<float>(std::sqrt(std::max(0.0, 1 - u.back() * u.back())))});
+  }
+  std::vector<BaseElevation> base;
+  for (const float angle : p.fan.elevation_rad) base.push_back({angle, std::cos(angle), std::sin(angle)});
+  std::vector<CouplingRow> rows;
+  for (const CouplingPanel& panel : p.coupling.panels)
+    rows.push_back({panel.first_column, panel.count, static_cast<std::uint32_t>(panel.weights), 0});
+
+  view_.column_sines = memory_.put(sines);
+  view_.base_elevations = memory_.put(base);
+  view_.pulse_rows = memory_.put(p.pulse_rows);
+  view_.transmit = memory_.put(p.columns.transmit);
+  view_.weights = memory_.put(p.coupling.weights);
+  view_.panels = memory_.put(rows);
+  view_.beam_sines = memory_.put(p.beam_sine);
+  view_.column_u = memory_.put(u);
+  view_.pattern = receive_pattern(p.mode.pattern);
+  view_.taps = p.taps;
+  view_.pulse_steps = p.pulse_steps;
+  view_.samples = p.samples;
+  view_.per_row = p.settings.samples_per_row;
+  view_.rows = p.settings.range_bin_count;
+  view_.beams = p.settings.beam_count;
+  view_.max_code = p.settings.format.max_code;
+  view_.half_gamma = p.settings.format.gamma / 2;
+  view_.bytes_a_sample = p.settings.format.bits / 8;
+  memory_.upload(lane);
+}
+
+bool PlanTables::serves(const PingRequest& request) const {
+  return model_ == request.model && seed_ == request.seed && sonar::serves(plan_, request);
+}
+
+void PlanTables::need_noise(int lane) {
+  if (view_.noise_table) return;
+  noise_.prepare(seed_, plan_.noise_filter);
+  view_.noise_table = noise_memory_.put(noise_.shaped());
+  noise_memory_.upload(lane);
+}
+
+void PlanTables::fill(PingView& view) const { view = view_; }
+
+}  // namespace sonar::cuda

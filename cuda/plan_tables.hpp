@@ -1,0 +1,36 @@
+// What the device needs of a plan: the tables that follow from product, settings and seed, sent once and used by every ping that
+// has them (core/pipeline/ping_plan.hpp).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "core/pipeline/noise.hpp"
+#include "core/pipeline/ping_plan.hpp"
+#include "cuda/arena.hpp"
+
+namespace sonar::cuda {
+
+class PlanTables {
+ public:
+  /// Queues the tables on `lane`. They live as long as this.
+  PlanTables(Machine& machine, int lane, const PingRequest& request);
+
+  bool serves(const PingRequest& request) const;
+  PingPlan& plan() { return plan_; }
+  const PingPlan& plan() const { return plan_; }
+  /// Noise of any kind: drawn when a ping first needs it. Queues the table on `lane`.
+  void need_noise(int lane);
+  /// The part of a ping's view that is the plan's.
+  void fill(PingView& view) const;
+
+ private:
+  std::shared_ptr<const SonarModel> model_;
+  Seed seed_;
+  PingPlan plan_;
+  NoiseTable noise_;
+  Arena memory_, noise_memory_;
+  PingView view_{};
+};
+
+}  // namespace sonar::cuda

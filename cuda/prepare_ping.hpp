@@ -1,0 +1,80 @@
+// The CPU's share of a ping that the device computes: which tiles are in view and what this ping makes of them, echoes that are
+// points, ghosts by way of mirrors, a few hundred numbers of the water and the receiver. Fills a PingView; nothing here is slow
+// but ghosts, which are summed by core/pipeline/multipath and sent as columns.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/pipeline/disturbances.hpp"
+#include "core/pipeline/multipath/multipath.hpp"
+#include "core/pipeline/ping_engine.hpp"
+#include "core/pipeline/ping_scalars.hpp"
+#include "core/pipeline/scatter.hpp"
+#include "core/pipeline/specular/specular.hpp"
+#include "cuda/arena.hpp"
+#include "cuda/cell_store.hpp"
+#include "cuda/flat_scene.hpp"
+#include "cuda/plan_tables.hpp"
+
+namespace sonar::cuda {
+
+/// A batch's place: its memory, its lane, its pings.
+struct BatchRoom {
+  BatchRoom(Machine& machine, int which_lane);
+
+  struct Ping {
+    sonar::Ping ping;   // sized, not filled
+    std::size_t index;  // of its request
+    std::shared_ptr<const PlanTables> plan;
+    Arena::Piece<std::uint8_t> codes;
+    Arena::Piece<float> pressure, beams;
+    Arena::Piece<FirstHit> truth;
+    Arena::Piece<std::uint32_t> counters;
+    PingStatistics statistics;
+  };
+  int lane;
+  Arena tables, work, results, cells;
+  std::vector<PingView> views;
+  std::vector<Ping> pings;
+};
+
+/// Scene and cells of an engine, and what it keeps between pings.
+class PingPreparer {
+ public:
+  PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene, const RayScene& rays, const simd::Kernels& kernels,
+               Parallel& pool, std::size_t cell_bytes);
+
+  /// Adds the ping to the room. Bodies must have been placed; `cells` must serve the request. `lane` is that of the tables and
+  /// cells that stay on the device. False: there is no room for its tiles; finish what is under way, forget_cells(), and again.
+  bool add(const PingRequest& request, std::size_t index, std::shared_ptr<PlanTables> plan, SurfaceCells& cells, int lane,
+           BatchRoom& room);
+  void forget_cells() { store_.clear(); }
+
+ private:
+  struct Making;
+  void place_fan(Making& m);
+  void find_points(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws);
+  void add_points(Making& m, std::span<const PointEcho> points, std::span<const PulseHeard> pulses);
+  bool find_tiles(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws, int lane);
+  void lay_out_tiles(Making& m, const std::vector<LawTable>& laws);
+  void add_water(Making& m);
+  void add_receiver(Making& m);
+  void take_results(Making& m);
+
+  std::shared_ptr<const Scene> scene_;
+  const RayScene& rays_;
+  const simd::Kernels& kernels_;
+  Parallel& pool_;
+  FlatScene flat_;
+  Arena scene_memory_;
+  TracerView tracer_;
+  CellStore store_;
+  MirrorEchoes mirror_echoes_;
+  MultipathWork multipath_;
+  std::vector<TileToSound> tiles_;
+  std::vector<const std::int16_t*> tile_cells_;
+};
+
+}  // namespace sonar::cuda

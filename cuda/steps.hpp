@@ -1,0 +1,76 @@
+// The steps of a ping by number: how many indices each has, and its body. The one place where the CUDA back end and the host
+// loops meet: both call run_step for every index below step_size, in the order of Step, with nothing but that order between them.
+#pragma once
+
+#include "cuda/beam_steps.hpp"
+#include "cuda/cell_steps.hpp"
+#include "cuda/column_steps.hpp"
+#include "cuda/fan_steps.hpp"
+
+namespace sonar::cuda {
+
+/// How many indices a step has for this ping; 0 = nothing to do.
+SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
+  const auto columns = static_cast<std::uint32_t>(p.sea.columns), elevations = static_cast<std::uint32_t>(p.sea.elevations);
+  const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
+  switch (step) {
+    case Step::trace_base:
+      return p.has_scene != 0 ? columns * elevations : 0;
+    case Step::refine:
+      return p.has_scene != 0 ? columns * (elevations - 1) : 0;
+    case Step::first_hits:
+      return p.first_hits != nullptr ? columns : 0;
+    case Step::scatter:
+    case Step::rank:
+    case Step::place:
+      return p.slots;
+    case Step::scan_chunks:
+    case Step::scan_columns:
+      return p.slots > 0 ? columns : 0;
+    case Step::sum_columns:
+      return columns * sum_parts;
+    case Step::ghosts:
+      return p.ghosts != nullptr ? columns * samples : 0;
+    case Step::volume:
+      return p.slices != nullptr ? columns : 0;
+    case Step::finish_columns:
+      return columns * samples;
+    case Step::point_weights:
+      return static_cast<std::uint32_t>(p.point_count + p.pulse_count) * beams;
+    case Step::couple:
+      return beams * samples;
+    case Step::crosstalk_sum:
+      return p.crosstalk != nullptr ? samples : 0;
+    case Step::crosstalk_add:
+      return p.crosstalk != nullptr ? beams * samples : 0;
+    case Step::receive:
+      return static_cast<std::uint32_t>(p.rows) * beams;
+    case Step::steps:
+      break;
+  }
+  return 0;
+}
+
+/// The body of a step, chosen when compiled: a kernel holds one only.
+template <Step step>
+SONAR_HD inline void run_step(const PingView& p, std::uint32_t i) {
+  if constexpr (step == Step::trace_base) trace_base(p, i);
+  if constexpr (step == Step::refine) refine(p, i);
+  if constexpr (step == Step::first_hits) first_hits(p, i);
+  if constexpr (step == Step::scatter) scatter(p, i);
+  if constexpr (step == Step::rank) rank(p, i);
+  if constexpr (step == Step::scan_chunks) scan_chunks(p, i);
+  if constexpr (step == Step::scan_columns) scan_columns(p, i);
+  if constexpr (step == Step::place) place(p, i);
+  if constexpr (step == Step::sum_columns) sum_columns(p, i);
+  if constexpr (step == Step::ghosts) ghosts(p, i);
+  if constexpr (step == Step::volume) volume(p, i);
+  if constexpr (step == Step::finish_columns) finish_columns(p, i);
+  if constexpr (step == Step::point_weights) point_weights(p, i);
+  if constexpr (step == Step::couple) couple(p, i);
+  if constexpr (step == Step::crosstalk_sum) crosstalk_sum(p, i);
+  if constexpr (step == Step::crosstalk_add) crosstalk_add(p, i);
+  if constexpr (step == Step::receive) receive(p, i);
+}
+
+}  // namespace sonar::cuda
