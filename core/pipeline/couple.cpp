@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <memory>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/beam_transform.hpp"
 
 namespace sonar {
 
@@ -17,6 +19,16 @@ void couple(const ColumnSignals& columns, const Coupling& coupling, const simd::
   out.stride = floats;
   out.data.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>((beams + 3) / 4 * 4));
 
+  if (coupling.transform) {
+    constexpr std::size_t cache_line = 64;
+    scratch.transform.resize(coupling.transform->work_floats() + cache_line / sizeof(float));
+    void* at = scratch.transform.data();
+    std::size_t room = scratch.transform.size() * sizeof(float);
+    auto* work = static_cast<float*>(std::align(cache_line, room - cache_line, at, room));
+    kernels.transform_beams(coupling.transform->tables(), columns.first_sample(0) + 2 * first_sample, columns.stride, floats,
+                            work, out.data.data(), floats);
+    return;
+  }
   scratch.window.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>(columns.columns));
   for (int k = 0; k < columns.columns; ++k) {
     const float* from = columns.first_sample(k) + 2 * first_sample;

@@ -7,6 +7,7 @@
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
+#include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/pulses/spectral_columns.hpp"
 
 namespace sonar {
@@ -19,8 +20,7 @@ constexpr int base_elevations = 48;              // docs/acoustics.md, section 2
 constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
 constexpr double unit_fan_over_width = 2.3;      // where there is no pattern to end it
 constexpr double widest_fan_rad = 1.4;
-constexpr double dropped_energy = 1e-4;  // of the coupling band, -40 dB
-constexpr double level_fade = 1.15;      // cell levels cross-fade over 15 % of range
+constexpr double level_fade = 1.15;  // cell levels cross-fade over 15 % of range
 
 double half_aperture_sine(const FrequencyMode& mode) { return std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2); }
 double beam_width_sine(const FrequencyMode& mode) {
@@ -39,6 +39,8 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pul
   while (fan.bins < 2048 && fan.bins < wanted) fan.bins *= 2;
   fan.first_tangent = static_cast<float>(-tangent);
   fan.bins_per_tangent = static_cast<float>(fan.bins / (2 * tangent));
+  for (int bin = 0; bin <= fan.bins; ++bin)
+    fan.tangent.push_back(fan.first_tangent + static_cast<float>(bin) / fan.bins_per_tangent);
   for (int e = 0; e < base_elevations; ++e) {
     // Nudged off round angles: a ray that lies exactly on the edge between two triangles can slip through.
     const double nudge = e == 0 || e == base_elevations - 1 ? 0 : 0.0137;
@@ -156,7 +158,8 @@ Columns make_columns(const FrequencyMode& mode, int beam_count) {
   return c;
 }
 
-Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared) {
+Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared,
+                       const CouplingOptions& options) {
   const ReceivePattern weight = receive_pattern(mode.pattern);
   Coupling c;
   // The smallest band whose dropped energy is below -40 dB.
@@ -168,9 +171,19 @@ Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const 
   }
   double dropped = 0;
   c.half_band = columns.count - 1;
-  while (c.half_band > 0 && dropped + energy[static_cast<std::size_t>(c.half_band)] < dropped_energy * total)
+  while (c.half_band > 0 && dropped + energy[static_cast<std::size_t>(c.half_band)] < options.dropped_energy * total)
     dropped += energy[static_cast<std::size_t>(c.half_band--)];
   c.weight_energy = total - dropped;
+  // Powers are summed without cancelling: there a transform's rounding, relative to the loudest, would show in the shadows.
+  if (options.transform && !squared && !weight.unit && beam_sines.size() > 1) {
+    auto tables = std::make_shared<const BeamTransformTables>(weight, columns, beam_sines);
+    const double band_cost = static_cast<double>(beam_sines.size()) * std::min(2 * c.half_band + 1, columns.count);
+    if (tables->cost() < band_cost) {
+      c.transform = std::move(tables);
+      c.half_band = columns.count - 1;
+      c.weight_energy = total;
+    }
+  }
 
   const int beams = static_cast<int>(beam_sines.size());
   const auto nearest_column = [&](int beam) {

@@ -30,6 +30,7 @@ struct Fan {
   double half_angle_rad = 0;
   float first_tangent = 0, bins_per_tangent = 0;
   int bins = 0;
+  std::vector<float> tangent;        // of every bin's lower edge, and of the end: bins + 1
   std::vector<float> elevation_rad;  // the base fan, from below to above
 };
 
@@ -39,11 +40,19 @@ struct CouplingPanel {
   int first_column = 0, count = 0;
   std::size_t weights = 0;  // offset into Coupling::weights, count x 4 values
 };
+class BeamTransformTables;
+
+/// How beams are made of columns.
+struct CouplingOptions {
+  double dropped_energy = 1e-4;  // of the band: -40 dB
+  bool transform = true;         // instead of a band that is wider than a transform is long, where beams allow it
+};
 struct Coupling {
   int half_band = 0;  // columns on either side that a beam listens to
   std::vector<CouplingPanel> panels;
   std::vector<float> weights;
-  double weight_energy = 1;  // sum_k W_jk^2 of the middle beam
+  std::shared_ptr<const BeamTransformTables> transform;  // when set: the same as the panels, then of all columns, for less
+  double weight_energy = 1;                              // sum_k W_jk^2 of the middle beam
 };
 
 class SpectralColumns;
@@ -106,6 +115,7 @@ std::string why_invalid(const PingRequest& request);
 // The parts of a plan, callable alone.
 Columns make_columns(const FrequencyMode& mode, int beam_count);
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count);
-Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared);
+Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared,
+                       const CouplingOptions& options = {});
 std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m);
 }  // namespace sonar

@@ -7,9 +7,14 @@ namespace sonar {
 namespace {
 
 /// Mean power of each row, beam after beam, turned so that a row's beams lie side by side.
-void detect(const BeamSignals& beams, const PingPlan& plan, int rows, int width, std::vector<float>& power) {
+void detect(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels& kernels, int rows, int width,
+            std::vector<float>& power) {
   const int per_row = plan.settings.samples_per_row;
   power.resize(static_cast<std::size_t>(rows) * static_cast<std::size_t>(width));
+  if (per_row == 1 && !plan.expected_power) {
+    kernels.detect(beams.data.data(), beams.stride, beams.beams, rows, power.data(), width);
+    return;
+  }
   constexpr int block = 16;  // beams at a time: their rows stay in the first cache while they are turned
   for (int from = 0; from < beams.beams; from += block) {
     const int to = std::min(from + block, beams.beams);
@@ -58,7 +63,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
   const int width = (s.beam_count + 15) / 16 * 16;
   const int bytes = s.format.bits / 8;
   if (!ping.beam_signal_upa.empty()) keep_signal(beams, ping.beam_signal_upa);
-  detect(beams, plan, rows, width, scratch.power);
+  detect(beams, plan, kernels, rows, width, scratch.power);
   scratch.codes.resize(static_cast<std::size_t>(width));
   const auto max_code = static_cast<float>(s.format.max_code);
   for (int row = 0; row < rows; ++row) {
@@ -69,6 +74,11 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
     kernels.quantise(power, plan.row_power_factor[static_cast<std::size_t>(first_row + row)], s.format.gamma / 2, max_code,
                      scratch.codes.data(), width);
     std::byte* out = ping.samples.data() + at * static_cast<std::size_t>(bytes);
+    if (bytes == 1) {
+      const float* codes = scratch.codes.data();
+      for (int j = 0; j < s.beam_count; ++j) out[j] = static_cast<std::byte>(static_cast<int>(codes[j]));
+      continue;
+    }
     for (int j = 0; j < s.beam_count; ++j) {
       // 2^32 - 1 is no float: compare before the conversion can overflow.
       const float code = scratch.codes[static_cast<std::size_t>(j)];

@@ -16,6 +16,27 @@ constexpr std::uint32_t fixed_fan_key = 0x66616eu;  // keeps these draws apart f
 
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
+/// Which columns the box round a tile's cells can reach: u = y / r (y / h for flat beams) over it, to second order.
+void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotation& sonar_from_object, const PingPlan& plan,
+                  TileToSound& out) {
+  out.first_column = 0, out.last_column = plan.columns.count;
+  const Vec3d half = to_double(tile.box_half_m), c = centre_from_sonar_m + sonar_from_object * to_double(tile.box_middle_m);
+  const double from_axis = plan.switches.conical ? length(c) : std::sqrt(c.x * c.x + c.y * c.y);
+  const double radius = length(half), nearest = from_axis - radius;
+  if (nearest < radius) return;
+  const double sine = c.y / from_axis;
+  // The gradient of u, in object axes; its second derivatives are at most 3 / r^2.
+  const double along = -sine / from_axis;
+  const Vec3d gradient = (1 / from_axis) * (transposed(sonar_from_object) *
+                                            Vec3d{along * c.x, 1 + along * c.y, plan.switches.conical ? along * c.z : 0});
+  const double spread = std::abs(gradient.x) * half.x + std::abs(gradient.y) * half.y + std::abs(gradient.z) * half.z +
+                        1.5 * radius * radius / (nearest * nearest) + 1e-6;
+  const double from = (plan.columns.first_sine - (sine + spread)) / plan.columns.spacing + 0.5;
+  const double to = (plan.columns.first_sine - (sine - spread)) / plan.columns.spacing + 1.5;
+  out.first_column = static_cast<int>(std::clamp(std::floor(from), 0.0, static_cast<double>(plan.columns.count)));
+  out.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(plan.columns.count)));
+}
+
 TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<const LawTable> laws, const BubbleLayer& bubbles,
                     const PingPlan& plan, const PingScalars& s) {
   TileToSound out;
@@ -50,19 +71,7 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<co
   seen.fade_out_to_m = t.level->fade_out_to_m;
   seen.fade_out_per_m = per_metre(t.level->full_to_m, t.level->fade_out_to_m);
 
-  const double radius = static_cast<double>(tile.half_edge_m) * 1.7320508;
-  out.first_column = 0, out.last_column = plan.columns.count;
-  if (range > 2 * radius) {
-    // |grad u| <= 1 / r (1 / h for flat beams), and r >= range - radius inside the cube.
-    const Vec3d c = at.from_sonar_m;
-    const double from_axis = plan.switches.conical ? range : std::sqrt(c.x * c.x + c.y * c.y);
-    const double sine = c.y / std::max(from_axis, 1e-9);
-    const double spread = from_axis > 2 * radius ? radius / (from_axis - radius) + 1e-6 : 2.0;
-    const double from = (plan.columns.first_sine - (sine + spread)) / plan.columns.spacing + 0.5;
-    const double to = (plan.columns.first_sine - (sine - spread)) / plan.columns.spacing + 1.5;
-    out.first_column = static_cast<int>(std::clamp(std::floor(from), 0.0, static_cast<double>(plan.columns.count)));
-    out.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(plan.columns.count)));
-  }
+  find_columns(tile, at.from_sonar_m, sonar_from_object, plan, out);
   return out;
 }
 

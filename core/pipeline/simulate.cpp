@@ -5,8 +5,11 @@
 namespace sonar {
 namespace {
 
-constexpr int group_columns = 48;   // columns one worker carries from rays to sums: their signals stay in the second cache
-constexpr int window_samples = 64;  // samples one worker carries from coupling to codes
+constexpr int traced_columns = 48;  // columns whose rays are refined together
+constexpr std::size_t group_bytes =
+    640 << 10;                            // signals and depth maps one worker carries from rays to sums: in the second cache
+constexpr int least_groups_a_worker = 3;  // so that all are done at about the same time
+constexpr int window_samples = 64;        // samples one worker carries from coupling to codes
 constexpr int echo_room = 16384;
 constexpr std::size_t most_prepared = 8;  // sets of settings kept ready
 
@@ -70,6 +73,7 @@ class PingUnderWay {
         crosstalk_(plan_, request.switches),
         bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world) {
     w_.columns.shape(plan_.columns.count, plan_.samples, plan_.taps);
+    group_columns_ = group_columns();
     w_.workers.resize(static_cast<std::size_t>(pool.threads()));
     w_.statistics = {};
     w_.first_hits.assign(request.switches.keep_truth ? static_cast<std::size_t>(plan_.columns.count) : 0, BeamTruth{});
@@ -86,7 +90,8 @@ class PingUnderWay {
 
  private:
   bool ray_is_scatterer() const { return plan_.fixed_fan > 0; }
-  int groups() const { return (plan_.columns.count + group_columns - 1) / group_columns; }
+  int group_columns() const;
+  int groups() const { return (plan_.columns.count + group_columns_ - 1) / group_columns_; }
   void sound_group(int first, int last, Workspace::PerWorker& mine);
   void scatter_hits_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch);
   void scatter_cells_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch);
@@ -106,9 +111,20 @@ class PingUnderWay {
   Leak leak_;
   Crosstalk crosstalk_;
   std::span<const Pose> bodies_;
+  int group_columns_ = traced_columns;
   std::vector<PointEcho> points_;
   std::vector<PulseHeard> other_sonars_;
 };
+
+/// How many columns a worker takes at once. Tiles that reach into several groups are looked at by each, so the more the better,
+/// as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
+int PingUnderWay::group_columns() const {
+  const auto column_bytes =
+      sizeof(float) * (static_cast<std::size_t>(w_.columns.stride) + static_cast<std::size_t>(plan_.fan.bins));
+  const int in_cache = static_cast<int>(group_bytes / column_bytes);
+  const int for_all = plan_.columns.count / (pool_.threads() > 1 ? least_groups_a_worker * pool_.threads() : 1);
+  return std::max(1, std::min(in_cache, for_all) / traced_columns) * traced_columns;
+}
 
 /// Surface cells that may be in view, sorted by the columns they reach; analytic points that are.
 void PingUnderWay::find_echo_sources() {
@@ -132,7 +148,7 @@ void PingUnderWay::find_echo_sources() {
   const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
   prepare_tiles(in_view, cells_, scene_.scene(), w_.laws, plan_, scalars_, pool_, w_.tiles);
-  sort_tiles(w_.tiles, group_columns, groups(), w_.tiles_by_group);
+  sort_tiles(w_.tiles, group_columns_, groups(), w_.tiles_by_group);
   watch.lap(Stage::cull);
   w_.statistics.tiles = in_view.size();
   w_.statistics.tiles_built = cells_.built_last_time();
@@ -151,8 +167,8 @@ void PingUnderWay::hear_by_mirrors() {
 /// Rays, echoes, pulses and noise, a group of columns at a time.
 void PingUnderWay::sound_columns() {
   pool_.for_each(static_cast<std::size_t>(groups()), [&](std::size_t g, int worker) {
-    const int first = static_cast<int>(g) * group_columns;
-    sound_group(first, std::min(first + group_columns, plan_.columns.count), w_.workers[static_cast<std::size_t>(worker)]);
+    const int first = static_cast<int>(g) * group_columns_;
+    sound_group(first, std::min(first + group_columns_, plan_.columns.count), w_.workers[static_cast<std::size_t>(worker)]);
   });
 }
 
@@ -192,11 +208,15 @@ void PingUnderWay::scatter_hits_of(int first, int last, Workspace::PerWorker& mi
 }
 
 void PingUnderWay::scatter_cells_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch) {
-  mine.statistics.rays += trace_fan(scene_, plan_, scalars_, first, last, mine.fan, mine.seen);
-  if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, first, last, w_.first_hits);
+  mine.seen.shape(first, last, plan_.fan.bins);
+  for (int from = first; from < last; from += traced_columns) {
+    const int to = std::min(from + traced_columns, last);
+    mine.statistics.rays += trace_fan(scene_, plan_, scalars_, from, to, mine.fan, mine.seen);
+    if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, from, to, w_.first_hits);
+  }
   watch.lap(Stage::trace);
   const simd::GroupView group = make_group_view(plan_, scalars_, mine.seen);
-  const auto& wanted = w_.tiles_by_group[static_cast<std::size_t>(first / group_columns)];
+  const auto& wanted = w_.tiles_by_group[static_cast<std::size_t>(first / group_columns_)];
   for (std::size_t next = 0; next < wanted.size();) {
     next = scatter(w_.tiles, wanted, next, group, kernels_, mine.echoes);
     mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);

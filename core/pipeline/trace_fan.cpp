@@ -145,12 +145,8 @@ class FanTracer {
   void draw(DepthMap& seen) {
     const Fan& fan = plan_.fan;
     const int n = elevations();
-    seen.first_column = first_;
-    seen.columns = last_ - first_;
-    seen.bins = fan.bins;
-    seen.inverse_x.resize(static_cast<std::size_t>(seen.columns) * static_cast<std::size_t>(fan.bins + 1));
-    for (int k = 0; k < seen.columns; ++k) {
-      float* map = seen.inverse_x.data() + static_cast<std::ptrdiff_t>(k) * (fan.bins + 1);
+    for (int k = 0; k < last_ - first_; ++k) {
+      float* map = seen.column(first_ + k);
       int bin = 0;
       for (std::int32_t i = k * n; at(i).next >= 0; i = at(i).next) {
         const Sample &a = at(i), &b = at(at(i).next);
@@ -158,10 +154,15 @@ class FanTracer {
         const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
         const float inverse_a = a.met.inverse_x, inverse_b = b.met.inverse_x, farther = std::min(inverse_a, inverse_b);
         const float per_tangent = (inverse_b - inverse_a) / (b.tangent - a.tangent);
-        for (; bin <= end; ++bin) {
-          const float tangent = fan.first_tangent + static_cast<float>(bin) / fan.bins_per_tangent;
-          map[bin] = a.edge_above ? farther : std::max(0.0f, inverse_a + per_tangent * (tangent - a.tangent));
+        if (bin > end) continue;
+        if (a.edge_above) {
+          std::fill(map + bin, map + end + 1, farther);
+        } else {
+          const float* __restrict tangent = fan.tangent.data();
+          for (int place = bin; place <= end; ++place)
+            map[place] = std::max(0.0f, inverse_a + per_tangent * (tangent[place] - a.tangent));
         }
+        bin = end + 1;
       }
     }
   }

@@ -17,6 +17,13 @@ namespace sonar {
 struct DepthMap {
   int first_column = 0, columns = 0, bins = 0;
   std::vector<float> inverse_x;  // [columns][bins + 1], 0 = nothing was hit
+
+  /// Of columns [first, last), to be drawn.
+  void shape(int first, int last, int bin_count) {
+    first_column = first, columns = last - first, bins = bin_count;
+    inverse_x.resize(static_cast<std::size_t>(columns) * static_cast<std::size_t>(bins + 1));
+  }
+  float* column(int k) { return inverse_x.data() + static_cast<std::ptrdiff_t>(k - first_column) * (bins + 1); }
 };
 
 /// Buffers of trace_fan that live from ping to ping; one per worker.
@@ -31,7 +38,7 @@ struct FanScratch {
   std::vector<FanInterval> open, halves;
 };
 
-/// Traces columns [first, last). Returns the number of rays.
+/// Traces columns [first, last) and draws them into the map, which has been shaped to hold them. Returns the number of rays.
 std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                       FanScratch& scratch, DepthMap& seen);
 

@@ -309,7 +309,7 @@ float GhostScatterer::beam_correlation(const Arrival& a, const Arrival& b) const
 
 std::vector<float> beam_correlation_over_columns(const PingPlan& plan) {
   const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
-  const int half = std::min(plan.coupling.half_band, plan.columns.count);
+  const int half = std::min(plan.coupling.half_band, plan.columns.count / 2);
   std::vector<double> w;
   for (int k = -half; k <= half; ++k) w.push_back(pattern(k * plan.columns.spacing));
   std::vector<float> correlation;

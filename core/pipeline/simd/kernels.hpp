@@ -1,4 +1,4 @@
-// The four hot loops of a ping, compiled once per instruction set from kernels.inl and picked at run time.
+// The hot loops of a ping, compiled once per instruction set from kernels.inl and picked at run time.
 // Plain arrays in, plain arrays out: what they compute is explained where they are called (scatter, synthesize, couple, receive).
 #pragma once
 
@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "core/pipeline/ping_engine.hpp"
+#include "core/pipeline/simd/beam_transform.hpp"
 #include "core/scene/cells/surface_cells.hpp"
 
 namespace sonar::simd {
@@ -70,6 +71,12 @@ struct Kernels {
                      int lead);
   /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.
   void (*couple_panel)(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats);
+  /// Beams of `floats` (a multiple of 32) interleaved values of each column, by way of a transform across the columns; `work`:
+  /// BeamTransformTables::work_floats(), 64-byte aligned.
+  void (*transform_beams)(const BeamTransform&, const float* columns, std::ptrdiff_t stride, int floats, float* work, float* out,
+                          std::ptrdiff_t out_stride);
+  /// power[row * width + beam] = |beams[beam * stride + 2 * row ...]|^2.
+  void (*detect)(const float* beams, std::ptrdiff_t stride, int beam_count, int rows, float* power, int width);
   /// codes[i] = min(max_code, round(max_code * (power[i] * gain)^half_gamma)), as float; n is a multiple of 16.
   void (*quantise)(const float* power, float gain, float half_gamma, float max_code, float* codes, int n);
 };

@@ -9,9 +9,11 @@ namespace sonar::simd {
 namespace avx2 {
 constexpr int lanes = 8;
 #include "core/pipeline/simd/kernels.inl"
+#include "core/pipeline/simd/transform.inl"
 }  // namespace avx2
 
 extern const Kernels avx2_kernels;
-const Kernels avx2_kernels{"avx2", avx2::scatter_tile, avx2::accumulate, avx2::couple_panel, avx2::quantise};
+const Kernels avx2_kernels{"avx2",       avx2::scatter_tile, avx2::accumulate, avx2::couple_panel, avx2::transform_beams,
+                           avx2::detect, avx2::quantise};
 
 }  // namespace sonar::simd

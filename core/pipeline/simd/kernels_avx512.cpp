@@ -9,9 +9,12 @@ namespace sonar::simd {
 namespace avx512 {
 constexpr int lanes = 16;
 #include "core/pipeline/simd/kernels.inl"
+#include "core/pipeline/simd/transform.inl"
 }  // namespace avx512
 
 extern const Kernels avx512_kernels;
-const Kernels avx512_kernels{"avx512", avx512::scatter_tile, avx512::accumulate, avx512::couple_panel, avx512::quantise};
+const Kernels avx512_kernels{
+    "avx512",       avx512::scatter_tile, avx512::accumulate, avx512::couple_panel, avx512::transform_beams,
+    avx512::detect, avx512::quantise};
 
 }  // namespace sonar::simd

@@ -9,10 +9,12 @@ namespace sonar::simd {
 namespace portable {
 constexpr int lanes = 4;
 #include "core/pipeline/simd/kernels.inl"
+#include "core/pipeline/simd/transform.inl"
 }  // namespace portable
 
 extern const Kernels portable_kernels;
-const Kernels portable_kernels{"portable", portable::scatter_tile, portable::accumulate, portable::couple_panel,
-                               portable::quantise};
+const Kernels portable_kernels{
+    "portable",       portable::scatter_tile, portable::accumulate, portable::couple_panel, portable::transform_beams,
+    portable::detect, portable::quantise};
 
 }  // namespace sonar::simd

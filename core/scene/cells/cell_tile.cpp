@@ -112,6 +112,15 @@ void pack(const std::vector<Cell>& cells, CellTile& tile) {
   tile.count = (n + CellTile::block - 1) / CellTile::block * CellTile::block;
   tile.stride = tile.count;
   tile.data = std::make_unique<std::int16_t[]>(static_cast<std::size_t>(tile.stride) * CellTile::columns);
+  Vec3d low = cells.front().from_centre, high = low;
+  for (const Cell& c : cells) {
+    const Vec3d p = c.from_centre;
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const double rounding = static_cast<double>(tile.position_unit_m);
+  tile.box_middle_m = to_float(0.5 * (low + high));
+  tile.box_half_m = to_float(0.5 * (high - low) + Vec3d{rounding, rounding, rounding});
   const auto put = [&](CellTile::Column c, int i, std::int16_t v) {
     tile.data[static_cast<std::size_t>(c * tile.stride + i)] = v;
   };

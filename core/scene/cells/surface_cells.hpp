@@ -24,6 +24,7 @@ struct CellTile {
   int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
   Vec3d centre_m;                                     // object coordinates
   float half_edge_m = 0;                              // of the cube
+  Vec3 box_middle_m, box_half_m;                      // the box round its cells, from the centre, object axes
   float position_unit_m = 0;
   float weight_unit = 0;  // xi * sqrt(cell area) [m] per count
   int count = 0;          // padded to a multiple of CellTile::block

@@ -1,0 +1,135 @@
+#include "core/pipeline/beam_transform.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/pipeline/ping_plan.hpp"
+
+namespace sonar {
+namespace {
+
+/// The smallest size of at least n whose only prime factors are 2 and 3.
+int smooth_size(int n) {
+  for (int size = std::max(n, 4);; ++size) {
+    int rest = size;
+    for (const int factor : {2, 3})
+      while (rest % factor == 0) rest /= factor;
+    if (rest == 1) return size;
+  }
+}
+
+void append_turns(int size, int count, int most, std::vector<float>& turns) {
+  for (int i = 0; i < count; ++i)
+    for (int m = 1; m <= most; ++m) {
+      const double angle = -2 * pi * static_cast<double>(static_cast<long>(i) * m % size) / size;
+      turns.push_back(static_cast<float>(std::cos(angle)));
+      turns.push_back(static_cast<float>(std::sin(angle)));
+    }
+}
+
+/// Solves a x = b, a symmetric and positive: Gauss without pivots.
+std::vector<double> solve(std::vector<double> a, std::vector<double> b) {
+  const std::size_t n = b.size();
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t i = k + 1; i < n; ++i) {
+      const double f = a[i * n + k] / a[k * n + k];
+      for (std::size_t j = k; j < n; ++j) a[i * n + j] -= f * a[k * n + j];
+      b[i] -= f * b[k];
+    }
+  for (std::size_t k = n; k-- > 0;) {
+    for (std::size_t j = k + 1; j < n; ++j) b[k] -= a[k * n + j] * b[j];
+    b[k] /= a[k * n + k];
+  }
+  return b;
+}
+
+/// Weights of `taps` values at 0, 1, ... that give the value at `place` of anything whose spectrum lies within +-band / 2 cycles
+/// a step, in the least squares.
+std::vector<double> weights_between(int taps, double place, double band) {
+  constexpr double ridge = 1e-13;  // the matrix is nearly singular: that is why few taps do
+  std::vector<double> matrix, right;
+  for (int a = 0; a < taps; ++a) {
+    for (int b = 0; b < taps; ++b) matrix.push_back(sinc(band * (a - b)) + (a == b ? ridge : 0));
+    right.push_back(sinc(band * (a - place)));
+  }
+  return solve(std::move(matrix), std::move(right));
+}
+
+}  // namespace
+
+BeamTransformTables::BeamTransformTables(const ReceivePattern& pattern, const Columns& columns,
+                                         const std::vector<double>& beam_sines) {
+  tables_.columns = columns.count;
+  tables_.beams = static_cast<int>(beam_sines.size());
+  tables_.quarter = smooth_size((columns.count + 1) / 2);
+  plan_passes();
+  weigh(pattern, columns.spacing);
+  read_between(pattern.aperture_wavelengths * columns.spacing, columns, beam_sines);
+  tables_.split = split_.data();
+  tables_.response = response_.data();
+  tables_.first_column = first_column_.data();
+  tables_.between = between_.data();
+}
+
+void BeamTransformTables::plan_passes() {
+  append_turns(4 * tables_.quarter, tables_.quarter, 3, split_);
+  for (int size = tables_.quarter; size > 1;) {
+    const int radix = size % 4 == 0 ? 4 : size % 3 == 0 ? 3 : 2;
+    append_turns(size, size / radix, radix - 1, turns_.emplace_back());
+    tables_.level[tables_.levels++] = {radix, size, nullptr};
+    size /= radix;
+  }
+  for (int l = 0; l < tables_.levels; ++l) tables_.level[l].turns = turns_[static_cast<std::size_t>(l)].data();
+}
+
+/// The transform of the weights, which are even: real. Those of columns half a line apart are wanted by no beam.
+void BeamTransformTables::weigh(const ReceivePattern& pattern, double spacing) {
+  const int size = 4 * tables_.quarter;
+  std::vector<double> cosine, weight;
+  for (int i = 0; i < size; ++i) cosine.push_back(std::cos(2 * pi * i / size));
+  for (int d = 0; d <= size / 2; ++d) weight.push_back(pattern(d * spacing) * (d == 0 || d == size / 2 ? 1 : 2));
+  for (int k = 0; k < 4; ++k)
+    for (int place = 0; place < tables_.quarter; ++place) {
+      int frequency = 0, step = 1, rest = place;
+      for (int l = 0; l < tables_.levels; ++l) {
+        const int part = tables_.level[l].size / tables_.level[l].radix;
+        frequency += step * (rest / part);
+        rest %= part;
+        step *= tables_.level[l].radix;
+      }
+      frequency = 4 * frequency + k;
+      double sum = 0;
+      for (std::size_t d = 0; d < weight.size(); ++d)
+        sum += weight[d] * cosine[d * static_cast<std::size_t>(frequency) % static_cast<std::size_t>(size)];
+      response_.push_back(static_cast<float>(sum / size));
+    }
+}
+
+void BeamTransformTables::read_between(double aperture_in_spacings, const Columns& columns,
+                                       const std::vector<double>& beam_sines) {
+  const auto place_of = [&](double sine) { return (columns.first_sine - sine) / columns.spacing; };
+  const bool on_columns = std::all_of(beam_sines.begin(), beam_sines.end(),
+                                      [&](double sine) { return std::abs(place_of(sine) - std::round(place_of(sine))) < 1e-6; });
+  tables_.taps = on_columns ? 1 : aperture_in_spacings < 0.25 ? 8 : 10;
+  for (const double sine : beam_sines) {
+    const double place = place_of(sine);
+    const int first = on_columns ? static_cast<int>(std::lround(place))
+                                 : std::clamp(static_cast<int>(std::floor(place)) - tables_.taps / 2 + 1, 0,
+                                              std::max(0, columns.count - tables_.taps));
+    first_column_.push_back(first);
+    if (on_columns)
+      between_.push_back(1);
+    else
+      for (const double w : weights_between(tables_.taps, place - first, aperture_in_spacings))
+        between_.push_back(static_cast<float>(w));
+  }
+}
+
+double BeamTransformTables::cost() const {
+  const double q = tables_.quarter;
+  double pass = 0;
+  for (int l = 0; l < tables_.levels; ++l) pass += q * (tables_.level[l].radix == 4 ? 7 : tables_.level[l].radix == 3 ? 9 : 4);
+  return 4 * (2 * pass + 2 * q) + 40 * q + 2.0 * tables_.taps * tables_.beams;
+}
+
+}  // namespace sonar
