@@ -44,6 +44,12 @@ ITEMS = {
         ("unit-exposure", "exposure of the systemd unit, systemd-analyze security", "at most 1.5"),
         ("driver-restart", "restart after 4 s under oculus_driver of ENSTA: it publishes again", "within 15 s"),
     ],
+    "Whole missions": [
+        ("mission-digest", "10 minutes of a trajectory in stepped time: digests of two runs, one of them recorded", "equal"),
+        ("mission-pace", "the same: pace", "faster than real time"),
+        ("mission-replay", "its .oculus recording, served by sonard replay, received by our client", "byte for byte the same"),
+        ("trajectory-load", "a trajectory of an hour at 100 Hz, 360,000 lines: read", "less than 1 s"),
+    ],
     "Bytes from outside": [
         ("dissector", "a recorded run read by tshark with our dissector and by our decoder", "equal, field by field"),
         ("asan", "functional suite but for what computes for long, under the address and undefined-behaviour sanitizers",

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What takes too long for every run, and is run before a release: the loads, full fuzzing, the whole functional suite under the
-# address and undefined-behaviour sanitizers, and what has threads under the thread sanitizer. Run by ./test.sh --long, or alone;
-# two to four hours on two cores. Every step is run, also after one that failed; a table ends it.
+# What takes too long for every run, and is run before a release: the loads, a mission of ten minutes, full fuzzing, the whole
+# functional suite under the address and undefined-behaviour sanitizers, and what has threads under the thread sanitizer. Run by
+# ./test.sh --long, or alone; two to four hours on two cores. Every step is run, also after one that failed; a table ends it.
 # usage: tests/tools/long_checks.sh [STEP...]
 #   SONARD_FUZZ_RUNS, SONARD_FUZZ_SECONDS   see tests/tools/fuzz.sh
 #   SONARD_RELIABILITY                      where figures are kept (build/reliability)
@@ -24,11 +24,12 @@ step() {  # step NAME COMMAND...: runs it, when wished, and remembers how it end
 }
 
 step load tests/load/load.sh
+step mission env SONARD_BUILD=build/release python3 -B tests/acceptance/mission_test.py --long
 step tsan tests/tools/sanitized_tests.sh tsan
 step asan tests/tools/sanitized_tests.sh asan-all
 step fuzz tests/tools/fuzz.sh
 
-[ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are load, tsan, asan, fuzz" >&2; exit 64; }
+[ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are load, mission, tsan, asan, fuzz" >&2; exit 64; }
 say "long checks"
 printf '%s\n' "${rows[@]}"
 echo "figures: $SONARD_RELIABILITY"

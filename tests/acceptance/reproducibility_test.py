@@ -1,0 +1,117 @@
+"""The bytes of a stepped run depend on the configuration and on what its clients ask for, and on nothing else: not on threads,
+onlookers or recordings, nor on what became of a run before. Restarted further on in the trajectory it shows the same pictures."""
+import hashlib
+import signal
+import subprocess
+import time
+import unittest
+
+import mcap_checker
+from mission import RATE_HZ, Mission, Onlooker
+from recording_test import oculus_log_messages
+from running_sonard import SONARCTL, run
+
+SECONDS, PINGS = 20, 24
+
+
+class Reproducibility(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        with Mission(SECONDS, PINGS) as mission:
+            cls.plain = mission.fly()
+        assert mission.code == 0
+
+    def expect_the_same(self, mission, client=1):
+        self.assertEqual(mission.code, 0)
+        self.assertEqual(mission.taken, PINGS)
+        self.assertEqual(mission.digests[client], self.plain.digests[1])
+        self.assertEqual(mission.sha256, self.plain.sha256, "the digest is of what arrives")
+
+    def test_again_and_with_any_number_of_threads(self):
+        self.assertEqual(self.plain.digests, {1: self.plain.sha256})
+        self.assertEqual(len({hashlib.sha256(str(p.image).encode()).digest() for p in self.plain.pictures()}), PINGS, "things move")
+        for threads in (1, 2, 4):
+            with self.subTest(threads=threads), Mission(SECONDS, PINGS, "--threads", threads) as mission:
+                self.expect_the_same(mission.fly(keep=False))
+
+    def test_others_may_look_on(self):
+        for comes_at in (0, 5):
+            with self.subTest(comes_at=comes_at), Mission(SECONDS, PINGS) as mission:
+                onlookers = []
+                come = lambda m=mission, o=onlookers: o.append(Onlooker(m.daemon.address))
+                if comes_at == 0:
+                    come()
+                    mission.fly(keep=False)
+                else:
+                    mission.fly(keep=False, after=(comes_at, come))
+                onlookers[0].end()
+                self.assertGreater(onlookers[0].pings, 0)
+                self.expect_the_same(mission, client=2 if comes_at == 0 else 1)
+        with Mission(SECONDS, PINGS) as mission:
+            events = subprocess.Popen([str(SONARCTL), "events", "--pings", "--clients", "--json", "--control", mission.control],
+                                      stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+            mission.fly(keep=False, after=(3, lambda: mission.steer("status")))
+            events.terminate()
+            told = events.communicate(timeout=60)[0]
+            self.assertIn('"ping"', told)
+            self.expect_the_same(mission)
+
+    def test_recording_changes_nothing_and_has_every_byte(self):
+        with Mission(SECONDS, PINGS, record=("run.mcap", "run.oculus", "run.pcap")) as mission:
+            mission.fly()
+            self.expect_the_same(mission)
+            kept = oculus_log_messages(mission.recorded("run.oculus").read_bytes())
+            self.assertEqual(b"".join(kept), self.plain.stream)
+            by_topic = {}
+            for topic, _, data in mcap_checker.check(mission.recorded("run.mcap").read_bytes()).messages:
+                by_topic.setdefault(topic, []).append(data)
+            self.assertEqual(b"".join(by_topic["/front/device"]), self.plain.stream)
+            for topic in ("image", "pose", "truth"):
+                self.assertEqual(len(by_topic[f"/front/{topic}"]), PINGS, topic)
+        with Mission(SECONDS, PINGS, record=("run.mcap",)) as mission:
+            mission.fly(keep=False, after=(10, lambda: mission.steer("recording", "start", "rest.mcap")))
+            self.expect_the_same(mission)
+            again = {}
+            for topic, _, data in mcap_checker.check(mission.recorded("run.mcap").read_bytes()).messages:
+                again.setdefault(topic, []).append(data)
+            self.assertEqual(again.pop("/front/status")[0][:16], by_topic.pop("/front/status")[0][:16])  # each run has its address
+            self.assertEqual(again, by_topic, "the file too is the same")
+            mcap_checker.check(mission.recorded("rest.mcap").read_bytes())
+
+    def test_killed_in_the_middle_and_started_again(self):
+        def kill():
+            deadline = time.monotonic() + 60
+            while killed.recorded("run.oculus").stat().st_size < 100_000 and time.monotonic() < deadline:
+                time.sleep(0.01)  # the recording has a ping or two
+            killed.daemon.process.send_signal(signal.SIGKILL)
+
+        with Mission(SECONDS, PINGS, record=("run.oculus",)) as killed:
+            killed.fly(after=(9, kill))
+            self.assertEqual(killed.code, -signal.SIGKILL)
+            self.assertGreaterEqual(killed.taken, 9)
+            self.assertTrue(self.plain.stream.startswith(killed.stream), "what had come is the beginning")
+            rest = killed.folder / "rest.raw"
+            done = run(SONARCTL, "record", "--from", killed.recorded("run.oculus"), "--raw", rest)
+            self.assertIn(done.returncode, (0, 65), done.stderr)  # 65: the last message is cut short
+            self.assertTrue(self.plain.stream.startswith(rest.read_bytes()), "its recording can be read as far as it goes")
+            self.assertGreater(rest.stat().st_size, 0)
+        with Mission(SECONDS, PINGS) as again:
+            self.expect_the_same(again.fly(keep=False))
+
+    def test_started_further_on_it_shows_the_same_pictures(self):
+        """Ping numbers and stamps count from the start of a run, and what the receiver adds with them: it is off here."""
+        quiet = ("--noise", "off", "--leak", "off")
+        later = 10
+        with Mission(SECONDS, PINGS, *quiet) as whole:
+            expected = whole.fly().pictures()[later:]
+        with Mission(SECONDS, PINGS - later, *quiet, start_s=later / RATE_HZ) as rest:
+            found = rest.fly().pictures()
+        self.assertEqual(len(found), PINGS - later)
+        for number, (a, b) in enumerate(zip(expected, found)):
+            self.assertTrue(b.image == a.image, f"ping {later + number}")
+            self.assertEqual((b.heading_deg, b.pitch_deg, b.roll_deg, b.pressure), (a.heading_deg, a.pitch_deg, a.roll_deg, a.pressure))
+            self.assertEqual(a.id, b.id + later)
+
+
+if __name__ == "__main__":
+    unittest.main()
