@@ -1,5 +1,6 @@
 #include "daemon/render/vehicle_path.hpp"
 
+#include "core/motion/jump.hpp"
 #include "daemon/world.hpp"
 
 namespace sonar::render {
@@ -27,7 +28,8 @@ Twist sonar_twist_at(const VehiclePath& path, const Pose& mount, Time at) {
   PoseHistory::Motion moves;
   if (path.trajectory) {
     const motion::Motion told = path.trajectory->at(at - path.begins_at).moves;
-    moves = {told.velocity_mps, told.angular_velocity_radps};
+    if (!motion::is_jump(told.velocity_mps, told.angular_velocity_radps))
+      moves = {told.velocity_mps, told.angular_velocity_radps};
   } else if (path.orbits) {
     moves = circling(path.initial).vehicle_moves(0, at);
   }

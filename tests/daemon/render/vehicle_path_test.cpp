@@ -39,6 +39,16 @@ TEST(VehiclePath, GoesOnBetweenTheLinesAndTellsItsMotion) {
   expect_near(swinging.velocity_mps, {0.5, pi / 4, 0}, 1e-12);
 }
 
+TEST(VehiclePath, AJumpBetweenLinesIsNoMotion) {
+  const VehiclePath path = path_of("t,x,y,z,yaw\n0,0,0,0,0\n1,29,0,0,0\n2,60,0,0,0\n2.1,60,0,0,90\n3,60,0,0,90\n");
+  expect_near(sonar_twist_at(path, {}, at(0.5)).velocity_mps, {29, 0, 0});
+  const Twist far = sonar_twist_at(path, {{1, 0, 0}, {}}, at(1.5)), turned = sonar_twist_at(path, {{1, 0, 0}, {}}, at(2.05));
+  expect_near(far.velocity_mps, {0, 0, 0});
+  expect_near(turned.velocity_mps, {0, 0, 0});
+  expect_near(turned.angular_rate_radps, {0, 0, 0});
+  expect_near(vehicle_at(path, at(1.5)).position_m, {44.5, 0, 0});  // where it is stays what the lines say
+}
+
 TEST(VehiclePath, KeepsTheTimesOfItsFile) {
   const VehiclePath path = path_of("1403636579.763555584 1 0 0 0 0 0 1\n1403636580.763555584 3 0 0 0 0 0 1\n");
   const std::vector<Time> times = times_of(path);

@@ -1,0 +1,16 @@
+// What of a motion is none: poses too far apart in too little time are a jump, not something that carries a sonar and shifts its
+// echoes. The one rule for what is played, what is sent (daemon/world), and what is rendered.
+#pragma once
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::motion {
+
+inline constexpr double fastest_mps = 30, fastest_radps = 10;
+
+/// Faster than that, or no number at all.
+inline bool is_jump(Vec3d velocity_mps, Vec3d angular_velocity_radps) {
+  return !(length(velocity_mps) <= fastest_mps && length(angular_velocity_radps) <= fastest_radps);
+}
+
+}  // namespace sonar::motion
