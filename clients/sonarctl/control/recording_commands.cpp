@@ -1,0 +1,61 @@
+// recording on the command line: files that a running sonard writes itself, on its own computer.
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "clients/sonarctl/argument_checks.hpp"
+#include "clients/sonarctl/command_line.hpp"
+#include "clients/sonarctl/control/control_commands.hpp"
+
+namespace sonar::clients {
+namespace {
+
+struct RecordingArguments {
+  ControlOptions control;
+  control::StartRecording start;
+  control::StopRecording stop;
+  std::function<Result<void>()> what;
+};
+
+CLI::App& add_command(CLI::App& recording, const std::string& name, const std::string& help, RecordingArguments& arguments) {
+  CLI::App& command = *recording.add_subcommand(name, help);
+  command.add_option("--control", arguments.control.address, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)")
+      ->check(address());
+  command.add_option("--token-file", arguments.control.token_file, "the daemon's control.token_file, when it has one");
+  return command;
+}
+
+}  // namespace
+
+Run add_recording(CLI::App& app) {
+  CLI::App& recording =
+      *app.add_subcommand("recording", "files that a running sonard writes itself, with true poses and what each beam meets");
+  recording.require_subcommand(1);
+  recording.footer(
+      "examples:\n"
+      "  sonarctl recording start run-1.mcap          in the folder that its configuration names\n"
+      "  sonarctl recording stop\n"
+      "sonarctl status shows what is recorded; sonarctl record writes files here, as a client of the sonar");
+  const auto arguments = std::make_shared<RecordingArguments>();
+  RecordingArguments& a = *arguments;
+
+  CLI::App& start = add_command(recording, "start", "a new file; its end says the kind: .mcap, .pcap, .oculus, .raw", a);
+  start.add_option("FILE", a.start.file, "its name, without a folder")->required();
+  start.add_option("--sonar", a.start.sonar, "which; may be left out when there is one");
+  start.footer("examples:\n  sonarctl recording start run-1.mcap\n  sonarctl recording start left.oculus --sonar left");
+  start.callback([&a] {
+    a.what = [&a] { return steer(a.control, a.start, a.start.file + " is being recorded; sonarctl status shows how it goes"); };
+  });
+
+  CLI::App& stop = add_command(recording, "stop", "finish a file, or all of them", a);
+  stop.add_option("FILE", a.stop.file, "which; left out: all");
+  stop.footer("examples:\n  sonarctl recording stop\n  sonarctl recording stop run-1.mcap");
+  stop.callback([&a] {
+    a.what = [&a] {
+      return steer(a.control, a.stop,
+                   (a.stop.file.empty() ? "all recordings are" : a.stop.file + " is") + std::string(" complete"));
+    };
+  });
+  return [arguments] { return arguments->what(); };
+}
+
+}  // namespace sonar::clients
