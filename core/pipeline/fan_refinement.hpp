@@ -56,10 +56,11 @@ struct FanInterval {
 template <class Sample>
 class FanRefinement {
  public:
-  /// The buffers live with the caller, from ping to ping.
+  /// The buffers live with the caller, from ping to ping. `first_column`: the plan's column that the intervals count from, so
+  /// that what a column sees does not depend on those it is traced with.
   FanRefinement(std::vector<Sample>& samples, std::vector<FanInterval>& open, std::vector<FanInterval>& halves,
-                float pulse_width_m)
-      : samples_(samples), open_(open), halves_(halves), tolerance_m_(pulse_width_m) {
+                float pulse_width_m, int first_column)
+      : samples_(samples), open_(open), halves_(halves), tolerance_m_(pulse_width_m), first_column_(first_column) {
     open_.clear();
   }
 
@@ -86,7 +87,7 @@ class FanRefinement {
   float middle_rad(const FanInterval& v) {
     const float below = at(v.below).elevation_rad, above = at(v.above).elevation_rad;
     if (!meet_the_same(at(v.below), at(v.above))) return 0.5f * (below + above);
-    const float turns = golden_turn * static_cast<float>(v.column) + 0.5f * static_cast<float>(v.depth);
+    const float turns = golden_turn * static_cast<float>(first_column_ + v.column) + 0.5f * static_cast<float>(v.depth);
     const float part = 0.5f + widest_skew * (2 * (turns - std::floor(turns)) - 1);
     return below + part * (above - below);
   }
@@ -156,6 +157,7 @@ class FanRefinement {
   std::vector<Sample>& samples_;
   std::vector<FanInterval>&open_, &halves_;
   float tolerance_m_;
+  int first_column_;
 };
 
 }  // namespace sonar

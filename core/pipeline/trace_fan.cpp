@@ -123,7 +123,7 @@ class FanTracer {
   }
 
   void refine() {
-    FanRefinement<Sample> refinement(s_.samples, s_.open, s_.halves, tolerance_m_);
+    FanRefinement<Sample> refinement(s_.samples, s_.open, s_.halves, tolerance_m_, first_);
     const int n = elevations();
     for (int e = 0; e + 1 < n; ++e)
       for (int k = 0; k < last_ - first_; ++k) refinement.consider_base(k * n + e, k * n + e + 1, k);

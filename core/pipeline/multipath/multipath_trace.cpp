@@ -156,7 +156,7 @@ class ColumnsTracer {
   }
 
   void refine() {
-    FanRefinement<Chain> refinement(samples_, open_, halves_, static_cast<float>(plan_.pulse_width_m));
+    FanRefinement<Chain> refinement(samples_, open_, halves_, static_cast<float>(plan_.pulse_width_m), first_);
     for (std::int32_t e = 0; e + 1 < elevations(); ++e)
       for (int k = 0; k < columns(); ++k) refinement.consider_base(k * elevations() + e, k * elevations() + e + 1, k);
     const auto trace = [&](std::span<const FanInterval> intervals) {
