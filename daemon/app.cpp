@@ -13,8 +13,9 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
     : config_(std::move(config)),
       options_(std::move(options)),
       log_(log),
-      clock_(config_.clock == ClockMode::stepped),
+      clock_(config_.clock != ClockMode::realtime),
       world_(pose_rules(config_), vehicles_of(config_), bodies_of(*scene, config_), clock_.now()),
+      stepped_time_(config_.clock, clock_, world_),
       simulator_(io_, make_engine(scene), compute_niceness),
       changes_(
           io_, simulator_, std::move(scene), make_engine, compute_niceness,
@@ -41,8 +42,8 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                  stop("the engine failed");
                }},
       fleet_(context_),
-      operations_({config_, clock_, world_, simulator_, changes_, admission_, pose_intake_, fleet_, events_, control_, log_,
-                   options_.load_scene}),
+      operations_({config_, clock_, world_, stepped_time_, simulator_, changes_, admission_, pose_intake_, fleet_, events_,
+                   control_, log_, [this] { on_change(); }, options_.load_scene}),
       control_(io_, config_.control, config_.limits, operations_, events_, pose_intake_, log_),
       signals_(io_),
       house_timer_(io_),
@@ -147,16 +148,36 @@ void App::look() {
 
 void App::step_time() {
   if (changes_.busy()) return;  // a change of the scene takes effect before the next step
+  skip_time();
   std::list<Device>& devices = fleet_.devices();
   if (!std::all_of(devices.begin(), devices.end(), [](const Device& d) { return d.settled(); })) return;
-  if (enough_served()) return stop("served " + std::to_string(options_.exit_after_pings) + " pings");
   Device* next = nullptr;
   for (Device& d : devices)
     if (d.next_tick() && (next == nullptr || *d.next_tick() < *next->next_tick())) next = &d;
-  if (next == nullptr) return;
-  clock_.advance_to(*next->next_tick());
-  for (Device& d : devices) d.tick_sessions(clock_.now());
+  const std::optional<Time> due = next != nullptr ? next->next_tick() : std::nullopt;
+  const SteppedTime::Bound bound = stepped_time_.bound();
+  const bool may_tick = due && *due <= bound.last_tick;
+  if (!may_tick && bound.then) advance_time(*bound.then);
+  stepped_time_.answer(due);
+  if (enough_served()) return stop("served " + std::to_string(options_.exit_after_pings) + " pings");
+  if (!may_tick) return;
+  advance_time(stepped_time_.tick_at(*due));
   next->step(clock_.now());
+}
+
+void App::advance_time(Time to) {
+  if (to <= clock_.now()) return;
+  clock_.advance_to(to);
+  for (Device& d : fleet_.devices()) d.tick_sessions(clock_.now());
+}
+
+/// Stamps that we follow began, or jumped ahead.
+void App::skip_time() {
+  const auto skipped = world_.take_skipped();
+  if (skipped.count() == 0) return;
+  clock_.advance_to(clock_.now() + skipped);
+  for (Device& d : fleet_.devices()) d.skip(skipped);
+  log_.info("time follows the poses: it jumps ahead by " + std::to_string(seconds(skipped)) + " s");
 }
 
 asio::awaitable<void> App::keep_house() {

@@ -25,6 +25,7 @@
 #include "daemon/scene_changes.hpp"
 #include "daemon/simulator.hpp"
 #include "daemon/start_engine.hpp"
+#include "daemon/stepped_time.hpp"
 #include "daemon/world.hpp"
 
 namespace sonar {
@@ -78,6 +79,8 @@ class App {
   void on_change();
   void look();  // after a change: end, or take the next step of stepped time
   void step_time();
+  void skip_time();
+  void advance_time(Time to);
   bool enough_served() const;
   void wait_for_signal();
   void reload();  // reload.cpp, as the next
@@ -92,6 +95,7 @@ class App {
   Clock clock_;
   Events events_;
   World world_;
+  SteppedTime stepped_time_;
   Simulator simulator_;
   SceneChanges changes_;
   Admission admission_;

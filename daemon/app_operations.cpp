@@ -36,8 +36,9 @@ void AppOperations::perform(const control::Operation& operation, const Sender& s
   if (std::holds_alternative<control::GetStatus>(operation)) {
     done({OperationResult::Code::done, {}, status()});
   } else if (const auto* sample = std::get_if<control::PoseSample>(&operation)) {
-    const std::string refusal = parts_.poses.take(*sample, sender);
-    done(refusal.empty() ? OperationResult{} : refused(refusal));
+    take(*sample, sender, std::move(done));
+  } else if (const auto* asked = std::get_if<control::Step>(&operation)) {
+    step(*asked, std::move(done));
   } else if (const auto* sonar = std::get_if<control::SetSonar>(&operation)) {
     done(carry_out(*sonar, sender));
   } else if (const auto* environment = std::get_if<control::SetEnvironment>(&operation)) {
@@ -54,6 +55,31 @@ void AppOperations::perform(const control::Operation& operation, const Sender& s
   } else {
     set(std::get<control::SetObject>(operation), sender, std::move(done));
   }
+}
+
+// ---- poses and time
+
+/// Where time follows the poses, the answer comes when the pings are out that this one made possible: who waits for it runs in
+/// step with the sonars.
+void AppOperations::take(const control::PoseSample& sample, const Sender& sender, Done done) {
+  const std::string refusal = parts_.poses.take(sample, sender);
+  if (!refusal.empty()) return done(refused(refusal));
+  if (sample.of != control::PoseSample::Of::vehicle || parts_.config.clock != ClockMode::follow) return done({});
+  parts_.time.wait([done = std::move(done)](Time) { done({}); });
+}
+
+void AppOperations::step(const control::Step& asked, Done done) {
+  if (const std::string why = parts_.time.step(asked.dt_s); !why.empty()) return done(refused(why));
+  parts_.time.wait([this, before = pings_made(), done = std::move(done)](Time then) {
+    done({OperationResult::Code::done, {}, control::Stepped{then.time_since_epoch().count(), pings_made() - before}});
+  });
+  parts_.on_change();
+}
+
+std::uint64_t AppOperations::pings_made() const {
+  std::uint64_t made = 0;
+  for (const Device& d : parts_.fleet.devices()) made += d.figures().pings;
+  return made;
 }
 
 // ---- sonars and water

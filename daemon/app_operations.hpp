@@ -9,6 +9,7 @@
 #include "daemon/operations.hpp"
 #include "daemon/pose_intake.hpp"
 #include "daemon/scene_changes.hpp"
+#include "daemon/stepped_time.hpp"
 
 namespace sonar {
 
@@ -18,6 +19,7 @@ struct AppParts {
   Config& config;
   Clock& clock;
   World& world;
+  SteppedTime& time;
   Simulator& simulator;
   SceneChanges& changes;
   Admission& admission;
@@ -26,6 +28,7 @@ struct AppParts {
   Events& events;
   const ControlServer& control;  // asked where it listens, once all is made
   Log& log;
+  std::function<void()> on_change;                                   // something stepped time may have waited for
   std::function<Result<ScenePointer>(const SceneFile&)> load_scene;  // empty: scenes cannot be loaded
 };
 
@@ -43,6 +46,9 @@ class AppOperations final : public Operations {
   OperationResult carry_out(const control::SetSonar& asked, const Sender& sender);
   OperationResult carry_out(const control::SetEnvironment& asked, const Sender& sender);
   OperationResult carry_out(const control::SetTrajectory& asked, const Sender& sender);
+  void take(const control::PoseSample& sample, const Sender& sender, Done done);
+  void step(const control::Step& asked, Done done);
+  std::uint64_t pings_made() const;
   void load(const control::LoadScene& asked, const Sender& sender, Done done);
   OperationResult without_words(const Error& error, const SceneFile& file, const Sender& sender);
   void set(const control::SetObject& asked, const Sender& sender, Done done);

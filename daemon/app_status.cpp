@@ -61,7 +61,8 @@ control::DaemonStatus AppOperations::status() const {
   s.version = SONARD_VERSION;
   s.config = config.source;
   s.scene = config.scene.name();
-  s.clock = parts_.clock.stepped() ? "stepped" : "realtime";
+  s.clock = name_of(config.clock);
+  s.now_ns = now.time_since_epoch().count();
   s.engine = parts_.simulator.engine_description();
   s.seed = config.seed;
   s.uptime_s = seconds(std::chrono::steady_clock::now() - started_);

@@ -69,7 +69,8 @@ std::string banner(const App& app, const BannerFacts& facts) {
   text += pose_line(app);
   text += control_line(app);
   text += "seed      " + std::to_string(app.config().seed) + "   reproducible";
-  if (app.config().clock == ClockMode::stepped) text += ", stepped clock";
+  if (const ClockMode clock = app.config().clock; clock != ClockMode::realtime)
+    text += ", " + std::string(name_of(clock)) + " clock";
   return text + "\n";
 }
 

@@ -1,4 +1,5 @@
-// The daemon's time: real (UNIX time that never jumps) or stepped (moves only when told). I/O thread only.
+// The daemon's time: real (UNIX time that never jumps) or stepped (moves only when told, by daemon/stepped_time.hpp). I/O thread
+// only.
 #pragma once
 
 #include <algorithm>

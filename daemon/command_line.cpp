@@ -21,9 +21,11 @@ constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the name
 void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("config", run.config, "configuration file; without one sonard looks in the usual places, then runs the demo");
   app.add_flag("--demo", run.demo, "run the built-in demo, whatever files there are");
-  app.add_option("--clock", run.clock,
-                 "realtime, or stepped: a tick when every client has taken the last ping (default realtime)")
-      ->check(one_of({"realtime", "stepped"}))
+  app.add_option(
+         "--clock", run.clock,
+         "realtime, stepped (a tick when every client has taken the last ping), lockstep (so far as sonarctl step asks) or\n"
+         "follow (so far as poses are stamped); default realtime")
+      ->check(one_of({clock_modes.begin(), clock_modes.end()}))
       ->envname("SONARD_CLOCK");
   add_engine_options(app, run.engine);
   app.add_option("--bind", run.bind, "address of the first sonar instead of its bind_ip and advertise_ip")
@@ -153,7 +155,8 @@ Command parse_command_line(int argc, char** argv) {
 }
 
 Result<void> override_config(Config& config, const RunCommand& command) {
-  if (!command.clock.empty()) config.clock = command.clock == "stepped" ? ClockMode::stepped : ClockMode::realtime;
+  if (const auto mode = std::find(clock_modes.begin(), clock_modes.end(), command.clock); mode != clock_modes.end())
+    config.clock = static_cast<ClockMode>(mode - clock_modes.begin());
   if (const auto r = override_engine(config.engine, config.seed, command.engine); !r) return r;
   if (!command.log_format.empty()) config.log.json = command.log_format == "json";
   if (command.log_level == "debug") config.log.level = LogLevel::debug;

@@ -206,8 +206,10 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   config.control = read_control(root.optional("control"), directory);
   config.engine = read_engine(root.optional("engine"));
   config.limits = read_limits(root.optional("limits"));
-  config.clock =
-      root.optional("clock").choice_or(ClockMode::realtime, {{"realtime", ClockMode::realtime}, {"stepped", ClockMode::stepped}});
+  config.clock = root.optional("clock").choice_or(ClockMode::realtime, {{name_of(ClockMode::realtime), ClockMode::realtime},
+                                                                        {name_of(ClockMode::stepped), ClockMode::stepped},
+                                                                        {name_of(ClockMode::lockstep), ClockMode::lockstep},
+                                                                        {name_of(ClockMode::follow), ClockMode::follow}});
   read_log(root.optional("log"), config.log);
   if (auto error = document.finish()) return tl::make_unexpected(*error);
   return config;

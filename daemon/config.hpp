@@ -16,6 +16,7 @@
 #include "core/motion/playback.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/sonar/water.hpp"
+#include "daemon/clock_mode.hpp"
 #include "daemon/log.hpp"
 #include "daemon/outbox.hpp"
 #include "daemon/scene_file.hpp"
@@ -40,7 +41,6 @@ bool is_loopback(Ipv4 ip);
 
 enum class WhenClientsFull { close_new, take_over, queue };
 enum class OnStale { hold, blank, stop };
-enum class ClockMode { realtime, stepped };
 
 struct VehicleConfig {
   std::string name;

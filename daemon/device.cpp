@@ -189,6 +189,11 @@ void Device::tick_sessions(Time now) {
   for (const SessionPointer& s : sessions) s->tick(now);
 }
 
+void Device::skip(std::chrono::nanoseconds by) {
+  pacer_.skip(by);
+  state_.powered_up_at += by;
+}
+
 void Device::update_state(Time now) {
   const Pose sonar = compose(context_.world.vehicle_at(config_.vehicle, now), config_.mount);
   state_.depth_m = depth_from_z(sonar.position_m.z);

@@ -63,6 +63,8 @@ class Device final : public SessionParent {
   bool settled() const;  // no ping under way, every client has taken what it was sent
   void step(Time now);
   void tick_sessions(Time now);
+  /// The clock jumps ahead: time that nobody lived.
+  void skip(std::chrono::nanoseconds by);
 
   bool gone() const;  // after stop(): nothing is left
   const SonarConfig& config() const { return config_; }

@@ -18,7 +18,7 @@ struct OperationResult {
   enum class Code { done, refused, failed };  // refused: the request is wrong; failed: right, but it could not be done
   Code code = Code::done;
   std::string text;  // one sentence when it was not done
-  std::variant<std::monostate, control::DaemonStatus> body;
+  std::variant<std::monostate, control::DaemonStatus, control::Stepped> body;
 };
 
 class Operations {

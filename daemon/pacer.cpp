@@ -27,6 +27,12 @@ void Pacer::configure(const PingSettings& settings, Time now) {
   }
 }
 
+void Pacer::skip(std::chrono::nanoseconds by) {
+  start_ += by;
+  trigger_at_ += by;
+  last_tick_ += by;
+}
+
 void Pacer::stop() {
   running_ = false;
   forget_trigger();

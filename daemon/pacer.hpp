@@ -27,6 +27,8 @@ class Pacer {
   /// New settings. The grid goes on when period and trigger mode stay the same; otherwise it restarts at `now`, but not before
   /// the sound of the last ping has come back. A trigger that waits stays owed as long as pings are triggered.
   void configure(const PingSettings& settings, Time now);
+  /// The clock jumps ahead by `by`: everything is due as long from now as it was.
+  void skip(std::chrono::nanoseconds by);
   /// No pings until the next configure().
   void stop();
   /// A trigger from the client; one is kept while the previous ping is still under way, more are counted as skipped,

@@ -68,9 +68,19 @@ World::Track* World::find(PoseSample::Of of, const std::string& name, std::strin
   return nullptr;
 }
 
-bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time now) const {
-  return !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain &&
-         now - track.last_arrival <= rules_.stale_after;
+bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) const {
+  const bool known = !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain;
+  if (!known) return false;
+  // Where time goes by the stamps, silence cannot be told by it; a simulator that began anew can.
+  return rules_.follows ? at >= track.history.newest().at - rules_.stale_after : now - track.last_arrival <= rules_.stale_after;
+}
+
+/// The sender's clock is mapped by the least delay seen; a jump of more than we would extrapolate is a new relation.
+World::Ns World::offset_for(const Track& track, Time at, Time now, bool goes_on) {
+  if (rules_.follows) return followed_offset_for(track, at, now);
+  const Ns offset = now - at;
+  const bool keep = goes_on && offset >= track.offset && offset - track.offset <= rules_.extrapolate_max;
+  return keep ? track.offset : offset;
 }
 
 /// Takes one from the allowance, or says that there is none.
@@ -103,7 +113,14 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
     return out;
   }
 
-  const bool same_history = continues(track, sample, sender, now);
+  if (rules_.follows && sample.of == PoseSample::Of::vehicle && sample.stamp.domain == ClockDomain::arrival) {
+    ++counters_.refused;
+    out.verdict = PoseVerdict::bad_time;
+    out.refusal = "it has no time stamp, and with clock: follow time is what poses say: send SIM or WALL time";
+    return out;
+  }
+
+  const bool same_history = continues(track, sample, sender, at, now);
   const bool reset = same_history && sample.reset_counter != track.reset_counter;
   if (same_history && !reset) {
     const bool seq_is_old = sample.seq != 0 && track.seq != 0 && sample.seq <= track.seq;
@@ -124,12 +141,8 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
     track.history.clear();
   }
 
-  // The sender's clock is mapped by the least delay seen; a jump of more than we would extrapolate is a new relation.
   const bool own_clock = !shared_clock && sample.stamp.domain != ClockDomain::arrival;
-  const Ns offset = own_clock ? now - at : Ns(0);
-  const bool keep =
-      own_clock && same_history && !reset && offset >= track.offset && offset - track.offset <= rules_.extrapolate_max;
-  if (!keep) track.offset = offset;
+  track.offset = own_clock ? offset_for(track, at, now, same_history && !reset) : Ns(0);
 
   if (track.source != sender.source) {
     out.notice = "pose source of " + track.body.name + " changed: " + track.source + " -> " + sender.source +
@@ -165,7 +178,11 @@ void World::show_again() {
 }
 
 bool World::is_stale(const Track& track, Time now) const {
-  return !track.history.empty() && now - track.last_arrival > rules_.stale_after;
+  return !track.history.empty() && now - last_news(track) > rules_.stale_after;
+}
+
+Time World::last_news(const Track& track) const {
+  return rules_.follows ? track.history.newest().at + track.offset : track.last_arrival;
 }
 
 std::vector<World::Stale> World::newly_stale(Time now) {
@@ -174,7 +191,7 @@ std::vector<World::Stale> World::newly_stale(Time now) {
     if (t.stale_reported || !is_stale(t, now)) continue;
     t.stale_reported = true;
     ++counters_.stale;
-    const auto silent = std::chrono::duration_cast<std::chrono::milliseconds>(now - t.last_arrival);
+    const auto silent = std::chrono::duration_cast<std::chrono::milliseconds>(now - last_news(t));
     sentences.push_back(
         {t.body.name, "no pose for " + t.body.name + " from " + t.source + " for " + std::to_string(silent.count()) + " ms"});
   }

@@ -21,6 +21,7 @@ struct PoseRules {
   std::chrono::nanoseconds stale_after = std::chrono::seconds(1);
   double max_jump_m = 50;
   bool stepped = false;      // simulated time: WALL stamps are then read as the sender's own, and there is no rate to limit
+  bool follows = false;      // simulated time that is what the vehicles' stamps say (world_follows.cpp)
   double most_per_s = 1000;  // poses kept of one body; faster ones replace the newest
   double burst = 64;         // taken whole at once: what a network holds back and then delivers
 };
@@ -103,6 +104,15 @@ class World {
   };
   /// The vehicles whose poses stopped since the last call.
   std::vector<Stale> newly_stale(Time now);
+
+  // When the rules follow the vehicles' stamps.
+  /// Time may pass as far as this: the least of the newest stamps, of the vehicles that are not left behind by more than
+  /// stale_after. Nothing before the first pose.
+  std::optional<Time> followed_until() const;
+  /// What the stamps have jumped ahead since the last call, at the first pose say: time that nobody lived. Orbits and
+  /// trajectories stand where they stood.
+  std::chrono::nanoseconds take_skipped();
+
   std::string_view source_of(std::size_t vehicle) const { return vehicles_[vehicle].source; }
   const PoseCounters& counters() const { return counters_; }
 
@@ -125,9 +135,14 @@ class World {
 
   std::vector<Track> taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const;
   Track* find(control::PoseSample::Of kind, const std::string& name, std::string& refusal);
-  bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time now) const;
+  bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now) const;
+  /// How far our time is ahead of the sender's, who stamped a pose with `at`.
+  Ns offset_for(const Track& track, Time at, Time now, bool goes_on);
+  Ns followed_offset_for(const Track& track, Time at, Time now);
+  bool is_followed(const Track& track, Time newest) const;
   bool over_rate(Track& track, Time now) const;
   bool is_stale(const Track& track, Time now) const;
+  Time last_news(const Track& track) const;
   Pose pose_at(const Track& track, Time t) const;
   Pose orbit(const Pose& initial, Time t) const;
   /// Of a body that follows its trajectory; moving as fast as it is played.
@@ -137,6 +152,8 @@ class World {
   PoseRules rules_;
   std::vector<Track> vehicles_, objects_;
   Time start_;
+  std::optional<Time> newest_followed_;  // ours
+  Ns skipped_{0};
   PoseCounters counters_;
 };
 

@@ -15,7 +15,8 @@ inline PoseRules pose_rules(const Config& config) {
   rules.extrapolate_max = nanoseconds_from(config.poses.extrapolate_max_s);
   rules.stale_after = nanoseconds_from(config.poses.stale_after_s);
   rules.max_jump_m = config.poses.max_jump_m;
-  rules.stepped = config.clock == ClockMode::stepped;
+  rules.stepped = config.clock != ClockMode::realtime;
+  rules.follows = config.clock == ClockMode::follow;
   return rules;
 }
 inline std::vector<BodyStart> vehicles_of(const Config& config) {

@@ -25,6 +25,7 @@ Run add_doctor(CLI::App& app);
 Run add_status(CLI::App& app);
 Run add_events(CLI::App& app);
 Run add_set(CLI::App& app);
+Run add_step(CLI::App& app);
 Run add_load(CLI::App& app);
 Run add_object(CLI::App& app);
 

@@ -58,6 +58,8 @@ class Playback {
   void resume(Time clock);
   void seek(Time clock, Ns to);  // 0 to duration
   void use_speed(Time clock, Speed speed);
+  /// The clock jumps ahead by `by`, and it stands where it stood.
+  void skip(Ns by) { clock_at_ += by; }
 
   bool paused() const { return paused_; }
   bool ended(Time clock) const { return !rules_.loop && line(clock) >= duration_; }

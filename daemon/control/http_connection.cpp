@@ -57,6 +57,7 @@ HttpAnswer answer_from(const OperationResult& result) {
   if (result.code == OperationResult::Code::refused) return answer_of(400, StatusCode::refused, result.text);
   if (result.code == OperationResult::Code::failed) return answer_of(409, StatusCode::failed, result.text);
   if (const auto* status = std::get_if<control::DaemonStatus>(&result.body)) return {200, control::json_of(*status) + "\n"};
+  if (const auto* stepped = std::get_if<control::Stepped>(&result.body)) return {200, control::json_of(*stepped) + "\n"};
   return answer_of(200, StatusCode::ok, result.text);
 }
 

@@ -20,6 +20,7 @@ StatusCode code_of(OperationResult::Code code) {
 Response response_of(std::uint64_t id, OperationResult result) {
   Response response{id, code_of(result.code), std::move(result.text), false};
   if (auto* status = std::get_if<control::DaemonStatus>(&result.body)) response.body = std::move(*status);
+  if (const auto* stepped = std::get_if<control::Stepped>(&result.body)) response.body = *stepped;
   return response;
 }
 

@@ -33,7 +33,7 @@ struct Unsupported {  // a request this version does not know
 struct Request {
   std::uint64_t id = 0;
   std::variant<Unsupported, Hello, PoseSample, GetStatus, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
-               SetTrajectory, Subscribe>
+               SetTrajectory, Step, Subscribe>
       op;
 };
 enum class StatusCode { ok, refused, unsupported, failed };
@@ -41,8 +41,8 @@ struct Response {
   std::uint64_t id = 0;
   StatusCode code = StatusCode::ok;
   std::string text;
-  bool hello = false;                                           // carries our Hello
-  std::variant<std::monostate, DaemonStatus, Event> body = {};  // of GetStatus; what was subscribed to
+  bool hello = false;                                                    // carries our Hello
+  std::variant<std::monostate, DaemonStatus, Event, Stepped> body = {};  // of GetStatus; what was subscribed to; of Step
 };
 
 /// One datagram: a PoseUpdate. Refused with one sentence when malformed (see checked()).
@@ -71,6 +71,7 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
 /// protobuf's mapping has it.
 std::string json_of(const Response& response);
 std::string json_of(const DaemonStatus& status);
+std::string json_of(const Stepped& stepped);
 std::string json_of(const Event& event);
 std::string json_of(StatusCode code, const std::string& text);  // {"code":"REFUSED","text":"..."}
 

@@ -128,6 +128,11 @@ std::string json_of(const DaemonStatus& status) {
   fill(message, status);
   return json_from(message);
 }
+std::string json_of(const Stepped& stepped) {
+  v1::Stepped message;
+  fill(message, stepped);
+  return json_from(message);
+}
 std::string json_of(const Event& event) {
   v1::Event message;
   fill(message, event);

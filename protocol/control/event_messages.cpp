@@ -123,6 +123,8 @@ void fill(v1::Response& out, const Response& response) {
     fill(*out.mutable_daemon(), *status);
   } else if (const auto* event = std::get_if<Event>(&response.body)) {
     fill(*out.mutable_event(), *event);
+  } else if (const auto* stepped = std::get_if<Stepped>(&response.body)) {
+    fill(*out.mutable_stepped(), *stepped);
   }
   repair_texts(out);
 }
@@ -137,6 +139,7 @@ Result<Response> from(const v1::Response& message) {
   response.text = message.status().text();
   response.hello = message.has_hello();
   if (message.has_daemon()) response.body = from(message.daemon());
+  if (message.has_stepped()) response.body = Stepped{message.stepped().now_ns(), message.stepped().pings()};
   if (message.has_event()) {
     auto event = from(message.event());
     if (!event) return tl::make_unexpected(event.error());

@@ -47,6 +47,7 @@ void fill(v1::Environment& out, const SetEnvironment& environment);
 SetEnvironment from(const v1::Environment& message);
 void fill(v1::DaemonStatus& out, const DaemonStatus& status);
 DaemonStatus from(const v1::DaemonStatus& message);
+void fill(v1::Stepped& out, const Stepped& stepped);
 void fill(v1::Event& out, const Event& event);
 Result<Event> from(const v1::Event& message);
 void fill(v1::Status& out, StatusCode code, const std::string& text);

@@ -49,13 +49,17 @@ struct SetTrajectory {
   std::optional<bool> paused;
   std::optional<double> position_s, speed;
 };
+/// Of time that passes on request: clock: lockstep.
+struct Step {
+  double dt_s = 0;
+};
 struct Subscribe {
   bool pings = false, clients = false, poses = false, scene = false;
 };
 
 /// What the daemon does for whoever may ask; Hello and Subscribe are the connection's own business.
-using Operation =
-    std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject, SetTrajectory>;
+using Operation = std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
+                               SetTrajectory, Step>;
 
 // ---- answers
 
@@ -109,6 +113,12 @@ struct DaemonStatus {
   PoseFigures poses;
   SetEnvironment environment;  // complete
   std::string control, http;   // addresses listened on; empty = not served
+  std::int64_t now_ns = 0;     // the daemon's time
+};
+/// A step is done.
+struct Stepped {
+  std::int64_t now_ns = 0;
+  std::uint64_t pings = 0;  // made meanwhile, by all sonars
 };
 
 // ---- events

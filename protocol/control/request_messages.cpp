@@ -156,6 +156,9 @@ Result<Request> with_op(const v1::Request& message) {
     case v1::Request::kSetTrajectory:
       take(from(message.set_trajectory()));
       break;
+    case v1::Request::kStep:
+      request.op = Step{message.step().dt_s()};
+      break;
     case v1::Request::OP_NOT_SET:
       break;
   }
@@ -213,6 +216,7 @@ struct Fill {
     if (op.position_s) m.mutable_position_s()->set_value(*op.position_s);
     if (op.speed) m.mutable_speed()->set_value(*op.speed);
   }
+  void operator()(const Step& op) const { out.mutable_step()->set_dt_s(op.dt_s); }
   void operator()(const Subscribe& op) const {
     v1::Subscribe& m = *out.mutable_subscribe();
     m.set_pings(op.pings);

@@ -157,6 +157,11 @@ void fill(v1::DaemonStatus& out, const DaemonStatus& s) {
   fill(*out.mutable_environment(), s.environment);
   out.set_control(s.control);
   out.set_http(s.http);
+  out.set_now_ns(s.now_ns);
+}
+void fill(v1::Stepped& out, const Stepped& s) {
+  out.set_now_ns(s.now_ns);
+  out.set_pings(s.pings);
 }
 DaemonStatus from(const v1::DaemonStatus& m) {
   DaemonStatus s;
@@ -175,6 +180,7 @@ DaemonStatus from(const v1::DaemonStatus& m) {
   s.environment = from(m.environment());
   s.control = m.control();
   s.http = m.http();
+  s.now_ns = m.now_ns();
   return s;
 }
 

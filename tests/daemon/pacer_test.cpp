@@ -56,6 +56,16 @@ TEST(Pacer, ABusySimulationLosesTheTick) {
   EXPECT_TRUE(pacer.fire(t0 + milliseconds(200), false));
 }
 
+TEST(Pacer, TimeThatIsSkippedIsNobodysTick) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  EXPECT_TRUE(pacer.fire(t0, false));
+  pacer.skip(std::chrono::hours(1));
+  EXPECT_EQ(*pacer.next_tick(), t0 + std::chrono::hours(1) + milliseconds(100)) << "as long from now as it was";
+  EXPECT_TRUE(pacer.fire(*pacer.next_tick(), false));
+  EXPECT_EQ(pacer.skipped_ticks(), 0u);
+}
+
 TEST(Pacer, NothingHappensBeforeTheTick) {
   Pacer pacer;
   pacer.configure(settings(10), t0);

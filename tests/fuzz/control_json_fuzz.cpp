@@ -26,6 +26,7 @@ struct Check {
   void operator()(const control::SetEnvironment& op) const {
     require(finite(op.temperature_c) && finite(op.salinity_psu) && finite(op.ph) && finite(op.sound_speed_mps));
   }
+  void operator()(const control::Step& op) const { require(std::isfinite(op.dt_s)); }
   void operator()(const control::SetTrajectory& op) const { require(finite(op.position_s) && finite(op.speed)); }
   template <class Op>
   void operator()(const Op&) const {}

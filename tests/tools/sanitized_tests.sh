@@ -35,12 +35,14 @@ esac
 #   render, determinism, picture, capture_comparison, trajectory   compute for long; rendering, pictures and what is played are
 #                                                      sounded by the test programs
 #   service, package, container                        judge unit, archive and image files, not a program of ours at run time
-#   bench                                              measures speed, by the same engine as the others
+#   bench, demo                                        measure speed and memory, by the same engine as the others
+#   load.descriptors                                   the undefined behaviour sanitizer looks at memory through a pipe, and takes
+#                                                      every object for a bad one when there is no descriptor left for it
 #   the Python client alone and without numpy          no program of ours takes part
-acceptance=(commands protocol mirror blueview_link demo life_cycle control reload status doctor view completion scene_command
+acceptance=(commands protocol mirror blueview_link life_cycle control reload status doctor view completion scene_command
   dissector driver_example first_minutes recording)
 programs="^acceptance\.($(IFS='|'; echo "${acceptance[*]}"))\$"
-programs+='|^load\.(descriptors|real_pings)$|^python_client\.with_daemon$|^bvtsdk\.sequences$'
+programs+='|^load\.real_pings$|^python_client\.with_daemon$|^bvtsdk\.sequences$'
 [ "$kind" != tsan ] || programs='^bvtsdk\.sequences$'
 
 need_packages "${build_packages[@]}" && configure "$preset" || exit

@@ -14,7 +14,7 @@ Json = Dict[str, Any]
 
 # 64 bits wide in control.proto, and therefore strings in its JSON; numbers here.
 _WIDE = {"seed", "pings", "refused", "served", "dropped", "skipped_ticks", "clients", "refused_clients", "pings_written",
-         "pings_dropped", "bytes_written", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "unsent"}
+         "pings_dropped", "bytes_written", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "now_ns", "unsent"}
 
 
 class ControlError(Exception):
@@ -154,9 +154,19 @@ class Control:
         self._post("object", dict(_placement(position, quaternion, rpy, frame), object=name))
 
     def send_pose(self, position: Sequence[float], quaternion: Optional[Sequence[float]] = None,
-                  rpy: Optional[Sequence[float]] = None, frame: str = "ENU_FLU", vehicle: str = "") -> None:
-        """A vehicle's pose, and an answer to it; many a second are PoseSender's."""
-        self._post("pose", dict(_placement(position, quaternion, rpy, frame), **_given(vehicle=vehicle or None)))
+                  rpy: Optional[Sequence[float]] = None, frame: str = "ENU_FLU", vehicle: str = "",
+                  timestamp: Optional[float] = None, timeout: float = 330.0) -> None:
+        """A vehicle's pose, and an answer to it; many a second are PoseSender's. timestamp: seconds on the sender's own clock.
+        With clock: follow the answer comes when every ping is out that the pose made possible."""
+        stamp = None if timestamp is None else {"domain": "SIM", "ns": str(round(timestamp * 1e9))}
+        self._post("pose", dict(_placement(position, quaternion, rpy, frame), **_given(vehicle=vehicle or None, time=stamp)),
+                   timeout)
+
+    # ---- time
+    def step(self, dt_s: float, timeout: float = 330.0) -> Json:
+        """With clock: lockstep, lets the daemon's time pass by dt_s; returns when every ping due in it is out: {"now_ns": the
+        daemon's time then, "pings": made meanwhile}. A ping due at the very end belongs to the next step."""
+        return dict(_read_json(self._post("step", {"dt_s": dt_s}, timeout)))
 
     # ---- HTTP
     def _ask(self, method: str, path: str, body: Optional[bytes] = None, timeout: Optional[float] = None) -> "tuple[int, str]":
@@ -175,11 +185,12 @@ class Control:
             raise _error(status, text)
         return text
 
-    def _post(self, operation: str, message: Json, timeout: Optional[float] = None) -> None:
+    def _post(self, operation: str, message: Json, timeout: Optional[float] = None) -> str:
         body = json.dumps(message, allow_nan=False).encode()
         status, text = self._ask("POST", "/api/v1/" + quote(operation), body, timeout)
         if status != 200:
             raise _error(status, text)
+        return text
 
 
 def _error(status: int, body: str) -> ControlError:

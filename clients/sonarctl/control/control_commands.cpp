@@ -1,5 +1,6 @@
 #include "clients/sonarctl/control/control_commands.hpp"
 
+#include <cinttypes>
 #include <cstdio>
 #include <thread>
 
@@ -11,6 +12,7 @@ namespace sonar::clients {
 namespace {
 
 constexpr std::chrono::minutes scene_patience{6};  // the daemon gives up after five
+constexpr std::chrono::hours step_patience{24};    // as long as the pings take; Ctrl-C ends it
 
 std::vector<std::string> lines_of(const std::string& text, int most) {
   std::vector<std::string> lines;
@@ -78,6 +80,24 @@ Result<void> steer(const ControlOptions& control, ControlClient::Operation opera
   if (!client) return tl::unexpected(client.error());
   if (const auto answer = client->request(std::move(operation), scene_patience); !answer) return tl::unexpected(answer.error());
   std::puts(done.c_str());
+  return {};
+}
+
+Result<void> step_time(const StepOptions& options) {
+  auto client = ControlClient::open(options.control);
+  if (!client) return tl::unexpected(client.error());
+  for (std::uint64_t n = 0; n < options.count && interrupted == 0; ++n) {
+    const auto answer = client->request(control::Step{options.dt_s}, step_patience);
+    if (!answer) return tl::unexpected(answer.error());
+    const auto* stepped = std::get_if<control::Stepped>(&answer->body);
+    if (stepped == nullptr) return failure(ErrorKind::bad_data, "sonard answered a step without the time");
+    if (options.json)
+      std::puts(control::json_of(*stepped).c_str());
+    else
+      std::printf("%.9f s  %" PRIu64 " ping%s\n", 1e-9 * static_cast<double>(stepped->now_ns), stepped->pings,
+                  stepped->pings == 1 ? "" : "s");
+    if (std::fflush(stdout) != 0) break;  // nobody reads any more
+  }
   return {};
 }
 

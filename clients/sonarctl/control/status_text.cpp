@@ -93,10 +93,15 @@ std::string text_from(const control::ObjectStatus& o) {
   return text;
 }
 
+/// Only where it is not what every clock on the wall says.
+std::string clock_time(const control::DaemonStatus& s) {
+  return s.clock == "realtime" ? std::string() : format(" at %.3f s", 1e-9 * static_cast<double>(s.now_ns));
+}
+
 std::string text_from(const control::DaemonStatus& s) {
   std::string text = "sonard " + s.version + "  up " + duration_text(s.uptime_s) + format("  %.0f MB\n", s.resident_mb);
   text += line("config", s.config);
-  text += line("scene", s.scene + "  seed " + std::to_string(s.seed) + "  clock " + s.clock);
+  text += line("scene", s.scene + "  seed " + std::to_string(s.seed) + "  clock " + s.clock + clock_time(s));
   text += line("engine", s.engine);
   if (!s.control.empty())  // an older daemon does not say it
     text += line("control", "tcp " + s.control + (s.http.empty() ? std::string("  http off") : "  http " + s.http));

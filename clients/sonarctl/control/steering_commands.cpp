@@ -1,6 +1,7 @@
 // status, events, set, load and object on the command line: everything that goes over the control stream.
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <utility>
 
 #include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
@@ -177,8 +178,9 @@ void add_set_trajectory(CLI::App& set, const std::shared_ptr<Steering>& steering
   });
 }
 
+/// `what` refers to the steering it is in: taken out, the two do not keep each other.
 Run run_of(const std::shared_ptr<Steering>& steering) {
-  return [steering] { return steering->what(); };
+  return [steering] { return std::exchange(steering->what, {})(); };
 }
 
 }  // namespace
@@ -235,6 +237,21 @@ Run add_set(CLI::App& app) {
   add_set_water(set, steering);
   add_set_trajectory(set, steering);
   return run_of(steering);
+}
+
+Run add_step(CLI::App& app) {
+  CLI::App& command =
+      *app.add_subcommand("step", "let the time of a sonard with clock: lockstep pass, and wait for the pings due in it");
+  command.footer(
+      "examples:\n"
+      "  sonarctl step 0.1                        a tenth of a second; a ping due at its very end belongs to the next step\n"
+      "  sonarctl step 0.1 --count 50");
+  const auto options = std::make_shared<StepOptions>();
+  add_control_options(command, options->control);
+  command.add_option("SECONDS", options->dt_s, "more than 0, at most 3600")->required()->check(number(0, 3600));
+  command.add_option("--count", options->count, "so many steps, one after the other (default 1)")->check(whole_number(1));
+  command.add_flag("--json", options->json, "one JSON object a step");
+  return [options] { return step_time(*options); };
 }
 
 Run add_load(CLI::App& app) {

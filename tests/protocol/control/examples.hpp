@@ -41,7 +41,8 @@ inline std::vector<Request> every_request() {
           {10, SetObject{"crate", true, tilted}},
           {11, Subscribe{true, false, true, false}},
           {12, SetTrajectory{PoseSample::Of::object, "crate", true, 1.5, 2.5}},
-          {13, SetTrajectory{PoseSample::Of::vehicle, "rov", {}, 0.25, {}}}};
+          {13, SetTrajectory{PoseSample::Of::vehicle, "rov", {}, 0.25, {}}},
+          {14, Step{0.125}}};
 }
 
 inline DaemonStatus full_status() {
@@ -80,6 +81,7 @@ inline DaemonStatus full_status() {
   s.environment = {12, 30, 8, 0};
   s.control = "127.0.0.4:14770";
   s.http = "127.0.0.5:8088";
+  s.now_ns = 1234567890123456780;
   return s;
 }
 

@@ -75,6 +75,7 @@ TEST(ControlRequests, TheOthersArriveAsAskedFor) {
   EXPECT_TRUE(plays.paused == true && plays.position_s == 1.5 && plays.speed == 2.5);
   EXPECT_TRUE(goes_on.of == PoseSample::Of::vehicle && goes_on.name == "rov");
   EXPECT_TRUE(!goes_on.paused && goes_on.position_s == 0.25 && !goes_on.speed);
+  EXPECT_EQ(std::get<Step>(round_trip(all[13]).op).dt_s, 0.125);
 }
 
 /// Request{id 3, sonar: SetSonar{range_m: 5, transmit: false}}, by hand: wrappers are messages of their own.
@@ -115,6 +116,7 @@ TEST(ControlRequests, RefusedWithASentenceThatNamesTheKey) {
   EXPECT_THAT(refusal_of(SetObject{"a", {}, Pose{{nan, 0, 0}, {}}}), HasSubstr("at: position has a NaN"));
   EXPECT_EQ(refusal_of(SetTrajectory{PoseSample::Of::vehicle, "", {}, nan, {}}), "set_trajectory.position_s is NaN or infinite");
   EXPECT_EQ(refusal_of(SetTrajectory{PoseSample::Of::object, "a\nb", {}, {}, {}}), "object has control characters");
+  EXPECT_EQ(refusal_of(Step{nan}), "step.dt_s is NaN or infinite");
   PoseSample pose;
   pose.name = "rov\x7f";
   EXPECT_EQ(refusal_of(pose), "vehicle has control characters");

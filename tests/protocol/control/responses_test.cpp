@@ -31,6 +31,15 @@ TEST(ControlResponses, AStatusArrivesWhole) {
   EXPECT_FALSE(status.objects.at(0).visible);
   EXPECT_EQ(status.poses.over_rate, 25u);
   EXPECT_EQ(status.environment.sound_speed_mps, 0.0);
+  EXPECT_EQ(status.now_ns, 1234567890123456780);
+}
+
+TEST(ControlResponses, AStepArrivesWhole) {
+  const Response sent{6, StatusCode::ok, "", false, Stepped{1234567890123456789, 3}};
+  const auto got = decode_response(encode_response(sent));
+  ASSERT_TRUE(got) << got.error().text;
+  EXPECT_TRUE(same(*got, sent)) << json_of(*got);
+  EXPECT_EQ(json_of(std::get<Stepped>(got->body)), R"({"now_ns":"1234567890123456789","pings":"3"})");
 }
 
 TEST(ControlResponses, EveryEventArrivesWhole) {

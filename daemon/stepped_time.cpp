@@ -1,0 +1,44 @@
+#include "daemon/stepped_time.hpp"
+
+#include <utility>
+
+namespace sonar {
+
+SteppedTime::Bound SteppedTime::bound() const {
+  if (mode_ == ClockMode::lockstep) return {asked_ - std::chrono::nanoseconds(1), asked_};
+  if (mode_ != ClockMode::follow) return {};
+  const std::optional<Time> stamped = world_.followed_until();
+  return {stamped.value_or(Time::min()), stamped};
+}
+
+Time SteppedTime::tick_at(Time due) const {
+  if (mode_ != ClockMode::follow) return due;
+  const Time last = bound().last_tick;
+  return last - due > most_lead ? last : due;
+}
+
+std::string SteppedTime::step(double dt_s) {
+  if (mode_ != ClockMode::lockstep)
+    return "time steps on request only with clock: lockstep; here it is clock: " + std::string(name_of(mode_));
+  if (!(dt_s > 0 && dt_s <= longest_step_s))
+    return "dt_s must be more than 0 and at most " + std::to_string(static_cast<int>(longest_step_s)) + " seconds";
+  const std::chrono::nanoseconds dt = nanoseconds_from(dt_s);
+  if (dt.count() == 0) return "dt_s is less than a nanosecond";
+  if (seconds(asked_ + dt - clock_.now()) > longest_step_s)
+    return "steps that wait to be done would take more than " + std::to_string(static_cast<int>(longest_step_s)) + " seconds";
+  asked_ += dt;
+  return {};
+}
+
+void SteppedTime::wait(Reached reached) { waiting_.push_back({bound(), std::move(reached)}); }
+
+void SteppedTime::answer(std::optional<Time> next_tick) {
+  // One that is answered may ask for more.
+  while (!waiting_.empty() && (!next_tick || *next_tick > waiting_.front().until.last_tick)) {
+    const Waiting done = std::move(waiting_.front());
+    waiting_.pop_front();
+    done.reached(done.until.then.value_or(clock_.now()));
+  }
+}
+
+}  // namespace sonar

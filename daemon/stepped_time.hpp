@@ -1,0 +1,58 @@
+// How far time that is not real may pass, and who waits for it to get there: nothing bounds it (stepped), control requests do
+// (lockstep), or the stamps of the vehicles' poses (follow). Used by App::step_time() alone; I/O thread only.
+#pragma once
+
+#include <functional>
+#include <list>
+#include <optional>
+#include <string>
+
+#include "daemon/clock.hpp"
+#include "daemon/clock_mode.hpp"
+#include "daemon/world.hpp"
+
+namespace sonar {
+
+class SteppedTime {
+ public:
+  /// Of one request, and of all that wait.
+  static constexpr double longest_step_s = 3600;
+  /// Poses of a simulator that does not wait for pings lead by no more than this; ticks before are skipped as in real time.
+  static constexpr std::chrono::nanoseconds most_lead = std::chrono::seconds(1);
+
+  SteppedTime(ClockMode mode, const Clock& clock, const World& world) : mode_(mode), clock_(clock), world_(world) {}
+
+  /// Ticks up to `last_tick` may come; when there are no more, it is `then`.
+  struct Bound {
+    Time last_tick = Time::max();
+    std::optional<Time> then = {};
+  };
+  Bound bound() const;
+  /// When a tick that was due at `due` comes.
+  Time tick_at(Time due) const;
+
+  /// Lets time pass by `dt_s` after all steps before: ticks at its end belong to the next step. Empty, or a sentence why not.
+  std::string step(double dt_s);
+
+  using Reached = std::function<void(Time then)>;
+  /// `reached` is called when every ping that bound() allows at this moment has been served, and it is `then`.
+  void wait(Reached reached);
+  /// Whether there is anything to wait for: real time and time that steps by itself owe nobody an answer.
+  bool makes_wait() const { return mode_ == ClockMode::lockstep || mode_ == ClockMode::follow; }
+  /// All is served that was due before `next_tick`; nothing = nothing more is due.
+  void answer(std::optional<Time> next_tick);
+
+ private:
+  struct Waiting {
+    Bound until;
+    Reached reached;
+  };
+
+  ClockMode mode_;
+  const Clock& clock_;
+  const World& world_;
+  Time asked_{};  // lockstep: steps let it pass so far
+  std::list<Waiting> waiting_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,92 @@
+"""Time that others let pass. lockstep: a program sends a pose, asks for a step, and has every ping due in it; follow: a simulator
+stamps its poses and waits for each answer. Both give the same bytes again, whatever the wall clock does meanwhile."""
+import re
+import sys
+import time
+import unittest
+
+from oculus_reader import Client, fire_message
+from running_sonard import ROOT, SONARCTL, Sonard, run
+
+sys.path.insert(0, str(ROOT / "clients/python"))
+from sonard_client import Control  # noqa: E402
+
+PINGS, RATE_HZ = 20, 10
+
+
+def pose_at(t):
+    return {"position": (-7 + 0.5 * t, 0, -3 - t), "rpy": (0, 0, 0.3 * t)}
+
+
+class Clocks(unittest.TestCase):
+    def driven(self, clock, drive, pause_s=0.0):
+        """The depths that PINGS pings tell of, and the digest of the stream; drive(control, n) makes ping n happen."""
+        with Sonard(arguments=["--clock", clock, "--digest", "--exit-after-pings", PINGS]) as daemon:
+            with Client(daemon.address) as client:
+                client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=5))
+                control = Control(daemon.address)
+                deadline = time.monotonic() + 60
+                while not control.status()["sonars"][0]["pinging"]:
+                    self.assertLess(time.monotonic(), deadline)
+                    time.sleep(0.01)
+                pings = []
+                for n in range(PINGS):
+                    drive(control, n)
+                    time.sleep(pause_s)
+                    pings.append(client.ping())
+            code, log = daemon.wait(), daemon.log()
+        self.assertEqual(code, 0, log)
+        digests = re.findall(r"sha256 ([0-9a-f]{64})", log)
+        self.assertEqual(len(digests), 1, log)
+        return pings, digests[0]
+
+    def expect_dive(self, pings):
+        per_m = (pings[-1].pressure - pings[0].pressure) / ((PINGS - 1) / RATE_HZ)
+        self.assertAlmostEqual(per_m, 0.1, delta=0.005, msg="ten metres of water are a bar")
+        for n, ping in enumerate(pings):
+            self.assertAlmostEqual(ping.pressure - pings[0].pressure, per_m * n / RATE_HZ, delta=1e-4, msg=f"ping {n}")
+
+    def test_lockstep_by_http(self):
+        def drive(control, n):
+            control.send_pose(**pose_at(n / RATE_HZ))
+            try:
+                answer = control.step(1 / RATE_HZ)
+            except OSError:  # the daemon ends with its last ping
+                self.assertEqual(n, PINGS - 1)
+            else:
+                self.assertEqual(answer, {"now_ns": (n + 1) * 100_000_000, "pings": 1})
+
+        pings, digest = self.driven("lockstep", drive)
+        self.expect_dive(pings)
+        self.assertEqual(self.driven("lockstep", drive, pause_s=0.02)[1], digest)
+
+    def test_follow_by_http(self):
+        def drive(control, n):
+            try:
+                control.send_pose(**pose_at(n / RATE_HZ), timestamp=1763 + n / RATE_HZ)
+            except OSError:
+                self.assertEqual(n, PINGS - 1)
+
+        pings, digest = self.driven("follow", drive)
+        self.expect_dive(pings)
+        self.assertEqual(self.driven("follow", drive, pause_s=0.02)[1], digest)
+
+    def test_step_command(self):
+        with Sonard(arguments=["--clock", "lockstep"]) as daemon, Client(daemon.address) as client:
+            control = f"{daemon.address}:14770"
+            client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=5))
+            result = run(SONARCTL, "step", "0.05", "--count", "3", "--control", control)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            lines = result.stdout.splitlines()
+            self.assertEqual([line.split(" s  ")[0] for line in lines], ["0.050000000", "0.100000000", "0.150000000"])
+            result = run(SONARCTL, "step", "0.1", "--control", control)
+            self.assertEqual(result.stdout, "0.250000000 s  1 ping\n")
+            self.assertIn("clock lockstep at 0.250 s", run(SONARCTL, "status", "--control", control).stdout)
+        with Sonard(arguments=["--clock", "stepped"]) as daemon:
+            result = run(SONARCTL, "step", "0.1", "--control", f"{daemon.address}:14770")
+            self.assertNotEqual(result.returncode, 0)
+            self.assertIn("only with clock: lockstep", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
