@@ -17,9 +17,13 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       world_(pose_rules(config_), vehicles_of(config_), bodies_of(*scene, config_), clock_.now()),
       stepped_time_(config_.clock, clock_, world_),
       simulator_(io_, make_engine(scene), compute_niceness),
+      recordings_(io_, config_, log_, compute_niceness, [this] { on_change(); }),
       changes_(
           io_, simulator_, std::move(scene), make_engine, compute_niceness,
-          [this](const ScenePointer& now) { world_.use_objects(bodies_of(*now, config_), clock_.now()); },
+          [this](const ScenePointer& now) {
+            world_.use_objects(bodies_of(*now, config_), clock_.now());
+            recordings_.use_scene(*now);
+          },
           [this] { on_change(); }),
       admission_(config_.limits, log_),
       pose_intake_(
@@ -34,6 +38,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                log_,
                config_,
                events_,
+               recordings_,
                options_.digest,
                [this] { on_change(); },
                [this](const std::string& why) {
@@ -43,13 +48,15 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                }},
       fleet_(context_),
       operations_({config_, clock_, world_, stepped_time_, simulator_, changes_, admission_, pose_intake_, fleet_, events_,
-                   control_, log_, [this] { on_change(); }, options_.load_scene}),
+                   recordings_, control_, log_, [this] { on_change(); }, options_.load_scene}),
       control_(io_, config_.control, config_.limits, operations_, events_, pose_intake_, log_),
       signals_(io_),
       house_timer_(io_),
       stop_timer_(io_),
       notify_(
-          io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {}
+          io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {
+  recordings_.use_scene(*changes_.scene());
+}
 
 Result<void> App::open() {
   if (options_.handle_signals) {  // before anybody can read that we are ready
@@ -115,6 +122,7 @@ void App::stop(const std::string& why) {
   house_timer_.cancel();
   changes_.stop();
   fleet_.stop();
+  recordings_.finish();
   // Clients have been sent away by then. What still holds us up, a long ping say, is not waited for.
   stop_timer_.expires_after(stop_limit);
   stop_timer_.async_wait([this](const error_code& ec) {
@@ -136,7 +144,7 @@ bool App::enough_served() const { return options_.exit_after_pings != 0 && fleet
 void App::look() {
   if (stopping_) {
     // These two are the last things that keep run() from returning.
-    if (fleet_.gone()) {
+    if (fleet_.gone() && recordings_.idle()) {
       signals_.cancel();
       stop_timer_.cancel();
     }

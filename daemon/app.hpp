@@ -22,6 +22,7 @@
 #include "daemon/notify.hpp"
 #include "daemon/pose_intake.hpp"
 #include "daemon/pose_server.hpp"
+#include "daemon/recording/recordings.hpp"
 #include "daemon/scene_changes.hpp"
 #include "daemon/simulator.hpp"
 #include "daemon/start_engine.hpp"
@@ -61,8 +62,8 @@ class App {
   const Config& config() const { return config_; }
   const Scene& scene() const { return *changes_.scene(); }
   const std::string& engine_description() const { return simulator_.engine_description(); }
-  /// After run(): the destructor would wait for a scene or a ping that nobody wants any more.
-  bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0; }
+  /// After run(): the destructor would wait for a scene or a ping that nobody wants any more, or for a disk.
+  bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0 || !recordings_.idle(); }
   const PoseServer& poses() const { return pose_server_; }
   const MavlinkServer& mavlink() const { return mavlink_server_; }
   const ControlServer& control() const { return control_; }
@@ -97,6 +98,7 @@ class App {
   World world_;
   SteppedTime stepped_time_;
   Simulator simulator_;
+  Recordings recordings_;
   SceneChanges changes_;
   Admission admission_;
   PoseIntake pose_intake_;

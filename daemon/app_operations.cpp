@@ -47,6 +47,10 @@ void AppOperations::perform(const control::Operation& operation, const Sender& s
     done(carry_out(*trajectory, sender));
   } else if (const auto* scene = std::get_if<control::LoadScene>(&operation)) {
     load(*scene, sender, std::move(done));
+  } else if (const auto* start_of = std::get_if<control::StartRecording>(&operation)) {
+    start(*start_of, sender, done);
+  } else if (const auto* stop_of = std::get_if<control::StopRecording>(&operation)) {
+    parts_.recordings.stop(*stop_of, [done = std::move(done)](const Result<void>& outcome) { done(result_of(outcome)); });
   } else if (const auto* added = std::get_if<control::AddObject>(&operation)) {
     edit([a = *added](const Scene& s) { return with_object(s, a); }, "object " + added->name + " added", sender, std::move(done));
   } else if (const auto* removed = std::get_if<control::RemoveObject>(&operation)) {
@@ -84,15 +88,27 @@ std::uint64_t AppOperations::pings_made() const {
 
 // ---- sonars and water
 
-OperationResult AppOperations::carry_out(const control::SetSonar& asked, const Sender& sender) {
+Result<Device*> AppOperations::sonar_called(const std::string& name) const {
   std::list<Device>& sonars = parts_.fleet.devices();
-  Device* const device = asked.sonar.empty() && sonars.size() == 1 ? &sonars.front() : parts_.fleet.find(asked.sonar);
-  if (device != nullptr) return result_of(device->ask(asked, sender.id));
+  Device* const device = name.empty() && sonars.size() == 1 ? &sonars.front() : parts_.fleet.find(name);
+  if (device != nullptr) return device;
   std::string names;
   for (const Device& d : sonars) names += (names.empty() ? "" : ", ") + d.config().name;
-  return refused(
-      (asked.sonar.empty() ? std::string("say which sonar") : "no sonar is called \"" + asked.sonar.substr(0, 64) + "\"") +
-      "; there are: " + names);
+  return failure(ErrorKind::usage,
+                 (name.empty() ? std::string("say which sonar") : "no sonar is called \"" + name.substr(0, 64) + "\"") +
+                     "; there are: " + names);
+}
+
+OperationResult AppOperations::carry_out(const control::SetSonar& asked, const Sender& sender) {
+  const auto device = sonar_called(asked.sonar);
+  return device ? result_of((*device)->ask(asked, sender.id)) : result_of(device.error());
+}
+
+void AppOperations::start(const control::StartRecording& asked, const Sender& sender, const Done& done) {
+  const auto device = sonar_called(asked.sonar);
+  if (!device) return done(result_of(device.error()));
+  parts_.recordings.start(asked, (*device)->recorded(), sender.id,
+                          [done](const Result<void>& outcome) { done(result_of(outcome)); });
 }
 
 OperationResult AppOperations::carry_out(const control::SetEnvironment& asked, const Sender& sender) {

@@ -26,6 +26,7 @@ struct AppParts {
   PoseIntake& poses;
   Fleet& fleet;
   Events& events;
+  Recordings& recordings;
   const ControlServer& control;  // asked where it listens, once all is made
   Log& log;
   std::function<void()> on_change;                                   // something stepped time may have waited for
@@ -46,6 +47,9 @@ class AppOperations final : public Operations {
   OperationResult carry_out(const control::SetSonar& asked, const Sender& sender);
   OperationResult carry_out(const control::SetEnvironment& asked, const Sender& sender);
   OperationResult carry_out(const control::SetTrajectory& asked, const Sender& sender);
+  /// An empty name: the only one there is.
+  Result<Device*> sonar_called(const std::string& name) const;
+  void start(const control::StartRecording& asked, const Sender& sender, const Done& done);
   void take(const control::PoseSample& sample, const Sender& sender, Done done);
   void step(const control::Step& asked, Done done);
   std::uint64_t pings_made() const;

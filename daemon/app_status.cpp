@@ -77,6 +77,7 @@ control::DaemonStatus AppOperations::status() const {
   s.environment = {config.water.temperature_c, config.water.salinity_psu, config.water.ph, config.water.sound_speed_mps};
   s.control = served_at(parts_.control.stream());
   s.http = served_at(parts_.control.http());
+  s.recordings = parts_.recordings.status();
   return s;
 }
 

@@ -51,9 +51,11 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
       ->check(one_of({"npy", "png", "raw"}));
   app.add_flag("--complex", render.complex, "also the complex beam signal, before magnitude and gain (npy)");
   app.add_option("--sonar", render.sonar, "which sonar of the configuration, when it has several");
-  app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, TUM, EuRoC");
+  app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, TUM, EuRoC, KITTI");
   app.add_option("--pose-frame", render.pose_frame, "of that file, when it does not say so itself")
       ->check(one_of({"ENU_FLU", "NED_FRD"}));
+  app.add_option("--pose-rate", render.pose_rate_hz, "of that file, lines a second: KITTI files have no times")
+      ->check(number(0.001, 10000.0));
   app.add_option("--rate", render.rate_hz, "pings a second (as the sonar is set; with --poses: at every line)")
       ->check(number(0.001, 10000.0));
   app.add_option("--report", render.report,
@@ -74,6 +76,7 @@ std::string complaint(const RenderCommand& render) {
   if (render.config.empty() && render.report.empty()) return "it needs a configuration or render file: sonard render FILE";
   if (writes && render.out.empty()) return "say where the files go: --out DIR";
   if (!writes && !render.out.empty()) return "--report and --check-expectations write no files: leave out --out";
+  if (render.pose_rate_hz && render.poses.empty()) return "--pose-rate is about --poses FILE, which is not given";
   if (!render.pose_frame.empty() && render.poses.empty()) return "--pose-frame is about --poses FILE, which is not given";
   return {};
 }

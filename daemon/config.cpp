@@ -185,6 +185,17 @@ void read_log(const Node& node, LogOptions& log) {
   log.json = map.optional("format").choice_or<bool>(false, {{"text", false}, {"json", true}});
 }
 
+RecordingConfig read_recording(const Node& node, const std::filesystem::path& directory) {
+  if (!node.present()) return {};
+  Map map = node.map();
+  const Node folder = map.required("folder");
+  const std::filesystem::path path = (directory / folder.text()).lexically_normal();
+  std::error_code ec;
+  if (folder.present() && !std::filesystem::is_directory(path, ec))
+    folder.fail("is no folder: " + path.string() + "; make it first, writable for sonard");
+  return {path};
+}
+
 Result<Config> read(const text::Document& document, const std::string& name, const std::filesystem::path& directory) {
   Config config;
   config.source = name;
@@ -206,6 +217,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   config.control = read_control(root.optional("control"), directory);
   config.engine = read_engine(root.optional("engine"));
   config.limits = read_limits(root.optional("limits"));
+  config.recording = read_recording(root.optional("recording"), directory);
   config.clock = root.optional("clock").choice_or(ClockMode::realtime, {{name_of(ClockMode::realtime), ClockMode::realtime},
                                                                         {name_of(ClockMode::stepped), ClockMode::stepped},
                                                                         {name_of(ClockMode::lockstep), ClockMode::lockstep},

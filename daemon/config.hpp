@@ -108,6 +108,10 @@ struct LimitConfig {
   std::chrono::milliseconds dead_peer{15000};    // one whose computer answers nothing
   int spare_descriptors = 32;                    // never given to clients
 };
+/// Recordings that control may ask for (docs/recording.md).
+struct RecordingConfig {
+  std::filesystem::path folder;  // an existing one; empty = nothing may be recorded
+};
 inline constexpr int most_fixed_rays = 100000;  // a column
 struct EngineConfig {
   int threads = 0;      // 0 = all cores
@@ -129,6 +133,7 @@ struct Config {
   PoseConfig poses;
   ControlConfig control;
   LimitConfig limits;
+  RecordingConfig recording;
   EngineConfig engine;
   ClockMode clock = ClockMode::realtime;
   LogOptions log;

@@ -223,6 +223,8 @@ void Device::ping(Time at) {
   request.seed = Seed(context_.config.seed);
   request.blank = (stale && on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
   request.switches = context_.config.engine.switches;
+  request.switches.keep_truth = context_.recordings.wants_truth(config_.name);
+  under_way_names_ = context_.recordings.names();
   busy_ = true;
   context_.simulator.submit(std::move(request), [this](Simulator::Outcome outcome) { on_ping(std::move(outcome)); });
 }
@@ -250,6 +252,7 @@ void Device::on_ping(Simulator::Outcome outcome) {
     for (const SessionPointer& s : sessions_)
       for (protocol::Event& event : s->push_ping(bytes, request, made_with, now)) wishes.emplace_back(s, std::move(event));
     for (const auto& [session, event] : wishes) on_event(*session, event);
+    record(outcome, bytes, now);
     tell_of_ping(*outcome.ping, outcome.seconds);
     if (figures_.pings == 1) context_.log.debug("first ping simulated", {{"sonar", config_.name}, {"ms", outcome.seconds * 1e3}});
   } else {

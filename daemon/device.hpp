@@ -21,6 +21,7 @@
 #include "daemon/metrics.hpp"
 #include "daemon/operations.hpp"
 #include "daemon/pacer.hpp"
+#include "daemon/recording/recordings.hpp"
 #include "daemon/session.hpp"
 #include "daemon/simulator.hpp"
 #include "daemon/world.hpp"
@@ -37,6 +38,7 @@ struct DeviceContext {
   Log& log;
   const Config& config;
   Events& events;
+  Recordings& recordings;
   bool digest = false;
   std::function<void()> on_change;                         // something stepped time or the end may have waited for
   std::function<void(const std::string& why)> on_failure;  // the engine failed: the daemon cannot go on
@@ -78,6 +80,8 @@ class Device final : public SessionParent {
 
   // What control may ask (device_control.cpp).
   control::SonarStatus status(Time now) const;
+  /// As recordings name it.
+  RecordedSonar recorded() const;
   /// Empty when all is well.
   std::string trouble() const;
   /// As one more client would have; nothing is changed when it is refused, with a sentence that says what the product can do.
@@ -109,6 +113,7 @@ class Device final : public SessionParent {
   void use_initial_settings();
   void change_settings(const protocol::ChangeSettings& change, const std::string& who);
   void tell_of_ping(const Ping& ping, double simulation_s) const;
+  void record(const Simulator::Outcome& outcome, const std::shared_ptr<const protocol::Bytes>& bytes, Time now) const;
   void tell_of_client(const Session& session, bool connected, const std::string& why) const;
   void arm();
   void on_timer();
@@ -145,6 +150,7 @@ class Device final : public SessionParent {
   GainAssist gain_assist_;
   std::uint64_t settings_id_ = 0;
   std::uint64_t under_way_settings_id_ = 0;            // of the ping that is being made
+  std::shared_ptr<const SceneNames> under_way_names_;  // of the scene it is made in
   std::uint64_t oldest_wanted_id_ = 0;                 // pings of settings before it belong to clients that have gone
   std::map<std::uint64_t, protocol::Bytes> requests_;  // settings_id -> the client's own bytes, echoed in its pings
   bool asked_ = false;                                 // a client that is still connected has sent settings

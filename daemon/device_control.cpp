@@ -55,6 +55,23 @@ std::string Device::trouble() const {
   return lost ? "sonar " + config_.name + " does not listen any more" : "";
 }
 
+RecordedSonar Device::recorded() const {
+  const auto number = [](Ipv4 ip) {
+    return std::uint32_t{ip[0]} << 24 | std::uint32_t{ip[1]} << 16 | std::uint32_t{ip[2]} << 8 | std::uint32_t{ip[3]};
+  };
+  RecordedSonar sonar{config_.name, std::string(vendor_.name()), {}};
+  sonar.ends.device = {number(state_.advertise_ip), data_endpoint().port()};
+  sonar.ends.status_from.address = sonar.ends.device.address;
+  if (!sessions_.empty()) sonar.ends.client.address = number(sessions_.front()->client_ip());
+  return sonar;
+}
+
+/// Clients have it in their outboxes by now: what becomes of the files is nothing to them.
+void Device::record(const Simulator::Outcome& outcome, const std::shared_ptr<const protocol::Bytes>& bytes, Time now) const {
+  if (!context_.recordings.takes(config_.name)) return;
+  context_.recordings.take(config_.name, {now, outcome.ping, bytes, vendor_.beacon(state_, now), under_way_names_});
+}
+
 Result<void> Device::ask(const control::SetSonar& asked, const std::string& who) {
   protocol::Wish wish{asked.range_m, asked.rate_hz, asked.gain_percent, asked.mode, asked.beams};
   const bool wishes = wish.range_m || wish.rate_hz || wish.gain_percent || wish.mode || wish.beams;

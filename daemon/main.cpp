@@ -77,6 +77,7 @@ int run(const RunCommand& command, Steady::time_point begin, bool& json) {
   json = command.log_format == "json";
   let_hangups_through(false);     // one that comes while the scene loads waits until there is somebody to take it
   std::signal(SIGPIPE, SIG_IGN);  // nobody reads the log any more (sonard 2>&1 | head): no reason to leave the clients
+  std::signal(SIGXFSZ, SIG_IGN);  // a recording that may not grow any more ends; clients stay
   raise_descriptor_limit();
   auto found = find_config(command);
   if (!found) return complain(found.error(), json);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/motion/jump.hpp"
+
 namespace sonar {
 namespace {
 
@@ -14,7 +16,6 @@ using control::PoseSample;
 constexpr double hidden_height_m = 1e4;  // far beyond any sonar's range, near enough for exact placement
 constexpr double smallest_orbit_m = 4;
 constexpr double orbit_speed_mps = 0.5;
-constexpr double fastest_mps = 30, fastest_radps = 10;  // beyond: a jump, not a movement
 constexpr std::chrono::nanoseconds future_allowed = std::chrono::seconds(1);
 
 std::string joined_names(const std::vector<std::string>& names) {
@@ -224,9 +225,7 @@ PoseHistory::Motion World::vehicle_moves(std::size_t vehicle, Time t) const {
   }
   const PoseHistory::Motion moves =
       track.history.empty() ? played(track, t).moves : track.history.motion_at(t - track.offset, rules_.extrapolate_max);
-  // Written so that what is not a number is no movement either.
-  const bool sane = length(moves.velocity_mps) <= fastest_mps && length(moves.angular_velocity_radps) <= fastest_radps;
-  return sane ? moves : PoseHistory::Motion{};
+  return motion::is_jump(moves.velocity_mps, moves.angular_velocity_radps) ? PoseHistory::Motion{} : moves;
 }
 
 Twist mounted_moves(const PoseHistory::Motion& body_moves, const Pose& body_in_world, const Pose& mount) {

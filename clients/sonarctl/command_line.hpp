@@ -28,5 +28,6 @@ Run add_set(CLI::App& app);
 Run add_step(CLI::App& app);
 Run add_load(CLI::App& app);
 Run add_object(CLI::App& app);
+Run add_recording(CLI::App& app);
 
 }  // namespace sonar::clients

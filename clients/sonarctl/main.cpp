@@ -27,10 +27,11 @@ int run(int argc, char** argv) {
       "  sonarctl view --png ping.png          one picture\n"
       "  sonarctl COMMAND --help               explains a command, with examples");
   const std::vector<std::pair<std::string, Run>> commands{
-      {"doctor", add_doctor(app)}, {"status", add_status(app)}, {"listen", add_listen(app)}, {"view", add_view(app)},
-      {"stats", add_stats(app)},   {"record", add_record(app)}, {"pose", add_pose(app)},     {"events", add_events(app)},
-      {"set", add_set(app)},       {"step", add_step(app)},     {"load", add_load(app)},     {"object", add_object(app)},
-      {"scene", add_scene(app)}};
+      {"doctor", add_doctor(app)},       {"status", add_status(app)}, {"listen", add_listen(app)},
+      {"view", add_view(app)},           {"stats", add_stats(app)},   {"record", add_record(app)},
+      {"pose", add_pose(app)},           {"events", add_events(app)}, {"set", add_set(app)},
+      {"step", add_step(app)},           {"load", add_load(app)},     {"object", add_object(app)},
+      {"recording", add_recording(app)}, {"scene", add_scene(app)}};
   const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
   const std::string complaint = text::complaint_about_words(app, words);
   if (!complaint.empty()) return complain(complaint, ErrorKind::usage);

@@ -122,7 +122,8 @@ class Reader {
         columns_ = Columns::euroc(words_.size());
         return false;
       case Format::kitti:
-        if (!(asked_.rate_hz.value_or(0) > 0)) complain("KITTI lines have no time; say how many there are a second: rate_hz");
+        if (!(asked_.rate_hz.value_or(0) > 0))
+          complain("KITTI lines have no time; say how many there are a second: rate_hz, --pose-rate");
         columns_ = Columns::kitti();
         return false;
       default:

@@ -100,7 +100,8 @@ std::string help_text(const std::string& address) {
          post + "pose" + json + "'{\"frame\":\"NED_FRD\",\"position\":{\"x\":0,\"y\":0,\"z\":3},\"orientation\":{\"w\":1}}'\n" +
          post + "objects/NAME" + json + "'{\"visible\":false}'\n" + post + "load" + json +
          "'{\"path\":\"demo.yaml\"}'\n\n"
-         "POST to /api/v1/ also: sonar, object, add_object, remove_object, set_object, set_trajectory, step.\n";
+         "POST to /api/v1/ also: sonar, object, add_object, remove_object, set_object, set_trajectory, step, start_recording,\n"
+         "stop_recording.\n";
 }
 
 }  // namespace sonar

@@ -113,8 +113,9 @@ Route route_of(const Target& target) {
   if (s.size() != 3) return {};
   if (s[2] == "status") return {Kind::status, "GET", "status"};
   if (s[2] == "events") return {Kind::events, "GET", ""};
-  constexpr std::array<std::string_view, 10> operations = {
-      "sonar", "environment", "load", "pose", "object", "add_object", "remove_object", "set_object", "set_trajectory", "step"};
+  constexpr std::array<std::string_view, 12> operations = {
+      "sonar",         "environment", "load",           "pose", "object",          "add_object",
+      "remove_object", "set_object",  "set_trajectory", "step", "start_recording", "stop_recording"};
   if (std::find(operations.begin(), operations.end(), s[2]) != operations.end()) return {Kind::operation, "POST", s[2]};
   return {};
 }

@@ -61,6 +61,7 @@ Result<motion::TrajectoryFile> poses_of(const RenderCommand& command) {
   motion::ReadOptions options;
   if (!command.pose_frame.empty())
     options.frame = command.pose_frame == "NED_FRD" ? motion::Frame::ned_frd : motion::Frame::enu_flu;
+  options.rate_hz = command.pose_rate_hz;
   return motion::load_trajectories(command.poses, options);
 }
 

@@ -33,7 +33,7 @@ struct Unsupported {  // a request this version does not know
 struct Request {
   std::uint64_t id = 0;
   std::variant<Unsupported, Hello, PoseSample, GetStatus, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
-               SetTrajectory, Step, Subscribe>
+               SetTrajectory, Step, StartRecording, StopRecording, Subscribe>
       op;
 };
 enum class StatusCode { ok, refused, unsupported, failed };

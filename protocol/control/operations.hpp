@@ -53,13 +53,21 @@ struct SetTrajectory {
 struct Step {
   double dt_s = 0;
 };
+/// Of what a sonar sends, into a new file of the configuration's recording.folder.
+struct StartRecording {
+  std::string file;
+  std::string sonar = {};  // empty = the only one there is
+};
+struct StopRecording {
+  std::string file;  // empty = all
+};
 struct Subscribe {
   bool pings = false, clients = false, poses = false, scene = false;
 };
 
 /// What the daemon does for whoever may ask; Hello and Subscribe are the connection's own business.
 using Operation = std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
-                               SetTrajectory, Step>;
+                               SetTrajectory, Step, StartRecording, StopRecording>;
 
 // ---- answers
 
@@ -103,6 +111,12 @@ struct ObjectStatus {
 struct PoseFigures {
   std::uint64_t accepted = 0, refused = 0, late = 0, replaced = 0, over_rate = 0;
 };
+struct RecordingStatus {
+  std::string sonar, file;
+  bool running = false;
+  std::uint64_t pings = 0, messages = 0, bytes = 0;  // messages of the sonar, bytes of the file
+  std::string why;                                   // it ended
+};
 struct DaemonStatus {
   std::string version, config, scene, clock, engine;
   std::uint64_t seed = 0;
@@ -114,6 +128,7 @@ struct DaemonStatus {
   SetEnvironment environment;  // complete
   std::string control, http;   // addresses listened on; empty = not served
   std::int64_t now_ns = 0;     // the daemon's time
+  std::vector<RecordingStatus> recordings;
 };
 /// A step is done.
 struct Stepped {

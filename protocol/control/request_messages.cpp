@@ -109,6 +109,20 @@ Result<SetTrajectory> from(const v1::SetTrajectory& m) {
   return set;
 }
 
+Result<StartRecording> from(const v1::StartRecording& m) {
+  const auto file = checked_text(m.file(), "file", true);
+  if (!file) return tl::make_unexpected(file.error());
+  const auto sonar = checked_text(m.sonar(), "sonar", false);
+  if (!sonar) return tl::make_unexpected(sonar.error());
+  return StartRecording{*file, *sonar};
+}
+
+Result<StopRecording> from(const v1::StopRecording& m) {
+  const auto file = checked_text(m.file(), "file", false);
+  if (!file) return tl::make_unexpected(file.error());
+  return StopRecording{*file};
+}
+
 Result<Request> with_op(const v1::Request& message) {
   Request request{message.id(), Unsupported{}};
   std::string refusal;
@@ -158,6 +172,12 @@ Result<Request> with_op(const v1::Request& message) {
       break;
     case v1::Request::kStep:
       request.op = Step{message.step().dt_s()};
+      break;
+    case v1::Request::kStartRecording:
+      take(from(message.start_recording()));
+      break;
+    case v1::Request::kStopRecording:
+      take(from(message.stop_recording()));
       break;
     case v1::Request::OP_NOT_SET:
       break;
@@ -217,6 +237,11 @@ struct Fill {
     if (op.speed) m.mutable_speed()->set_value(*op.speed);
   }
   void operator()(const Step& op) const { out.mutable_step()->set_dt_s(op.dt_s); }
+  void operator()(const StartRecording& op) const {
+    out.mutable_start_recording()->set_file(op.file);
+    out.mutable_start_recording()->set_sonar(op.sonar);
+  }
+  void operator()(const StopRecording& op) const { out.mutable_stop_recording()->set_file(op.file); }
   void operator()(const Subscribe& op) const {
     v1::Subscribe& m = *out.mutable_subscribe();
     m.set_pings(op.pings);

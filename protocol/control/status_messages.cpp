@@ -124,6 +124,19 @@ void fill(v1::PoseFigures& out, const PoseFigures& f) {
 }
 PoseFigures from(const v1::PoseFigures& m) { return {m.accepted(), m.refused(), m.late(), m.replaced(), m.over_rate()}; }
 
+void fill(v1::RecordingStatus& out, const RecordingStatus& s) {
+  out.set_sonar(s.sonar);
+  out.set_file(s.file);
+  out.set_running(s.running);
+  out.set_pings(s.pings);
+  out.set_messages(s.messages);
+  out.set_bytes(s.bytes);
+  out.set_why(s.why);
+}
+RecordingStatus from(const v1::RecordingStatus& m) {
+  return {m.sonar(), m.file(), m.running(), m.pings(), m.messages(), m.bytes(), m.why()};
+}
+
 }  // namespace
 
 void fill(v1::Environment& out, const SetEnvironment& e) {
@@ -157,6 +170,7 @@ void fill(v1::DaemonStatus& out, const DaemonStatus& s) {
   fill(*out.mutable_environment(), s.environment);
   out.set_control(s.control);
   out.set_http(s.http);
+  for (const RecordingStatus& recording : s.recordings) fill(*out.add_recordings(), recording);
   out.set_now_ns(s.now_ns);
 }
 void fill(v1::Stepped& out, const Stepped& s) {
@@ -180,6 +194,7 @@ DaemonStatus from(const v1::DaemonStatus& m) {
   s.environment = from(m.environment());
   s.control = m.control();
   s.http = m.http();
+  for (const v1::RecordingStatus& recording : m.recordings()) s.recordings.push_back(from(recording));
   s.now_ns = m.now_ns();
   return s;
 }

@@ -1,4 +1,5 @@
 """Recorded by sonarctl, replayed by sonard: the same bytes, whatever kind of file lies between; files judged by other readers."""
+import json
 import os
 import pathlib
 import resource
@@ -12,7 +13,7 @@ import time
 import unittest
 
 import mcap_checker
-from oculus_reader import HEADER, Ping
+from oculus_reader import HEADER, Client, Ping, fire_message
 from running_sonard import ROOT, SONARCTL, SONARD, Sonard, free_address, run
 from tshark import messages, tshark, why_not
 
@@ -166,6 +167,49 @@ class Recorded(Files):
         self.assertEqual(oculus_log_messages(self.read("oculus")), sent)
         topics = [(topic, data) for topic, _, data in mcap_checker.check(self.read("mcap")).messages]
         self.assertEqual([data for topic, data in topics if topic == "/sonar/device"], sent)
+
+
+class Inside(Files):
+    """sonard writes the file itself."""
+
+    def steer(self, *words):
+        return run(SONARCTL, *words, "--control", f"{self.daemon.address}:14770")
+
+    def recording(self):
+        return json.loads(self.steer("status", "--json").stdout)["recordings"][0]
+
+    def test_a_full_disk_ends_the_recording_and_no_client_notices(self):
+        with Sonard(scene="tank-rod.yaml", more="recording: {folder: .}\n") as self.daemon:
+            kept = pathlib.Path(self.daemon.folder.name) / "run.mcap"
+            done = self.steer("recording", "start", "run.mcap")
+            self.assertEqual((done.returncode, done.stdout), (0, "run.mcap is being recorded; sonarctl status shows how it goes\n"))
+            for name, code in (("run.mcap", 65), ("../run.mcap", 65), ("run.txt", 65)):
+                self.assertEqual(self.steer("recording", "start", name).returncode, code, name)
+            resource.prlimit(self.daemon.process.pid, resource.RLIMIT_FSIZE, (2_500_000, 2_500_000))
+            with Client(self.daemon.address) as client:
+                client.send(fire_message(range_=1, flags=0x09))
+                numbers = [client.ping().id]
+                self.assertTrue(self.recording()["running"])
+                deadline = time.monotonic() + 100
+                while self.recording()["running"] and time.monotonic() < deadline:
+                    numbers += [client.ping().id for _ in range(4)]
+                numbers += [client.ping().id for _ in range(4)]
+            self.assertEqual(numbers, list(range(numbers[0], numbers[0] + len(numbers))))
+            self.assertIn("File too large", self.recording()["why"])
+            self.assertIn(f"recording {kept}  of front: ", self.steer("status").stdout)
+            self.assertEqual(self.steer("recording", "stop").stderr, "sonarctl: sonard refused: nothing is being recorded\n")
+            self.assertEqual(self.daemon.stop()[0], 0)
+            self.assertEqual(self.daemon.log().count("recording stopped: cannot write on to"), 1)
+            self.assertNotIn("recording ended", self.daemon.log())
+            done = run(SONARCTL, "record", "--from", kept, "--raw", self.path("raw"))
+            self.assertIn(done.returncode, (0, 65), done.stderr)
+            self.assertGreater(len(split(self.read("raw"))), 3)
+
+    def test_only_where_the_configuration_says(self):
+        with Sonard(scene="tank-rod.yaml") as self.daemon:
+            done = self.steer("recording", "start", "run.mcap")
+            self.assertEqual(done.returncode, 65)
+            self.assertIn("recording: {folder: DIR}", done.stderr)
 
 
 class OneIntoAnother(Files):

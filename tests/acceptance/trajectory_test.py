@@ -136,6 +136,7 @@ class Files(unittest.TestCase):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             (folder / "dive.tum").write_text(dive(), encoding="utf-8")
+            (folder / "way.kitti").write_text("".join(f"1 0 0 {x} 0 1 0 0 0 0 1 -0.6\n" for x in (-0.5, -0.4, -0.2)), encoding="utf-8")
             (folder / "boat.csv").write_text("# frame: ENU_FLU\nt,x,y,z\n0,1,2,-3\n9,1,3,-3\n", encoding="utf-8")
             (folder / "sonard.yaml").write_text(f"""\
 world: {{scene: {ROOT / 'scenes/tank-rod.yaml'}}}
@@ -157,6 +158,15 @@ sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
         self.assertEqual([round(s["time_s"], 4) for s in done.sidecars], [0, 0.3, 1, 1.1, 2.5, 4])
         for s in done.sidecars:
             self.assertAlmostEqual(s["vehicle_in_world"]["xyz_m"][2], -depth_m(s["time_s"]), places=5)
+
+    def test_render_of_a_file_without_times_is_told_its_rate(self):
+        words = ["render", "--poses", "FOLDER/way.kitti", "--pose-frame", "ENU_FLU", "--out", "FOLDER/out", "--format", "raw"]
+        done = self.with_files("none", "rod", *words, "--pose-rate", "4")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([(s["time_s"], s["vehicle_in_world"]["xyz_m"][0]) for s in done.sidecars], [(0, -0.5), (0.25, -0.4), (0.5, -0.2)])
+        without = self.with_files("none", "rod", *words)
+        self.assertEqual((without.returncode, without.stderr.count("\n")), (65, 1), without.stderr)
+        self.assertIn("rate", without.stderr)
 
     def test_says_what_is_followed_and_what_cannot_be(self):
         good = self.check("{file: dive.tum, speed: 2}")

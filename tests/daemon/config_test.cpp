@@ -247,7 +247,7 @@ TEST(Config, EveryRefusalSaysWhatAndWhere) {
   EXPECT_THAT(with("poses: {json: 127.0.0.1:14770}\n"), HasSubstr("poses.json: the same address as poses.protobuf"));
   EXPECT_THAT(with("poses: {stale_after_s: 0}\n"), HasSubstr("poses.stale_after_s"));
   EXPECT_THAT(with("engine: {quality: best}\n"), HasSubstr("engine.quality"));
-  EXPECT_THAT(with("clock: folow\n"), HasSubstr("clock: must be one of"));
+  EXPECT_THAT(with("clock: folow\n"), HasSubstr("did you mean \"follow\""));
   EXPECT_THAT(with("log: {level: loud}\n"), HasSubstr("log.level"));
   const std::string hot = "world: {scene: scene.yaml, water: {temperature_c: 30}}\n";
   EXPECT_THAT(why(hot + vehicles + sonar), HasSubstr("world.water.temperature_c: 30 C or more"));

@@ -23,7 +23,7 @@ using Kind = RecordingFile::Kind;
 struct Folder {
   Folder() {
     static int count = 0;
-    path = ::testing::TempDir() + "/recordings-" + std::to_string(::getpid()) + "-" + std::to_string(++count);
+    path = ::testing::TempDir() + "recordings-" + std::to_string(::getpid()) + "-" + std::to_string(++count);
     std::filesystem::create_directory(path);
   }
   ~Folder() {

@@ -32,8 +32,8 @@ case $kind in
   tsan) wanted='^tests/(protocol|daemon|clients)/.*_test$|/base_test$|/analytic_rays_test$' ;;
 esac
 # Through ctest: the shipped programs. Not among them, with the reasons:
-#   render, determinism, picture, capture_comparison, trajectory   compute for long; rendering, pictures and what is played are
-#                                                      sounded by the test programs
+#   render, determinism, reproducibility, mission, picture, capture_comparison, trajectory   compute for long; rendering, pictures,
+#                                                      recordings and what is played are sounded by the test programs
 #   service, package, container                        judge unit, archive and image files, not a program of ours at run time
 #   bench, demo                                        measure speed and memory, by the same engine as the others
 #   load.descriptors                                   the undefined behaviour sanitizer looks at memory through a pipe, and takes

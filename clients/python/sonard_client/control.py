@@ -14,7 +14,7 @@ Json = Dict[str, Any]
 
 # 64 bits wide in control.proto, and therefore strings in its JSON; numbers here.
 _WIDE = {"seed", "pings", "refused", "served", "dropped", "skipped_ticks", "clients", "refused_clients", "pings_written",
-         "pings_dropped", "bytes_written", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "now_ns", "unsent"}
+         "pings_dropped", "bytes_written", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "now_ns", "unsent", "messages", "bytes"}
 
 
 class ControlError(Exception):
@@ -161,6 +161,23 @@ class Control:
         stamp = None if timestamp is None else {"domain": "SIM", "ns": str(round(timestamp * 1e9))}
         self._post("pose", dict(_placement(position, quaternion, rpy, frame), **_given(vehicle=vehicle or None, time=stamp)),
                    timeout)
+
+    # ---- trajectories and recordings
+    def set_trajectory(self, vehicle: str = "", object_name: str = "", paused: Optional[bool] = None,
+                       position_s: Optional[float] = None, speed: Optional[float] = None) -> None:
+        """Of what a vehicle, or the moving object named, plays from a file. position_s: seconds from its start. speed: seconds of
+        it for one of the daemon's clock, 0.001 to 1000."""
+        self._post("set_trajectory", _given(vehicle=vehicle or None, object=object_name or None, paused=paused,
+                                            position_s=position_s, speed=speed))
+
+    def start_recording(self, file: str, sonar: str = "") -> None:
+        """sonard writes it, in the folder of its configuration; the end of the name says the kind: .mcap, .pcap, .oculus, .raw.
+        Returns when the file is open."""
+        self._post("start_recording", _given(file=file, sonar=sonar or None))
+
+    def stop_recording(self, file: str = "") -> None:
+        """One, or all. Returns when the file is complete."""
+        self._post("stop_recording", _given(file=file or None))
 
     # ---- time
     def step(self, dt_s: float, timeout: float = 330.0) -> Json:

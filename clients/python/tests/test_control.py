@@ -77,6 +77,16 @@ class Asked(unittest.TestCase):
         self.assertEqual(status["sonars"][0], {"clients": [], "figures": {"pings": 7, "clients": 1}})
         self.assertEqual(self.last(), ("GET", "/api/v1/status", None))
 
+    def test_trajectories_and_recordings(self):
+        self.control.set_trajectory("rov", paused=False, position_s=1.5)
+        self.assertEqual(self.last(), ("POST", "/api/v1/set_trajectory", {"vehicle": "rov", "paused": False, "position_s": 1.5}))
+        self.control.set_trajectory(object_name="boat", speed=2)
+        self.assertEqual(self.last(), ("POST", "/api/v1/set_trajectory", {"object": "boat", "speed": 2}))
+        self.control.start_recording("run.mcap", "front")
+        self.assertEqual(self.last(), ("POST", "/api/v1/start_recording", {"file": "run.mcap", "sonar": "front"}))
+        self.control.stop_recording()
+        self.assertEqual(self.last(), ("POST", "/api/v1/stop_recording", {}))
+
     def test_refusals_carry_the_sentence(self):
         with self.assertRaisesRegex(ControlError, "no sonar is called") as caught:
             self.control.set_sonar("rear", range_m=5)

@@ -63,6 +63,13 @@ std::string trajectory_text(const std::optional<control::TrajectoryStatus>& t) {
                 t->paused ? " paused" : "");
 }
 
+std::string recording_text(const control::RecordingStatus& r) {
+  return r.file +
+         format("  of %s: %llu pings, %llu messages, %.1f MB", r.sonar.c_str(), wide(r.pings), wide(r.messages),
+                static_cast<double>(r.bytes) / 1e6) +
+         (r.running ? std::string() : "  ended: " + r.why);
+}
+
 std::string event_text(const control::PingEvent& e) {
   return format("ping %u  %s  %g m  %u beams x %u rows  %.1f ms  %u client%s", e.number, e.sonar.c_str(), e.range_m, e.beams,
                 e.rows, e.simulation_ms, e.clients, e.clients == 1 ? "" : "s");
@@ -113,6 +120,7 @@ std::string text_from(const control::DaemonStatus& s) {
   text +=
       line("poses", format("%llu accepted, %llu refused, %llu late, %llu replaced, %llu over the rate", wide(s.poses.accepted),
                            wide(s.poses.refused), wide(s.poses.late), wide(s.poses.replaced), wide(s.poses.over_rate)));
+  for (const control::RecordingStatus& r : s.recordings) text += line("recording", recording_text(r));
   for (const control::ObjectStatus& o : s.objects) text += line("object", text_from(o));
   return text;
 }

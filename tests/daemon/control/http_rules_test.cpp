@@ -65,7 +65,7 @@ TEST(HttpRules, Routes) {
   EXPECT_EQ(route("/api/v1/status").kind, Kind::status);
   EXPECT_EQ(route("/api/v1/events?pings=1").kind, Kind::events);
   for (const char* op : {"sonar", "environment", "load", "pose", "object", "add_object", "remove_object", "set_object",
-                         "set_trajectory", "step"}) {
+                         "set_trajectory", "step", "start_recording", "stop_recording"}) {
     const Route r = route(("/api/v1/" + std::string(op)).c_str());
     EXPECT_EQ(r.kind, Kind::operation);
     EXPECT_EQ(r.op, op);

@@ -42,7 +42,9 @@ inline std::vector<Request> every_request() {
           {11, Subscribe{true, false, true, false}},
           {12, SetTrajectory{PoseSample::Of::object, "crate", true, 1.5, 2.5}},
           {13, SetTrajectory{PoseSample::Of::vehicle, "rov", {}, 0.25, {}}},
-          {14, Step{0.125}}};
+          {14, Step{0.125}},
+          {15, StartRecording{"run-1.mcap", "front"}},
+          {16, StopRecording{"run-1.mcap"}}};
 }
 
 inline DaemonStatus full_status() {
@@ -82,6 +84,8 @@ inline DaemonStatus full_status() {
   s.control = "127.0.0.4:14770";
   s.http = "127.0.0.5:8088";
   s.now_ns = 1234567890123456780;
+  s.recordings = {{"front", "recordings/run-1.mcap", true, 31, 32, 33, ""},
+                  {"front", "recordings/run-0.pcap", false, 34, 35, 36, "the disk is full"}};
   return s;
 }
 
