@@ -1,0 +1,140 @@
+// The device engine against the CPU engine where both are given the same rays (flat_ray_scene.cpp): what is left is arithmetic,
+// and it is the same arithmetic. Every part of the model, alone and together, in batches and one by one.
+#include <gtest/gtest.h>
+
+#include "tests/core/pipeline/basin.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/cuda/comparing.hpp"
+
+namespace sonar::test {
+namespace {
+
+// The goal is 1e-4 and 1 LSB. With the same rays, on a processor that rounds as the device does, it is nothing at all; the rest
+// is what the last bit of a library's sine, or a transform instead of a band across the beams, may do.
+constexpr double most_apart = 5e-6;
+
+void expect_same(const Ping& cpu, const Ping& device, const std::string& what) {
+  const Apart d = compare(cpu, device);
+  EXPECT_TRUE(d.shape) << what;
+  EXPECT_LE(d.relative_l2, most_apart) << what;
+  EXPECT_LE(d.most_lsb, 1u) << what;
+  EXPECT_LE(static_cast<double>(d.samples_off), 1e-3 * static_cast<double>(cpu.samples.size())) << what;
+  EXPECT_TRUE(d.truth) << what;
+}
+
+/// Beams three times as wide: cells, most of whose time goes into making them, are a ninth as many.
+std::shared_ptr<const SonarModel> with_wide_beams(FrequencyMode mode, Waveform::Shape shape) {
+  mode.pattern.azimuth_width_rad *= 3;
+  return model_of(mode, shape, false);
+}
+
+/// All turns that the device takes: tones in the time domain too. Ghosts, which are the CPU's and slow, in one of them only.
+std::vector<std::pair<std::string, PingRequest>> on_device_turns() {
+  auto all = turns();
+  const auto tone = with_wide_beams(p900(), Waveform::Shape::cw), sweep = with_wide_beams(oculus_high(), Waveform::Shape::lfm);
+  for (auto& [what, request] : all) {
+    request.model = request.model->modes[0].waveform.exact ? tone : sweep;
+    request.switches.multipath = what == "everything, high" || what == "everything, low";
+  }
+  std::erase_if(all, [](const auto& turn) {
+    return !cuda::why_not_on_device(turn.second).empty() || turn.first.starts_with("everything again") ||
+           turn.first.starts_with("everything at last");
+  });
+  return all;
+}
+
+TEST(DeviceEngine, DoesEveryPartOfTheModelAsTheCpuDoes) {
+  BothEngines both(basin());
+  std::size_t compared = 0;
+  for (const auto& [what, request] : on_device_turns()) {
+    expect_same(both.by_cpu(request), both.by_device(request), what);
+    ++compared;
+  }
+  EXPECT_GE(compared, 14u);
+  EXPECT_TRUE(both.said.empty());
+}
+
+TEST(DeviceEngine, IsTheSameBytesInBatchesOfAnySize) {
+  std::vector<PingRequest> requests;
+  for (auto& [what, request] : on_device_turns())
+    if (!request.switches.expected_power && !request.switches.multipath && requests.size() < 7) requests.push_back(request);
+  BothEngines one(basin(), SimdLevel::portable, 1), three(basin(), SimdLevel::portable, 3);
+  std::vector<Ping> single;
+  for (const PingRequest& r : requests) single.push_back(one.by_device(r));
+  const std::vector<Ping> batched = three.by_device(requests);
+  ASSERT_EQ(batched.size(), 7u);
+  for (std::size_t i = 0; i < single.size(); ++i) {
+    EXPECT_EQ(batched[i].samples, single[i].samples) << i;
+    EXPECT_EQ(batched[i].pressure_upa, single[i].pressure_upa) << i;
+    EXPECT_EQ(batched[i].request.number, requests[i].number) << i;
+  }
+}
+
+TEST(DeviceEngine, LeavesToTheCpuWhatItCannotDoAndSaysSoOnce) {
+  BothEngines both(basin());
+  std::vector<PingRequest> requests{high(), high(), low(), low(), high()};
+  for (PingRequest& r : requests) r.switches.multipath = false, r.settings.range_bin_count = 30;
+  requests[1].switches.fixed_fan = 40;
+  if (spectral::have_transform) {
+    EXPECT_EQ(cuda::why_not_on_device(low()), "pings with an exact pulse");
+  }
+  const std::vector<Ping> pings = both.by_device(requests);
+  for (std::size_t i = 0; i < requests.size(); ++i) expect_same(both.by_cpu(requests[i]), pings[i], std::to_string(i));
+  ASSERT_EQ(both.said.size(), spectral::have_transform ? 2u : 1u);
+  EXPECT_EQ(both.said[0], "CUDA: pings of a fixed fan are computed by the CPU");
+  requests[0].settings.beam_count = 0;
+  EXPECT_THROW(both.by_device(requests), std::invalid_argument);
+}
+
+struct Case {
+  std::string name;
+  FrequencyMode mode;
+  PingSettings settings;
+};
+std::vector<Case> cases() {
+  PingSettings near = default_rows(2, 703);
+  near.format = {.bits = 8, .max_code = 254, .gamma = 0.5f, .row_gains = false};
+  return {{"P1", p900(), default_rows(10, 394)}, {"P3a", oculus_high(), default_rows(10, 437)}, {"P3c", oculus_high(), near}};
+}
+
+// The benchmark's sizes, over relief with things on it, standing still and moving; also beside the CPU's widest instructions.
+TEST(DeviceEngine, DoesTheBenchmarksCases) {
+  SceneMaker maker;
+  maker.add(height_field(-1, 12, -10, 10, 0.1, rough_relief(0.1, 30)), -25, {0, 0, -2});
+  maker.add(sphere(0.5, 4), -15, {5, 0.7, -1.5});
+  maker.add_body(box({0.4, 0.3, 0.3}), -15, {{4, -1, -1.4}, quat_from_rpy({0.1, 0.2, 0.7})});
+  const auto scene = maker.make();
+  for (const Case& c : cases()) {
+    SonarModel model;
+    model.name = "test";
+    model.modes = {c.mode};
+    PingRequest r;
+    r.model = std::make_shared<const SonarModel>(std::move(model));
+    r.settings = c.settings;
+    r.settings.gain_db = 20;
+    r.water = {.temperature_c = 10, .salinity_psu = 0, .ph = 8, .sound_speed_mps = 1480};
+    r.sonar_in_world = {{0, 0, 0}, quat_from_rpy({0, 0.25, 0.1})};
+    r.seed = Seed{3};
+    r.switches.keep_pressure = r.switches.keep_beams = r.switches.keep_truth = true;
+    BothEngines both(scene);
+    const Ping cpu = both.by_cpu(r), device = both.by_device(r);
+    expect_same(cpu, device, c.name);
+    const PingStatistics ours = both.device().statistics(), theirs = both.cpu().statistics();
+    EXPECT_EQ(ours.rays, theirs.rays) << c.name;
+    EXPECT_EQ(ours.tiles, theirs.tiles) << c.name;
+    EXPECT_EQ(ours.echoes, theirs.echoes) << c.name;
+    RecordProperty(c.name, std::to_string(compare(cpu, device).relative_l2));
+
+    // The CPU's wider instructions fuse multiplications with additions. That turns carriers by a ten-thousandth: as far as the
+    // CPU's own loops are apart, and no farther, the device is from them.
+    Parallel pool(2);
+    const Ping fused = make_cpu_engine(scene, pool, {})->run({&r, 1}).at(0);
+    EXPECT_LE(compare(fused, device).relative_l2, 1.01 * compare(fused, cpu).relative_l2 + 1e-6) << c.name;
+    EXPECT_LE(compare(fused, device).relative_l2, 5e-4) << c.name;
+    r.sonar_moves = {{0.8, 0.1, 0}, {0, 0.05, 0.3}};
+    expect_same(both.by_cpu(r), both.by_device(r), c.name + " moving");
+  }
+}
+
+}  // namespace
+}  // namespace sonar::test
