@@ -34,6 +34,7 @@ class Engine final : public PingEngine {
     return pings;
   }
 
+  void let_in(Interruption* who) override { canonical_->let_in(who); }
   std::string description() const override { return canonical_->description(); }
   PingStatistics statistics() const override { return last_was_canonical_ ? canonical_->statistics() : statistics_; }
 

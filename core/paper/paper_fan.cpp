@@ -20,6 +20,16 @@ std::vector<double> widths_of(const std::vector<double>& centres, double lone) {
   return widths;
 }
 
+void tabulate(PaperFan& fan) {
+  for (const double azimuth : fan.azimuth_rad)
+    fan.ahead.push_back(fan.perspective ? Vec3d{1, std::tan(azimuth), 0} : Vec3d{std::cos(azimuth), std::sin(azimuth), 0});
+  for (int row = 0; row < fan.rows; ++row) {
+    const double up = fan.first_row + row * fan.row_step;
+    fan.level.push_back(fan.perspective ? 1 : std::cos(up));
+    fan.rise.push_back(fan.perspective ? up : std::sin(up));
+  }
+}
+
 }  // namespace
 
 PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
@@ -35,19 +45,22 @@ PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
   if (!fan.perspective) {
     for (const double sine : plan.beam_sine) fan.azimuth_rad.push_back(std::asin(sine));
     fan.column_width = widths_of(fan.azimuth_rad, aperture);
+    tabulate(fan);
     return fan;
   }
   const double side = std::tan(std::min(0.5 * aperture, widest_half_angle_rad));
   const int columns = plan.settings.beam_count;
   for (int i = 0; i < columns; ++i) fan.azimuth_rad.push_back(std::atan(side * (1 - (2.0 * i + 1) / columns)));
   fan.column_width.assign(static_cast<std::size_t>(columns), 2 * side / columns);
+  tabulate(fan);
   return fan;
 }
 
 Vec3d PaperFan::direction(int column, int row) const {
-  const double azimuth = azimuth_rad[static_cast<std::size_t>(column)], up = first_row + row * row_step;
-  if (!perspective) return {std::cos(up) * std::cos(azimuth), std::cos(up) * std::sin(azimuth), std::sin(up)};
-  const Vec3d pixel{1, std::tan(azimuth), up};
+  const Vec3d& to = ahead[static_cast<std::size_t>(column)];
+  const auto r = static_cast<std::size_t>(row);
+  if (!perspective) return {level[r] * to.x, level[r] * to.y, rise[r]};
+  const Vec3d pixel{1, to.y, rise[r]};
   return (1 / length(pixel)) * pixel;
 }
 
@@ -77,7 +90,7 @@ void trace_column(const RayScene& scene, const PaperFan& fan, const PingScalars&
       const Vec3 along{packet.direction_x[lane], packet.direction_y[lane], packet.direction_z[lane]};
       if (!(length(normal) > 0)) continue;
       const int row = from + lane;
-      hits.push_back({column, row, static_cast<double>(packet.far[lane]), std::asin(fan.direction(column, row).z),
+      hits.push_back({column, row, static_cast<double>(packet.far[lane]), fan.elevation_rad(column, row),
                       std::min(1.0, static_cast<double>(std::abs(dot(normal, along)) / length(normal))),
                       fan.solid_angle_sr(column, row), packet.object[lane], packet.triangle[lane]});
     }

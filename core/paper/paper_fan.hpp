@@ -2,6 +2,7 @@
 // method. First stage of core/paper; docs/acoustics.md, section 8.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -22,10 +23,15 @@ struct PaperFan {
   std::vector<double> column_width;    // [columns] of azimuth [rad]; perspective: of the tangent
   double first_row = 0, row_step = 0;  // elevation [rad] of row 0; perspective: its tangent over the horizontal x axis
   int rows = 0;
+  std::vector<Vec3d> ahead;         // [columns] per column, and
+  std::vector<double> level, rise;  // [rows] per row: what directions are put together of
 
   int columns() const { return static_cast<int>(azimuth_rad.size()); }
   /// Unit vector in the sonar's frame.
   Vec3d direction(int column, int row) const;
+  double elevation_rad(int column, int row) const {
+    return perspective ? std::asin(direction(column, row).z) : first_row + row * row_step;
+  }
   /// Solid angle a ray stands for [sr]. Fan: dtheta dphi as printed in eq. (2), without cos(phi).
   double solid_angle_sr(int column, int row) const;
 };

@@ -12,6 +12,7 @@
 namespace sonar::paper {
 namespace {
 
+constexpr int sum_width = 8;                       // of the fast sum: relative error 1e-7
 constexpr std::uint32_t speckle_key = 0x50323521;  // keeps these draws apart from all others
 constexpr double width_constant = 0.884;           // P25's code, for sinc patterns: -3 dB width times aperture
 
@@ -32,12 +33,12 @@ double elevation_pattern(const Prepared& p, double elevation_rad) {
 }
 
 /// What a scatterer of a known cross-section sends back; none when it lies outside the record.
-bool add_echo(double range_m, double elevation_rad, double cross_section_m2, ComplexNormal xi, const Prepared& p,
-              const PingScalars& s, std::vector<PaperEcho>& echoes) {
+bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& p, const PingScalars& s,
+              std::vector<PaperEcho>& echoes) {
   const double turns = range_m * s.samples_per_m / p.plan.samples;
   if (!(turns < 1)) return false;
-  const double amplitude = s.source_upa * std::sqrt(cross_section_m2) * elevation_pattern(p, elevation_rad) *
-                           two_way_transmission(range_m, s.absorption_np_per_m);
+  const double amplitude =
+      s.source_upa * std::sqrt(cross_section_m2) * pattern * two_way_transmission(range_m, s.absorption_np_per_m);
   if (p.plan.expected_power)
     echoes.push_back({turns, {amplitude * amplitude, 0}});
   else
@@ -104,7 +105,7 @@ class PaperPing {
   }
 
   void sound_columns();
-  void correct_beams();
+  void correct_beams(const simd::Kernels& kernels);
   Ping image(const simd::Kernels& kernels);
 
  private:
@@ -149,7 +150,8 @@ void PaperPing::sound_column(int column, PingStatistics& mine) {
         truth_of(hits, 0.5 * static_cast<double>(p_.plan.mode.pattern.elevation_width_rad));
   std::vector<PaperEcho> echoes = echoes_of(hits, mu_, scene_.scene(), p_, s_, request_);
   for (const PointInView& point : points_) {
-    if (point.column == column) add_echo(point.range_m, point.elevation_rad, point.cross_section_m2, {1, 0}, p_, s_, echoes);
+    if (point.column == column)
+      add_echo(point.range_m, elevation_pattern(p_, point.elevation_rad), point.cross_section_m2, {1, 0}, p_, s_, echoes);
   }
   const double scattered = now();
   const std::span<float> out = std::span(columns_).subspan(static_cast<std::size_t>(column) * values_, values_);
@@ -167,10 +169,11 @@ void PaperPing::sound_column(int column, PingStatistics& mine) {
   mine.seconds[static_cast<std::size_t>(Stage::synthesize)] += now() - scattered;
 }
 
-void PaperPing::correct_beams() {
+void PaperPing::correct_beams(const simd::Kernels& kernels) {
   const double begin = now();
   beams_.resize(columns_.size());
-  correct(p_.correction, p_.plan.settings.beam_count, p_.fan.columns(), columns_, static_cast<int>(values_), pool_, beams_);
+  correct(p_.correction, p_.plan.settings.beam_count, p_.fan.columns(), columns_, static_cast<int>(values_), kernels, pool_,
+          beams_);
   statistics_.seconds[static_cast<std::size_t>(Stage::couple)] += now() - begin;
 }
 
@@ -214,12 +217,15 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
       fan(make_paper_fan(plan, request.switches.mode, request.switches.fixed_fan)),
       spectrum(make_spectrum(plan)),
       inverse(spectrum) {
-  if (sum == FrequencySum::fast && spectral::have_transform) fast = std::make_unique<spectral::FrequencySums>(spectrum.count);
+  if (sum == FrequencySum::fast && spectral::have_transform)
+    fast = std::make_unique<spectral::FrequencySums>(spectrum.count, sum_width);
   if (plan.expected_power) pulse_power = std::make_unique<PulsePower>(spectrum, inverse);
   const double spacing = static_cast<double>(plan.mode.horizontal_aperture_rad) / plan.settings.beam_count;
-  correction = make_correction(fan.azimuth_rad, spacing, plan.expected_power);
+  correction = panels_of(make_correction(fan.azimuth_rad, spacing, plan.expected_power), plan.settings.beam_count, fan.columns());
   if (plan.mode.pattern.elevation_taper != Taper::unit)
     elevation_per_sine = width_constant / static_cast<double>(plan.mode.pattern.elevation_width_rad);
+  for (int row = 0; row < fan.rows && !fan.perspective; ++row)
+    pattern.push_back(elevation_pattern(*this, fan.elevation_rad(0, row)));
 }
 
 bool Prepared::serves(const PingRequest& request) const { return request.model == model && sonar::serves(plan, request); }
@@ -234,7 +240,9 @@ std::vector<PaperEcho> echoes_of(std::span<const PaperHit> hits, std::span<const
     const Random4 draw = philox(static_cast<std::uint32_t>(request.number), static_cast<std::uint32_t>(hit.column),
                                 static_cast<std::uint32_t>(hit.row), speckle_key, static_cast<std::uint32_t>(bits),
                                 static_cast<std::uint32_t>(bits >> 32));
-    add_echo(hit.range_m, hit.elevation_rad, printed_cross_section_m2(strength, hit.cosine, hit.range_m, hit.solid_angle_sr),
+    const double pattern =
+        p.pattern.empty() ? elevation_pattern(p, hit.elevation_rad) : p.pattern[static_cast<std::size_t>(hit.row)];
+    add_echo(hit.range_m, pattern, printed_cross_section_m2(strength, hit.cosine, hit.range_m, hit.solid_angle_sr),
              complex_normal(draw.v[0], draw.v[1]), p, s, echoes);
   }
   return echoes;
@@ -243,8 +251,8 @@ std::vector<PaperEcho> echoes_of(std::span<const PaperHit> hits, std::span<const
 Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
               Parallel& pool, double (*now_s)(), PingStatistics& statistics) {
   PaperPing ping(scene, request, prepared, pool, now_s, statistics);
-  ping.sound_columns();  // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, a column a beam
-  ping.correct_beams();  // "as coded"
+  ping.sound_columns();         // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, a column a beam
+  ping.correct_beams(kernels);  // "as coded"
   return ping.image(kernels);
 }
 

@@ -23,7 +23,8 @@ struct Prepared {
   std::unique_ptr<spectral::FrequencySums> fast;  // none: term by term
   InverseTransform inverse;
   std::unique_ptr<PulsePower> pulse_power;  // in expected power only
-  std::vector<float> correction;            // [beams][columns]
+  std::vector<float> correction;            // panels of it, see panels_of
+  std::vector<double> pattern;              // D(phi) of a row, of fans
   double elevation_per_sine = 0;            // D(phi) = sinc(elevation_per_sine sin phi); 0 = no pattern
 };
 

@@ -63,21 +63,29 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
   return weights;
 }
 
-void correct(std::span<const float> weights, int beams, int columns, std::span<const float> in, int values, Parallel& pool,
-             std::span<float> out) {
+std::vector<float> panels_of(std::span<const float> weights, int beams, int columns) {
+  const auto b = static_cast<std::size_t>(beams), c = static_cast<std::size_t>(columns);
+  std::vector<float> panels((b + 3) / 4 * 4 * c, 0.0f);
+  for (std::size_t j = 0; j < b; ++j)
+    for (std::size_t k = 0; k < c; ++k) panels[(j / 4 * c + k) * 4 + j % 4] = weights[j * c + k];
+  return panels;
+}
+
+void correct(std::span<const float> panels, int beams, int columns, std::span<const float> in, int values,
+             const simd::Kernels& kernels, Parallel& pool, std::span<float> out) {
   constexpr int block = 128;  // values at a time: those of all columns stay in the second cache
-  const auto length = static_cast<std::size_t>(values);
-  pool.for_each((length + block - 1) / block, [&](std::size_t b, int) {
+  const auto length = static_cast<std::size_t>(values), count = static_cast<std::size_t>(columns);
+  std::vector<std::vector<float>> windows(static_cast<std::size_t>(pool.threads()));
+  pool.for_each((length + block - 1) / block, [&](std::size_t b, int worker) {
     const std::size_t from = b * block, n = std::min<std::size_t>(block, length - from);
-    for (std::size_t j = 0; j < static_cast<std::size_t>(beams); ++j) {
-      float sum[block] = {};
-      const float* weight = weights.data() + j * static_cast<std::size_t>(columns);
-      for (std::size_t k = 0; k < static_cast<std::size_t>(columns); ++k) {
-        const float* column = in.data() + k * length + from;
-        const float w = weight[k];
-        for (std::size_t i = 0; i < n; ++i) sum[i] += w * column[i];
-      }
-      std::copy(sum, sum + n, out.data() + j * length + from);
+    std::vector<float>& window = windows[static_cast<std::size_t>(worker)];
+    window.assign(count * block, 0.0f);
+    for (std::size_t k = 0; k < count; ++k) std::copy_n(in.data() + k * length + from, n, window.data() + k * block);
+    for (int j = 0; j < beams; j += 4) {
+      float sums[4 * block];
+      kernels.couple_panel(window.data(), block, panels.data() + static_cast<std::size_t>(j) * count, columns, sums, block);
+      for (int i = 0; i < 4 && j + i < beams; ++i)
+        std::copy_n(sums + i * block, n, out.data() + static_cast<std::size_t>(j + i) * length + from);
     }
   });
 }

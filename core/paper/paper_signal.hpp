@@ -12,10 +12,11 @@
 #include "core/paper/paper_fan.hpp"
 #include "core/pipeline/couple.hpp"
 #include "core/pipeline/pulses/spectral.hpp"
+#include "core/pipeline/simd/kernels.hpp"
 
 namespace sonar::paper {
 
-/// How eq. (1) is summed over the scatterers: term by term, or by a non-uniform transform (relative error 8e-6).
+/// How eq. (1) is summed over the scatterers: term by term, or by a non-uniform transform (relative error 1e-7).
 enum class FrequencySum { fast, direct };
 
 /// Eq. (2) without xi: mu cos^2(incidence) r^2 dOmega [m^2], the printed footprint. Lambert's law would have cos^1 here.
@@ -48,9 +49,11 @@ void sum_frequencies(std::span<const PaperEcho> echoes, const PaperSpectrum& spe
 /// sum of all V^2. `squared` for expected power. [beams][columns]
 std::vector<float> make_correction(std::span<const double> azimuth_rad, double spacing_rad, bool squared);
 
-/// out[j] = sum_k weights[j][k] in[k], rows of `values` floats.
-void correct(std::span<const float> weights, int beams, int columns, std::span<const float> in, int values, Parallel& pool,
-             std::span<float> out);
+/// The weights of four beams side by side, [(beams + 3) / 4][columns][4]: as the kernels want them.
+std::vector<float> panels_of(std::span<const float> weights, int beams, int columns);
+/// out[j] = sum_k weights[j][k] in[k], rows of `values` floats; `panels` of those weights.
+void correct(std::span<const float> panels, int beams, int columns, std::span<const float> in, int values,
+             const simd::Kernels& kernels, Parallel& pool, std::span<float> out);
 
 /// s[n] = sum_m P(f_m) e^{i 2 pi (f_m - f_c) t_n}: the record's samples from its spectrum.
 class InverseTransform {

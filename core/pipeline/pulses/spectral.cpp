@@ -10,7 +10,9 @@ namespace {
 
 constexpr int oversampling = 2;
 constexpr double sharpness_per_width = 2.3;
-constexpr int restart_every = 256;  // a phase turned on step by step forgets itself slowly
+constexpr int small_padding = 8, large_padding = 16;  // of widths, so that loops over them are whole vectors
+constexpr int extra_terms = 4;                        // of the polynomials, beyond the width
+constexpr int restart_every = 256;                    // a phase turned on step by step forgets itself slowly
 
 double kernel(double x) {  // |x| <= 1 over its half width, times the width: see sharpness_per_width
   return std::sqrt(std::max(0.0, 1 - x * x)) - 1;
@@ -26,6 +28,24 @@ double kernel_transform(int width, double f) {
     sum += std::exp(sharpness_per_width * width * kernel(x)) * std::cos(pi * f * width * x) * std::cos(t);
   }
   return sum * pi / steps * width / 2;
+}
+
+/// Coefficients, lowest first, of the polynomial through the Chebyshev points of [-1, 1]: as good as least squares.
+template <class Function>
+std::vector<double> fit(const Function& f, int terms) {
+  const auto n = static_cast<std::size_t>(terms);
+  std::vector<double> node(n), divided(n), power(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    node[i] = std::cos(pi * (static_cast<double>(i) + 0.5) / static_cast<double>(n));
+    divided[i] = f(node[i]);
+  }
+  for (std::size_t order = 1; order < n; ++order)
+    for (std::size_t i = n - 1; i >= order; --i) divided[i] = (divided[i] - divided[i - 1]) / (node[i] - node[i - order]);
+  for (std::size_t i = n; i-- > 0;) {  // power = power * (t - node_i) + divided_i
+    for (std::size_t k = n - 1; k > 0; --k) power[k] = power[k - 1] - node[i] * power[k];
+    power[0] = divided[i] - node[i] * power[0];
+  }
+  return power;
 }
 
 }  // namespace
@@ -57,21 +77,45 @@ FrequencySums::FrequencySums(int count, int width)
     : count_(count),
       width_(width),
       points_(quick_size(std::max(oversampling * count, 2 * width))),
-      forward_(points_, Fft::Direction::forward) {
+      padded_(width <= small_padding ? small_padding : large_padding),
+      forward_(points_, Fft::Direction::forward),
+      terms_(width + extra_terms) {
+  polynomial_.assign(static_cast<std::size_t>(terms_ * padded_), 0.0);
+  for (int k = 0; k < width; ++k) {
+    const std::vector<double> fitted =
+        fit([&](double t) { return std::exp(sharpness_per_width * width * kernel(((t + 1) / 2 + k) * 2 / width - 1)); }, terms_);
+    for (int term = 0; term < terms_; ++term)
+      polynomial_[static_cast<std::size_t>(term * padded_ + k)] = fitted[static_cast<std::size_t>(terms_ - 1 - term)];
+  }
   for (int m = 0; m < count; ++m)
     correction_.push_back(1 / kernel_transform(width, static_cast<double>(m - count / 2) / points_));
 }
 
-void FrequencySums::add(double turns, Complex amplitude, Complex* grid) const {
+template <int padded>
+void FrequencySums::spread(double turns, Complex amplitude, Complex* grid) const {
   const double place = (turns - std::floor(turns)) * points_;  // may round up to points_: the wrap below knows
   const double first = std::ceil(place - 0.5 * width_);
+  const double t = 2 * (first - place + 0.5 * width_) - 1;
+  double value[padded];
+  const double* c = polynomial_.data();
+  for (int k = 0; k < padded; ++k) value[k] = c[k];
+  for (int term = 1; term < terms_; ++term) {
+    c += padded;
+    for (int k = 0; k < padded; ++k) value[k] = value[k] * t + c[k];
+  }
   int at = static_cast<int>(first);
   if (at < 0) at += points_;
   for (int k = 0; k < width_; ++k) {
-    const double x = (first + k - place) * 2 / width_;
     if (at >= points_) at -= points_;
-    grid[at++] += std::exp(sharpness_per_width * width_ * kernel(x)) * amplitude;
+    grid[at++] += value[k] * amplitude;
   }
+}
+
+void FrequencySums::add(double turns, Complex amplitude, Complex* grid) const {
+  if (padded_ == small_padding)
+    spread<small_padding>(turns, amplitude, grid);
+  else
+    spread<large_padding>(turns, amplitude, grid);
 }
 
 void FrequencySums::transform(Complex* grid, Complex* sums) const {

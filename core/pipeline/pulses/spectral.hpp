@@ -49,8 +49,13 @@ class FrequencySums {
   void transform(Complex* grid, Complex* sums) const;
 
  private:
-  int count_, width_, points_;
+  template <int padded>
+  void spread(double turns, Complex amplitude, Complex* grid) const;
+
+  int count_, width_, points_, padded_;
   Fft forward_;
+  int terms_ = 0;
+  std::vector<double> polynomial_;  // [terms][padded]: the kernel at each point, by where between points the echo lies
   std::vector<double> correction_;  // 1 / the kernel's transform, per sum
 };
 
