@@ -1,4 +1,5 @@
 // The CPU's ping engine: owns the rays' scene, the surface cells and the buffers, and runs simulate() for each request.
+#include <array>
 #include <stdexcept>
 
 #include "core/pipeline/ping_engine.hpp"
@@ -7,7 +8,8 @@
 namespace sonar {
 namespace {
 
-class CpuEngine final : public PingEngine {
+/// Lets pings in between the parts of another one: each has buffers of its own, and finds scene and cells as it needs them.
+class CpuEngine final : public PingEngine, private Interruption {
  public:
   CpuEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options)
       : rays_(scene, pool.threads()),
@@ -15,7 +17,7 @@ class CpuEngine final : public PingEngine {
         pool_(pool),
         options_(options),
         kernels_(simd::kernels_for(options.simd)) {
-    work_.now_s = options.now_s;
+    for (Workspace& work : work_) work.now_s = options.now_s;
   }
 
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
@@ -23,30 +25,60 @@ class CpuEngine final : public PingEngine {
     pings.reserve(requests.size());
     for (const PingRequest& request : requests) {
       if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
-      if (!cells_ || !cells_->serves(request.seed, request.switches.texture))
-        cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, request.switches.texture);
-      if (!scene_->bodies_in_world.empty())
-        rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
-      pings.push_back(simulate(rays_, *cells_, request, kernels_, work_, pool_));
+      pings.push_back(run(request));
     }
     return pings;
   }
+
+  void let_in(Interruption* who) override { who_ = who; }
 
   std::string description() const override {
     return std::string("cpu, ") + kernels_.name + ", " + std::to_string(pool_.threads()) +
            (pool_.threads() == 1 ? " thread, " : " threads, ") + RayScene::version();
   }
 
-  PingStatistics statistics() const override { return work_.statistics; }
+  PingStatistics statistics() const override { return work_[0].statistics; }
 
  private:
+  Ping run(const PingRequest& request) {
+    if (!cells_ || !cells_->serves(request.seed, request.switches.texture))
+      cells_ = std::make_shared<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, request.switches.texture);
+    place_bodies(request);
+    if (under_way_.request != nullptr) return simulate(rays_, *cells_, request, kernels_, work_[1], pool_);
+    under_way_ = {&request, cells_, 0};
+    struct Finish {
+      UnderWay& ping;
+      ~Finish() { ping = {}; }
+    } finish{under_way_};
+    work_[0].between = who_ ? this : nullptr;
+    return simulate(rays_, *under_way_.cells, request, kernels_, work_[0], pool_);
+  }
+  void place_bodies(const PingRequest& request) {
+    if (!scene_->bodies_in_world.empty())
+      rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
+  }
+  bool expected() const override { return who_->expected(); }
+  void take() override {
+    if (under_way_.view == 0) under_way_.view = under_way_.cells->views();
+    under_way_.cells->keep_since(under_way_.view);
+    who_->take();
+    under_way_.cells->keep_since(0);
+    place_bodies(*under_way_.request);  // where the ping under way has them
+  }
+
   RayScene rays_;
   std::shared_ptr<const Scene> scene_;
   Parallel& pool_;
   EngineOptions options_;
   const simd::Kernels& kernels_;
-  std::unique_ptr<SurfaceCells> cells_;
-  Workspace work_;
+  std::shared_ptr<SurfaceCells> cells_;
+  std::array<Workspace, 2> work_;  // of the ping under way, and of one let in
+  Interruption* who_ = nullptr;
+  struct UnderWay {
+    const PingRequest* request = nullptr;
+    std::shared_ptr<SurfaceCells> cells;  // a ping let in may need others
+    std::uint64_t view = 0;               // the one whose tiles it uses
+  } under_way_;
 };
 
 }  // namespace

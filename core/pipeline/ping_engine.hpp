@@ -33,12 +33,24 @@ struct PingStatistics {
   std::size_t rays = 0, tiles = 0, tiles_built = 0, cells = 0, echoes = 0, cell_bytes = 0;
 };
 
+/// Whoever may want another ping of an engine while one is under way.
+class Interruption {
+ public:
+  virtual ~Interruption() = default;
+  /// Whether that is likely: the ping is then made in smaller parts.
+  virtual bool expected() const = 0;
+  /// Between two parts, on the thread of run(); may call run() of the same engine, but not from within that again.
+  virtual void take() = 0;
+};
+
 class PingEngine {
  public:
   virtual ~PingEngine() = default;
   /// A request that cannot be simulated (why_invalid in core/pipeline/ping_plan.hpp) throws std::invalid_argument with the
   /// reason. One caller at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
+  /// Engines that let nobody in between ignore it. Null = nobody; no ping may be under way.
+  virtual void let_in(Interruption* who) { static_cast<void>(who); }
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
   /// Of the last ping.
   virtual PingStatistics statistics() const { return {}; }

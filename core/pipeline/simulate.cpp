@@ -119,6 +119,7 @@ class PingUnderWay {
 /// How many columns a worker takes at once. Tiles that reach into several groups are looked at by each, so the more the better,
 /// as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
 int PingUnderWay::group_columns() const {
+  if (w_.between && w_.between->expected()) return traced_columns;
   const auto column_bytes =
       sizeof(float) * (static_cast<std::size_t>(w_.columns.stride) + static_cast<std::size_t>(plan_.fan.bins));
   const int in_cache = static_cast<int>(group_bytes / column_bytes);
@@ -166,10 +167,15 @@ void PingUnderWay::hear_by_mirrors() {
 
 /// Rays, echoes, pulses and noise, a group of columns at a time.
 void PingUnderWay::sound_columns() {
-  pool_.for_each(static_cast<std::size_t>(groups()), [&](std::size_t g, int worker) {
-    const int first = static_cast<int>(g) * group_columns_;
-    sound_group(first, std::min(first + group_columns_, plan_.columns.count), w_.workers[static_cast<std::size_t>(worker)]);
-  });
+  const auto all = static_cast<std::size_t>(groups());
+  const std::size_t at_once = w_.between && w_.between->expected() ? static_cast<std::size_t>(pool_.threads()) : all;
+  for (std::size_t from = 0; from < all; from += at_once) {
+    if (from > 0) w_.between->take();
+    pool_.for_each(std::min(at_once, all - from), [&](std::size_t g, int worker) {
+      const int first = static_cast<int>(from + g) * group_columns_;
+      sound_group(first, std::min(first + group_columns_, plan_.columns.count), w_.workers[static_cast<std::size_t>(worker)]);
+    });
+  }
 }
 
 void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) {

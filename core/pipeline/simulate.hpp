@@ -60,6 +60,7 @@ struct Workspace {
   std::vector<PerWorker> workers;
   PingStatistics statistics;
   double (*now_s)() = nullptr;
+  Interruption* between = nullptr;  // is asked between the groups of columns; null = nobody
 };
 
 /// `cells` must belong to the scene of `scene` and to the request's seed; bodies must have been placed.

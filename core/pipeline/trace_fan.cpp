@@ -21,6 +21,7 @@ struct ColumnSine {
 };
 std::vector<ColumnSine> column_sines(const Columns& columns, int first, int last) {
   std::vector<ColumnSine> sines;
+  sines.reserve(static_cast<std::size_t>(last - first));
   for (int k = first; k < last; ++k) {
     const double u = columns.sine(k);
     sines.push_back({static_cast<float>(u), static_cast<float>(std::sqrt(std::max(0.0, 1 - u * u)))});
@@ -75,6 +76,7 @@ class FanTracer {
         s_(scratch) {
     tolerance_m_ = static_cast<float>(plan.pulse_width_m);
     columns_ = column_sines(plan.columns, first, last);
+    base_.reserve(plan.fan.elevation_rad.size());
     for (const float angle : plan.fan.elevation_rad) base_.push_back(elevation_at(angle));
   }
 

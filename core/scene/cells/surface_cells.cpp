@@ -256,7 +256,7 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
 /// Forgets what was not looked at for longest; it comes back identical when wanted again.
 void SurfaceCells::keep_within_budget() {
   for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {
-    if (age >= now_) continue;
+    if (age >= now_ || (kept_since_ > 0 && now_ - age >= kept_since_)) continue;
     for (auto& sheet : sheets_)
       for (auto& root : sheet->roots) {
         cached_bytes_ -= Sheet::forget_below(*root, now_ - age + 1);

@@ -93,6 +93,11 @@ class SurfaceCells {
   const std::vector<TileInView>& in_view(const CellView& view, Parallel& pool);
   /// Rotation from object to sonar axes of the last view, per object.
   const Rotation& sonar_from_object(int object) const { return rotations_[static_cast<std::size_t>(object)]; }
+  /// Views so far.
+  std::uint64_t views() const { return now_; }
+  /// From now on nothing is forgotten of that view and later ones: others may be asked for while its tiles are in use. 0 = of
+  /// none.
+  void keep_since(std::uint64_t view) { kept_since_ = view; }
   /// Of the tiles and of the tree that leads to them.
   std::size_t cached_bytes() const { return cached_bytes_; }
   std::size_t built_last_time() const { return built_; }
@@ -108,8 +113,8 @@ class SurfaceCells {
   bool textured_ = true, has_texture_ = false;
   std::vector<std::unique_ptr<const TextureField>> textures_;  // per material, null = none
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
-  std::uint64_t now_ = 0;
-  double fan_cosine_ = 1, fan_sine_ = 0;  // of the last view's half angle
+  std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
+  double fan_cosine_ = 1, fan_sine_ = 0;    // of the last view's half angle
   std::vector<std::unique_ptr<Sheet>> sheets_;
   std::vector<Rotation> rotations_;
   std::vector<TileInView> in_view_;
