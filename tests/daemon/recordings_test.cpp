@@ -128,7 +128,7 @@ TEST(RecordingConfig, NamesAFolderThatIsThere) {
   EXPECT_EQ(absolute->recording.folder, folder.path);
   EXPECT_THAT(read("recording: {folder: there}\n").error().text, HasSubstr("c.yaml:4:21: recording.folder: is no folder: "));
   EXPECT_THAT(read("recording: {folder: scene.yaml}\n").error().text, HasSubstr("is no folder"));
-  EXPECT_THAT(read("recording: {file: here}\n").error().text, HasSubstr("did you mean \"folder\""));
+  EXPECT_THAT(read("recording: {folder: here, format: mcap}\n").error().text, HasSubstr("recording.format: unknown key"));
 }
 
 // ---- the queue
