@@ -66,7 +66,7 @@ NO_NUMBER = 0  # truths beyond the table
 
 NOT_BUILT = {
     13: "only if a corner module is built, and none is: corners echo by multipath or not at all",
-    20: "needs a CUDA device; the engine on the device does not exist yet",
+    20: "needs a CUDA device, and there was none; by loops on the host: docs/cuda.md",
 }
 
 
