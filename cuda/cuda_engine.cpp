@@ -9,11 +9,11 @@ namespace sonar {
 Result<std::unique_ptr<PingEngine>> make_cuda_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
                                                      const EngineOptions& options, cuda::DeviceEngineOptions device_options) {
   auto machine = cuda::open_cuda_machine();
-  if (!machine) return failure(ErrorKind::unavailable, "no CUDA engine (CUDA: " + machine.error().text + "); use the CPU engine");
+  if (!machine) return failure(ErrorKind::unavailable, "no CUDA engine (CUDA: " + machine.error().text + ")");
   try {
     return cuda::make_device_engine(std::move(scene), pool, options, *std::move(machine), std::move(device_options));
   } catch (const std::runtime_error& e) {
-    return failure(ErrorKind::unavailable, std::string("no CUDA engine (CUDA: ") + e.what() + "); use the CPU engine");
+    return failure(ErrorKind::unavailable, std::string("no CUDA engine (CUDA: ") + e.what() + ")");
   }
 }
 

@@ -64,7 +64,6 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
       ->check(one_of({"coverage"}));
   app.add_flag("--check-expectations", render.check_expectations,
                "measure what the render file expects; exit code 1 if it is not so");
-  app.add_option("--engine", render.device, "what computes (default cpu)")->check(one_of({"cpu"}));
   app.add_flag("--overwrite", render.overwrite, "replace the pings of other inputs in the folder");
   app.add_flag("--quiet", render.quiet, "no progress");
   add_engine_options(app, render.engine);

@@ -29,7 +29,7 @@ struct RenderCommand {
   std::optional<std::uint64_t> pings;  // nothing: one, or one for every line of a file of poses
   std::vector<std::string> formats{"npy", "png"};
   std::optional<double> pose_rate_hz;  // of a KITTI file, which has no times
-  std::string sonar, poses, pose_frame, report, device = "cpu";
+  std::string sonar, poses, pose_frame, report;
   std::optional<double> rate_hz;
   bool complex = false, quiet = false, overwrite = false, check_expectations = false;
   EngineOptionsGiven engine;

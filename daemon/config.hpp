@@ -113,9 +113,13 @@ struct RecordingConfig {
   std::filesystem::path folder;  // an existing one; empty = nothing may be recorded
 };
 inline constexpr int most_fixed_rays = 100000;  // a column
+/// What computes the pings (docs/cuda.md).
+enum class EngineDevice { cpu, cuda, automatic };
+
 struct EngineConfig {
   int threads = 0;      // 0 = all cores
   int io_priority = 0;  // 1 to 99: the I/O thread is scheduled in real time (SCHED_FIFO); 0 = as usual
+  EngineDevice device = EngineDevice::cpu;
   SimdLevel simd = SimdLevel::automatic;
   Switches switches;
 };

@@ -106,6 +106,8 @@ EngineConfig read_engine(const Node& node) {
   engine.threads = static_cast<int>(map.optional("threads").integer_or(0, 0, 256));
   engine.io_priority = static_cast<int>(map.optional("io_priority").integer_or(0, 0, 99));
   map.optional("quality").choice_or<int>(0, {{"default", 0}});
+  engine.device = map.optional("device").choice_or(
+      EngineDevice::cpu, {{"auto", EngineDevice::automatic}, {"cpu", EngineDevice::cpu}, {"cuda", EngineDevice::cuda}});
   engine.simd = map.optional("simd").choice_or(SimdLevel::automatic, {{"auto", SimdLevel::automatic},
                                                                       {"portable", SimdLevel::portable},
                                                                       {"avx2", SimdLevel::avx2},

@@ -39,12 +39,18 @@ void add_engine_options(CLI::App& app, EngineOptionsGiven& given) {
   app.add_option("--threads", given.threads, "compute threads (default 0: all cores)")
       ->check(whole_number(0, 256))
       ->envname("SONARD_THREADS");
+  app.add_option("--engine", given.device, "what computes the pings; auto: the CUDA device if there is one (default cpu)")
+      ->check(one_of({"auto", "cpu", "cuda"}))
+      ->envname("SONARD_ENGINE");
   add_model_options(app, given);
 }
 
 Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given) {
   if (given.threads) engine.threads = *given.threads;
   if (given.seed) seed = *given.seed;
+  if (given.device == "auto") engine.device = EngineDevice::automatic;
+  if (given.device == "cpu") engine.device = EngineDevice::cpu;
+  if (given.device == "cuda") engine.device = EngineDevice::cuda;
   if (given.simd == "auto") engine.simd = SimdLevel::automatic;
   if (given.simd == "portable") engine.simd = SimdLevel::portable;
   if (given.simd == "avx2") engine.simd = SimdLevel::avx2;

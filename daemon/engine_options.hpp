@@ -19,7 +19,7 @@ namespace sonar {
 
 /// Empty = as the configuration says.
 struct EngineOptionsGiven {
-  std::string simd, mode;
+  std::string device, simd, mode;
   std::optional<int> threads;
   std::optional<std::uint64_t> seed;
   std::optional<int> fixed_fan;

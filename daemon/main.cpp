@@ -8,10 +8,10 @@
 #include <new>
 #include <thread>
 
-#include "core/paper/paper_engine.hpp"
 #include "daemon/app.hpp"
 #include "daemon/banner.hpp"
 #include "daemon/bench.hpp"
+#include "daemon/choose_engine.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/control/token.hpp"
 #include "daemon/effective_switches.hpp"
@@ -93,16 +93,18 @@ int run(const RunCommand& command, Steady::time_point begin, bool& json) {
   for (const std::string& note : (*scene)->notes) log.info(note);
   if (const std::string note = note_of_parts_left_out(config.engine.switches); !note.empty()) log.info(note);
   Parallel pool(compute_threads(config.engine), compute_niceness);  // outlives the engine inside App
-  const EngineOptions engine_options{config.engine.simd};
+  // Engines speak on threads of their own, so each has a log of its own.
+  const auto make = [&pool, engine = config.engine, log_options = config.log](ScenePointer s) {
+    const auto own_log = std::make_shared<Log>(log_options);
+    return choose_engine(engine.device, std::move(s), pool, {engine.simd},
+                         [own_log](const std::string& what) { own_log->warning(what); });
+  };
   Result<std::unique_ptr<PingEngine>> engine;
-  compute_apart([&] {
-    engine =
-        start_engine([&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, engine_options); }, *scene);
-  });
+  compute_apart([&] { engine = start_engine(make, *scene); });
   if (!engine) return complain(engine.error(), json);
   const auto make_engine_for = [&](ScenePointer s) -> std::unique_ptr<PingEngine> {
     if (*engine) return *std::move(engine);  // the first
-    return make_engine(std::move(s), pool, engine_options);
+    return make(std::move(s));
   };
   AppOptions options;
   options.exit_after_pings = command.exit_after_pings;

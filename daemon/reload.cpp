@@ -55,6 +55,7 @@ std::vector<std::string> keep_what_needs_a_restart(const Config& now, Config& ne
   keep("limits.control_clients", now.limits.control_clients, next.limits.control_clients);
   keep("engine.threads", now.engine.threads, next.engine.threads);
   keep("engine.io_priority", now.engine.io_priority, next.engine.io_priority);
+  keep("engine.device", now.engine.device, next.engine.device);
   keep("engine.simd", now.engine.simd, next.engine.simd);
   keep("clock", now.clock, next.clock);
   keep("log", now.log, next.log);

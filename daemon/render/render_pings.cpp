@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "core/image/draw_fan.hpp"
-#include "core/paper/paper_engine.hpp"
+#include "daemon/choose_engine.hpp"
 #include "daemon/render/npy.hpp"
 #include "daemon/render/sidecar.hpp"
 #include "daemon/render/sonar_version.hpp"
@@ -187,7 +188,8 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
       } else {
         if (!engine) {
           const auto make = [&](std::shared_ptr<const Scene> s) {
-            return make_engine(std::move(s), pool, {.simd = job.engine.simd});
+            return choose_engine(job.engine.device, std::move(s), pool, {.simd = job.engine.simd},
+                                 [](const std::string& what) { std::fprintf(stderr, "sonard: %s\n", what.c_str()); });
           };
           auto started = start_engine(make, job.scene);
           if (!started) return tl::make_unexpected(started.error());

@@ -184,7 +184,8 @@ std::string digest_of(const RenderInput& input, double rate_hz) {
     add(hash, json_of(*job.model, job.mode()));
     hash.add(std::as_bytes(std::span(job.mode().waveform.samples)));
     add(hash, {json_of(job.settings), json_of(job.water), json_of(job.engine.switches), job.seed, job.sonar_id, job.values,
-               static_cast<int>(job.engine.simd), json_of(job.mount), json_of(job.path.initial), job.path.orbits});
+               static_cast<int>(job.engine.simd) + 16 * static_cast<int>(job.engine.device), json_of(job.mount),
+               json_of(job.path.initial), job.path.orbits});
     add_way(hash, job.path.trajectory, job.path.begins_at);
     for (std::size_t i = 0; i < job.body_paths.size(); ++i) {
       if (job.body_paths[i]) add(hash, i);

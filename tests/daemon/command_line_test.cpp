@@ -90,11 +90,12 @@ TEST(CommandLine, SwitchesWinOverTheFileOnlyWhenGiven) {
 
 TEST(CommandLine, TheOtherRunOptionsReplaceTheFilesValues) {
   const Config c = overridden({"--clock", "stepped", "--threads", "3", "--seed", "9", "--simd", "portable", "--bind", "127.0.0.9",
-                               "--log-format", "json", "--log-level", "error"});
+                               "--engine", "cuda", "--log-format", "json", "--log-level", "error"});
   EXPECT_EQ(c.clock, ClockMode::stepped);
   EXPECT_EQ(c.engine.threads, 3);
   EXPECT_EQ(c.seed, 9u);
   EXPECT_EQ(c.engine.simd, SimdLevel::portable);
+  EXPECT_EQ(c.engine.device, EngineDevice::cuda);
   EXPECT_EQ(text_of(c.sonars.at(0).bind_ip), "127.0.0.9");
   EXPECT_EQ(text_of(c.sonars.at(0).advertise_ip), "127.0.0.9");
   EXPECT_TRUE(c.log.json);

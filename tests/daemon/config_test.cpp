@@ -119,7 +119,7 @@ poses:
   stale_after_s: 2
   on_stale: stop
   max_jump_m: 5
-engine: {threads: 3, quality: default, simd: portable, expected_power: true, noise: off, fixed_fan: 16}
+engine: {threads: 3, quality: default, device: auto, simd: portable, expected_power: true, noise: off, fixed_fan: 16}
 clock: stepped
 log: {level: debug, format: json}
 )");
@@ -153,6 +153,7 @@ log: {level: debug, format: json}
   EXPECT_FALSE(c->poses.allow_from.at(1).contains({10, 0, 0, 2}));
   EXPECT_EQ(c->poses.on_stale, OnStale::stop);
   EXPECT_EQ(c->engine.threads, 3);
+  EXPECT_EQ(c->engine.device, EngineDevice::automatic);
   EXPECT_EQ(c->engine.simd, SimdLevel::portable);
   EXPECT_FALSE(c->engine.switches.noise);
   EXPECT_EQ(c->engine.switches.fixed_fan, 16);
