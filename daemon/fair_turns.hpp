@@ -1,0 +1,51 @@
+// Whose ping is next when several sonars share one engine: who has had least of its time, and whether a ping is worth letting in
+// before one under way is finished. Pure: times are passed in; owned by the Simulator.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+
+namespace sonar {
+
+class FairTurns {
+ public:
+  /// A request of that sonar has come. Who was silent has saved up nothing.
+  void ask(std::uint32_t sonar) {
+    Account& a = accounts_[sonar];
+    a.used_s = std::max(a.used_s, floor_s_);
+  }
+  /// Its ping begins.
+  void begin(std::uint32_t sonar) { floor_s_ = std::max(floor_s_, accounts_[sonar].used_s); }
+  /// Its ping has taken so long of the engine's time.
+  void end(std::uint32_t sonar, double seconds) {
+    Account& a = accounts_[sonar];
+    a.used_s += seconds;
+    a.last_s = seconds;
+    ++a.pings;
+  }
+  double used_s(std::uint32_t sonar) const {
+    const auto it = accounts_.find(sonar);
+    return it == accounts_.end() ? 0 : it->second.used_s;
+  }
+  bool several() const { return accounts_.size() > 1; }
+
+  /// Whether `other` goes first although the ping of `running` has been under way for `elapsed_s`: it has had less, and its ping
+  /// is done sooner than what is left of that one.
+  bool goes_first(std::uint32_t other, std::uint32_t running, double elapsed_s) const {
+    const auto a = accounts_.find(other), b = accounts_.find(running);
+    if (a == accounts_.end() || b == accounts_.end() || a->second.pings == 0 || b->second.pings == 0) return false;
+    const bool had_less = a->second.used_s < b->second.used_s + elapsed_s;
+    return had_less && a->second.last_s < b->second.last_s - elapsed_s;
+  }
+
+ private:
+  struct Account {
+    double used_s = 0, last_s = 0;
+    std::uint64_t pings = 0;
+  };
+  std::map<std::uint32_t, Account> accounts_;
+  double floor_s_ = 0;  // what the one whose ping began last had had
+};
+
+}  // namespace sonar

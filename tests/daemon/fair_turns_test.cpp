@@ -1,0 +1,94 @@
+// Several sonars on one engine: a quick one is let in between, a greedy one waits, and nobody saves up turns by being silent.
+#include "daemon/fair_turns.hpp"
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "daemon/simulator.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::uint32_t slow = 0, quick = 1;
+
+TEST(FairTurns, AQuickOneThatHadLessGoesFirst) {
+  FairTurns turns;
+  turns.ask(slow), turns.ask(quick);
+  turns.end(slow, 0.1), turns.end(quick, 0.01);
+  EXPECT_TRUE(turns.goes_first(quick, slow, 0.005));
+  EXPECT_FALSE(turns.goes_first(quick, slow, 0.095)) << "the slow one is nearly done";
+  EXPECT_FALSE(turns.goes_first(slow, quick, 0));
+}
+
+TEST(FairTurns, AQuickOneThatHadMoreWaits) {
+  FairTurns turns;
+  turns.ask(slow), turns.ask(quick);
+  turns.end(slow, 0.1);
+  for (int i = 0; i < 20; ++i) turns.end(quick, 0.01);
+  EXPECT_FALSE(turns.goes_first(quick, slow, 0.005)) << "0.2 s against 0.105 s";
+}
+
+TEST(FairTurns, SilenceSavesNothing) {
+  FairTurns turns;
+  turns.ask(slow), turns.ask(quick);
+  for (int i = 0; i < 50; ++i) turns.begin(slow), turns.end(slow, 0.1);
+  turns.ask(quick);
+  EXPECT_NEAR(turns.used_s(quick), 4.9, 1e-9) << "as much as the other had when its last ping began";
+}
+
+TEST(FairTurns, WhoseTimeIsUnknownIsNotLetIn) {
+  FairTurns turns;
+  turns.ask(slow), turns.ask(quick);
+  turns.end(slow, 0.1);
+  EXPECT_FALSE(turns.goes_first(quick, slow, 0));
+}
+
+/// Takes 100 ms for the slow sonar, in parts of 5 ms, and 1 ms for the quick one.
+class Parts final : public PingEngine {
+ public:
+  std::vector<Ping> run(std::span<const PingRequest> requests) override {
+    const auto wait = [](int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); };
+    if (requests.front().sonar_id == quick) wait(1);
+    for (int part = 0; requests.front().sonar_id == slow && part < 20; ++part) {
+      wait(5);
+      if (who_) who_->take();
+    }
+    Ping ping;
+    ping.request = requests.front();
+    return {ping};
+  }
+  void let_in(Interruption* who) override { who_ = who; }
+  std::string description() const override { return "parts"; }
+
+ private:
+  Interruption* who_ = nullptr;
+};
+
+TEST(Simulator, AQuickSonarKeepsItsRateBesideASlowOne) {
+  asio::io_context io;
+  Simulator simulator(io, std::make_unique<Parts>(), 0);
+  int slow_pings = 0, quick_pings = 0;
+  double quick_seconds = 0;
+  const std::function<void(std::uint32_t)> ask = [&](std::uint32_t sonar) {
+    PingRequest request;
+    request.sonar_id = sonar;
+    simulator.submit(request, [&, sonar](Simulator::Outcome outcome) {
+      ASSERT_TRUE(outcome.ping) << outcome.failure;
+      ++(sonar == slow ? slow_pings : quick_pings);
+      if (sonar == quick) quick_seconds = outcome.seconds;
+      if (slow_pings < 5) ask(sonar);
+    });
+  };
+  ask(slow), ask(quick);
+  io.run();
+  EXPECT_GE(slow_pings, 5);
+  EXPECT_GE(quick_pings, 25) << "one after the other they would be 5; the slow one's parts leave room for 100";
+  EXPECT_LT(quick_seconds, 0.05);
+}
+
+}  // namespace
+}  // namespace sonar
