@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -15,7 +16,20 @@
 
 namespace sonar::test {
 
-/// Both over one scene. On a real device where SONARD_TEST_DEVICE is set, else by host loops.
+/// What the engine of these tests runs on: host loops, or, in programs compiled for it, the device.
+#ifdef SONAR_TEST_ON_DEVICE
+inline Result<std::unique_ptr<cuda::Machine>> test_machine() {
+  setenv("SONARD_CUDA_MODULE", SONAR_TEST_ON_DEVICE, 1);
+  return cuda::open_cuda_machine();
+}
+#else
+inline Result<std::unique_ptr<cuda::Machine>> test_machine() { return cuda::make_host_loops(); }
+#endif
+/// Stands first in every test.
+#define SKIP_WITHOUT_A_MACHINE() \
+  if (const auto machine = sonar::test::test_machine(); !machine) GTEST_SKIP() << "CUDA: " << machine.error().text
+
+/// Both over one scene.
 class BothEngines {
  public:
   explicit BothEngines(std::shared_ptr<const Scene> scene, SimdLevel simd = SimdLevel::portable, int batch = 8)
@@ -23,14 +37,7 @@ class BothEngines {
     cuda::DeviceEngineOptions options;
     options.batch = batch;
     options.say = [this](const std::string& what) { said.push_back(what); };
-    device_ = cuda::make_device_engine(scene, pool_, {.simd = simd}, machine(), options);
-  }
-  static bool on_device() { return std::getenv("SONARD_TEST_DEVICE") != nullptr; }
-  static std::unique_ptr<cuda::Machine> machine() {
-    if (!on_device()) return cuda::make_host_loops();
-    auto machine = cuda::open_cuda_machine();
-    if (!machine) throw std::runtime_error("SONARD_TEST_DEVICE is set, but: " + machine.error().text);
-    return *std::move(machine);
+    device_ = cuda::make_device_engine(scene, pool_, {.simd = simd}, test_machine().value(), options);
   }
   Ping by_cpu(const PingRequest& r) { return cpu_->run({&r, 1}).at(0); }
   Ping by_device(const PingRequest& r) { return device_->run({&r, 1}).at(0); }

@@ -35,6 +35,7 @@ PingRequest looking(double yaw_rad) {
 }
 
 TEST(DeviceEngineBesideEmbree, DiffersByTheRimsOfShadowsAlone) {
+  SKIP_WITHOUT_A_MACHINE();
   BothEngines both(sea_bed());
   double worst = 0, all = 0;
   constexpr int pings = 8;
@@ -60,6 +61,7 @@ TEST(DeviceEngineBesideEmbree, DiffersByTheRimsOfShadowsAlone) {
 
 // With nothing that throws a shadow, there is nothing to differ by.
 TEST(DeviceEngineBesideEmbree, IsTheSameWhereThereAreNoShadows) {
+  SKIP_WITHOUT_A_MACHINE();
   SceneMaker maker;
   maker.add(height_field(-1, 12, -10, 10, 0.25, [](double x, double y) { return 0.02 * x + 0.01 * y; }), -25, {0, 0, -2});
   BothEngines both(maker.make());

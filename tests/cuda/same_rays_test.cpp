@@ -44,6 +44,7 @@ std::vector<std::pair<std::string, PingRequest>> on_device_turns() {
 }
 
 TEST(DeviceEngine, DoesEveryPartOfTheModelAsTheCpuDoes) {
+  SKIP_WITHOUT_A_MACHINE();
   BothEngines both(basin());
   std::size_t compared = 0;
   for (const auto& [what, request] : on_device_turns()) {
@@ -55,6 +56,7 @@ TEST(DeviceEngine, DoesEveryPartOfTheModelAsTheCpuDoes) {
 }
 
 TEST(DeviceEngine, IsTheSameBytesInBatchesOfAnySize) {
+  SKIP_WITHOUT_A_MACHINE();
   std::vector<PingRequest> requests;
   for (auto& [what, request] : on_device_turns())
     if (!request.switches.expected_power && !request.switches.multipath && requests.size() < 7) requests.push_back(request);
@@ -71,6 +73,7 @@ TEST(DeviceEngine, IsTheSameBytesInBatchesOfAnySize) {
 }
 
 TEST(DeviceEngine, LeavesToTheCpuWhatItCannotDoAndSaysSoOnce) {
+  SKIP_WITHOUT_A_MACHINE();
   BothEngines both(basin());
   std::vector<PingRequest> requests{high(), high(), low(), low(), high()};
   for (PingRequest& r : requests) r.switches.multipath = false, r.settings.range_bin_count = 30;
@@ -99,6 +102,7 @@ std::vector<Case> cases() {
 
 // The benchmark's sizes, over relief with things on it, standing still and moving; also beside the CPU's widest instructions.
 TEST(DeviceEngine, DoesTheBenchmarksCases) {
+  SKIP_WITHOUT_A_MACHINE();
   SceneMaker maker;
   maker.add(height_field(-1, 12, -10, 10, 0.1, rough_relief(0.1, 30)), -25, {0, 0, -2});
   maker.add(sphere(0.5, 4), -15, {5, 0.7, -1.5});

@@ -45,7 +45,7 @@ table=$(SONARD_CUDA_MODULE="$build/daemon/libsonard_cuda.so" "$build/tests/cuda/
 {
   echo "# The CUDA engine, measured"
   echo
-  echo "Written by \`tests/tools/gpu_check.sh\`; what it checks: [cuda.md](cuda.md)."
+  echo "Written by \`tests/tools/gpu_check.sh\`; what it checks: docs/cuda.md."
   echo
   echo "| | |"
   echo "|---|---|"
