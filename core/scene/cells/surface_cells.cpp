@@ -169,6 +169,7 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
       std::tie(sheet->material, sheet->axis, sheet->negative_side) = key;
       sheet->mesh = object.mesh;
       sheet->plant(triangles);
+      for (auto& root : sheet->roots) roots_.push_back({sheet.get(), root.get()});
       sheets_.push_back(std::move(sheet));
     }
   }
@@ -176,7 +177,8 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
 
 SurfaceCells::~SurfaceCells() = default;
 
-void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& turn) {
+void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& turn,
+                         Found& found) const {
   const Cube cube = cube_of(node.address);
   const Vec3d centre = lattice::from_permuted(cube.u, cube.v, cube.w, sheet.axis);
   const double radius = cube.half * 1.7320508075688772 * 1.0001;
@@ -202,16 +204,40 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
     const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
     if (!overlaps) continue;
     if (level.level == node.address.level) {
-      wanted_.push_back(&node);
-      in_view_.push_back({&node.tile, &level, q, p, sheet.object});
+      found.wanted.push_back(&node);
+      found.in_view.push_back({&node.tile, &level, q, p, sheet.object});
     } else if (level.level > node.address.level) {
       finer = true;
     }
   }
   if (!finer) return;
-  if (!node.divided) cached_bytes_ += sheet.divide(node);
+  if (!node.divided) found.new_bytes += sheet.divide(node);
   for (auto& child : node.children)
-    if (child) visit(sheet, *child, view, sonar_in_object, turn);
+    if (child) visit(sheet, *child, view, sonar_in_object, turn, found);
+}
+
+/// Stretches of roots side by side; what each finds stays apart, so that the order does not depend on who looked.
+void SurfaceCells::look(const CellView& view, Parallel& pool) {
+  constexpr std::size_t stretch = 16;
+  const std::size_t objects = scene_->objects.size();
+  rotations_.resize(objects);
+  sonar_in_object_.resize(objects);
+  for (std::size_t o = 0; o < objects; ++o) {
+    sonar_in_object_[o] = compose(inverse(scene_->in_world(scene_->objects[o], view.bodies_in_world)), view.sonar_in_world);
+    rotations_[o] = rotation_from(conjugate(sonar_in_object_[o].orientation));
+  }
+  found_.resize((roots_.size() + stretch - 1) / stretch);
+  pool.for_each(found_.size(), [&](std::size_t s, int) {
+    Found& found = found_[s];
+    found.in_view.clear();
+    found.wanted.clear();
+    found.new_bytes = 0;
+    for (std::size_t r = s * stretch; r < std::min(roots_.size(), (s + 1) * stretch); ++r) {
+      Sheet& sheet = *roots_[r].sheet;
+      const auto object = static_cast<std::size_t>(sheet.object);
+      visit(sheet, *roots_[r].node, view, sonar_in_object_[object], rotations_[object], found);
+    }
+  });
 }
 
 const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
@@ -219,24 +245,15 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
   ++now_;
   fan_cosine_ = std::cos(static_cast<double>(view.max_elevation_rad));
   fan_sine_ = std::sin(static_cast<double>(view.max_elevation_rad));
+  look(view, pool);
   in_view_.clear();
-  wanted_.clear();
-  rotations_.resize(scene_->objects.size());
-  int object = -1;
-  Pose sonar_in_object;
-  for (auto& sheet : sheets_) {
-    if (sheet->object != object) {
-      object = sheet->object;
-      const Object& o = scene_->objects[static_cast<std::size_t>(object)];
-      sonar_in_object = compose(inverse(scene_->in_world(o, view.bodies_in_world)), view.sonar_in_world);
-      rotations_[static_cast<std::size_t>(object)] = rotation_from(conjugate(sonar_in_object.orientation));
-    }
-    for (auto& root : sheet->roots) visit(*sheet, *root, view, sonar_in_object, rotations_[static_cast<std::size_t>(object)]);
-  }
-
   std::vector<Node*> missing;
-  for (Node* node : wanted_)
-    if (!node->built) missing.push_back(node);
+  for (const Found& found : found_) {
+    cached_bytes_ += found.new_bytes;
+    in_view_.insert(in_view_.end(), found.in_view.begin(), found.in_view.end());
+    for (Node* node : found.wanted)
+      if (!node->built) missing.push_back(node);
+  }
   pool.for_each(missing.size(), [&](std::size_t n, int) {
     Node& node = *missing[n];
     const TileAddress& a = node.address;

@@ -105,7 +105,18 @@ class SurfaceCells {
  private:
   class Sheet;
   struct Node;
-  void visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& sonar_from_object);
+  struct Root {
+    Sheet* sheet;
+    Node* node;
+  };
+  struct Found {  // by those who look through some of the roots
+    std::vector<TileInView> in_view;
+    std::vector<Node*> wanted;  // the nodes of in_view
+    std::size_t new_bytes = 0;
+  };
+  void look(const CellView& view, Parallel& pool);
+  void visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& sonar_from_object,
+             Found& found) const;
   void keep_within_budget();
 
   std::shared_ptr<const Scene> scene_;
@@ -116,9 +127,11 @@ class SurfaceCells {
   std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
   double fan_cosine_ = 1, fan_sine_ = 0;    // of the last view's half angle
   std::vector<std::unique_ptr<Sheet>> sheets_;
+  std::vector<Root> roots_;            // of all sheets, in order
+  std::vector<Pose> sonar_in_object_;  // of the last view, per object
   std::vector<Rotation> rotations_;
   std::vector<TileInView> in_view_;
-  std::vector<Node*> wanted_;  // the nodes of in_view_
+  std::vector<Found> found_;  // for each stretch of roots
 };
 
 }  // namespace sonar
