@@ -31,6 +31,7 @@ struct Loaded {
   std::string why_not;  // "not installed", or what is wrong with it
 };
 
+/// Every time anew, which costs little where it is loaded already.
 Loaded load() {
   for (const fs::path& place : module_places()) {
     std::error_code error;
@@ -47,25 +48,23 @@ Loaded load() {
   }
   return {nullptr, "not installed"};
 }
-const Loaded& loaded() {
-  static const Loaded once = load();
-  return once;
-}
 
 struct Found {
+  const CudaModule* module = nullptr;
   int devices = 0;
   std::string status;  // see cuda_status()
 };
 Found find_device() {
-  const CudaModule* module = loaded().module;
-  if (!module) return {0, loaded().why_not};
+  const Loaded loaded = load();
+  const CudaModule* module = loaded.module;
+  if (!module) return {nullptr, 0, loaded.why_not};
   std::array<char, 256> name{};
-  Found found;
+  Found found{module, 0, ""};
   const int code = module->query(&found.devices, name.data(), name.size());
   if (code != 0)
     found.status = std::string("no device (") + module->reason(code) + ")";
   else
-    found.status = found.devices > 0 ? name.data() : "no device";
+    found.status = found.devices > 0 ? name.data() : name[0] != 0 ? std::string("no device (") + name.data() + ")" : "no device";
   return found;
 }
 
@@ -120,7 +119,7 @@ Result<std::unique_ptr<Machine>> open_cuda_machine() {
   const Found found = find_device();
   if (found.devices == 0) return failure(ErrorKind::unavailable, found.status);
   try {
-    return std::make_unique<CudaMachine>(*loaded().module, found.status);
+    return std::make_unique<CudaMachine>(*found.module, found.status);
   } catch (const std::runtime_error& e) {
     return failure(ErrorKind::unavailable, e.what());
   }

@@ -41,6 +41,12 @@ int query(int* devices, char* name, std::size_t room) {
   *devices = 0;
   cudaError_t error = cudaGetDeviceCount(devices);
   if (error == cudaErrorNoDevice) return cudaSuccess;
+  int driver = 0;
+  if (error == cudaErrorInsufficientDriver && cudaDriverGetVersion(&driver) == cudaSuccess && driver == 0) {
+    *devices = 0;
+    std::snprintf(name, room, "no NVIDIA driver");
+    return cudaSuccess;
+  }
   cudaDeviceProp p;
   if (error == cudaSuccess && *devices > 0) error = cudaGetDeviceProperties(&p, device);
   if (error != cudaSuccess) {

@@ -17,7 +17,7 @@ inline constexpr const char* module_entry = "sonard_cuda_module";
 struct CudaModule {
   std::uint32_t version, view_bytes, tile_bytes, steps;
   const char* (*reason)(int code);
-  /// Devices that there are; the name of the first, if any: "NVIDIA H200, 139.8 GiB, compute 9.0".
+  /// Devices that there are; the name of the first: "NVIDIA H200, 139.8 GiB, compute 9.0"; of none, why, or nothing.
   int (*query)(int* devices, char* name, std::size_t room);
   int (*open)(void** machine);
   void (*close)(void* machine);

@@ -14,7 +14,6 @@ using testing::AnyOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-// What is loaded stays loaded, so that each test, which ctest gives a process of its own, sees one module only.
 void look_at(const char* module) { setenv("SONARD_CUDA_MODULE", module, 1); }
 
 void expect_no_engine() {
