@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Checks the CUDA engine on the device of this machine: builds, tests, compute-sanitizer, benchmark; writes docs/benchmarks-gpu.md.
+# Checks the CUDA engine on this machine's device: builds, tests, compute-sanitizer, benchmark; writes docs/benchmarks-gpu.md.
 # Exit 77 without a device, 1 when something fails. usage: tests/tools/gpu_check.sh [build folder, default build/gpu]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
