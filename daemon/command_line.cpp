@@ -58,6 +58,8 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
       ->check(number(0.001, 10000.0));
   app.add_option("--rate", render.rate_hz, "pings a second (as the sonar is set; with --poses: at every line)")
       ->check(number(0.001, 10000.0));
+  app.add_option("--batch", render.batch, "pings to make before they are written by all threads at once, for data sets (default 1)")
+      ->check(whole_number(1, 4096));
   app.add_option("--report", render.report,
                  "coverage: every bin of a plane bed against the closed form; without a configuration "
                  "for every sonar there is")

@@ -31,6 +31,7 @@ struct RenderCommand {
   std::optional<double> pose_rate_hz;  // of a KITTI file, which has no times
   std::string sonar, poses, pose_frame, report;
   std::optional<double> rate_hz;
+  int batch = 1;
   bool complex = false, quiet = false, overwrite = false, check_expectations = false;
   EngineOptionsGiven engine;
 };

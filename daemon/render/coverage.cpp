@@ -126,6 +126,7 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
       ratios += ratio;
       ++coverage.bins;
       coverage.good += std::abs(off_db) <= 1;
+      coverage.empty += off_db <= -10;
       if (std::abs(off_db) > std::abs(coverage.worst_db)) coverage.worst_db = off_db;
     }
   }
@@ -137,6 +138,8 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
 
 namespace {
 
+constexpr double tilt_rad = 0.25, height_in_ranges = 0.2, bed_z_m = -20;
+
 std::shared_ptr<const Scene> level_bed(double size_m) {
   auto scene = std::make_shared<Scene>();
   scene->name = "level bed";
@@ -144,7 +147,7 @@ std::shared_ptr<const Scene> level_bed(double size_m) {
   auto mesh = make_plane(size_m, size_m, std::max(1.0, size_m / 200));
   scene->objects.push_back({.name = "bed",
                             .mesh = std::make_shared<const Mesh>(std::move(mesh)),
-                            .in_world = {{0, 0, -20}, {}},
+                            .in_world = {{0, 0, bed_z_m}, {}},
                             .primitive = {.kind = Primitive::Kind::plane, .size_m = {size_m, size_m, 0}}});
   return scene;
 }
@@ -160,8 +163,18 @@ bool acoustically_equal(const RenderJob& a, const RenderJob& b) {
 
 }  // namespace
 
+RenderJob over_a_level_bed(std::shared_ptr<const SonarModel> model, const PingSettings& settings, const std::string& name) {
+  RenderJob job;
+  job.model = std::move(model);
+  job.settings = settings;
+  job.name = name;
+  job.sonar_name = job.model->profile;
+  job.path.initial = {{0, 0, bed_z_m + height_in_ranges * settings.range_m}, quat_from_rpy({0, tilt_rad, 0})};
+  job.scene = level_bed(2.5 * settings.range_m);
+  return job;
+}
+
 std::vector<RenderJob> shipped_sonars_over_a_bed() {
-  constexpr double tilt_rad = 0.25, height_in_ranges = 0.2, bed_z_m = -20;
   std::vector<RenderJob> jobs;
   for (const protocol::Vendor* vendor : protocol::vendors())
     for (const auto& model : vendor->models())

@@ -12,6 +12,7 @@ namespace sonar::render {
 
 struct Coverage {
   std::size_t bins = 0, good = 0;  // good: within 1 dB
+  std::size_t empty = 0;           // 10 dB or more below: no energy to speak of
   double worst_db = 0;             // signed, of the bin farthest off
   double mean_db = 0;              // of all bins' powers over their closed form
   double percent() const { return bins == 0 ? 0 : 100.0 * static_cast<double>(good) / static_cast<double>(bins); }
@@ -26,8 +27,9 @@ RenderJob with_bed_only(RenderJob job);
 /// plane below the sonar, a sonar that rolls, flat beams, the comparison modes, beams without a width.
 Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
 
-/// Every mode of every product over a level bed: at its stored range, or its longest if that is shorter, a fifth of the range
-/// above the bed and 0.25 rad nose down.
+/// That product over a level bed, a fifth of the range above it and 0.25 rad nose down.
+RenderJob over_a_level_bed(std::shared_ptr<const SonarModel> model, const PingSettings& settings, const std::string& name);
+/// Every mode of every product over a level bed: at its stored range, or its longest if that is shorter.
 std::vector<RenderJob> shipped_sonars_over_a_bed();
 
 }  // namespace sonar::render

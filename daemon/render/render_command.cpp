@@ -33,6 +33,15 @@ class ProgressLine {
  public:
   explicit ProgressLine(bool quiet) : quiet_(quiet) {}
 
+  /// After the last: the whole run.
+  void conclude(const Progress& p) const {
+    if (quiet_ || p.done == p.kept) return;
+    const double taken_s = std::max(std::chrono::duration<double>(Clock::now() - begin_).count(), 1e-3);
+    std::fprintf(stderr, "%llu pings in %.1f s: %.1f pings/s, %.1f MB/s written\n",
+                 static_cast<unsigned long long>(p.done - p.kept), taken_s, static_cast<double>(p.done - p.kept) / taken_s,
+                 static_cast<double>(p.bytes) / 1e6 / taken_s);
+  }
+
   void tell(const Progress& p) {
     const auto now = Clock::now();
     const bool last = p.done == p.all;
@@ -134,6 +143,7 @@ OutputOptions output_options(const RenderCommand& command) {
   options.raw = wanted("raw");
   options.complex = command.complex;
   options.overwrite = command.overwrite;
+  options.batch = command.batch;
   options.pings = command.pings;
   options.rate_hz = command.rate_hz;
   return options;
@@ -157,7 +167,9 @@ int run_render(const RenderCommand& command) {
   ProgressLine line(command.quiet);
   Parallel pool(threads_of(input->jobs.front().engine));
   const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.tell(p); });
-  return done ? 0 : complain(done.error());
+  if (!done) return complain(done.error());
+  line.conclude(*done);
+  return 0;
 }
 
 }  // namespace sonar::render

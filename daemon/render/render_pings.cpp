@@ -117,13 +117,23 @@ Result<void> write_picture(const Ping& ping, const path& file) {
   return write_png(*fan, file);
 }
 
-/// Everything but the sidecar first: where that stands, the ping is whole.
-Result<void> write_ping(const RenderJob& job, const Ping& ping, const PingEngine& engine, const OutputOptions& o,
-                        std::uint64_t number, const std::string& digest) {
+/// A ping on its way into files.
+struct MadePing {
+  std::uint64_t number = 0;
+  PingRequest request;
+  Ping ping;
+  PingStatistics count;
+  Result<std::uint64_t> written = std::uint64_t{0};  // bytes
+};
+
+/// Everything but the sidecar first: where that stands, the ping is whole. Returns how many bytes that was.
+Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, const std::string& engine, const OutputOptions& o,
+                                 const std::string& digest) {
+  const Ping& ping = made.ping;
   const PingSettings& s = ping.request.settings;
   const auto rows = static_cast<std::size_t>(s.range_bin_count), beams = static_cast<std::size_t>(s.beam_count);
   const char* codes = s.format.bits == 8 ? "|u1" : s.format.bits == 16 ? "<u2" : "<u4";
-  const std::string stem = (o.folder / number_text(number)).string();
+  const std::string stem = (o.folder / number_text(made.number)).string();
   if (o.complex && ping.beam_signal_upa.empty())
     return failure(ErrorKind::usage,
                    "there is no complex beam signal in expected power and in the comparison modes; leave out --complex");
@@ -137,8 +147,29 @@ Result<void> write_ping(const RenderJob& job, const Ping& ping, const PingEngine
       std::as_bytes(std::span(ping.beam_signal_upa)));
   put(o.raw, "_samples.raw", {}, ping.samples);
   if (done && o.png) done = write_picture(ping, stem + ".png");
-  if (done) done = write_file(stem + ".json", {bytes_of(sidecar(job, ping, engine, digest).dump(1) + "\n")});
-  return done;
+  if (done) done = write_file(stem + ".json", {bytes_of(sidecar(job, ping, engine, made.count, digest).dump(1) + "\n")});
+  if (!done) return tl::make_unexpected(done.error());
+  std::uint64_t bytes = 0;
+  std::error_code ec;
+  for (const path& file : files_of(o, made.number)) bytes += std::filesystem::file_size(file, ec);
+  return bytes;
+}
+
+/// Makes the pings one after the other, each by all threads, and writes them side by side.
+Result<void> render_batch(const RenderJob& job, PingEngine& engine, const OutputOptions& o, const std::string& digest,
+                          Parallel& pool, std::vector<MadePing>& batch, Progress& progress) {
+  for (MadePing& made : batch) {
+    made.ping = std::move(engine.run({&made.request, 1}).at(0));
+    made.count = engine.statistics();
+  }
+  const std::string description = engine.description();
+  pool.for_each(batch.size(), [&](std::size_t i, int) { batch[i].written = write_ping(job, batch[i], description, o, digest); });
+  for (const MadePing& made : batch) {
+    if (!made.written) return tl::make_unexpected(made.written.error());
+    progress.bytes += *made.written;
+  }
+  batch.clear();
+  return {};
 }
 
 }  // namespace
@@ -181,11 +212,20 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
   for (std::size_t j = 0; j < input.jobs.size(); ++j) {
     const RenderJob& job = input.jobs[j];
     std::unique_ptr<PingEngine> engine;  // not before it is needed: a finished folder costs no scene
-    for (const Time at : times[j]) {
-      const std::uint64_t number = progress.done + 1;
-      if (is_finished(o, number, digest)) {
-        ++progress.kept;
-      } else {
+    std::vector<MadePing> batch;
+    for (std::size_t i = 0; i < times[j].size(); ++i) {
+      const std::uint64_t number = progress.done + batch.size() + 1;
+      const bool is_there = is_finished(o, number, digest);
+      if (!is_there) {
+        MadePing& made = batch.emplace_back();
+        made.number = number;
+        made.request = make_request(job, PingNumber{static_cast<std::uint32_t>(number)}, times[j][i]);
+        made.request.switches.keep_pressure = o.npy;
+        made.request.switches.keep_beams = o.complex;
+        made.request.switches.keep_truth = true;
+      }
+      const bool full = batch.size() >= static_cast<std::size_t>(o.batch) || i + 1 == times[j].size() || is_there;
+      if (full && !batch.empty()) {
         if (!engine) {
           const auto make = [&](std::shared_ptr<const Scene> s) {
             return choose_engine(job.engine.device, std::move(s), pool, {.simd = job.engine.simd},
@@ -195,20 +235,21 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
           if (!started) return tl::make_unexpected(started.error());
           engine = *std::move(started);
         }
-        PingRequest request = make_request(job, PingNumber{static_cast<std::uint32_t>(number)}, at);
-        request.switches.keep_pressure = o.npy;
-        request.switches.keep_beams = o.complex;
-        request.switches.keep_truth = true;
+        const std::size_t made = batch.size();
         try {
-          const std::vector<Ping> pings = engine->run({&request, 1});
-          if (auto done = write_ping(job, pings.at(0), *engine, o, number, digest); !done)
+          if (auto done = render_batch(job, *engine, o, digest, pool, batch, progress); !done)
             return tl::make_unexpected(done.error());
         } catch (const std::invalid_argument& refused) {
           return failure(ErrorKind::config, input.source + ": " + refused.what());
         }
+        progress.done += made;
+        told(progress);
       }
-      ++progress.done;
-      told(progress);
+      if (is_there) {
+        ++progress.kept;
+        ++progress.done;
+        told(progress);
+      }
     }
   }
   return progress;

@@ -16,6 +16,7 @@ namespace sonar::render {
 struct OutputOptions {
   std::filesystem::path folder;
   bool npy = true, png = true, raw = false, complex = false;
+  int batch = 1;                       // pings that are made before they are written, by all threads at once
   bool overwrite = false;              // pings of other inputs in the folder are removed
   std::optional<std::uint64_t> pings;  // of each job; nothing: one, or one for every pose of the file
   std::optional<double> rate_hz;       // nothing: as the settings say, or at every pose
@@ -23,6 +24,7 @@ struct OutputOptions {
 
 struct Progress {
   std::uint64_t done = 0, all = 0, kept = 0;
+  std::uint64_t bytes = 0;  // written
 };
 
 /// When the pings of a job are fired [s]. usage: more pings than the poses last.

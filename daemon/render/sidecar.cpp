@@ -139,12 +139,12 @@ void add_scene(Sha256& hash, const Scene& scene) {
 
 }  // namespace
 
-json sidecar(const RenderJob& job, const Ping& ping, const PingEngine& engine, const std::string& digest) {
+json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, const PingStatistics& count,
+             const std::string& digest) {
   const PingRequest& r = ping.request;
   const PingSettings& s = r.settings;
   const FrequencyMode& mode = ping.mode();
   const double depth_m = depth_from_z(r.sonar_in_world.position_m.z);
-  const PingStatistics count = engine.statistics();
   return {{"sonard", version},
           {"inputs", digest},
           {"ping", static_cast<std::uint32_t>(r.number)},
@@ -172,7 +172,7 @@ json sidecar(const RenderJob& job, const Ping& ping, const PingEngine& engine, c
             {"angular_rate_radps", json_of(r.sonar_moves.angular_rate_radps)}}},
           {"seed", static_cast<std::uint64_t>(r.seed)},
           {"switches", json_of(effective_switches(r.switches))},
-          {"engine", engine.description()},
+          {"engine", engine},
           {"counts", {{"rays", count.rays}, {"echoes", count.echoes}, {"tiles", count.tiles}, {"cells", count.cells}}},
           {"truth", truth_of(ping, *job.scene)}};
 }

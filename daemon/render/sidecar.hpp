@@ -10,7 +10,9 @@
 
 namespace sonar::render {
 
-nlohmann::json sidecar(const RenderJob& job, const Ping& ping, const PingEngine& engine, const std::string& digest);
+/// `engine`: its description; `count`: of that ping.
+nlohmann::json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, const PingStatistics& count,
+                       const std::string& digest);
 
 /// SHA-256 of what the pings depend on: the files' text, the scene as loaded, the sonar, switches, seed, poses and times.
 /// Threads and the number of pings do not count.

@@ -117,6 +117,15 @@ class Render(unittest.TestCase):
         self.assertTrue((self.out / "000003.json").exists())
         self.assertEqual([p.name for p in self.out.iterdir() if p.suffix == ".tmp"], [])
 
+    def test_batches_make_the_same_files_and_tell_the_rate(self):
+        self.expect(self.render("--pings", "5", "--format", "raw"), 0, "5 of 5 pings", "MB/s written")
+        batched = self.out.parent / "batched"
+        self.expect(self.render("--pings", "5", "--format", "raw", "--batch", "3", out=batched), 0, "5 of 5 pings")
+        names = sorted(p.name for p in self.out.iterdir())
+        self.assertEqual(names, sorted(p.name for p in batched.iterdir()))
+        for name in names:
+            self.assertEqual((self.out / name).read_bytes(), (batched / name).read_bytes(), name)
+
     def test_a_folder_belongs_to_one_set_of_inputs(self):
         self.expect(self.render("--pings", "2", "--format", "npy", "--quiet"), 0)
         self.expect(self.render("--seed", "9"), 64, "other inputs", "--overwrite")

@@ -269,7 +269,8 @@ TEST(Sidecar, TellsTheSwitchesThatTookEffect) {
   const auto switches_told = [&](const std::string& part) {
     const auto engine = make_engine(job.scene, pool, {});
     const PingRequest request = make_request(job, PingNumber{1}, Time{});
-    return sidecar(job, engine->run({&request, 1}).at(0), *engine, "")["switches"][part].get<bool>();
+    return sidecar(job, engine->run({&request, 1}).at(0), engine->description(), engine->statistics(), "")["switches"][part]
+        .get<bool>();
   };
   EXPECT_TRUE(switches_told("specular"));
   job.engine.switches.multipath = true;
