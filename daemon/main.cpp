@@ -10,7 +10,7 @@
 
 #include "daemon/app.hpp"
 #include "daemon/banner.hpp"
-#include "daemon/bench.hpp"
+#include "daemon/bench/bench_command.hpp"
 #include "daemon/choose_engine.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/control/token.hpp"

@@ -9,7 +9,7 @@
 #include "core/scene/scene.hpp"
 #include "core/sonar/sonar_model.hpp"
 
-namespace sonar {
+namespace sonar::bench {
 
 /// Names of the switched parts that can be given: texture, volume, crosstalk, leak.
 std::vector<std::string> parts_to_give();
@@ -21,4 +21,4 @@ std::shared_ptr<const SonarModel> with_parts(std::shared_ptr<const SonarModel> m
 /// Which of parts_to_give() the scene and the sonar have of their own.
 std::vector<std::string> parts_had(const Scene& scene, const FrequencyMode& mode);
 
-}  // namespace sonar
+}  // namespace sonar::bench

@@ -1,8 +1,8 @@
-#include "daemon/bench_parts.hpp"
+#include "daemon/bench/parts.hpp"
 
 #include <algorithm>
 
-namespace sonar {
+namespace sonar::bench {
 namespace {
 
 // unknown: chosen as figures that are heard and not absurd; a part costs the same at any level.
@@ -49,4 +49,4 @@ std::vector<std::string> parts_had(const Scene& scene, const FrequencyMode& mode
   return had;
 }
 
-}  // namespace sonar
+}  // namespace sonar::bench

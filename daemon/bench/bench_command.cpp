@@ -1,0 +1,185 @@
+#include "daemon/bench/bench_command.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <thread>
+
+#include "core/text/arguments.hpp"
+#include "daemon/bench/findings.hpp"
+#include "daemon/bench/parts.hpp"
+#include "daemon/bench/ratios.hpp"
+#include "daemon/effective_switches.hpp"
+#include "daemon/engine_options.hpp"
+#include "daemon/scene_file.hpp"
+#include "daemon/start_engine.hpp"
+
+namespace sonar {
+namespace bench {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* other_cases[] = {"P3e", "P5", "P6", "P7", "P8", "P9", "P12"};  // beside bench_cases()
+constexpr int ratios_missed = 1;
+
+template <class Items>
+std::vector<std::string> names_of(const Items& items) {
+  std::vector<std::string> names;
+  for (const auto& item : items) names.push_back(item.name);
+  return names;
+}
+std::vector<std::string> all_cases() {
+  std::vector<std::string> names = names_of(bench_cases());
+  names.insert(names.end(), std::begin(other_cases), std::end(other_cases));
+  return names;
+}
+
+bool wanted(const std::vector<std::string>& names, const std::string& name) {
+  return names.empty() || std::find(names.begin(), names.end(), name) != names.end();
+}
+
+int complain(const Error& error) {
+  std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
+  return exit_code(error.kind);
+}
+
+Result<ScenePointer> scene_of(const BenchScene& where, const BenchOptions& options) {
+  const auto file = find_scene(where.name + ".yaml", options.scene_folder);
+  if (!file)
+    return failure(ErrorKind::missing_file, "no scene " + where.name + ".yaml; looked in " + scene_folders(options.scene_folder));
+  const auto loaded = load_scene(*file);
+  if (!loaded) return tl::make_unexpected(loaded.error());
+  return *loaded;
+}
+
+/// Warm pings of every case over one scene.
+Result<void> time_pings(const BenchScene& where, const ScenePointer& loaded, const BenchOptions& options, json& report) {
+  const auto scene = with_parts(loaded, options.given_parts);
+  for (const BenchCase& c : bench_cases()) {
+    if (!wanted(options.cases, c.name)) continue;
+    for (const int threads : options.threads) {
+      std::unique_ptr<Bench> bench;
+      const auto engine = start_engine(
+          [&](ScenePointer s) {
+            bench = std::make_unique<Bench>(std::move(s), threads, options);
+            return std::move(bench->engine);
+          },
+          scene);
+      if (!engine) return tl::make_unexpected(engine.error());
+      const Figures f = measure(c, where, *loaded, **engine, threads, options);
+      print(f);
+      report["results"].push_back(json_of(f));
+    }
+  }
+  return {};
+}
+
+/// Everything else, over the first scene.
+Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, const BenchOptions& options, json& report) {
+  bool all_hold = true;
+  const auto asked = [&](const char* name) { return wanted(options.cases, name); };
+  if (asked("P3e")) report["cold"] = find_cold_pings(scene, where, options);
+  if (asked("P5")) {
+    auto latency = find_latency(scene, options);
+    if (!latency) return tl::make_unexpected(latency.error());
+    report["latency"] = *std::move(latency);
+  }
+  if (asked("P6"))
+    for (const auto& ratios :
+         {measure_sums(options), measure_coupling(options), measure_rays(scene, where, options), measure_detection(options)})
+      for (const Ratio& r : ratios) {
+        print(r);
+        all_hold &= r.holds();
+        report["ratios"].push_back(json_of(r));
+      }
+  if (asked("P7")) report["objects"] = find_cost_of_objects(scene, where, options);
+  if (asked("P8")) {
+    report["clients"] = json::array();
+    for (const int clients : options.curves ? std::vector{1, 4, 10} : std::vector{10}) {
+      auto cost = find_cost_of_clients(scene, clients, 5, options);
+      if (!cost) return tl::make_unexpected(cost.error());
+      report["clients"].push_back(*std::move(cost));
+    }
+  }
+  if (asked("P9")) report["hashes"] = find_hashes(scene, where, options);
+  if (asked("P12")) {
+    auto empty = find_empty_bins(options);
+    if (!empty) return tl::make_unexpected(empty.error());
+    report["empty_bins"] = *std::move(empty);
+  }
+  if (options.curves) report["curves"] = find_curves(scene, where, options);
+  return all_hold;
+}
+
+int run(const BenchOptions& options) {
+  const std::string note = note_of_parts_left_out(options.engine.switches);
+  if (!note.empty()) std::printf("%s\n", note.c_str());
+  json report{{"processor", processor()}, {"results", json::array()}};
+  if (double load[1]; ::getloadavg(load, 1) == 1) report["load_average"] = load[0];  // of others: what lengthens wall times
+  std::printf("%s\n", processor().c_str());
+  bool first = true, all_hold = true;
+  for (const BenchScene& where : bench_scenes()) {
+    if (!wanted(options.scenes, where.name)) continue;
+    const auto scene = scene_of(where, options);
+    if (!scene) return complain(scene.error());
+    if (const auto timed = time_pings(where, *scene, options, report); !timed) return complain(timed.error());
+    if (!std::exchange(first, false)) continue;
+    const auto rest = find_the_rest(where, *scene, options, report);
+    if (!rest) return complain(rest.error());
+    all_hold = *rest;
+  }
+  if (!options.json_file.empty()) {
+    std::ofstream file(options.json_file);
+    if (!(file << report.dump(2) << '\n'))
+      return complain({ErrorKind::io, "cannot write " + options.json_file + "; choose another --json file"});
+  }
+  return all_hold ? 0 : ratios_missed;
+}
+
+}  // namespace
+}  // namespace bench
+
+int run_bench(int argc, char** argv) {
+  bench::BenchOptions options;
+  EngineOptionsGiven model;
+  CLI::App cli{
+      "Times whole pings, stage by stage, warm: the cells of the scene are made already. The first ping, which makes them, is\n"
+      "the figure \"cold\" of every case; P3e jumps. P5 and P8 run a daemon on loopback, P6 compares the hot loops with the "
+      "plain\n"
+      "ways of doing the same and exits with 1 when a ratio is missed.",
+      "sonard bench"};
+  cli.footer("examples:\n  sonard bench --case P1 --case P3d --threads 1 --threads 2 --json out.json\n  sonard bench --case P6");
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  cli.add_option("--case", options.cases, "case to run (may repeat; default all)")->check(text::one_of(bench::all_cases()));
+  cli.add_option("--scene", options.scenes, "scene to run it over (may repeat; default all)")
+      ->check(text::one_of(bench::names_of(bench::bench_scenes())));
+  cli.add_option("--threads", options.threads, "threads (may repeat; default all processors)")->check(text::whole_number(1, 256));
+  cli.add_option("--pings", options.pings, "pings to time")->check(text::whole_number(1, 100000))->capture_default_str();
+  cli.add_flag("--curves", options.curves, "also how times grow with rays, rows, beams, triangles, sonars and clients");
+  cli.add_option("--give", options.given_parts,
+                 "give scene and sonar what this part of the model needs, where they lack it (may repeat; default none)")
+      ->check(text::one_of(bench::parts_to_give()));
+  cli.add_option("--frequency-sum", options.frequency_sum, "of the modes paper and raster: by a transform, or term by term")
+      ->check(text::one_of({"fast", "direct"}))
+      ->capture_default_str();
+  cli.add_option("--scenes-dir", options.scene_folder, "folder to look for the scene files in first; else the shipped ones");
+  cli.add_option("--json", options.json_file, "also write the figures to this file");
+  add_model_options(cli, model);
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (const std::string wrong = text::complaint_about_words(cli, words); !wrong.empty())
+    return bench::complain({ErrorKind::usage, wrong});
+  try {
+    cli.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return cli.exit(e);  // --help
+    return bench::complain({ErrorKind::usage, text::complaint_about(cli, e, words)});
+  }
+  if (const auto r = override_engine(options.engine, options.seed, model); !r) return bench::complain(r.error());
+  if (options.threads.empty()) options.threads.push_back(processors);
+  return bench::run(options);
+}
+
+}  // namespace sonar

@@ -1,0 +1,56 @@
+"""The page of benchmarks says what the figures say: verdicts, missing parts, and pictures that are XML."""
+
+import unittest
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import write_benchmarks
+
+
+def result(case, threads, rate):
+    return {"case": case, "scene": "local-search", "threads": threads, "description": case + " described", "engine": "cpu, test",
+            "triangles": 202692, "pings_per_second": rate, "median_ms": 1e3 / rate, "min_ms": 900 / rate, "processor_ms": 5.0,
+            "thread_ms": {"trace": 3.34, "scatter": 3.8, "frame": 0.0}}
+
+
+TIMES = {"min_ms": 1.0, "median_ms": 2.0, "p90_ms": 3.0, "p99_ms": 4.0, "max_ms": 5.0}
+
+
+class Page(unittest.TestCase):
+    def test_verdicts_are_those_of_the_figures(self):
+        report = {"processor": "test", "results": [result("P1", 1, 100), result("P1", 2, 260), result("P3a", 2, 39)]}
+        page = write_benchmarks.page(report)
+        row = {line.split(" | ")[0]: line for line in page.splitlines() if line.startswith("| P") and "described" in line}
+        self.assertIn("| 260 |", row["| P1"])
+        self.assertTrue(row["| P1"].endswith("goal |"))
+        self.assertTrue(row["| P3a"].endswith("**missed** |"))
+        self.assertIn("50 %", page, "1.9 ms of the prototype against 3.8")
+        self.assertIn("333 times the paper's", page)
+
+    def test_everything_found_is_told(self):
+        report = {"processor": "test", "load_average": 5.5, "results": [result("P1", 2, 80)],
+                  "latency": {"rows": 437, "threads": 2, "triggers": 200, "latency": TIMES},
+                  "clients": [{"clients": 10, "pings_per_second": 40.0, "dropped": 1, "sender_share": 0.1}],
+                  "cold": [{"case": "P1", "threads": 2, "cold": TIMES, "warm": TIMES, "new_tiles": 0.9}],
+                  "objects": {"objects": 100, "place": TIMES, "added": TIMES},
+                  "hashes": [{"case": "P1", "same": False, "sha256": "0123456789abcdef0"}],
+                  "empty_bins": [{"case": "P1", "rays": 300, "rows": 394, "bins": 1000, "empty_share": 0.31}],
+                  "ratios": [{"name": "slow / fast", "slow_ms": 100.0, "fast_ms": 1.0, "ratio": 100.0, "least": 500.0,
+                              "difference": 0.0, "holds": False}],
+                  "curves": [{"name": "rows", "case": "P3a", "points": [{"x": 200, "median_ms": 3.0}, {"x": 400, "median_ms": 5.0}]}]}
+        with TemporaryDirectory() as folder:
+            write_benchmarks.write(report, Path(folder))
+            page = (Path(folder) / (write_benchmarks.NAME + ".md")).read_text(encoding="utf-8")
+            for svg in ("benchmarks-rates.svg", "benchmarks-curves.svg"):
+                self.assertTrue(ElementTree.parse(Path(folder) / svg).getroot().tag.endswith("svg"))
+        for words in ("p99 4.00 ms", "no drop: **missed**", "**different bytes**", "31.000 %", "| 500 |", "400: 5.00 ms",
+                      "Must hold 500, goal 60: goal", "before the run: 5.5"):
+            self.assertIn(words, page)
+
+    def test_a_report_of_nothing_is_a_page(self):
+        self.assertIn("# Benchmarks", write_benchmarks.page({"processor": "test", "results": [result("P2", 1, 10)]}))
+
+
+if __name__ == "__main__":
+    unittest.main()
