@@ -40,8 +40,12 @@ class Mission:
     def __enter__(self):
         self.daemon.__enter__()
         self.control = f"{self.daemon.address}:14770"
-        for name in self.record:
-            self.steer("recording", "start", name)
+        try:
+            for name in self.record:
+                self.steer("recording", "start", name)
+        except BaseException:
+            self.daemon.__exit__()
+            raise
         return self
 
     def __exit__(self, *what):
