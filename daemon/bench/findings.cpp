@@ -64,7 +64,7 @@ json find_cold_pings(const ScenePointer& scene, const BenchScene& where, const B
         warm.push_back(1e3 * pinger.fire(*bench.engine, pinger.request(++number, at)));
       }
       const Times cold_ms(cold), warm_ms(warm);
-      const double share = seen > 0 ? built / seen : 0;
+      const double share = seen > 0 ? std::min(1.0, built / seen) : 0;  // empty tiles are built too
       std::printf(
           "P3e  %-4s after a jump, %d thread%s: cold %.1f ms (worst %.1f), the next %.1f; %.0f %% of the tiles were new\n", name,
           threads, threads == 1 ? "" : "s", cold_ms.median, cold_ms.max, warm_ms.median, 100 * share);
