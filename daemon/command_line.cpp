@@ -23,8 +23,7 @@ void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_flag("--demo", run.demo, "run the built-in demo, whatever files there are");
   app.add_option(
          "--clock", run.clock,
-         "realtime, stepped (a tick when every client has taken the last ping), lockstep (so far as sonarctl step asks) or\n"
-         "follow (so far as poses are stamped); default realtime")
+         "realtime, or stepped (when clients have taken the last ping), lockstep (sonarctl step), follow (stamps of poses)")
       ->check(one_of({clock_modes.begin(), clock_modes.end()}))
       ->envname("SONARD_CLOCK");
   add_engine_options(app, run.engine);
@@ -58,7 +57,8 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
       ->check(number(0.001, 10000.0));
   app.add_option("--rate", render.rate_hz, "pings a second (as the sonar is set; with --poses: at every line)")
       ->check(number(0.001, 10000.0));
-  app.add_option("--batch", render.batch, "pings to make before they are written by all threads at once, for data sets (default 1)")
+  app.add_option("--batch", render.batch,
+                 "pings to make before they are written by all threads at once, for data sets (default 1)")
       ->check(whole_number(1, 4096));
   app.add_option("--report", render.report,
                  "coverage: every bin of a plane bed against the closed form; without a configuration "

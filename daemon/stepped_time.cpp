@@ -1,5 +1,6 @@
 #include "daemon/stepped_time.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace sonar {
@@ -13,8 +14,7 @@ SteppedTime::Bound SteppedTime::bound() const {
 
 Time SteppedTime::tick_at(Time due) const {
   if (mode_ != ClockMode::follow) return due;
-  const Time last = bound().last_tick;
-  return last - due > most_lead ? last : due;
+  return std::max(due, bound().last_tick - most_lead);
 }
 
 std::string SteppedTime::step(double dt_s) {
