@@ -2,6 +2,7 @@
 stamps its poses and waits for each answer. Both give the same bytes again, whatever the wall clock does meanwhile."""
 import re
 import sys
+import threading
 import time
 import unittest
 
@@ -24,11 +25,7 @@ class Clocks(unittest.TestCase):
         with Sonard(arguments=["--clock", clock, "--digest", "--exit-after-pings", PINGS]) as daemon:
             with Client(daemon.address) as client:
                 client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=5))
-                control = Control(daemon.address)
-                deadline = time.monotonic() + 60
-                while not control.status()["sonars"][0]["pinging"]:
-                    self.assertLess(time.monotonic(), deadline)
-                    time.sleep(0.01)
+                control = self.when_pinging(daemon)
                 pings = []
                 for n in range(PINGS):
                     drive(control, n)
@@ -39,6 +36,14 @@ class Clocks(unittest.TestCase):
         digests = re.findall(r"sha256 ([0-9a-f]{64})", log)
         self.assertEqual(len(digests), 1, log)
         return pings, digests[0]
+
+    def when_pinging(self, daemon):
+        """The sonar has heard what its client asked."""
+        control, deadline = Control(daemon.address), time.monotonic() + 60
+        while not control.status()["sonars"][0]["pinging"]:
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.01)
+        return control
 
     def expect_dive(self, pings):
         per_m = (pings[-1].pressure - pings[0].pressure) / ((PINGS - 1) / RATE_HZ)
@@ -75,12 +80,16 @@ class Clocks(unittest.TestCase):
         with Sonard(arguments=["--clock", "lockstep"]) as daemon, Client(daemon.address) as client:
             control = f"{daemon.address}:14770"
             client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=5))
+            self.when_pinging(daemon)
+            reader = threading.Thread(target=lambda: [client.ping() for _ in range(3)])  # time waits for clients
+            reader.start()
             result = run(SONARCTL, "step", "0.05", "--count", "3", "--control", control)
             self.assertEqual(result.returncode, 0, result.stderr)
             lines = result.stdout.splitlines()
-            self.assertEqual([line.split(" s  ")[0] for line in lines], ["0.050000000", "0.100000000", "0.150000000"])
+            self.assertEqual(lines, ["0.050000000 s  1 ping", "0.100000000 s  0 pings", "0.150000000 s  1 ping"])
             result = run(SONARCTL, "step", "0.1", "--control", control)
             self.assertEqual(result.stdout, "0.250000000 s  1 ping\n")
+            reader.join(20)
             self.assertIn("clock lockstep at 0.250 s", run(SONARCTL, "status", "--control", control).stdout)
         with Sonard(arguments=["--clock", "stepped"]) as daemon:
             result = run(SONARCTL, "step", "0.1", "--control", f"{daemon.address}:14770")

@@ -40,7 +40,7 @@ class Planted(unittest.TestCase):
                 ("protocol/oculus/a.cpp", "core/scene/scene.hpp"), ("protocol/oculus/a.cpp", "core/pipeline/ping_engine.hpp"),
                 ("protocol/oculus/a.cpp", "protocol/blueview/models.hpp"), ("protocol/control/a.cpp", "daemon/world.hpp"),
                 ("clients/sonarctl/a.cpp", "daemon/config.hpp"), ("clients/sonarctl/a.cpp", "core/pipeline/simulate.hpp"),
-                ("cuda/a.cu", "core/scene/ray_scene.hpp"), ("daemon/a.cpp", "clients/sonarctl/net.hpp")]:
+                ("cuda/a.cu", "core/image/raster.hpp"), ("daemon/a.cpp", "clients/sonarctl/net.hpp")]:
             with self.subTest(name=name, header=header):
                 self.expect(name, f'\n#include "{header}"\n', 2, "must not include")
 
