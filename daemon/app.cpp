@@ -166,7 +166,9 @@ void App::step_time() {
   const SteppedTime::Bound bound = stepped_time_.bound();
   const bool may_tick = due && *due <= bound.last_tick;
   if (!may_tick && bound.then) advance_time(*bound.then);
-  stepped_time_.answer(due);
+  const bool answered = stepped_time_.answer(due);
+  if (answered) on_change();  // first the answers, in turns of their own
+  if (enough_served() && answered) return;
   if (enough_served()) return stop("served " + std::to_string(options_.exit_after_pings) + " pings");
   if (!may_tick) return;
   advance_time(stepped_time_.tick_at(*due));
@@ -176,14 +178,14 @@ void App::step_time() {
 void App::advance_time(Time to) {
   if (to <= clock_.now()) return;
   clock_.advance_to(to);
-  for (Device& d : fleet_.devices()) d.tick_sessions(clock_.now());
+  for (Device& d : fleet_.devices()) d.tick_sessions();
 }
 
 /// Stamps that we follow began, or jumped ahead.
 void App::skip_time() {
   const auto skipped = world_.take_skipped();
   if (skipped.count() == 0) return;
-  clock_.advance_to(clock_.now() + skipped);
+  clock_.skip(skipped);
   for (Device& d : fleet_.devices()) d.skip(skipped);
   log_.info("time follows the poses: it jumps ahead by " + std::to_string(seconds(skipped)) + " s");
 }

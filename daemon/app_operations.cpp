@@ -74,8 +74,11 @@ void AppOperations::take(const control::PoseSample& sample, const Sender& sender
 
 void AppOperations::step(const control::Step& asked, Done done) {
   if (const std::string why = parts_.time.step(asked.dt_s); !why.empty()) return done(refused(why));
-  parts_.time.wait([this, before = pings_made(), done = std::move(done)](Time then) {
-    done({OperationResult::Code::done, {}, control::Stepped{then.time_since_epoch().count(), pings_made() - before}});
+  parts_.time.wait([this, done = std::move(done)](Time then) {
+    const std::uint64_t told = std::exchange(pings_told_, pings_made());
+    // A sonar that a reload took away took its pings along.
+    const std::uint64_t pings = pings_told_ - std::min(told, pings_told_);
+    done({OperationResult::Code::done, {}, control::Stepped{then.time_since_epoch().count(), pings}});
   });
   parts_.on_change();
 }

@@ -63,6 +63,7 @@ class AppOperations final : public Operations {
   control::DaemonStatus status() const;
 
   AppParts parts_;
+  std::uint64_t pings_told_ = 0;  // in answers to steps
   std::uint32_t placements_ = 0;  // of moving objects: none is a movement from the one before
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
 };

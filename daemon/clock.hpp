@@ -26,11 +26,19 @@ class Clock {
   std::chrono::steady_clock::time_point timer_at(Time t) const { return started_ + (t - origin_); }
   /// Stepped time only; never backwards.
   void advance_to(Time t) { origin_ = std::max(origin_, t); }
+  /// Stepped time only: it jumps ahead by what nobody lives through.
+  void skip(std::chrono::nanoseconds by) {
+    origin_ += by;
+    skipped_ += by;
+  }
+  /// Without what was skipped: conversations go by this, whose silences and rhythms know no jumps.
+  Time lived() const { return now() - skipped_; }
 
  private:
   bool stepped_;
   Wall wall_;
   std::chrono::steady_clock::time_point started_;
+  std::chrono::nanoseconds skipped_{0};
   Time origin_;  // real: the UNIX time at started_; stepped: now
 };
 

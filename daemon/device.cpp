@@ -184,9 +184,9 @@ void Device::step(Time now) {
   if (pacer_.fire(now, busy_)) ping(pacer_.last_tick());
 }
 
-void Device::tick_sessions(Time now) {
+void Device::tick_sessions() {
   const auto sessions = sessions_;
-  for (const SessionPointer& s : sessions) s->tick(now);
+  for (const SessionPointer& s : sessions) s->tick(context_.clock.lived());
 }
 
 void Device::skip(std::chrono::nanoseconds by) {
@@ -250,7 +250,8 @@ void Device::on_ping(Simulator::Outcome outcome) {
     const Time now = context_.clock.now();
     std::vector<std::pair<SessionPointer, protocol::Event>> wishes;
     for (const SessionPointer& s : sessions_)
-      for (protocol::Event& event : s->push_ping(bytes, request, made_with, now)) wishes.emplace_back(s, std::move(event));
+      for (protocol::Event& event : s->push_ping(bytes, request, made_with, context_.clock.lived()))
+        wishes.emplace_back(s, std::move(event));
     for (const auto& [session, event] : wishes) on_event(*session, event);
     record(outcome, bytes, now);
     tell_of_ping(*outcome.ping, outcome.seconds);

@@ -64,7 +64,7 @@ class Device final : public SessionParent {
   std::optional<Time> next_tick() const;
   bool settled() const;  // no ping under way, every client has taken what it was sent
   void step(Time now);
-  void tick_sessions(Time now);
+  void tick_sessions();
   /// The clock jumps ahead: time that nobody lived.
   void skip(std::chrono::nanoseconds by);
 

@@ -121,7 +121,8 @@ void Device::welcome(tcp::socket socket, Admission::Place place) {
   const Time now = context_.clock.now();
   Session::Setup setup{config_.outbox, context_.digest, ++figures_.clients, context_.config.limits, std::move(place)};
   update_state(now);
-  auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket), vendor_.converse(state_, now), setup);
+  auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket),
+                                           vendor_.converse(state_, context_.clock.lived()), setup);
   say_visit("client connected", {{"client", session->client()}});
   tell_of_client(*session, true, {});
   sessions_.push_back(session);

@@ -79,7 +79,7 @@ asio::awaitable<void> Session::read() {
       co_return;
     }
     bytes_read_ += n;
-    if (!finishing_) handle(dialogue_->on_bytes(std::span(received_).first(n), clock_.now()));
+    if (!finishing_) handle(dialogue_->on_bytes(std::span(received_).first(n), clock_.lived()));
     const auto pause = input_rate_.pause_after(n, Steady::now());
     if (pause.count() > 0 && !finishing_) co_await rest(pause);
   }
@@ -179,7 +179,7 @@ asio::awaitable<void> Session::watch() {
     } else if (writing_ && now - progress_at_ > setup_.limits.stall) {
       reset("took no byte for " + std::to_string(setup_.limits.stall.count()) + " ms");
     } else if (!finishing_ && !clock_.stepped()) {
-      tick(clock_.now());
+      tick(clock_.lived());
     }
   }
 }

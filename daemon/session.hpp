@@ -53,7 +53,7 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Offers a ping, made with the settings of that request. Returns what the client wants next, for the device.
   std::vector<protocol::Event> push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,
                                          protocol::BytesView made_with, Time now);
-  /// Stepped time: the keep-alives that are due at `now`.
+  /// Stepped time: the keep-alives that are due at `now`, of the time lived through.
   void tick(Time now);
   /// No more messages after the one being written; then FIN. Reset if the client does not take it in time.
   void finish(std::string why);

@@ -39,8 +39,8 @@ class SteppedTime {
   void wait(Reached reached);
   /// Whether there is anything to wait for: real time and time that steps by itself owe nobody an answer.
   bool makes_wait() const { return mode_ == ClockMode::lockstep || mode_ == ClockMode::follow; }
-  /// All is served that was due before `next_tick`; nothing = nothing more is due.
-  void answer(std::optional<Time> next_tick);
+  /// All is served that was due before `next_tick`; nothing = nothing more is due. Whether there was anybody to answer.
+  bool answer(std::optional<Time> next_tick);
 
  private:
   struct Waiting {

@@ -18,7 +18,7 @@ bool World::is_followed(const Track& track, Time newest) const {
 /// in all other cases ours goes on from where it is.
 World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
   const Time newest = newest_followed_.value_or(now);
-  const bool vehicle = &track >= vehicles_.data() && &track < vehicles_.data() + vehicles_.size();
+  const bool vehicle = std::any_of(vehicles_.begin(), vehicles_.end(), [&](const Track& t) { return &t == &track; });
   const auto take = [&](Ns offset) {
     if (vehicle) newest_followed_ = std::max(newest, at + offset);
     return offset;
@@ -28,10 +28,12 @@ World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
     const Wide by = lead(offset);
     return (by < 0 ? -by : by) <= rules_.stale_after.count();
   };
-  if (is_near(track.offset)) return take(track.offset);
-  if (is_near(Ns{0})) return take(Ns{0});
-  for (const Track& other : vehicles_)
-    if (!other.history.empty() && is_near(other.offset)) return take(other.offset);
+  if (!vehicle || newest_followed_) {  // the first pose is where time begins, however soon after 0
+    if (is_near(track.offset)) return take(track.offset);
+    if (is_near(Ns{0})) return take(Ns{0});
+    for (const Track& other : vehicles_)
+      if (!other.history.empty() && is_near(other.offset)) return take(other.offset);
+  }
 
   const bool alone = std::none_of(vehicles_.begin(), vehicles_.end(),
                                   [&](const Track& other) { return &other != &track && is_followed(other, newest); });
@@ -53,6 +55,8 @@ std::optional<Time> World::followed_until() const {
 World::Ns World::take_skipped() {
   const Ns skipped = std::exchange(skipped_, Ns{0});
   start_ += skipped;
+  for (Track& t : objects_)
+    if (!t.history.empty()) t.offset += skipped;
   for (std::vector<Track>* tracks : {&vehicles_, &objects_})
     for (Track& t : *tracks) t.playback.skip(skipped);
   return skipped;

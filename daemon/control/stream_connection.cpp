@@ -138,14 +138,14 @@ bool StreamConnection::take_greeted(const control::Request& request) {
 
 /// The answer may come later than others, and later than this connection lives.
 void StreamConnection::perform(std::uint64_t id, const control::Operation& operation) {
-  ++under_way_;
-  const bool pose = std::holds_alternative<control::PoseSample>(operation);
-  context_.operations.perform(operation, sender_, [weak = weak_from_this(), id, pose](OperationResult result) {
+  const bool unasked = std::holds_alternative<control::PoseSample>(operation) && id == 0;  // nobody waits for an answer
+  if (!unasked) ++under_way_;
+  context_.operations.perform(operation, sender_, [weak = weak_from_this(), id, unasked](OperationResult result) {
     const auto self = weak.lock();
     if (!self) return;
-    --self->under_way_;
+    if (!unasked) --self->under_way_;
     self->wake_reader_.cancel();
-    const bool silent = pose && id == 0 && result.code == OperationResult::Code::done;
+    const bool silent = unasked && result.code == OperationResult::Code::done;
     if (!silent) self->answer(response_of(id, std::move(result)));
   });
 }

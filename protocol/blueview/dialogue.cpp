@@ -58,7 +58,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     if (subscription_ && subscription_->next <= now) {
       ask_for_ping(subscription_->head, reaction);
       subscription_->wanted = true;
-      while (subscription_->next <= now) subscription_->next += subscription_->interval;
+      subscription_->next += ((now - subscription_->next) / subscription_->interval + 1) * subscription_->interval;
     }
     if (now >= spoke_at_ + keep_alive_after) reaction.replies.push_back(make_frame(FrameType::keep_alive, 0, {}));
     if (!reaction.replies.empty()) spoke_at_ = now;

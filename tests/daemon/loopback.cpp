@@ -55,10 +55,11 @@ std::string yaml_of(const DaemonSetup& s) {
   const std::string control = s.more.find("control:") == std::string::npos ? "control: {stream: off, http: off}\n" : "";
   const std::string status =
       s.sonar_lines.find("status_to") == std::string::npos ? "    status_to: ['" + s.address + ":9']\n" : "";
-  return "world: {scene: scene.yaml}\n"
-         "vehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}\n"
-         "sonars:\n  - name: front\n    profile: oculus-m1200d\n    bind_ip: " +
-         s.address + "\n" + status + s.sonar_lines + poses + control + s.more;
+  return std::string(
+             "world: {scene: scene.yaml}\n"
+             "vehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}\n") +
+         s.vehicle_lines + "sonars:\n  - name: front\n    profile: oculus-m1200d\n    bind_ip: " + s.address + "\n" + status +
+         s.sonar_lines + poses + control + s.more;
 }
 
 std::string own_address() {

@@ -60,8 +60,9 @@ std::shared_ptr<Scene> small_scene(bool moving_object = false);
 
 struct DaemonSetup {
   std::string address = own_address();
-  std::string sonar_lines;  // more keys of the sonar, "    key: value\n"
-  std::string more;         // more sections
+  std::string sonar_lines;    // more keys of the sonar, "    key: value\n"
+  std::string vehicle_lines;  // vehicles beside rov, "  - {name: boat}\n"
+  std::string more;           // more sections
   AppOptions options;
   milliseconds engine_takes{0};
   FakeEngine::Before engine_before;
