@@ -35,14 +35,14 @@ void SteppedTime::wait(Reached reached) { waiting_.push_back({bound(), std::move
 bool SteppedTime::answer(std::optional<Time> next_tick) {
   // One that is answered may ask for more. The bound falls when a vehicle that is behind joins those that are followed: who
   // waited for more is answered then, or all would wait for each other.
-  const bool any = !waiting_.empty();
-  const std::size_t before = waiting_.size();
+  bool any = false;
   while (!waiting_.empty() && (!next_tick || *next_tick > std::min(waiting_.front().until.last_tick, bound().last_tick))) {
     const Waiting done = std::move(waiting_.front());
     waiting_.pop_front();
+    any = true;
     done.reached(done.until.then.value_or(clock_.now()));
   }
-  return any && waiting_.size() < before;
+  return any;
 }
 
 }  // namespace sonar

@@ -15,17 +15,6 @@ namespace {
 
 constexpr int tries = 7, window_samples = 64;
 
-template <class Work>
-double best_ms(int times, Work&& work) {
-  double best = 1e9;
-  for (int i = 0; i < times; ++i) {
-    const double begin = this_thread_s();
-    work();
-    best = std::min(best, 1e3 * (this_thread_s() - begin));
-  }
-  return best;
-}
-
 PingPlan plan_of(const char* name) {
   const BenchCase c = *find_case(name);
   return make_plan(c.profile.model->modes[static_cast<std::size_t>(c.settings.mode)], c.settings, {});

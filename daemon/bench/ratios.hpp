@@ -2,6 +2,7 @@
 // that they hold on a noisy machine. Best of several runs each.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,18 @@
 #include "daemon/bench/measure.hpp"
 
 namespace sonar::bench {
+
+/// Of so many runs of `work`, the time that the quickest took of this thread.
+template <class Work>
+double best_ms(int times, Work&& work) {
+  double best = 1e9;
+  for (int i = 0; i < times; ++i) {
+    const double begin = this_thread_s();
+    work();
+    best = std::min(best, 1e3 * (this_thread_s() - begin));
+  }
+  return best;
+}
 
 struct Ratio {
   std::string name;  // "synthesis: complex exponentials / pulses in time"

@@ -72,17 +72,6 @@ SONAR_CLONES void turn_phases(const Column& c, int count, float* __restrict re, 
   }
 }
 
-template <class Work>
-double best_ms(int times, Work&& work) {
-  double best = 1e9;
-  for (int i = 0; i < times; ++i) {
-    const double begin = this_thread_s();
-    work();
-    best = std::min(best, 1e3 * (this_thread_s() - begin));
-  }
-  return best;
-}
-
 /// Relative difference in the least squares.
 double difference(const Sums& truth, const Sums& other) {
   double off = 0, all = 0;

@@ -1,15 +1,14 @@
 // Recordings inside the daemon: which names they take, what goes into files, and that neither a full nor a slow disk is anything
 // to the clients.
 #include <gmock/gmock.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 
 #include "daemon/recording/recordings.hpp"
 #include "protocol/recording/recording.hpp"
 #include "tests/daemon/loopback.hpp"
+#include "tests/small_disk.hpp"
 
 namespace sonar::testing_daemon {
 namespace {
@@ -283,21 +282,6 @@ TEST(RecordedDaemon, IsToldInTheStatusAndStopsWhenAsked) {
   EXPECT_TRUE(client.next_ping());
   EXPECT_EQ(daemon.stop(), 0);
 }
-
-/// Files of this process may not grow beyond so much, as on a full disk.
-class SmallDisk {
- public:
-  explicit SmallDisk(rlim_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallDisk() { ::setrlimit(RLIMIT_FSIZE, &before_); }
-
- private:
-  rlimit before_{};
-};
 
 TEST(RecordedDaemon, AFullDiskEndsTheRecordingAndNothingElse) {
   const Folder folder;

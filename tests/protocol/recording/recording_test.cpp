@@ -1,10 +1,7 @@
 // What holds for every format: what was written is read again, whatever part of the file is there, and a full disk spoils
 // nothing.
-#include <sys/resource.h>
-
-#include <csignal>
-
 #include "tests/protocol/recording/recording_testing.hpp"
+#include "tests/small_disk.hpp"
 
 namespace sonar::recording::testing {
 namespace {
@@ -75,21 +72,6 @@ TEST_P(EveryFormat, SurvivesAnyByteBeingWrong) {
       }
     }
 }
-
-/// Files may grow to so many bytes for as long as it lives, as if the disk ended there.
-class SmallDisk {
- public:
-  explicit SmallDisk(rlim_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallDisk() { ::setrlimit(RLIMIT_FSIZE, &before_); }
-
- private:
-  rlimit before_{};
-};
 
 TEST_P(EveryFormat, AFullDiskLeavesWhatWasWritten) {
   const TemporaryFile file("full-disk");
