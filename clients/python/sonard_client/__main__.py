@@ -74,7 +74,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
         print(f"sonard_client: {error}", file=sys.stderr)
         return 64
     except (ControlError, OSError) as error:
-        print(f"sonard_client: {error}", file=sys.stderr)
+        words = error.strerror if isinstance(error, OSError) and not error.filename and error.strerror else error
+        print(f"sonard_client: {words}", file=sys.stderr)
         return 69
     return 0
 

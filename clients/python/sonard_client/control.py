@@ -1,6 +1,7 @@
 """Asks and steers a running sonard over HTTP, docs/control.md: status, settings, water, scene, objects, events."""
 from __future__ import annotations
 
+import errno
 import http.client
 import json
 import socket
@@ -193,6 +194,9 @@ class Control:
             connection.request(method, path, body, headers)
             answer = connection.getresponse()
             return answer.status, answer.read().decode(errors="replace")
+        except ConnectionRefusedError:
+            raise ConnectionRefusedError(
+                errno.ECONNREFUSED, f"nobody listens at {self.host}:{self.port}: is sonard running, with control.http on?") from None
         finally:
             connection.close()
 

@@ -1,6 +1,7 @@
 """A driver for Oculus sonars, emulated or real: connect, fire, take the pings."""
 from __future__ import annotations
 
+import errno
 import socket
 import time
 from collections import deque
@@ -58,7 +59,12 @@ class OculusClient:
         self._last_fire = b""
         self._ready: Deque[Message] = deque()
         self._heard = False
-        self._socket = socket.create_connection(self.address, timeout=timeout)
+        try:
+            self._socket = socket.create_connection(self.address, timeout=timeout)
+        except ConnectionRefusedError:
+            raise ConnectionRefusedError(errno.ECONNREFUSED, f"no sonar listens at {self.address[0]}:{self.address[1]}") from None
+        except socket.timeout:
+            raise TimeoutError(errno.ETIMEDOUT, f"{self.address[0]}:{self.address[1]} did not answer within {timeout:g} s") from None
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def fire(self, range_m: float = 10, rate_hz: int = 10, gain_percent: float = 50, mode: int = 2, beams: int = 512,

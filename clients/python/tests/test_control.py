@@ -8,7 +8,7 @@ import unittest
 
 from common import PACKAGE  # and it is on the path
 
-from sonard_client import Control, ControlError
+from sonard_client import Control, ControlError, OculusClient
 
 ANSWERS = {
     "/healthz": (503, "scene cannot be loaded\n"),
@@ -48,6 +48,17 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def log_message(self, *_):
         """Not into the test's output."""
+
+
+class Nobody(unittest.TestCase):
+    def test_says_who_does_not_listen(self):
+        with socket.socket() as taken:  # and does not listen
+            taken.bind(("127.0.0.1", 0))
+            port = taken.getsockname()[1]
+            with self.assertRaisesRegex(ConnectionRefusedError, f"nobody listens at 127.0.0.1:{port}: is sonard running"):
+                Control(port=port).status()
+            with self.assertRaisesRegex(ConnectionRefusedError, f"no sonar listens at 127.0.0.1:{port}"):
+                OculusClient("127.0.0.1", port)
 
 
 class Asked(unittest.TestCase):
