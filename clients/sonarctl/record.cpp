@@ -186,8 +186,11 @@ class Recorder {
 };
 
 void report(const RecordFiles& files, double seconds) {
-  std::printf("recorded %llu pings, %llu messages, %.1f MB, %.1f s: %s\n", static_cast<unsigned long long>(files.pings()),
-              static_cast<unsigned long long>(files.messages()), static_cast<double>(files.bytes()) / 1e6, seconds,
+  const auto counted = [](std::uint64_t n, const char* what) {
+    return std::to_string(n).append(" ").append(what).append(n == 1 ? "" : "s");
+  };
+  std::printf("recorded %s, %s, %.1f MB, %.1f s: %s\n", counted(files.pings(), "ping").c_str(),
+              counted(files.messages(), "message").c_str(), static_cast<double>(files.bytes()) / 1e6, seconds,
               files.sizes().c_str());
 }
 

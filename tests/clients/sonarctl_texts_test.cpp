@@ -73,6 +73,8 @@ TEST(StatusText, NamesEverything) {
   status.vehicles.push_back({"rov", "json 127.0.0.1", true, {}});
   status.vehicles.push_back(
       {"auv", "trajectory dive.tum", false, {}, control::TrajectoryStatus{"dive.tum", 12.34, 60, 2.5, true, true}});
+  status.vehicles.push_back(
+      {"boat", "trajectory way.csv", false, {}, control::TrajectoryStatus{"way.csv", 60, 60, 1, false, false}});
   status.objects.push_back({"wall", "concrete", true, false, 12, {}});
   const std::string text = text_from(status);
   for (const char* part :
@@ -82,7 +84,8 @@ TEST(StatusText, NamesEverything) {
         "tcp 0.0.0.0:52100  advertised as 10.0.0.5  status -> 10.0.0.255:52102\n",
         "place   -6.00 0.00 -3.00 m, heading 90.0, pitch -10.0, roll 0.0 deg\n",
         "10.0.0.9:4000  12 pings, 1 dropped, 2.5 MB, 2 min\n", "from json 127.0.0.1  stale\n",
-        "from trajectory dive.tum  at 12.3 of 60.0 s x2.5 looped paused\n", "moving  hidden\n"})
+        "from trajectory dive.tum  at 12.3 of 60.0 s x2.5 looped paused\n",
+        "from trajectory way.csv  at 60.0 of 60.0 s x1 ended\n", "moving  hidden\n"})
     EXPECT_THAT(text, HasSubstr(part));
 }
 

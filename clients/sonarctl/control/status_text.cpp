@@ -60,13 +60,15 @@ std::string water_text(const control::SetEnvironment& e) {
 std::string trajectory_text(const std::optional<control::TrajectoryStatus>& t) {
   if (!t) return {};
   return format("  at %.1f of %.1f s x%g%s%s", t->position_s, t->duration_s, t->speed, t->loop ? " looped" : "",
-                t->paused ? " paused" : "");
+                t->paused                                    ? " paused"
+                : !t->loop && t->position_s >= t->duration_s ? " ended"
+                                                             : "");
 }
 
 std::string recording_text(const control::RecordingStatus& r) {
   return r.file +
-         format("  of %s: %llu pings, %llu messages, %.1f MB", r.sonar.c_str(), wide(r.pings), wide(r.messages),
-                static_cast<double>(r.bytes) / 1e6) +
+         format("  of %s: %llu ping%s, %llu message%s, %.1f MB", r.sonar.c_str(), wide(r.pings), r.pings == 1 ? "" : "s",
+                wide(r.messages), r.messages == 1 ? "" : "s", static_cast<double>(r.bytes) / 1e6) +
          (r.running ? std::string() : "  ended: " + r.why);
 }
 
