@@ -10,8 +10,14 @@ constexpr auto tick_period = std::chrono::milliseconds(250);
 /// Heartbeats and silences are those of the wires, also where the daemon's time is stepped.
 Time wire_time() { return Time(std::chrono::steady_clock::now().time_since_epoch()); }
 
-mavlink::Settings settings_of(const MavlinkConfig& link, const std::optional<Geodetic>& origin) {
-  return {link.vehicle, link.system_id, link.component_id, link.request_rates, link.rate_hz, origin};
+mavlink::Settings settings_of(const MavlinkConfig& link, const Config& config) {
+  return {link.vehicle,
+          link.system_id,
+          link.component_id,
+          link.request_rates,
+          link.rate_hz,
+          config.origin,
+          config.clock == ClockMode::follow};
 }
 std::string text_of(const MavlinkConfig& link) { return (link.dials ? "udpout:" : "udpin:") + text_of(link.at); }
 std::string text_of(const udp::endpoint& e) { return e.address().to_string() + ":" + std::to_string(e.port()); }
@@ -24,7 +30,7 @@ MavlinkServer::MavlinkServer(asio::io_context& io, const Config& config, PoseInt
 Result<void> MavlinkServer::open() {
   for (const MavlinkConfig& wanted : config_.poses.mavlink) {
     Link& link = links_.emplace_back(Link{wanted,
-                                          mavlink::MavlinkPoses(settings_of(wanted, config_.origin)),
+                                          mavlink::MavlinkPoses(settings_of(wanted, config_)),
                                           udp::socket(io_),
                                           asio::steady_timer(io_),
                                           std::nullopt,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace sonar::mavlink {
 namespace {
@@ -55,6 +56,7 @@ void MavlinkPoses::begin(std::uint8_t system, Time now) {
   local_in_world_.reset();
   newest_ns_ = {};
   yielded_ = {};
+  timeless_ = {};
   reset_counter_ = {};
   begin_histories();
 }
@@ -245,6 +247,11 @@ std::optional<Pose> MavlinkPoses::placed(std::string_view message, const Result<
 void MavlinkPoses::offer(Source source, const RawPose& raw, Stamp stamp, const Pose& enu_in_world, Moment at) {
   for (std::size_t better = 0; better < index_of(source); ++better)
     if (yielded_[better] && at.now - *yielded_[better] <= source_silence) return;
+  if (settings_.needs_time && stamp.domain == ClockDomain::arrival) {
+    if (!std::exchange(timeless_[index_of(source)], true))
+      at.out.notices.push_back(std::string(name_of(source)) + " bears no time and is not used: time is what poses say");
+    return;
+  }
   control::PoseSample sample;
   sample.name = settings_.vehicle;
   sample.stamp = stamp;

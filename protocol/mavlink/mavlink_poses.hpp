@@ -27,6 +27,7 @@ struct Settings {
   bool request_rates = false;                    // ask the autopilot for its messages
   double rate_hz = 50;                           // so often
   std::optional<Geodetic> origin;                // of the world; without it latitudes and longitudes mean nothing
+  bool needs_time = false;                       // what bears no time is no source
 };
 
 struct SourcedPose {
@@ -119,6 +120,7 @@ class MavlinkPoses {
   std::int64_t newest_boot_ms_ = 0;
   std::array<std::int64_t, source_count> newest_ns_{};
   std::array<std::optional<Time>, source_count> yielded_{};
+  std::array<bool, source_count> timeless_{};  // and the log says so
   std::array<std::optional<std::uint8_t>, source_count> reset_counter_{};
   std::uint32_t resets_ = 0;
 };

@@ -86,6 +86,25 @@ TEST(MavlinkPoses, TheBestSourceThatIsAliveCounts) {
       << "ODOMETRY is silent for 1.1 s";
 }
 
+TEST(MavlinkPoses, WhereTimeIsWhatPosesSayThoseWithoutAreNoSource) {
+  Sender v;
+  Settings settings = with_origin();
+  settings.needs_time = true;
+  Link link(settings);
+  SimState sim;
+  sim.latitude_e7_deg = 476000000, sim.longitude_e7_deg = -1223300000;
+  sim.altitude_m = -12;
+  Odometry timeless = odometry(0, 0);
+  timeless.time_us = 0;
+  const Reaction r = link(v(sim) + v(timeless) + v(attitude(1000, 0)) + v(local(1000, 1, 1, 1)), 1);
+  ASSERT_EQ(r.poses.size(), 1u) << "they do not hold back the others";
+  EXPECT_EQ(r.poses[0].source, "system 1 LOCAL_POSITION_NED and attitude");
+  EXPECT_THAT(r.refusals, IsEmpty());
+  ASSERT_EQ(r.notices.size(), 2u);
+  EXPECT_THAT(r.notices[0], HasSubstr("SIM_STATE bears no time and is not used"));
+  EXPECT_THAT(link(v(sim), 1.1).notices, IsEmpty()) << "said once";
+}
+
 TEST(MavlinkPoses, ARefusedSourceIsNotAlive) {
   Sender v;
   Link link;
