@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <exception>
 #include <new>
 #include <utility>
 
@@ -36,6 +37,8 @@ void Recordings::on_thread(Job job, After after) {
       outcome = job();
     } catch (const std::bad_alloc&) {
       outcome.result = failure(ErrorKind::unavailable, "not enough memory to record");
+    } catch (const std::exception& e) {
+      outcome.result = failure(ErrorKind::bug, std::string("writing it failed: ").append(e.what()));
     }
     asio::post(io_, [this, outcome = std::move(outcome), after = std::move(after)]() mutable {
       --under_way_;
@@ -72,6 +75,7 @@ void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar
           if (finishing_) return end(recording, "sonard stops");
         }
         if (!finishing_) done(outcome.result);
+        if (outcome.result && !recording->ends_with.empty()) end(recording, recording->ends_with);
         on_change_();
       });
 }
@@ -126,6 +130,14 @@ void Recordings::stop(const control::StopRecording& asked, Done done) {
   }
 }
 
+void Recordings::end_of(const std::string& sonar, const std::string& why) {
+  for (const Pointer& r : recordings_) {
+    if (r->told.sonar != sonar) continue;
+    if (r->state == Recording::State::opening) r->ends_with = why;
+    end(r, why);
+  }
+}
+
 void Recordings::finish() {
   finishing_ = true;
   for (const Pointer& r : recordings_) {
@@ -159,11 +171,24 @@ void Recordings::take(const std::string& sonar, RecordedPing ping) {
     if (r->state == Recording::State::running && r->told.sonar == sonar) write(r, ping);
 }
 
+bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
+  const auto is_running = [](const Pointer& r) { return r->state == Recording::State::running; };
+  std::size_t waiting = 0;
+  Pointer most = recording;
+  for (const Pointer& r : recordings_) {
+    if (!is_running(r)) continue;
+    waiting += r->waiting_bytes;
+    if (r->waiting_bytes > most->waiting_bytes) most = r;
+  }
+  if (waiting > 0 && waiting + bytes > most_waiting_bytes_)
+    fail(most,
+         "its file is written too slowly: " + std::to_string(most->waiting_bytes / 1000000) + " MB of pings wait for the disk");
+  return is_running(recording);
+}
+
 void Recordings::write(const Pointer& recording, RecordedPing ping) {
   const std::size_t size = ping.size();
-  if (recording->waiting_bytes > 0 && recording->waiting_bytes + size > most_waiting_bytes_)
-    return fail(recording, "its file is written too slowly: " + std::to_string(recording->waiting_bytes / 1000000) +
-                               " MB of pings wait for the disk");
+  if (!has_room_for(recording, size)) return;
   recording->waiting_bytes += size;
   on_thread(
       [work = recording->work, ping = std::move(ping)]() -> Outcome {

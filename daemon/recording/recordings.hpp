@@ -24,7 +24,7 @@ namespace sonar {
 class Recordings {
  public:
   static constexpr std::size_t most_at_once = 4, most_remembered = 8;
-  static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // of one recording
+  static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // of all recordings together
   /// Called once, when it was begun or has ended, before this returns or later; never after finish().
   using Done = std::function<void(const Result<void>&)>;
 
@@ -40,6 +40,8 @@ class Recordings {
   void start(const control::StartRecording& asked, RecordedSonar sonar, const std::string& who, Done done);
   /// An empty name = all that there are.
   void stop(const control::StopRecording& asked, Done done);
+  /// The sonar stops: nothing more will come of it.
+  void end_of(const std::string& sonar, const std::string& why);
   /// The daemon stops: files are finished, nobody is told.
   void finish();
 
@@ -69,7 +71,8 @@ class Recordings {
     RecordingFile::Kind kind{};
     control::RecordingStatus told;
     std::size_t waiting_bytes = 0;
-    bool failed = false;  // and the log says so
+    bool failed = false;    // and the log says so
+    std::string ends_with;  // the sonar stopped while it was opened: why
     std::vector<Done> at_end;
     std::shared_ptr<Work> work = std::make_shared<Work>();
   };
@@ -82,6 +85,8 @@ class Recordings {
   template <class Job, class After>
   void on_thread(Job job, After after);
   std::size_t running() const;
+  /// Whether this recording may let so many bytes more wait; the one that lets most wait ends when there is no room.
+  bool has_room_for(const Pointer& recording, std::size_t bytes);
   Result<Pointer> begin(const control::StartRecording& asked, const RecordedSonar& sonar);
   void write(const Pointer& recording, RecordedPing ping);
   void end(const Pointer& recording, const std::string& why);

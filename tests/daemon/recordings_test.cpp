@@ -2,6 +2,7 @@
 // to the clients.
 #include <gmock/gmock.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -178,6 +179,26 @@ TEST(Recordings, ADiskThatDoesNotKeepUpEndsTheRecordingAndSaysSoOnce) {
   EXPECT_EQ(messages_in(status.file), 1u);
 }
 
+TEST(Recordings, TheOneThatLetsMostWaitEndsFirst) {
+  Queue q(3 * ping_at(0).size());
+  for (const char* sonar : {"front", "rear"})
+    q.recordings->start({std::string(sonar) + ".mcap"}, {sonar, "oculus", {}}, "test",
+                        [](const Result<void>& r) { ASSERT_TRUE(r); });
+  q.run();
+  q.recordings->take("front", ping_at(0));
+  q.recordings->take("front", ping_at(0.1));
+  q.recordings->take("rear", ping_at(0.1));
+  EXPECT_TRUE(q.recordings->takes("front") && q.recordings->takes("rear"));
+  q.recordings->take("rear", ping_at(0.2));
+  EXPECT_FALSE(q.recordings->takes("front"));
+  EXPECT_TRUE(q.recordings->takes("rear"));
+  q.run();
+  q.recordings->stop({}, [](const Result<void>& r) { EXPECT_TRUE(r); });
+  q.run();
+  EXPECT_EQ(messages_in(q.recordings->status().at(0).file), 2u);
+  EXPECT_EQ(messages_in(q.recordings->status().at(1).file), 2u);
+}
+
 TEST(Recordings, FewAtATimeAndOnlyWhereTheConfigurationSays) {
   Queue q(1 << 20);
   std::vector<std::string> answers;
@@ -313,6 +334,29 @@ TEST(RecordedDaemon, AFullDiskEndsTheRecordingAndNothingElse) {
   const std::uint64_t kept = messages_in(told.file);
   EXPECT_GT(kept, 0u);
   EXPECT_LT(kept, told.pings);
+}
+
+TEST(RecordedDaemon, ASonarThatAReloadTakesAwayIsRecordedNoMore) {
+  const Folder folder;
+  DaemonSetup setup = recording_setup(folder);
+  setup.config_file = setup.options.handle_signals = true;
+  const std::string other = own_address();
+  const auto also = [&other](const char* name) {
+    return std::string("  - {name: ") + name + ", profile: oculus-m1200d, bind_ip: " + other + ", status_to: ['" + other +
+           ":9'], device_id: 9}\n";
+  };
+  setup.sonar_lines = also("rear");
+  Daemon daemon(setup);
+  EXPECT_EQ(daemon.ask(control::StartRecording{"rear.mcap", "rear"}).text, "");
+  EXPECT_EQ(daemon.ask(control::StartRecording{"front.mcap", "front"}).text, "");
+  setup.sonar_lines = also("aft");
+  daemon.write_config(yaml_of(setup));
+  ASSERT_EQ(kill(getpid(), SIGHUP), 0);
+  ASSERT_TRUE(eventually([&] { return !daemon.status().recordings.at(0).running; }));
+  EXPECT_EQ(daemon.status().recordings.at(0).why, "the configuration changed");
+  EXPECT_TRUE(daemon.status().recordings.at(1).running);
+  EXPECT_EQ(daemon.stop(), 0);
+  EXPECT_EQ(messages_in(folder.path + "/rear.mcap"), 0u) << "whole, if empty";
 }
 
 TEST(RecordedDaemon, AStopOfTheDaemonFinishesTheFile) {
