@@ -159,24 +159,32 @@ void App::step_time() {
   skip_time();
   std::list<Device>& devices = fleet_.devices();
   if (!std::all_of(devices.begin(), devices.end(), [](const Device& d) { return d.settled(); })) return;
-  Device* next = nullptr;
-  for (Device& d : devices)
-    if (d.next_tick() && (next == nullptr || *d.next_tick() < *next->next_tick())) next = &d;
-  const std::optional<Time> due = next != nullptr ? next->next_tick() : std::nullopt;
-  const SteppedTime::Bound bound = stepped_time_.bound();
-  const bool may_tick = due && *due <= bound.last_tick;
-  if (!may_tick && bound.then) advance_time(*bound.then);
+  Device* pings = nullptr;  // next
+  std::optional<Time> ping, wish, talk;
+  const auto is_first = [](std::optional<Time> t, std::optional<Time> of) { return t && (!of || *t < *of); };
+  for (Device& d : devices) {
+    if (const auto t = d.next_tick(); is_first(t, ping)) ping = t, pings = &d;
+    if (const auto t = d.next_wish(); is_first(t, wish)) wish = t;
+    if (const auto t = d.next_talk(); is_first(t, talk)) talk = t;
+  }
+  const std::optional<Time> for_pings = is_first(wish, ping) ? wish : ping;
+  const SteppedTime::Bound bound = stepped_time_.bound(for_pings);
+  const bool talks = is_first(talk, ping) || talk == ping;  // before the ping that is due at the same moment
+  const std::optional<Time> due = talks ? talk : ping;
+  // What is said at this very moment needs no time to pass.
+  const bool may_come = due && (*due <= bound.last_tick || (talks && *due <= clock_.now()));
+  if (!may_come && bound.then) advance_time(*bound.then);
   const bool answered = stepped_time_.answer(due);
   if (answered) on_change();  // first the answers, in turns of their own
   if (enough_served() && answered) return;
   if (enough_served()) return stop("served " + std::to_string(options_.exit_after_pings) + " pings");
-  if (!may_tick) return;
+  if (!may_come) return;
   advance_time(stepped_time_.tick_at(*due));
-  next->step(clock_.now());
+  if (talks) return on_change();  // what it made them say, or ask for, may be taken or due before the rest
+  pings->step(clock_.now());
 }
 
 void App::advance_time(Time to) {
-  if (to <= clock_.now()) return;
   clock_.advance_to(to);
   for (Device& d : fleet_.devices()) d.tick_sessions();
 }

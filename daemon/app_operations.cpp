@@ -69,6 +69,9 @@ void AppOperations::take(const control::PoseSample& sample, const Sender& sender
   const std::string refusal = parts_.poses.take(sample, sender);
   if (!refusal.empty()) return done(refused(refusal));
   if (sample.of != control::PoseSample::Of::vehicle || parts_.config.clock != ClockMode::follow) return done({});
+  if (parts_.time.is_full())
+    return done(
+        {OperationResult::Code::failed, "the pose counts, but too many wait for their pings already to wait for these", {}});
   parts_.time.wait([done = std::move(done)](Time) { done({}); });
 }
 
@@ -85,7 +88,7 @@ void AppOperations::step(const control::Step& asked, Done done) {
 
 std::uint64_t AppOperations::pings_made() const {
   std::uint64_t made = 0;
-  for (const Device& d : parts_.fleet.devices()) made += d.figures().pings;
+  for (const Device& d : parts_.fleet.devices()) made += d.pings();
   return made;
 }
 

@@ -33,6 +33,8 @@ class Clock {
   }
   /// Without what was skipped: conversations go by this, whose silences and rhythms know no jumps.
   Time lived() const { return now() - skipped_; }
+  /// When it is that `lived` will have been lived through, if nothing more is skipped.
+  Time at_lived(Time lived) const { return lived > Time::max() - skipped_ ? Time::max() : lived + skipped_; }
 
  private:
   bool stepped_;

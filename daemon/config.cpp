@@ -196,6 +196,18 @@ RecordingConfig read_recording(const Node& node, const std::filesystem::path& di
   return {path};
 }
 
+/// Empty, or what time waits for in vain.
+std::string why_time_would_stand(const Config& config) {
+  const bool has_control = config.control.stream.enabled || config.control.http.enabled;
+  const bool has_poses = config.poses.protobuf.enabled || config.poses.json.enabled || !config.poses.mavlink.empty();
+  if (config.clock == ClockMode::lockstep && !has_control)
+    return "lockstep lets time pass when control asks for it, and control.stream and control.http are off: leave one on";
+  if (config.clock == ClockMode::follow && !has_control && !has_poses)
+    return "follow lets time pass by the stamps of poses, and poses.protobuf, poses.json, poses.mavlink and control are off: "
+           "leave one on";
+  return {};
+}
+
 Result<Config> read(const text::Document& document, const std::string& name, const std::filesystem::path& directory) {
   Config config;
   config.source = name;
@@ -218,10 +230,12 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   config.engine = read_engine(root.optional("engine"));
   config.limits = read_limits(root.optional("limits"));
   config.recording = read_recording(root.optional("recording"), directory);
-  config.clock = root.optional("clock").choice_or(ClockMode::realtime, {{name_of(ClockMode::realtime), ClockMode::realtime},
-                                                                        {name_of(ClockMode::stepped), ClockMode::stepped},
-                                                                        {name_of(ClockMode::lockstep), ClockMode::lockstep},
-                                                                        {name_of(ClockMode::follow), ClockMode::follow}});
+  const Node clock = root.optional("clock");
+  config.clock = clock.choice_or(ClockMode::realtime, {{name_of(ClockMode::realtime), ClockMode::realtime},
+                                                       {name_of(ClockMode::stepped), ClockMode::stepped},
+                                                       {name_of(ClockMode::lockstep), ClockMode::lockstep},
+                                                       {name_of(ClockMode::follow), ClockMode::follow}});
+  if (const std::string why = why_time_would_stand(config); !why.empty()) clock.fail(why);
   read_log(root.optional("log"), config.log);
   if (auto error = document.finish()) return tl::make_unexpected(*error);
   return config;

@@ -88,6 +88,7 @@ void Device::stop(const std::string& why) {
   answers_.stop();
   pacer_.stop();
   beacon_.close(ec);
+  context_.recordings.end_of(config_.name, why);
   for (Waiting& waiting : queue_) waiting.socket.close(ec);
   queue_.clear();
   const auto sessions = sessions_;  // finish() may end one at once and change the list
@@ -155,6 +156,16 @@ std::optional<Time> Device::next_tick() const {
   const bool waits_for_pose =
       next && context_.config.poses.on_stale == OnStale::stop && context_.world.is_stale(config_.vehicle, *next);
   return waits_for_pose ? std::nullopt : next;
+}
+
+std::optional<Time> Device::next_talk() const { return earliest(&Session::next_tick); }
+std::optional<Time> Device::next_wish() const { return earliest(&Session::next_wish); }
+
+std::optional<Time> Device::earliest(std::optional<Time> (Session::*of)() const) const {
+  std::optional<Time> first;
+  for (const SessionPointer& s : sessions_)
+    if (const auto t = ((*s).*of)(); t && (!first || *t < *first)) first = t;
+  return first ? std::optional(context_.clock.at_lived(*first)) : std::nullopt;
 }
 
 bool Device::settled() const {

@@ -62,6 +62,9 @@ class Device final : public SessionParent {
 
   // Stepped time: App asks and tells.
   std::optional<Time> next_tick() const;
+  /// When a conversation has something to do next, and when one will ask for a ping by itself.
+  std::optional<Time> next_talk() const;
+  std::optional<Time> next_wish() const;
   bool settled() const;  // no ping under way, every client has taken what it was sent
   void step(Time now);
   void tick_sessions();
@@ -71,6 +74,10 @@ class Device final : public SessionParent {
   bool gone() const;  // after stop(): nothing is left
   const SonarConfig& config() const { return config_; }
   DeviceFigures figures() const;
+  /// Of those: pings that at least one client has got.
+  std::uint64_t served() const { return figures_.served; }
+  /// Of those: pings that were made.
+  std::uint64_t pings() const { return figures_.pings; }
   std::vector<StreamDigest> digests() const;
   tcp::endpoint data_endpoint() const;
   std::vector<udp::endpoint> status_destinations() const { return status_to_; }
@@ -118,6 +125,7 @@ class Device final : public SessionParent {
   void arm();
   void on_timer();
   bool wants_pings() const;
+  std::optional<Time> earliest(std::optional<Time> (Session::*of)() const) const;
   void ping(Time at);
   void on_ping(Simulator::Outcome outcome);
   void update_state(Time now);

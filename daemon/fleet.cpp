@@ -57,8 +57,8 @@ bool Fleet::gone() const {
 
 std::uint64_t Fleet::served() const {
   std::uint64_t served = served_before_;
-  for (const Device& d : devices_) served += d.figures().served;
-  for (const Retired& r : retired_) served += r.device.front().figures().served;
+  for (const Device& d : devices_) served += d.served();
+  for (const Retired& r : retired_) served += r.device.front().served();
   return served;
 }
 
@@ -96,7 +96,7 @@ void Fleet::sweep() {
       ++it;
       continue;
     }
-    served_before_ += device.figures().served;
+    served_before_ += device.served();
     it = retired_.erase(it);
   }
 }

@@ -12,6 +12,7 @@ namespace {
 // Bytes the kernel may hold that are not yet on the wire. More would only make a slow client's picture older.
 constexpr int unsent_limit_bytes = 256 * 1024;
 constexpr auto idle_watch = std::chrono::seconds(1);
+constexpr auto shortest_rhythm = std::chrono::milliseconds(1);  // of a conversation's ticks in stepped time
 
 std::string reason(const error_code& ec) {
   if (ec == asio::error::eof) return "closed by the client";
@@ -79,6 +80,8 @@ asio::awaitable<void> Session::read() {
       co_return;
     }
     bytes_read_ += n;
+    heard_at_ = Steady::now();
+    not_before_ = {};
     if (!finishing_) handle(dialogue_->on_bytes(std::span(received_).first(n), clock_.lived()));
     const auto pause = input_rate_.pause_after(n, Steady::now());
     if (pause.count() > 0 && !finishing_) co_await rest(pause);
@@ -178,15 +181,36 @@ asio::awaitable<void> Session::watch() {
       over(why_);
     } else if (writing_ && now - progress_at_ > setup_.limits.stall) {
       reset("took no byte for " + std::to_string(setup_.limits.stall.count()) + " ms");
+    } else if (!finishing_ && is_silent(now)) {
+      finish("silent for " + std::to_string(dialogue_->longest_silence()->count() / 1000) + " s");
     } else if (!finishing_ && !clock_.stepped()) {
       tick(clock_.lived());
     }
   }
 }
 
+/// Not one whose bytes wait to be read: it may be us who were stopped for a while.
+bool Session::is_silent(Steady::time_point now) const {
+  const auto longest = dialogue_->longest_silence();
+  error_code ec;
+  return longest && now - heard_at_ > *longest && socket_.available(ec) == 0;
+}
+
 void Session::tick(Time now) {
   if (over_ || finishing_ || now < dialogue_->next_tick()) return;
   handle(dialogue_->on_tick(now));
+  not_before_ = now + shortest_rhythm;
+}
+
+/// A dialogue that would be ticked at the same moment for ever must not hold up time: only its client's words bring that about.
+std::optional<Time> Session::next_tick() const {
+  if (over_ || finishing_) return std::nullopt;
+  return std::max(dialogue_->next_tick(), not_before_);
+}
+
+std::optional<Time> Session::next_wish() const {
+  const auto wish = over_ || finishing_ ? std::nullopt : dialogue_->next_wish();
+  return wish ? std::optional(std::max(*wish, not_before_)) : std::nullopt;
 }
 
 std::vector<protocol::Event> Session::push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,

@@ -53,8 +53,13 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Offers a ping, made with the settings of that request. Returns what the client wants next, for the device.
   std::vector<protocol::Event> push_ping(const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,
                                          protocol::BytesView made_with, Time now);
-  /// Stepped time: the keep-alives that are due at `now`, of the time lived through.
+  /// What is due at `now`, of the time lived through: keep-alives, what a host has subscribed to.
   void tick(Time now);
+  // Stepped time, which passes from one to the next, of the time lived through. Nothing when the conversation is ending.
+  /// When tick() has something to do next.
+  std::optional<Time> next_tick() const;
+  /// When it will ask for a ping by itself.
+  std::optional<Time> next_wish() const;
   /// No more messages after the one being written; then FIN. Reset if the client does not take it in time.
   void finish(std::string why);
   /// At once, without goodbye.
@@ -81,6 +86,7 @@ class Session : public std::enable_shared_from_this<Session> {
   asio::awaitable<bool> write_bytes(protocol::BytesView bytes);
   void handle(protocol::Reaction reaction);
   Steady::time_point watch_until() const;
+  bool is_silent(Steady::time_point now) const;
   void over(std::string why);
   void spawn(asio::awaitable<void> (Session::*part)());
 
@@ -98,7 +104,9 @@ class Session : public std::enable_shared_from_this<Session> {
   std::array<std::byte, 8192> received_{};
   const Steady::time_point connected_at_ = Steady::now();
   std::uint64_t bytes_written_ = 0, bytes_read_ = 0;
-  Steady::time_point progress_at_{};  // a byte went out, while writing
+  Steady::time_point heard_at_ = connected_at_;  // a byte came in
+  Time not_before_{};                            // that the dialogue is ticked again
+  Steady::time_point progress_at_{};             // a byte went out, while writing
   Steady::time_point finish_by_{};
   bool writing_ = false, finishing_ = false, said_goodbye_ = false, over_ = false;
   std::string why_;

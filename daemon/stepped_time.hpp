@@ -17,18 +17,22 @@ class SteppedTime {
  public:
   /// Of one request, and of all that wait.
   static constexpr double longest_step_s = 3600;
-  /// Poses of a simulator that does not wait for pings lead by no more than this; ticks before are skipped as in real time.
+  static constexpr std::size_t most_waiting = 4096;
+  /// Poses of a simulator that does not wait for pings lead by no more than this; ticks before are skipped as in real time, but
+  /// for those that somebody waits for.
   static constexpr std::chrono::nanoseconds most_lead = std::chrono::seconds(1);
 
   SteppedTime(ClockMode mode, const Clock& clock, const World& world) : mode_(mode), clock_(clock), world_(world) {}
 
-  /// Ticks up to `last_tick` may come; when there are no more, it is `then`.
+  /// Pings that are due up to `last_tick` may come, and so may what else conversations have to do; when there is no more, it is
+  /// `then`.
   struct Bound {
     Time last_tick = Time::max();
     std::optional<Time> then = {};
   };
-  Bound bound() const;
-  /// When a tick that was due at `due` comes.
+  /// `for_pings`: when the next ping is due, or will be asked for. Time that steps by itself passes as far as that.
+  Bound bound(std::optional<Time> for_pings = {}) const;
+  /// When what was due at `due` comes.
   Time tick_at(Time due) const;
 
   /// Lets time pass by `dt_s` after all steps before: ticks at its end belong to the next step. Empty, or a sentence why not.
@@ -37,10 +41,12 @@ class SteppedTime {
   using Reached = std::function<void(Time then)>;
   /// `reached` is called when every ping that bound() allows at this moment has been served, and it is `then`.
   void wait(Reached reached);
+  /// Nobody else may wait: who hangs up is not forgotten before it is reached.
+  bool is_full() const { return waiting_.size() >= most_waiting; }
   /// Whether there is anything to wait for: real time and time that steps by itself owe nobody an answer.
   bool makes_wait() const { return mode_ == ClockMode::lockstep || mode_ == ClockMode::follow; }
-  /// All is served that was due before `next_tick`; nothing = nothing more is due. Whether there was anybody to answer.
-  bool answer(std::optional<Time> next_tick);
+  /// All is done that was due before `next`; nothing = nothing more is due. Whether there was anybody to answer.
+  bool answer(std::optional<Time> next);
 
  private:
   struct Waiting {

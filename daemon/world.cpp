@@ -143,7 +143,10 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   }
 
   const bool own_clock = !shared_clock && sample.stamp.domain != ClockDomain::arrival;
-  track.offset = own_clock ? offset_for(track, at, now, same_history && !reset) : Ns(0);
+  const Ns offset = own_clock ? offset_for(track, at, now, same_history && !reset) : Ns(0);
+  if (rules_.follows && offset != track.offset && track.sender_id == sender.id)
+    out.notice = "stamps of " + track.body.name + " do not go on from where they were: taken as the next moments of our time";
+  track.offset = offset;
 
   if (track.source != sender.source) {
     out.notice = "pose source of " + track.body.name + " changed: " + track.source + " -> " + sender.source +

@@ -105,6 +105,12 @@ class Dialogue {
   /// Keep-alives. Called at or after next_tick().
   virtual Reaction on_tick(Time now) = 0;
   virtual Time next_tick() const = 0;
+  /// When on_tick() will ask for a ping by itself. Time that steps by itself passes as far as that, and not for keep-alives
+  /// alone.
+  virtual std::optional<Time> next_wish() const { return std::nullopt; }
+  /// A client that says nothing for longer has gone. By the wall's clock, whatever the time is that the dialogue is told of:
+  /// clients live by theirs. Nothing: it may be silent.
+  virtual std::optional<std::chrono::milliseconds> longest_silence() const { return std::nullopt; }
   /// A ping was put into this client's outbox: keep-alives only fill silence.
   virtual void on_ping_queued(Time now) = 0;
   /// A ping is ready, made with the settings of that request; its shared bytes are so many. Most clients take every ping as it

@@ -19,19 +19,18 @@ using protocol::Notice;
 using protocol::Reaction;
 using protocol::RequestPing;
 
-constexpr auto keep_alive_after = 2s;    // of our silence
-constexpr auto dead_after = 10s;         // of the host's
+constexpr auto keep_alive_after = 2s;  // of our silence
+constexpr auto longest_host_silence = 10s;
 constexpr std::size_t most_waiting = 8;  // triggers of one host that may wait for their ping
 constexpr std::uint32_t longest_wait_ms = 600000;
 constexpr float housing_above_water_c = 2;  // unknown: what the thermometer of a real head reads
 
 class BlueViewDialogue final : public protocol::Dialogue {
  public:
-  BlueViewDialogue(const DeviceState& device, Time now) : device_(device), heard_at_(now), spoke_at_(now) {}
+  BlueViewDialogue(const DeviceState& device, Time now) : device_(device), spoke_at_(now) {}
 
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
-    heard_at_ = now;
     settings_ = settings_from(device_.request, device_);
     framer_.append(received);
     while (const auto frame = framer_.next()) {
@@ -45,11 +44,6 @@ class BlueViewDialogue final : public protocol::Dialogue {
 
   Reaction on_tick(Time now) override {
     Reaction reaction;
-    if (now >= heard_at_ + dead_after) {
-      reaction.events.emplace_back(Close{"silent for 10 s"});
-      heard_at_ = now;
-      return reaction;
-    }
     settings_ = settings_from(device_.request, device_);
     while (!waiting_.empty() && waiting_.front().until <= now) {  // every wait is as long: the oldest ends first
       reaction.replies.push_back(make_error(waiting_.front().request_id, Code::timeout, "no ping in the time given"));
@@ -66,11 +60,14 @@ class BlueViewDialogue final : public protocol::Dialogue {
   }
 
   Time next_tick() const override {
-    Time next = std::min(spoke_at_ + keep_alive_after, heard_at_ + dead_after);
+    Time next = spoke_at_ + keep_alive_after;
     for (const Waiting& w : waiting_) next = std::min(next, w.until);
     if (subscription_) next = std::min(next, subscription_->next);
     return next;
   }
+
+  std::optional<Time> next_wish() const override { return subscription_ ? std::optional(subscription_->next) : std::nullopt; }
+  std::optional<std::chrono::milliseconds> longest_silence() const override { return longest_host_silence; }
 
   void on_ping_queued(Time now) override { spoke_at_ = now; }
 
@@ -291,7 +288,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
   bool greeted_ = false;
   std::deque<Waiting> waiting_;  // oldest first
   std::optional<Subscription> subscription_;
-  Time heard_at_, spoke_at_;
+  Time spoke_at_;
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 // out.
 #include <gmock/gmock.h>
 
+#include "protocol/control/control.hpp"
 #include "tests/daemon/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -15,11 +16,12 @@ using oculus::PingRate;
 using std::chrono::nanoseconds;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using Code = OperationResult::Code;
 
 DaemonSetup with_clock(const std::string& mode, const std::string& more = "") {
   DaemonSetup setup;
-  setup.more = "clock: " + mode + "\n" + more;
+  setup.more = "clock: " + mode + "\ncontrol: {stream: '127.0.0.1:0', http: off}\n" + more;
   return setup;
 }
 
@@ -123,6 +125,19 @@ TEST(Lockstep, RefusesStepsThatMeanNothing) {
   EXPECT_THAT(other.ask(Step{1}).text, HasSubstr("only with clock: lockstep; here it is clock: stepped"));
 }
 
+TEST(Lockstep, NoMoreThanSomeThousandsMayWait) {
+  const Clock clock(true);
+  const World world({}, {{"rov", {}, false}}, {}, Time{});
+  SteppedTime time(ClockMode::lockstep, clock, world);
+  for (std::size_t i = 0; i < SteppedTime::most_waiting; ++i) {
+    ASSERT_EQ(time.step(1e-6), "");
+    time.wait([](Time) {});
+  }
+  EXPECT_THAT(time.step(1e-6), HasSubstr("4096 requests wait"));
+  time.answer({});
+  EXPECT_EQ(time.step(1e-6), "");
+}
+
 TEST(Lockstep, ADaemonThatStopsOwesNobodyAnAnswer) {
   DaemonSetup setup = with_clock("lockstep");
   setup.engine_takes = milliseconds(20);
@@ -201,6 +216,23 @@ TEST(Follow, AVehicleThatJoinsFromBehindKeepsNobodyWaiting) {
   ASSERT_EQ(behind.wait_for(patience), std::future_status::ready);
 }
 
+TEST(Follow, WhoWaitsForTheAnswerGetsEveryPingHoweverFarApartThePosesAre) {
+  Pinging p(with_clock("follow", "poses: {protobuf: '127.0.0.1:0', json: off, stale_after_s: 5}\n"));
+  p.pose(0, milliseconds(0));
+  p.pose(3, std::chrono::seconds(3));
+  EXPECT_EQ(p.daemon.requests().size(), 121u);
+  EXPECT_EQ(p.daemon.status().sonars.at(0).figures.skipped_ticks, 0u);
+}
+
+TEST(Follow, StampsThatDoNotGoOnAreToldOf) {
+  Pinging p(with_clock("follow"));
+  p.pose(0, std::chrono::seconds(100));
+  p.pose(0, std::chrono::seconds(100) + milliseconds(50));
+  EXPECT_THAT(p.daemon.log_text(), Not(HasSubstr("do not go on")));
+  p.pose(5, milliseconds(10));
+  EXPECT_THAT(p.daemon.log_text(), HasSubstr("stamps of rov do not go on from where they were"));
+}
+
 TEST(Follow, APoseWithoutATimeIsRefused) {
   Pinging p(with_clock("follow"));
   PoseSample arrival;
@@ -211,23 +243,21 @@ TEST(Follow, APoseWithoutATimeIsRefused) {
 }
 
 TEST(Follow, ASimulatorThatDoesNotWaitLosesTicksAsInRealTime) {
-  DaemonSetup setup = with_clock("follow");
+  DaemonSetup setup = with_clock("follow", "poses: {protobuf: '127.0.0.1:0', json: off}\n");
   setup.engine_takes = milliseconds(20);
   Pinging p(std::move(setup));
-  std::vector<std::future<OperationResult>> poses;
-  for (int i = 0; i <= 100; ++i) {  // five seconds at once: 201 ticks
-    PoseSample s;
-    s.pose.position_m = {0.01 * i, 0, -3};
-    s.stamp = {ClockDomain::sim, std::int64_t{i} * 50'000'000};
-    poses.push_back(p.daemon.ask_later(s));
-  }
-  for (auto& pose : poses) EXPECT_EQ(pose.get().code, Code::done);
+  const std::uint16_t port = p.daemon.app().poses().protobuf().port;
+  for (int i = 0; i <= 100; ++i)  // five seconds at once: 201 ticks
+    send_udp("127.0.0.1", port, control::encode_pose_datagram(p.sample(0.01 * i, i * milliseconds(50))));
+  ASSERT_TRUE(eventually([&] { return p.daemon.status().now_ns == 5'000'000'000; }));
+  ASSERT_TRUE(eventually([&] {
+    const auto figures = p.daemon.status().sonars.at(0).figures;
+    return figures.pings + figures.skipped_ticks == 201;
+  })) << "every tick is accounted for";
   const auto requests = p.daemon.requests();
   EXPECT_LT(requests.size(), 100u);
   EXPECT_GE(requests.size(), 41u) << "the last second is whole";
   EXPECT_EQ(requests.back().fired_at, Time(std::chrono::seconds(5)));
-  const auto figures = p.daemon.status().sonars.at(0).figures;
-  EXPECT_EQ(figures.pings + figures.skipped_ticks, 201u) << "every tick is accounted for";
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ std::string yaml_of(const DaemonSetup& s) {
   return std::string(
              "world: {scene: scene.yaml}\n"
              "vehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}\n") +
-         s.vehicle_lines + "sonars:\n  - name: front\n    profile: oculus-m1200d\n    bind_ip: " + s.address + "\n" + status +
+         s.vehicle_lines + "sonars:\n  - name: front\n    profile: " + s.profile + "\n    bind_ip: " + s.address + "\n" + status +
          s.sonar_lines + poses + control + s.more;
 }
 

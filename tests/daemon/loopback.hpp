@@ -60,6 +60,7 @@ std::shared_ptr<Scene> small_scene(bool moving_object = false);
 
 struct DaemonSetup {
   std::string address = own_address();
+  std::string profile = "oculus-m1200d";
   std::string sonar_lines;    // more keys of the sonar, "    key: value\n"
   std::string vehicle_lines;  // vehicles beside rov, "  - {name: boat}\n"
   std::string more;           // more sections

@@ -18,7 +18,7 @@ struct Served {
 Served serve(std::uint64_t pings, milliseconds engine_takes, bool dawdle) {
   DaemonSetup setup;
   setup.more = "clock: stepped\n";
-  setup.sonar_lines = "    options: {dummy_period_ms: 20}\n";  // much shorter than the test: must not show in the stream
+  setup.sonar_lines = "    options: {dummy_period_ms: 20}\n";  // shorter than a ping, much shorter than the test
   setup.options.exit_after_pings = pings;
   setup.options.digest = true;
   setup.engine_takes = engine_takes;
