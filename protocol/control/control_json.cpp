@@ -58,6 +58,15 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
   std::vector<std::set<std::string>> keys_;  // of each open object
 };
 
+/// What to write for a protobuf type; empty where the words before it say enough.
+std::string kind_of(const std::string& type) {
+  if (type == "DOUBLE" || type == "FLOAT") return "a number";
+  if (type == "BOOL") return "true or false";
+  if (type.starts_with("UINT")) return "a whole number from 0 on";
+  if (type.starts_with("INT")) return "a whole number";
+  return type == "STRING" ? "a text in quotes" : "";
+}
+
 /// protobuf's own words: "(mount.xyz_m): Cannot find field." or "(range_m.value): invalid value \"far\" for type TYPE_DOUBLE",
 /// sometimes with a word in front, sometimes without brackets, and then several lines that show the place.
 std::string sentence_from(const std::string& words) {
@@ -70,7 +79,11 @@ std::string sentence_from(const std::string& words) {
   if (key.starts_with('(') && key.ends_with(')')) key = key.substr(1, key.size() - 2);
   if (key.ends_with(".value")) key.resize(key.size() - 6);  // of wrappers such as DoubleValue
   if (what == "Cannot find field.") what = "unknown key";
-  if (const auto type = what.find(" for type TYPE_"); type != std::string::npos) what.resize(type);
+  if (const auto type = what.find(" for type TYPE_"); type != std::string::npos) {
+    const std::string expected = kind_of(what.substr(type + std::string(" for type TYPE_").size()));
+    what.resize(type);
+    if (!expected.empty()) what += ", expected " + expected;
+  }
   return in_quotes(key) + ": " + what;
 }
 

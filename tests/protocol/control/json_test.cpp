@@ -60,7 +60,9 @@ TEST(ControlJson, ReadsEveryRequestLikeItsBytes) {
 TEST(ControlJson, RefusesWithASentence) {
   EXPECT_THAT(refusal_of("sonar", R"({"rang_m":5})"), HasSubstr("\"rang_m\": unknown key"));
   EXPECT_THAT(refusal_of("sonar", R"({"mount":{"frame":"FRD","xyz_m":[0,0,0]}})"), HasSubstr("xyz_m"));
-  EXPECT_EQ(refusal_of("sonar", R"({"range_m":"far"})"), R"("range_m": invalid value "far")");
+  EXPECT_EQ(refusal_of("sonar", R"({"range_m":"far"})"), R"("range_m": invalid value "far", expected a number)");
+  EXPECT_EQ(refusal_of("sonar", R"({"mode":-3})"), R"("mode": invalid value -3, expected a whole number from 0 on)");
+  EXPECT_THAT(refusal_of("sonar", R"({"transmit":7})"), HasSubstr("expected true or false"));
   EXPECT_THAT(refusal_of("sonar", R"({"mount":{"position":{"x":"far"}}})"), HasSubstr("position.x\": invalid value"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":"NaN"})"), HasSubstr("sonar.range_m is NaN"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":1e999})"), HasSubstr("not JSON"));
