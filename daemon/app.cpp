@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <csignal>
 
-#include "daemon/real_time.hpp"
-#include "daemon/world_parts.hpp"
+#include "daemon/system/real_time.hpp"
+#include "daemon/world/world_parts.hpp"
 
 namespace sonar {
 App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory& make_engine, AppOptions options, Log& log)

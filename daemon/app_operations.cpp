@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "daemon/config_parts.hpp"
+#include "daemon/config/config_parts.hpp"
 #include "daemon/reload.hpp"
 
 namespace sonar {

@@ -3,13 +3,13 @@
 
 #include <chrono>
 
-#include "daemon/admission.hpp"
-#include "daemon/config.hpp"
-#include "daemon/fleet.hpp"
+#include "daemon/config/config.hpp"
 #include "daemon/operations.hpp"
-#include "daemon/pose_intake.hpp"
-#include "daemon/scene_changes.hpp"
-#include "daemon/stepped_time.hpp"
+#include "daemon/poses/pose_intake.hpp"
+#include "daemon/sonars/admission.hpp"
+#include "daemon/sonars/fleet.hpp"
+#include "daemon/time/stepped_time.hpp"
+#include "daemon/world/scene_changes.hpp"
 
 namespace sonar {
 

@@ -1,7 +1,7 @@
 // How the daemon is: everything that GetStatus answers, the figures for /metrics, and what is wrong.
 #include "daemon/app_operations.hpp"
 #include "daemon/control/control_server.hpp"
-#include "daemon/prometheus.hpp"
+#include "daemon/control/prometheus.hpp"
 
 namespace sonar {
 namespace {

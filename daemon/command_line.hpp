@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/base/result.hpp"
-#include "daemon/config.hpp"
-#include "daemon/engine_options.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/engine/engine_options.hpp"
 #include "daemon/replay/replay_command.hpp"
 
 namespace sonar {

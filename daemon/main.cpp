@@ -11,14 +11,14 @@
 #include "daemon/app.hpp"
 #include "daemon/banner.hpp"
 #include "daemon/bench/bench_command.hpp"
-#include "daemon/choose_engine.hpp"
 #include "daemon/command_line.hpp"
+#include "daemon/config/effective_switches.hpp"
 #include "daemon/control/token.hpp"
-#include "daemon/effective_switches.hpp"
-#include "daemon/real_time.hpp"
+#include "daemon/engine/choose_engine.hpp"
 #include "daemon/render/render_command.hpp"
-#include "daemon/standard_streams.hpp"
-#include "daemon/world_parts.hpp"
+#include "daemon/system/real_time.hpp"
+#include "daemon/system/standard_streams.hpp"
+#include "daemon/world/world_parts.hpp"
 
 namespace sonar {
 namespace {

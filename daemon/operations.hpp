@@ -9,7 +9,7 @@
 #include <utility>
 #include <variant>
 
-#include "daemon/world.hpp"
+#include "daemon/world/world.hpp"
 #include "protocol/control/operations.hpp"
 
 namespace sonar {

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "daemon/app.hpp"
-#include "daemon/world_parts.hpp"
+#include "daemon/world/world_parts.hpp"
 
 namespace sonar {
 namespace {

@@ -11,10 +11,10 @@
 #include "daemon/bench/findings.hpp"
 #include "daemon/bench/parts.hpp"
 #include "daemon/bench/ratios.hpp"
-#include "daemon/effective_switches.hpp"
-#include "daemon/engine_options.hpp"
-#include "daemon/scene_file.hpp"
-#include "daemon/start_engine.hpp"
+#include "daemon/config/effective_switches.hpp"
+#include "daemon/config/scene_file.hpp"
+#include "daemon/engine/engine_options.hpp"
+#include "daemon/engine/start_engine.hpp"
 
 namespace sonar {
 namespace bench {

@@ -8,7 +8,7 @@
 #include "core/scene/ray_scene.hpp"
 #include "core/scene/shapes/primitives.hpp"
 #include "daemon/render/coverage.hpp"
-#include "daemon/sha256.hpp"
+#include "daemon/system/sha256.hpp"
 
 namespace sonar::bench {
 namespace {

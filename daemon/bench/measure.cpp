@@ -10,7 +10,7 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "daemon/bench/parts.hpp"
-#include "daemon/effective_switches.hpp"
+#include "daemon/config/effective_switches.hpp"
 
 namespace sonar::bench {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "core/pipeline/ping_engine.hpp"
 #include "daemon/bench/cases.hpp"
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 
 namespace sonar::bench {
 

@@ -4,9 +4,9 @@
 
 #include <string>
 
+#include "daemon/config/places.hpp"
 #include "daemon/control/control_context.hpp"
-#include "daemon/listen.hpp"
-#include "daemon/places.hpp"
+#include "daemon/system/listen.hpp"
 
 namespace sonar {
 

@@ -3,12 +3,12 @@
 
 #include <chrono>
 
-#include "daemon/asio.hpp"
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 #include "daemon/control/token.hpp"
-#include "daemon/log.hpp"
 #include "daemon/operations.hpp"
-#include "daemon/pose_intake.hpp"
+#include "daemon/poses/pose_intake.hpp"
+#include "daemon/system/asio.hpp"
+#include "daemon/system/log.hpp"
 
 namespace sonar {
 

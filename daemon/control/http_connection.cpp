@@ -3,7 +3,7 @@
 #include <array>
 #include <utility>
 
-#include "daemon/input_rate.hpp"
+#include "daemon/sonars/input_rate.hpp"
 
 namespace sonar {
 namespace {

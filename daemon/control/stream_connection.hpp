@@ -8,7 +8,7 @@
 
 #include "daemon/control/control_context.hpp"
 #include "daemon/control/event_queue.hpp"
-#include "daemon/input_rate.hpp"
+#include "daemon/sonars/input_rate.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 

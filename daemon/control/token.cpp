@@ -4,7 +4,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "daemon/sha256.hpp"
+#include "daemon/system/sha256.hpp"
 
 namespace sonar {
 namespace {

@@ -13,10 +13,10 @@
 
 #include "core/base/result.hpp"
 #include "core/scene/scene.hpp"
-#include "daemon/asio.hpp"
-#include "daemon/config.hpp"
-#include "daemon/log.hpp"
+#include "daemon/config/config.hpp"
 #include "daemon/recording/recording_file.hpp"
+#include "daemon/system/asio.hpp"
+#include "daemon/system/log.hpp"
 #include "protocol/control/operations.hpp"
 
 namespace sonar {

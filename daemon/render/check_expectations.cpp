@@ -3,11 +3,11 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "core/text/format.hpp"
+#include "daemon/engine/start_engine.hpp"
 #include "daemon/render/coverage.hpp"
 #include "daemon/render/expectation.hpp"
 #include "daemon/render/render_job.hpp"
 #include "daemon/render/resolution_cell.hpp"
-#include "daemon/start_engine.hpp"
 
 namespace sonar::render {
 namespace {

@@ -9,10 +9,10 @@
 #include <thread>
 
 #include "core/paper/paper_engine.hpp"
-#include "daemon/effective_switches.hpp"
+#include "daemon/config/effective_switches.hpp"
+#include "daemon/engine/start_engine.hpp"
 #include "daemon/render/coverage.hpp"
 #include "daemon/render/render_pings.hpp"
-#include "daemon/start_engine.hpp"
 
 namespace sonar::render {
 namespace {

@@ -4,11 +4,11 @@
 #include <sstream>
 
 #include "core/text/strict_yaml.hpp"
-#include "daemon/config_parts.hpp"
-#include "daemon/read_trajectory.hpp"
+#include "daemon/config/config_parts.hpp"
+#include "daemon/config/read_trajectory.hpp"
 #include "daemon/render/render_job.hpp"
 #include "daemon/render/sonar_keys.hpp"
-#include "daemon/world_parts.hpp"
+#include "daemon/world/world_parts.hpp"
 
 namespace sonar::render {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "core/scene/scene.hpp"
 #include "core/sonar/ping.hpp"
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 #include "daemon/render/expectation.hpp"
 #include "daemon/render/formula.hpp"
 #include "daemon/render/vehicle_path.hpp"

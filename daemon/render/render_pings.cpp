@@ -8,11 +8,11 @@
 #include <stdexcept>
 
 #include "core/image/draw_fan.hpp"
-#include "daemon/choose_engine.hpp"
+#include "daemon/engine/choose_engine.hpp"
+#include "daemon/engine/start_engine.hpp"
 #include "daemon/render/npy.hpp"
 #include "daemon/render/sidecar.hpp"
 #include "daemon/render/sonar_version.hpp"
-#include "daemon/start_engine.hpp"
 
 namespace sonar::render {
 namespace {

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/effective_switches.hpp"
+#include "daemon/config/effective_switches.hpp"
 #include "daemon/render/sonar_version.hpp"
-#include "daemon/sha256.hpp"
+#include "daemon/system/sha256.hpp"
 
 namespace sonar::render {
 namespace {

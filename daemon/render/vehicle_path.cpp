@@ -1,7 +1,7 @@
 #include "daemon/render/vehicle_path.hpp"
 
 #include "core/motion/jump.hpp"
-#include "daemon/world.hpp"
+#include "daemon/world/world.hpp"
 
 namespace sonar::render {
 namespace {

@@ -1,7 +1,7 @@
 // The sonar that a recording comes from, as its status datagram shows it: taken from the recording, with the addresses of here.
 #pragma once
 
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 #include "protocol/oculus/messages.hpp"
 #include "protocol/recording/recording.hpp"
 

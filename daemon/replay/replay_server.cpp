@@ -3,7 +3,7 @@
 #include <csignal>
 #include <cstdlib>
 
-#include "daemon/listen.hpp"
+#include "daemon/system/listen.hpp"
 
 namespace sonar {
 namespace {

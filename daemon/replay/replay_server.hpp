@@ -4,10 +4,10 @@
 
 #include <memory>
 
-#include "daemon/asio.hpp"
-#include "daemon/log.hpp"
 #include "daemon/replay/replay_device.hpp"
 #include "daemon/replay/replay_pace.hpp"
+#include "daemon/system/asio.hpp"
+#include "daemon/system/log.hpp"
 
 namespace sonar {
 

@@ -1,5 +1,5 @@
 // A pose as a sender gave it, checked and turned into the house's frames: world ENU, body FLU, SI units, int64 nanoseconds.
-// protocol/control makes these from protobuf and JSON; daemon/world.hpp keeps them.
+// protocol/control makes these from protobuf and JSON; daemon/world/world.hpp keeps them.
 #pragma once
 
 #include <array>

@@ -28,6 +28,12 @@ FLOORS = {
     "protocol/blueview": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
     "protocol/recording": ["core/base/", "core/sonar/", "protocol/wire/", "protocol/oculus/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
+    # Within the daemon, from the ground up; the rooms not named here stand above these.
+    "daemon/system": ["core/", "protocol/", "daemon/system/"],
+    "daemon/config": ["core/", "protocol/", "daemon/config/", "daemon/system/"],
+    "daemon/engine": ["core/", "cuda/", "protocol/", "daemon/config/", "daemon/engine/", "daemon/system/"],
+    "daemon/world": ["core/", "protocol/", "daemon/config/", "daemon/engine/", "daemon/system/", "daemon/world/"],
+    "daemon/time": ["core/", "protocol/", "daemon/config/", "daemon/system/", "daemon/time/", "daemon/world/"],
     "clients": ["core/base/", "core/image/", "core/sonar/", "core/text/", "protocol/", "clients/"],
     "clients/scene_tools": ["core/base/", "core/scene/", "core/text/", "clients/scene_tools/"],  # docs/decisions/0013-scene-tools.md
     "clients/bvtsdk": ["clients/bvtsdk/"],  # loaded into foreign processes: nothing of the house comes along
@@ -45,7 +51,7 @@ DEPENDENCIES = {
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp"],
     r"zlib\.h": ["protocol/blueview/deflate.cpp", "protocol/recording/inflate.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],
-    r"boost/asio\.hpp": ["daemon/asio.hpp"],
+    r"boost/asio\.hpp": ["daemon/system/asio.hpp"],
     r"spdlog/|fmt/": ["daemon/", "clients/"],
     r"google/protobuf|.*\.pb\.h": ["protocol/control/"],
     r"nlohmann/": ["protocol/control/", "daemon/", "clients/"],

@@ -4,7 +4,7 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "core/scene/files/load_scene.hpp"
-#include "daemon/edit_scene.hpp"
+#include "daemon/world/edit_scene.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar {

@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 #include "daemon/reload.hpp"
 
 namespace sonar {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 
 namespace sonar {
 namespace {

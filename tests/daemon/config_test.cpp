@@ -1,5 +1,5 @@
 // The configuration file: every key, every default, every refusal with file, line, column and key.
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

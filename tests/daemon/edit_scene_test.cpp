@@ -1,5 +1,5 @@
 // Scenes made from scenes: what is not changed keeps its place, and what cannot be is refused with what the scene has.
-#include "daemon/edit_scene.hpp"
+#include "daemon/world/edit_scene.hpp"
 
 #include <gmock/gmock.h>
 

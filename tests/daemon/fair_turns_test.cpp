@@ -1,5 +1,5 @@
 // Several sonars on one engine: a quick one is let in between, a greedy one waits, and nobody saves up turns by being silent.
-#include "daemon/fair_turns.hpp"
+#include "daemon/engine/fair_turns.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/simulator.hpp"
+#include "daemon/engine/simulator.hpp"
 
 namespace sonar {
 namespace {

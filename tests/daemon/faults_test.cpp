@@ -1,8 +1,8 @@
 // An exception in one conversation, a mistake of ours: it is said, and costs that conversation only.
 #include <gmock/gmock.h>
 
-#include "daemon/pose_server.hpp"
-#include "daemon/session.hpp"
+#include "daemon/poses/pose_server.hpp"
+#include "daemon/sonars/session.hpp"
 #include "tests/daemon/loopback.hpp"
 
 namespace sonar::testing_daemon {

@@ -1,5 +1,5 @@
 // A client is read at the allowed rate over any stretch of time, and at once after a pause.
-#include "daemon/input_rate.hpp"
+#include "daemon/sonars/input_rate.hpp"
 
 #include <gtest/gtest.h>
 

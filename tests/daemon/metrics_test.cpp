@@ -1,5 +1,5 @@
 // Histograms and the Prometheus text: bounds, quantiles, escaping, and that every line is one that a scraper takes.
-#include "daemon/metrics.hpp"
+#include "daemon/sonars/metrics.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -10,7 +10,7 @@
 #include <set>
 #include <sstream>
 
-#include "daemon/prometheus.hpp"
+#include "daemon/control/prometheus.hpp"
 
 namespace sonar {
 namespace {

@@ -1,5 +1,5 @@
 // The outbox rule of docs/architecture.md: message being written + depth waiting pings, whole messages, drops counted.
-#include "daemon/outbox.hpp"
+#include "daemon/sonars/outbox.hpp"
 
 #include <gtest/gtest.h>
 

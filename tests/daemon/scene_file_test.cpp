@@ -1,5 +1,5 @@
 // Which scene a name stands for, and that the built-in ones are the shipped ones and need no files.
-#include "daemon/scene_file.hpp"
+#include "daemon/config/scene_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "core/scene/files/built_in_scenes.hpp"
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 
 namespace sonar {
 namespace {

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 
 namespace sonar {
 namespace {

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/world.hpp"
+#include "daemon/world/world.hpp"
 
 namespace sonar {
 namespace {

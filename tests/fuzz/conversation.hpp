@@ -1,4 +1,4 @@
-// One device and up to three clients in virtual time, without sockets: what daemon/session.cpp does with a Dialogue and an
+// One device and up to three clients in virtual time, without sockets: what daemon/sonars/session.cpp does with a Dialogue and an
 // Outbox, and everything that must hold between them. conversation_fuzz.cpp drives it by a script of bytes.
 #pragma once
 
@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/outbox.hpp"
+#include "daemon/sonars/outbox.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "protocol/vendor.hpp"
 

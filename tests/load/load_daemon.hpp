@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/metrics.hpp"
+#include "daemon/sonars/metrics.hpp"
 
 namespace sonar::load {
 

@@ -1,0 +1,286 @@
+#include "daemon/config/config.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <set>
+
+#include "core/text/decimal.hpp"
+#include "core/text/strict_yaml.hpp"
+#include "daemon/config/config_parts.hpp"
+#include "daemon/config/read_trajectory.hpp"
+
+namespace sonar {
+namespace {
+
+using text::Map;
+using text::Node;
+using text::Range;
+
+Ipv4 read_ip(const Node& node, Ipv4 fallback = {}) {
+  if (!node.present()) return fallback;
+  const auto ip = parse_ipv4(node.text(64));
+  if (!ip) node.fail(ip.error().text);
+  return ip.value_or(fallback);
+}
+
+AddressRange read_range(const Node& node) {
+  const std::string text = node.text(64);
+  const std::size_t slash = text.find('/');
+  const auto ip = parse_ipv4(std::string_view(text).substr(0, slash));
+  const auto bits = slash == std::string::npos ? std::optional<std::int64_t>(32) : text::parse_integer(text.substr(slash + 1));
+  if (!ip || !bits || *bits < 0 || *bits > 32) {
+    node.fail("is not an address range; write it as 192.168.1.0/24");
+    return {};
+  }
+  return {*ip, static_cast<int>(*bits)};
+}
+
+void read_world(Map map, Config& config, const std::filesystem::path& directory) {
+  config.scene = read_scene_file(map.required("scene"), directory);
+  config.seed = map.optional("seed").unsigned_integer_or(1);
+  config.origin = read_origin(map.optional("origin"));
+  config.water = read_water(map.optional("water"), &config.allow_hot);
+}
+
+/// The name of the next of several; `taken` has those before it.
+Node read_name(Map& map, std::size_t longest, std::set<std::string>& taken, std::string& name) {
+  const Node node = map.required("name");
+  name = node.text(longest);
+  if (!taken.insert(name).second && node.present()) node.fail("\"" + name + "\" is used twice");
+  return node;
+}
+
+void read_vehicles(const Node& node, TrajectoryFiles& files, Config& config) {
+  std::set<std::string> names;
+  for (const Node& item : node.items(1, 64)) {
+    Map map = item.map();
+    VehicleConfig vehicle;
+    read_name(map, 64, names, vehicle.name);
+    vehicle.initial_pose = read_world_pose(map.optional("initial_pose"));
+    vehicle.plan = files.read_plan(map.optional("trajectory"), vehicle.name, &vehicle.orbits);
+    config.vehicles.push_back(std::move(vehicle));
+  }
+}
+
+void read_objects(const Node& node, TrajectoryFiles& files, Config& config) {
+  std::set<std::string> names;
+  for (const Node& item : node.items(0, 256)) {
+    Map map = item.map();
+    ObjectConfig object;
+    const Node name = read_name(map, 256, names, object.name);
+    object.place = name.location() + ": " + name.path();
+    object.plan = files.read_plan(map.required("trajectory"), object.name);
+    config.objects.push_back(std::move(object));
+  }
+}
+
+std::size_t read_vehicle_of(Map& map, const Config& config) {
+  const Node node = map.optional("vehicle");
+  if (!node.present()) {
+    if (config.vehicles.size() > 1) map.required("vehicle");
+    return 0;
+  }
+  std::vector<std::string_view> names;
+  for (const VehicleConfig& v : config.vehicles) names.push_back(v.name);
+  return node.choice_index(std::move(names));
+}
+
+void read_addresses(Map& map, SonarConfig& sonar) {
+  sonar.bind_ip = read_ip(map.required("bind_ip"));
+  const bool any = sonar.bind_ip == Ipv4{};
+  const Node advertise = any ? map.required("advertise_ip") : map.optional("advertise_ip");
+  sonar.advertise_ip = read_ip(advertise, sonar.bind_ip);
+  const Node netmask = map.optional("netmask");
+  sonar.has_own_netmask = netmask.present();
+  sonar.netmask = read_ip(netmask);
+  for (const Node& to : map.optional("status_to").items(0, 16)) sonar.status_to.push_back(read_endpoint(to, false));
+  sonar.has_own_status_to = !sonar.status_to.empty();
+  derive_addresses(sonar);
+}
+
+SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
+  SonarConfig sonar;
+  const Node name = map.required("name");
+  sonar.name = name.text(64);
+  const Node profile_node = map.required("profile");
+  const auto profile = protocol::find_profile(profile_node.text(64));
+  if (!profile) profile_node.fail(profile.error().text);
+  sonar.vehicle = read_vehicle_of(map, config);
+  sonar.mount = read_mount(map.optional("mount"));
+  read_addresses(map, sonar);
+  sonar.device_id = static_cast<std::uint16_t>(map.optional("device_id").integer_or(7001 + static_cast<int>(index), 1, 65535));
+  if (Node node = map.optional("clients")) {
+    Map clients = node.map();
+    sonar.max_clients =
+        static_cast<int>(clients.optional("max").integer_or(profile ? profile->vendor->default_max_clients() : 1, 1, 16));
+    sonar.when_full = clients.optional("when_full")
+                          .choice_or(WhenClientsFull::close_new, {{"close_new", WhenClientsFull::close_new},
+                                                                  {"take_over", WhenClientsFull::take_over},
+                                                                  {"queue", WhenClientsFull::queue}});
+  } else if (profile) {
+    sonar.max_clients = profile->vendor->default_max_clients();
+  }
+  if (Node node = map.optional("outbox")) {
+    Map outbox = node.map();
+    sonar.outbox.depth = static_cast<int>(outbox.optional("depth").integer_or(1, 1, OutboxRules::deepest));
+    sonar.outbox.when_full = outbox.optional("full").choice_or(
+        WhenFull::replace_oldest, {{"replace_oldest", WhenFull::replace_oldest}, {"drop_newest", WhenFull::drop_newest}});
+  }
+  const Node options = map.optional("options");
+  if (profile) {
+    sonar.profile = *profile;
+    sonar.options = read_options(options, *profile->vendor);
+    const auto tuned = profile->vendor->tuned(profile->model, sonar.options);
+    if (!tuned) options.fail(tuned.error().text);
+    sonar.profile.model = tuned.value_or(profile->model);
+  } else if (options.present()) {
+    options.map().entries();
+  }
+  for (const SonarConfig& other : config.sonars) {  // what is not there is the fault to be told, not that it is not there twice
+    if (name.present() && other.name == sonar.name) name.fail("\"" + sonar.name + "\" is used twice");
+    if (map.has("bind_ip") && other.bind_ip == sonar.bind_ip)
+      map.required("bind_ip").fail(text_of(sonar.bind_ip) + " is already used by sonar \"" + other.name +
+                                   "\"; each sonar needs its own address");
+    if (other.device_id == sonar.device_id)
+      map.optional("device_id").fail(std::to_string(sonar.device_id) + " is already used by sonar \"" + other.name + "\"");
+  }
+  return sonar;
+}
+
+PoseListener read_listener(const Node& node, std::uint16_t default_port, bool has_ranges) {
+  PoseListener listener{true, {{127, 0, 0, 1}, default_port}};
+  if (!node.present()) return listener;
+  if (node.text(64) == "off") return {false, {}};
+  listener.at = read_endpoint(node, true);
+  if (!is_loopback(listener.at.ip) && !has_ranges)
+    node.fail("poses from other computers need poses.allow_from, e.g. allow_from: [192.168.1.0/24]");
+  return listener;
+}
+
+void read_poses(const Node& node, const std::vector<VehicleConfig>& vehicles, PoseConfig& poses) {
+  poses.protobuf.at = {{127, 0, 0, 1}, 14770};
+  poses.json.at = {{127, 0, 0, 1}, 14771};
+  if (!node.present()) return;
+  Map map = node.map();
+  for (const Node& range : map.optional("allow_from").items(0, 64)) poses.allow_from.push_back(read_range(range));
+  poses.protobuf = read_listener(map.optional("protobuf"), 14770, !poses.allow_from.empty());
+  poses.json = read_listener(map.optional("json"), 14771, !poses.allow_from.empty());
+  poses.mavlink = read_mavlink(map.optional("mavlink"), !poses.allow_from.empty(), vehicles);
+  const bool same = poses.protobuf.enabled && poses.json.enabled && poses.json.at.port != 0 &&
+                    poses.protobuf.at.ip == poses.json.at.ip && poses.protobuf.at.port == poses.json.at.port;
+  if (same) map.optional("json").fail("the same address as poses.protobuf; give each its own port");
+  poses.extrapolate_max_s = map.optional("extrapolate_max_s").number_or(poses.extrapolate_max_s, Range::between(0, 10));
+  poses.stale_after_s = map.optional("stale_after_s").number_or(poses.stale_after_s, Range::between(0.01, 3600));
+  poses.max_jump_m = map.optional("max_jump_m").number_or(poses.max_jump_m, Range::between(0.001, 1e7));
+  poses.on_stale = map.optional("on_stale")
+                       .choice_or(OnStale::hold, {{"hold", OnStale::hold}, {"blank", OnStale::blank}, {"stop", OnStale::stop}});
+}
+
+void read_log(const Node& node, LogOptions& log) {
+  if (!node.present()) return;
+  Map map = node.map();
+  log.level = map.optional("level").choice_or(
+      LogLevel::info,
+      {{"debug", LogLevel::debug}, {"info", LogLevel::info}, {"warning", LogLevel::warning}, {"error", LogLevel::error}});
+  log.json = map.optional("format").choice_or<bool>(false, {{"text", false}, {"json", true}});
+}
+
+RecordingConfig read_recording(const Node& node, const std::filesystem::path& directory) {
+  if (!node.present()) return {};
+  Map map = node.map();
+  const Node folder = map.required("folder");
+  const std::filesystem::path path = (directory / folder.text()).lexically_normal();
+  std::error_code ec;
+  if (folder.present() && !std::filesystem::is_directory(path, ec))
+    folder.fail("is no folder: " + path.string() + "; make it first, writable for sonard");
+  return {path};
+}
+
+/// Empty, or what time waits for in vain.
+std::string why_time_would_stand(const Config& config) {
+  const bool has_control = config.control.stream.enabled || config.control.http.enabled;
+  const bool has_poses = config.poses.protobuf.enabled || config.poses.json.enabled || !config.poses.mavlink.empty();
+  if (config.clock == ClockMode::lockstep && !has_control)
+    return "lockstep lets time pass when control asks for it, and control.stream and control.http are off: leave one on";
+  if (config.clock == ClockMode::follow && !has_control && !has_poses)
+    return "follow lets time pass by the stamps of poses, and poses.protobuf, poses.json, poses.mavlink and control are off: "
+           "leave one on";
+  return {};
+}
+
+Result<Config> read(const text::Document& document, const std::string& name, const std::filesystem::path& directory) {
+  Config config;
+  config.source = name;
+  Map root = document.root();
+  if (root.has("scene") && !root.has("world"))
+    return failure(ErrorKind::config,
+                   name + ": this is a render file, not a configuration: sonard render " + name + " --out DIR (docs/render.md)");
+  if (root.has("objects") && !root.has("world") && !root.has("vehicles") && !root.has("sonars"))
+    return failure(ErrorKind::config, name +
+                                          ": this looks like a scene, not a configuration, which names its scene: world: "
+                                          "{scene: FILE} (docs/configuration.md)");
+  read_world(root.required("world").map(), config, directory);
+  TrajectoryFiles files(directory);
+  read_vehicles(root.required("vehicles"), files, config);
+  read_objects(root.optional("objects"), files, config);
+  std::size_t index = 0;
+  for (const Node& item : root.required("sonars").items(1, 64)) config.sonars.push_back(read_sonar(item.map(), config, index++));
+  read_poses(root.optional("poses"), config.vehicles, config.poses);
+  config.control = read_control(root.optional("control"), directory);
+  config.engine = read_engine(root.optional("engine"));
+  config.limits = read_limits(root.optional("limits"));
+  config.recording = read_recording(root.optional("recording"), directory);
+  const Node clock = root.optional("clock");
+  config.clock = clock.choice_or(ClockMode::realtime, {{name_of(ClockMode::realtime), ClockMode::realtime},
+                                                       {name_of(ClockMode::stepped), ClockMode::stepped},
+                                                       {name_of(ClockMode::lockstep), ClockMode::lockstep},
+                                                       {name_of(ClockMode::follow), ClockMode::follow}});
+  if (const std::string why = why_time_would_stand(config); !why.empty()) clock.fail(why);
+  read_log(root.optional("log"), config.log);
+  if (auto error = document.finish()) return tl::make_unexpected(*error);
+  return config;
+}
+
+constexpr std::string_view demo_yaml = R"(world:
+  scene: demo.yaml
+  seed: 1
+vehicles:
+  - name: rov
+    initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}
+    trajectory: orbit
+sonars:
+  - name: front
+    profile: oculus-m1200d
+    mount: {frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}
+    bind_ip: 127.0.0.2
+)";
+
+}  // namespace
+
+Result<Config> load_config(const std::filesystem::path& file) {
+  const auto document = text::parse_yaml_file(file, {.error_kind = ErrorKind::config});
+  if (!document) return tl::make_unexpected(document.error());
+  return read(*document, file.string(), file.parent_path());
+}
+
+Result<Config> parse_config(std::string_view yaml, const std::string& name, const std::filesystem::path& directory) {
+  const auto document = text::parse_yaml(yaml, name, {.error_kind = ErrorKind::config});
+  if (!document) return tl::make_unexpected(document.error());
+  return read(*document, name, directory);
+}
+
+Result<Config> demo_config() {
+  auto config = parse_config(demo_yaml, "demo", {});
+  if (config) config->scene = {"demo.yaml", true};  // whatever files there are
+  return config;
+}
+
+std::vector<std::filesystem::path> config_search_path() {
+  std::vector<std::filesystem::path> places = {"./sonard.yaml"};
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
+    places.push_back(std::filesystem::path(home) / ".config/sonard/sonard.yaml");
+  places.push_back("/etc/sonard/sonard.yaml");
+  return places;
+}
+
+}  // namespace sonar

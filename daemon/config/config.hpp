@@ -1,0 +1,147 @@
+// The configuration file as one struct tree with defaults, read and validated once at start; docs/configuration.md is its manual.
+// Nothing else in the daemon reads settings from anywhere.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/geodesy.hpp"
+#include "core/base/geometry.hpp"
+#include "core/base/result.hpp"
+#include "core/motion/playback.hpp"
+#include "core/pipeline/ping_engine.hpp"
+#include "core/sonar/water.hpp"
+#include "daemon/config/clock_mode.hpp"
+#include "daemon/config/outbox_rules.hpp"
+#include "daemon/config/scene_file.hpp"
+#include "daemon/system/addresses.hpp"
+#include "daemon/system/log.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+enum class WhenClientsFull { close_new, take_over, queue };
+enum class OnStale { hold, blank, stop };
+
+struct VehicleConfig {
+  std::string name;
+  Pose initial_pose;  // in world
+  bool orbits = false;
+  motion::Plan plan{};  // instead
+};
+/// A moving object of the scene that follows a trajectory.
+struct ObjectConfig {
+  std::string name;
+  motion::Plan plan;
+  std::string place;  // file:line:col: key.path, for what only the scene can tell
+};
+struct SonarConfig {
+  std::string name;
+  protocol::Profile profile;
+  std::size_t vehicle = 0;  // index into Config::vehicles
+  Pose mount;               // sonar in vehicle, FLU
+  Ipv4 bind_ip{}, advertise_ip{}, netmask{};
+  std::vector<Endpoint> status_to;                          // port 0 = the vendor's own
+  bool has_own_netmask = false, has_own_status_to = false;  // from the file, not derived from advertise_ip
+  std::uint16_t device_id = 0;
+  int max_clients = 1;
+  WhenClientsFull when_full = WhenClientsFull::close_new;
+  OutboxRules outbox;
+  protocol::OptionValues options;  // complete
+};
+struct PoseListener {
+  bool enabled = true;
+  Endpoint at;
+};
+/// A MAVLink link that poses come by (docs/autopilots.md).
+struct MavlinkConfig {
+  bool dials = false;  // udpout: we speak first, and hear that address only
+  Endpoint at;
+  std::string vehicle;
+  std::uint8_t system_id = 0, component_id = 0;  // 0 = the first that speaks
+  bool request_rates = false;                    // ask the autopilot for its messages, rate_hz each
+  double rate_hz = 50;
+};
+struct PoseConfig {
+  PoseListener protobuf, json;
+  std::vector<MavlinkConfig> mavlink;
+  std::vector<AddressRange> allow_from;  // empty = anybody who reaches the listener (loopback only)
+  double extrapolate_max_s = 0.2;
+  double stale_after_s = 1.0;
+  OnStale on_stale = OnStale::hold;
+  double max_jump_m = 50;
+};
+/// Who may steer the daemon, and where they ask (docs/control.md).
+struct ControlConfig {
+  PoseListener stream{true, {{127, 0, 0, 1}, 14770}};  // TCP: the control stream
+  PoseListener http{true, {{127, 0, 0, 1}, 8088}};
+  bool stream_given = false, http_given = false;  // by the file: then it must be free; the default gives way with a warning
+  std::filesystem::path token_file;               // empty = none; needed when a listener is not on loopback
+  std::vector<std::string> hosts;                 // names that HTTP's Host and Origin may have, beside addresses and localhost
+};
+/// What strangers may cost us.
+struct LimitConfig {
+  int clients = 256;                             // of all sonars together; 16 of one: SonarConfig::max_clients
+  int control_clients = 32;                      // of the stream, and of HTTP
+  std::size_t input_bytes_per_s = 1u << 20;      // of one client; more is read more slowly
+  std::size_t control_message_bytes = 1u << 20;  // of one message of the stream, one body of HTTP
+  std::chrono::milliseconds stall{10000};        // a client that takes no byte for so long is reset
+  std::chrono::milliseconds dead_peer{15000};    // one whose computer answers nothing
+  int spare_descriptors = 32;                    // never given to clients
+};
+/// Recordings that control may ask for (docs/recording.md).
+struct RecordingConfig {
+  std::filesystem::path folder;  // an existing one; empty = nothing may be recorded
+};
+inline constexpr int most_fixed_rays = 100000;  // a column
+/// What computes the pings (docs/cuda.md).
+enum class EngineDevice { cpu, cuda, automatic };
+
+struct EngineConfig {
+  int threads = 0;      // 0 = all cores
+  int io_priority = 0;  // 1 to 99: the I/O thread is scheduled in real time (SCHED_FIFO); 0 = as usual
+  EngineDevice device = EngineDevice::cpu;
+  SimdLevel simd = SimdLevel::automatic;
+  Switches switches;
+};
+
+struct Config {
+  std::string source;  // the file, or what stands in for it
+  SceneFile scene;     // as found
+  std::uint64_t seed = 1;
+  std::optional<Geodetic> origin;  // where latitudes and longitudes are counted from
+  Water water;
+  bool allow_hot = false;  // water of 30 C or more is meant
+  std::vector<VehicleConfig> vehicles;
+  std::vector<ObjectConfig> objects;
+  std::vector<SonarConfig> sonars;
+  PoseConfig poses;
+  ControlConfig control;
+  LimitConfig limits;
+  RecordingConfig recording;
+  EngineConfig engine;
+  ClockMode clock = ClockMode::realtime;
+  LogOptions log;
+};
+
+/// Errors: file:line:col: key.path: what, and the nearest valid name.
+Result<Config> load_config(const std::filesystem::path& file);
+/// `directory` is where relative scene paths start; `name` stands in errors for the file.
+Result<Config> parse_config(std::string_view yaml, const std::string& name, const std::filesystem::path& directory);
+/// What runs when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. Needs no files.
+Result<Config> demo_config();
+
+/// ./sonard.yaml, ~/.config/sonard/sonard.yaml, /etc/sonard/sonard.yaml, in this order.
+std::vector<std::filesystem::path> config_search_path();
+
+/// Fills netmask and status_to from advertise_ip, unless the file gives them.
+void derive_addresses(SonarConfig& sonar);
+/// Moves the first sonar to another address, with all that is derived from it. Errors are sentences for the command line.
+Result<void> rebind(Config& config, std::string_view address);
+
+}  // namespace sonar

@@ -1,0 +1,58 @@
+// Where the daemon listens and who may steer it, from the configuration.
+#include "core/text/decimal.hpp"
+#include "daemon/config/config_parts.hpp"
+
+namespace sonar {
+
+using text::Map;
+using text::Node;
+
+Endpoint read_endpoint(const Node& node, bool port_needed) {
+  const std::string text = node.text(64);
+  const std::size_t colon = text.find(':');
+  Endpoint endpoint;
+  const auto ip = parse_ipv4(std::string_view(text).substr(0, colon));
+  const auto port = colon == std::string::npos ? std::optional<std::int64_t>(0) : text::parse_integer(text.substr(colon + 1));
+  if (!ip || (port_needed && colon == std::string::npos))
+    node.fail("is not an address; write it as " +
+              std::string(port_needed ? "127.0.0.1:14770" : "127.255.255.255 or 192.168.1.7:52102"));
+  else if (!port || *port < 0 || *port > 65535)
+    node.fail("port must be a number from 0 to 65535");
+  else
+    endpoint = {*ip, static_cast<std::uint16_t>(*port)};
+  return endpoint;
+}
+
+namespace {
+
+/// `given` = by the file: then it must be free; the default gives way with a warning.
+void read_control_listener(const Node& node, bool has_token, PoseListener& listener, bool& given) {
+  if (!node.present()) return;
+  given = true;
+  if (node.text(64) == "off") {
+    listener = {false, {}};
+    return;
+  }
+  listener = {true, read_endpoint(node, true)};
+  if (!is_loopback(listener.at.ip) && !has_token)
+    node.fail("can be reached from other computers: that needs control.token_file, the file of a secret that clients must show");
+}
+
+}  // namespace
+
+ControlConfig read_control(const Node& node, const std::filesystem::path& directory) {
+  ControlConfig control;
+  if (!node.present()) return control;
+  Map map = node.map();
+  if (const Node file = map.optional("token_file")) control.token_file = directory / file.text();
+  control.hosts = map.optional("hosts").texts(0, 64);
+  const bool has_token = !control.token_file.empty();
+  read_control_listener(map.optional("stream"), has_token, control.stream, control.stream_given);
+  read_control_listener(map.optional("http"), has_token, control.http, control.http_given);
+  const bool same = control.stream.enabled && control.http.enabled && control.http.at.port != 0 &&
+                    control.stream.at.ip == control.http.at.ip && control.stream.at.port == control.http.at.port;
+  if (same) map.optional("http").fail("the same address as control.stream; give each its own port");
+  return control;
+}
+
+}  // namespace sonar

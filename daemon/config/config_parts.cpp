@@ -1,0 +1,151 @@
+#include "daemon/config/config_parts.hpp"
+
+#include <cmath>
+
+#include "daemon/config/effective_switches.hpp"
+#include "daemon/config/nearest_scene.hpp"
+
+namespace sonar {
+namespace {
+
+using text::Map;
+using text::Node;
+using text::Range;
+
+constexpr Range finite_place{.min = -1e7, .max = 1e7};
+constexpr double hot_c = 30;  // a widely used driver sends the sonar to standby above this (docs/protocols/oculus.md, section 4)
+
+Pose pose_from(const std::array<double, 3>& xyz_m, const std::array<double, 3>& rpy_deg) {
+  return {{xyz_m[0], xyz_m[1], xyz_m[2]},
+          quat_from_rpy({rad_from_deg(rpy_deg[0]), rad_from_deg(rpy_deg[1]), rad_from_deg(rpy_deg[2])})};
+}
+
+}  // namespace
+
+Pose read_world_pose(const Node& node) {
+  if (!node.present()) return {};
+  Map map = node.map();
+  const bool ned = map.required("frame").choice<bool>({{"ENU_FLU", false}, {"NED_FRD", true}});
+  const auto xyz_m = map.required("xyz_m").numbers<3>(finite_place);
+  const auto rpy_deg = map.optional("rpy_deg").numbers_or<3>({0, 0, 0}, Range::between(-360, 360));
+  const Pose pose = pose_from(xyz_m, rpy_deg);
+  return ned ? enu_flu_from_ned_frd(pose) : pose;
+}
+
+Pose read_mount(const Node& node) {
+  if (!node.present()) return {};
+  Map map = node.map();
+  const bool frd = map.required("frame").choice<bool>({{"FLU", false}, {"FRD", true}});
+  const auto xyz_m = map.optional("xyz_m").numbers_or<3>({0, 0, 0}, Range::between(-1000, 1000));
+  const auto rpy_deg = map.optional("rpy_deg").numbers_or<3>({0, 0, 0}, Range::between(-360, 360));
+  const Pose pose = pose_from(xyz_m, rpy_deg);
+  return frd ? flu_from_frd(pose) : pose;
+}
+
+SceneFile read_scene_file(const Node& node, const std::filesystem::path& directory) {
+  const std::string given = node.text();
+  if (auto found = find_scene(given, directory)) return *std::move(found);
+  const std::string near = nearest_scene(given, directory);
+  const std::string meant = near.empty() ? "; looked in " : "; did you mean \"" + near + "\"? Looked in ";
+  node.fail("no such file: \"" + given.substr(0, 256) + "\"" + meant + scene_folders(directory));
+  return {given};
+}
+
+Water read_water(const Node& node, bool* allow_hot) {
+  Water water;
+  if (!node.present()) return water;
+  Map map = node.map();
+  const Node temperature = map.optional("temperature_c");
+  water.temperature_c = temperature.number_or(water.temperature_c, Range::between(-2, 40));
+  water.salinity_psu = map.optional("salinity_psu").number_or(water.salinity_psu, Range::between(0, 42));
+  water.ph = map.optional("ph").number_or(water.ph, Range::between(6, 9));
+  water.sound_speed_mps = map.optional("sound_speed_mps").number_or(0, Range::between(0, 2000));
+  if (water.sound_speed_mps != 0 && water.sound_speed_mps < 1000)
+    map.optional("sound_speed_mps").fail("must be 0 (computed from the rest) or from 1000 to 2000");
+  const bool hot_is_meant = map.optional("allow_hot").boolean_or(false);
+  if (allow_hot != nullptr) *allow_hot = hot_is_meant;
+  if (!hot_is_meant && water.temperature_c >= hot_c)
+    temperature.fail("30 C or more sends a real driver to standby; add allow_hot: true if that is what you want");
+  return water;
+}
+
+std::string why_no_water(const Water& water, bool allow_hot) {
+  if (!(water.temperature_c >= -2 && water.temperature_c <= 40)) return "temperature_c must be from -2 to 40";
+  if (!(water.salinity_psu >= 0 && water.salinity_psu <= 42)) return "salinity_psu must be from 0 to 42";
+  if (!(water.ph >= 6 && water.ph <= 9)) return "ph must be from 6 to 9";
+  if (water.sound_speed_mps != 0 && !(water.sound_speed_mps >= 1000 && water.sound_speed_mps <= 2000))
+    return "sound_speed_mps must be 0 (computed from the rest) or from 1000 to 2000";
+  if (water.temperature_c >= hot_c && !allow_hot)
+    return "30 C or more sends a real driver to standby; world.water.allow_hot: true in the configuration allows it";
+  return {};
+}
+
+protocol::OptionValues read_options(const Node& node, const protocol::Vendor& vendor) {
+  protocol::OptionValues given;
+  Map map = node.map();
+  for (const protocol::Option& option : vendor.options()) {  // asked for one by one: errors then stand where the mistake is
+    const Node value = map.optional(option.name);
+    if (!value.present()) continue;
+    if (option.allowed.empty()) {
+      const Range range = option.highest > 0 ? Range::between(option.lowest, option.highest) : Range::above(0);
+      if (value.text(64) != option.default_value) value.number(range);
+    } else {
+      value.choice_index(option.allowed);
+    }
+    given[std::string(option.name)] = value.text(64);
+  }
+  auto complete = check_options(vendor, given);
+  if (!complete) node.fail(complete.error().text);
+  return complete.value_or(protocol::OptionValues{});
+}
+
+EngineConfig read_engine(const Node& node) {
+  EngineConfig engine;
+  if (!node.present()) return engine;
+  Map map = node.map();
+  engine.threads = static_cast<int>(map.optional("threads").integer_or(0, 0, 256));
+  engine.io_priority = static_cast<int>(map.optional("io_priority").integer_or(0, 0, 99));
+  map.optional("quality").choice_or<int>(0, {{"default", 0}});
+  engine.device = map.optional("device").choice_or(
+      EngineDevice::cpu, {{"auto", EngineDevice::automatic}, {"cpu", EngineDevice::cpu}, {"cuda", EngineDevice::cuda}});
+  engine.simd = map.optional("simd").choice_or(SimdLevel::automatic, {{"auto", SimdLevel::automatic},
+                                                                      {"portable", SimdLevel::portable},
+                                                                      {"avx2", SimdLevel::avx2},
+                                                                      {"avx512", SimdLevel::avx512}});
+  engine.switches.expected_power = map.optional("expected_power").boolean_or(false);
+  engine.switches.mode = map.optional("mode").choice_or(
+      Mode::canonical, {{"canonical", Mode::canonical}, {"paper", Mode::paper}, {"raster", Mode::raster}});
+  engine.switches.fixed_fan = static_cast<int>(map.optional("fixed_fan").integer_or(0, 0, most_fixed_rays));
+  for (const NamedSwitch& part : named_switches) {
+    bool& is_on = engine.switches.*part.is_on;
+    const Node given = map.optional(part.name);
+    is_on = given.choice_or<bool>(is_on, {{"on", true}, {"off", false}});
+    const std::string why = why_without_effect(engine.switches, part);
+    if (given.present() && is_on && !why.empty()) given.fail("has no effect: " + why + "; leave out one of them");
+  }
+  return engine;
+}
+
+LimitConfig read_limits(const Node& node) {
+  LimitConfig limits;
+  if (!node.present()) return limits;
+  Map map = node.map();
+  const auto whole = [&map](const char* key, auto& value, std::int64_t least, std::int64_t most) {
+    value = static_cast<std::remove_reference_t<decltype(value)>>(
+        map.optional(key).integer_or(static_cast<std::int64_t>(value), least, most));
+  };
+  const auto seconds = [&map](const char* key, std::chrono::milliseconds& value, double least) {
+    const double s = map.optional(key).number_or(std::chrono::duration<double>(value).count(), Range::between(least, 3600));
+    value = std::chrono::milliseconds(std::llround(1e3 * s));
+  };
+  whole("clients", limits.clients, 1, 65536);
+  whole("control_clients", limits.control_clients, 1, 1024);
+  whole("input_bytes_per_s", limits.input_bytes_per_s, 1024, std::int64_t{1} << 40);
+  whole("control_message_bytes", limits.control_message_bytes, 1024, 1 << 20);
+  seconds("stall_s", limits.stall, 0.1);
+  seconds("dead_peer_s", limits.dead_peer, 3);
+  whole("spare_descriptors", limits.spare_descriptors, 0, 65536);
+  return limits;
+}
+
+}  // namespace sonar

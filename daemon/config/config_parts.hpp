@@ -1,0 +1,35 @@
+// Parts that the configuration and the render files have in common: poses, water, options of a sonar, switches of the engine.
+// Readers over strict_yaml cursors; what is wrong is told by the document's finish().
+#pragma once
+
+#include <filesystem>
+
+#include "core/text/strict_yaml.hpp"
+#include "daemon/config/config.hpp"
+
+namespace sonar {
+
+/// `{frame: ENU_FLU | NED_FRD, xyz_m, rpy_deg}`; absent = the origin.
+Pose read_world_pose(const text::Node& node);
+/// `{frame: FLU | FRD, xyz_m, rpy_deg}` of a sonar on its vehicle.
+Pose read_mount(const text::Node& node);
+/// "127.0.0.1:14770"; the port may be left out unless it is needed.
+Endpoint read_endpoint(const text::Node& node, bool port_needed);
+/// `{lat, lon, alt}` of the world's origin; absent = nowhere.
+std::optional<Geodetic> read_origin(const text::Node& node);
+/// One endpoint, or a list of links. `has_ranges`: poses.allow_from says who is heard.
+std::vector<MavlinkConfig> read_mavlink(const text::Node& node, bool has_ranges, const std::vector<VehicleConfig>& vehicles);
+/// Relative files start in `directory`.
+ControlConfig read_control(const text::Node& node, const std::filesystem::path& directory);
+/// The name of a scene file, found as find_scene() does.
+SceneFile read_scene_file(const text::Node& node, const std::filesystem::path& directory);
+/// Whether water of 30 C or more is meant is told beside it.
+Water read_water(const text::Node& node, bool* allow_hot = nullptr);
+/// The same rules for water that came otherwise: empty, or one sentence.
+std::string why_no_water(const Water& water, bool allow_hot);
+/// Complete: defaults filled in.
+protocol::OptionValues read_options(const text::Node& node, const protocol::Vendor& vendor);
+EngineConfig read_engine(const text::Node& node);
+LimitConfig read_limits(const text::Node& node);
+
+}  // namespace sonar

@@ -1,0 +1,37 @@
+// Options of the engine and of the model's parts, the same for every command that pings: run, render and bench. What is given
+// on the command line, or stands for it in the environment, wins over the file.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/config/config.hpp"
+
+namespace CLI {
+class App;
+}  // namespace CLI
+
+namespace sonar {
+
+/// Empty = as the configuration says.
+struct EngineOptionsGiven {
+  std::string device, simd, mode;
+  std::optional<int> threads;
+  std::optional<std::uint64_t> seed;
+  std::optional<int> fixed_fan;
+  bool expected_power = false;
+  std::array<std::string, named_switches.size()> switches;  // "on", "off", in the order of named_switches
+};
+
+/// Everything but the threads, which a benchmark varies.
+void add_model_options(CLI::App& app, EngineOptionsGiven& given);
+void add_engine_options(CLI::App& app, EngineOptionsGiven& given);
+
+/// Usage error: a part that is switched on but left out by the mode or the fixed fan. One of the file's own is no error.
+Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given);
+
+}  // namespace sonar

@@ -1,0 +1,74 @@
+// What one client is still to be sent: the message being written, control replies in order, and at most `depth` waiting pings.
+// Filled by the Device, emptied by the Session's writer; whole messages only, so a stream can never be cut or mixed.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <vector>
+
+#include "core/base/units.hpp"
+#include "daemon/config/outbox_rules.hpp"
+
+namespace sonar {
+
+/// Why a ping that was offered to a client never reached it whole.
+enum class DropReason {
+  slow,  // another ping took its place, or it found none
+  gone,  // the connection ended first
+  stop,  // we ended the conversation: only the message being written is still finished
+};
+inline constexpr std::size_t drop_reasons = 3;
+
+class Outbox {
+ public:
+  using Bytes = std::vector<std::byte>;
+  struct Message {
+    std::shared_ptr<const Bytes> bytes;
+    std::uint32_t ping = 0;       // its number; 0 = a reply
+    std::vector<Bytes> prefixes;  // of a ping: it is sent once for each, the prefix first; none = once, as it is
+    Time fired_at{};              // of a ping
+    explicit operator bool() const { return bytes != nullptr; }
+  };
+  static constexpr std::size_t most_ping_bytes = 8u << 20;    // waiting pings of one client
+  static constexpr std::size_t most_reply_bytes = 64u << 10;  // a client that asks and never reads
+  static constexpr std::size_t most_replies = 256;
+
+  explicit Outbox(OutboxRules rules) : rules_(rules) {}
+
+  /// False when replies pile up beyond their bound: the session must be closed.
+  bool push_reply(Bytes reply);
+  void push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number, std::vector<Bytes> prefixes = {}, Time fired_at = {});
+  /// The next message to write, whole: replies before pings. Empty while one is being written, or when there is nothing.
+  Message take();
+  /// The message last taken has been written to its end.
+  void written();
+  /// Leaves the message being written and the replies, which are small.
+  void drop_waiting_pings(DropReason why = DropReason::stop);
+  /// The connection is over: nothing more is written, and what was not is dropped, the message being written too.
+  void end(DropReason why);
+
+  bool idle() const { return !writing_ && replies_.empty() && pings_.empty(); }
+  /// At any moment offered = written + dropped + waiting + the one being written.
+  std::uint64_t pings_offered() const { return pings_offered_; }
+  std::uint64_t pings_written() const { return pings_written_; }
+  std::uint64_t pings_dropped() const;
+  const std::array<std::uint64_t, drop_reasons>& dropped_by_reason() const { return dropped_; }
+  std::size_t pings_waiting() const { return pings_.size(); }
+
+ private:
+  void count_drop(DropReason why, std::uint64_t pings = 1) { dropped_[static_cast<std::size_t>(why)] += pings; }
+
+  OutboxRules rules_;
+  std::deque<Bytes> replies_;
+  std::size_t reply_bytes_ = 0;
+  std::deque<Message> pings_;
+  std::size_t ping_bytes_ = 0;
+  bool writing_ = false, writing_ping_ = false;
+  std::uint64_t pings_offered_ = 0, pings_written_ = 0;
+  std::array<std::uint64_t, drop_reasons> dropped_{};
+};
+
+}  // namespace sonar
