@@ -160,7 +160,7 @@ Command parse_command_line(int argc, char** argv) {
 
 Result<void> override_config(Config& config, const RunCommand& command) {
   if (const auto mode = std::find(clock_modes.begin(), clock_modes.end(), command.clock); mode != clock_modes.end())
-    config.clock = static_cast<ClockMode>(mode - clock_modes.begin());
+    config.clock = static_cast<ClockMode>(mode - clock_modes.begin()), config.clock_place = "--clock";
   if (const auto r = override_engine(config.engine, config.seed, command.engine); !r) return r;
   if (!command.log_format.empty()) config.log.json = command.log_format == "json";
   if (command.log_level == "debug") config.log.level = LogLevel::debug;
@@ -169,7 +169,7 @@ Result<void> override_config(Config& config, const RunCommand& command) {
   if (command.log_level == "error") config.log.level = LogLevel::error;
   if (!command.bind.empty())
     if (const auto r = rebind(config, command.bind); !r) return failure(r.error().kind, "--bind: " + r.error().text);
-  return {};
+  return check_time_can_pass(config);
 }
 
 }  // namespace sonar

@@ -139,6 +139,7 @@ int run(const RunCommand& command, Steady::time_point begin, bool& json) {
 int check(const CheckCommand& command) {
   const auto config = load_config(command.config);
   if (!config) return complain(config.error());
+  if (const auto passes = check_time_can_pass(*config); !passes) return complain(passes.error());
   if (!config->control.token_file.empty()) {
     std::string warning;
     if (const auto token = Token::read(config->control.token_file, warning); !token) return complain(token.error());

@@ -53,9 +53,11 @@ struct DeviceState {
   Time powered_up_at{};
   Water water;  // at the device, as measured by its sensors
   double depth_m = 0;
-  OptionValues options;   // complete: defaults filled in by check_options
-  Bytes request;          // ChangeSettings::request of the settings that hold now
-  struct StoredAddress {  // what a client wrote; stored, never applied
+  OptionValues options;         // complete: defaults filled in by check_options
+  Bytes request;                // ChangeSettings::request of the settings that hold now
+  bool ping_is_owed = false;    // somebody asked for one ping and waits for it
+  bool simulated_time = false;  // it may stand while people wait
+  struct StoredAddress {        // what a client wrote; stored, never applied
     std::uint32_t ip = 0, netmask = 0;
     bool dhcp = false;
   } stored_address;

@@ -196,18 +196,6 @@ RecordingConfig read_recording(const Node& node, const std::filesystem::path& di
   return {path};
 }
 
-/// Empty, or what time waits for in vain.
-std::string why_time_would_stand(const Config& config) {
-  const bool has_control = config.control.stream.enabled || config.control.http.enabled;
-  const bool has_poses = config.poses.protobuf.enabled || config.poses.json.enabled || !config.poses.mavlink.empty();
-  if (config.clock == ClockMode::lockstep && !has_control)
-    return "lockstep lets time pass when control asks for it, and control.stream and control.http are off: leave one on";
-  if (config.clock == ClockMode::follow && !has_control && !has_poses)
-    return "follow lets time pass by the stamps of poses, and poses.protobuf, poses.json, poses.mavlink and control are off: "
-           "leave one on";
-  return {};
-}
-
 Result<Config> read(const text::Document& document, const std::string& name, const std::filesystem::path& directory) {
   Config config;
   config.source = name;
@@ -235,7 +223,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
                                                        {name_of(ClockMode::stepped), ClockMode::stepped},
                                                        {name_of(ClockMode::lockstep), ClockMode::lockstep},
                                                        {name_of(ClockMode::follow), ClockMode::follow}});
-  if (const std::string why = why_time_would_stand(config); !why.empty()) clock.fail(why);
+  config.clock_place = clock.present() ? clock.location() + ": " + clock.path() : name + ": clock";
   read_log(root.optional("log"), config.log);
   if (auto error = document.finish()) return tl::make_unexpected(*error);
   return config;
@@ -256,6 +244,19 @@ sonars:
 )";
 
 }  // namespace
+
+Result<void> check_time_can_pass(const Config& config) {
+  const bool has_control = config.control.stream.enabled || config.control.http.enabled;
+  const bool has_poses = config.poses.protobuf.enabled || config.poses.json.enabled || !config.poses.mavlink.empty();
+  const char* why = nullptr;
+  if (config.clock == ClockMode::lockstep && !has_control)
+    why = "lockstep lets time pass when control asks for it, and control.stream and control.http are off: leave one on";
+  if (config.clock == ClockMode::follow && !has_control && !has_poses)
+    why =
+        "follow lets time pass by the stamps of poses, and poses.protobuf, poses.json, poses.mavlink and control are off: leave "
+        "one on";
+  return why == nullptr ? Result<void>{} : failure(ErrorKind::config, config.clock_place + ": " + why);
+}
 
 Result<Config> load_config(const std::filesystem::path& file) {
   const auto document = text::parse_yaml_file(file, {.error_kind = ErrorKind::config});

@@ -126,6 +126,7 @@ struct Config {
   RecordingConfig recording;
   EngineConfig engine;
   ClockMode clock = ClockMode::realtime;
+  std::string clock_place;  // file:line:col: clock, for what only shows with the command line
   LogOptions log;
 };
 
@@ -133,6 +134,8 @@ struct Config {
 Result<Config> load_config(const std::filesystem::path& file);
 /// `directory` is where relative scene paths start; `name` stands in errors for the file.
 Result<Config> parse_config(std::string_view yaml, const std::string& name, const std::filesystem::path& directory);
+/// What time waits for must be able to come; asked when the command line has had its say. config.
+Result<void> check_time_can_pass(const Config& config);
 /// What runs when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. Needs no files.
 Result<Config> demo_config();
 

@@ -26,20 +26,22 @@ Recordings::Recordings(asio::io_context& io, const Config& config, Log& log, int
 
 Recordings::~Recordings() { thread_.join(); }
 
-/// `job` on the thread, `after` takes here what came of it. The loop lives until then.
+/// `job` on the thread, `after` takes here what came of it and how far the file is. The loop lives until then.
 template <class Job, class After>
-void Recordings::on_thread(Job job, After after) {
+void Recordings::on_thread(const std::shared_ptr<Work>& work, Job job, After after) {
   ++under_way_;
-  auto work = asio::make_work_guard(io_);
-  asio::post(thread_, [this, work = std::move(work), job = std::move(job), after = std::move(after)]() mutable {
+  auto guard = asio::make_work_guard(io_);
+  asio::post(thread_, [this, guard = std::move(guard), work, job = std::move(job), after = std::move(after)]() mutable {
     Outcome outcome;
     try {
-      outcome = job();
+      outcome.result = job(*work);
     } catch (const std::bad_alloc&) {
       outcome.result = failure(ErrorKind::unavailable, "not enough memory to record");
     } catch (const std::exception& e) {
       outcome.result = failure(ErrorKind::bug, std::string("writing it failed: ").append(e.what()));
     }
+    work->failed |= !outcome.result;
+    if (work->file) outcome.figures = work->file->figures();
     asio::post(io_, [this, outcome = std::move(outcome), after = std::move(after)]() mutable {
       --under_way_;
       after(outcome);
@@ -59,11 +61,12 @@ void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar
   if (!begun) return done(tl::make_unexpected(begun.error()));
   const Pointer recording = *begun;
   on_thread(
-      [work = recording->work, file = std::filesystem::path(recording->told.file), kind = recording->kind,
-       sonar = std::move(sonar)]() -> Outcome {
+      recording->work,
+      [file = std::filesystem::path(recording->told.file), kind = recording->kind,
+       sonar = std::move(sonar)](Work& work) -> Result<void> {
         auto made = RecordingFile::create(file, kind, sonar);
-        if (!made) return {tl::make_unexpected(made.error()), {}};
-        work->file = std::move(*made);
+        if (!made) return tl::make_unexpected(made.error());
+        work.file = std::move(*made);
         return {};
       },
       [this, recording, who, done = std::move(done)](const Outcome& outcome) {
@@ -176,9 +179,8 @@ bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
   std::size_t waiting = 0;
   Pointer most = recording;
   for (const Pointer& r : recordings_) {
-    if (!is_running(r)) continue;
-    waiting += r->waiting_bytes;
-    if (r->waiting_bytes > most->waiting_bytes) most = r;
+    waiting += r->waiting_bytes;  // of one that ends, too: it is still in memory
+    if (is_running(r) && r->waiting_bytes > most->waiting_bytes) most = r;
   }
   if (waiting > 0 && waiting + bytes > most_waiting_bytes_)
     fail(most,
@@ -191,13 +193,7 @@ void Recordings::write(const Pointer& recording, RecordedPing ping) {
   if (!has_room_for(recording, size)) return;
   recording->waiting_bytes += size;
   on_thread(
-      [work = recording->work, ping = std::move(ping)]() -> Outcome {
-        Outcome outcome;
-        if (!work->failed) outcome.result = work->file->write(ping);
-        work->failed |= !outcome.result;
-        outcome.figures = work->file->figures();
-        return outcome;
-      },
+      recording->work, [ping = std::move(ping)](Work& work) { return work.failed ? Result<void>{} : work.file->write(ping); },
       [this, recording, size](const Outcome& outcome) {
         recording->waiting_bytes -= size;
         recording->told.pings = outcome.figures.pings;
@@ -225,11 +221,7 @@ void Recordings::end(const Pointer& recording, const std::string& why) {
   recording->told.running = false;
   recording->told.why = why;
   on_thread(
-      [work = recording->work]() -> Outcome {
-        Outcome outcome{work->file->close(), {}};
-        outcome.figures = work->file->figures();
-        return outcome;
-      },
+      recording->work, [](Work& work) { return work.file->close(); },
       [this, recording](const Outcome& outcome) { ended(recording, outcome); });
 }
 

@@ -83,7 +83,7 @@ class Recordings {
   };
 
   template <class Job, class After>
-  void on_thread(Job job, After after);
+  void on_thread(const std::shared_ptr<Work>& work, Job job, After after);
   std::size_t running() const;
   /// Whether this recording may let so many bytes more wait; the one that lets most wait ends when there is no room.
   bool has_room_for(const Pointer& recording, std::size_t bytes);

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-protocol::DeviceState describe(const SonarConfig& config, const Water& water, Time now) {
+protocol::DeviceState describe(const SonarConfig& config, const Water& water, Time now, bool simulated_time) {
   protocol::DeviceState s;
   s.name = config.name;
   s.id = config.device_id;
@@ -25,6 +25,7 @@ protocol::DeviceState describe(const SonarConfig& config, const Water& water, Ti
   s.powered_up_at = now;
   s.water = water;
   s.options = config.options;
+  s.simulated_time = simulated_time;
   return s;
 }
 
@@ -35,7 +36,7 @@ Device::Device(DeviceContext& context, const SonarConfig& config, std::uint32_t 
       config_(config),
       vendor_(*config.profile.vendor),
       index_(index),
-      state_(describe(config, context.config.water, context.clock.now())),
+      state_(describe(config, context.config.water, context.clock.now(), context.clock.stepped())),
       acceptor_(context.io),
       beacon_(context.io),
       beacon_timer_(context.io),
@@ -74,6 +75,7 @@ tcp::endpoint Device::data_endpoint() const {
 }
 
 void Device::start() {
+  started_ = true;
   keep_accepting();
   answers_.start();
   if (beacon_period_.count() > 0) keep_announcing();
@@ -88,7 +90,7 @@ void Device::stop(const std::string& why) {
   answers_.stop();
   pacer_.stop();
   beacon_.close(ec);
-  context_.recordings.end_of(config_.name, why);
+  if (started_) context_.recordings.end_of(config_.name, why);  // else one of the same name may go on
   for (Waiting& waiting : queue_) waiting.socket.close(ec);
   queue_.clear();
   const auto sessions = sessions_;  // finish() may end one at once and change the list
@@ -137,6 +139,7 @@ void Device::on_event(Session& from, const protocol::Event& event) {
     const bool joins = std::get<protocol::RequestPing>(event).joins;
     const bool served = joins && busy_ && under_way_settings_id_ == settings_id_;
     if (!served) pacer_.trigger(context_.clock.now(), joins);
+    state_.ping_is_owed = pacer_.trigger_waits();
   } else if (const auto* store = std::get_if<protocol::StoreAddress>(&event)) {
     state_.stored_address = store->address;
   } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
@@ -153,13 +156,18 @@ void Device::on_event(Session& from, const protocol::Event& event) {
 
 std::optional<Time> Device::next_tick() const {
   const auto next = pacer_.next_tick();
-  const bool waits_for_pose =
-      next && context_.config.poses.on_stale == OnStale::stop && context_.world.is_stale(config_.vehicle, *next);
-  return waits_for_pose ? std::nullopt : next;
+  return next && waits_for_pose(*next) ? std::nullopt : next;
+}
+
+bool Device::waits_for_pose(Time at) const {
+  return context_.config.poses.on_stale == OnStale::stop && context_.world.is_stale(config_.vehicle, at);
 }
 
 std::optional<Time> Device::next_talk() const { return earliest(&Session::next_tick); }
-std::optional<Time> Device::next_wish() const { return earliest(&Session::next_wish); }
+std::optional<Time> Device::next_wish() const {
+  const auto next = earliest(&Session::next_wish);
+  return next && waits_for_pose(*next) ? std::nullopt : next;
+}
 
 std::optional<Time> Device::earliest(std::optional<Time> (Session::*of)() const) const {
   std::optional<Time> first;
@@ -192,7 +200,9 @@ void Device::on_timer() {
 
 void Device::step(Time now) {
   if (const auto due = pacer_.next_tick(); due && now >= *due) figures_.lateness.add(seconds(now - *due));
-  if (pacer_.fire(now, busy_)) ping(pacer_.last_tick());
+  const bool fires = pacer_.fire(now, busy_);
+  state_.ping_is_owed = pacer_.trigger_waits();
+  if (fires) ping(pacer_.last_tick());
 }
 
 void Device::tick_sessions() {
@@ -215,7 +225,7 @@ void Device::ping(Time at) {
   const OnStale on_stale = context_.config.poses.on_stale;
   if (stale && on_stale == OnStale::stop) {
     ++figures_.skipped_stale;
-    return;
+    return context_.on_change();
   }
   update_state(at);
   PingRequest request;

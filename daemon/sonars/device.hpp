@@ -125,6 +125,7 @@ class Device final : public SessionParent {
   void arm();
   void on_timer();
   bool wants_pings() const;
+  bool waits_for_pose(Time at) const;
   std::optional<Time> earliest(std::optional<Time> (Session::*of)() const) const;
   void ping(Time at);
   void on_ping(Simulator::Outcome outcome);
@@ -164,7 +165,7 @@ class Device final : public SessionParent {
   bool asked_ = false;                                 // a client that is still connected has sent settings
   std::uint32_t ping_number_ = 0;
   bool transmits_ = true;  // as far as control is concerned
-  bool busy_ = false, stopping_ = false, beacon_failed_ = false;
+  bool busy_ = false, started_ = false, stopping_ = false, beacon_failed_ = false;
 
   DeviceFigures figures_;
   LogLimiter refusals_, visits_, changes_, notices_, faults_;

@@ -41,6 +41,7 @@ class Pacer {
   bool fire(Time now, bool busy);
 
   Time last_tick() const { return last_tick_; }
+  bool trigger_waits() const { return trigger_waits_; }
   std::chrono::nanoseconds period() const { return period_; }
   /// That were due; those skipped, fired, and a trigger that waits add up to it.
   std::uint64_t ticks() const { return ticks_; }

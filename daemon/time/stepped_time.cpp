@@ -13,10 +13,11 @@ SteppedTime::Bound SteppedTime::bound(std::optional<Time> for_pings) const {
 }
 
 Time SteppedTime::tick_at(Time due) const {
-  if (mode_ != ClockMode::follow) return due;
+  const Bound now = bound();
+  if (mode_ != ClockMode::follow || !now.then) return due;  // before the first pose there is no lead
   const bool is_waited_for =
       std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return w.until.last_tick >= due; });
-  return is_waited_for ? due : std::max(due, bound().last_tick - most_lead);
+  return is_waited_for ? due : std::max(due, now.last_tick - most_lead);
 }
 
 std::string SteppedTime::step(double dt_s) {

@@ -144,7 +144,8 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
 
   const bool own_clock = !shared_clock && sample.stamp.domain != ClockDomain::arrival;
   const Ns offset = own_clock ? offset_for(track, at, now, same_history && !reset) : Ns(0);
-  if (rules_.follows && offset != track.offset && track.sender_id == sender.id)
+  const bool vehicle = sample.of == PoseSample::Of::vehicle;  // other bodies may come seldom
+  if (rules_.follows && vehicle && offset != track.offset && track.sender_id == sender.id)
     out.notice = "stamps of " + track.body.name + " do not go on from where they were: taken as the next moments of our time";
   track.offset = offset;
 

@@ -50,8 +50,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
       waiting_.pop_front();
     }
     if (subscription_ && subscription_->next <= now) {
-      ask_for_ping(subscription_->head, reaction);
       subscription_->wanted = true;
+      if (subscribed_head_is_free()) ask_for_ping(subscription_->head, reaction);
       subscription_->next += ((now - subscription_->next) / subscription_->interval + 1) * subscription_->interval;
     }
     if (now >= spoke_at_ + keep_alive_after) reaction.replies.push_back(make_frame(FrameType::keep_alive, 0, {}));
@@ -90,10 +90,11 @@ class BlueViewDialogue final : public protocol::Dialogue {
       delivery.prefixes.push_back(make_header(FrameType::ping_data, 0, shared_bytes));
       subscription_->wanted = false;
     }
-    if (!waiting_.empty()) {  // for another head, or with other settings: that one is next
+    const bool subscriber_waits = subscription_ && subscription_->wanted;
+    if (!waiting_.empty() || subscriber_waits) {  // for another head, or with other settings: that one is next
       Reaction reaction;
       settings_ = settings_from(device_.request, device_);
-      ask_for_ping(waiting_.front().head, reaction);
+      ask_for_ping(waiting_.empty() ? subscription_->head : waiting_.front().head, reaction);
       delivery.events = std::move(reaction.events);
     }
     if (!delivery.prefixes.empty()) on_ping_queued(now);
@@ -193,8 +194,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     put_text(out, std::to_string(device_.id));
     put_text(out, "sonard");
     write("temp_c", static_cast<float>(device_.water.temperature_c) + housing_above_water_c);
-    const std::uint32_t capabilities = text_option(device_.options, option_name::heads_base) == "strict" ? 1 : 0;
-    write("caps", capabilities);
+    const std::uint32_t strict_heads = text_option(device_.options, option_name::heads_base) == "strict" ? 1 : 0;
+    write("caps", strict_heads | (device_.simulated_time ? 2u : 0u));
     write("n_heads", static_cast<std::uint8_t>(settings_.heads.size()));
     for (std::size_t i = 0; i < settings_.heads.size(); ++i) put_head(out, static_cast<int>(i));
     return out;
@@ -271,6 +272,9 @@ class BlueViewDialogue final : public protocol::Dialogue {
     }
     reaction.replies.push_back(make_frame(reply_to(FrameType::subscribe), frame.header.request_id, {}));
   }
+
+  /// Who asked for one ping of another head gets that first: a quick subscription would else take the sonar away every time.
+  bool subscribed_head_is_free() const { return !device_.ping_is_owed || settings_.active_head == subscription_->head; }
 
   void ask_for_ping(int head, Reaction& reaction) {
     settings_.active_head = head;

@@ -1,6 +1,7 @@
 // What the user types reaches the configuration, and wins over the file; what is not typed changes nothing.
 #include "daemon/command_line.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace sonar {
@@ -27,10 +28,30 @@ Config overridden(const std::vector<std::string>& words, const std::string& engi
   return *std::move(config);
 }
 
+/// Of a configuration whose controls are off, with these words.
+Result<void> deaf_with(const std::string& clock, const std::vector<std::string>& words) {
+  auto config = parse_config(
+      "world: {scene: demo.yaml}\nvehicles: [{name: rov}]\nsonars: [{name: a, profile: oculus-m1200d, bind_ip: "
+      "127.0.0.2}]\ncontrol: {stream: off, http: off}\nclock: " +
+          clock + "\n",
+      "test.yaml", {});
+  if (!config) throw std::runtime_error(config.error().text);
+  return override_config(*config, std::get<RunCommand>(parse(words)));
+}
+
 int usage_error(const std::vector<std::string>& words) {
   const Command command = parse(words);
   const auto* leave = std::get_if<Leave>(&command);
   return leave == nullptr ? 0 : leave->exit_code;
+}
+
+TEST(CommandLine, ItsClockIsJudgedInPlaceOfTheFiles) {
+  EXPECT_TRUE(deaf_with("realtime", {"run", "x.yaml"}));
+  EXPECT_THAT(deaf_with("realtime", {"run", "x.yaml", "--clock", "lockstep"}).error().text,
+              ::testing::StartsWith("--clock: lockstep lets time pass"));
+  EXPECT_THAT(deaf_with("lockstep", {"run", "x.yaml"}).error().text,
+              ::testing::StartsWith("test.yaml:5:8: clock: lockstep lets"));
+  EXPECT_TRUE(deaf_with("lockstep", {"run", "x.yaml", "--clock", "realtime"}));
 }
 
 TEST(CommandLine, SwitchesOfTheModelReachTheEngine) {

@@ -249,12 +249,6 @@ TEST(Config, EveryRefusalSaysWhatAndWhere) {
   EXPECT_THAT(with("poses: {stale_after_s: 0}\n"), HasSubstr("poses.stale_after_s"));
   EXPECT_THAT(with("engine: {quality: best}\n"), HasSubstr("engine.quality"));
   EXPECT_THAT(with("clock: folow\n"), HasSubstr("did you mean \"follow\""));
-  EXPECT_THAT(with("clock: lockstep\ncontrol: {stream: off, http: off}\n"),
-              HasSubstr("clock: lockstep lets time pass when control asks for it, and control.stream and control.http are off"));
-  EXPECT_EQ(with("clock: lockstep\ncontrol: {stream: off}\n"), "accepted");
-  const std::string deaf = "control: {stream: off, http: off}\nposes: {protobuf: off, json: off";
-  EXPECT_THAT(with("clock: follow\n" + deaf + "}\n"), HasSubstr("clock: follow lets time pass by the stamps of poses"));
-  EXPECT_EQ(with("clock: follow\n" + deaf + ", mavlink: 'udpin:127.0.0.1:0'}\n"), "accepted");
   EXPECT_THAT(with("log: {level: loud}\n"), HasSubstr("log.level"));
   const std::string hot = "world: {scene: scene.yaml, water: {temperature_c: 30}}\n";
   EXPECT_THAT(why(hot + vehicles + sonar), HasSubstr("world.water.temperature_c: 30 C or more"));
@@ -262,6 +256,23 @@ TEST(Config, EveryRefusalSaysWhatAndWhere) {
   EXPECT_THAT(why("world: {scene: scene.yaml, water: {sound_speed_mps: 340}}\n" + vehicles + sonar),
               HasSubstr("sound_speed_mps"));
   EXPECT_THAT(why(world + "vehicles: [{name: a, trajectory: path.csv}]\n" + sonar), HasSubstr("vehicles[0].trajectory"));
+}
+
+TEST(Config, ATimeThatWouldStandForEverIsRefused) {
+  const auto with = [](const std::string& more) {
+    const auto config = parse(world + vehicles + sonar + more);
+    if (!config) return config.error().text;
+    const auto passes = check_time_can_pass(*config);
+    return passes ? std::string("accepted") : passes.error().text;
+  };
+  EXPECT_THAT(with("control: {stream: off, http: off}\nclock: lockstep\n"),
+              HasSubstr("sonard.yaml:8:8: clock: lockstep lets time pass when control asks for it, and control.stream and "
+                        "control.http are off"));
+  EXPECT_EQ(with("clock: lockstep\ncontrol: {stream: off}\n"), "accepted");
+  const std::string deaf = "control: {stream: off, http: off}\nposes: {protobuf: off, json: off";
+  EXPECT_THAT(with("clock: follow\n" + deaf + "}\n"), HasSubstr("clock: follow lets time pass by the stamps of poses"));
+  EXPECT_EQ(with("clock: follow\n" + deaf + ", mavlink: 'udpin:127.0.0.1:0'}\n"), "accepted");
+  EXPECT_EQ(with("clock: stepped\n" + deaf + "}\n"), "accepted");
 }
 
 TEST(Config, ErrorsOfConfigurationsExitWith78AndMissingFilesWith66) {

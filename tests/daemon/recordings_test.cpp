@@ -359,6 +359,21 @@ TEST(RecordedDaemon, ASonarThatAReloadTakesAwayIsRecordedNoMore) {
   EXPECT_EQ(messages_in(folder.path + "/rear.mcap"), 0u) << "whole, if empty";
 }
 
+TEST(RecordedDaemon, AReloadThatFailsLeavesTheRecordingOfWhatGoesOn) {
+  const Folder folder;
+  DaemonSetup setup = recording_setup(folder);
+  setup.config_file = setup.options.handle_signals = true;
+  Daemon daemon(setup);
+  const Daemon holds_the_other_address;
+  EXPECT_EQ(daemon.ask(control::StartRecording{"front.mcap"}).text, "");
+  setup.address = holds_the_other_address.address();
+  daemon.write_config(yaml_of(setup));
+  ASSERT_EQ(kill(getpid(), SIGHUP), 0);
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("front as before") != std::string::npos; })) << daemon.log_text();
+  EXPECT_TRUE(daemon.status().recordings.at(0).running);
+  EXPECT_EQ(daemon.stop(), 0);
+}
+
 TEST(RecordedDaemon, AStopOfTheDaemonFinishesTheFile) {
   const Folder folder;
   Daemon daemon(recording_setup(folder));

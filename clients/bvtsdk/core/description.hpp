@@ -28,10 +28,12 @@ struct SonarDescription {
   std::uint16_t version = 1;
   std::string model, name, serial, firmware;
   float temperature_c = 0;
-  std::uint32_t capabilities = 0;  // bit 0: head numbers are strict
+  std::uint32_t capabilities = 0;  // bit 0: head numbers are strict; bit 1: its time may stand
   std::vector<HeadDescription> heads;
 
   bool strict_heads() const { return (capabilities & 1) != 0; }
+  /// Of a simulator: that it says nothing for long means nothing.
+  bool may_be_silent() const { return (capabilities & 2) != 0; }
   /// The head a host means by a number: its own, or 0 and 1 alike where there is one head and numbers are not strict.
   const HeadDescription* head(int number) const;
 };

@@ -67,6 +67,7 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
   if (greeted != success) return connection_timed_out;
   std::optional<SonarDescription> told = decode_description(answer);
   if (!told) return bad_packet_type;
+  fresh->may_be_silent_ = told->may_be_silent();
   sonar = std::move(*told);
   link = std::move(fresh);
   return success;
@@ -122,7 +123,7 @@ void Link::read_until_lost() {
     const auto glance = std::min(patience_.silence, patience_.lifeless) / 4;
     while (connected()) {
       if (wait_for(socket_.fd(), POLLIN, Clock::now() + glance) == success) receive();
-      if (Clock::now() - last_heard_ > patience_.lifeless) lose(socket_read_timeout);
+      if (!may_be_silent_ && Clock::now() - last_heard_ > patience_.lifeless) lose(socket_read_timeout);
       keep_alive();
     }
   } catch (const std::exception& e) {  // out of memory

@@ -66,6 +66,7 @@ class Link {
   const Patience patience_;
   Descriptor socket_;
   std::atomic<Code> lost_{success};
+  std::atomic<bool> may_be_silent_{false};  // the sonar's time may stand; that it is gone, TCP tells
 
   std::mutex waiting_mutex_;
   std::condition_variable answered_;

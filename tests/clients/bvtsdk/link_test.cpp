@@ -54,11 +54,13 @@ class Peer {
   void reply(const FrameHeader& request, const Bytes& payload) {
     send({static_cast<FrameType>(static_cast<int>(request.type) | 0x8000), 0, request.request_id, 0}, payload);
   }
-  void greet() {
+  void greet(std::uint32_t capabilities = 0) {
     Bytes payload;
     const FrameHeader hello = next(payload);
     EXPECT_EQ(hello.type, FrameType::hello);
-    reply(hello, encode_description(some_sonar()));
+    SonarDescription sonar = some_sonar();
+    sonar.capabilities |= capabilities;
+    reply(hello, encode_description(sonar));
   }
   /// Until the host hangs up.
   void wait_for_the_end() {
@@ -186,6 +188,18 @@ TEST(Link, SendsKeepAliveWhenItHasNothingToSay) {
     for (int i = 0; i < 1500 && heard < 8; ++i) std::this_thread::sleep_for(10ms);
   }
   EXPECT_EQ(heard, 8);
+}
+
+TEST(Link, ASonarWhoseTimeMayStandIsNotGivenUp) {
+  FakeSonar fake([](Peer& peer) {
+    peer.greet(2);
+    peer.wait_for_the_end();
+  });
+  std::unique_ptr<Link> link;
+  const Patience impatient{10s, 10s, 50ms, 100ms};
+  ASSERT_EQ(fake.open(link, impatient), success);
+  std::this_thread::sleep_for(1s);
+  EXPECT_TRUE(link->connected());
 }
 
 TEST(Link, ASilentSonarIsGivenUp) {
