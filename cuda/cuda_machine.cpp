@@ -97,9 +97,11 @@ class CudaMachine final : public Machine {
   void download(int lane, void* to, const void* from_device, std::size_t bytes) override {
     check(module_.download(at_, lane, to, from_device, bytes));
   }
-  void zero(int lane, void* device, std::size_t bytes) override { check(module_.zero(at_, lane, device, bytes)); }
-  void run(int lane, Step step, const PingView* views, int pings, std::uint32_t largest) override {
-    check(module_.run(at_, lane, static_cast<int>(step), views, pings, largest));
+  void run(int lane, const Launch& launch) override { check(module_.run(at_, lane, &launch)); }
+  StepSeconds step_seconds(int lane) override {
+    StepSeconds seconds;
+    check(module_.step_seconds(at_, lane, &seconds));
+    return seconds;
   }
   void order(int lane, int earlier) override { check(module_.order(at_, lane, earlier)); }
   void wait(int lane) override { check(module_.wait(at_, lane)); }

@@ -5,18 +5,25 @@
 #include <new>
 
 #include "cuda/cuda_module.hpp"
+#include "cuda/graph_shelf.hpp"
 #include "cuda/steps.hpp"
 
 namespace sonar::cuda {
 namespace {
 
 constexpr int lanes = 3;  // as Machine::lanes
-constexpr unsigned threads_a_block = 128;
 constexpr int device = 0;
 
+struct Lane {
+  cudaStream_t stream = nullptr;
+  cudaEvent_t done = nullptr;
+  GraphShelf<cudaGraphExec_t> graphs;
+  cudaEvent_t begin[step_count] = {}, end[step_count] = {};  // made when a launch is first timed
+  bool timed[step_count] = {};                               // since step_seconds was last asked
+};
 struct Opened {
-  cudaStream_t lane[lanes] = {};
-  cudaEvent_t done[lanes] = {};
+  Lane lane[lanes];
+  bool graphs_work = true;  // until one does not: then launches are plain for good
 };
 Opened& opened(void* machine) { return *static_cast<Opened*>(machine); }
 
@@ -24,7 +31,7 @@ Opened& opened(void* machine) { return *static_cast<Opened*>(machine); }
 template <Step step>
 __global__ void __launch_bounds__(threads_a_block) kernel(const PingView* views) {
   const PingView& view = views[blockIdx.y];
-  const unsigned i = blockIdx.x * threads_a_block + threadIdx.x;
+  const unsigned i = blockIdx.x * threads_a_block + threadIdx.x;  // at most 2^32 - 1: see blocks_for
   if (i < step_size(step, view)) run_step<step>(view, i);
 }
 
@@ -60,21 +67,27 @@ int query(int* devices, char* name, std::size_t room) {
 }
 
 void close(void* machine) {
-  Opened& m = opened(machine);
-  for (int i = 0; i < lanes; ++i) {
-    if (m.done[i]) cudaEventDestroy(m.done[i]);
-    if (m.lane[i]) cudaStreamDestroy(m.lane[i]);
+  for (Lane& l : opened(machine).lane) {
+    if (l.stream) cudaStreamSynchronize(l.stream);
+    for (auto& entry : l.graphs.entries())
+      if (entry.graph) cudaGraphExecDestroy(entry.graph);
+    for (int step = 0; step < step_count; ++step) {
+      if (l.begin[step]) cudaEventDestroy(l.begin[step]);
+      if (l.end[step]) cudaEventDestroy(l.end[step]);
+    }
+    if (l.done) cudaEventDestroy(l.done);
+    if (l.stream) cudaStreamDestroy(l.stream);
   }
-  delete &m;
+  delete &opened(machine);
 }
 
 int open(void** machine) {
   Opened* m = new (std::nothrow) Opened;
   if (!m) return cudaErrorMemoryAllocation;
   cudaError_t error = cudaSetDevice(device);
-  for (int i = 0; i < lanes && error == cudaSuccess; ++i) {
-    error = cudaStreamCreateWithFlags(&m->lane[i], cudaStreamNonBlocking);
-    if (error == cudaSuccess) error = cudaEventCreateWithFlags(&m->done[i], cudaEventDisableTiming);
+  for (Lane& l : m->lane) {
+    if (error == cudaSuccess) error = cudaStreamCreateWithFlags(&l.stream, cudaStreamNonBlocking);
+    if (error == cudaSuccess) error = cudaEventCreateWithFlags(&l.done, cudaEventDisableTiming);
   }
   // A kernel that this build has no code for fails here and not in the first ping.
   cudaFuncAttributes attributes;
@@ -92,28 +105,97 @@ int release(void*, void* at) { return cudaFree(at); }
 int allocate_host(void*, void** at, std::size_t bytes) { return cudaMallocHost(at, bytes); }
 int release_host(void*, void* at) { return cudaFreeHost(at); }
 int upload(void* machine, int lane, void* to, const void* from, std::size_t bytes) {
-  return cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, opened(machine).lane[lane]);
+  return cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, opened(machine).lane[lane].stream);
 }
 int download(void* machine, int lane, void* to, const void* from, std::size_t bytes) {
-  return cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, opened(machine).lane[lane]);
+  return cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, opened(machine).lane[lane].stream);
 }
-int zero(void* machine, int lane, void* at, std::size_t bytes) {
-  return cudaMemsetAsync(at, 0, bytes, opened(machine).lane[lane]);
+cudaError_t launch_step(cudaStream_t stream, int step, const GraphKey& what) {
+  const Kernel k = kernel_of(static_cast<Step>(step), std::make_integer_sequence<int, step_count>());
+  k<<<dim3(what.blocks[step], static_cast<unsigned>(what.pings)), threads_a_block, 0, stream>>>(what.views);
+  return cudaGetLastError();
+}
+cudaError_t launch_plainly(cudaStream_t stream, const GraphKey& what) {
+  cudaError_t error = cudaSuccess;
+  for (int step = what.from; step < what.to && error == cudaSuccess; ++step)
+    if (what.blocks[step] > 0) error = launch_step(stream, step, what);
+  return error;
 }
 
-int run(void* machine, int lane, int step, const PingView* views, int pings, std::uint32_t largest) {
-  const Kernel k = kernel_of(static_cast<Step>(step), std::make_integer_sequence<int, static_cast<int>(Step::steps)>());
-  const dim3 grid((largest + threads_a_block - 1) / threads_a_block, static_cast<unsigned>(pings));
-  k<<<grid, threads_a_block, 0, opened(machine).lane[lane]>>>(views);
-  return cudaGetLastError();
+/// The launch as a graph; null when that does not work here. The stream is out of capture in any case.
+cudaGraphExec_t capture(cudaStream_t stream, const GraphKey& what) {
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t made = nullptr;
+  // Of this thread only: other engines may allocate on theirs meanwhile.
+  if (cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal) == cudaSuccess) {
+    const cudaError_t launched = launch_plainly(stream, what);
+    const cudaError_t ended = cudaStreamEndCapture(stream, &graph);
+    if (launched == cudaSuccess && ended == cudaSuccess && graph && cudaGraphInstantiateWithFlags(&made, graph, 0) != cudaSuccess)
+      made = nullptr;
+  }
+  if (graph) cudaGraphDestroy(graph);
+  if (!made) cudaGetLastError();  // it is no error of the launch that follows
+  return made;
+}
+
+cudaError_t launch_by_graph(Opened& m, Lane& lane, const GraphKey& what) {
+  cudaGraphExec_t dropped = nullptr;
+  auto& entry = lane.graphs.look_up(what, dropped);
+  if (dropped) {
+    const cudaError_t error = cudaStreamSynchronize(lane.stream);  // it may be at work
+    cudaGraphExecDestroy(dropped);
+    if (error != cudaSuccess) return error;
+  }
+  // What came before has been launched plainly: every kernel is loaded by then, which a capture must not do.
+  if (!entry.graph && entry.seen > 1) {
+    entry.graph = capture(lane.stream, what);
+    m.graphs_work = entry.graph != nullptr;
+  }
+  return entry.graph ? cudaGraphLaunch(entry.graph, lane.stream) : launch_plainly(lane.stream, what);
+}
+
+cudaError_t launch_timed(Lane& lane, const GraphKey& what) {
+  cudaError_t error = cudaSuccess;
+  for (int step = what.from; step < what.to && error == cudaSuccess; ++step) {
+    if (what.blocks[step] == 0) continue;
+    if (!lane.begin[step]) error = cudaEventCreate(&lane.begin[step]);
+    if (error == cudaSuccess && !lane.end[step]) error = cudaEventCreate(&lane.end[step]);
+    if (error == cudaSuccess) error = cudaEventRecord(lane.begin[step], lane.stream);
+    if (error == cudaSuccess) error = launch_step(lane.stream, step, what);
+    if (error == cudaSuccess) error = cudaEventRecord(lane.end[step], lane.stream);
+    lane.timed[step] = error == cudaSuccess;
+  }
+  return error;
+}
+
+int run(void* machine, int lane, const Launch* launch) {
+  Opened& m = opened(machine);
+  Lane& l = m.lane[lane];
+  const GraphKey what(*launch);
+  if (launch->timed != 0) return launch_timed(l, what);
+  return m.graphs_work ? launch_by_graph(m, l, what) : launch_plainly(l.stream, what);
+}
+
+int step_seconds(void* machine, int lane, StepSeconds* seconds) {
+  Lane& l = opened(machine).lane[lane];
+  for (int step = 0; step < step_count; ++step) {
+    seconds->of[step] = 0;
+    if (!l.timed[step]) continue;
+    l.timed[step] = false;
+    float ms = 0;
+    const cudaError_t error = cudaEventElapsedTime(&ms, l.begin[step], l.end[step]);
+    if (error != cudaSuccess) return error;
+    seconds->of[step] = 1e-3 * static_cast<double>(ms);
+  }
+  return cudaSuccess;
 }
 
 int order(void* machine, int lane, int earlier) {
-  Opened& m = opened(machine);
-  const cudaError_t error = cudaEventRecord(m.done[earlier], m.lane[earlier]);
-  return error != cudaSuccess ? error : cudaStreamWaitEvent(m.lane[lane], m.done[earlier], 0);
+  Lane& before = opened(machine).lane[earlier];
+  const cudaError_t error = cudaEventRecord(before.done, before.stream);
+  return error != cudaSuccess ? error : cudaStreamWaitEvent(opened(machine).lane[lane].stream, before.done, 0);
 }
-int wait(void* machine, int lane) { return cudaStreamSynchronize(opened(machine).lane[lane]); }
+int wait(void* machine, int lane) { return cudaStreamSynchronize(opened(machine).lane[lane].stream); }
 
 const CudaModule module{module_version,
                         sizeof(PingView),
@@ -129,8 +211,8 @@ const CudaModule module{module_version,
                         release_host,
                         upload,
                         download,
-                        zero,
                         run,
+                        step_seconds,
                         order,
                         wait};
 

@@ -9,7 +9,7 @@
 
 namespace sonar::cuda {
 
-inline constexpr std::uint32_t module_version = 1;  // of this file, of device_types.hpp and of the steps
+inline constexpr std::uint32_t module_version = 2;  // of this file, of device_types.hpp and of the steps
 inline constexpr const char* module_file = "libsonard_cuda.so";
 inline constexpr const char* module_entry = "sonard_cuda_module";
 
@@ -27,8 +27,8 @@ struct CudaModule {
   int (*release_host)(void* machine, void* host);
   int (*upload)(void* machine, int lane, void* to_device, const void* from, std::size_t bytes);
   int (*download)(void* machine, int lane, void* to, const void* from_device, std::size_t bytes);
-  int (*zero)(void* machine, int lane, void* device, std::size_t bytes);
-  int (*run)(void* machine, int lane, int step, const PingView* views, int pings, std::uint32_t largest);
+  int (*run)(void* machine, int lane, const Launch* launch);
+  int (*step_seconds)(void* machine, int lane, StepSeconds* seconds);
   int (*order)(void* machine, int lane, int earlier);
   int (*wait)(void* machine, int lane);
 };

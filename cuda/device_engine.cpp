@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
@@ -13,7 +14,17 @@ namespace sonar::cuda {
 namespace {
 
 constexpr std::size_t most_plans = 8;
-constexpr int keeping_lane = 2;  // of what stays on the device: plans and cells; rooms have 0 and 1
+constexpr int keeping_lane = 2;                           // of what stays on the device: plans and cells; rooms have 0 and 1
+constexpr std::size_t work_bytes = std::size_t{1} << 30;  // of a batch: pings of many samples are launched before it is full
+
+/// Where the benchmark's table has a step.
+constexpr Stage stage_of(Step step) {
+  if (step <= Step::first_hits) return Stage::trace;
+  if (step <= Step::place) return Stage::scatter;
+  if (step <= Step::sum_columns) return Stage::synthesize;
+  if (step <= Step::finish_columns) return Stage::noise;
+  return step == Step::receive ? Stage::receive : Stage::couple;
+}
 
 class DeviceEngine final : public PingEngine {
  public:
@@ -26,8 +37,9 @@ class DeviceEngine final : public PingEngine {
         pool_(pool),
         kernels_(simd::kernels_for(options.simd)),
         rays_(scene, pool.threads()),
-        preparer_(*machine_, scene, rays_, kernels_, pool, device_options_.cell_bytes),
-        rooms_{BatchRoom(*machine_, 0), BatchRoom(*machine_, 1)} {
+        preparer_(*machine_, scene, rays_, kernels_, pool, device_options_.cell_bytes, options.now_s),
+        batch_(static_cast<std::size_t>(std::max(1, device_options_.batch))),
+        rooms_{BatchRoom(*machine_, 0, batch_), BatchRoom(*machine_, 1, batch_)} {
     work_.now_s = options.now_s;
   }
   ~DeviceEngine() override {
@@ -42,10 +54,11 @@ class DeviceEngine final : public PingEngine {
         run_on_device(requests, pings);
         return pings;
       } catch (const std::runtime_error& e) {
-        failed_ = true;
-        say(std::string("the CUDA engine stopped: ") + e.what() + "; from here on the CPU computes");
+        failed_ = std::string("the CUDA engine stopped: ") + e.what();
         for (BatchRoom& room : rooms_) empty(room);
+        if (device_options_.cpu_after_failure) say(*failed_ + "; from here on the CPU computes");
       }
+    if (!device_options_.cpu_after_failure) throw EngineUnavailable(*failed_ + "; use --engine cpu or auto");
     for (std::size_t i = 0; i < requests.size(); ++i) pings[i] = by_cpu(requests[i]);
     return pings;
   }
@@ -71,7 +84,7 @@ class DeviceEngine final : public PingEngine {
         preparer_.forget_cells();
         if (!prepare(requests[i], i, rooms_[which])) throw std::runtime_error("the tiles of one ping do not fit an empty store");
       }
-      if (rooms_[which].pings.size() < static_cast<std::size_t>(device_options_.batch)) continue;
+      if (rooms_[which].pings.size() < batch_ && rooms_[which].work.taken_bytes() < work_bytes) continue;
       launch(rooms_[which]);
       which = 1 - which;
       finish(rooms_[which], pings);  // the other one: it has had the time it took to prepare this one
@@ -112,30 +125,32 @@ class DeviceEngine final : public PingEngine {
 
   void launch(BatchRoom& room) {
     if (room.pings.empty()) return;
-    const PingView* views = room.tables.put(room.views);
     machine_->order(room.lane, keeping_lane);
-    room.tables.upload(room.lane);
-    for (const PingView& view : room.views) {
-      machine_->zero(room.lane, view.counters, 2 * sizeof(std::uint32_t));
-      if (view.slots > 0)
-        machine_->zero(room.lane, view.in_chunk,
-                       sizeof(std::uint32_t) * view.chunks * static_cast<std::size_t>(view.sea.columns));
-    }
-    const auto pings = static_cast<int>(room.views.size());
-    for (int s = 0; s < static_cast<int>(Step::steps); ++s) {
-      const auto step = static_cast<Step>(s);
-      std::uint32_t largest = 0;
-      for (const PingView& view : room.views) largest = std::max(largest, step_size(step, view));
-      if (largest > 0) machine_->run(room.lane, step, views, pings, largest);
-    }
+    Launch launch;
+    launch.views = room.upload();
+    launch.pings = static_cast<std::int32_t>(room.views.size());
+    launch.timed = options_.now_s != nullptr ? 1 : 0;
+    for (int step = 0; step < step_count; ++step)
+      for (const PingView& view : room.views)
+        launch.largest[step] = std::max(launch.largest[step], step_size(static_cast<Step>(step), view));
+    machine_->run(room.lane, launch);
     room.results.download(room.lane);
   }
 
   void finish(BatchRoom& room, std::vector<Ping>& pings) {
     if (room.pings.empty()) return;
     machine_->wait(room.lane);
+    if (options_.now_s) share_times(room);
     for (std::size_t i = 0; i < room.pings.size(); ++i) pings[room.pings[i].index] = take(room.pings[i], room.views[i]);
     empty(room);
+  }
+  /// Every ping of a batch took as long as the others.
+  void share_times(BatchRoom& room) {
+    const StepSeconds seconds = machine_->step_seconds(room.lane);
+    for (BatchRoom::Ping& ping : room.pings)
+      for (int step = 0; step < step_count; ++step)
+        ping.statistics.seconds[static_cast<std::size_t>(stage_of(static_cast<Step>(step)))] +=
+            seconds.of[step] / static_cast<double>(room.pings.size());
   }
   Ping take(BatchRoom::Ping& from, const PingView& view) {
     Ping ping = std::move(from.ping);
@@ -186,11 +201,12 @@ class DeviceEngine final : public PingEngine {
   std::unique_ptr<SurfaceCells> cells_;
   std::vector<std::shared_ptr<PlanTables>> plans_;
   PingPreparer preparer_;
+  std::size_t batch_;
   BatchRoom rooms_[2];
   Workspace work_;  // of the CPU
   std::set<std::string> told_;
   PingStatistics statistics_;
-  bool failed_ = false;
+  std::optional<std::string> failed_;  // why
 };
 
 }  // namespace

@@ -15,12 +15,15 @@ namespace sonar::cuda {
 struct DeviceEngineOptions {
   std::size_t cell_bytes = std::size_t{2} << 30;  // of the device's memory for surface cells; what one ping needs, it gets
   int batch = 8;                                  // pings that are launched together
+  bool cpu_after_failure = true;                  // else a device that fails is the end: run() throws EngineUnavailable
   /// Told, once each: what the CPU computes instead, and why. May be empty.
   std::function<void(const std::string&)> say = {};
 };
 
 /// The pool must outlive the engine. Pings that the device does not do (why_not_on_device) are computed here by the CPU; so is
-/// everything from the moment the device fails. Throws std::runtime_error when the device cannot hold the scene.
+/// everything from the moment the device fails, beginning with the pings that were lost, unless the options say otherwise. With a
+/// clock in `options` every step is timed by the device's own, which takes a little time itself. Throws std::runtime_error when
+/// the device cannot hold the scene.
 std::unique_ptr<PingEngine> make_device_engine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options,
                                                std::unique_ptr<Machine> machine, DeviceEngineOptions device_options = {});
 

@@ -14,7 +14,8 @@ inline constexpr std::uint32_t no_object = 0xFFFFFFFFu;  // what a ray that hits
 inline constexpr int elevation_terms = 9;                // of the elevation pattern, as simd::elevation_terms
 inline constexpr int law_steps = 128;                    // of a tabulated scattering law, as simd::law_steps
 inline constexpr std::uint32_t slots_a_chunk = 256;      // cells that are sorted into columns together
-inline constexpr std::uint32_t sum_parts = 32;           // threads that share the sum of one column: a warp
+inline constexpr std::uint32_t counters_a_ping = 2;
+inline constexpr std::uint32_t sum_parts = 32;  // threads that share the sum of one column: a warp
 
 /// Boxes of both children, one line of the cache. Links as in bvh_link.
 struct alignas(64) BvhNode {
@@ -180,11 +181,12 @@ struct PingView {
   std::uint8_t* codes;      // [rows][beams][bytes]
   float* pressure;          // [rows][beams], null = not wanted
   float* kept_beams;        // complex [samples][beams], null = not wanted
-  std::uint32_t* counters;  // [0] rays, [1] echoes
+  std::uint32_t* counters;  // [0] rays, [1] echoes: counters_a_ping of them
 };
 
 /// The kernels of a ping, in order. What each does: steps.hpp.
 enum class Step : std::int32_t {
+  clear,
   trace_base,
   refine,
   first_hits,
@@ -203,6 +205,17 @@ enum class Step : std::int32_t {
   crosstalk_add,
   receive,
   steps
+};
+inline constexpr std::int32_t step_count = static_cast<std::int32_t>(Step::steps);
+
+/// Steps [from, to) for pings whose views lie in the device's memory.
+struct Launch {
+  const PingView* views = nullptr;
+  std::int32_t pings = 0, from = 0, to = step_count, timed = 0;
+  std::uint32_t largest[step_count] = {};  // of the pings' step_size
+};
+struct StepSeconds {
+  double of[step_count] = {};
 };
 
 }  // namespace sonar::cuda

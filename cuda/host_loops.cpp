@@ -1,4 +1,5 @@
 #include <array>
+#include <chrono>
 #include <cstring>
 #include <new>
 #include <utility>
@@ -23,6 +24,8 @@ constexpr auto loops = loops_of(std::make_index_sequence<static_cast<std::size_t
 
 constexpr std::align_val_t alignment{256};  // as the device gives it
 
+double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
 class HostLoops final : public Machine {
  public:
   std::string name() const override { return "host loops"; }
@@ -32,12 +35,21 @@ class HostLoops final : public Machine {
   void release_host(void* host) override { ::operator delete(host, alignment); }
   void upload(int, void* to_device, const void* from, std::size_t bytes) override { std::memcpy(to_device, from, bytes); }
   void download(int, void* to, const void* from_device, std::size_t bytes) override { std::memcpy(to, from_device, bytes); }
-  void zero(int, void* device, std::size_t bytes) override { std::memset(device, 0, bytes); }
-  void run(int, Step step, const PingView* views, int pings, std::uint32_t) override {
-    for (int p = 0; p < pings; ++p) loops[static_cast<std::size_t>(step)](views[p], step_size(step, views[p]));
+  void run(int lane, const Launch& launch) override {
+    StepSeconds& seconds = seconds_[static_cast<std::size_t>(lane)];
+    for (int step = launch.from; step < launch.to; ++step) {
+      const double begin = launch.timed != 0 ? now_s() : 0;
+      for (int p = 0; p < launch.pings; ++p)
+        loops[static_cast<std::size_t>(step)](launch.views[p], step_size(static_cast<Step>(step), launch.views[p]));
+      if (launch.timed != 0) seconds.of[step] += now_s() - begin;
+    }
   }
+  StepSeconds step_seconds(int lane) override { return std::exchange(seconds_[static_cast<std::size_t>(lane)], {}); }
   void order(int, int) override {}
   void wait(int) override {}
+
+ private:
+  std::array<StepSeconds, lanes> seconds_{};
 };
 
 }  // namespace

@@ -26,9 +26,10 @@ class Machine {
   /// Queued; `from` must stay as it is until the lane has been waited for.
   virtual void upload(int lane, void* to_device, const void* from, std::size_t bytes) = 0;
   virtual void download(int lane, void* to, const void* from_device, std::size_t bytes) = 0;
-  virtual void zero(int lane, void* device, std::size_t bytes) = 0;
-  /// Runs a step for `pings` pings, whose views lie in the device's memory; `largest` is the largest of their step_size.
-  virtual void run(int lane, Step step, const PingView* views, int pings, std::uint32_t largest) = 0;
+  /// Queues steps, one after the other. A launch that is timed is for benchmarks: each step is then told apart.
+  virtual void run(int lane, const Launch& launch) = 0;
+  /// How long each step took in the timed launches since the last call; the lane must have been waited for.
+  virtual StepSeconds step_seconds(int lane) = 0;
   /// What is queued on `lane` from now on begins after what is queued on `earlier` already.
   virtual void order(int lane, int earlier) = 0;
   virtual void wait(int lane) = 0;

@@ -16,12 +16,21 @@ constexpr std::size_t table_chunk = 4u << 20, work_chunk = 64u << 20, result_chu
 
 }  // namespace
 
-BatchRoom::BatchRoom(Machine& machine, int which_lane)
+BatchRoom::BatchRoom(Machine& machine, int which_lane, std::size_t most_pings)
     : lane(which_lane),
       tables(machine, Arena::Where::both, table_chunk),
       work(machine, Arena::Where::device, work_chunk),
       results(machine, Arena::Where::both, result_chunk),
-      cells(machine, Arena::Where::host, cell_chunk) {}
+      cells(machine, Arena::Where::host, cell_chunk),
+      view_memory_(machine, Arena::Where::both, 0),
+      view_table_(view_memory_.take<PingView>(most_pings)) {}
+
+const PingView* BatchRoom::upload() {
+  std::copy(views.begin(), views.end(), view_table_.host);
+  view_memory_.upload(lane);
+  tables.upload(lane);
+  return view_table_.device;
+}
 
 /// A ping while its view is being filled.
 struct PingPreparer::Making {
@@ -40,11 +49,12 @@ struct PingPreparer::Making {
 };
 
 PingPreparer::PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene, const RayScene& rays,
-                           const simd::Kernels& kernels, Parallel& pool, std::size_t cell_bytes)
+                           const simd::Kernels& kernels, Parallel& pool, std::size_t cell_bytes, double (*now_s)())
     : scene_(std::move(scene)),
       rays_(rays),
       kernels_(kernels),
       pool_(pool),
+      now_s_(now_s),
       flat_(*scene_),
       scene_memory_(machine, Arena::Where::both, 0),
       store_(machine, cell_bytes) {
@@ -73,8 +83,13 @@ bool PingPreparer::add(const PingRequest& request, std::size_t index, std::share
   place_fan(m);
   if (!request.blank) {
     const std::vector<LawTable> laws = laws_of(*scene_, m.plan, m.scalars);
+    const double begin = now();
     find_points(m, cells, laws);
+    const double points = now();
     if (!find_tiles(m, cells, laws, lane)) return false;
+    const auto stage = [&](Stage s) -> double& { return m.ping.statistics.seconds[static_cast<std::size_t>(s)]; };
+    stage(request.switches.multipath ? Stage::multipath : Stage::specular) += points - begin;
+    stage(m.ping.statistics.tiles_built > 0 ? Stage::build_cells : Stage::cull) += now() - points;
     add_water(m);
   }
   add_receiver(m);
@@ -304,7 +319,7 @@ void PingPreparer::take_results(Making& m) {
   m.ping.codes = m.room.results.take<std::uint8_t>(ping.samples.size());
   m.ping.pressure = m.room.results.take<float>(ping.pressure_upa.size());
   m.ping.beams = m.room.results.take<float>(2 * ping.beam_signal_upa.size());
-  m.ping.counters = m.room.results.take<std::uint32_t>(2);
+  m.ping.counters = m.room.results.take<std::uint32_t>(counters_a_ping);
   if (m.request.switches.keep_truth) m.ping.truth = m.room.results.take<FirstHit>(m.columns());
   PingView& view = m.view;
   view.codes = m.ping.codes.device;

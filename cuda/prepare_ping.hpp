@@ -22,7 +22,7 @@ namespace sonar::cuda {
 
 /// A batch's place: its memory, its lane, its pings.
 struct BatchRoom {
-  BatchRoom(Machine& machine, int which_lane);
+  BatchRoom(Machine& machine, int which_lane, std::size_t most_pings);
 
   struct Ping {
     sonar::Ping ping;   // sized, not filled
@@ -38,13 +38,21 @@ struct BatchRoom {
   Arena tables, work, results, cells;
   std::vector<PingView> views;
   std::vector<Ping> pings;
+
+  /// Queues views and tables. The views lie where those of the batch before lay: what was captured of it (cuda_module.cu) serves
+  /// again.
+  const PingView* upload();
+
+ private:
+  Arena view_memory_;
+  Arena::Piece<PingView> view_table_;
 };
 
 /// Scene and cells of an engine, and what it keeps between pings.
 class PingPreparer {
  public:
   PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene, const RayScene& rays, const simd::Kernels& kernels,
-               Parallel& pool, std::size_t cell_bytes);
+               Parallel& pool, std::size_t cell_bytes, double (*now_s)());
 
   /// Adds the ping to the room. Bodies must have been placed; `cells` must serve the request. `lane` is that of the tables and
   /// cells that stay on the device. False: there is no room for its tiles; finish what is under way, forget_cells(), and again.
@@ -62,11 +70,13 @@ class PingPreparer {
   void add_water(Making& m);
   void add_receiver(Making& m);
   void take_results(Making& m);
+  double now() const { return now_s_ ? now_s_() : 0; }
 
   std::shared_ptr<const Scene> scene_;
   const RayScene& rays_;
   const simd::Kernels& kernels_;
   Parallel& pool_;
+  double (*now_s_)();  // null = nobody asks how long things take
   FlatScene flat_;
   Arena scene_memory_;
   TracerView tracer_;

@@ -9,11 +9,19 @@
 
 namespace sonar::cuda {
 
+/// What the other steps count in.
+SONAR_HD inline void clear(const PingView& p, std::uint32_t i) {
+  if (i < counters_a_ping) p.counters[i] = 0;
+  if (i < p.chunks * static_cast<std::uint32_t>(p.sea.columns)) p.in_chunk[i] = 0;
+}
+
 /// How many indices a step has for this ping; 0 = nothing to do.
 SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
   const auto columns = static_cast<std::uint32_t>(p.sea.columns), elevations = static_cast<std::uint32_t>(p.sea.elevations);
   const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
   switch (step) {
+    case Step::clear:
+      return p.chunks * columns > counters_a_ping ? p.chunks * columns : counters_a_ping;
     case Step::trace_base:
       return p.has_scene != 0 ? columns * elevations : 0;
     case Step::refine:
@@ -54,6 +62,7 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
 /// The body of a step, chosen when compiled: a kernel holds one only.
 template <Step step>
 SONAR_HD inline void run_step(const PingView& p, std::uint32_t i) {
+  if constexpr (step == Step::clear) clear(p, i);
   if constexpr (step == Step::trace_base) trace_base(p, i);
   if constexpr (step == Step::refine) refine(p, i);
   if constexpr (step == Step::first_hits) first_hits(p, i);

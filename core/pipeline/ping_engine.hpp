@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,12 @@ class Interruption {
   virtual bool expected() const = 0;
   /// Between two parts, on the thread of run(); may call run() of the same engine, but not from within that again.
   virtual void take() = 0;
+};
+
+/// What an engine computes with is gone, a device that failed, and nothing may take its place.
+class EngineUnavailable : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 class PingEngine {
