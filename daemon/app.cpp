@@ -41,9 +41,9 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                recordings_,
                options_.digest,
                [this] { on_change(); },
-               [this](const std::string& why) {
-                 log_.error(why);
-                 exit_code_ = exit_code(ErrorKind::bug);
+               [this](const Error& why) {
+                 log_.error(why.text);
+                 exit_code_ = exit_code(why.kind);
                  stop("the engine failed");
                }},
       fleet_(context_),

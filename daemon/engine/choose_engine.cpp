@@ -51,6 +51,7 @@ std::unique_ptr<PingEngine> choose_engine(EngineDevice device, std::shared_ptr<c
   if (device == EngineDevice::cpu) return make_engine(std::move(scene), pool, options);
   cuda::DeviceEngineOptions device_options;
   device_options.say = say;
+  device_options.cpu_after_failure = device == EngineDevice::automatic;
   auto engine = make_cuda_engine(scene, pool, options, device_options);
   if (engine) return std::make_unique<DeviceAndModes>(*std::move(engine), std::move(scene), pool, options);
   if (device == EngineDevice::cuda) throw std::runtime_error(engine.error().text + "; use --engine cpu or auto");

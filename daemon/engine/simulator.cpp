@@ -130,6 +130,9 @@ Simulator::Outcome Simulator::run(const PingRequest& request) {
   } catch (const std::bad_alloc&) {
     outcome.failure = "out of memory";
     outcome.refused = true;
+  } catch (const EngineUnavailable& e) {
+    outcome.failure = e.what();
+    outcome.kind = ErrorKind::unavailable;
   } catch (const std::exception& e) {
     outcome.failure = e.what();
   }

@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "core/base/result.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "daemon/engine/fair_turns.hpp"
 #include "daemon/system/asio.hpp"
@@ -20,8 +21,9 @@ class Simulator : private Interruption {
   struct Outcome {
     std::shared_ptr<const Ping> ping;  // null on failure
     std::string failure;
-    bool refused = false;  // only this ping could not be made: it is invalid or there was no memory for it
-    double seconds = 0;    // of wall time it took, without pings of other sonars that were let in
+    bool refused = false;             // only this ping could not be made: it is invalid or there was no memory for it
+    ErrorKind kind = ErrorKind::bug;  // of a failure that is more than that
+    double seconds = 0;               // of wall time it took, without pings of other sonars that were let in
   };
   using Done = std::function<void(Outcome)>;
   using Retired = std::function<void(std::shared_ptr<PingEngine>)>;

@@ -241,6 +241,8 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
             return tl::make_unexpected(done.error());
         } catch (const std::invalid_argument& refused) {
           return failure(ErrorKind::config, input.source + ": " + refused.what());
+        } catch (const EngineUnavailable& gone) {
+          return failure(ErrorKind::unavailable, gone.what());
         }
         progress.done += made;
         told(progress);

@@ -262,7 +262,7 @@ void Device::on_ping(Simulator::Outcome outcome) {
     if (refusals_.allows(LogLimiter::Clock::now(), unsaid))
       context_.log.warning("ping dropped: " + outcome.failure, {{"sonar", config_.name}, {"unsaid", unsaid}});
   } else if (!outcome.ping) {
-    context_.on_failure("sonar " + config_.name + ": the ping engine failed: " + outcome.failure);
+    context_.on_failure({outcome.kind, "sonar " + config_.name + ": the ping engine failed: " + outcome.failure});
   } else if (const PingRequest& request = outcome.ping->request;
              !stopping_ && !sessions_.empty() && request.settings_id >= oldest_wanted_id_) {
     const protocol::Bytes made_with = requests_[request.settings_id];

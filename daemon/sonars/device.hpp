@@ -40,8 +40,8 @@ struct DeviceContext {
   Events& events;
   Recordings& recordings;
   bool digest = false;
-  std::function<void()> on_change;                         // something stepped time or the end may have waited for
-  std::function<void(const std::string& why)> on_failure;  // the engine failed: the daemon cannot go on
+  std::function<void()> on_change;                   // something stepped time or the end may have waited for
+  std::function<void(const Error& why)> on_failure;  // the engine failed: the daemon cannot go on
 };
 
 struct StreamDigest {

@@ -46,5 +46,24 @@ TEST(CudaSeam, NamesTheDeviceOrSaysThatThereIsNone) {
 #endif
 }
 
+TEST(CudaSeam, TakesTheDeviceOfAModule) {
+  look_at(SONARD_HOST_MODULE);
+  EXPECT_EQ(cuda_status(), "host loops");
+  Parallel pool;
+  const auto engine = make_cuda_engine(std::make_shared<const Scene>(), pool);
+  ASSERT_TRUE(engine);
+  EXPECT_THAT((*engine)->description(), StartsWith("cuda, host loops, "));
+}
+
+TEST(CudaSeam, SaysThatADeviceWasLostAtOnce) {
+  look_at(SONARD_HOST_MODULE);
+  setenv("SONARD_TEST_DEVICE_LASTS", "2", 1);
+  Parallel pool;
+  const auto engine = make_cuda_engine(std::make_shared<const Scene>(), pool);
+  unsetenv("SONARD_TEST_DEVICE_LASTS");
+  ASSERT_FALSE(engine);
+  EXPECT_EQ(engine.error().text, "no CUDA engine (CUDA: host loops: the device is lost)");
+}
+
 }  // namespace
 }  // namespace sonar

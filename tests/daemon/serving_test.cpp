@@ -155,6 +155,18 @@ TEST(Serving, TheEngineFailingEndsTheDaemonWithExitCode70) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("out of coffee"));
 }
 
+TEST(Serving, AnEngineWhoseDeviceIsLostEndsTheDaemonWithExitCode69) {
+  DaemonSetup setup;
+  setup.engine_before = [](std::uint32_t ping) {
+    if (ping == 2) throw EngineUnavailable("the device is lost; use --engine cpu");
+  };
+  Daemon daemon(setup);
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  EXPECT_EQ(daemon.wait(), 69);
+  EXPECT_THAT(daemon.log_text(), HasSubstr("the ping engine failed: the device is lost; use --engine cpu"));
+}
+
 TEST(Serving, APingTheEngineRefusesIsDroppedCountedAndSaid) {
   DaemonSetup setup;
   setup.engine_before = [](std::uint32_t ping) {

@@ -1,0 +1,65 @@
+"""sonard with a device, as a user runs it; the device is host loops behind the same module (tests/cuda/host_module.cpp)."""
+import json
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from running_sonard import BUILD, ROOT, SONARD
+
+MODULE = BUILD / "tests/cuda/libhost_module.so"
+CONFIG = f"""\
+world: {{scene: {ROOT}/scenes/l-targets.yaml}}
+vehicles: [{{name: rov}}]
+sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
+"""
+LOST = "the CUDA engine stopped: host loops: the device is lost"
+
+
+class Device(unittest.TestCase):
+    def setUp(self):
+        self.assertTrue(MODULE.exists(), MODULE)
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.path = pathlib.Path(folder.name)
+        self.config = self.path / "sonard.yaml"
+        self.config.write_text(CONFIG, encoding="utf-8")
+
+    def sonard(self, *words, lasts=None):
+        environment = dict(os.environ, SONARD_CUDA_MODULE=str(MODULE))
+        if lasts is not None:
+            environment["SONARD_TEST_DEVICE_LASTS"] = str(lasts)
+        return subprocess.run([str(SONARD), *map(str, words)], env=environment, capture_output=True, text=True, timeout=300, check=False)
+
+    def render(self, out, engine, lasts=None):
+        return self.sonard("render", self.config, "--out", self.path / out, "--format", "npy", "--pings", "3", "--quiet",
+                           "--engine", engine, lasts=lasts)
+
+    def samples(self, out):
+        files = sorted((self.path / out).glob("*_samples.npy"))
+        self.assertEqual(len(files), 3)
+        return [f.read_bytes() for f in files]
+
+    def test_renders_on_the_device(self):
+        result = self.render("sound", "cuda")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        side = json.loads((self.path / "sound/000001.json").read_text(encoding="utf-8"))
+        self.assertIn("cuda, host loops", json.dumps(side))
+        self.samples("sound")
+
+    def test_a_device_that_fails_is_one_line_and_the_cpu_goes_on(self):
+        self.assertEqual(self.render("cpu", "cpu").returncode, 0)
+        result = self.render("lost", "auto", lasts=30)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stderr, f"sonard: {LOST}; from here on the CPU computes\n")
+        self.assertEqual(self.samples("lost"), self.samples("cpu"))
+
+    def test_a_device_that_fails_where_it_alone_was_wanted_is_exit_code_69(self):
+        result = self.render("lost", "cuda", lasts=30)
+        self.assertEqual(result.returncode, 69, result.stderr)
+        self.assertEqual(result.stderr, f"sonard: {LOST}; use --engine cpu or auto\n")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,111 @@
+// A device that fails, at every call that it can fail at: no ping is lost, or the engine says that it is at its end.
+#include "tests/cuda/failing_machine.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "cuda/device_engine.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+
+namespace sonar::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr int never = std::numeric_limits<int>::max();
+
+double no_time() { return 0; }
+
+class LostDevice : public ::testing::Test {
+ protected:
+  LostDevice() {
+    SceneMaker maker;
+    maker.add(height_field(0, 4, -2, 2, 0.5, [](double, double) { return 0.0; }), -25, {0, 0, -1});
+    scene_ = maker.make();
+    SonarModel model;
+    model.name = "test";
+    model.modes = {p900()};
+    PingRequest r;
+    r.model = std::make_shared<const SonarModel>(std::move(model));
+    r.settings = default_rows(3, 60);
+    r.settings.beam_count = 32;
+    r.sonar_in_world = {{0, 0, 0}, quat_from_rpy({0, 0.4, 0})};
+    for (std::uint32_t i = 0; i < 5; ++i) {
+      r.number = PingNumber{i};
+      requests_.push_back(r);
+    }
+    for (const Ping& ping : make_cpu_engine(scene_, pool_, options_)->run(requests_)) samples_.push_back(ping.samples);
+  }
+  std::unique_ptr<PingEngine> engine(int last_call, bool cpu_after_failure) {
+    calls_ = 0;
+    said_.clear();
+    cuda::DeviceEngineOptions device;
+    device.batch = 2;
+    device.cpu_after_failure = cpu_after_failure;
+    device.say = [this](const std::string& what) { said_.push_back(what); };
+    return cuda::make_device_engine(scene_, pool_, options_, std::make_unique<FailingMachine>(calls_, last_call), device);
+  }
+  Parallel pool_{1};
+  EngineOptions options_{.simd = SimdLevel::portable, .now_s = no_time};
+  std::shared_ptr<const Scene> scene_;
+  std::vector<PingRequest> requests_;
+  std::vector<std::vector<std::byte>> samples_;  // the CPU's
+  int calls_ = 0;
+  std::vector<std::string> said_;
+};
+
+TEST_F(LostDevice, IsReplacedByTheCpuFromThePingItLost) {
+  int first = 0, all = 0;
+  {
+    const auto sound = engine(never, true);
+    first = calls_;
+    sound->run(requests_);
+    all = calls_;  // before the waits of its end
+    EXPECT_TRUE(said_.empty());
+    EXPECT_THAT(sound->description(), StartsWith("cuda, "));
+  }
+  ASSERT_GT(first, 5);
+  ASSERT_GE(all - first, 40);
+  for (int last = first; last < all; ++last) {
+    const auto lost = engine(last, true);
+    for (int again = 0; again < 2; ++again) {
+      const auto pings = lost->run(requests_);
+      ASSERT_EQ(pings.size(), requests_.size());
+      for (std::size_t i = 0; i < pings.size(); ++i) {
+        EXPECT_EQ(pings[i].request.number, requests_[i].number);
+        ASSERT_EQ(pings[i].samples, samples_[i]) << "lost at call " << last << ", ping " << i;
+      }
+    }
+    ASSERT_EQ(said_.size(), 1u) << last;
+    EXPECT_EQ(said_[0], "the CUDA engine stopped: the device is lost; from here on the CPU computes");
+    EXPECT_THAT(lost->description(), StartsWith("cpu, after a failure of a device that fails"));
+  }
+}
+
+TEST_F(LostDevice, IsTheEndWhereNothingMayTakeItsPlace) {
+  const int first = (engine(never, false), calls_);
+  for (const int last : {first, first + 1, first + 20}) {
+    const auto lost = engine(last, false);
+    for (int again = 0; again < 2; ++again) {
+      try {
+        lost->run(requests_);
+        ADD_FAILURE() << "nothing was thrown: " << last;
+      } catch (const EngineUnavailable& e) {
+        EXPECT_STREQ(e.what(), "the CUDA engine stopped: the device is lost; use --engine cpu or auto");
+      }
+    }
+    EXPECT_TRUE(said_.empty());
+  }
+}
+
+TEST_F(LostDevice, IsNoEngineWhenItIsLostWhileTheSceneIsSent) {
+  const int first = (engine(never, true), calls_);
+  for (int last = 0; last < first; ++last) EXPECT_THROW(engine(last, true), std::runtime_error) << last;
+}
+
+}  // namespace
+}  // namespace sonar::test

@@ -1,0 +1,85 @@
+// A module as nvcc makes one, but with host loops for a device: the shipped programs then do all that they do with a CUDA device,
+// from looking for the module to the last image. SONARD_TEST_DEVICE_LASTS=N loses that device at the Nth call.
+#include <climits>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+
+#include "cuda/cuda_module.hpp"
+#include "tests/cuda/failing_machine.hpp"
+
+namespace sonar::cuda {
+namespace {
+
+struct Opened {
+  explicit Opened(int lasts) : machine(calls, lasts) {}
+  int calls = 0;
+  test::FailingMachine machine;
+};
+Machine& machine_of(void* opened) { return static_cast<Opened*>(opened)->machine; }
+
+template <class Call>
+int code_of(const Call& call) {
+  try {
+    call();
+    return 0;
+  } catch (const std::exception&) {
+    return 1;
+  }
+}
+
+const char* reason(int) { return "the device is lost"; }
+int query(int* devices, char* name, std::size_t room) {
+  *devices = 1;
+  std::snprintf(name, room, "host loops");
+  return 0;
+}
+int open(void** machine) {
+  const char* lasts = std::getenv("SONARD_TEST_DEVICE_LASTS");
+  *machine = new Opened(lasts ? std::atoi(lasts) : INT_MAX);
+  return 0;
+}
+void close(void* machine) { delete static_cast<Opened*>(machine); }
+int allocate(void* m, void** at, std::size_t bytes) {
+  return code_of([&] { *at = machine_of(m).allocate(bytes); });
+}
+int release(void* m, void* at) {
+  return code_of([&] { machine_of(m).release(at); });
+}
+int allocate_host(void* m, void** at, std::size_t bytes) {
+  return code_of([&] { *at = machine_of(m).allocate_host(bytes); });
+}
+int release_host(void* m, void* at) {
+  return code_of([&] { machine_of(m).release_host(at); });
+}
+int upload(void* m, int lane, void* to, const void* from, std::size_t bytes) {
+  return code_of([&] { machine_of(m).upload(lane, to, from, bytes); });
+}
+int download(void* m, int lane, void* to, const void* from, std::size_t bytes) {
+  return code_of([&] { machine_of(m).download(lane, to, from, bytes); });
+}
+int run(void* m, int lane, const Launch* launch) {
+  return code_of([&] { machine_of(m).run(lane, *launch); });
+}
+int step_seconds(void* m, int lane, StepSeconds* seconds) {
+  return code_of([&] { *seconds = machine_of(m).step_seconds(lane); });
+}
+int order(void* m, int lane, int earlier) {
+  return code_of([&] { machine_of(m).order(lane, earlier); });
+}
+int wait(void* m, int lane) {
+  return code_of([&] { machine_of(m).wait(lane); });
+}
+
+const CudaModule module{module_version, sizeof(PingView), sizeof(TileView), static_cast<std::uint32_t>(Step::steps),
+                        reason,         query,            open,             close,
+                        allocate,       release,          allocate_host,    release_host,
+                        upload,         download,         run,              step_seconds,
+                        order,          wait};
+
+}  // namespace
+}  // namespace sonar::cuda
+
+extern "C" __attribute__((visibility("default"))) const sonar::cuda::CudaModule* sonard_cuda_module() {
+  return &sonar::cuda::module;
+}
