@@ -8,6 +8,8 @@
 #include <thread>
 
 #include "core/text/arguments.hpp"
+#include "cuda/cuda_status.hpp"
+#include "cuda/device_engine.hpp"
 #include "daemon/bench/findings.hpp"
 #include "daemon/bench/parts.hpp"
 #include "daemon/bench/ratios.hpp"
@@ -22,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* other_cases[] = {"P3e", "P5", "P6", "P7", "P8", "P9", "P12"};  // beside bench_cases()
+constexpr const char* other_cases[] = {"P3e", "P5", "P6", "P7", "P8", "P9", "P10", "P12"};  // beside bench_cases()
 constexpr int ratios_missed = 1;
 
 template <class Items>
@@ -55,21 +57,38 @@ Result<ScenePointer> scene_of(const BenchScene& where, const BenchOptions& optio
   return *loaded;
 }
 
+/// What computes the case: a device only what it can.
+BenchOptions options_for(const BenchCase& c, const BenchOptions& options) {
+  BenchOptions own = options;
+  if (options.engine.device == EngineDevice::cpu) return own;
+  const std::string why = cuda::why_not_on_device(Pinger(c, options).request(0, {}));
+  if (why.empty()) return own;
+  own.engine.device = EngineDevice::cpu;
+  std::printf("%-4s by the CPU: %s are not for the device\n", c.name.c_str(), why.c_str());
+  return own;
+}
+
 /// Warm pings of every case over one scene.
 Result<void> time_pings(const BenchScene& where, const ScenePointer& loaded, const BenchOptions& options, json& report) {
   const auto scene = with_parts(loaded, options.given_parts);
   for (const BenchCase& c : bench_cases()) {
     if (!wanted(options.cases, c.name)) continue;
+    const BenchOptions own = options_for(c, options);
     for (const int threads : options.threads) {
       std::unique_ptr<Bench> bench;
       const auto engine = start_engine(
           [&](ScenePointer s) {
-            bench = std::make_unique<Bench>(std::move(s), threads, options);
+            bench = std::make_unique<Bench>(std::move(s), threads, own);
             return std::move(bench->engine);
           },
           scene);
       if (!engine) return tl::make_unexpected(engine.error());
-      const Figures f = measure(c, where, *loaded, **engine, threads, options);
+      Figures f = measure(c, where, *loaded, **engine, threads, own);
+      if (own.engine.device != EngineDevice::cpu) {  // its steps, apart from the rate
+        BenchOptions few = own;
+        few.pings = std::min(own.pings, 20);
+        f.stage_ms = measure(c, where, *loaded, *Bench(scene, threads, own, true).engine, threads, few).stage_ms;
+      }
       print(f);
       report["results"].push_back(json_of(f));
     }
@@ -105,6 +124,11 @@ Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, c
     }
   }
   if (asked("P9")) report["hashes"] = find_hashes(scene, where, options);
+  if (asked("P10") && options.engine.device != EngineDevice::cpu) {
+    auto rates = find_device_rates(scene, where, options);
+    if (!rates) return tl::make_unexpected(rates.error());
+    report["device"] = *std::move(rates);
+  }
   if (asked("P12")) {
     auto empty = find_empty_bins(options);
     if (!empty) return tl::make_unexpected(empty.error());
@@ -114,12 +138,33 @@ Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, c
   return all_hold;
 }
 
-int run(const BenchOptions& options) {
+/// A device that is not there is known before anything is measured; `automatic` becomes what there is.
+Result<void> find_device(BenchOptions& options) {
+  if (options.engine.device == EngineDevice::cpu) {
+    if (!options.cases.empty() && wanted(options.cases, "P10"))
+      return failure(ErrorKind::usage, "case P10 is of a device: add --engine cuda");
+    return {};
+  }
+  const auto machine = cuda::open_cuda_machine();
+  if (machine) {
+    options.engine.device = EngineDevice::cuda;
+    return {};
+  }
+  const std::string why = "no CUDA engine (CUDA: " + machine.error().text + ")";
+  if (options.engine.device == EngineDevice::cuda) return failure(ErrorKind::unavailable, why + "; use --engine cpu or auto");
+  std::fprintf(stderr, "sonard: engine auto: %s\n", why.c_str());
+  options.engine.device = EngineDevice::cpu;
+  return {};
+}
+
+int run(BenchOptions options) {
+  if (const auto found = find_device(options); !found) return complain(found.error());
   const std::string note = note_of_parts_left_out(options.engine.switches);
   if (!note.empty()) std::printf("%s\n", note.c_str());
   json report{{"processor", processor()}, {"results", json::array()}};
   if (double load[1]; ::getloadavg(load, 1) == 1) report["load_average"] = load[0];  // of others: what lengthens wall times
   std::printf("%s\n", processor().c_str());
+  if (options.engine.device != EngineDevice::cpu) std::printf("%s\n", cuda_status().c_str());
   bool first = true, all_hold = true;
   for (const BenchScene& where : bench_scenes()) {
     if (!wanted(options.scenes, where.name)) continue;
@@ -167,6 +212,12 @@ int run_bench(int argc, char** argv) {
       ->capture_default_str();
   cli.add_option("--scenes-dir", options.scene_folder, "folder to look for the scene files in first; else the shipped ones");
   cli.add_option("--json", options.json_file, "also write the figures to this file");
+  cli.add_option(
+         "--reference-ms", options.reference_ms,
+         "milliseconds a frame of the public reference CUDA code on this device, for the ratio of P10 (default: the 36 that "
+         "were published for another device)")
+      ->check(CLI::PositiveNumber);
+  add_device_option(cli, model);
   add_model_options(cli, model);
   const std::vector<std::string> words(argv + 1, argv + argc);
   if (const std::string wrong = text::complaint_about_words(cli, words); !wrong.empty())
@@ -179,7 +230,11 @@ int run_bench(int argc, char** argv) {
   }
   if (const auto r = override_engine(options.engine, options.seed, model); !r) return bench::complain(r.error());
   if (options.threads.empty()) options.threads.push_back(processors);
-  return bench::run(options);
+  try {
+    return bench::run(options);
+  } catch (const EngineUnavailable& gone) {
+    return bench::complain({ErrorKind::unavailable, gone.what()});
+  }
 }
 
 }  // namespace sonar

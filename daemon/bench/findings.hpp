@@ -21,6 +21,10 @@ nlohmann::json find_hashes(const ScenePointer& scene, const BenchScene& where, c
 /// P12: bins of a level bed 10 dB or more below their closed form, in expected power; cells, and one scatterer a ray.
 Result<nlohmann::json> find_empty_bins(const BenchOptions& options);
 
+/// P10 and P11: pings a second in batches on the device, of P1 and P3a, by the size of a batch; what of it is the processor's and
+/// what the device's; the ratio to the public reference code.
+Result<nlohmann::json> find_device_rates(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
+
 /// How the time of a ping grows with rays, rows, triangles, beams and sonars.
 nlohmann::json find_curves(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 

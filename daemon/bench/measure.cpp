@@ -11,6 +11,7 @@
 #include "core/paper/paper_engine.hpp"
 #include "daemon/bench/parts.hpp"
 #include "daemon/config/effective_switches.hpp"
+#include "daemon/engine/choose_engine.hpp"
 
 namespace sonar::bench {
 namespace {
@@ -58,7 +59,13 @@ void to_json(nlohmann::json& j, const Times& t) {
   j = {{"min_ms", t.min}, {"median_ms", t.median}, {"p90_ms", t.p90}, {"p99_ms", t.p99}, {"max_ms", t.max}};
 }
 
-Bench::Bench(std::shared_ptr<const Scene> scene, int threads, const BenchOptions& options) : pool(threads) {
+Bench::Bench(std::shared_ptr<const Scene> scene, int threads, const BenchOptions& options, bool device_steps) : pool(threads) {
+  if (options.engine.device != EngineDevice::cpu) {
+    engine = choose_engine(options.engine.device, std::move(scene), pool,
+                           {.simd = options.engine.simd, .now_s = device_steps ? now_s : nullptr},
+                           [](const std::string& what) { std::fprintf(stderr, "sonard: %s\n", what.c_str()); });
+    return;
+  }
   const auto sum = options.frequency_sum == "direct" ? paper::FrequencySum::direct : paper::FrequencySum::fast;
   engine = make_engine(std::move(scene), pool, {.simd = options.engine.simd, .now_s = now_s}, sum);
 }
@@ -95,6 +102,13 @@ double Pinger::fire(PingEngine& engine, const PingRequest& request, Ping* ping) 
   frame_s_ = end - done;
   if (ping) *ping = std::move(pings.front());
   return end - begin;
+}
+
+double Pinger::fire(PingEngine& engine, std::span<const PingRequest> requests) {
+  const double begin = now_s();
+  for (const Ping& ping : engine.run(requests))
+    if (case_.profile.vendor) static_cast<void>(case_.profile.vendor->frame(ping, device_, echo_));
+  return now_s() - begin;
 }
 
 Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene, PingEngine& engine, int threads,

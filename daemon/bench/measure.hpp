@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,7 @@ struct BenchOptions {
   std::uint64_t seed = 1;
   std::string scene_folder;
   std::string json_file;
+  double reference_ms = 0;  // of P11: a frame of the public reference code on this device; 0 = not measured
 };
 
 /// An engine with the pool it runs on.
@@ -45,7 +47,8 @@ struct Bench {
   Parallel pool;
   std::unique_ptr<PingEngine> engine;
 
-  Bench(std::shared_ptr<const Scene> scene, int threads, const BenchOptions& options);
+  /// A device is timed step by step only where that is wanted: it takes time of its own.
+  Bench(std::shared_ptr<const Scene> scene, int threads, const BenchOptions& options, bool device_steps = false);
 };
 
 /// Pings of one case, framed where its model has a vendor.
@@ -57,6 +60,8 @@ class Pinger {
   /// Seconds it took; `ping` gets the picture when it is wanted.
   double fire(PingEngine& engine, const PingRequest& request, Ping* ping = nullptr);
   double last_frame_s() const { return frame_s_; }
+  /// Seconds that all of them took in one call, framed too.
+  double fire(PingEngine& engine, std::span<const PingRequest> requests);
   const Switches& switches() const { return switches_; }
   const SonarModel& model() const { return *model_; }
 

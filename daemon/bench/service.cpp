@@ -10,9 +10,9 @@
 #include <string>
 #include <thread>
 
-#include "core/paper/paper_engine.hpp"
 #include "daemon/app.hpp"
 #include "daemon/bench/findings.hpp"
+#include "daemon/engine/choose_engine.hpp"
 #include "protocol/oculus/decode.hpp"
 
 namespace sonar::bench {
@@ -82,8 +82,10 @@ class Service {
         log_(errors_only()),
         app_(
             std::move(config), scene,
-            [this, simd = options.engine.simd](ScenePointer s) { return make_engine(std::move(s), pool_, {.simd = simd}); }, {},
-            log_) {}
+            [this, engine = options.engine](ScenePointer s) {
+              return choose_engine(engine.device, std::move(s), pool_, {.simd = engine.simd}, {});
+            },
+            {}, log_) {}
 
   static LogOptions errors_only() {
     LogOptions options;

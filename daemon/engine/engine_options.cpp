@@ -35,13 +35,17 @@ void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
   }
 }
 
+void add_device_option(CLI::App& app, EngineOptionsGiven& given) {
+  app.add_option("--engine", given.device, "what computes the pings; auto: the CUDA device if there is one (default cpu)")
+      ->check(one_of({"auto", "cpu", "cuda"}))
+      ->envname("SONARD_ENGINE");
+}
+
 void add_engine_options(CLI::App& app, EngineOptionsGiven& given) {
   app.add_option("--threads", given.threads, "compute threads (default 0: all cores)")
       ->check(whole_number(0, 256))
       ->envname("SONARD_THREADS");
-  app.add_option("--engine", given.device, "what computes the pings; auto: the CUDA device if there is one (default cpu)")
-      ->check(one_of({"auto", "cpu", "cuda"}))
-      ->envname("SONARD_ENGINE");
+  add_device_option(app, given);
   add_model_options(app, given);
 }
 

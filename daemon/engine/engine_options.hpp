@@ -27,7 +27,8 @@ struct EngineOptionsGiven {
   std::array<std::string, named_switches.size()> switches;  // "on", "off", in the order of named_switches
 };
 
-/// Everything but the threads, which a benchmark varies.
+void add_device_option(CLI::App& app, EngineOptionsGiven& given);
+/// Everything but the threads, which a benchmark varies, and the device.
 void add_model_options(CLI::App& app, EngineOptionsGiven& given);
 void add_engine_options(CLI::App& app, EngineOptionsGiven& given);
 

@@ -71,11 +71,24 @@ int wait(void* m, int lane) {
   return code_of([&] { machine_of(m).wait(lane); });
 }
 
-const CudaModule module{module_version, sizeof(PingView), sizeof(TileView), static_cast<std::uint32_t>(Step::steps),
-                        reason,         query,            open,             close,
-                        allocate,       release,          allocate_host,    release_host,
-                        upload,         download,         run,              step_seconds,
-                        order,          wait};
+const CudaModule module{module_version,
+                        sizeof(PingView),
+                        sizeof(TileView),
+                        static_cast<std::uint32_t>(Step::steps),
+                        reason,
+                        query,
+                        open,
+                        close,
+                        allocate,
+                        release,
+                        allocate_host,
+                        release_host,
+                        upload,
+                        download,
+                        run,
+                        step_seconds,
+                        order,
+                        wait};
 
 }  // namespace
 }  // namespace sonar::cuda

@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Checks the CUDA engine on this machine's device: builds, tests, compute-sanitizer, benchmark; writes docs/benchmarks-gpu.md.
 # Exit 77 without a device, 1 when something fails. usage: tests/tools/gpu_check.sh [build folder, default build/gpu]
+# GPU_CHECK_ARCHITECTURES=75 builds for compute 7.5, say; GPU_CHECK_REFERENCE_MS=30 is what a frame of the public reference code
+# takes on this device, for the ratio P11.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 build=${1:-build/gpu}
@@ -20,7 +22,7 @@ cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSONAR_CUDA=REQUIRED
   ${GPU_CHECK_ARCHITECTURES:+-DCMAKE_CUDA_ARCHITECTURES="$GPU_CHECK_ARCHITECTURES"} >"$build.log" 2>&1 ||
   { tail -20 "$build.log" >&2; exit 1; }
 tests="cuda_device_same_rays_test cuda_device_embree_rays_test"
-ninja -C "$build" $tests cuda_seam_test cuda_bench
+ninja -C "$build" $tests cuda_seam_test sonard sonard_cuda
 
 for test in $tests cuda_seam_test; do
   # A test that is skipped here has checked nothing: with a device there is no reason for it.
@@ -39,29 +41,20 @@ if [ -n "$sanitizer" ]; then
   sanitized="clean: memcheck, racecheck ($("$sanitizer" --version | grep -o 'Version [0-9.]*' | head -1))"
 fi
 
+# The benchmark of docs/cuda.md, as any user can run it.
+SONARD_CUDA_MODULE="$build/daemon/libsonard_cuda.so" "$build/daemon/sonard" bench --engine cuda --scene local-search \
+  --scenes-dir scenes --case P1 --case P3a --case P3b --case P3c --case P3d --case P5 --case P9 --case P10 --pings 256 \
+  ${GPU_CHECK_REFERENCE_MS:+--reference-ms "$GPU_CHECK_REFERENCE_MS"} --json "$build/bench-gpu.json"
+
 ask() { nvidia-smi --query-gpu="$1" --format=csv,noheader -i 0; }
-distances=$(grep -hE "^[0-9]+: relative L2" "$build/cuda_device_embree_rays_test.log" || true)
-table=$(SONARD_CUDA_MODULE="$build/daemon/libsonard_cuda.so" "$build/tests/cuda/cuda_bench" 512)
-{
-  echo "# The CUDA engine, measured"
-  echo
-  echo "Written by \`tests/tools/gpu_check.sh\`; what it checks: docs/cuda.md."
-  echo
-  echo "| | |"
-  echo "|---|---|"
-  echo "| device | $(ask name), $(ask memory.total) |"
-  echo "| driver, toolkit | $(ask driver_version), $("$nvcc" --version | grep -o 'release [0-9.]*') |"
-  echo "| clocks as found | SM $(ask clocks.sm), at most $(ask clocks.max.sm); memory $(ask clocks.mem) |"
-  echo "| processor | $(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | xargs), $(nproc) cores |"
-  echo "| tests on the device | pass |"
-  echo "| compute-sanitizer | $sanitized |"
-  echo
-  echo "$table"
-  echo
-  echo "Beside the CPU engine with Embree (docs/cuda.md, \"How equal it is\"), eight pings of P1:"
-  echo
-  echo '```'
-  echo "$distances"
-  echo '```'
-} >"$page"
+DISTANCES=$(grep -hE "^[0-9]+: relative L2" "$build/cuda_device_embree_rays_test.log" || true) \
+  MEMORY=$(ask memory.total) DRIVER=$(ask driver_version) TOOLKIT=$("$nvcc" --version | grep -o 'release [0-9.]*') \
+  CLOCKS="SM $(ask clocks.sm), at most $(ask clocks.max.sm); memory $(ask clocks.mem)" SANITIZED=$sanitized \
+  python3 - >"$build/facts-gpu.json" <<'END'
+import json, os
+facts = {"memory": "MEMORY", "driver": "DRIVER", "toolkit": "TOOLKIT", "clocks as found": "CLOCKS", "compute-sanitizer": "SANITIZED"}
+facts = {name: os.environ[variable] for name, variable in facts.items()} | {"tests on the device": "pass"}
+print(json.dumps({"facts": facts, "distances": os.environ["DISTANCES"]}))
+END
+python3 -B tests/bench/write_gpu_benchmarks.py "$build/bench-gpu.json" "$build/facts-gpu.json" "$page"
 echo "gpu_check: passed; $page is written"
