@@ -3,8 +3,10 @@
 
 #include <cstdio>
 #include <new>
+#include <vector>
 
 #include "cuda/cuda_module.hpp"
+#include "cuda/cufft_library.hpp"
 #include "cuda/graph_shelf.hpp"
 #include "cuda/steps.hpp"
 
@@ -14,12 +16,21 @@ namespace {
 constexpr int lanes = 3;  // as Machine::lanes
 constexpr int device = 0;
 
+constexpr std::size_t most_transforms = 8;
+constexpr int timed_things = step_count + 2;  // steps; transforms there, and back
+
+struct Transform {
+  int size, rows;
+  CufftLibrary::Handle plan;
+};
 struct Lane {
   cudaStream_t stream = nullptr;
   cudaEvent_t done = nullptr;
   GraphShelf<cudaGraphExec_t> graphs;
-  cudaEvent_t begin[step_count] = {}, end[step_count] = {};  // made when a launch is first timed
-  bool timed[step_count] = {};                               // since step_seconds was last asked
+  std::vector<Transform> transforms;  // newest first; of this lane alone, since a plan has room for one at a time
+  cudaEvent_t begin[timed_things] = {}, end[timed_things] = {};  // made when a launch is first timed
+  bool timed[timed_things] = {};                                 // since step_seconds was last asked
+  bool timing = false;                                           // the last launch was timed
 };
 struct Opened {
   Lane lane[lanes];
@@ -42,7 +53,9 @@ Kernel kernel_of(Step wanted, std::integer_sequence<int, step...>) {
   return kernels[static_cast<int>(wanted)];
 }
 
-const char* reason(int code) { return cudaGetErrorString(static_cast<cudaError_t>(code)); }
+const char* reason(int code) {
+  return code >= cufft_codes ? CufftLibrary::reason(code) : cudaGetErrorString(static_cast<cudaError_t>(code));
+}
 
 int query(int* devices, char* name, std::size_t room) {
   *devices = 0;
@@ -71,7 +84,8 @@ void close(void* machine) {
     if (l.stream) cudaStreamSynchronize(l.stream);
     for (auto& entry : l.graphs.entries())
       if (entry.graph) cudaGraphExecDestroy(entry.graph);
-    for (int step = 0; step < step_count; ++step) {
+    for (const Transform& t : l.transforms) cufft().destroy(t.plan);
+    for (int step = 0; step < timed_things; ++step) {
       if (l.begin[step]) cudaEventDestroy(l.begin[step]);
       if (l.end[step]) cudaEventDestroy(l.end[step]);
     }
@@ -154,16 +168,27 @@ cudaError_t launch_by_graph(Opened& m, Lane& lane, const GraphKey& what) {
   return entry.graph ? cudaGraphLaunch(entry.graph, lane.stream) : launch_plainly(lane.stream, what);
 }
 
+/// Begins what is timed, unless it has begun already.
+cudaError_t begin_timing(Lane& lane, int what) {
+  cudaError_t error = cudaSuccess;
+  if (!lane.begin[what]) error = cudaEventCreate(&lane.begin[what]);
+  if (error == cudaSuccess && !lane.end[what]) error = cudaEventCreate(&lane.end[what]);
+  if (error == cudaSuccess && !lane.timed[what]) error = cudaEventRecord(lane.begin[what], lane.stream);
+  return error;
+}
+cudaError_t end_timing(Lane& lane, int what) {
+  const cudaError_t error = cudaEventRecord(lane.end[what], lane.stream);
+  lane.timed[what] = error == cudaSuccess;
+  return error;
+}
+
 cudaError_t launch_timed(Lane& lane, const GraphKey& what) {
   cudaError_t error = cudaSuccess;
   for (int step = what.from; step < what.to && error == cudaSuccess; ++step) {
     if (what.blocks[step] == 0) continue;
-    if (!lane.begin[step]) error = cudaEventCreate(&lane.begin[step]);
-    if (error == cudaSuccess && !lane.end[step]) error = cudaEventCreate(&lane.end[step]);
-    if (error == cudaSuccess) error = cudaEventRecord(lane.begin[step], lane.stream);
+    error = begin_timing(lane, step);
     if (error == cudaSuccess) error = launch_step(lane.stream, step, what);
-    if (error == cudaSuccess) error = cudaEventRecord(lane.end[step], lane.stream);
-    lane.timed[step] = error == cudaSuccess;
+    if (error == cudaSuccess) error = end_timing(lane, step);
   }
   return error;
 }
@@ -172,20 +197,60 @@ int run(void* machine, int lane, const Launch* launch) {
   Opened& m = opened(machine);
   Lane& l = m.lane[lane];
   const GraphKey what(*launch);
+  l.timing = launch->timed != 0;
   if (launch->timed != 0) return launch_timed(l, what);
   return m.graphs_work ? launch_by_graph(m, l, what) : launch_plainly(l.stream, what);
 }
 
+int transforms(char* name, std::size_t room) {
+  cufft().describe(name, room);
+  return cufft().loaded() ? 1 : 0;
+}
+
+/// The lane's plan for that size, now the newest. Making one allocates and may wait for the device; it is made once.
+int transform_for(Lane& lane, int size, int rows, CufftLibrary::Handle* plan) {
+  std::vector<Transform>& all = lane.transforms;
+  std::size_t i = 0;
+  while (i < all.size() && (all[i].size != size || all[i].rows != rows)) ++i;
+  if (i == all.size()) {
+    if (i == most_transforms) {
+      if (const cudaError_t error = cudaStreamSynchronize(lane.stream)) return error;  // it may be at work
+      cufft().destroy(all.back().plan);
+      all.pop_back();
+    }
+    Transform made{size, rows, {}};
+    if (const int code = cufft().make(&made.plan, size, rows, lane.stream)) return code;
+    all.push_back(made);
+    i = all.size() - 1;
+  }
+  const Transform found = all[i];
+  for (; i > 0; --i) all[i] = all[i - 1];
+  all[0] = found;
+  *plan = found.plan;
+  return 0;
+}
+
+int transform(void* machine, int lane, void* values, int size, int rows, int inverse) {
+  Lane& l = opened(machine).lane[lane];
+  CufftLibrary::Handle plan;
+  if (const int code = transform_for(l, size, rows, &plan)) return code;
+  const int what = step_count + (inverse != 0 ? 1 : 0);
+  if (l.timing)
+    if (const cudaError_t error = begin_timing(l, what)) return error;
+  if (const int code = cufft().run(plan, values, inverse != 0)) return code;
+  return l.timing ? end_timing(l, what) : cudaSuccess;
+}
+
 int step_seconds(void* machine, int lane, StepSeconds* seconds) {
   Lane& l = opened(machine).lane[lane];
-  for (int step = 0; step < step_count; ++step) {
-    seconds->of[step] = 0;
+  *seconds = StepSeconds{};
+  for (int step = 0; step < timed_things; ++step) {
     if (!l.timed[step]) continue;
     l.timed[step] = false;
     float ms = 0;
     const cudaError_t error = cudaEventElapsedTime(&ms, l.begin[step], l.end[step]);
     if (error != cudaSuccess) return error;
-    seconds->of[step] = 1e-3 * static_cast<double>(ms);
+    (step < step_count ? seconds->of[step] : seconds->transforms) += 1e-3 * static_cast<double>(ms);
   }
   return cudaSuccess;
 }
@@ -212,6 +277,8 @@ const CudaModule module{module_version,
                         upload,
                         download,
                         run,
+                        transforms,
+                        transform,
                         step_seconds,
                         order,
                         wait};

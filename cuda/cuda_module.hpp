@@ -9,7 +9,7 @@
 
 namespace sonar::cuda {
 
-inline constexpr std::uint32_t module_version = 2;  // of this file, of device_types.hpp and of the steps
+inline constexpr std::uint32_t module_version = 3;  // of this file, of device_types.hpp and of the steps
 inline constexpr const char* module_file = "libsonard_cuda.so";
 inline constexpr const char* module_entry = "sonard_cuda_module";
 
@@ -28,6 +28,9 @@ struct CudaModule {
   int (*upload)(void* machine, int lane, void* to_device, const void* from, std::size_t bytes);
   int (*download)(void* machine, int lane, void* to, const void* from_device, std::size_t bytes);
   int (*run)(void* machine, int lane, const Launch* launch);
+  /// Whether there is cuFFT, which one, or which file is missing. Needs no machine.
+  int (*transforms)(char* name, std::size_t room);
+  int (*transform)(void* machine, int lane, void* values, int size, int rows, int inverse);
   int (*step_seconds)(void* machine, int lane, StepSeconds* seconds);
   int (*order)(void* machine, int lane, int earlier);
   int (*wait)(void* machine, int lane);

@@ -21,7 +21,7 @@ constexpr std::size_t work_bytes = std::size_t{1} << 30;  // of a batch: pings o
 constexpr Stage stage_of(Step step) {
   if (step <= Step::first_hits) return Stage::trace;
   if (step <= Step::place) return Stage::scatter;
-  if (step <= Step::sum_columns) return Stage::synthesize;
+  if (step <= Step::unfold) return Stage::synthesize;
   if (step <= Step::finish_columns) return Stage::noise;
   return step == Step::receive ? Stage::receive : Stage::couple;
 }
@@ -73,7 +73,7 @@ class DeviceEngine final : public PingEngine {
   void run_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
     std::size_t which = 0;
     for (std::size_t i = 0; i < requests.size(); ++i) {
-      if (const std::string why = why_not_on_device(requests[i]); !why.empty()) {
+      if (const std::string why = why_not_on_device(requests[i], machine_->transforms()); !why.empty()) {
         if (told_.insert(why).second) say("CUDA: " + why + " are computed by the CPU");
         pings[i] = by_cpu(requests[i]);
         continue;
@@ -133,8 +133,29 @@ class DeviceEngine final : public PingEngine {
     for (int step = 0; step < step_count; ++step)
       for (const PingView& view : room.views)
         launch.largest[step] = std::max(launch.largest[step], step_size(static_cast<Step>(step), view));
-    machine_->run(room.lane, launch);
+    run_steps(room, launch);
     room.results.download(room.lane);
+  }
+
+  /// In one piece, or in three where transforms stand between.
+  void run_steps(const BatchRoom& room, Launch launch) {
+    const auto run_to = [&](int to) {
+      launch.to = to;
+      machine_->run(room.lane, launch);
+      launch.from = to;
+    };
+    if (launch.largest[static_cast<int>(Step::spread)] > 0) {
+      for (const bool inverse : {false, true}) {
+        run_to(static_cast<int>(inverse ? Step::unfold : Step::fold));
+        for (const PingView& view : room.views) {
+          const SpectralView& s = view.spectral;
+          if (s.grids)
+            machine_->transform(room.lane, inverse ? s.folded : s.grids, inverse ? s.period : s.points, view.sea.columns,
+                                inverse);
+        }
+      }
+    }
+    run_to(step_count);
   }
 
   void finish(BatchRoom& room, std::vector<Ping>& pings) {
@@ -147,10 +168,12 @@ class DeviceEngine final : public PingEngine {
   /// Every ping of a batch took as long as the others.
   void share_times(BatchRoom& room) {
     const StepSeconds seconds = machine_->step_seconds(room.lane);
-    for (BatchRoom::Ping& ping : room.pings)
+    const auto pings = static_cast<double>(room.pings.size());
+    for (BatchRoom::Ping& ping : room.pings) {
+      ping.statistics.seconds[static_cast<std::size_t>(Stage::synthesize)] += seconds.transforms / pings;
       for (int step = 0; step < step_count; ++step)
-        ping.statistics.seconds[static_cast<std::size_t>(stage_of(static_cast<Step>(step)))] +=
-            seconds.of[step] / static_cast<double>(room.pings.size());
+        ping.statistics.seconds[static_cast<std::size_t>(stage_of(static_cast<Step>(step)))] += seconds.of[step] / pings;
+    }
   }
   Ping take(BatchRoom::Ping& from, const PingView& view) {
     Ping ping = std::move(from.ping);
@@ -216,11 +239,11 @@ std::unique_ptr<PingEngine> make_device_engine(std::shared_ptr<const Scene> scen
   return std::make_unique<DeviceEngine>(std::move(scene), pool, options, std::move(machine), std::move(device_options));
 }
 
-std::string why_not_on_device(const PingRequest& request) {
+std::string why_not_on_device(const PingRequest& request, bool transforms) {
   const Waveform& w = request.model->modes[static_cast<std::size_t>(request.settings.mode)].waveform;
   if (request.switches.mode != Mode::canonical) return "pings of the comparison modes";
   if (request.switches.fixed_fan > 0) return "pings of a fixed fan";
-  if (request.switches.expected_power) return "";
+  if (request.switches.expected_power || transforms) return "";
   if (w.shape == Waveform::Shape::measured) return "pings with a measured pulse";
   if (w.exact) return "pings with an exact pulse";
   return "";

@@ -28,7 +28,7 @@ std::unique_ptr<PingEngine> make_device_engine(std::shared_ptr<const Scene> scen
                                                std::unique_ptr<Machine> machine, DeviceEngineOptions device_options = {});
 
 /// The part of the model that only the CPU does, as the beginning of a sentence ("pings of a fixed fan"); empty when there is
-/// none. docs/cuda.md lists them.
-std::string why_not_on_device(const PingRequest& request);
+/// none. `transforms`: whether the machine has them. docs/cuda.md lists them.
+std::string why_not_on_device(const PingRequest& request, bool transforms = true);
 
 }  // namespace sonar::cuda

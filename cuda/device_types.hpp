@@ -119,6 +119,16 @@ struct PulseInBeams {
   std::int32_t from, to;
 };
 
+/// Pulses by way of the spectrum, see spectral_steps.hpp; grids null = by their table.
+struct SpectralView {
+  double* grids;             // complex [columns][points]
+  double* folded;            // complex [columns][period]
+  const double* kernel;      // [terms][padded]
+  const double* correction;  // [frequencies]
+  const double* response;    // complex [frequencies]
+  std::int32_t points, period, frequencies, width, terms, padded;
+};
+
 struct NoiseKey {
   std::uint32_t seed_low, seed_high, sonar, ping;
 };
@@ -130,8 +140,8 @@ struct PingView {
   // plan
   const ColumnSine* column_sines;        // [columns]
   const BaseElevation* base_elevations;  // [elevations]
-  const float* pulse_rows;
-  const float* transmit;  // [columns]
+  const float* pulse_rows;               // null where `spectral` serves
+  const float* transmit;                 // [columns]
   const float* weights;
   const CouplingRow* panels;  // [beams / 4, rounded up]
   const double* beam_sines;   // [beams]
@@ -139,6 +149,7 @@ struct PingView {
   const float* noise_table;   // complex, table_samples of them
   ReceivePattern pattern;
   std::int32_t taps, pulse_steps, samples, per_row, rows, beams;
+  SpectralView spectral;  // grids and folded are the ping's own
   // surfaces
   const TileView* tiles;
   const std::uint32_t* tile_first_slot;  // [tiles + 1]
@@ -196,6 +207,9 @@ enum class Step : std::int32_t {
   scan_columns,
   place,
   sum_columns,
+  spread,
+  fold,
+  unfold,
   ghosts,
   volume,
   finish_columns,
@@ -216,6 +230,7 @@ struct Launch {
 };
 struct StepSeconds {
   double of[step_count] = {};
+  double transforms = 0;
 };
 
 }  // namespace sonar::cuda

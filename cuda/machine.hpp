@@ -28,6 +28,11 @@ class Machine {
   virtual void download(int lane, void* to, const void* from_device, std::size_t bytes) = 0;
   /// Queues steps, one after the other. A launch that is timed is for benchmarks: each step is then told apart.
   virtual void run(int lane, const Launch& launch) = 0;
+  /// Whether transform() can be had; else pulses by way of the spectrum are the CPU's.
+  virtual bool transforms() const = 0;
+  /// Queues x[k] = sum_n x[n] e^{-+ i 2 pi k n / size} over `rows` rows of complex values, one after the other on the device, in
+  /// place, not scaled. Timed when the launch before it on the lane was.
+  virtual void transform(int lane, double* values, int size, int rows, bool inverse) = 0;
   /// How long each step took in the timed launches since the last call; the lane must have been waited for.
   virtual StepSeconds step_seconds(int lane) = 0;
   /// What is queued on `lane` from now on begins after what is queued on `earlier` already.
@@ -35,8 +40,11 @@ class Machine {
   virtual void wait(int lane) = 0;
 };
 
+/// In which order host loops take a step's indices. A device takes them in any: where another order makes other bytes, there is a
+/// race. But forwards, memory begins with what is no number, as a device's may: where that shows, something was read unwritten.
+enum class LoopOrder { forwards, backwards, scattered };
 /// Loops on the calling thread; for tests, which so run what the device runs.
-std::unique_ptr<Machine> make_host_loops();
+std::unique_ptr<Machine> make_host_loops(LoopOrder order = LoopOrder::forwards);
 
 /// Loads the module and takes the first device. The error says what is missing and where was looked.
 Result<std::unique_ptr<Machine>> open_cuda_machine();

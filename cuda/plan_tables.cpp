@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/pipeline/pulses/spectral_columns.hpp"
 #include "core/pipeline/volume.hpp"
 #include "cuda/fan_steps.hpp"
 
@@ -47,7 +48,22 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.max_code = p.settings.format.max_code;
   view_.half_gamma = p.settings.format.gamma / 2;
   view_.bytes_a_sample = p.settings.format.bits / 8;
+  if (p.spectral) add_spectrum(*p.spectral);
   memory_.upload(lane);
+}
+
+void PlanTables::add_spectrum(const SpectralColumns& s) {
+  const spectral::FrequencySums::Tables t = s.sums().tables();
+  SpectralView& v = view_.spectral;
+  v.points = s.sums().grid_points();
+  v.period = s.period_samples();
+  v.frequencies = s.frequencies();
+  v.width = t.width, v.terms = t.terms, v.padded = t.padded;
+  v.kernel = memory_.put(t.polynomial);
+  v.correction = memory_.put(t.correction);
+  std::vector<double> response;
+  for (const spectral::Complex& r : s.response()) response.push_back(r.real()), response.push_back(r.imag());
+  v.response = memory_.put(response);
 }
 
 bool PlanTables::serves(const PingRequest& request) const {

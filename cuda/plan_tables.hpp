@@ -25,6 +25,8 @@ class PlanTables {
   void fill(PingView& view) const;
 
  private:
+  void add_spectrum(const SpectralColumns& spectral);
+
   std::shared_ptr<const SonarModel> model_;
   Seed seed_;
   PingPlan plan_;

@@ -91,6 +91,11 @@ bool PingPreparer::add(const PingRequest& request, std::size_t index, std::share
     stage(request.switches.multipath ? Stage::multipath : Stage::specular) += points - begin;
     stage(m.ping.statistics.tiles_built > 0 ? Stage::build_cells : Stage::cull) += now() - points;
     add_water(m);
+    if (m.plan.spectral) {
+      SpectralView& v = m.view.spectral;
+      v.grids = room.work.take<double>(2 * m.columns() * static_cast<std::size_t>(v.points)).device;
+      v.folded = room.work.take<double>(2 * m.columns() * static_cast<std::size_t>(v.period)).device;
+    }
   }
   add_receiver(m);
   take_results(m);

@@ -6,6 +6,7 @@
 #include "cuda/cell_steps.hpp"
 #include "cuda/column_steps.hpp"
 #include "cuda/fan_steps.hpp"
+#include "cuda/spectral_steps.hpp"
 
 namespace sonar::cuda {
 
@@ -36,7 +37,13 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
     case Step::scan_columns:
       return p.slots > 0 ? columns : 0;
     case Step::sum_columns:
-      return columns * sum_parts;
+      return p.spectral.grids == nullptr ? columns * sum_parts : 0;
+    case Step::spread:
+      return p.spectral.grids != nullptr ? columns * sum_parts : 0;
+    case Step::fold:
+      return p.spectral.grids != nullptr ? columns * static_cast<std::uint32_t>(p.spectral.period) : 0;
+    case Step::unfold:
+      return p.spectral.grids != nullptr ? columns * samples : 0;
     case Step::ghosts:
       return p.ghosts != nullptr ? columns * samples : 0;
     case Step::volume:
@@ -72,6 +79,9 @@ SONAR_HD inline void run_step(const PingView& p, std::uint32_t i) {
   if constexpr (step == Step::scan_columns) scan_columns(p, i);
   if constexpr (step == Step::place) place(p, i);
   if constexpr (step == Step::sum_columns) sum_columns(p, i);
+  if constexpr (step == Step::spread) spread(p, i);
+  if constexpr (step == Step::fold) fold(p, i);
+  if constexpr (step == Step::unfold) unfold(p, i);
   if constexpr (step == Step::ghosts) ghosts(p, i);
   if constexpr (step == Step::volume) volume(p, i);
   if constexpr (step == Step::finish_columns) finish_columns(p, i);

@@ -1,10 +1,13 @@
 // The seam answers on every machine: without the module, with one that is none, without a device, and with one.
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdlib>
 
 #include "cuda/cuda_engine.hpp"
+#include "cuda/cuda_module.hpp"
 #include "cuda/cuda_status.hpp"
 
 namespace sonar {
@@ -41,6 +44,22 @@ TEST(CudaSeam, NamesTheDeviceOrSaysThatThereIsNone) {
   look_at(SONARD_CUDA_MODULE);
   EXPECT_THAT(cuda_status(), AnyOf(StartsWith("no device"), HasSubstr("GiB, compute ")));
   if (cuda_status().starts_with("no device")) expect_no_engine();
+#else
+  GTEST_SKIP() << "this build has no CUDA module: nvcc was not found";
+#endif
+}
+
+// The library alone: it needs no device to say who it is.
+TEST(CudaSeam, FindsCufftOrSaysWhichFileIsMissing) {
+#ifdef SONARD_CUDA_MODULE
+  void* library = dlopen(SONARD_CUDA_MODULE, RTLD_NOW | RTLD_LOCAL);
+  ASSERT_NE(library, nullptr) << dlerror();
+  const auto entry = reinterpret_cast<cuda::CudaModuleEntry>(dlsym(library, cuda::module_entry));
+  ASSERT_NE(entry, nullptr);
+  std::array<char, 256> name{};
+  const bool there = entry()->transforms(name.data(), name.size()) != 0;
+  EXPECT_THAT(std::string(name.data()), StartsWith(there ? "cuFFT " : "no libcufft.so."));
+  if (!there) GTEST_SKIP() << name.data();
 #else
   GTEST_SKIP() << "this build has no CUDA module: nvcc was not found";
 #endif

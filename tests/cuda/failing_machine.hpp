@@ -21,6 +21,10 @@ class FailingMachine final : public cuda::Machine {
   void upload(int lane, void* to, const void* from, std::size_t n) override { called(), inner_->upload(lane, to, from, n); }
   void download(int lane, void* to, const void* from, std::size_t n) override { called(), inner_->download(lane, to, from, n); }
   void run(int lane, const cuda::Launch& launch) override { called(), inner_->run(lane, launch); }
+  bool transforms() const override { return inner_->transforms(); }
+  void transform(int lane, double* values, int size, int rows, bool inverse) override {
+    called(), inner_->transform(lane, values, size, rows, inverse);
+  }
   cuda::StepSeconds step_seconds(int lane) override { return called(), inner_->step_seconds(lane); }
   void order(int lane, int earlier) override { called(), inner_->order(lane, earlier); }
   void wait(int lane) override { called(), inner_->wait(lane); }

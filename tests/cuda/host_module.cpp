@@ -61,6 +61,13 @@ int download(void* m, int lane, void* to, const void* from, std::size_t bytes) {
 int run(void* m, int lane, const Launch* launch) {
   return code_of([&] { machine_of(m).run(lane, *launch); });
 }
+int transforms(char* name, std::size_t room) {
+  std::snprintf(name, room, "FFTW");
+  return make_host_loops()->transforms() ? 1 : 0;
+}
+int transform(void* m, int lane, void* values, int size, int rows, int inverse) {
+  return code_of([&] { machine_of(m).transform(lane, static_cast<double*>(values), size, rows, inverse != 0); });
+}
 int step_seconds(void* m, int lane, StepSeconds* seconds) {
   return code_of([&] { *seconds = machine_of(m).step_seconds(lane); });
 }
@@ -86,6 +93,8 @@ const CudaModule module{module_version,
                         upload,
                         download,
                         run,
+                        transforms,
+                        transform,
                         step_seconds,
                         order,
                         wait};

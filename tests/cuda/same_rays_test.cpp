@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/pipeline/basin.hpp"
+#include "tests/core/pipeline/pulses.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/cuda/comparing.hpp"
 
@@ -55,6 +56,47 @@ TEST(DeviceEngine, DoesEveryPartOfTheModelAsTheCpuDoes) {
   EXPECT_TRUE(both.said.empty());
 }
 
+// Tones that are exact, and a pulse that is measured and complex: echoes to a grid, two transforms, back to samples.
+TEST(DeviceEngine, SumsPulsesByWayOfTheSpectrumAsTheCpuDoes) {
+  SKIP_WITHOUT_A_MACHINE();
+  if (!test_machine().value()->transforms()) GTEST_SKIP() << "no Fourier transform here: exact pulses are the CPU's";
+  SonarModel measured;
+  measured.name = "measured";
+  measured.modes = {p900()};
+  measured.modes[0].waveform = waveform_of(Waveform::Shape::measured);
+  measured.modes[0].pattern.azimuth_width_rad *= 3;
+  const auto lopsided = std::make_shared<const SonarModel>(std::move(measured));
+  FrequencyMode wide = p900();
+  wide.pattern.azimuth_width_rad *= 3;
+  const auto tone = model_of(wide, Waveform::Shape::cw, true);
+  BothEngines both(basin());
+  std::vector<PingRequest> requests;
+  for (const char* turn : {"everything, low", "blank, low", "flat beams, low", "fewer beams and rows, low", "somewhere else, low",
+                           "everything again, low", "expected power, low"})
+    for (auto& [what, request] : turns()) {
+      if (what != turn) continue;
+      for (const auto& model : {tone, lopsided}) {
+        PingRequest r = request;
+        r.model = model;
+        r.switches.multipath = what == "everything, low";
+        if (model == lopsided) r.settings.samples_per_row = 1;
+        SCOPED_TRACE(what + ", " + model->name);
+        expect_same(both.by_cpu(r), both.by_device(r), what + ", " + model->name);
+        requests.push_back(std::move(r));
+      }
+    }
+  ASSERT_EQ(requests.size(), 14u);
+  EXPECT_TRUE(both.said.empty()) << both.said[0];
+  // Beside pings that need no transform, in one batch.
+  requests.push_back(high());
+  requests.back().switches.multipath = false;
+  std::swap(requests.back(), requests[2]);
+  std::vector<Ping> single;
+  for (const PingRequest& r : requests) single.push_back(both.by_device(r));
+  const std::vector<Ping> batched = both.by_device(requests);
+  for (std::size_t i = 0; i < single.size(); ++i) EXPECT_EQ(batched[i].samples, single[i].samples) << i;
+}
+
 TEST(DeviceEngine, IsTheSameBytesInBatchesOfAnySize) {
   SKIP_WITHOUT_A_MACHINE();
   std::vector<PingRequest> requests;
@@ -78,12 +120,12 @@ TEST(DeviceEngine, LeavesToTheCpuWhatItCannotDoAndSaysSoOnce) {
   std::vector<PingRequest> requests{high(), high(), low(), low(), high()};
   for (PingRequest& r : requests) r.switches.multipath = false, r.settings.range_bin_count = 30;
   requests[1].switches.fixed_fan = 40;
-  if (spectral::have_transform) {
-    EXPECT_EQ(cuda::why_not_on_device(low()), "pings with an exact pulse");
-  }
+  const bool transforms = test_machine().value()->transforms();
+  EXPECT_EQ(cuda::why_not_on_device(low()), "");
+  EXPECT_EQ(cuda::why_not_on_device(low(), false), spectral::have_transform ? "pings with an exact pulse" : "");
   const std::vector<Ping> pings = both.by_device(requests);
   for (std::size_t i = 0; i < requests.size(); ++i) expect_same(both.by_cpu(requests[i]), pings[i], std::to_string(i));
-  ASSERT_EQ(both.said.size(), spectral::have_transform ? 2u : 1u);
+  ASSERT_EQ(both.said.size(), spectral::have_transform && !transforms ? 2u : 1u);
   EXPECT_EQ(both.said[0], "CUDA: pings of a fixed fan are computed by the CPU");
   requests[0].settings.beam_count = 0;
   EXPECT_THROW(both.by_device(requests), std::invalid_argument);

@@ -43,6 +43,13 @@ class FrequencySums {
   int count() const { return count_; }
   /// Values of the grid that the caller keeps, zero before the first add.
   int grid_points() const { return points_; }
+  /// What add and transform work with, for an engine that does the same elsewhere.
+  struct Tables {
+    int width, terms, padded;
+    std::span<const double> polynomial;  // [terms][padded], highest power first: the kernel at each of `width` points
+    std::span<const double> correction;  // per sum: 1 / the kernel's transform
+  };
+  Tables tables() const { return {width_, terms_, padded_, polynomial_, correction_}; }
   /// `turns`: delay times the frequency step, any finite number; delays a whole turn apart look the same.
   void add(double turns, Complex amplitude, Complex* grid) const;
   /// sums[m] = sum_i A_i e^{-i 2 pi (m - count / 2) turns_i}, m in [0, count). Leaves the grid in disorder.

@@ -25,6 +25,9 @@ class SpectralColumns {
 
   int period_samples() const { return period_; }
   int frequencies() const { return sums_.count(); }
+  const spectral::FrequencySums& sums() const { return sums_; }
+  /// What every sum is multiplied with: the pulse's spectrum over the period.
+  std::span<const spectral::Complex> response() const { return response_; }
 
   void begin(int columns, SpectralScratch& scratch) const;
   /// Takes the echoes in; their columns must lie in [first_column, first_column + columns of begin).
