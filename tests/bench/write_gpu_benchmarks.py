@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the page of the CUDA engine's benchmarks from what `sonard bench --engine cuda --json` found and from facts of the machine.
 
-usage: write_gpu_benchmarks.py REPORT.json FACTS.json PAGE.md
+usage: write_gpu_benchmarks.py REPORT.json FACTS.json PAGE
 FACTS: {"facts": {"driver": "...", ...}, "distances": "lines of the comparison with Embree's rays"}; tests/tools/gpu_check.sh
 """
 
