@@ -22,19 +22,12 @@ const CellStore::Held* CellStore::held(const CellTile& t) const {
   return same ? &h : nullptr;
 }
 
-bool CellStore::has_room(std::span<const TileInView> tiles) const {
-  std::size_t more = 0;
-  for (const TileInView& t : tiles)
-    if (!held(*t.tile)) more += t.tile->bytes();
-  return more == 0 || tiles_.empty() || bytes() + more <= budget_bytes_;
-}
-
 void CellStore::clear() {
   tiles_.clear();
   memory_.clear();
 }
 
-void CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells) {
+bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells) {
   cells.assign(tiles.size(), nullptr);
   std::size_t more = 0;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
@@ -44,7 +37,8 @@ void CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
     else
       more += values(t);
   }
-  if (more == 0) return;
+  if (more == 0) return true;
+  if (!tiles_.empty() && bytes() + more * sizeof(std::int16_t) > budget_bytes_) return false;
   const auto host = staging.take<std::int16_t>(more);
   const auto device = memory_.take<std::int16_t>(more);
   std::size_t at = 0;
@@ -57,6 +51,7 @@ void CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
     at += values(t);
   }
   machine_.upload(lane, device.device, host.host, more * sizeof(std::int16_t));
+  return true;
 }
 
 }  // namespace sonar::cuda

@@ -18,12 +18,11 @@ class CellStore {
   /// `budget_bytes`: of the device's memory; what one ping sees is kept whatever it takes.
   CellStore(Machine& machine, std::size_t budget_bytes);
 
-  /// Whether the tiles fit in beside those that are held; if not, clear() first, when no ping under way needs them.
-  bool has_room(std::span<const TileInView> tiles) const;
-  void clear();
   /// Where each tile's cells lie on the device, in the order of `tiles`. What was not there is queued on `lane`; it travels by
-  /// way of `staging`, which must live until that is done.
-  void find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells);
+  /// way of `staging`, which must live until that is done. False: they do not fit in beside those that are held; clear() first,
+  /// when no ping under way needs them.
+  bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells);
+  void clear();
 
   std::size_t bytes() const { return memory_.taken_bytes(); }
 

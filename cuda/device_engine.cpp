@@ -14,8 +14,7 @@ namespace sonar::cuda {
 namespace {
 
 constexpr std::size_t most_plans = 8;
-constexpr int keeping_lane = 2;                           // of what stays on the device: plans and cells; rooms have 0 and 1
-constexpr std::size_t work_bytes = std::size_t{1} << 30;  // of a batch: pings of many samples are launched before it is full
+constexpr int keeping_lane = 2;  // of what stays on the device: plans and cells; rooms have 0 and 1
 
 /// Where the benchmark's table has a step.
 constexpr Stage stage_of(Step step) {
@@ -84,7 +83,7 @@ class DeviceEngine final : public PingEngine {
         preparer_.forget_cells();
         if (!prepare(requests[i], i, rooms_[which])) throw std::runtime_error("the tiles of one ping do not fit an empty store");
       }
-      if (rooms_[which].pings.size() < batch_ && rooms_[which].work.taken_bytes() < work_bytes) continue;
+      if (rooms_[which].pings.size() < batch_ && rooms_[which].work.taken_bytes() < device_options_.work_bytes) continue;
       launch(rooms_[which]);
       which = 1 - which;
       finish(rooms_[which], pings);  // the other one: it has had the time it took to prepare this one

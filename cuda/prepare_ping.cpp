@@ -212,8 +212,7 @@ bool PingPreparer::find_tiles(Making& m, SurfaceCells& cells, const std::vector<
   in.max_elevation_rad = static_cast<float>(plan.widest_about_axis_rad());
   in.levels = plan.levels;
   const std::vector<TileInView>& seen = cells.in_view(in, pool_);
-  if (!store_.has_room(seen)) return false;
-  store_.find(seen, lane, m.room.cells, tile_cells_);
+  if (!store_.find(seen, lane, m.room.cells, tile_cells_)) return false;
   prepare_tiles(seen, cells, *scene_, laws, plan, m.scalars, pool_, tiles_);
   m.ping.statistics.tiles = seen.size();
   m.ping.statistics.tiles_built = cells.built_last_time();

@@ -1,5 +1,6 @@
 // A module as nvcc makes one, but with host loops for a device: the shipped programs then do all that they do with a CUDA device,
-// from looking for the module to the last image. SONARD_TEST_DEVICE_LASTS=N loses that device at the Nth call.
+// from looking for the module to the last image. SONARD_TEST_DEVICE_LASTS=N loses that device at the Nth call;
+// SONARD_TEST_DEVICE_IDLE=1 leaves out its steps, so that the rate is what the processor's share of a ping allows.
 #include <climits>
 #include <cstdio>
 #include <cstdlib>
@@ -14,6 +15,7 @@ namespace {
 struct Opened {
   explicit Opened(int lasts) : machine(calls, lasts) {}
   int calls = 0;
+  bool idle = std::getenv("SONARD_TEST_DEVICE_IDLE") != nullptr;
   test::FailingMachine machine;
 };
 Machine& machine_of(void* opened) { return static_cast<Opened*>(opened)->machine; }
@@ -59,6 +61,7 @@ int download(void* m, int lane, void* to, const void* from, std::size_t bytes) {
   return code_of([&] { machine_of(m).download(lane, to, from, bytes); });
 }
 int run(void* m, int lane, const Launch* launch) {
+  if (static_cast<Opened*>(m)->idle) return 0;
   return code_of([&] { machine_of(m).run(lane, *launch); });
 }
 int transforms(char* name, std::size_t room) {

@@ -14,8 +14,8 @@ using cuda::LoopOrder;
 
 std::vector<PingRequest> requests() {
   std::vector<PingRequest> all;
-  const std::set<std::string> wanted{"everything, high",    "everything, low", "expected power, high", "blank, low",
-                                     "somewhere else, low", "flat beams, high"};
+  const std::set<std::string> wanted{"everything, high", "everything, low",     "expected power, high",
+                                     "blank, low",       "somewhere else, low", "flat beams, high"};
   for (auto& [what, request] : turns())
     if (wanted.count(what) > 0) {
       request.switches.multipath = what == "everything, high";

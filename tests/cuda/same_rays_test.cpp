@@ -2,6 +2,8 @@
 // and it is the same arithmetic. Every part of the model, alone and together, in batches and one by one.
 #include <gtest/gtest.h>
 
+#include <chrono>
+
 #include "tests/core/pipeline/basin.hpp"
 #include "tests/core/pipeline/pulses.hpp"
 #include "tests/core/pipeline/scenes.hpp"
@@ -112,6 +114,38 @@ TEST(DeviceEngine, IsTheSameBytesInBatchesOfAnySize) {
     EXPECT_EQ(batched[i].pressure_upa, single[i].pressure_upa) << i;
     EXPECT_EQ(batched[i].request.number, requests[i].number) << i;
   }
+}
+
+double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+// A launch that comes again may be a captured graph, one that is timed never is; a batch may end for lack of room, cells be sent
+// anew.
+TEST(DeviceEngine, IsTheSameBytesHoweverItIsLaunched) {
+  SKIP_WITHOUT_A_MACHINE();
+  PingRequest request;
+  for (auto& [what, r] : on_device_turns())
+    if (what == "somewhere else, high") request = r;
+  ASSERT_TRUE(request.model);
+  const std::vector<PingRequest> four(4, request);
+  const auto scene = basin();
+  Parallel pool(1);
+  std::vector<cuda::DeviceEngineOptions> ways(4);
+  ways[1].batch = 2;
+  ways[2].work_bytes = ways[3].cell_bytes = 1;
+  ways[3].batch = 1;
+  std::vector<std::byte> samples;
+  for (const auto& options : ways)
+    for (double (*clock)() : {static_cast<double (*)()>(nullptr), seconds}) {
+      const auto engine = cuda::make_device_engine(scene, pool, {.now_s = clock}, test_machine().value(), options);
+      for (int again = 0; again < 4; ++again)
+        for (const Ping& ping : engine->run(four)) {
+          if (samples.empty()) samples = ping.samples;
+          ASSERT_EQ(ping.samples, samples) << again;
+        }
+      const PingStatistics took = engine->statistics();
+      for (const Stage s : {Stage::trace, Stage::scatter, Stage::synthesize, Stage::noise, Stage::couple, Stage::receive})
+        EXPECT_EQ(took.seconds[static_cast<std::size_t>(s)] > 0, clock != nullptr) << stage_names[static_cast<std::size_t>(s)];
+    }
 }
 
 TEST(DeviceEngine, LeavesToTheCpuWhatItCannotDoAndSaysSoOnce) {
