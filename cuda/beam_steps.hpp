@@ -18,20 +18,9 @@ SONAR_HD inline void point_weights(const PingView& p, std::uint32_t i) {
   p.point_weights[i] = p.pattern(from.sine - p.beam_sines[i % beams]);
 }
 
-/// Sample `i` of [beams][samples].
-SONAR_HD inline void couple(const PingView& p, std::uint32_t i) {
-  const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
-  const std::uint32_t j = i / samples;
-  const auto n = static_cast<std::int32_t>(i % samples);
-  const CouplingRow& row = p.panels[j / 4];
-  const float* weight = p.weights + row.weights + j % 4;
-  const float* column = p.signals + 2 * (static_cast<std::int64_t>(row.first_column) * p.samples + n);
-  float re = 0, im = 0;
-  for (int k = 0; k < row.count; ++k) {
-    re += weight[4 * k] * column[0];
-    im += weight[4 * k] * column[1];
-    column += 2 * static_cast<std::int64_t>(p.samples);
-  }
+/// Adds what points and other sonars are at sample `n` of beam `j`.
+SONAR_HD inline void add_points(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
+  const auto beams = static_cast<std::uint32_t>(p.beams);
   const bool power = p.sea.expected_power != 0;
   double sum_re = 0, sum_im = 0;
   for (int q = 0; q < p.point_count; ++q) {
@@ -51,8 +40,34 @@ SONAR_HD inline void couple(const PingView& p, std::uint32_t i) {
     re += static_cast<float>(power ? w * w * (a * a + b * b) : w * a);
     if (!power) im += static_cast<float>(w * b);
   }
-  p.beam_signals[2 * static_cast<std::int64_t>(i)] = re;
-  p.beam_signals[2 * static_cast<std::int64_t>(i) + 1] = im;
+}
+
+/// Sample `i` of [panels][samples]: the four beams of a panel at once, which listen to the same columns.
+SONAR_HD inline void couple(const PingView& p, std::uint32_t i) {
+  const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
+  const std::uint32_t panel = i / samples;
+  const auto n = static_cast<std::int32_t>(i % samples);
+  const CouplingRow& row = p.panels[panel];
+  const float* weight = p.weights + row.weights;
+  const float* column = p.signals + 2 * (static_cast<std::int64_t>(row.first_column) * p.samples + n);
+  float re[beams_a_panel] = {}, im[beams_a_panel] = {};
+  for (int k = 0; k < row.count; ++k) {
+    const float a = column[0], b = column[1];
+    for (std::uint32_t beam = 0; beam < beams_a_panel; ++beam) {
+      re[beam] += weight[beam] * a;
+      im[beam] += weight[beam] * b;
+    }
+    weight += beams_a_panel;
+    column += 2 * static_cast<std::int64_t>(p.samples);
+  }
+  for (std::uint32_t beam = 0; beam < beams_a_panel; ++beam) {
+    const std::uint32_t j = panel * beams_a_panel + beam;
+    if (j >= beams) break;
+    add_points(p, j, n, re[beam], im[beam]);
+    float* to = p.beam_signals + 2 * (static_cast<std::int64_t>(j) * p.samples + n);
+    to[0] = re[beam];
+    to[1] = im[beam];
+  }
 }
 
 /// Sample `n`: the sum over all beams.

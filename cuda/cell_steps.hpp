@@ -130,12 +130,16 @@ SONAR_HD inline void rank(const PingView& p, std::uint32_t i) {
 /// Column `k`: counts of the chunks become sums over the chunks before.
 SONAR_HD inline void scan_chunks(const PingView& p, std::uint32_t k) {
   const auto columns = static_cast<std::uint32_t>(p.sea.columns);
+  constexpr std::uint32_t at_once = 8;  // read before they are written: so the device waits for memory once for all of them
   std::uint32_t before = 0;
-  for (std::uint32_t chunk = 0; chunk < p.chunks; ++chunk) {
-    std::uint32_t& here = p.in_chunk[chunk * columns + k];
-    const std::uint32_t count = here;
-    here = before;
-    before += count;
+  for (std::uint32_t from = 0; from < p.chunks; from += at_once) {
+    const std::uint32_t some = p.chunks - from < at_once ? p.chunks - from : at_once;
+    std::uint32_t count[at_once];
+    for (std::uint32_t c = 0; c < at_once; ++c) count[c] = c < some ? p.in_chunk[(from + c) * columns + k] : 0;
+    for (std::uint32_t c = 0; c < at_once; ++c) {
+      if (c < some) p.in_chunk[(from + c) * columns + k] = before;
+      before += count[c];
+    }
   }
   p.in_column[k] = before;
 }

@@ -15,7 +15,8 @@ inline constexpr int elevation_terms = 9;                // of the elevation pat
 inline constexpr int law_steps = 128;                    // of a tabulated scattering law, as simd::law_steps
 inline constexpr std::uint32_t slots_a_chunk = 256;      // cells that are sorted into columns together
 inline constexpr std::uint32_t counters_a_ping = 2;
-inline constexpr std::uint32_t sum_parts = 32;  // threads that share the sum of one column: a warp
+inline constexpr std::uint32_t beams_a_panel = 4;  // as CouplingPanel has
+inline constexpr std::uint32_t sum_parts = 32;     // threads that share the sum of one column: a warp
 
 /// Boxes of both children, one line of the cache. Links as in bvh_link.
 struct alignas(64) BvhNode {
@@ -104,7 +105,7 @@ struct SeaView {
   float origin[3], world_from_sonar[9], far_m, pulse_width_m, truth_half_width_rad;
 };
 
-struct CouplingRow {  // four beams, see CouplingPanel
+struct CouplingRow {  // beams_a_panel beams, see CouplingPanel
   std::int32_t first_column, count;
   std::uint32_t weights, unused;
 };

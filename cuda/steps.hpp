@@ -53,7 +53,7 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
     case Step::point_weights:
       return static_cast<std::uint32_t>(p.point_count + p.pulse_count) * beams;
     case Step::couple:
-      return beams * samples;
+      return (beams + beams_a_panel - 1) / beams_a_panel * samples;
     case Step::crosstalk_sum:
       return p.crosstalk != nullptr ? samples : 0;
     case Step::crosstalk_add:
