@@ -70,11 +70,7 @@ Found find_device() {
 
 class CudaMachine final : public Machine {
  public:
-  CudaMachine(const CudaModule& module, std::string name) : module_(module), name_(std::move(name)) {
-    check(module_.open(&at_));
-    std::array<char, 256> which{};
-    transforms_ = module_.transforms(which.data(), which.size()) != 0;
-  }
+  CudaMachine(const CudaModule& module, std::string name) : module_(module), name_(std::move(name)) { check(module_.open(&at_)); }
   ~CudaMachine() override {
     if (at_) module_.close(at_);
   }
@@ -102,7 +98,10 @@ class CudaMachine final : public Machine {
     check(module_.download(at_, lane, to, from_device, bytes));
   }
   void run(int lane, const Launch& launch) override { check(module_.run(at_, lane, &launch)); }
-  bool transforms() const override { return transforms_; }
+  std::string why_no_transforms() const override {
+    std::array<char, 256> which{};
+    return module_.transforms(which.data(), which.size()) != 0 ? "" : which.data();
+  }
   void transform(int lane, double* values, int size, int rows, bool inverse) override {
     check(module_.transform(at_, lane, values, size, rows, inverse ? 1 : 0));
   }
@@ -121,7 +120,6 @@ class CudaMachine final : public Machine {
   const CudaModule& module_;
   std::string name_;
   void* at_ = nullptr;
-  bool transforms_ = false;
 };
 
 }  // namespace

@@ -72,8 +72,8 @@ class DeviceEngine final : public PingEngine {
   void run_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
     std::size_t which = 0;
     for (std::size_t i = 0; i < requests.size(); ++i) {
-      if (const std::string why = why_not_on_device(requests[i], machine_->transforms()); !why.empty()) {
-        if (told_.insert(why).second) say("CUDA: " + why + " are computed by the CPU");
+      if (const std::string why = why_by_cpu(requests[i]); !why.empty()) {
+        if (told_.insert(why).second) say("CUDA: " + why);
         pings[i] = by_cpu(requests[i]);
         continue;
       }
@@ -93,6 +93,13 @@ class DeviceEngine final : public PingEngine {
     finish(rooms_[which], pings);
   }
 
+  /// Empty when the device does it.
+  std::string why_by_cpu(const PingRequest& request) const {
+    if (const std::string why = why_not_on_device(request); !why.empty()) return why + " are computed by the CPU";
+    const std::string without = why_not_on_device(request, false);
+    const std::string missing = without.empty() ? "" : machine_->why_no_transforms();  // not asked about without need
+    return missing.empty() ? "" : without + " are computed by the CPU (" + missing + ")";
+  }
   bool prepare(const PingRequest& request, std::size_t index, BatchRoom& room) {
     place(request);
     return preparer_.add(request, index, plan_for(request), *cells_, keeping_lane, room);

@@ -65,7 +65,7 @@ class HostLoops final : public Machine {
       if (launch.timed != 0) seconds.of[step] += now_s() - begin;
     }
   }
-  bool transforms() const override { return spectral::have_transform; }
+  std::string why_no_transforms() const override { return spectral::have_transform ? "" : "no FFTW"; }
   void transform(int lane, double* values, int size, int rows, bool inverse) override {
     const double begin = now_s();
     using spectral::Fft;

@@ -28,8 +28,9 @@ class Machine {
   virtual void download(int lane, void* to, const void* from_device, std::size_t bytes) = 0;
   /// Queues steps, one after the other. A launch that is timed is for benchmarks: each step is then told apart.
   virtual void run(int lane, const Launch& launch) = 0;
-  /// Whether transform() can be had; else pulses by way of the spectrum are the CPU's.
-  virtual bool transforms() const = 0;
+  /// Empty when transform() can be had; else what is missing, and pulses by way of the spectrum are the CPU's. What it takes is
+  /// loaded by the first to ask.
+  virtual std::string why_no_transforms() const = 0;
   /// Queues x[k] = sum_n x[n] e^{-+ i 2 pi k n / size} over `rows` rows of complex values, one after the other on the device, in
   /// place, not scaled. Timed when the launch before it on the lane was.
   virtual void transform(int lane, double* values, int size, int rows, bool inverse) = 0;

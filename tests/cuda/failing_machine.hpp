@@ -10,6 +10,8 @@ namespace sonar::test {
 
 class FailingMachine final : public cuda::Machine {
  public:
+  /// When set, it has no transforms, and this is why.
+  std::string no_transforms;
   /// `calls` is counted up, and outlives this; the call that finds it at `last` fails, as do all that follow.
   FailingMachine(int& calls, int last) : calls_(calls), last_(last) {}
 
@@ -21,7 +23,7 @@ class FailingMachine final : public cuda::Machine {
   void upload(int lane, void* to, const void* from, std::size_t n) override { called(), inner_->upload(lane, to, from, n); }
   void download(int lane, void* to, const void* from, std::size_t n) override { called(), inner_->download(lane, to, from, n); }
   void run(int lane, const cuda::Launch& launch) override { called(), inner_->run(lane, launch); }
-  bool transforms() const override { return inner_->transforms(); }
+  std::string why_no_transforms() const override { return no_transforms.empty() ? inner_->why_no_transforms() : no_transforms; }
   void transform(int lane, double* values, int size, int rows, bool inverse) override {
     called(), inner_->transform(lane, values, size, rows, inverse);
   }

@@ -110,6 +110,20 @@ TEST_F(LostDevice, IsTheEndWhereNothingMayTakeItsPlace) {
   }
 }
 
+TEST_F(LostDevice, IsNotAskedForTransformsThatItDoesNotHave) {
+  if (!spectral::have_transform) GTEST_SKIP() << "no exact pulses in this build";
+  auto machine = std::make_unique<FailingMachine>(calls_, never);
+  machine->no_transforms = "no libcufft.so.12";
+  cuda::DeviceEngineOptions device;
+  device.say = [this](const std::string& what) { said_.push_back(what); };
+  const auto sound = cuda::make_device_engine(scene_, pool_, options_, std::move(machine), device);
+  const auto pings = sound->run(requests_);
+  EXPECT_EQ(pings[3].samples, samples_[3]);
+  sound->run(requests_);
+  ASSERT_EQ(said_.size(), 1u);
+  EXPECT_EQ(said_[0], "CUDA: pings with an exact pulse are computed by the CPU (no libcufft.so.12)");
+}
+
 TEST_F(LostDevice, IsNoEngineWhenItIsLostWhileTheSceneIsSent) {
   const int first = (engine(never, true), calls_);
   for (int last = 0; last < first; ++last) EXPECT_THROW(engine(last, true), std::runtime_error) << last;

@@ -61,7 +61,8 @@ TEST(DeviceEngine, DoesEveryPartOfTheModelAsTheCpuDoes) {
 // Tones that are exact, and a pulse that is measured and complex: echoes to a grid, two transforms, back to samples.
 TEST(DeviceEngine, SumsPulsesByWayOfTheSpectrumAsTheCpuDoes) {
   SKIP_WITHOUT_A_MACHINE();
-  if (!test_machine().value()->transforms()) GTEST_SKIP() << "no Fourier transform here: exact pulses are the CPU's";
+  if (const std::string why = test_machine().value()->why_no_transforms(); !why.empty())
+    GTEST_SKIP() << why << ": exact pulses are the CPU's";
   SonarModel measured;
   measured.name = "measured";
   measured.modes = {p900()};
@@ -154,7 +155,7 @@ TEST(DeviceEngine, LeavesToTheCpuWhatItCannotDoAndSaysSoOnce) {
   std::vector<PingRequest> requests{high(), high(), low(), low(), high()};
   for (PingRequest& r : requests) r.switches.multipath = false, r.settings.range_bin_count = 30;
   requests[1].switches.fixed_fan = 40;
-  const bool transforms = test_machine().value()->transforms();
+  const bool transforms = test_machine().value()->why_no_transforms().empty();
   EXPECT_EQ(cuda::why_not_on_device(low()), "");
   EXPECT_EQ(cuda::why_not_on_device(low(), false), spectral::have_transform ? "pings with an exact pulse" : "");
   const std::vector<Ping> pings = both.by_device(requests);
