@@ -1,9 +1,12 @@
 #include "cuda/cell_store.hpp"
 
+#include <algorithm>
+
 namespace sonar::cuda {
 namespace {
 
 constexpr std::size_t chunk_bytes = 16u << 20;
+constexpr std::size_t tiles_at_once = 256;  // that one worker looks up
 
 std::size_t values(const CellTile& t) { return static_cast<std::size_t>(t.stride) * CellTile::columns; }
 
@@ -27,16 +30,17 @@ void CellStore::clear() {
   memory_.clear();
 }
 
-bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells) {
+bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells,
+                     Parallel& pool) {
   cells.assign(tiles.size(), nullptr);
+  pool.for_each((tiles.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
+    const std::size_t end = std::min(tiles.size(), (part + 1) * tiles_at_once);
+    for (std::size_t i = part * tiles_at_once; i < end; ++i)
+      if (const Held* h = held(*tiles[i].tile)) cells[i] = h->device;
+  });
   std::size_t more = 0;
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    const CellTile& t = *tiles[i].tile;
-    if (const Held* h = held(t))
-      cells[i] = h->device;
-    else
-      more += values(t);
-  }
+  for (std::size_t i = 0; i < tiles.size(); ++i)
+    if (!cells[i]) more += values(*tiles[i].tile);
   if (more == 0) return true;
   if (!tiles_.empty() && bytes() + more * sizeof(std::int16_t) > budget_bytes_) return false;
   const auto host = staging.take<std::int16_t>(more);

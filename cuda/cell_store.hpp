@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/base/parallel.hpp"
 #include "core/scene/cells/surface_cells.hpp"
 #include "cuda/arena.hpp"
 
@@ -21,7 +22,7 @@ class CellStore {
   /// Where each tile's cells lie on the device, in the order of `tiles`. What was not there is queued on `lane`; it travels by
   /// way of `staging`, which must live until that is done. False: they do not fit in beside those that are held; clear() first,
   /// when no ping under way needs them.
-  bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells);
+  bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();
 
   std::size_t bytes() const { return memory_.taken_bytes(); }

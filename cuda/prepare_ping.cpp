@@ -13,6 +13,7 @@ namespace sonar::cuda {
 namespace {
 
 constexpr std::size_t table_chunk = 4u << 20, work_chunk = 64u << 20, result_chunk = 4u << 20, cell_chunk = 8u << 20;
+constexpr std::size_t tiles_at_once = 256;  // that one worker writes
 
 }  // namespace
 
@@ -212,7 +213,7 @@ bool PingPreparer::find_tiles(Making& m, SurfaceCells& cells, const std::vector<
   in.max_elevation_rad = static_cast<float>(plan.widest_about_axis_rad());
   in.levels = plan.levels;
   const std::vector<TileInView>& seen = cells.in_view(in, pool_);
-  if (!store_.find(seen, lane, m.room.cells, tile_cells_)) return false;
+  if (!store_.find(seen, lane, m.room.cells, tile_cells_, pool_)) return false;
   prepare_tiles(seen, cells, *scene_, laws, plan, m.scalars, pool_, tiles_);
   m.ping.statistics.tiles = seen.size();
   m.ping.statistics.tiles_built = cells.built_last_time();
@@ -221,37 +222,46 @@ bool PingPreparer::find_tiles(Making& m, SurfaceCells& cells, const std::vector<
   return true;
 }
 
+/// A tile as the device knows it.
+TileView PingPreparer::view_of(const TileToSound& to_sound, const std::int16_t* cells, const float* law) {
+  const simd::TileSeen& seen = to_sound.seen;
+  const CellTile& tile = *seen.tile;
+  TileView t{};
+  t.cells = cells;
+  t.law = law;
+  t.count = tile.count;
+  t.axis = tile.axis;
+  t.position_unit_m = tile.position_unit_m;
+  std::copy_n(seen.from_sonar_object, 3, t.from_sonar_object);
+  std::copy_n(seen.from_sonar, 3, t.from_sonar);
+  std::copy_n(seen.turn, 9, t.turn);
+  t.range_m = seen.range_m;
+  t.sample_shift = seen.sample_shift;
+  t.phase_turns = seen.phase_turns;
+  t.amplitude = seen.amplitude;
+  t.area_amplitude = seen.area_amplitude;
+  t.fade_in_from_m = seen.fade_in_from_m;
+  t.fade_in_per_m = seen.fade_in_per_m;
+  t.fade_out_to_m = seen.fade_out_to_m;
+  t.fade_out_per_m = seen.fade_out_per_m;
+  return t;
+}
+
 /// The tiles one after the other, every cell a slot.
 void PingPreparer::lay_out_tiles(Making& m, const std::vector<LawTable>& laws) {
   std::vector<const float*> law_on_device;
   for (const LawTable& law : laws) law_on_device.push_back(m.room.tables.put(law.root));
   const auto tiles = m.room.tables.take<TileView>(tiles_.size());
   const auto first_slot = m.room.tables.take<std::uint32_t>(tiles_.size() + 1);
+  pool_.for_each((tiles_.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
+    const std::size_t end = std::min(tiles_.size(), (part + 1) * tiles_at_once);
+    for (std::size_t i = part * tiles_at_once; i < end; ++i)
+      tiles.host[i] = view_of(tiles_[i], tile_cells_[i], law_on_device[static_cast<std::size_t>(tiles_[i].seen.tile->material)]);
+  });
   std::uint32_t slots = 0;
   for (std::size_t i = 0; i < tiles_.size(); ++i) {
-    const simd::TileSeen& seen = tiles_[i].seen;
-    const CellTile& tile = *seen.tile;
-    TileView t{};
-    t.cells = tile_cells_[i];
-    t.law = law_on_device[static_cast<std::size_t>(tile.material)];
-    t.count = tile.count;
-    t.axis = tile.axis;
-    t.position_unit_m = tile.position_unit_m;
-    std::copy_n(seen.from_sonar_object, 3, t.from_sonar_object);
-    std::copy_n(seen.from_sonar, 3, t.from_sonar);
-    std::copy_n(seen.turn, 9, t.turn);
-    t.range_m = seen.range_m;
-    t.sample_shift = seen.sample_shift;
-    t.phase_turns = seen.phase_turns;
-    t.amplitude = seen.amplitude;
-    t.area_amplitude = seen.area_amplitude;
-    t.fade_in_from_m = seen.fade_in_from_m;
-    t.fade_in_per_m = seen.fade_in_per_m;
-    t.fade_out_to_m = seen.fade_out_to_m;
-    t.fade_out_per_m = seen.fade_out_per_m;
-    tiles.host[i] = t;
     first_slot.host[i] = slots;
-    slots += static_cast<std::uint32_t>(tile.count);
+    slots += static_cast<std::uint32_t>(tiles.host[i].count);
   }
   first_slot.host[tiles_.size()] = slots;
   m.ping.statistics.cells = slots;

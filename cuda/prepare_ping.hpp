@@ -66,6 +66,7 @@ class PingPreparer {
   void find_points(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws);
   void add_points(Making& m, std::span<const PointEcho> points, std::span<const PulseHeard> pulses);
   bool find_tiles(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws, int lane);
+  static TileView view_of(const TileToSound& to_sound, const std::int16_t* cells, const float* law);
   void lay_out_tiles(Making& m, const std::vector<LawTable>& laws);
   void add_water(Making& m);
   void add_receiver(Making& m);
