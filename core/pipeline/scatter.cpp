@@ -75,6 +75,13 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<co
   return out;
 }
 
+/// Asks for a tile's cells ahead of their turn: they lie anywhere in memory, so that no processor guesses where.
+void fetch_cells(const CellTile& tile) {
+  constexpr std::size_t cache_line = 64;
+  const auto* at = reinterpret_cast<const char*>(tile.data.get());
+  for (std::size_t byte = 0; byte < tile.bytes(); byte += cache_line) __builtin_prefetch(at + byte);
+}
+
 /// Of a ray of the fixed fan, sonar axes.
 Vec3d direction_of_hit(const FanHit& hit, double sine, bool conical) {
   const ConicalDirection d{sine, static_cast<double>(hit.elevation_rad)};
@@ -154,6 +161,8 @@ void sort_tiles(const std::vector<TileToSound>& tiles, int group_columns, int gr
 std::size_t scatter(const std::vector<TileToSound>& tiles, std::span<const std::uint32_t> wanted, std::size_t from,
                     const simd::GroupView& group, const simd::Kernels& kernels, Echoes& echoes) {
   for (; from < wanted.size(); ++from) {
+    if (from + 2 < wanted.size()) __builtin_prefetch(tiles[wanted[from + 2]].seen.tile);
+    if (from + 1 < wanted.size()) fetch_cells(*tiles[wanted[from + 1]].seen.tile);
     const simd::TileSeen& seen = tiles[wanted[from]].seen;
     if (echoes.count + seen.tile->count > echoes.capacity()) {
       if (echoes.count > 0) break;

@@ -1,4 +1,6 @@
 // The hot loops for processors with AVX2 and FMA; see kernels.inl.
+#include <immintrin.h>
+
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -8,7 +10,9 @@
 namespace sonar::simd {
 namespace avx2 {
 constexpr int lanes = 8;
+#include "core/pipeline/simd/lanes.inl"
 #include "core/pipeline/simd/kernels.inl"
+#include "core/pipeline/simd/cells.inl"
 #include "core/pipeline/simd/transform.inl"
 }  // namespace avx2
 

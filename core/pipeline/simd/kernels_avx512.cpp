@@ -8,7 +8,9 @@
 namespace sonar::simd {
 namespace avx512 {
 constexpr int lanes = 16;
+#include "core/pipeline/simd/lanes.inl"
 #include "core/pipeline/simd/kernels.inl"
+#include "core/pipeline/simd/cells.inl"
 #include "core/pipeline/simd/transform.inl"
 }  // namespace avx512
 

@@ -8,7 +8,9 @@
 namespace sonar::simd {
 namespace portable {
 constexpr int lanes = 4;
+#include "core/pipeline/simd/lanes.inl"
 #include "core/pipeline/simd/kernels.inl"
+#include "core/pipeline/simd/cells.inl"
 #include "core/pipeline/simd/transform.inl"
 }  // namespace portable
 

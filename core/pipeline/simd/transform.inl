@@ -14,7 +14,6 @@ inline ComplexLanes times_conjugate(ComplexLanes v, const float* w) {
 }
 inline ComplexLanes times_i(ComplexLanes v) { return {-v.im, v.re}; }
 
-typedef std::int32_t LaneNumbers __attribute__((vector_size(4 * lanes)));
 struct Shuffles {
   LaneNumbers even, odd, low, high;
 };

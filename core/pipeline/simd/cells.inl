@@ -1,0 +1,170 @@
+// Cells of a tile to echoes: where they are, which the rays have seen, how they sound. Included by the instruction sets after
+// kernels.inl. Every value is a vector of cells; those that are not seen are dropped before anything is spent on their sound.
+
+inline constexpr int chunk = 256;
+
+struct Chunk {  // the cells of one stretch of a tile that are seen, packed
+  alignas(64) float range[chunk + 16], offset[chunk + 16], cosine[chunk + 16], slope2[chunk + 16], column[chunk + 16],
+      weight_re[chunk + 16], weight_im[chunk + 16];
+};
+
+/// Of a tile: the ranges between which its cells count, by its level and by the record.
+struct RangeWindow {
+  float from_m, to_m;
+};
+inline RangeWindow range_window(const TileSeen& s, const GroupView& g) {
+  const float shift = g.sample_offset - s.sample_shift;
+  return {larger(s.fade_in_from_m, (g.first_sample + shift) / g.samples_per_m),
+          smaller(s.fade_out_to_m, (g.last_sample + shift) / g.samples_per_m)};
+}
+
+/// Cells cover more surface than their lattice square on a slope: 1 / |normal along the dominant axis|; 0 for padding.
+inline Lanes area_of(const CellTile& t, int i, Lanes weight_re, Lanes weight_im) {
+  const Lanes along = counts(t.column(static_cast<CellTile::Column>(CellTile::normal_x + t.axis)) + i);
+  const Lanes weight2 = weight_re * weight_re + weight_im * weight_im;
+  return choose(below(all(0), weight2), 1.0f / (magnitude(along) * CellTile::normal_unit), all(0));
+}
+
+/// Where the cells are: range, column, elevation, cosine of incidence; which lie in the group's window; and which of them the
+/// depth map shows: a cell no farther than what the rays saw along its direction. Returns how many there are.
+template <bool conical>
+__attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, int from, int n, Chunk& c) {
+  const CellTile& t = *s.tile;
+  const std::int16_t *tx = t.column(CellTile::x), *ty = t.column(CellTile::y), *tz = t.column(CellTile::z);
+  const std::int16_t *nx = t.column(CellTile::normal_x), *ny = t.column(CellTile::normal_y), *nz = t.column(CellTile::normal_z);
+  const std::int16_t *wr = t.column(CellTile::weight_re), *wi = t.column(CellTile::weight_im);
+  const float unit = t.position_unit_m;
+  const float qx0 = s.from_sonar_object[0], qy0 = s.from_sonar_object[1], qz0 = s.from_sonar_object[2];
+  const float px0 = s.from_sonar[0], py0 = s.from_sonar[1], pz0 = s.from_sonar[2];
+  const float r0 = s.range_m, r0_squared = r0 * r0;
+  const float m00 = s.turn[0], m01 = s.turn[1], m02 = s.turn[2], m10 = s.turn[3], m11 = s.turn[4], m12 = s.turn[5];
+  const float m20 = s.turn[6], m21 = s.turn[7], m22 = s.turn[8];
+  const RangeWindow window = range_window(s, g);
+  const Lanes first_column = all(static_cast<float>(g.first_column)), end_column = all(static_cast<float>(g.last_column));
+  const Lanes bins = all(static_cast<float>(g.bins)), nearest = all(window.from_m), farthest = all(window.to_m);
+  const int row = g.bins + 1;
+  int m = 0;
+  for (int i = from; i < from + n; i += lanes) {
+    const Lanes dx = unit * counts(tx + i), dy = unit * counts(ty + i), dz = unit * counts(tz + i);
+    const Lanes e = dx * (2 * qx0 + dx) + dy * (2 * qy0 + dy) + dz * (2 * qz0 + dz);
+    const Lanes r_squared = larger(r0_squared + e, all(1e-6f)), inverse_r = inverse_root(r_squared), r = r_squared * inverse_r;
+    const Lanes x = px0 + m00 * dx + m01 * dy + m02 * dz;
+    const Lanes y = py0 + m10 * dx + m11 * dy + m12 * dz;
+    const Lanes z = pz0 + m20 * dx + m21 * dy + m22 * dz;
+    // What elevations are measured against.
+    const Lanes inverse_h = conical ? reciprocal(larger(x, all(1e-6f))) : inverse_root(larger(x * x + y * y, all(1e-12f)));
+    const Lanes column = (g.first_edge_sine - y * (conical ? inverse_r : inverse_h)) * g.columns_per_sine;
+    const Lanes slope = z * inverse_h, bin = (slope - g.first_tangent) * g.bins_per_tangent;
+    LaneMask keep = both(not_below(column, first_column), below(column, end_column));
+    keep = both(keep, both(not_below(bin, all(0)), below(bin, bins)));
+    keep = both(keep, both(not_below(r, nearest), below(r, farthest)));
+    keep = both(keep, below(all(1e-6f), x));
+    if (!any(keep)) continue;
+
+    const Lanes bin_here = choose(keep, bin, all(0));
+    const LaneNumbers bin_below = whole_part(bin_here);
+    const LaneNumbers at = (whole_part(choose(keep, column, first_column)) - g.first_column) * row + bin_below;
+    const Lanes a = gather(g.inverse_depth, at), b = gather(g.inverse_depth + 1, at);
+    const Lanes seen = a + (bin_here - as_floats(bin_below)) * (b - a);
+    keep = both(keep, not_below(inverse_h * (1.0f + g.depth_tolerance_m * inverse_r), seen));
+    if (!any(keep)) continue;
+
+    const Lanes along = counts(nx + i) * (qx0 + dx) + counts(ny + i) * (qy0 + dy) + counts(nz + i) * (qz0 + dz);
+    const Lanes weight_re = counts(wr + i), weight_im = counts(wi + i);
+    pack(c.range + m, keep, r);
+    pack(c.offset + m, keep, e * reciprocal(r0 + r));
+    pack(c.cosine + m, keep, magnitude(along) * (CellTile::normal_unit * inverse_r));
+    pack(c.slope2 + m, keep, slope * slope);
+    pack(c.column + m, keep, column);
+    if (g.expected_power) {
+      pack(c.weight_re + m, keep, area_of(t, i, weight_re, weight_im));
+    } else {
+      pack(c.weight_re + m, keep, weight_re);
+      pack(c.weight_im + m, keep, weight_im);
+    }
+    m += count_of(keep);
+  }
+  return m;
+}
+
+inline Lanes cross_fade(const TileSeen& s, Lanes r) {
+  const Lanes in = (r - s.fade_in_from_m) * s.fade_in_per_m, out = (s.fade_out_to_m - r) * s.fade_out_per_m;
+  return larger(smaller(smaller(in, out), all(1)), all(0));
+}
+
+/// Two-way elevation pattern, polynomial in sin^2, from the square of the tangent.
+inline Lanes elevation_pattern(const float (&e)[elevation_terms], Lanes slope2) {
+  const Lanes w = slope2 * reciprocal(1.0f + slope2);
+  Lanes p = all(e[elevation_terms - 1]);
+  for (int term = elevation_terms - 2; term >= 0; --term) p = e[term] + w * p;
+  return p;
+}
+
+/// Replaces the cosines by the root of the material's scattering strength; without a table Lambert's cosine is that already.
+__attribute__((noinline)) void apply_law(const float* __restrict law, int n, Chunk& c) {
+#pragma GCC ivdep
+  for (int i = 0; i < n; ++i) {
+    const float at = static_cast<float>(law_steps) * std::sqrt(larger(1.0f - c.cosine[i], 0.0f));
+    const std::int32_t step = static_cast<std::int32_t>(at);
+    const float a = law[step], b = law[step + 1];
+    c.cosine[i] = a + (at - static_cast<float>(step)) * (b - a);
+  }
+}
+
+inline Lanes sine_of_turns(Lanes turns) {
+  const Lanes x = turns - nearest_whole(turns);
+  const Lanes folded = choose(below(all(0), x), all(0.5f), all(-0.5f)) - x;
+  const Lanes y = 6.2831853071795865f * choose(below(all(0.25f), magnitude(x)), folded, x), y2 = y * y;
+  const Lanes p = -1.6666667e-1f + y2 * (8.3333333e-3f + y2 * (-1.9841270e-4f + y2 * (2.7557319e-6f + y2 * -2.5052108e-8f)));
+  return y + y * y2 * p;
+}
+
+/// Amplitude and carrier of every visible cell, times its speckle.
+__attribute__((noinline)) void sound_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
+  for (int i = 0; i < n; i += lanes) {
+    const Lanes r = load(c.range + i), offset = load(c.offset + i), d = -g.decay_per_m * offset;
+    const Lanes loss = 1.0f + d * (1.0f + d * (0.5f + d * (1.0f / 6.0f + d * (1.0f / 24.0f))));
+    const Lanes amplitude = s.amplitude * root_of(cross_fade(s, r)) * load(c.cosine + i) *
+                            elevation_pattern(g.elevation, load(c.slope2 + i)) * loss * reciprocal(r * r);
+    const Lanes turns = -(s.phase_turns + g.turns_per_m * offset);
+    const Lanes cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
+    const Lanes a = load(c.weight_re + i), b = load(c.weight_im + i);
+    store(out.re + i, a * cs - b * sn);
+    store(out.im + i, a * sn + b * cs);
+    store(out.sample + i, r * g.samples_per_m - (g.sample_offset - s.sample_shift));
+    *reinterpret_cast<LaneNumbers*>(out.column + i) = whole_part(load(c.column + i));
+  }
+}
+
+/// The same in expected power: |xi|^2 is 1, so only the cell's area counts and no carrier is needed.
+inline void power_of_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
+  for (int i = 0; i < n; i += lanes) {
+    const Lanes r = load(c.range + i);
+    Lanes loss;
+    for (int l = 0; l < lanes; ++l) loss[l] = std::exp(-g.decay_per_m * c.offset[i + l]);
+    const Lanes amplitude = s.area_amplitude * load(c.cosine + i) * elevation_pattern(g.elevation, load(c.slope2 + i)) * loss *
+                            reciprocal(r * r);
+    store(out.re + i, amplitude * amplitude * cross_fade(s, r) * load(c.weight_re + i));
+    store(out.im + i, Lanes{});
+    store(out.sample + i, r * g.samples_per_m - (g.sample_offset - s.sample_shift));
+    *reinterpret_cast<LaneNumbers*>(out.column + i) = whole_part(load(c.column + i));
+  }
+}
+
+int scatter_tile(const TileSeen& s, const GroupView& g, EchoArrays out) {
+  Chunk c;
+  int appended = 0;
+  for (int from = 0; from < s.tile->count; from += chunk) {
+    const int n = s.tile->count - from < chunk ? s.tile->count - from : chunk;
+    const int m = g.conical ? see_cells<true>(s, g, from, n, c) : see_cells<false>(s, g, from, n, c);
+    if (m == 0) continue;
+    if (s.law != nullptr) apply_law(s.law, m, c);
+    if (g.expected_power)
+      power_of_cells(s, g, m, c, out);
+    else
+      sound_cells(s, g, m, c, out);
+    out = {out.sample + m, out.re + m, out.im + m, out.column + m};
+    appended += m;
+  }
+  return appended;
+}

@@ -1,0 +1,133 @@
+// A vector of `lanes` floats as a value, and what loops over cells ask of it; included once per instruction set, first of all.
+// Reciprocals and roots: where an instruction set has quick estimates, those and a step of Newton's, to two units in the last
+// place; divisions in vectors take longer than all else that is done to a cell.
+
+typedef float Lanes __attribute__((vector_size(4 * lanes), aligned(4)));
+typedef std::int32_t LaneNumbers __attribute__((vector_size(4 * lanes), aligned(4)));
+
+inline Lanes load(const float* at) { return *reinterpret_cast<const Lanes*>(at); }
+inline void store(float* at, Lanes v) { *reinterpret_cast<Lanes*>(at) = v; }
+inline Lanes all(float x) { return Lanes{} + x; }
+
+#if defined(__AVX512F__)
+
+using LaneMask = __mmask16;
+inline __m512 native(Lanes v) { return reinterpret_cast<__m512>(v); }
+inline LaneMask below(Lanes a, Lanes b) { return _mm512_cmp_ps_mask(native(a), native(b), _CMP_LT_OQ); }
+inline LaneMask not_below(Lanes a, Lanes b) { return _mm512_cmp_ps_mask(native(a), native(b), _CMP_GE_OQ); }
+inline LaneMask both(LaneMask a, LaneMask b) { return static_cast<LaneMask>(a & b); }
+inline bool any(LaneMask m) { return m != 0; }
+inline Lanes choose(LaneMask m, Lanes a, Lanes b) { return Lanes(_mm512_mask_blend_ps(m, native(b), native(a))); }
+inline Lanes larger(Lanes a, Lanes b) { return Lanes(_mm512_max_ps(native(a), native(b))); }
+inline Lanes smaller(Lanes a, Lanes b) { return Lanes(_mm512_min_ps(native(a), native(b))); }
+inline Lanes magnitude(Lanes a) { return Lanes(_mm512_abs_ps(native(a))); }
+inline Lanes nearest_whole(Lanes v) { return Lanes(_mm512_roundscale_ps(native(v), 0)); }
+inline LaneNumbers whole_part(Lanes v) { return LaneNumbers(_mm512_cvttps_epi32(native(v))); }
+inline Lanes as_floats(LaneNumbers n) { return Lanes(_mm512_cvtepi32_ps(reinterpret_cast<__m512i>(n))); }
+inline Lanes counts(const std::int16_t* at) {
+  return Lanes(_mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(at)))));
+}
+inline Lanes gather(const float* table, LaneNumbers at) {
+  return Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table, 4));
+}
+inline Lanes reciprocal(Lanes x) {
+  const Lanes guess = Lanes(_mm512_rcp14_ps(native(x)));
+  return guess + guess * (1.0f - x * guess);
+}
+inline Lanes inverse_root(Lanes x) {  // x > 0
+  const Lanes guess = Lanes(_mm512_rsqrt14_ps(native(x)));
+  return guess + 0.5f * guess * (1.0f - x * guess * guess);
+}
+/// The lanes of the mask, packed, to `at`; writes a whole vector.
+inline void pack(float* at, LaneMask m, Lanes v) {
+  // Compress in registers and store whole vectors: compressing stores are slow on some processors.
+  _mm512_storeu_ps(at, _mm512_maskz_compress_ps(m, native(v)));
+}
+inline int count_of(LaneMask m) { return __builtin_popcount(m); }
+
+#else
+
+using LaneMask = LaneNumbers;
+inline LaneMask below(Lanes a, Lanes b) { return a < b; }
+inline LaneMask not_below(Lanes a, Lanes b) { return a >= b; }
+inline LaneMask both(LaneMask a, LaneMask b) { return a & b; }
+inline Lanes choose(LaneMask m, Lanes a, Lanes b) { return m ? a : b; }
+inline Lanes larger(Lanes a, Lanes b) { return a > b ? a : b; }
+inline Lanes smaller(Lanes a, Lanes b) { return a < b ? a : b; }
+inline Lanes magnitude(Lanes a) { return a < 0 ? -a : a; }
+inline LaneNumbers whole_part(Lanes v) { return __builtin_convertvector(v, LaneNumbers); }
+inline Lanes as_floats(LaneNumbers n) { return __builtin_convertvector(n, Lanes); }
+inline Lanes reciprocal(Lanes x) { return 1.0f / x; }
+
+#if defined(__AVX2__)
+
+inline __m256 native(Lanes v) { return reinterpret_cast<__m256>(v); }
+inline int bits_of(LaneMask m) { return _mm256_movemask_ps(reinterpret_cast<__m256>(m)); }
+inline bool any(LaneMask m) { return bits_of(m) != 0; }
+inline int count_of(LaneMask m) { return __builtin_popcount(static_cast<unsigned>(bits_of(m))); }
+inline Lanes nearest_whole(Lanes v) { return Lanes(_mm256_round_ps(native(v), _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)); }
+inline Lanes inverse_root(Lanes x) { return 1.0f / Lanes(_mm256_sqrt_ps(native(x))); }  // x > 0
+inline Lanes counts(const std::int16_t* at) {
+  return Lanes(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at)))));
+}
+inline Lanes gather(const float* table, LaneNumbers at) {
+  return Lanes(_mm256_i32gather_ps(table, reinterpret_cast<__m256i>(at), 4));
+}
+
+struct PackOrders {
+  alignas(32) std::int32_t lane[256][lanes];
+};
+constexpr PackOrders make_pack_orders() {
+  PackOrders orders{};
+  for (int mask = 0; mask < 256; ++mask)
+    for (int l = 0, n = 0; l < lanes; ++l)
+      if (mask >> l & 1) orders.lane[mask][n++] = l;
+  return orders;
+}
+constexpr PackOrders pack_orders = make_pack_orders();
+/// The lanes of the mask, packed, to `at`; writes a whole vector.
+inline void pack(float* at, LaneMask m, Lanes v) {
+  const auto* order = reinterpret_cast<const __m256i*>(pack_orders.lane[bits_of(m)]);
+  _mm256_storeu_ps(at, _mm256_permutevar8x32_ps(native(v), _mm256_load_si256(order)));
+}
+
+#else
+
+inline int count_of(LaneMask m) {
+  int count = 0;
+  for (int l = 0; l < lanes; ++l) count -= m[l];
+  return count;
+}
+inline bool any(LaneMask m) { return count_of(m) > 0; }
+inline Lanes nearest_whole(Lanes v) {
+  Lanes n;
+  for (int l = 0; l < lanes; ++l) n[l] = std::floor(v[l] + 0.5f);
+  return n;
+}
+inline Lanes inverse_root(Lanes x) {  // x > 0
+  Lanes root;
+  for (int l = 0; l < lanes; ++l) root[l] = std::sqrt(x[l]);
+  return 1.0f / root;
+}
+inline Lanes counts(const std::int16_t* at) {
+  Lanes v;
+  for (int l = 0; l < lanes; ++l) v[l] = static_cast<float>(at[l]);
+  return v;
+}
+inline Lanes gather(const float* table, LaneNumbers at) {
+  Lanes v;
+  for (int l = 0; l < lanes; ++l) v[l] = table[at[l]];
+  return v;
+}
+/// The lanes of the mask, packed, to `at`; may write a whole vector.
+inline void pack(float* at, LaneMask m, Lanes v) {
+  for (int l = 0; l < lanes; ++l) {
+    *at = v[l];
+    at -= m[l];
+  }
+}
+
+#endif
+#endif
+
+inline Lanes root_of(Lanes x) { return x * inverse_root(larger(x, all(1e-30f))); }  // x >= 0
