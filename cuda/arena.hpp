@@ -41,8 +41,8 @@ class Arena {
     if (!values.empty()) std::memcpy(static_cast<void*>(piece.host), values.data(), values.size_bytes());
     return piece.device;
   }
-  template <class T>
-  T* put(const std::vector<T>& values) {
+  template <class T, class Allocator>
+  T* put(const std::vector<T, Allocator>& values) {
     return put(std::span<const T>(values));
   }
 

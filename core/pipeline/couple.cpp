@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <memory>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/beam_transform.hpp"
@@ -20,13 +19,9 @@ void couple(const ColumnSignals& columns, const Coupling& coupling, const simd::
   out.data.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>((beams + 3) / 4 * 4));
 
   if (coupling.transform) {
-    constexpr std::size_t cache_line = 64;
-    scratch.transform.resize(coupling.transform->work_floats() + cache_line / sizeof(float));
-    void* at = scratch.transform.data();
-    std::size_t room = scratch.transform.size() * sizeof(float);
-    auto* work = static_cast<float*>(std::align(cache_line, room - cache_line, at, room));
+    scratch.transform.resize(coupling.transform->work_floats());
     kernels.transform_beams(coupling.transform->tables(), columns.first_sample(0) + 2 * first_sample, columns.stride, floats,
-                            work, out.data.data(), floats);
+                            scratch.transform.data(), out.data.data(), floats);
     return;
   }
   scratch.window.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>(columns.columns));

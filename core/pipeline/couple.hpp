@@ -22,8 +22,8 @@ struct BeamSignals {
 
 /// Buffers of couple, one per worker.
 struct CoupleScratch {
-  std::vector<float> window;     // the columns' samples side by side, of a band
-  std::vector<float> transform;  // the line of a transform
+  std::vector<float> window;  // the columns' samples side by side, of a band
+  AlignedFloats transform;    // the line of a transform
 };
 
 void couple(const ColumnSignals& columns, const Coupling& coupling, const simd::Kernels& kernels, int first_sample, int samples,

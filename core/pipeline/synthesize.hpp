@@ -3,8 +3,8 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
+#include "core/base/aligned.hpp"
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/scatter.hpp"
@@ -16,7 +16,7 @@ struct ColumnSignals {
   int columns = 0, samples = 0;
   int lead = 0;               // samples of room before sample 0, for pulses that begin earlier
   std::ptrdiff_t stride = 0;  // floats from column to column
-  std::vector<float> data;
+  AlignedFloats data;         // so is every column, on a cache line
 
   void shape(int column_count, int sample_count, int taps);
   float* column(int k) { return data.data() + k * stride; }

@@ -20,7 +20,8 @@ PingPlan plan_of(const char* name) {
   return make_plan(c.profile.model->modes[static_cast<std::size_t>(c.settings.mode)], c.settings, {});
 }
 
-void fill_with_noise(std::vector<float>& values) {
+template <class Floats>
+void fill_with_noise(Floats& values) {
   for (std::size_t i = 0; i + 1 < values.size(); i += 2) {
     const Random4 draw = philox(static_cast<std::uint32_t>(i), 0, 0, 0, 7, 0);
     const ComplexNormal z = complex_normal(draw.v[0], draw.v[1]);

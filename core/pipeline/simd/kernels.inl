@@ -71,22 +71,42 @@ void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, flo
 }
 
 #if defined(__AVX512F__)
+/// Sixteen echoes at a time: where each falls is worked out in vectors. A pulse is added to the two aligned vectors it reaches
+/// into, since the next echo often falls a sample aside: to load what overlaps a store under way only in part stalls, to load
+/// what was stored whole does not.
 template <>
 void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                         int first_column, int lead) {
+  alignas(64) std::int32_t turned[8][lanes];  // taps, twice each, begun at a sample within the vector and wrapped round
+  for (int begin = 0; begin < 8; ++begin)
+    for (int l = 0; l < lanes; ++l) turned[begin][l] = (l / 2 - begin) & 7;
   const float steps = static_cast<float>(pulse.steps);
-  const __m512i twice = _mm512_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7);
-  for (int i = 0; i < count; ++i) {
-    const float whole = std::floor(e.sample[i]);
-    const float position = (e.sample[i] - whole) * steps;
-    const int step = static_cast<int>(position);
-    const float part = position - static_cast<float>(step);
-    const float* row = pulse.rows + static_cast<std::ptrdiff_t>(step) * 16;
-    const __m256 p8 = _mm256_fmadd_ps(_mm256_set1_ps(part), _mm256_loadu_ps(row + 8), _mm256_loadu_ps(row));
-    const __m512 p = _mm512_permutexvar_ps(twice, _mm512_castps256_ps512(p8));
-    const __m512 a = _mm512_mask_blend_ps(0xAAAA, _mm512_set1_ps(e.re[i]), _mm512_set1_ps(e.im[i]));
-    float* at = columns + (e.column[i] - first_column) * stride + 2 * (static_cast<int>(whole) - 3 + lead);
-    _mm512_storeu_ps(at, _mm512_fmadd_ps(p, a, _mm512_loadu_ps(at)));
+  for (int from = 0; from < count; from += lanes) {
+    alignas(64) float part[lanes];
+    alignas(64) std::int32_t row_at[lanes], sample_at[lanes];
+    const Lanes sample = load(e.sample + from), whole = Lanes(_mm512_floor_ps(native(sample)));
+    const Lanes position = (sample - whole) * steps;
+    const LaneNumbers step = whole_part(position);
+    store(part, position - as_floats(step));
+    *reinterpret_cast<LaneNumbers*>(row_at) = step * 16;
+    *reinterpret_cast<LaneNumbers*>(sample_at) = whole_part(whole) - (3 - lead);
+    const int n = count - from < lanes ? count - from : lanes;
+    const float *re = e.re + from, *im = e.im + from, *rows = pulse.rows;
+    const std::int32_t* column = e.column + from;
+    for (int i = 0; i < n; ++i) {
+      const float* row = rows + row_at[i];
+      const __m256 taps = _mm256_fmadd_ps(_mm256_set1_ps(part[i]), _mm256_loadu_ps(row + 8), _mm256_loadu_ps(row));
+      const int begin = sample_at[i] & 7;
+      const auto here = static_cast<__mmask16>(0xFFFFu << 2 * begin);
+      const __m512i places = _mm512_load_si512(turned[begin]);
+      const __m512 first = _mm512_maskz_permutexvar_ps(here, places, _mm512_castps256_ps512(taps));
+      const __m512 second =
+          _mm512_maskz_permutexvar_ps(static_cast<__mmask16>(~here), places, _mm512_castps256_ps512(taps));
+      const __m512 a = _mm512_mask_blend_ps(0xAAAA, _mm512_set1_ps(re[i]), _mm512_set1_ps(im[i]));
+      float* at = columns + (column[i] - first_column) * stride + 2 * (sample_at[i] - begin);
+      _mm512_storeu_ps(at, _mm512_fmadd_ps(first, a, _mm512_loadu_ps(at)));
+      _mm512_storeu_ps(at + 16, _mm512_fmadd_ps(second, a, _mm512_loadu_ps(at + 16)));
+    }
   }
 }
 #endif
