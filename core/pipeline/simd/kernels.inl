@@ -3,6 +3,8 @@
 // Loops that must become vector code stand in functions of their own: inlined into each other, compilers lose the thread.
 // The order of every sum is fixed, so a result depends on the instruction set but never on threads.
 
+#include "core/pipeline/simd/lanes.inl"
+
 inline float larger(float a, float b) { return a > b ? a : b; }
 inline float smaller(float a, float b) { return a < b ? a : b; }
 
@@ -143,3 +145,6 @@ void quantise(const float* power, float gain, float half_gamma, float max_code, 
     codes[i] = smaller(std::floor(v * max_code + 0.5f), max_code);
   }
 }
+
+#include "core/pipeline/simd/cells.inl"
+#include "core/pipeline/simd/transform.inl"

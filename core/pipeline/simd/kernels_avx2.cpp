@@ -10,10 +10,7 @@
 namespace sonar::simd {
 namespace avx2 {
 constexpr int lanes = 8;
-#include "core/pipeline/simd/lanes.inl"
 #include "core/pipeline/simd/kernels.inl"
-#include "core/pipeline/simd/cells.inl"
-#include "core/pipeline/simd/transform.inl"
 }  // namespace avx2
 
 extern const Kernels avx2_kernels;

@@ -8,10 +8,7 @@
 namespace sonar::simd {
 namespace avx512 {
 constexpr int lanes = 16;
-#include "core/pipeline/simd/lanes.inl"
 #include "core/pipeline/simd/kernels.inl"
-#include "core/pipeline/simd/cells.inl"
-#include "core/pipeline/simd/transform.inl"
 }  // namespace avx512
 
 extern const Kernels avx512_kernels;

@@ -8,10 +8,7 @@
 namespace sonar::simd {
 namespace portable {
 constexpr int lanes = 4;
-#include "core/pipeline/simd/lanes.inl"
 #include "core/pipeline/simd/kernels.inl"
-#include "core/pipeline/simd/cells.inl"
-#include "core/pipeline/simd/transform.inl"
 }  // namespace portable
 
 extern const Kernels portable_kernels;
