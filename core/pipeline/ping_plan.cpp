@@ -125,6 +125,19 @@ void fill_row_gains(PingPlan& plan) {
   }
 }
 
+void lay_out_fixed_fan(PingPlan& p) {
+  const double step_rad = 2 * p.fan.half_angle_rad / p.fixed_fan;
+  const bool has_pattern = p.mode.pattern.elevation_taper != Taper::unit;
+  const double aperture = has_pattern ? elevation_aperture_in_wavelengths(p.mode.pattern) : 0;
+  for (int ray = 0; ray < p.fixed_fan; ++ray) {
+    const double angle = (ray + 0.5) * step_rad - p.fan.half_angle_rad, cosine = std::cos(angle);
+    const double pattern = has_pattern ? elevation_two_way(aperture, angle) : 1.0;
+    const double solid_angle = p.columns.spacing * step_rad * (p.switches.conical ? 1.0 : cosine);
+    p.fixed_fan_rays.push_back({static_cast<float>(angle), static_cast<float>(cosine), static_cast<float>(std::sin(angle)),
+                                static_cast<float>(pattern * std::sqrt(solid_angle))});
+  }
+}
+
 }  // namespace
 
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count) {
@@ -259,6 +272,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.coupling = make_coupling(mode, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);
   p.fan = make_fan(mode, settings, p.pulse_width_m);
+  lay_out_fixed_fan(p);
   p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
   // The mean over speckle hides no chance in where cells lie: smaller cells leave a tenth of a decibel of it.
   const double cell_scale = p.expected_power ? 0.4 : 1.0;

@@ -34,6 +34,12 @@ struct Fan {
   std::vector<float> elevation_rad;  // the base fan, from below to above
 };
 
+/// A ray of the fixed fan: its elevation about the array axis, and pattern times root of the solid angle, of flat beams but for
+/// what depends on the column.
+struct FixedFanRay {
+  float elevation_rad = 0, cosine = 1, sine = 0, weight = 0;
+};
+
 /// Weights of four neighbouring beams over the columns they share.
 struct CouplingPanel {
   int first_beam = 0;  // the four beams first_beam .. +3; those past the last beam have zero weights
@@ -63,6 +69,7 @@ struct PingPlan {
   Switches switches;
   bool expected_power = false;
   int fixed_fan = 0;
+  std::vector<FixedFanRay> fixed_fan_rays;
 
   Columns columns;
   Fan fan;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/base/random.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/bubbles.hpp"
@@ -11,8 +10,6 @@
 
 namespace sonar {
 namespace {
-
-constexpr std::uint32_t fixed_fan_key = 0x66616eu;  // keeps these draws apart from the cells'
 
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
@@ -80,12 +77,6 @@ void fetch_cells(const CellTile& tile) {
   constexpr std::size_t cache_line = 64;
   const auto* at = reinterpret_cast<const char*>(tile.data.get());
   for (std::size_t byte = 0; byte < tile.bytes(); byte += cache_line) __builtin_prefetch(at + byte);
-}
-
-/// Of a ray of the fixed fan, sonar axes.
-Vec3d direction_of_hit(const FanHit& hit, double sine, bool conical) {
-  const ConicalDirection d{sine, static_cast<double>(hit.elevation_rad)};
-  return conical ? sonar_from_conical(d) : sonar_from_flat(d);
 }
 
 }  // namespace
@@ -171,42 +162,6 @@ std::size_t scatter(const std::vector<TileToSound>& tiles, std::span<const std::
     echoes.count += kernels.scatter_tile(seen, group, echoes.at(echoes.count));
   }
   return from;
-}
-
-void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPlan& plan, const PingScalars& s, Seed seed,
-                  Echoes& echoes) {
-  const double step_rad = 2 * plan.fan.half_angle_rad / plan.fixed_fan;
-  const auto bits = static_cast<std::uint64_t>(seed);
-  const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
-  const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
-  for (const FanHit& hit : hits) {
-    const double r = static_cast<double>(hit.range_m), sine = plan.columns.sine(hit.column);
-    const double at_sample = s.sample_of(r) + s.doppler_samples(direction_of_hit(hit, sine, plan.switches.conical));
-    const double cosine = static_cast<double>(hit.cosine);
-    // Said so that what is not a number is left out, too.
-    if (!(at_sample > -plan.taps / 2 && at_sample < plan.samples + plan.taps / 2 - 1)) continue;
-    if (!(r >= nearest_scatterer_m && cosine >= 0 && cosine < 1.001)) continue;
-    const Object& object = scene.objects[hit.object];
-    const double strength =
-        scattering_strength(scene.materials[object.mesh->material[hit.triangle]], cosine,
-                            static_cast<double>(plan.mode.centre_hz), s.sound_speed_mps, plan.switches.specular);
-    const double solid_angle =
-        plan.columns.spacing * step_rad *
-        (plan.switches.conical ? 1.0 : std::cos(static_cast<double>(hit.elevation_rad)) / std::sqrt(1 - sine * sine));
-    const double sigma = strength * footprint_area_m2(cosine, r, solid_angle);
-    const double pattern = has_pattern ? elevation_two_way(aperture, static_cast<double>(hit.elevation_rad)) : 1.0;
-    const double amplitude = s.source_upa * std::sqrt(sigma) * two_way_transmission(r, s.absorption_np_per_m) * pattern;
-    if (plan.expected_power) {
-      echoes.add(static_cast<float>(at_sample), {static_cast<float>(amplitude * amplitude), 0}, hit.column);
-      continue;
-    }
-    const Random4 draw = philox(hit.object, static_cast<std::uint32_t>(hit.column), static_cast<std::uint32_t>(hit.ray),
-                                fixed_fan_key, static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32));
-    const ComplexNormal xi = complex_normal(draw.v[0], draw.v[1]);
-    const double phase = -2 * pi * fraction_of_turn(r * s.turns_per_m);
-    const std::complex<double> a = std::complex<double>(xi.re, xi.im) * std::polar(amplitude, phase);
-    echoes.add(static_cast<float>(at_sample), std::complex<float>(a), hit.column);
-  }
 }
 
 std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pose> bodies_in_world, const PingPlan& plan,

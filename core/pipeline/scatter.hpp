@@ -54,9 +54,9 @@ void sort_tiles(const std::vector<TileToSound>& tiles, int group_columns, int gr
 std::size_t scatter(const std::vector<TileToSound>& tiles, std::span<const std::uint32_t> wanted, std::size_t from,
                     const simd::GroupView& group, const simd::Kernels& kernels, Echoes& echoes);
 
-/// One echo a hit (paper-style): sigma = mu cos r^2 dOmega, speckle keyed by (seed, object, column, ray).
-void scatter_hits(std::span<const FanHit> hits, const Scene& scene, const PingPlan& plan, const PingScalars& scalars, Seed seed,
-                  Echoes& echoes);
+/// One echo a hit (paper-style): sigma = mu cos r^2 dOmega, speckle keyed by (seed, object, column, ray). Appends.
+void scatter_hits(std::span<const FanHit> hits, const Scene& scene, std::span<const LawTable> laws, const PingPlan& plan,
+                  const PingScalars& scalars, Seed seed, const simd::Kernels& kernels, Echoes& echoes);
 
 /// An echo without a surface: coupled to the beams at its exact direction, never snapped to a column.
 struct PointEcho {

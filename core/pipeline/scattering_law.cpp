@@ -47,6 +47,14 @@ double scattering_strength(const Material& m, double cosine, double centre_hz, d
   return law * scattered * trend(m, centre_hz);
 }
 
+float LawTable::root_strength(float cosine) const {
+  const float root_mu = static_cast<float>(std::sqrt(mu));
+  if (root.empty()) return root_mu * cosine;
+  const float at = static_cast<float>(simd::law_steps) * std::sqrt(std::max(1.0f - cosine, 0.0f));
+  const auto step = static_cast<std::size_t>(at);
+  return root_mu * (root[step] + (at - static_cast<float>(step)) * (root[step + 1] - root[step]));
+}
+
 LawTable make_law(const Material& m, double centre_hz, double sound_speed_mps, bool specular) {
   LawTable law;
   law.mu = lambert_mu(m) * trend(m, centre_hz);

@@ -14,6 +14,8 @@ struct LawTable {
   std::vector<float> root;  // sqrt(sigma_b / mu) over sqrt(1 - cosine), simd::law_steps + 2 values; or empty
 
   const float* table() const { return root.empty() ? nullptr : root.data(); }
+  /// sqrt(sigma_b), cosine at least 0.
+  float root_strength(float cosine) const;
 };
 
 /// Roughness below this many radians of phase, k h, is smooth: the surface mirrors in part, and only the rest scatters.

@@ -135,8 +135,8 @@ void PingUnderWay::find_echo_sources() {
   Stopwatch watch(w_.now_s, w_.statistics);
   if (request_.switches.specular) w_.mirror_echoes.find(scene_, bodies_, plan_, scalars_, points_);
   watch.lap(Stage::specular);
-  if (ray_is_scatterer()) return;
   w_.laws = laws_of(scene_.scene(), plan_, scalars_);
+  if (ray_is_scatterer()) return;
   if (request_.switches.multipath) hear_by_mirrors();
   watch.lap(Stage::multipath);
   CellView view;
@@ -202,11 +202,11 @@ void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) 
 
 void PingUnderWay::scatter_hits_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch) {
   mine.hits.clear();
-  trace_fixed_fan(scene_, plan_, scalars_, first, last, plan_.fixed_fan, mine.hits);
+  trace_fixed_fan(scene_, plan_, scalars_, first, last, mine.hits);
   if (!w_.first_hits.empty()) note_first_hits(mine.hits, plan_, w_.first_hits);
   mine.statistics.rays += static_cast<std::size_t>(last - first) * static_cast<std::size_t>(plan_.fixed_fan);
   watch.lap(Stage::trace);
-  scatter_hits(mine.hits, scene_.scene(), plan_, scalars_, request_.seed, mine.echoes);
+  scatter_hits(mine.hits, scene_.scene(), w_.laws, plan_, scalars_, request_.seed, kernels_, mine.echoes);
   mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
   watch.lap(Stage::scatter);
   sum_pulses(first, mine);

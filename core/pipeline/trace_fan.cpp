@@ -186,19 +186,22 @@ std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingSca
   return FanTracer(scene, plan, scalars, first, last, scratch).run(seen);
 }
 
-void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, int rays,
+void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                      std::vector<FanHit>& hits) {
   PacketFiller filler(plan, scalars, static_cast<float>(scalars.max_range_m));
-  const double step = 2 * plan.fan.half_angle_rad / rays;
+  const int rays = plan.fixed_fan;
   const std::vector<ColumnSine> sines = column_sines(plan.columns, first, last);
   for (int column = first; column < last; ++column) {
     const ColumnSine sine = sines[static_cast<std::size_t>(column - first)];
     if (!(sine.across > 0)) continue;
     for (int from = 0; from < rays; from += RayPacket::size) {
       const int to = std::min(from + RayPacket::size, rays);
-      const auto elevation = [&](int ray) { return static_cast<float>((ray + 0.5) * step - plan.fan.half_angle_rad); };
+      const auto elevation = [&](int ray) {
+        const FixedFanRay& r = plan.fixed_fan_rays[static_cast<std::size_t>(ray)];
+        return Elevation{r.elevation_rad, r.cosine, r.sine};
+      };
       filler.clear();
-      for (int ray = from; ray < to; ++ray) filler.add(sine, elevation_at(elevation(ray)));
+      for (int ray = from; ray < to; ++ray) filler.add(sine, elevation(ray));
       filler.trace(scene);
       for (int ray = from; ray < to; ++ray) {
         const auto i = static_cast<std::size_t>(ray - from);
@@ -208,7 +211,8 @@ void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScal
         const Vec3 along{p.direction_x[i], p.direction_y[i], p.direction_z[i]};
         const float size = length(normal);
         if (!(size > 0)) continue;
-        hits.push_back({column, ray, p.far[i], elevation(ray), std::abs(dot(normal, along)) / size, p.object[i], p.triangle[i]});
+        hits.push_back(
+            {column, ray, p.far[i], elevation(ray).angle_rad, std::abs(dot(normal, along)) / size, p.object[i], p.triangle[i]});
       }
     }
   }

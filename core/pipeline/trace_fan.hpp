@@ -48,8 +48,8 @@ struct FanHit {
   float range_m = 0, elevation_rad = 0, cosine = 0;
   std::uint32_t object = 0, triangle = 0;
 };
-/// `rays` uniform elevations for every column of [first, last); appends to `hits`.
-void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last, int rays,
+/// The plan's fixed fan for every column of [first, last); appends to `hits`.
+void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                      std::vector<FanHit>& hits);
 
 }  // namespace sonar

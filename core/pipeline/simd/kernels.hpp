@@ -56,6 +56,20 @@ struct EchoArrays {
   std::int32_t* column;  // absolute column
 };
 
+/// Rays that are scatterers: each draws a complex Gaussian of its own, a function of its counters (core/base/random.hpp).
+struct HitDraw {
+  const std::uint32_t* counter[3];
+  std::uint32_t last_counter, key[2];
+};
+struct HitsToSound {
+  static constexpr int most = 256;  // at once
+  HitDraw draw;
+  const float* range_m;
+  const float* weight;  // amplitude but for the absorption of the water
+  float decay_per_m;    // 2 alpha [Np/m]
+  double turns_per_m;   // 2 f / c
+};
+
 /// A real pulse on the sample grid: row `f` holds `taps` values and then `taps` differences to the next row.
 struct PulseRows {
   const float* rows;
@@ -66,6 +80,8 @@ struct Kernels {
   const char* name;
   /// Appends the visible cells of a tile; `out` has room for tile.count + 16 more. Returns how many were appended.
   int (*scatter_tile)(const TileSeen&, const GroupView&, EchoArrays out);
+  /// re + i im = weight * draw * exp(-decay_per_m range - i 2 pi turns_per_m range), of n <= HitsToSound::most hits.
+  void (*sound_hits)(const HitsToSound&, int n, float* re, float* im);
   /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im).
   void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column,
                      int lead);

@@ -325,7 +325,9 @@ TEST(StageOracles, Oracle44_AwkwardHitsGiveFiniteEchoes) {
       request.switches.fixed_fan = 32;
       const PingPlan plan = make_plan(p900(), request.settings, request.switches);
       Echoes echoes;
-      scatter_hits(hits, *scene, plan, make_scalars(plan, request, {}), Seed{1}, echoes);
+      const PingScalars scalars = make_scalars(plan, request, {});
+      scatter_hits(hits, *scene, laws_of(*scene, plan, scalars), plan, scalars, Seed{1}, simd::kernels_for(SimdLevel::automatic),
+                   echoes);
       for (int i = 0; i < echoes.count; ++i) {
         const auto at = static_cast<std::size_t>(i);
         bad += !(std::isfinite(echoes.sample[at]) && std::isfinite(echoes.re[at]) && std::isfinite(echoes.im[at]));
