@@ -34,7 +34,7 @@ double elevation_pattern(const Prepared& p, double elevation_rad) {
 
 /// What a scatterer of a known cross-section sends back; none when it lies outside the record.
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& p, const PingScalars& s,
-              std::vector<PaperEcho>& echoes) {
+              PaperEchoes& echoes) {
   const double turns = range_m * s.samples_per_m / p.plan.samples;
   if (!(turns < 1)) return false;
   const double amplitude =
@@ -88,39 +88,48 @@ BeamTruth truth_of(std::span<const PaperHit> hits, double half_width_rad) {
 /// One ping under way, stage by stage.
 class PaperPing {
  public:
-  PaperPing(const RayScene& scene, const PingRequest& request, const Prepared& prepared, Parallel& pool, double (*now_s)(),
-            PingStatistics& statistics)
+  PaperPing(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
+            Parallel& pool, double (*now_s)(), PingStatistics& statistics)
       : scene_(scene),
         request_(request),
         p_(prepared),
+        kernels_(kernels),
         s_(still_scalars(prepared.plan, request, scene.origin())),
         mu_(coefficients(scene.scene())),
         pool_(pool),
         now_s_(now_s),
         statistics_(statistics),
-        shares_(static_cast<std::size_t>(pool.threads())) {
+        work_(static_cast<std::size_t>(pool.threads())) {
     values_ = static_cast<std::size_t>(p_.plan.expected_power ? p_.plan.samples : 2 * p_.spectrum.count);
     columns_.resize(values_ * static_cast<std::size_t>(p_.fan.columns()));
     if (request.switches.keep_truth) truth_.resize(static_cast<std::size_t>(p_.fan.columns()));
   }
 
   void sound_columns();
-  void correct_beams(const simd::Kernels& kernels);
-  Ping image(const simd::Kernels& kernels);
+  void correct_beams();
+  Ping image();
 
  private:
   double now() const { return now_s_ ? now_s_() : 0; }
-  void sound_column(int column, PingStatistics& mine);
+  /// One worker's.
+  struct Work {
+    std::vector<PaperHit> hits;
+    PaperEchoes echoes;
+    SumScratch sum;
+    PingStatistics statistics;
+  };
+  void sound_column(int column, Work& work);
 
   const RayScene& scene_;
   const PingRequest& request_;
   const Prepared& p_;
+  const simd::Kernels& kernels_;
   PingScalars s_;
   std::vector<double> mu_;
   Parallel& pool_;
   double (*now_s_)();
   PingStatistics& statistics_;
-  std::vector<PingStatistics> shares_;  // per worker
+  std::vector<Work> work_;  // per worker
   std::vector<PointInView> points_;
   std::size_t values_ = 0;  // floats a column: spectrum, or in expected power samples
   std::vector<float> columns_, beams_;
@@ -131,24 +140,29 @@ void PaperPing::sound_columns() {
   if (request_.blank) return;
   points_ = points_in_view(scene_, p_, s_, request_);
   pool_.for_each(static_cast<std::size_t>(p_.fan.columns()), [&](std::size_t column, int worker) {
-    sound_column(static_cast<int>(column), shares_[static_cast<std::size_t>(worker)]);
+    sound_column(static_cast<int>(column), work_[static_cast<std::size_t>(worker)]);
   });
-  for (const PingStatistics& share : shares_) {
+  for (const Work& work : work_) {
+    const PingStatistics& share = work.statistics;
     for (std::size_t i = 0; i < share.seconds.size(); ++i) statistics_.seconds[i] += share.seconds[i];
     statistics_.rays += share.rays;
     statistics_.echoes += share.echoes;
   }
 }
 
-void PaperPing::sound_column(int column, PingStatistics& mine) {
+void PaperPing::sound_column(int column, Work& work) {
+  PingStatistics& mine = work.statistics;
   const double begin = now();
-  std::vector<PaperHit> hits;
+  std::vector<PaperHit>& hits = work.hits;
+  hits.clear();
   trace_column(scene_, p_.fan, s_, column, static_cast<float>(s_.max_range_m), hits);
   const double traced = now();
   if (!truth_.empty())
     truth_[static_cast<std::size_t>(column)] =
         truth_of(hits, 0.5 * static_cast<double>(p_.plan.mode.pattern.elevation_width_rad));
-  std::vector<PaperEcho> echoes = echoes_of(hits, mu_, scene_.scene(), p_, s_, request_);
+  PaperEchoes& echoes = work.echoes;
+  echoes.turns.clear(), echoes.re.clear(), echoes.im.clear();
+  echoes_of(hits, mu_, scene_.scene(), p_, s_, request_, kernels_, echoes);
   for (const PointInView& point : points_) {
     if (point.column == column)
       add_echo(point.range_m, elevation_pattern(p_, point.elevation_rad), point.cross_section_m2, {1, 0}, p_, s_, echoes);
@@ -156,11 +170,11 @@ void PaperPing::sound_column(int column, PingStatistics& mine) {
   const double scattered = now();
   const std::span<float> out = std::span(columns_).subspan(static_cast<std::size_t>(column) * values_, values_);
   if (p_.plan.expected_power) {
-    for (const PaperEcho& echo : echoes) p_.pulse_power->add(echo, out);
+    for (std::size_t i = 0; i < echoes.size(); ++i) p_.pulse_power->add(echoes[i], out);
   } else {
-    std::vector<std::complex<float>> sums(static_cast<std::size_t>(p_.spectrum.count));
-    sum_frequencies(echoes, p_.spectrum, p_.fast.get(), sums);
-    for (std::size_t m = 0; m < sums.size(); ++m) out[2 * m] = sums[m].real(), out[2 * m + 1] = sums[m].imag();
+    // An array of complex numbers may be read as one of floats.
+    sum_frequencies(echoes, p_.spectrum, p_.fast.get(), kernels_, work.sum,
+                    {reinterpret_cast<std::complex<float>*>(out.data()), static_cast<std::size_t>(p_.spectrum.count)});
   }
   mine.rays += static_cast<std::size_t>(p_.fan.rows);
   mine.echoes += echoes.size();
@@ -169,15 +183,15 @@ void PaperPing::sound_column(int column, PingStatistics& mine) {
   mine.seconds[static_cast<std::size_t>(Stage::synthesize)] += now() - scattered;
 }
 
-void PaperPing::correct_beams(const simd::Kernels& kernels) {
+void PaperPing::correct_beams() {
   const double begin = now();
   beams_.resize(columns_.size());
-  correct(p_.correction, p_.plan.settings.beam_count, p_.fan.columns(), columns_, static_cast<int>(values_), kernels, pool_,
+  correct(p_.correction, p_.plan.settings.beam_count, p_.fan.columns(), columns_, static_cast<int>(values_), kernels_, pool_,
           beams_);
   statistics_.seconds[static_cast<std::size_t>(Stage::couple)] += now() - begin;
 }
 
-Ping PaperPing::image(const simd::Kernels& kernels) {
+Ping PaperPing::image() {
   const double begin = now();
   const int beams = p_.plan.settings.beam_count;
   BeamSignals signals;
@@ -204,7 +218,7 @@ Ping PaperPing::image(const simd::Kernels& kernels) {
     ping.beam_azimuth_rad[j] = static_cast<float>(p_.fan.azimuth_rad[j]);
   ping.truth = truth_;
   ReceiveScratch scratch;
-  receive(signals, p_.plan, kernels, scratch, ping);
+  receive(signals, p_.plan, kernels_, scratch, ping);
   statistics_.seconds[static_cast<std::size_t>(Stage::receive)] += now() - begin;
   return ping;
 }
@@ -230,30 +244,57 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
 
 bool Prepared::serves(const PingRequest& request) const { return request.model == model && sonar::serves(plan, request); }
 
-std::vector<PaperEcho> echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene,
-                                 const Prepared& p, const PingScalars& s, const PingRequest& request) {
+void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene, const Prepared& p,
+               const PingScalars& s, const PingRequest& request, const simd::Kernels& kernels, PaperEchoes& echoes) {
   const auto bits = static_cast<std::uint64_t>(request.seed);
-  std::vector<PaperEcho> echoes;
-  echoes.reserve(hits.size() + 1);
-  for (const PaperHit& hit : hits) {
-    const double strength = mu[scene.objects[hit.object].mesh->material[hit.triangle]];
-    const Random4 draw = philox(static_cast<std::uint32_t>(request.number), static_cast<std::uint32_t>(hit.column),
-                                static_cast<std::uint32_t>(hit.row), speckle_key, static_cast<std::uint32_t>(bits),
-                                static_cast<std::uint32_t>(bits >> 32));
-    const double pattern =
-        p.pattern.empty() ? elevation_pattern(p, hit.elevation_rad) : p.pattern[static_cast<std::size_t>(hit.row)];
-    add_echo(hit.range_m, pattern, printed_cross_section_m2(strength, hit.cosine, hit.range_m, hit.solid_angle_sr),
-             complex_normal(draw.v[0], draw.v[1]), p, s, echoes);
+  const auto pattern_of = [&](const PaperHit& hit) {
+    return p.pattern.empty() ? elevation_pattern(p, hit.elevation_rad) : p.pattern[static_cast<std::size_t>(hit.row)];
+  };
+  const auto mu_of = [&](const PaperHit& hit) { return mu[scene.objects[hit.object].mesh->material[hit.triangle]]; };
+  if (p.plan.expected_power) {
+    for (const PaperHit& hit : hits)
+      add_echo(hit.range_m, pattern_of(hit), printed_cross_section_m2(mu_of(hit), hit.cosine, hit.range_m, hit.solid_angle_sr),
+               {}, p, s, echoes);
+    return;
   }
-  return echoes;
+  constexpr std::size_t most = simd::HitsToSound::most;
+  std::uint32_t number[most], column[most], row[most];
+  float range[most], weight[most], re[most], im[most];
+  std::fill_n(number, most, static_cast<std::uint32_t>(request.number));
+  simd::HitsToSound sounding{
+      {{number, column, row}, speckle_key, {static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32)}},
+      range,
+      weight,
+      static_cast<float>(2 * s.absorption_np_per_m),
+      s.turns_per_m};
+  int n = 0;
+  const auto send = [&] {
+    kernels.sound_hits(sounding, n, re, im);
+    for (int i = 0; i < n; ++i)
+      echoes.push_back({static_cast<double>(range[i]) * s.samples_per_m / p.plan.samples, {re[i], im[i]}});
+    n = 0;
+  };
+  for (const PaperHit& hit : hits) {
+    if (!(hit.range_m * s.samples_per_m < p.plan.samples)) continue;
+    // sqrt(printed_cross_section_m2) / r^2
+    const bool heard = hit.range_m >= nearest_scatterer_m;
+    const double amplitude =
+        s.source_upa * std::sqrt(mu_of(hit) * hit.solid_angle_sr) * hit.cosine * pattern_of(hit) / hit.range_m;
+    range[n] = static_cast<float>(hit.range_m);
+    weight[n] = heard ? static_cast<float>(amplitude) : 0;
+    column[n] = static_cast<std::uint32_t>(hit.column);
+    row[n] = static_cast<std::uint32_t>(hit.row);
+    if (++n == static_cast<int>(most)) send();
+  }
+  send();
 }
 
 Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
               Parallel& pool, double (*now_s)(), PingStatistics& statistics) {
-  PaperPing ping(scene, request, prepared, pool, now_s, statistics);
-  ping.sound_columns();         // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, a column a beam
-  ping.correct_beams(kernels);  // "as coded"
-  return ping.image(kernels);
+  PaperPing ping(scene, request, prepared, kernels, pool, now_s, statistics);
+  ping.sound_columns();  // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, a column a beam
+  ping.correct_beams();  // "as coded"
+  return ping.image();
 }
 
 }  // namespace sonar::paper

@@ -30,8 +30,8 @@ struct Prepared {
 
 /// Eq. (2) and the rest of eq. (1) but the sum: one column's hits as echoes. `mu` per material. Hits outside the record are
 /// dropped, as the reference code does.
-std::vector<PaperEcho> echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene,
-                                 const Prepared& prepared, const PingScalars& scalars, const PingRequest& request);
+void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene, const Prepared& prepared,
+               const PingScalars& scalars, const PingRequest& request, const simd::Kernels& kernels, PaperEchoes& echoes);
 
 /// Bodies must have been placed.
 Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,

@@ -32,17 +32,24 @@ PaperSpectrum make_spectrum(const PingPlan& plan) {
   return s;
 }
 
-void sum_frequencies(std::span<const PaperEcho> echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
-                     std::span<std::complex<float>> out) {
-  std::vector<Complex> sums(static_cast<std::size_t>(spectrum.count));
+void PaperEchoes::push_back(const PaperEcho& e) {
+  turns.push_back(e.turns);
+  re.push_back(e.amplitude.real());
+  im.push_back(e.amplitude.imag());
+}
+
+void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
+                     const simd::Kernels& kernels, SumScratch& scratch, std::span<std::complex<float>> out) {
+  std::vector<Complex>& sums = scratch.sums;
   if (fast) {
-    std::vector<Complex> grid(static_cast<std::size_t>(fast->grid_points()));
+    sums.resize(static_cast<std::size_t>(spectrum.count));
+    scratch.grid.assign(static_cast<std::size_t>(fast->grid_points() + fast->padding), 0.0);
     const double middle = spectrum.first_frequency + spectrum.count / 2;
-    for (const PaperEcho& e : echoes) fast->add(e.turns, e.amplitude * turned(-middle * e.turns), grid.data());
-    fast->transform(grid.data(), sums.data());
+    fast->add(echoes.turns, echoes.re, echoes.im, middle, kernels, scratch.grid.data());
+    fast->transform(scratch.grid.data(), sums.data());
   } else {
     std::vector<spectral::Arrival> arrivals;
-    for (const PaperEcho& e : echoes) arrivals.push_back({e.turns, e.amplitude});
+    for (std::size_t i = 0; i < echoes.size(); ++i) arrivals.push_back({echoes[i].turns, echoes[i].amplitude});
     sums = spectral::direct_sum(arrivals, {spectrum.first_frequency, 1.0, spectrum.count});
   }
   for (std::size_t m = 0; m < sums.size(); ++m) out[m] = std::complex<float>(spectrum.weight[m] * sums[m]);
@@ -127,9 +134,11 @@ PulsePower::PulsePower(const PaperSpectrum& spectrum, const InverseTransform& in
   std::vector<std::complex<float>> lone(static_cast<std::size_t>(spectrum.count));
   std::vector<Complex> work;
   std::vector<float> signal(2 * n);
+  SumScratch scratch;
   for (int step = 0; step <= steps_; ++step) {  // an echo that falls step / steps of a sample after sample 0
-    const PaperEcho echo{(offset_ + static_cast<double>(step) / steps_) / samples_, {1, 0}};
-    sum_frequencies({&echo, 1}, spectrum, nullptr, lone);
+    PaperEchoes echo;
+    echo.push_back({(offset_ + static_cast<double>(step) / steps_) / samples_, {1, 0}});
+    sum_frequencies(echo, spectrum, nullptr, simd::kernels_for(SimdLevel::automatic), scratch, lone);
     inverse.run(lone, work, signal.data());
     for (std::size_t i = 0; i < n; ++i) table_.push_back(signal[2 * i] * signal[2 * i] + signal[2 * i + 1] * signal[2 * i + 1]);
   }

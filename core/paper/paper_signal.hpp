@@ -29,6 +29,18 @@ struct PaperEcho {
   double turns = 0;
   spectral::Complex amplitude;  // [uPa] e^{-i 2 pi f_c tau} included; in expected power the power [uPa^2]
 };
+/// The scatterers of one column, side by side.
+struct PaperEchoes {
+  std::vector<double> turns, re, im;
+
+  std::size_t size() const { return turns.size(); }
+  PaperEcho operator[](std::size_t i) const { return {turns[i], {re[i], im[i]}}; }
+  void push_back(const PaperEcho& e);
+};
+/// Buffers of sum_frequencies, one set a worker.
+struct SumScratch {
+  std::vector<spectral::Complex> grid, sums;
+};
 
 /// The frequencies of eq. (4), f_m = f_min + m df with df = 1 / T and M = b T, and the spectrum of eq. (3) at them. S_0 is set so
 /// that a lone echo on a sample peaks at its own amplitude.
@@ -41,9 +53,9 @@ struct PaperSpectrum {
 };
 PaperSpectrum make_spectrum(const PingPlan& plan);
 
-/// P_j(f_m) of one column: sum over echoes times |S|. `fast` null = term by term.
-void sum_frequencies(std::span<const PaperEcho> echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
-                     std::span<std::complex<float>> out);
+/// P_j(f_m) of one column: sum over echoes times |S|. `fast` (of width 8) null = term by term.
+void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
+                     const simd::Kernels& kernels, SumScratch& scratch, std::span<std::complex<float>> out);
 
 /// "As coded" (P25 does not print it): V_jk = |sin y / y|, y = pi 0.884 / spacing sin(theta_j - theta_k), over the root of the
 /// sum of all V^2. `squared` for expected power. [beams][columns]

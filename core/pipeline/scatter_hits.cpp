@@ -44,8 +44,9 @@ class HitBatch {
     // sqrt(sigma) / r^2, sigma = strength * footprint_area_m2; the solid angle of a ray is in its weight.
     const float strength = laws_[object.mesh->material[hit.triangle]].root_strength(hit.cosine);
     const float slant = std::sqrt(std::max(hit.cosine, static_cast<float>(cosine_floor)));
-    const float weight = static_cast<float>(s_.source_upa) * strength * plan_.fixed_fan_rays[static_cast<std::size_t>(hit.ray)].weight /
-                         (slant * hit.range_m) * column_weight(hit.column);
+    const float weight = static_cast<float>(s_.source_upa) * strength *
+                         plan_.fixed_fan_rays[static_cast<std::size_t>(hit.ray)].weight / (slant * hit.range_m) *
+                         column_weight(hit.column);
     sample_[count_] = static_cast<float>(at_sample);
     range_m_[count_] = hit.range_m;
     weight_[count_] = weight;

@@ -1,6 +1,7 @@
 #include "core/pipeline/pulses/spectral.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "core/base/geometry.hpp"
@@ -116,6 +117,13 @@ void FrequencySums::add(double turns, Complex amplitude, Complex* grid) const {
     spread<small_padding>(turns, amplitude, grid);
   else
     spread<large_padding>(turns, amplitude, grid);
+}
+
+void FrequencySums::add(std::span<const double> turns, std::span<const double> re, std::span<const double> im, double turn_on,
+                        const simd::Kernels& kernels, Complex* grid) const {
+  assert(width_ == simd::SpreadGrid::width && padded_ == small_padding);
+  kernels.spread({points_, terms_, polynomial_.data()}, {turns.data(), re.data(), im.data(), turn_on},
+                 static_cast<int>(turns.size()), reinterpret_cast<double*>(grid));
 }
 
 void FrequencySums::transform(Complex* grid, Complex* sums) const {

@@ -9,6 +9,7 @@
 
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/pulses/spectral_transform.hpp"
+#include "core/pipeline/simd/kernels.hpp"
 
 namespace sonar::spectral {
 
@@ -52,6 +53,11 @@ class FrequencySums {
   Tables tables() const { return {width_, terms_, padded_, polynomial_, correction_}; }
   /// `turns`: delay times the frequency step, any finite number; delays a whole turn apart look the same.
   void add(double turns, Complex amplitude, Complex* grid) const;
+  /// The same of many at once, each turned on by e^{-i 2 pi turn_on turns}; only of width 8. The grid has room for `padding`
+  /// more.
+  void add(std::span<const double> turns, std::span<const double> re, std::span<const double> im, double turn_on,
+           const simd::Kernels& kernels, Complex* grid) const;
+  static constexpr int padding = simd::SpreadGrid::width;
   /// sums[m] = sum_i A_i e^{-i 2 pi (m - count / 2) turns_i}, m in [0, count). Leaves the grid in disorder.
   void transform(Complex* grid, Complex* sums) const;
 

@@ -70,6 +70,18 @@ struct HitsToSound {
   double turns_per_m;   // 2 f / c
 };
 
+/// The grid of a non-uniform transform (core/pipeline/pulses/spectral.hpp): `points` complex values, and room for a kernel more.
+struct SpreadGrid {
+  static constexpr int width = 8;
+  int points = 0, terms = 0;
+  const double* polynomial = nullptr;  // [terms][width], highest first
+};
+/// Echoes to be spread, turned on by e^{-i 2 pi turn_on turns} first.
+struct SpreadEchoes {
+  const double *turns, *re, *im;
+  double turn_on;
+};
+
 /// A real pulse on the sample grid: row `f` holds `taps` values and then `taps` differences to the next row.
 struct PulseRows {
   const float* rows;
@@ -82,6 +94,8 @@ struct Kernels {
   int (*scatter_tile)(const TileSeen&, const GroupView&, EchoArrays out);
   /// re + i im = weight * draw * exp(-decay_per_m range - i 2 pi turns_per_m range), of n <= HitsToSound::most hits.
   void (*sound_hits)(const HitsToSound&, int n, float* re, float* im);
+  /// Adds the echoes' kernels to grid[2 (points + width)].
+  void (*spread)(const SpreadGrid&, const SpreadEchoes&, int count, double* grid);
   /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im).
   void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column,
                      int lead);

@@ -148,4 +148,5 @@ void quantise(const float* power, float gain, float half_gamma, float max_code, 
 
 #include "core/pipeline/simd/cells.inl"
 #include "core/pipeline/simd/hits.inl"
+#include "core/pipeline/simd/spread.inl"
 #include "core/pipeline/simd/transform.inl"
