@@ -100,7 +100,7 @@ class PaperPing {
         now_s_(now_s),
         statistics_(statistics),
         work_(static_cast<std::size_t>(pool.threads())) {
-    values_ = static_cast<std::size_t>(p_.plan.expected_power ? p_.plan.samples : 2 * p_.spectrum.count);
+    values_ = static_cast<std::size_t>((p_.plan.expected_power ? p_.plan.samples : 2 * p_.spectrum.count) + 31) / 32 * 32;
     columns_.resize(values_ * static_cast<std::size_t>(p_.fan.columns()));
     if (request.switches.keep_truth) truth_.resize(static_cast<std::size_t>(p_.fan.columns()));
   }
@@ -110,6 +110,7 @@ class PaperPing {
   Ping image();
 
  private:
+  void receive_rows(const BeamSignals& signals, Ping& ping);
   double now() const { return now_s_ ? now_s_() : 0; }
   /// One worker's.
   struct Work {
@@ -131,7 +132,7 @@ class PaperPing {
   PingStatistics& statistics_;
   std::vector<Work> work_;  // per worker
   std::vector<PointInView> points_;
-  std::size_t values_ = 0;  // floats a column: spectrum, or in expected power samples
+  std::size_t values_ = 0;  // floats a column, whole vectors of them: spectrum, or in expected power samples
   std::vector<float> columns_, beams_;
   std::vector<BeamTruth> truth_;
 };
@@ -170,7 +171,8 @@ void PaperPing::sound_column(int column, Work& work) {
   const double scattered = now();
   const std::span<float> out = std::span(columns_).subspan(static_cast<std::size_t>(column) * values_, values_);
   if (p_.plan.expected_power) {
-    for (std::size_t i = 0; i < echoes.size(); ++i) p_.pulse_power->add(echoes[i], out);
+    for (std::size_t i = 0; i < echoes.size(); ++i)
+      p_.pulse_power->add(echoes[i], out.first(static_cast<std::size_t>(p_.plan.samples)));
   } else {
     // An array of complex numbers may be read as one of floats.
     sum_frequencies(echoes, p_.spectrum, p_.fast.get(), kernels_, work.sum,
@@ -186,8 +188,11 @@ void PaperPing::sound_column(int column, Work& work) {
 void PaperPing::correct_beams() {
   const double begin = now();
   beams_.resize(columns_.size());
-  correct(p_.correction, p_.plan.settings.beam_count, p_.fan.columns(), columns_, static_cast<int>(values_), kernels_, pool_,
-          beams_);
+  if (p_.even)
+    correct(*p_.even, columns_, static_cast<int>(values_), kernels_, pool_, beams_);
+  else
+    correct(p_.correction, p_.plan.settings.beam_count, p_.fan.columns(), columns_, static_cast<int>(values_), kernels_, pool_,
+            beams_);
   statistics_.seconds[static_cast<std::size_t>(Stage::couple)] += now() - begin;
 }
 
@@ -203,13 +208,11 @@ Ping PaperPing::image() {
   pool_.for_each(static_cast<std::size_t>(beams), [&](std::size_t j, int worker) {
     const float* in = beams_.data() + j * values_;
     float* out = signals.beam(static_cast<int>(j));
-    if (p_.plan.expected_power) {
-      for (std::size_t n = 0; n < values_; ++n) out[2 * n] = in[n];
-      return;
-    }
-    std::vector<std::complex<float>> spectrum(values_ / 2);
-    for (std::size_t m = 0; m < spectrum.size(); ++m) spectrum[m] = {in[2 * m], in[2 * m + 1]};
-    p_.inverse.run(spectrum, work[static_cast<std::size_t>(worker)], out);
+    if (p_.plan.expected_power)
+      for (int n = 0; n < p_.plan.samples; ++n) out[2 * n] = in[n];
+    else
+      p_.inverse.run({reinterpret_cast<const std::complex<float>*>(in), static_cast<std::size_t>(p_.spectrum.count)},
+                     work[static_cast<std::size_t>(worker)], out);
   });
   Ping ping;
   ping.request = request_;
@@ -217,10 +220,32 @@ Ping PaperPing::image() {
   for (std::size_t j = 0; j < ping.beam_azimuth_rad.size(); ++j)
     ping.beam_azimuth_rad[j] = static_cast<float>(p_.fan.azimuth_rad[j]);
   ping.truth = truth_;
-  ReceiveScratch scratch;
-  receive(signals, p_.plan, kernels_, scratch, ping);
+  receive_rows(signals, ping);
   statistics_.seconds[static_cast<std::size_t>(Stage::receive)] += now() - begin;
   return ping;
+}
+
+/// Envelope, gain and codes, a window of rows at a time.
+void PaperPing::receive_rows(const BeamSignals& signals, Ping& ping) {
+  constexpr int rows_at_once = 64;
+  struct Scratch {
+    BeamSignals window;
+    ReceiveScratch receive;
+  };
+  std::vector<Scratch> scratch(static_cast<std::size_t>(pool_.threads()));
+  const int rows = p_.plan.settings.range_bin_count, per_row = p_.plan.settings.samples_per_row;
+  pool_.for_each(static_cast<std::size_t>((rows + rows_at_once - 1) / rows_at_once), [&](std::size_t w, int worker) {
+    Scratch& mine = scratch[static_cast<std::size_t>(worker)];
+    BeamSignals& window = mine.window;
+    const int first = static_cast<int>(w) * rows_at_once, last = std::min(first + rows_at_once, rows);
+    window.beams = signals.beams;
+    window.first_sample = first * per_row;
+    window.samples = (last - first) * per_row;
+    window.stride = 2 * window.samples;
+    window.data.resize(static_cast<std::size_t>(window.beams) * static_cast<std::size_t>(window.stride));
+    for (int j = 0; j < window.beams; ++j) std::copy_n(signals.beam(j) + 2 * window.first_sample, window.stride, window.beam(j));
+    receive(window, p_.plan, kernels_, mine.receive, ping);
+  });
 }
 
 }  // namespace
@@ -235,7 +260,10 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
     fast = std::make_unique<spectral::FrequencySums>(spectrum.count, sum_width);
   if (plan.expected_power) pulse_power = std::make_unique<PulsePower>(spectrum, inverse);
   const double spacing = static_cast<double>(plan.mode.horizontal_aperture_rad) / plan.settings.beam_count;
-  correction = panels_of(make_correction(fan.azimuth_rad, spacing, plan.expected_power), plan.settings.beam_count, fan.columns());
+  if (!plan.expected_power) even = even_correction(fan.azimuth_rad, spacing);
+  if (!even)
+    correction =
+        panels_of(make_correction(fan.azimuth_rad, spacing, plan.expected_power), plan.settings.beam_count, fan.columns());
   if (plan.mode.pattern.elevation_taper != Taper::unit)
     elevation_per_sine = width_constant / static_cast<double>(plan.mode.pattern.elevation_width_rad);
   for (int row = 0; row < fan.rows && !fan.perspective; ++row)

@@ -22,10 +22,11 @@ struct Prepared {
   PaperSpectrum spectrum;
   std::unique_ptr<spectral::FrequencySums> fast;  // none: term by term
   InverseTransform inverse;
-  std::unique_ptr<PulsePower> pulse_power;  // in expected power only
-  std::vector<float> correction;            // panels of it, see panels_of
-  std::vector<double> pattern;              // D(phi) of a row, of fans
-  double elevation_per_sine = 0;            // D(phi) = sinc(elevation_per_sine sin phi); 0 = no pattern
+  std::unique_ptr<PulsePower> pulse_power;    // in expected power only
+  std::unique_ptr<BeamTransformTables> even;  // the correction of even azimuths, or none:
+  std::vector<float> correction;              // panels of it, see panels_of
+  std::vector<double> pattern;                // D(phi) of a row, of fans
+  double elevation_per_sine = 0;              // D(phi) = sinc(elevation_per_sine sin phi); 0 = no pattern
 };
 
 /// Eq. (2) and the rest of eq. (1) but the sum: one column's hits as echoes. `mu` per material. Hits outside the record are

@@ -70,6 +70,32 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
   return weights;
 }
 
+std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad) {
+  const std::size_t n = azimuth_rad.size();
+  if (n < 2) return nullptr;
+  const double step = (azimuth_rad.back() - azimuth_rad.front()) / static_cast<double>(n - 1);
+  std::vector<double> v;
+  double energy = 0;
+  for (std::size_t d = 0; d < n; ++d) {
+    if (std::abs(azimuth_rad[d] - azimuth_rad[0] - static_cast<double>(d) * step) > 1e-9) return nullptr;
+    const double y = pi * 0.884 / spacing_rad * std::sin(static_cast<double>(d) * step);
+    v.push_back(d == 0 ? 1.0 : std::abs(std::sin(y) / y));
+    energy += v.back() * v.back() * static_cast<double>(n - d) * (d == 0 ? 1 : 2);
+  }
+  for (double& x : v) x /= std::sqrt(energy);
+  return std::make_unique<BeamTransformTables>(v);
+}
+
+void correct(const BeamTransformTables& even, std::span<const float> in, int values, const simd::Kernels& kernels, Parallel& pool,
+             std::span<float> out) {
+  constexpr int block = 32;
+  std::vector<AlignedFloats> work(static_cast<std::size_t>(pool.threads()), AlignedFloats(even.work_floats()));
+  pool.for_each(static_cast<std::size_t>(values / block), [&](std::size_t b, int worker) {
+    kernels.transform_beams(even.tables(), in.data() + b * block, values, block, work[static_cast<std::size_t>(worker)].data(),
+                            out.data() + b * block, values);
+  });
+}
+
 std::vector<float> panels_of(std::span<const float> weights, int beams, int columns) {
   const auto b = static_cast<std::size_t>(beams), c = static_cast<std::size_t>(columns);
   std::vector<float> panels((b + 3) / 4 * 4 * c, 0.0f);

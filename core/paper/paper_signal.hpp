@@ -10,6 +10,7 @@
 
 #include "core/base/parallel.hpp"
 #include "core/paper/paper_fan.hpp"
+#include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/couple.hpp"
 #include "core/pipeline/pulses/spectral.hpp"
 #include "core/pipeline/simd/kernels.hpp"
@@ -60,6 +61,13 @@ void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, c
 /// "As coded" (P25 does not print it): V_jk = |sin y / y|, y = pi 0.884 / spacing sin(theta_j - theta_k), over the root of the
 /// sum of all V^2. `squared` for expected power. [beams][columns]
 std::vector<float> make_correction(std::span<const double> azimuth_rad, double spacing_rad, bool squared);
+
+/// The same where the azimuths are even, so that V depends on how far apart two of them are: not squared; null where they are
+/// not.
+std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad);
+/// out[j][...] = sum_k V_jk in[k][...] by those tables; `values` floats a row, a multiple of 32.
+void correct(const BeamTransformTables& even, std::span<const float> in, int values, const simd::Kernels& kernels, Parallel& pool,
+             std::span<float> out);
 
 /// The weights of four beams side by side, [(beams + 3) / 4][columns][4]: as the kernels want them.
 std::vector<float> panels_of(std::span<const float> weights, int beams, int columns);

@@ -59,12 +59,32 @@ std::vector<double> weights_between(int taps, double place, double band) {
 
 BeamTransformTables::BeamTransformTables(const ReceivePattern& pattern, const Columns& columns,
                                          const std::vector<double>& beam_sines) {
-  tables_.columns = columns.count;
-  tables_.beams = static_cast<int>(beam_sines.size());
-  tables_.quarter = smooth_size((columns.count + 1) / 2);
-  plan_passes();
-  weigh(pattern, columns.spacing);
+  lay_out(columns.count, static_cast<int>(beam_sines.size()));
+  std::vector<double> of_distance;
+  for (int d = 0; d < columns.count; ++d) of_distance.push_back(pattern(d * columns.spacing));
+  weigh(of_distance);
   read_between(pattern.aperture_wavelengths * columns.spacing, columns, beam_sines);
+  point_at_tables();
+}
+
+BeamTransformTables::BeamTransformTables(const std::vector<double>& of_distance) {
+  const int count = static_cast<int>(of_distance.size());
+  lay_out(count, count);
+  weigh(of_distance);
+  tables_.taps = 1;
+  between_.assign(of_distance.size(), 1.0f);
+  for (int j = 0; j < count; ++j) first_column_.push_back(j);
+  point_at_tables();
+}
+
+void BeamTransformTables::lay_out(int columns, int beams) {
+  tables_.columns = columns;
+  tables_.beams = beams;
+  tables_.quarter = smooth_size((columns + 1) / 2);
+  plan_passes();
+}
+
+void BeamTransformTables::point_at_tables() {
   tables_.split = split_.data();
   tables_.response = response_.data();
   tables_.first_column = first_column_.data();
@@ -82,12 +102,12 @@ void BeamTransformTables::plan_passes() {
   for (int l = 0; l < tables_.levels; ++l) tables_.level[l].turns = turns_[static_cast<std::size_t>(l)].data();
 }
 
-/// The transform of the weights, which are even: real. Those of columns half a line apart are wanted by no beam.
-void BeamTransformTables::weigh(const ReceivePattern& pattern, double spacing) {
+/// The transform of the weights, which are even: real. No beam wants those of columns as far apart as a line of columns is long.
+void BeamTransformTables::weigh(const std::vector<double>& of_distance) {
   const int size = 4 * tables_.quarter;
   std::vector<double> cosine, weight;
   for (int i = 0; i < size; ++i) cosine.push_back(std::cos(2 * pi * i / size));
-  for (int d = 0; d <= size / 2; ++d) weight.push_back(pattern(d * spacing) * (d == 0 || d == size / 2 ? 1 : 2));
+  for (std::size_t d = 0; d < of_distance.size(); ++d) weight.push_back(of_distance[d] * (d == 0 ? 1 : 2));
   for (int k = 0; k < 4; ++k)
     for (int place = 0; place < tables_.quarter; ++place) {
       int frequency = 0, step = 1, rest = place;

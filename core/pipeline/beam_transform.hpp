@@ -18,6 +18,8 @@ class BeamTransformTables {
  public:
   /// Relative error of the reading between columns at most 2e-6 for columns up to 0.35 of a beam apart (single precision: 1e-6).
   BeamTransformTables(const ReceivePattern& pattern, const Columns& columns, const std::vector<double>& beam_sines);
+  /// As many beams as columns, each on its column, of which it hears the one that is d away with the weight of_distance[d].
+  explicit BeamTransformTables(const std::vector<double>& of_distance);
   BeamTransformTables(const BeamTransformTables&) = delete;
   BeamTransformTables& operator=(const BeamTransformTables&) = delete;
 
@@ -29,8 +31,10 @@ class BeamTransformTables {
   double cost() const;
 
  private:
+  void lay_out(int columns, int beams);
   void plan_passes();
-  void weigh(const ReceivePattern& pattern, double spacing);
+  void weigh(const std::vector<double>& of_distance);
+  void point_at_tables();
   void read_between(double aperture_in_spacings, const Columns& columns, const std::vector<double>& beam_sines);
 
   simd::BeamTransform tables_;

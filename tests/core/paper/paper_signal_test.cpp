@@ -133,6 +133,29 @@ TEST(PaperPower, OneEchoIsTheSquareOfItsSignal) {
   }
 }
 
+TEST(PaperCorrection, OfEvenAzimuthsIsTheSameByATransform) {
+  const double spacing = rad_from_deg(90.0 / 512);
+  const PaperFan fan = make_paper_fan(paper_plan(), Mode::paper, 0);
+  const auto even = even_correction(fan.azimuth_rad, spacing);
+  ASSERT_NE(even, nullptr);
+  constexpr int values = 64;
+  std::vector<float> in(512 * values), fast(in.size()), slow(in.size());
+  for (std::size_t i = 0; i < in.size(); ++i) in[i] = static_cast<float>(std::sin(0.37 * static_cast<double>(i * i % 1009)));
+  Parallel pool(2);
+  const simd::Kernels& kernels = simd::kernels_for(SimdLevel::automatic);
+  correct(*even, in, values, kernels, pool, fast);
+  correct(panels_of(make_correction(fan.azimuth_rad, spacing, false), 512, 512), 512, 512, in, values, kernels, pool, slow);
+  double off = 0, all = 0;
+  for (std::size_t i = 0; i < in.size(); ++i) {
+    const auto difference = static_cast<double>(fast[i] - slow[i]);
+    off += difference * difference;
+    all += static_cast<double>(slow[i] * slow[i]);
+  }
+  EXPECT_LT(std::sqrt(off / all), 1e-6);
+  const PaperFan raster = make_paper_fan(paper_plan(), Mode::raster, 0);
+  EXPECT_EQ(even_correction(raster.azimuth_rad, spacing), nullptr) << "pixels are not even in azimuth";
+}
+
 TEST(PaperCorrection, IsTheReferenceCodes) {
   const double spacing = rad_from_deg(90.0 / 512);
   const PaperFan fan = make_paper_fan(paper_plan(), Mode::paper, 0);
