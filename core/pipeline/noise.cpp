@@ -41,6 +41,16 @@ void NoiseTable::prepare(Seed seed, const std::vector<float>& filter) {
 }
 
 void NoiseTable::add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const {
+  read(sonar, ping, column_index, rms, samples, column, [](auto& to, auto noise) { to += noise; });
+}
+
+void NoiseTable::set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const {
+  read(sonar, ping, column_index, rms, samples, column, [](auto& to, auto noise) { to = noise; });
+}
+
+template <class Put>
+void NoiseTable::read(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column,
+                      Put put) const {
   const auto bits = static_cast<std::uint64_t>(seed_);
   const NoisePlace place = noise_place(static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32), sonar, ping,
                                        static_cast<std::uint32_t>(column_index));
@@ -52,11 +62,11 @@ void NoiseTable::add(std::uint32_t sonar, std::uint32_t ping, int column_index, 
     float* __restrict to = column + 2 * static_cast<std::ptrdiff_t>(done);
     if (place.quarter)
       for (int i = 0; i < run; ++i) {
-        to[2 * i] -= sign * from[2 * i + 1];
-        to[2 * i + 1] += sign * from[2 * i];
+        put(to[2 * i], -sign * from[2 * i + 1]);
+        put(to[2 * i + 1], sign * from[2 * i]);
       }
     else
-      for (int i = 0; i < 2 * run; ++i) to[i] += sign * from[i];
+      for (int i = 0; i < 2 * run; ++i) put(to[i], sign * from[i]);
     done += run;
     at = 0;
   }

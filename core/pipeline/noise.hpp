@@ -16,10 +16,15 @@ class NoiseTable {
   void prepare(Seed seed, const std::vector<float>& filter);
   /// column[2 n], column[2 n + 1] += rms * noise for n in [0, samples). A function of (seed, sonar, ping, column, n) alone.
   void add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
+  /// The same in place of what is there.
+  void set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The table that add() reads: noise_table_samples complex values (core/pipeline/arithmetic/noise_place.hpp).
   const std::vector<float>& shaped() const { return shaped_; }
 
  private:
+  template <class Put>
+  void read(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column, Put put) const;
+
   Seed seed_{};
   std::vector<float> filter_;
   std::vector<float> white_, shaped_;  // complex, interleaved

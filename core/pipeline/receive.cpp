@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 namespace sonar {
 namespace {
@@ -65,20 +66,21 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
   if (!ping.beam_signal_upa.empty()) keep_signal(beams, ping.beam_signal_upa);
   detect(beams, plan, kernels, rows, width, scratch.power);
   scratch.codes.resize(static_cast<std::size_t>(width));
+  scratch.bytes.resize(static_cast<std::size_t>(width));
   const auto max_code = static_cast<float>(s.format.max_code);
   for (int row = 0; row < rows; ++row) {
     const float* power = scratch.power.data() + static_cast<std::ptrdiff_t>(row) * width;
     const std::size_t at = static_cast<std::size_t>(first_row + row) * static_cast<std::size_t>(s.beam_count);
     if (!ping.pressure_upa.empty())
       for (int j = 0; j < s.beam_count; ++j) ping.pressure_upa[at + static_cast<std::size_t>(j)] = std::sqrt(power[j]);
-    kernels.quantise(power, plan.row_power_factor[static_cast<std::size_t>(first_row + row)], s.format.gamma / 2, max_code,
-                     scratch.codes.data(), width);
+    const float gain = plan.row_power_factor[static_cast<std::size_t>(first_row + row)], half_gamma = s.format.gamma / 2;
     std::byte* out = ping.samples.data() + at * static_cast<std::size_t>(bytes);
     if (bytes == 1) {
-      const float* codes = scratch.codes.data();
-      for (int j = 0; j < s.beam_count; ++j) out[j] = static_cast<std::byte>(static_cast<int>(codes[j]));
+      kernels.quantise_bytes(power, gain, half_gamma, max_code, scratch.bytes.data(), width);
+      std::memcpy(out, scratch.bytes.data(), static_cast<std::size_t>(s.beam_count));
       continue;
     }
+    kernels.quantise(power, gain, half_gamma, max_code, scratch.codes.data(), width);
     for (int j = 0; j < s.beam_count; ++j) {
       // 2^32 - 1 is no float: compare before the conversion can overflow.
       const float code = scratch.codes[static_cast<std::size_t>(j)];

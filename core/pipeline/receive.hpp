@@ -12,7 +12,8 @@ namespace sonar {
 /// Buffers of receive, one per worker.
 struct ReceiveScratch {
   std::vector<float> power;  // [rows][beams rounded up]
-  std::vector<float> codes;
+  std::vector<float> codes;  // of a row, and where they are
+  std::vector<std::uint8_t> bytes;
 };
 
 /// Sizes the parts of the ping that receive fills.

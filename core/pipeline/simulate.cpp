@@ -120,10 +120,11 @@ class PingUnderWay {
 /// as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
 int PingUnderWay::group_columns() const {
   if (w_.between && w_.between->expected()) return traced_columns;
-  const auto column_bytes =
-      sizeof(float) * (static_cast<std::size_t>(w_.columns.stride) + static_cast<std::size_t>(plan_.fan.bins));
+  const int bins = ray_is_scatterer() ? 0 : plan_.fan.bins;
+  const auto column_bytes = sizeof(float) * (static_cast<std::size_t>(w_.columns.stride) + static_cast<std::size_t>(bins));
   const int in_cache = static_cast<int>(group_bytes / column_bytes);
   const int for_all = plan_.columns.count / (pool_.threads() > 1 ? least_groups_a_worker * pool_.threads() : 1);
+  if (ray_is_scatterer()) return std::max(1, std::min({in_cache, for_all, traced_columns}));
   return std::max(1, std::min(in_cache, for_all) / traced_columns) * traced_columns;
 }
 
@@ -180,7 +181,10 @@ void PingUnderWay::sound_columns() {
 
 void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) {
   Stopwatch watch(w_.now_s, mine.statistics);
-  clear_columns(w_.columns, first, last);
+  const ReceiverNoise noise{request_.switches.noise ? &prepared_.noise : nullptr, request_.sonar_id,
+                            static_cast<std::uint32_t>(request_.number)};
+  begin_columns(plan_, noise, first, last, w_.columns);
+  watch.lap(Stage::noise);
   if (plan_.spectral) plan_.spectral->begin(last - first, mine.spectral);
   if (!request_.blank) {
     if (ray_is_scatterer())
@@ -193,8 +197,7 @@ void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) 
   if (volume_.is_heard() && !request_.blank)
     volume_.add(ray_is_scatterer() ? nullptr : &mine.seen, prepared_.noise, request_.sonar_id,
                 static_cast<std::uint32_t>(request_.number), first, last, mine.volume, w_.columns);
-  finish_columns(plan_, request_.switches.noise ? &prepared_.noise : nullptr, request_.sonar_id,
-                 static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
+  finish_columns(plan_, noise, first, last, w_.columns);
   if (leak_.is_heard() && !request_.blank)
     leak_.add(plan_, prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
   watch.lap(Stage::noise);

@@ -24,9 +24,33 @@ void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernel
   echoes.count = 0;
 }
 
-void finish_columns(const PingPlan& plan, const NoiseTable* noise, std::uint32_t sonar, std::uint32_t ping, int first, int last,
-                    ColumnSignals& signals) {
+namespace {
+
+bool begins_with_noise(const PingPlan& plan, const ReceiverNoise& noise, int column) {
+  return noise.table && !plan.expected_power && plan.columns.transmit[static_cast<std::size_t>(column)] == 1.0f;
+}
+
+}  // namespace
+
+void begin_columns(const PingPlan& plan, const ReceiverNoise& noise, int first, int last, ColumnSignals& signals) {
+  const auto rms = static_cast<float>(plan.column_noise_upa);
   for (int k = first; k < last; ++k) {
+    float *at = signals.column(k), *end = at + signals.stride;
+    if (!begins_with_noise(plan, noise, k)) {
+      std::fill(at, end, 0.0f);
+      continue;
+    }
+    float* samples = at + 2 * signals.lead;
+    std::fill(at, samples, 0.0f);
+    noise.table->set(noise.sonar, noise.ping, k, rms, signals.samples, samples);
+    std::fill(samples + 2 * signals.samples, end, 0.0f);
+  }
+}
+
+void finish_columns(const PingPlan& plan, const ReceiverNoise& noise, int first, int last, ColumnSignals& signals) {
+  const auto rms = static_cast<float>(plan.column_noise_upa);
+  for (int k = first; k < last; ++k) {
+    if (begins_with_noise(plan, noise, k)) continue;
     float* at = signals.column(k);
     const float amplitude = plan.columns.transmit[static_cast<std::size_t>(k)];
     if (amplitude != 1.0f) {
@@ -34,12 +58,11 @@ void finish_columns(const PingPlan& plan, const NoiseTable* noise, std::uint32_t
       for (std::ptrdiff_t i = 0; i < signals.stride; ++i) at[i] *= factor;
     }
     float* samples = at + 2 * signals.lead;
-    const auto rms = static_cast<float>(plan.column_noise_upa);
-    if (!noise) continue;
+    if (!noise.table) continue;
     if (plan.expected_power)
       for (int n = 0; n < signals.samples; ++n) samples[2 * n] += rms * rms;
     else
-      noise->add(sonar, ping, k, rms, signals.samples, samples);
+      noise.table->add(noise.sonar, noise.ping, k, rms, signals.samples, samples);
   }
 }
 

@@ -25,10 +25,18 @@ struct ColumnSignals {
 
 /// Zeroes columns [first, last).
 void clear_columns(ColumnSignals& signals, int first, int last);
+
+/// A ping's receiver noise; `table` null = none.
+struct ReceiverNoise {
+  const NoiseTable* table = nullptr;
+  std::uint32_t sonar = 0, ping = 0;
+};
+/// Empty columns [first, last): zero, or where the transmitter's pattern is 1 the noise already, which saves going over them
+/// twice.
+void begin_columns(const PingPlan& plan, const ReceiverNoise& noise, int first, int last, ColumnSignals& signals);
 /// Adds the pulses of the echoes, whose columns must lie in [first_column, ...) of `signals`.
 void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernels& kernels, ColumnSignals& signals);
-/// Applies the transmitter's pattern and adds receiver noise to columns [first, last); `noise` null = none.
-void finish_columns(const PingPlan& plan, const NoiseTable* noise, std::uint32_t sonar, std::uint32_t ping, int first, int last,
-                    ColumnSignals& signals);
+/// Applies the transmitter's pattern to columns [first, last) and adds the noise that begin_columns did not.
+void finish_columns(const PingPlan& plan, const ReceiverNoise& noise, int first, int last, ColumnSignals& signals);
 
 }  // namespace sonar

@@ -109,6 +109,8 @@ struct Kernels {
   void (*detect)(const float* beams, std::ptrdiff_t stride, int beam_count, int rows, float* power, int width);
   /// codes[i] = min(max_code, round(max_code * (power[i] * gain)^half_gamma)), as float; n is a multiple of 16.
   void (*quantise)(const float* power, float gain, float half_gamma, float max_code, float* codes, int n);
+  /// The same as bytes, max_code at most 255.
+  void (*quantise_bytes)(const float* power, float gain, float half_gamma, float max_code, std::uint8_t* codes, int n);
 };
 
 /// The kernels of a level; `automatic` takes the best this processor has. A level it lacks falls back to the next lower one.

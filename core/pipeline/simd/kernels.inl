@@ -139,14 +139,8 @@ void couple_panel(const float* in, std::ptrdiff_t in_stride, const float* panel,
   }
 }
 
-void quantise(const float* power, float gain, float half_gamma, float max_code, float* codes, int n) {
-  for (int i = 0; i < n; ++i) {
-    const float v = exp2_of(half_gamma * log2_of(larger(power[i] * gain, 1e-30f)));
-    codes[i] = smaller(std::floor(v * max_code + 0.5f), max_code);
-  }
-}
-
 #include "core/pipeline/simd/cells.inl"
 #include "core/pipeline/simd/hits.inl"
+#include "core/pipeline/simd/quantise.inl"
 #include "core/pipeline/simd/spread.inl"
 #include "core/pipeline/simd/transform.inl"
