@@ -5,7 +5,7 @@
 namespace sonar {
 namespace {
 
-constexpr int traced_columns = 48;  // columns whose rays are refined together
+constexpr int most_traced_columns = 48;  // columns whose rays are refined together
 constexpr std::size_t group_bytes =
     640 << 10;                            // signals and depth maps one worker carries from rays to sums: in the second cache
 constexpr int least_groups_a_worker = 3;  // so that all are done at about the same time
@@ -90,6 +90,11 @@ class PingUnderWay {
 
  private:
   bool ray_is_scatterer() const { return plan_.fixed_fan > 0; }
+  /// As even as may be, so that no group is left over that is small.
+  int traced_columns() const {
+    const int parts = (plan_.columns.count + most_traced_columns - 1) / most_traced_columns;
+    return (plan_.columns.count + parts - 1) / parts;
+  }
   int group_columns() const;
   int groups() const { return (plan_.columns.count + group_columns_ - 1) / group_columns_; }
   void sound_group(int first, int last, Workspace::PerWorker& mine);
@@ -111,7 +116,7 @@ class PingUnderWay {
   Leak leak_;
   Crosstalk crosstalk_;
   std::span<const Pose> bodies_;
-  int group_columns_ = traced_columns;
+  int group_columns_ = 0;
   std::vector<PointEcho> points_;
   std::vector<PulseHeard> other_sonars_;
 };
@@ -119,13 +124,15 @@ class PingUnderWay {
 /// How many columns a worker takes at once. Tiles that reach into several groups are looked at by each, so the more the better,
 /// as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
 int PingUnderWay::group_columns() const {
-  if (w_.between && w_.between->expected()) return traced_columns;
+  const int traced = traced_columns();
+  if (w_.between && w_.between->expected()) return traced;
   const int bins = ray_is_scatterer() ? 0 : plan_.fan.bins;
   const auto column_bytes = sizeof(float) * (static_cast<std::size_t>(w_.columns.stride) + static_cast<std::size_t>(bins));
   const int in_cache = static_cast<int>(group_bytes / column_bytes);
-  const int for_all = plan_.columns.count / (pool_.threads() > 1 ? least_groups_a_worker * pool_.threads() : 1);
-  if (ray_is_scatterer()) return std::max(1, std::min({in_cache, for_all, traced_columns}));
-  return std::max(1, std::min(in_cache, for_all) / traced_columns) * traced_columns;
+  const int least_groups = pool_.threads() > 1 ? least_groups_a_worker * pool_.threads() : 1;
+  const int for_all = (plan_.columns.count + least_groups - 1) / least_groups;
+  if (ray_is_scatterer()) return std::max(1, std::min({in_cache, for_all, traced}));
+  return std::max(1, std::min(in_cache / traced, (for_all + traced - 1) / traced)) * traced;
 }
 
 /// Surface cells that may be in view, sorted by the columns they reach; analytic points that are.
@@ -218,8 +225,8 @@ void PingUnderWay::scatter_hits_of(int first, int last, Workspace::PerWorker& mi
 
 void PingUnderWay::scatter_cells_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch) {
   mine.seen.shape(first, last, plan_.fan.bins);
-  for (int from = first; from < last; from += traced_columns) {
-    const int to = std::min(from + traced_columns, last);
+  for (int from = first; from < last; from += traced_columns()) {
+    const int to = std::min(from + traced_columns(), last);
     mine.statistics.rays += trace_fan(scene_, plan_, scalars_, from, to, mine.fan, mine.seen);
     if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, from, to, w_.first_hits);
   }
