@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <random>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -17,23 +16,13 @@
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/scatter.hpp"
 #include "core/pipeline/synthesize.hpp"
+#include "tests/core/pipeline/kernel_sets.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
 namespace sonar::test {
 namespace {
-
-/// The distinct kernel sets this processor can run.
-std::vector<const simd::Kernels*> kernel_sets() {
-  std::vector<const simd::Kernels*> sets;
-  std::set<std::string> names;
-  for (const SimdLevel level : {SimdLevel::portable, SimdLevel::avx2, SimdLevel::avx512}) {
-    const simd::Kernels& k = simd::kernels_for(level);
-    if (names.insert(k.name).second) sets.push_back(&k);
-  }
-  return sets;
-}
 
 PingPlan plan_of(const FrequencyMode& mode, const PingSettings& settings) { return make_plan(mode, settings, Switches{}); }
 
@@ -142,28 +131,6 @@ TEST(StageOracles, Oracle19_CouplingAgainstDenseSum) {
          {CouplingCase{p900(), 512}, CouplingCase{narrow, 256}, CouplingCase{oculus_high(), 512}, CouplingCase{oculus_low(), 256},
           CouplingCase{oculus_low(), 511}, CouplingCase{p900(), 3}, CouplingCase{open, 256}}) {
       check_coupling(c, *kernels);
-    }
-  }
-}
-
-// Whatever the processor: the same picture to the rounding of a float.
-TEST(StageOracles, KernelSetsAgreeOnAPing) {
-  SceneMaker maker;
-  maker.add(height_field(-2, 14, -10, 10, 0.1, rough_relief(0.03, 40)), -20).add(sphere(0.4, 3), -10, {5, 1, 0.4});
-  const auto scene = maker.make();
-  for (const bool expected_power : {false, true}) {
-    std::vector<float> first;
-    for (const SimdLevel level : {SimdLevel::portable, SimdLevel::avx2, SimdLevel::avx512}) {
-      Sounding s(scene, oculus_high(), default_rows(10, 720), {.threads = 2, .engine = {.simd = level}});
-      s.request.switches.expected_power = expected_power;
-      const std::vector<float> now = s.ping_from({0, 0, 2}, {0, 0.25, 0}).pressure_upa;
-      if (first.empty()) first = now;
-      double error = 0, power = 0;
-      for (std::size_t i = 0; i < now.size(); ++i) {
-        error += std::pow(static_cast<double>(now[i]) - static_cast<double>(first[i]), 2);
-        power += std::pow(static_cast<double>(first[i]), 2);
-      }
-      EXPECT_LE(std::sqrt(error / power), 1e-3) << s.engine().description();
     }
   }
 }

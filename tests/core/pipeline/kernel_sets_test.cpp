@@ -1,0 +1,125 @@
+// The hot loops, whatever the processor: the same picture from all, and of what is simple enough the picture that its definition
+// gives.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "core/base/random.hpp"
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/scattering.hpp"
+#include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/scatter.hpp"
+#include "tests/core/pipeline/kernel_sets.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+
+namespace sonar::test {
+namespace {
+
+// To the rounding of a float.
+TEST(KernelSets, AgreeOnAPing) {
+  SceneMaker maker;
+  maker.add(height_field(-2, 14, -10, 10, 0.1, rough_relief(0.03, 40)), -20).add(sphere(0.4, 3), -10, {5, 1, 0.4});
+  const auto scene = maker.make();
+  struct Case {
+    bool expected_power, conical;
+    int fixed_fan, bits;
+  };
+  for (const Case c : {Case{false, true, 0, 16}, Case{true, true, 0, 16}, Case{false, false, 0, 8}, Case{true, false, 0, 8},
+                       Case{false, true, 60, 8}, Case{true, false, 60, 16}}) {
+    std::vector<float> first;
+    std::vector<std::byte> first_bytes;
+    for (const SimdLevel level : {SimdLevel::portable, SimdLevel::avx2, SimdLevel::avx512}) {
+      Sounding s(scene, oculus_high(), default_rows(10, 720), {.threads = 2, .engine = {.simd = level}});
+      s.request.switches.expected_power = c.expected_power;
+      s.request.switches.conical = c.conical;
+      s.request.switches.fixed_fan = c.fixed_fan;
+      s.request.settings.format.bits = c.bits;
+      s.request.settings.format.max_code = c.bits == 8 ? 255 : 65535;
+      s.request.settings.format.gamma = 0.5f;
+      s.request.settings.gain_db = 10;
+      const Ping& ping = s.ping_from({0, 0, 2}, {0, 0.25, 0});
+      const std::vector<float> now = ping.pressure_upa;
+      if (first.empty()) first = now, first_bytes = ping.samples;
+      if (c.bits == 8) {
+        int other = 0, far_off = 0, lit = 0;
+        for (std::size_t i = 0; i < first_bytes.size(); ++i) {
+          const int off = std::abs(static_cast<int>(first_bytes[i]) - static_cast<int>(ping.samples[i]));
+          other += off > 0, far_off += off > 2, lit += first_bytes[i] != std::byte{0} && first_bytes[i] != std::byte{255};
+        }
+        EXPECT_GT(lit, 1000) << "codes that say something";
+        EXPECT_LE(other, static_cast<int>(first_bytes.size()) / 100) << s.engine().description();
+        EXPECT_LE(far_off, static_cast<int>(first_bytes.size()) / 10000) << s.engine().description();
+      }
+      double error = 0, power = 0;
+      for (std::size_t i = 0; i < now.size(); ++i) {
+        error += std::pow(static_cast<double>(now[i]) - static_cast<double>(first[i]), 2);
+        power += std::pow(static_cast<double>(first[i]), 2);
+      }
+      EXPECT_LE(std::sqrt(error / power), 1e-3) << s.engine().description();
+    }
+  }
+}
+
+// A ray of the fixed fan: an echo of sqrt(sigma) e^{-2 alpha r} / r^2 D(psi), with a draw and a carrier of its own.
+TEST(KernelSets, HitsOfTheFixedFanSoundAsDefined) {
+  Material smooth;
+  smooth.lambert_db = -15;
+  smooth.roughness_m = 1e-4f;
+  const auto scene = SceneMaker().add(wall(5, 5), -20, {5, 0, 0}).add_of(wall(5, 5), smooth, {7, 0, 0}).make();
+  for (const bool conical : {false, true}) {
+    PingRequest request = Sounding(scene, p900(), default_rows(10, 394)).request;
+    request.switches.conical = conical;
+    request.switches.specular = true;
+    request.switches.fixed_fan = 500;
+    const PingPlan plan = make_plan(p900(), request.settings, request.switches);
+    const PingScalars scalars = make_scalars(plan, request, {});
+    const double step = 2 * plan.fan.half_angle_rad / plan.fixed_fan;
+    std::vector<FanHit> hits;
+    for (int i = 0; i < 500; ++i) {
+      const auto elevation = static_cast<float>((i + 0.5) * step - plan.fan.half_angle_rad);
+      hits.push_back({.column = 20 + i,
+                      .ray = i,
+                      .range_m = 0.5f + 0.019f * static_cast<float>(i),
+                      .elevation_rad = elevation,
+                      .cosine = static_cast<float>(i % 100) / 99,
+                      .object = static_cast<std::uint32_t>(i % 2),
+                      .triangle = 0});
+    }
+    const std::vector<LawTable> laws = laws_of(*scene, plan, scalars);
+    ASSERT_EQ(laws[1].root.empty(), false) << "one of the two materials has a law that is tabulated";
+    for (const simd::Kernels* kernels : kernel_sets()) {
+      Echoes echoes;
+      scatter_hits(hits, *scene, laws, plan, scalars, Seed{77}, *kernels, echoes);
+      ASSERT_EQ(echoes.count, 500);
+      double off = 0, all = 0;
+      for (std::size_t i = 0; i < hits.size(); ++i) {
+        const FanHit& hit = hits[i];
+        const double r = static_cast<double>(hit.range_m), cosine = static_cast<double>(hit.cosine);
+        const double psi = static_cast<double>(hit.elevation_rad), sine = plan.columns.sine(hit.column);
+        const double solid = plan.columns.spacing * step * (conical ? 1 : std::cos(psi) / std::sqrt(1 - sine * sine));
+        const Material& material = scene->materials[scene->objects[hit.object].mesh->material[0]];
+        const double sigma =
+            scattering_strength(material, cosine, static_cast<double>(plan.mode.centre_hz), scalars.sound_speed_mps, true) *
+            footprint_area_m2(cosine, r, solid);
+        const double amplitude = scalars.source_upa * std::sqrt(sigma) * two_way_transmission(r, scalars.absorption_np_per_m) *
+                                 elevation_two_way(plan.mode.pattern, psi);
+        const Random4 draw =
+            philox(hit.object, static_cast<std::uint32_t>(hit.column), static_cast<std::uint32_t>(hit.ray), 0x66616e, 77, 0);
+        const ComplexNormal xi = complex_normal(draw.v[0], draw.v[1]);
+        const std::complex<double> expected =
+            std::complex<double>(xi.re, xi.im) * std::polar(amplitude, -2 * pi * r * scalars.turns_per_m);
+        off += std::norm(expected - std::complex<double>(echoes.re[i], echoes.im[i]));
+        all += std::norm(expected);
+        EXPECT_NEAR(echoes.sample[i], scalars.sample_of(r), 1e-4);
+        EXPECT_EQ(echoes.column[i], hit.column);
+      }
+      EXPECT_LT(std::sqrt(off / all), 1e-3) << kernels->name << ": the tabulated law is the coarsest part";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace sonar::test
