@@ -14,13 +14,14 @@ namespace sonar {
 
 /// A cube of the lattice: the triangles that may own points in it, the tile of its level once wanted, the eight cubes inside.
 struct SurfaceCells::Node {
+  // What every visit asks comes first, side by side.
   TileAddress address;
-  std::vector<std::uint32_t> triangles;
-  std::array<std::unique_ptr<Node>, 8> children;  // null where no triangle goes
   bool divided = false;
   bool built = false;
-  CellTile tile;
   std::uint64_t last_visited = 0;
+  std::array<std::unique_ptr<Node>, 8> children;  // null where no triangle goes
+  std::vector<std::uint32_t> triangles;
+  CellTile tile;
 
   std::size_t own_bytes() const { return sizeof(Node) + triangles.capacity() * sizeof(std::uint32_t) + tile.bytes(); }
 };
@@ -212,6 +213,11 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
   }
   if (!finer) return;
   if (!node.divided) found.new_bytes += sheet.divide(node);
+  for (const auto& child : node.children) {  // they lie anywhere in memory: ask for all before the first
+    const auto* at = reinterpret_cast<const char*>(child.get());
+    __builtin_prefetch(at);
+    __builtin_prefetch(at + 64);
+  }
   for (auto& child : node.children)
     if (child) visit(sheet, *child, view, sonar_in_object, turn, found);
 }
