@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/base/random.hpp"
 #include "core/paper/paper_signal.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simd/kernels.hpp"
@@ -28,6 +29,13 @@ struct Prepared {
   std::vector<double> pattern;                // D(phi) of a row, of fans
   double elevation_per_sine = 0;              // D(phi) = sinc(elevation_per_sine sin phi); 0 = no pattern
 };
+
+/// D(phi) of an elevation.
+double elevation_pattern(const Prepared& prepared, double elevation_rad);
+
+/// What a scatterer of a known cross-section sends back; none, and false, when it lies outside the record.
+bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& prepared,
+              const PingScalars& scalars, PaperEchoes& echoes);
 
 /// Eq. (2) and the rest of eq. (1) but the sum: one column's hits as echoes. `mu` per material. Hits outside the record are
 /// dropped, as the reference code does.

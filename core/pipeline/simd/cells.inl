@@ -4,7 +4,7 @@
 inline constexpr int chunk = 256;
 
 struct Chunk {  // the cells of one stretch of a tile that are seen, packed
-  alignas(64) float range[chunk + 16], offset[chunk + 16], cosine[chunk + 16], slope2[chunk + 16], column[chunk + 16],
+  alignas(64) float range[chunk + 16], offset[chunk + 16], cosine[chunk + 16], sine2[chunk + 16], column[chunk + 16],
       weight_re[chunk + 16], weight_im[chunk + 16];
 };
 
@@ -47,14 +47,15 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
   for (int i = from; i < from + n; i += lanes) {
     const Lanes dx = unit * counts(tx + i), dy = unit * counts(ty + i), dz = unit * counts(tz + i);
     const Lanes e = dx * (2 * qx0 + dx) + dy * (2 * qy0 + dy) + dz * (2 * qz0 + dz);
-    const Lanes r_squared = larger(r0_squared + e, all(1e-6f)), inverse_r = inverse_root(r_squared), r = r_squared * inverse_r;
+    Lanes inverse_r;
+    const Lanes r = root_and_inverse(larger(r0_squared + e, all(1e-6f)), inverse_r);
     const Lanes x = px0 + m00 * dx + m01 * dy + m02 * dz;
     const Lanes y = py0 + m10 * dx + m11 * dy + m12 * dz;
     const Lanes z = pz0 + m20 * dx + m21 * dy + m22 * dz;
     // What elevations are measured against.
     const Lanes inverse_h = conical ? reciprocal(larger(x, all(1e-6f))) : inverse_root(larger(x * x + y * y, all(1e-12f)));
     const Lanes column = (g.first_edge_sine - y * (conical ? inverse_r : inverse_h)) * g.columns_per_sine;
-    const Lanes slope = z * inverse_h, bin = (slope - g.first_tangent) * g.bins_per_tangent;
+    const Lanes bin = (z * inverse_h - g.first_tangent) * g.bins_per_tangent;
     LaneMask keep = both(not_below(column, first_column), below(column, end_column));
     keep = both(keep, both(not_below(bin, all(0)), below(bin, bins)));
     keep = both(keep, both(not_below(r, nearest), below(r, farthest)));
@@ -72,9 +73,10 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
     const Lanes along = counts(nx + i) * (qx0 + dx) + counts(ny + i) * (qy0 + dy) + counts(nz + i) * (qz0 + dz);
     const Lanes weight_re = counts(wr + i), weight_im = counts(wi + i);
     pack(c.range + m, keep, r);
-    pack(c.offset + m, keep, e * reciprocal(r0 + r));
+    pack(c.offset + m, keep, quotient(e, r0 + r));
     pack(c.cosine + m, keep, magnitude(along) * (CellTile::normal_unit * inverse_r));
-    pack(c.slope2 + m, keep, slope * slope);
+    const Lanes z2 = z * z, h2 = conical ? x * x : x * x + y * y;
+    pack(c.sine2 + m, keep, quotient(z2, h2 + z2));
     pack(c.column + m, keep, column);
     if (g.expected_power) {
       pack(c.weight_re + m, keep, area_of(t, i, weight_re, weight_im));
@@ -92,9 +94,8 @@ inline Lanes cross_fade(const TileSeen& s, Lanes r) {
   return larger(smaller(smaller(in, out), all(1)), all(0));
 }
 
-/// Two-way elevation pattern, polynomial in sin^2, from the square of the tangent.
-inline Lanes elevation_pattern(const float (&e)[elevation_terms], Lanes slope2) {
-  const Lanes w = slope2 * reciprocal(1.0f + slope2);
+/// Two-way elevation pattern, polynomial in w = sin^2.
+inline Lanes elevation_pattern(const float (&e)[elevation_terms], Lanes w) {
   Lanes p = all(e[elevation_terms - 1]);
   for (int term = elevation_terms - 2; term >= 0; --term) p = e[term] + w * p;
   return p;
@@ -125,7 +126,7 @@ __attribute__((noinline)) void sound_cells(const TileSeen& s, const GroupView& g
     const Lanes r = load(c.range + i), offset = load(c.offset + i), d = -g.decay_per_m * offset;
     const Lanes loss = 1.0f + d * (1.0f + d * (0.5f + d * (1.0f / 6.0f + d * (1.0f / 24.0f))));
     const Lanes amplitude = s.amplitude * root_of(cross_fade(s, r)) * load(c.cosine + i) *
-                            elevation_pattern(g.elevation, load(c.slope2 + i)) * loss * reciprocal(r * r);
+                            elevation_pattern(g.elevation, load(c.sine2 + i)) * loss * reciprocal(r * r);
     const Lanes turns = -(s.phase_turns + g.turns_per_m * offset);
     const Lanes cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
     const Lanes a = load(c.weight_re + i), b = load(c.weight_im + i);
@@ -142,7 +143,7 @@ inline void power_of_cells(const TileSeen& s, const GroupView& g, int n, const C
     const Lanes r = load(c.range + i);
     Lanes loss;
     for (int l = 0; l < lanes; ++l) loss[l] = std::exp(-g.decay_per_m * c.offset[i + l]);
-    const Lanes amplitude = s.area_amplitude * load(c.cosine + i) * elevation_pattern(g.elevation, load(c.slope2 + i)) * loss *
+    const Lanes amplitude = s.area_amplitude * load(c.cosine + i) * elevation_pattern(g.elevation, load(c.sine2 + i)) * loss *
                             reciprocal(r * r);
     store(out.re + i, amplitude * amplitude * cross_fade(s, r) * load(c.weight_re + i));
     store(out.im + i, Lanes{});

@@ -38,6 +38,17 @@ inline Lanes inverse_root(Lanes x) {  // x > 0
   const Lanes guess = Lanes(_mm512_rsqrt14_ps(native(x)));
   return guess + 0.5f * guess * (1.0f - x * guess * guess);
 }
+// What the estimate left over made good: as good as a division, and as a root.
+inline Lanes quotient(Lanes a, Lanes b) {
+  const Lanes inverse = reciprocal(b), q = a * inverse;
+  return q + inverse * (a - q * b);
+}
+inline Lanes root_and_inverse(Lanes x, Lanes& inverse) {  // x > 0
+  inverse = inverse_root(x);
+  const Lanes r = x * inverse;
+  return r + 0.5f * inverse * (x - r * r);
+}
+inline Lanes root_of(Lanes x) { return x * inverse_root(larger(x, all(1e-30f))); }  // x >= 0
 /// The lanes of the mask, packed, to `at`; writes a whole vector.
 inline void pack(float* at, LaneMask m, Lanes v) {
   // Compress in registers and store whole vectors: compressing stores are slow on some processors.
@@ -58,6 +69,7 @@ inline Lanes magnitude(Lanes a) { return a < 0 ? -a : a; }
 inline LaneNumbers whole_part(Lanes v) { return __builtin_convertvector(v, LaneNumbers); }
 inline Lanes as_floats(LaneNumbers n) { return __builtin_convertvector(n, Lanes); }
 inline Lanes reciprocal(Lanes x) { return 1.0f / x; }
+inline Lanes quotient(Lanes a, Lanes b) { return a / b; }
 
 #if defined(__AVX2__)
 
@@ -66,7 +78,7 @@ inline int bits_of(LaneMask m) { return _mm256_movemask_ps(reinterpret_cast<__m2
 inline bool any(LaneMask m) { return bits_of(m) != 0; }
 inline int count_of(LaneMask m) { return __builtin_popcount(static_cast<unsigned>(bits_of(m))); }
 inline Lanes nearest_whole(Lanes v) { return Lanes(_mm256_round_ps(native(v), _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)); }
-inline Lanes inverse_root(Lanes x) { return 1.0f / Lanes(_mm256_sqrt_ps(native(x))); }  // x > 0
+inline Lanes square_root(Lanes x) { return Lanes(_mm256_sqrt_ps(native(x))); }
 inline Lanes counts(const std::int16_t* at) {
   return Lanes(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at)))));
 }
@@ -104,10 +116,10 @@ inline Lanes nearest_whole(Lanes v) {
   for (int l = 0; l < lanes; ++l) n[l] = std::floor(v[l] + 0.5f);
   return n;
 }
-inline Lanes inverse_root(Lanes x) {  // x > 0
+inline Lanes square_root(Lanes x) {
   Lanes root;
   for (int l = 0; l < lanes; ++l) root[l] = std::sqrt(x[l]);
-  return 1.0f / root;
+  return root;
 }
 inline Lanes counts(const std::int16_t* at) {
   Lanes v;
@@ -128,6 +140,13 @@ inline void pack(float* at, LaneMask m, Lanes v) {
 }
 
 #endif
-#endif
 
-inline Lanes root_of(Lanes x) { return x * inverse_root(larger(x, all(1e-30f))); }  // x >= 0
+inline Lanes inverse_root(Lanes x) { return 1.0f / square_root(x); }  // x > 0
+inline Lanes root_and_inverse(Lanes x, Lanes& inverse) {              // x > 0
+  const Lanes root = square_root(x);
+  inverse = 1.0f / root;
+  return root;
+}
+inline Lanes root_of(Lanes x) { return square_root(x); }  // x >= 0
+
+#endif

@@ -1,0 +1,79 @@
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/random.hpp"
+#include "core/paper/paper_ping.hpp"
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/scattering.hpp"
+
+namespace sonar::paper {
+namespace {
+
+constexpr std::uint32_t speckle_key = 0x50323521;  // keeps these draws apart from all others
+
+}  // namespace
+
+double elevation_pattern(const Prepared& p, double elevation_rad) {
+  return p.elevation_per_sine > 0 ? sinc(p.elevation_per_sine * std::sin(elevation_rad)) : 1.0;
+}
+
+bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& p, const PingScalars& s,
+              PaperEchoes& echoes) {
+  const double turns = range_m * s.samples_per_m / p.plan.samples;
+  if (!(turns < 1)) return false;
+  const double amplitude =
+      s.source_upa * std::sqrt(cross_section_m2) * pattern * two_way_transmission(range_m, s.absorption_np_per_m);
+  if (p.plan.expected_power)
+    echoes.push_back({turns, {amplitude * amplitude, 0}});
+  else
+    echoes.push_back({turns, spectral::Complex(static_cast<double>(xi.re), static_cast<double>(xi.im)) *
+                                 std::polar(amplitude, -2 * pi * fraction_of_turn(range_m * s.turns_per_m))});
+  return true;
+}
+
+void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene, const Prepared& p,
+               const PingScalars& s, const PingRequest& request, const simd::Kernels& kernels, PaperEchoes& echoes) {
+  const auto bits = static_cast<std::uint64_t>(request.seed);
+  const auto pattern_of = [&](const PaperHit& hit) {
+    return p.pattern.empty() ? elevation_pattern(p, hit.elevation_rad) : p.pattern[static_cast<std::size_t>(hit.row)];
+  };
+  const auto mu_of = [&](const PaperHit& hit) { return mu[scene.objects[hit.object].mesh->material[hit.triangle]]; };
+  if (p.plan.expected_power) {
+    for (const PaperHit& hit : hits)
+      add_echo(hit.range_m, pattern_of(hit), printed_cross_section_m2(mu_of(hit), hit.cosine, hit.range_m, hit.solid_angle_sr),
+               {}, p, s, echoes);
+    return;
+  }
+  constexpr std::size_t most = simd::HitsToSound::most;
+  std::uint32_t number[most], column[most], row[most];
+  float range[most], weight[most], re[most], im[most];
+  std::fill_n(number, most, static_cast<std::uint32_t>(request.number));
+  simd::HitsToSound sounding{
+      {{number, column, row}, speckle_key, {static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32)}},
+      range,
+      weight,
+      static_cast<float>(2 * s.absorption_np_per_m),
+      s.turns_per_m};
+  int n = 0;
+  const auto send = [&] {
+    kernels.sound_hits(sounding, n, re, im);
+    for (int i = 0; i < n; ++i)
+      echoes.push_back({static_cast<double>(range[i]) * s.samples_per_m / p.plan.samples, {re[i], im[i]}});
+    n = 0;
+  };
+  for (const PaperHit& hit : hits) {
+    if (!(hit.range_m * s.samples_per_m < p.plan.samples)) continue;
+    // sqrt(printed_cross_section_m2) / r^2
+    const bool heard = hit.range_m >= nearest_scatterer_m;
+    const double amplitude =
+        s.source_upa * std::sqrt(mu_of(hit) * hit.solid_angle_sr) * hit.cosine * pattern_of(hit) / hit.range_m;
+    range[n] = static_cast<float>(hit.range_m);
+    weight[n] = heard ? static_cast<float>(amplitude) : 0;
+    column[n] = static_cast<std::uint32_t>(hit.column);
+    row[n] = static_cast<std::uint32_t>(hit.row);
+    if (++n == static_cast<int>(most)) send();
+  }
+  send();
+}
+
+}  // namespace sonar::paper
