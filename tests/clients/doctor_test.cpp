@@ -196,6 +196,10 @@ TEST(Doctor, KnowsWhyNoPingComes) {
   expect(line(facts, "ping"), Level::fail, "no ping came", "standby");
   sonar.stream.asked = true;
   expect(line(facts, "ping"), Level::fail, "no ping came", "overloaded");
+  facts.control.status->clock = "lockstep";
+  expect(line(facts, "ping"), Level::warn, "with clock: lockstep time stands until it is asked to pass", "sonarctl step");
+  facts.control.status->clock = "follow";
+  expect(line(facts, "ping"), Level::warn, "with clock: follow time stands until the next pose comes", "sender of poses");
   sonar.says = facts.control.status->sonars[0];
   sonar.says->figures.refused = 7;
   expect(line(facts, "ping"), Level::fail, "the engine refused 7 of them", "log");

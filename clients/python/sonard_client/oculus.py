@@ -5,7 +5,8 @@ import errno
 import socket
 import time
 from collections import deque
-from typing import Any, Deque, Iterator, Optional, Tuple
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Callable, Deque, Iterator, List, Optional, Tuple
 
 from . import layouts
 from .layouts import FireSettings
@@ -113,6 +114,22 @@ class OculusClient:
                                    ("" if self._last_fire else ": fire() was not called"))
             if message.type == layouts.PING:
                 return ping_from(message)
+
+    def pings_during(self, act: Callable[[], Any], settle: float = 0.1) -> List[Ping]:
+        """The pings that come while act() runs beside, and until none has come for `settle` seconds after it. What act() raises is
+        raised here. With clock: lockstep or follow time waits for readers, so one thread alone would wait for itself:
+        sonar.pings_during(lambda: control.step(0.5))"""
+        pings: List[Ping] = []
+        with ThreadPoolExecutor(1) as beside:
+            done = beside.submit(act)
+            while True:
+                was_done = done.done()
+                message = self.message(settle)
+                if message is not None and message.type == layouts.PING:
+                    pings.append(ping_from(message))
+                elif message is None and was_done:
+                    done.result()
+                    return pings
 
     def message(self, timeout: float = 10.0) -> Optional[Message]:
         """The next message of any kind, dummies among them; None when none is whole within `timeout` seconds."""

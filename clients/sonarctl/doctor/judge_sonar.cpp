@@ -142,10 +142,18 @@ class SonarJudge {
     if (sonar_.says && sonar_.says->figures.refused > 0)
       return add(Level::fail, "ping", text + ": the engine refused " + std::to_string(sonar_.says->figures.refused) + " of them",
                  "sonard's log says why");
+    if (clock() == "lockstep" || clock() == "follow")
+      return add(Level::warn, "ping",
+                 text + ": with clock: " + clock() + " time stands until " +
+                     (clock() == "lockstep" ? "it is asked to pass" : "the next pose comes"),
+                 clock() == "lockstep" ? "let it pass meanwhile: sonarctl step 0.1 --count 20" : "start the sender of poses");
     add(Level::fail, "ping", text,
         s.asked ? "is the computer overloaded, or sonard stopped (SIGSTOP, a debugger)? See its log"
                 : "its client asked for standby, or for pings on request; sonarctl status shows the settings");
   }
+
+  /// The daemon's, when it says so: "realtime", "stepped", ...
+  std::string clock() const { return facts_.control.status ? facts_.control.status->clock : std::string(); }
 
   /// Where something does listen.
   std::string where_else() const {
@@ -193,6 +201,11 @@ class SonarJudge {
     if (s.pings < 2)
       return add(Level::warn, "rate", "one ping only in " + format("%.1f", s.waited_s) + " s: no rate can be told",
                  "sonarctl listen " + sonar_.at.host + " looks for longer");
+    if (!clock().empty() && clock() != "realtime")
+      return add(Level::ok, "rate",
+                 format("%.1f", s.rate_hz) + " pings a second of ours; the daemon's time is another (clock: " + clock() +
+                     ") and has passed meanwhile",
+                 "");
     const double expected_hz = s.asked ? s.asked_hz : sonar_.says ? sonar_.says->rate_hz : 0;
     std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
     if (expected_hz > 0) text += " (asked " + format("%g", expected_hz) + ")";
