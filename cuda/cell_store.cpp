@@ -51,10 +51,14 @@ bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
     const CellTile& t = *tiles[i].tile;
     std::memcpy(host.host + at, t.data.get(), values(t) * sizeof(std::int16_t));
     cells[i] = device.device + at;
-    tiles_[t.data.get()] = {t.weight_unit, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]};
     at += values(t);
   }
   machine_.upload(lane, device.device, host.host, more * sizeof(std::int16_t));
+  for (std::size_t i = 0; i < tiles.size(); ++i) {  // known from here on, when they are on their way
+    if (cells[i] < device.device || cells[i] >= device.device + more) continue;
+    const CellTile& t = *tiles[i].tile;
+    tiles_[t.data.get()] = {t.weight_unit, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]};
+  }
   return true;
 }
 

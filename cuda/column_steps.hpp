@@ -1,5 +1,5 @@
 // Kernel bodies that complete the columns' signals: ghosts, the water's own reverberation, the transmitter's pattern, receiver
-// noise and leak, in the order of simulate() (core/pipeline/simulate.cpp).
+// noise and leak, as simulate() does (core/pipeline/simulate.cpp), which begins with the noise: sums differ by rounding.
 #pragma once
 
 #include <cmath>

@@ -114,9 +114,14 @@ int open(void** machine) {
   return cudaSuccess;
 }
 
-int allocate(void*, void** at, std::size_t bytes) { return cudaMalloc(at, bytes); }
+/// The runtime keeps a thread's last error, also one that was told; the next launch must not find it.
+cudaError_t told(cudaError_t error) {
+  if (error != cudaSuccess) cudaGetLastError();
+  return error;
+}
+int allocate(void*, void** at, std::size_t bytes) { return told(cudaMalloc(at, bytes)); }
 int release(void*, void* at) { return cudaFree(at); }
-int allocate_host(void*, void** at, std::size_t bytes) { return cudaMallocHost(at, bytes); }
+int allocate_host(void*, void** at, std::size_t bytes) { return told(cudaMallocHost(at, bytes)); }
 int release_host(void*, void* at) { return cudaFreeHost(at); }
 int upload(void* machine, int lane, void* to, const void* from, std::size_t bytes) {
   return cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, opened(machine).lane[lane].stream);
@@ -125,6 +130,7 @@ int download(void* machine, int lane, void* to, const void* from, std::size_t by
   return cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, opened(machine).lane[lane].stream);
 }
 cudaError_t launch_step(cudaStream_t stream, int step, const GraphKey& what) {
+  cudaGetLastError();  // another engine's, on this thread: not this launch's
   const Kernel k = kernel_of(static_cast<Step>(step), std::make_integer_sequence<int, step_count>());
   k<<<dim3(what.blocks[step], static_cast<unsigned>(what.pings)), threads_a_block, 0, stream>>>(what.views);
   return cudaGetLastError();

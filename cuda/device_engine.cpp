@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -49,16 +50,25 @@ class DeviceEngine final : public PingEngine {
     for (const PingRequest& request : requests)
       if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
     std::vector<Ping> pings(requests.size());
+    each_.assign(requests.size(), {});
     if (!failed_) try {
         run_on_device(requests, pings);
         return pings;
+      } catch (const std::bad_alloc&) {  // of the computer's memory: what was begun is forgotten, the next ping begins anew
+        for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);
+        for (BatchRoom& room : rooms_) empty(room);
+        preparer_.forget_cells();
+        throw;
       } catch (const std::runtime_error& e) {
         failed_ = std::string("the CUDA engine stopped: ") + e.what();
         for (BatchRoom& room : rooms_) empty(room);
         if (device_options_.cpu_after_failure) say(*failed_ + "; from here on the CPU computes");
       }
     if (!device_options_.cpu_after_failure) throw EngineUnavailable(*failed_ + "; use --engine cpu or auto");
-    for (std::size_t i = 0; i < requests.size(); ++i) pings[i] = by_cpu(requests[i]);
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+      pings[i] = by_cpu(requests[i]);
+      each_[i] = statistics_;
+    }
     return pings;
   }
 
@@ -67,6 +77,7 @@ class DeviceEngine final : public PingEngine {
            std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
   }
   PingStatistics statistics() const override { return statistics_; }
+  std::vector<PingStatistics> statistics_of_each() const override { return each_; }
 
  private:
   void run_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
@@ -75,6 +86,7 @@ class DeviceEngine final : public PingEngine {
       if (const std::string why = why_by_cpu(requests[i]); !why.empty()) {
         if (told_.insert(why).second) say("CUDA: " + why);
         pings[i] = by_cpu(requests[i]);
+        each_[i] = statistics_;
         continue;
       }
       if (!prepare(requests[i], i, rooms_[which])) {
@@ -168,7 +180,10 @@ class DeviceEngine final : public PingEngine {
     if (room.pings.empty()) return;
     machine_->wait(room.lane);
     if (options_.now_s) share_times(room);
-    for (std::size_t i = 0; i < room.pings.size(); ++i) pings[room.pings[i].index] = take(room.pings[i], room.views[i]);
+    for (std::size_t i = 0; i < room.pings.size(); ++i) {
+      pings[room.pings[i].index] = take(room.pings[i], room.views[i]);
+      each_[room.pings[i].index] = statistics_;
+    }
     empty(room);
   }
   /// Every ping of a batch took as long as the others.
@@ -235,6 +250,7 @@ class DeviceEngine final : public PingEngine {
   Workspace work_;  // of the CPU
   std::set<std::string> told_;
   PingStatistics statistics_;
+  std::vector<PingStatistics> each_;   // of the last run
   std::optional<std::string> failed_;  // why
 };
 

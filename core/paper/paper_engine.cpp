@@ -19,24 +19,29 @@ class Engine final : public PingEngine {
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
     std::vector<Ping> pings;
     pings.reserve(requests.size());
+    std::vector<PingStatistics> each;  // a ping that is let in has its own
     while (!requests.empty()) {
       if (requests.front().switches.mode != Mode::canonical) {
         pings.push_back(compare(requests.front()));
+        each.push_back(statistics_);
         requests = requests.subspan(1);
         continue;
       }
       std::size_t n = 1;  // the longest run of canonical requests, so that an engine that likes batches gets them
       while (n < requests.size() && requests[n].switches.mode == Mode::canonical) ++n;
       for (Ping& ping : canonical_->run(requests.first(n))) pings.push_back(std::move(ping));
+      for (const PingStatistics& s : canonical_->statistics_of_each()) each.push_back(s);
       requests = requests.subspan(n);
       last_was_canonical_ = true;
     }
+    each_ = std::move(each);
     return pings;
   }
 
   void let_in(Interruption* who) override { canonical_->let_in(who); }
   std::string description() const override { return canonical_->description(); }
   PingStatistics statistics() const override { return last_was_canonical_ ? canonical_->statistics() : statistics_; }
+  std::vector<PingStatistics> statistics_of_each() const override { return each_; }
 
  private:
   Ping compare(const PingRequest& request) {
@@ -58,6 +63,7 @@ class Engine final : public PingEngine {
   std::unique_ptr<RayScene> rays_;
   std::unique_ptr<paper::Prepared> prepared_;
   PingStatistics statistics_;
+  std::vector<PingStatistics> each_;  // of the last run
   bool last_was_canonical_ = true;
 };
 

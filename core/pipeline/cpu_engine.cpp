@@ -23,9 +23,12 @@ class CpuEngine final : public PingEngine, private Interruption {
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
     std::vector<Ping> pings;
     pings.reserve(requests.size());
+    const bool let_in = under_way_.request != nullptr;
+    if (!let_in) each_.clear();
     for (const PingRequest& request : requests) {
       if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
       pings.push_back(run(request));
+      if (!let_in) each_.push_back(work_[0].statistics);
     }
     return pings;
   }
@@ -38,6 +41,7 @@ class CpuEngine final : public PingEngine, private Interruption {
   }
 
   PingStatistics statistics() const override { return work_[0].statistics; }
+  std::vector<PingStatistics> statistics_of_each() const override { return each_; }
 
  private:
   Ping run(const PingRequest& request) {
@@ -72,7 +76,8 @@ class CpuEngine final : public PingEngine, private Interruption {
   EngineOptions options_;
   const simd::Kernels& kernels_;
   std::shared_ptr<SurfaceCells> cells_;
-  std::array<Workspace, 2> work_;  // of the ping under way, and of one let in
+  std::array<Workspace, 2> work_;     // of the ping under way, and of one let in
+  std::vector<PingStatistics> each_;  // of the last run
   Interruption* who_ = nullptr;
   struct UnderWay {
     const PingRequest* request = nullptr;

@@ -61,6 +61,8 @@ class PingEngine {
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
   /// Of the last ping.
   virtual PingStatistics statistics() const { return {}; }
+  /// Of every ping of the last run(), in its order.
+  virtual std::vector<PingStatistics> statistics_of_each() const { return {statistics()}; }
 };
 
 /// Builds the acceleration structures; the pool must outlive the engine.

@@ -17,18 +17,21 @@ class DeviceAndModes final : public PingEngine {
 
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
     std::vector<Ping> pings;
+    each_.clear();
     while (!requests.empty()) {
       const bool canonical = is_canonical(requests.front());
       std::size_t n = 1;
       while (n < requests.size() && is_canonical(requests[n]) == canonical) ++n;
       last_ = canonical ? device_.get() : &modes();
       for (Ping& ping : last_->run(requests.first(n))) pings.push_back(std::move(ping));
+      for (const PingStatistics& s : last_->statistics_of_each()) each_.push_back(s);
       requests = requests.subspan(n);
     }
     return pings;
   }
   std::string description() const override { return device_->description(); }
   PingStatistics statistics() const override { return last_ ? last_->statistics() : PingStatistics{}; }
+  std::vector<PingStatistics> statistics_of_each() const override { return each_; }
 
  private:
   static bool is_canonical(const PingRequest& request) { return request.switches.mode == Mode::canonical; }
@@ -39,6 +42,7 @@ class DeviceAndModes final : public PingEngine {
 
   std::unique_ptr<PingEngine> device_, modes_;
   PingEngine* last_ = nullptr;
+  std::vector<PingStatistics> each_;  // of the last run
   std::shared_ptr<const Scene> scene_;
   Parallel& pool_;
   EngineOptions options_;

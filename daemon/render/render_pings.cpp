@@ -155,14 +155,19 @@ Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, con
   return bytes;
 }
 
-/// Makes the pings one after the other, each by all threads, and writes them side by side.
+/// Makes the pings in one go, which is what a device wants; the CPU takes them one after the other, each by all threads. They are
+/// written side by side.
 Result<void> render_batch(const RenderJob& job, PingEngine& engine, const OutputOptions& o, const std::string& digest,
                           Parallel& pool, std::vector<MadePing>& batch, Progress& progress) {
-  for (MadePing& made : batch) {
-    made.ping = std::move(engine.run({&made.request, 1}).at(0));
-    made.count = engine.statistics();
+  std::vector<PingRequest> requests;
+  for (const MadePing& made : batch) requests.push_back(made.request);
+  std::vector<Ping> pings = engine.run(requests);
+  const std::vector<PingStatistics> counts = engine.statistics_of_each();
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    batch[i].ping = std::move(pings.at(i));
+    batch[i].count = counts.at(i);
   }
-  const std::string description = engine.description();
+  const std::string description = engine.description();  // of all: what a device that fails had begun is made again
   pool.for_each(batch.size(), [&](std::size_t i, int) { batch[i].written = write_ping(job, batch[i], description, o, digest); });
   for (const MadePing& made : batch) {
     if (!made.written) return tl::make_unexpected(made.written.error());

@@ -32,9 +32,9 @@ class Device(unittest.TestCase):
             environment["SONARD_TEST_DEVICE_LASTS"] = str(lasts)
         return subprocess.run([str(SONARD), *map(str, words)], env=environment, capture_output=True, text=True, timeout=300, check=False)
 
-    def render(self, out, engine, lasts=None):
+    def render(self, out, engine, lasts=None, batch=1):
         return self.sonard("render", self.config, "--out", self.path / out, "--format", "npy", "--pings", "3", "--quiet",
-                           "--engine", engine, lasts=lasts)
+                           "--engine", engine, "--batch", batch, lasts=lasts)
 
     def samples(self, out):
         files = sorted((self.path / out).glob("*_samples.npy"))
@@ -54,6 +54,24 @@ class Device(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(result.stderr, f"sonard: {LOST}; from here on the CPU computes\n")
         self.assertEqual(self.samples("lost"), self.samples("cpu"))
+
+    def test_files_say_by_what_they_were_made(self):
+        for out, engine in (("cpu", "cpu"), ("device", "cuda")):
+            self.assertEqual(self.render(out, engine, batch=3).returncode, 0)
+        made = {"cpu, after a failure": self.samples("cpu"), "cuda, host loops": self.samples("device")}
+        self.assertNotEqual(*made.values(), "else this test sees nothing")
+        found = set()
+        for batch in (1, 2):
+            for lasts in (30, 45, 60, 75):
+                out = f"lost-{batch}-{lasts}"
+                self.assertEqual(self.render(out, "auto", lasts, batch).returncode, 0)
+                for i, samples in enumerate(self.samples(out)):
+                    side = (self.path / out / f"{i + 1:06}.json").read_text(encoding="utf-8")
+                    by = [words for words in made if words in side]
+                    self.assertEqual(len(by), 1, side)
+                    self.assertEqual(samples, made[by[0]][i], f"{out}, ping {i + 1}")
+                    found.add(by[0])
+        self.assertEqual(len(found), 2, "the device was never lost between two pings")
 
     def test_a_device_that_fails_where_it_alone_was_wanted_is_exit_code_69(self):
         result = self.render("lost", "cuda", lasts=30)

@@ -34,11 +34,11 @@ done
 sanitizer=$(command -v compute-sanitizer || ls "$(dirname "$nvcc")/compute-sanitizer" 2>/dev/null || true)
 sanitized="not run: compute-sanitizer is not installed"
 if [ -n "$sanitizer" ]; then
-  for tool in memcheck racecheck; do
+  for tool in memcheck initcheck; do  # not racecheck: it looks at shared memory, and the kernels have none
     "$sanitizer" --tool "$tool" --error-exitcode 9 "$build/tests/cuda/cuda_device_same_rays_test" \
       --gtest_filter='OnDevice.IsTheSame*:OnDevice.SumsPulses*'
   done
-  sanitized="clean: memcheck, racecheck ($("$sanitizer" --version | grep -o 'Version [0-9.]*' | head -1))"
+  sanitized="clean: memcheck, initcheck ($("$sanitizer" --version | grep -o 'Version [0-9.]*' | head -1))"
 fi
 
 # The benchmark of docs/cuda.md, as any user can run it.

@@ -214,6 +214,7 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
   if (!finer) return;
   if (!node.divided) found.new_bytes += sheet.divide(node);
   for (const auto& child : node.children) {  // they lie anywhere in memory: ask for all before the first
+    if (!child) continue;
     const auto* at = reinterpret_cast<const char*>(child.get());
     __builtin_prefetch(at);
     __builtin_prefetch(at + 64);
