@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -78,32 +79,52 @@ inline double height(const Facet& f, double xu, double xv) {
   return f.w[0] - (f.nu * (xu - f.u[0]) + f.nv * (xv - f.v[0])) / f.nw;
 }
 
-/// Whether a facet may own points inside the cube; may say yes too often, never no.
-inline bool may_touch(const Facet& f, double cu, double cv, double cw, double half) {
-  const double slack = half * 1e-6 + 1e-9;
-  const double h = half + slack;
-  const double centre[3] = {cu, cv, cw};
+/// What every question to a facet about a cube asks for, worked out once.
+struct FacetBounds {
+  double low[3], high[3];  // along u, v, w
+  double u[3], v[3], du[3], dv[3], edge_reach[3];
+  double u0, v0, w0, nu, nv, nw, normal_reach;
+};
+
+inline FacetBounds bounds_of(const Facet& f) {
+  FacetBounds b{};
   const double* corner[3] = {f.u, f.v, f.w};
   for (int a = 0; a < 3; ++a) {
-    const double lo = std::fmin(corner[a][0], std::fmin(corner[a][1], corner[a][2]));
-    const double hi = std::fmax(corner[a][0], std::fmax(corner[a][1], corner[a][2]));
-    if (lo > centre[a] + h || hi < centre[a] - h) return false;
+    const double* c = corner[a];
+    const double least = c[0] < c[1] ? c[0] : c[1], most = c[0] > c[1] ? c[0] : c[1];
+    b.low[a] = least < c[2] ? least : c[2];
+    b.high[a] = most > c[2] ? most : c[2];
   }
-  const double off = f.nu * (cu - f.u[0]) + f.nv * (cv - f.v[0]) + f.nw * (cw - f.w[0]);
-  if (std::abs(off) > h * (std::abs(f.nu) + std::abs(f.nv) + std::abs(f.nw))) return false;
   const double turn = f.nw > 0 ? 1.0 : -1.0;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3;
-    const double du = turn * (f.u[j] - f.u[i]), dv = turn * (f.v[j] - f.v[i]);
-    const double inside_most = du * (cv - f.v[i]) - dv * (cu - f.u[i]) + h * (std::abs(du) + std::abs(dv));
-    if (inside_most < 0) return false;
+    b.u[i] = f.u[i], b.v[i] = f.v[i];
+    b.du[i] = turn * (f.u[j] - f.u[i]), b.dv[i] = turn * (f.v[j] - f.v[i]);
+    b.edge_reach[i] = std::abs(b.du[i]) + std::abs(b.dv[i]);
   }
+  b.u0 = f.u[0], b.v0 = f.v[0], b.w0 = f.w[0];
+  b.nu = f.nu, b.nv = f.nv, b.nw = f.nw;
+  b.normal_reach = std::abs(f.nu) + std::abs(f.nv) + std::abs(f.nw);
+  return b;
+}
+
+/// Whether a facet may own points inside the cube; may say yes too often, never no.
+inline bool may_touch(const FacetBounds& f, double cu, double cv, double cw, double half) {
+  const double slack = half * 1e-6 + 1e-9;
+  const double h = half + slack;
+  const double centre[3] = {cu, cv, cw};
+  for (int a = 0; a < 3; ++a)
+    if (f.low[a] > centre[a] + h || f.high[a] < centre[a] - h) return false;
+  const double off = f.nu * (cu - f.u0) + f.nv * (cv - f.v0) + f.nw * (cw - f.w0);
+  if (std::abs(off) > h * f.normal_reach) return false;
+  for (int i = 0; i < 3; ++i)
+    if (f.du[i] * (cv - f.v[i]) - f.dv[i] * (cu - f.u[i]) + h * f.edge_reach[i] < 0) return false;
   return true;
 }
 
-/// Edge of the cube (and of the tile) whose cells have the size 2^-level.
-inline double tile_edge_m(int level) { return std::ldexp(16.0, -level); }
-inline double cell_size_m(int level) { return std::ldexp(1.0, -level); }
+/// Size of a cell, 2^-level, and edge of the cube (and of the tile) that holds 16 along; |level| below 1000.
+inline double cell_size_m(int level) { return std::bit_cast<double>(static_cast<std::uint64_t>(1023 - level) << 52); }
+inline double tile_edge_m(int level) { return 16 * cell_size_m(level); }
 
 /// Permuted coordinates back to object coordinates.
 inline Vec3d from_permuted(double u, double v, double w, int axis) {

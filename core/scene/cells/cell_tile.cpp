@@ -2,73 +2,37 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
+#include <limits>
+#include <memory>
 #include <vector>
 
-#include "core/base/random.hpp"
+#include "core/scene/cells/cell_lanes.hpp"
 #include "core/scene/cells/cell_lattice.hpp"
 #include "core/scene/cells/texture.hpp"
 
 namespace sonar {
 namespace {
 
-constexpr int side = 16;                        // cells along a tile
-constexpr std::uint32_t block_key = 0x6e6574u;  // keeps the draws of blocks apart from those of cells
+using cell_lanes::side;
 
-struct LatticePoint {
-  double u, v;
-  std::uint32_t speckle_a, speckle_b;
+/// What the cells of one facet share.
+struct FacetOfCells {
+  std::int16_t normal[3];  // x, y, z, in CellTile::normal_unit
+  double root_area;
 };
 
-struct Cell {
-  std::uint32_t order;  // 4 x 4 sub-squares, so that sixteen neighbours in memory are neighbours in space
-  Vec3d from_centre;
-  Vec3d normal;
-  float re, im;
+struct OwnedAgain {
+  std::int32_t point, facet;
+  double w;
 };
 
-/// Which quarter of its cell a point lies in, across a 4 x 4 block, from where the cell lies along it: two binary digits, each
-/// flipped by random bits that depend on the digits before it (nested scrambling).
-int quarter_of(int along, std::uint32_t scramble) {
-  const auto bit = [&](int i) { return static_cast<int>(scramble >> i & 1u); };
-  const int half = (along & 1) ^ bit(along >> 1);
-  return 2 * half + ((along >> 1) ^ bit(2 + half));
-}
-
-/// One draw gives a lattice cell all it needs: two numbers for where its point lies, two for its speckle. Points of a block of 4
-/// x 4 cells share the block out: its sixteen strips of any shape from 1/16 x 1 to 1 x 1/16 hold one point each (a scrambled
-/// digital net), so that the echo of a stretch of range depends little on the draw. Each point alone is uniform in its cell.
-std::array<LatticePoint, side * side> draw_points(const TileAddress& a, std::uint32_t texture_seed, Seed seed) {
-  std::array<LatticePoint, side * side> points;
-  const double s = lattice::cell_size_m(a.level);
-  const auto bits = static_cast<std::uint64_t>(seed);
-  const std::uint32_t sheet = static_cast<std::uint32_t>(a.object) * 8u + static_cast<std::uint32_t>(a.axis) * 2u +
-                              static_cast<std::uint32_t>(a.negative_side);
-  const auto draw_at = [&](std::int32_t i, std::int32_t j, std::uint32_t key) {
-    return philox(sheet, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(a.level),
-                  static_cast<std::uint32_t>(bits) ^ key, static_cast<std::uint32_t>(bits >> 32) ^ texture_seed);
-  };
-  std::array<Random4, (side / 4) * (side / 4)> blocks;
-  for (int b = 0; b < static_cast<int>(blocks.size()); ++b)
-    blocks[static_cast<std::size_t>(b)] =
-        draw_at(a.i * (side / 4) + b % (side / 4), a.j * (side / 4) + b / (side / 4), block_key);
-  for (int row = 0; row < side; ++row)
-    for (int col = 0; col < side; ++col) {
-      const std::int32_t i = a.i * side + col, j = a.j * side + row;
-      const Random4 draw = draw_at(i, j, 0);
-      const Random4& block = blocks[static_cast<std::size_t>(row / 4 * (side / 4) + col / 4)];
-      const int quarter_u = quarter_of(row % 4, block.v[0] >> 4 * (col % 4)),
-                quarter_v = quarter_of(col % 4, block.v[1] >> 4 * (row % 4));
-      points[static_cast<std::size_t>(row * side + col)] = {
-          (i + 0.25 * (quarter_u + static_cast<double>(uniform_open(draw.v[0])))) * s,
-          (j + 0.25 * (quarter_v + static_cast<double>(uniform_open(draw.v[1])))) * s, draw.v[2], draw.v[3]};
-    }
-  return points;
-}
-
-constexpr std::uint32_t sub_square_order(int row, int col) {
-  return static_cast<std::uint32_t>((row / 4) * 64 + (col / 4) * 16 + (row % 4) * 4 + col % 4);
-}
+/// The points that facets own in one cube.
+struct Ownership {
+  cell_lanes::Points points;
+  cell_lanes::Owners first;       // the first facet, for each point
+  std::vector<OwnedAgain> again;  // further facets, in the order of the facets
+  std::vector<FacetOfCells> facets;
+};
 
 /// Lattice columns (or rows) of this tile that an interval of the plane can reach.
 struct CellRange {
@@ -80,61 +44,163 @@ CellRange cells_between(double lo, double hi, double s, std::int32_t tile) {
   return {static_cast<int>(std::clamp(from, 0.0, double{side})), static_cast<int>(std::clamp(to, -1.0, double{side - 1}))};
 }
 
-void add_cells(const lattice::Facet& f, const TileAddress& a, Vec3d centre, const std::array<LatticePoint, side * side>& points,
-               std::optional<TexturePatch>& patch, std::vector<Cell>& cells) {
-  const double s = lattice::cell_size_m(a.level), edge = lattice::tile_edge_m(a.level);
+std::int16_t normal_counts(double value) {
+  return static_cast<std::int16_t>(std::lround(std::clamp(value * 32767, -32767.0, 32767.0)));
+}
+
+/// lattice::owns and lattice::height, with all that a point does not change worked out.
+cell_lanes::FacetTest test_of(const lattice::Facet& f, const TileAddress& a, CellRange cols, CellRange rows) {
+  const double s = lattice::cell_size_m(a.level), edge = lattice::tile_edge_m(a.level), turn = f.nw > 0 ? 1.0 : -1.0;
+  const auto border = [&](std::int32_t tile, int cell) { return (static_cast<double>(tile) * side + cell) * s; };
+  cell_lanes::FacetTest t{};
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3;
+    const bool forward = f.u[i] < f.u[j] || (f.u[i] == f.u[j] && f.v[i] < f.v[j]);
+    const int p = forward ? i : j, q = forward ? j : i;
+    const double sign = forward ? turn : -turn;
+    const double du = turn * (f.u[j] - f.u[i]), dv = turn * (f.v[j] - f.v[i]);
+    const bool with_its_points = dv < 0 || (dv == 0 && du > 0);
+    // Areas are zero or far from the least normal number: coordinates are single precision.
+    t.edge[i] = {f.u[p], f.v[p], sign * (f.u[q] - f.u[p]), sign * (f.v[q] - f.v[p]),
+                 with_its_points ? 0.0 : std::numeric_limits<double>::min()};
+  }
+  // No point lies on a border between cells.
+  t.low_u = border(a.i, cols.from), t.end_u = border(a.i, cols.to + 1);
+  t.low_v = border(a.j, rows.from), t.end_v = border(a.j, rows.to + 1);
+  t.low_w = a.k * edge, t.end_w = (a.k + 1.0) * edge;
+  t.u0 = f.u[0], t.v0 = f.v[0], t.w0 = f.w[0];
+  t.nu = f.nu, t.nv = f.nv, t.nw = f.nw;
+  return t;
+}
+
+void own(const lattice::Facet& f, const TileAddress& a, Ownership& all) {
+  const double s = lattice::cell_size_m(a.level);
   const auto [u_lo, u_hi] = std::minmax({f.u[0], f.u[1], f.u[2]});
   const auto [v_lo, v_hi] = std::minmax({f.v[0], f.v[1], f.v[2]});
   const CellRange cols = cells_between(u_lo, u_hi, s, a.i), rows = cells_between(v_lo, v_hi, s, a.j);
+  if (cols.from > cols.to || rows.from > rows.to) return;
+  const cell_lanes::FacetTest test = test_of(f, a, cols, rows);
+  const auto facet = static_cast<std::int32_t>(all.facets.size());
   const Vec3d normal = lattice::from_permuted(f.nu, f.nv, f.nw, a.axis);
-  const double root_area = s / std::sqrt(std::abs(f.nw));
-  for (int row = rows.from; row <= rows.to; ++row)
-    for (int col = cols.from; col <= cols.to; ++col) {
-      const LatticePoint& p = points[static_cast<std::size_t>(row * side + col)];
-      if (!lattice::owns(f, p.u, p.v)) continue;
-      const double w = lattice::height(f, p.u, p.v);
-      if (std::floor(w / edge) != static_cast<double>(a.k)) continue;
-      const ComplexNormal xi = complex_normal(p.speckle_a, p.speckle_b);
-      const Vec3d place = lattice::from_permuted(p.u, p.v, w, a.axis);
-      const double root = patch ? root_area * static_cast<double>(patch->root_at(place)) : root_area;
-      cells.push_back({sub_square_order(row, col), place - centre, normal, static_cast<float>(xi.re * root),
-                       static_cast<float>(xi.im * root)});
+  all.facets.push_back(
+      {{normal_counts(normal.x), normal_counts(normal.y), normal_counts(normal.z)}, s / std::sqrt(std::abs(f.nw))});
+  cell_lanes::BlockHeights found;
+  for (int row = rows.from / 4; row <= rows.to / 4; ++row)
+    for (int col = cols.from / 4; col <= cols.to / 4; ++col) {
+      const int which = row * (side / 4) + col;
+      if (cell_lanes::own_block(test, all.points, which, facet, all.first, found)) continue;
+      for (int l = 0; l < cell_lanes::block; ++l) {
+        if (!found.owned[l]) continue;
+        const int p = which * cell_lanes::block + l;
+        if (all.first.facet[p] < 0) {
+          all.first.facet[p] = facet;
+          all.first.w[p] = found.w[l];
+        } else {
+          all.again.push_back({p, facet, found.w[l]});
+        }
+      }
     }
 }
 
-std::int16_t counts(double value) { return static_cast<std::int16_t>(std::lround(std::clamp(value, -32767.0, 32767.0))); }
+/// The cells of a tile in their order, padded to whole blocks: the last is repeated, with zero root.
+struct CellList {
+  explicit CellList(std::size_t most)
+      : doubles(std::make_unique_for_overwrite<double[]>(4 * most)),
+        words(std::make_unique_for_overwrite<std::uint32_t[]>(3 * most)),
+        floats(std::make_unique_for_overwrite<float[]>(2 * most)) {
+    std::size_t n = 0;
+    for (double** d : {&u, &v, &w, &root}) *d = doubles.get() + most * n++;
+    n = 0;
+    for (std::uint32_t** d : {&speckle_a, &speckle_b, &facet}) *d = words.get() + most * n++;
+    re = floats.get(), im = re + most;
+  }
+  std::unique_ptr<double[]> doubles;
+  std::unique_ptr<std::uint32_t[]> words;
+  std::unique_ptr<float[]> floats;
+  double *u, *v, *w, *root;
+  std::uint32_t *speckle_a, *speckle_b, *facet;
+  float *re, *im;
+  int size = 0, padded = 0;
 
-void pack(const std::vector<Cell>& cells, CellTile& tile) {
-  float peak = 0;
-  for (const Cell& c : cells) peak = std::max({peak, std::abs(c.re), std::abs(c.im)});
-  tile.weight_unit = peak > 0 ? peak / 32767.0f : 1.0f;
-  const int n = static_cast<int>(cells.size());
-  tile.count = (n + CellTile::block - 1) / CellTile::block * CellTile::block;
-  tile.stride = tile.count;
-  tile.data = std::make_unique<std::int16_t[]>(static_cast<std::size_t>(tile.stride) * CellTile::columns);
-  Vec3d low = cells.front().from_centre, high = low;
-  for (const Cell& c : cells) {
-    const Vec3d p = c.from_centre;
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  void put(int n, const cell_lanes::Points& from, int p, std::int64_t of_facet, double height) const {
+    u[n] = from.u[p];
+    v[n] = from.v[p];
+    w[n] = height;
+    speckle_a[n] = from.speckle_a[p];
+    speckle_b[n] = from.speckle_b[p];
+    facet[n] = static_cast<std::uint32_t>(of_facet);
   }
-  const double rounding = static_cast<double>(tile.position_unit_m);
-  tile.box_middle_m = to_float(0.5 * (low + high));
-  tile.box_half_m = to_float(0.5 * (high - low) + Vec3d{rounding, rounding, rounding});
-  const auto put = [&](CellTile::Column c, int i, std::int16_t v) {
-    tile.data[static_cast<std::size_t>(c * tile.stride + i)] = v;
+};
+
+CellList list_cells(Ownership& all) {
+  CellList cells(cell_lanes::points + all.again.size() + CellTile::block);
+  std::stable_sort(all.again.begin(), all.again.end(), [](const auto& a, const auto& b) { return a.point < b.point; });
+  auto again = all.again.cbegin();
+  int n = 0;
+  for (int p = 0; p < cell_lanes::points; ++p) {
+    cells.put(n, all.points, p, all.first.facet[p], all.first.w[p]);  // the next takes its place where nobody owns it
+    n += all.first.facet[p] >= 0;
+    for (; again != all.again.cend() && again->point == p; ++again) cells.put(n++, all.points, p, again->facet, again->w);
+  }
+  cells.size = n;
+  cells.padded = (n + CellTile::block - 1) / CellTile::block * CellTile::block;
+  for (; n < cells.padded; ++n) {
+    const int last = cells.size - 1;
+    cells.u[n] = cells.u[last];
+    cells.v[n] = cells.v[last];
+    cells.w[n] = cells.w[last];
+    cells.facet[n] = cells.facet[last];
+    cells.speckle_a[n] = cells.speckle_b[n] = 0;
+    cells.root[n] = 0;
+  }
+  return cells;
+}
+
+void find_roots(const Ownership& all, const TileAddress& a, const TextureField* texture, const CellList& cells) {
+  for (int n = 0; n < cells.size; ++n) cells.root[n] = all.facets[cells.facet[n]].root_area;
+  if (!texture) return;
+  TexturePatch patch(*texture, a.object);
+  for (int n = 0; n < cells.size; ++n)
+    cells.root[n] *= static_cast<double>(patch.root_at(lattice::from_permuted(cells.u[n], cells.v[n], cells.w[n], a.axis)));
+}
+
+void pack(const Ownership& all, const TileAddress& a, const CellList& cells, CellTile& tile) {
+  const int n = cells.padded;
+  tile.count = tile.stride = n;
+  tile.data = std::make_unique_for_overwrite<std::int16_t[]>(static_cast<std::size_t>(n) * CellTile::columns);
+  const auto column = [&](int c) { return tile.data.get() + static_cast<std::ptrdiff_t>(c) * n; };
+
+  const double edge = lattice::tile_edge_m(a.level), unit = static_cast<double>(tile.position_unit_m);
+  const auto along = [&](const double* places, std::int32_t index, int axis) {
+    return cell_lanes::pack_places(places, n, (index + 0.5) * edge, unit, column(CellTile::x + axis));
   };
-  for (int i = 0; i < tile.count; ++i) {
-    const Cell& c = cells[static_cast<std::size_t>(std::min(i, n - 1))];  // padding repeats the last place, with zero weight
-    put(CellTile::x, i, counts(c.from_centre.x / tile.position_unit_m));
-    put(CellTile::y, i, counts(c.from_centre.y / tile.position_unit_m));
-    put(CellTile::z, i, counts(c.from_centre.z / tile.position_unit_m));
-    put(CellTile::normal_x, i, counts(c.normal.x * 32767));
-    put(CellTile::normal_y, i, counts(c.normal.y * 32767));
-    put(CellTile::normal_z, i, counts(c.normal.z * 32767));
-    put(CellTile::weight_re, i, i < n ? counts(c.re / tile.weight_unit) : std::int16_t{0});
-    put(CellTile::weight_im, i, i < n ? counts(c.im / tile.weight_unit) : std::int16_t{0});
+  const cell_lanes::Extent u = along(cells.u, a.i, lattice::u_axis(a.axis)), v = along(cells.v, a.j, lattice::v_axis(a.axis)),
+                           w = along(cells.w, a.k, a.axis);
+  const Vec3d low = lattice::from_permuted(u.low, v.low, w.low, a.axis),
+              high = lattice::from_permuted(u.high, v.high, w.high, a.axis);
+  tile.box_middle_m = to_float(0.5 * (low + high));
+  tile.box_half_m = to_float(0.5 * (high - low) + Vec3d{unit, unit, unit});
+
+  std::int16_t *normal_x = column(CellTile::normal_x), *normal_y = column(CellTile::normal_y),
+               *normal_z = column(CellTile::normal_z);
+  const FacetOfCells* facets = all.facets.data();
+  for (int i = 0; i < n; ++i) {
+    const std::int16_t* normal = facets[cells.facet[i]].normal;
+    normal_x[i] = normal[0], normal_y[i] = normal[1], normal_z[i] = normal[2];
   }
+
+  const float peak = cell_lanes::speckle(cells.speckle_a, cells.speckle_b, cells.root, n, cells.re, cells.im);
+  tile.weight_unit = peak > 0 ? peak / 32767.0f : 1.0f;
+  cell_lanes::pack_weights(cells.re, n, tile.weight_unit, column(CellTile::weight_re));
+  cell_lanes::pack_weights(cells.im, n, tile.weight_unit, column(CellTile::weight_im));
+}
+
+cell_lanes::DrawKey key_of(const TileAddress& a, std::uint32_t texture_seed, Seed seed) {
+  const auto bits = static_cast<std::uint64_t>(seed);
+  const std::uint32_t sheet = static_cast<std::uint32_t>(a.object) * 8u + static_cast<std::uint32_t>(a.axis) * 2u +
+                              static_cast<std::uint32_t>(a.negative_side);
+  return {sheet, static_cast<std::uint32_t>(a.level), static_cast<std::uint32_t>(bits),
+          static_cast<std::uint32_t>(bits >> 32) ^ texture_seed};
 }
 
 }  // namespace
@@ -151,15 +217,15 @@ CellTile build_tile(const TileAddress& a, const Mesh& mesh, std::span<const std:
   tile.half_edge_m = static_cast<float>(edge / 2);
   tile.position_unit_m = static_cast<float>(edge / 2 / 32700.0);
 
-  const auto points = draw_points(a, texture_seed, seed);
-  std::vector<Cell> cells;
-  cells.reserve(side * side);
-  std::optional<TexturePatch> patch;
-  if (texture) patch.emplace(*texture, a.object);
-  for (const std::uint32_t t : triangles) add_cells(lattice::facet_of(mesh, t, a.axis), a, tile.centre_m, points, patch, cells);
-  if (cells.empty()) return tile;
-  std::stable_sort(cells.begin(), cells.end(), [](const Cell& p, const Cell& q) { return p.order < q.order; });
-  pack(cells, tile);
+  Ownership all;
+  all.facets.reserve(triangles.size());
+  cell_lanes::draw_points(key_of(a, texture_seed, seed), a.i * side, a.j * side, lattice::cell_size_m(a.level), all.points);
+  std::fill(std::begin(all.first.facet), std::end(all.first.facet), -1);
+  for (const std::uint32_t t : triangles) own(lattice::facet_of(mesh, t, a.axis), a, all);
+  const CellList cells = list_cells(all);
+  if (cells.size == 0) return tile;
+  find_roots(all, a, texture, cells);
+  pack(all, a, cells, tile);
   return tile;
 }
 

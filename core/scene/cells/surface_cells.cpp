@@ -52,10 +52,7 @@ Cube cube_of(const TileAddress& a) {
   const double e = lattice::tile_edge_m(a.level);
   return {(a.i + 0.5) * e, (a.j + 0.5) * e, (a.k + 0.5) * e, e / 2};
 }
-bool may_touch(const lattice::Facet& f, const TileAddress& a) {
-  const Cube c = cube_of(a);
-  return lattice::may_touch(f, c.u, c.v, c.w, c.half);
-}
+bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lattice::may_touch(f, c.u, c.v, c.w, c.half); }
 
 /// The finest level at which few enough cubes cover the triangles.
 int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles) {
@@ -85,11 +82,12 @@ void SurfaceCells::Sheet::plant(const std::vector<std::uint32_t>& triangles) {
     const auto [v_lo, v_hi] = std::minmax({f.v[0], f.v[1], f.v[2]});
     const auto [w_lo, w_hi] = std::minmax({f.w[0], f.w[1], f.w[2]});
     const double slack = e * 1e-6;
+    const lattice::FacetBounds bounds = lattice::bounds_of(f);
     for (std::int32_t i = index(u_lo - slack); i <= index(u_hi + slack); ++i)
       for (std::int32_t j = index(v_lo - slack); j <= index(v_hi + slack); ++j)
         for (std::int32_t k = index(w_lo - slack); k <= index(w_hi + slack); ++k) {
           const TileAddress a{object, material, axis, negative_side, level, i, j, k};
-          if (!may_touch(f, a)) continue;
+          if (!may_touch(bounds, cube_of(a))) continue;
           auto& node = planted[{i, j, k}];
           if (!node) {
             node = std::make_unique<Node>();
@@ -104,25 +102,36 @@ void SurfaceCells::Sheet::plant(const std::vector<std::uint32_t>& triangles) {
 std::size_t SurfaceCells::Sheet::divide(Node& node) const {
   node.divided = true;
   std::array<TileAddress, 8> inside;
+  std::array<Cube, 8> cubes;
   for (int c = 0; c < 8; ++c) {
     TileAddress& a = inside[static_cast<std::size_t>(c)] = node.address;
     ++a.level;
     a.i = a.i * 2 + (c & 1);
     a.j = a.j * 2 + (c >> 1 & 1);
     a.k = a.k * 2 + (c >> 2 & 1);
+    cubes[static_cast<std::size_t>(c)] = cube_of(a);
   }
-  for (const std::uint32_t t : node.triangles) {
-    const lattice::Facet f = lattice::facet_of(*mesh, t, axis);
+  std::vector<std::uint8_t> touched(node.triangles.size());  // which cubes, as bits
+  std::array<std::size_t, 8> how_many{};
+  for (std::size_t n = 0; n < touched.size(); ++n) {
+    const lattice::FacetBounds f = lattice::bounds_of(lattice::facet_of(*mesh, node.triangles[n], axis));
+    unsigned bits = 0;
     for (std::size_t c = 0; c < 8; ++c) {
-      if (!may_touch(f, inside[c])) continue;
-      if (!node.children[c]) {
-        node.children[c] = std::make_unique<Node>();
-        node.children[c]->address = inside[c];
-      }
-      node.children[c]->triangles.push_back(t);
+      const bool touches = may_touch(f, cubes[c]);
+      bits |= static_cast<unsigned>(touches) << c;
+      how_many[c] += touches;
     }
+    touched[n] = static_cast<std::uint8_t>(bits);
   }
   std::size_t bytes = 0;
+  for (std::size_t c = 0; c < 8; ++c) {
+    if (how_many[c] == 0) continue;
+    node.children[c] = std::make_unique<Node>();
+    node.children[c]->address = inside[c];
+    node.children[c]->triangles.reserve(how_many[c]);
+    for (std::size_t n = 0; n < touched.size(); ++n)
+      if (touched[n] >> c & 1) node.children[c]->triangles.push_back(node.triangles[n]);
+  }
   for (const auto& child : node.children)
     if (child) bytes += child->own_bytes();
   return bytes;

@@ -1,0 +1,208 @@
+#include "core/scene/cells/cell_lanes.hpp"
+
+#include <array>
+#include <bit>
+#include <cmath>
+
+// Compiled for two generations of processors, and chosen when the program starts. This file is built without contraction into
+// fused operations, so that both round alike.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
+#define SONAR_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define SONAR_CLONES
+#endif
+
+namespace sonar::cell_lanes {
+namespace {
+
+constexpr std::uint32_t block_key = 0x6e6574u;  // keeps the draws of blocks apart from those of cells
+constexpr int across = 4;                       // blocks along a tile, and cells along a block
+
+/// Which quarter of its cell a point lies in, across a 4 x 4 block, from where the cell lies along it: two binary digits, each
+/// flipped by random bits that depend on the digits before it (nested scrambling).
+constexpr double quarter_of(int along, unsigned scramble) {
+  const auto bit = [&](int i) { return static_cast<int>(scramble >> i & 1u); };
+  const int half = (along & 1) ^ bit(along >> 1);
+  return 2 * half + ((along >> 1) ^ bit(2 + half));
+}
+constexpr auto quarters = [] {
+  std::array<std::array<double, across>, 16> all{};
+  for (unsigned scramble = 0; scramble < 16; ++scramble)
+    for (int along = 0; along < across; ++along) all[scramble][static_cast<std::size_t>(along)] = quarter_of(along, scramble);
+  return all;
+}();
+
+/// Sixteen draws of philox (core/base/random.hpp) side by side.
+struct Draws {
+  alignas(64) std::uint32_t v[4][block];
+};
+inline void draw(const DrawKey& key, const std::uint32_t* i, const std::uint32_t* j, Draws& d) {
+  for (int l = 0; l < block; ++l) {
+    d.v[0][l] = key.sheet;
+    d.v[1][l] = i[l];
+    d.v[2][l] = j[l];
+    d.v[3][l] = key.level;
+  }
+  std::uint32_t lo = key.lo, hi = key.hi;
+  for (int round = 0; round < 10; ++round) {
+    for (int l = 0; l < block; ++l) {
+      const std::uint64_t p0 = std::uint64_t{0xD2511F53u} * d.v[0][l], p1 = std::uint64_t{0xCD9E8D57u} * d.v[2][l];
+      d.v[0][l] = static_cast<std::uint32_t>(p1 >> 32) ^ d.v[1][l] ^ lo;
+      d.v[2][l] = static_cast<std::uint32_t>(p0 >> 32) ^ d.v[3][l] ^ hi;
+      d.v[1][l] = static_cast<std::uint32_t>(p1);
+      d.v[3][l] = static_cast<std::uint32_t>(p0);
+    }
+    lo += 0x9E3779B9u;
+    hi += 0xBB67AE85u;
+  }
+}
+
+/// (0, 1), as uniform_open; the bits are taken as a signed number, which vectors convert.
+inline float uniform(std::uint32_t bits) {
+  return (static_cast<float>(static_cast<std::int32_t>(bits >> 9)) + 0.5f) * (1.0f / 8388608.0f);
+}
+
+/// -log x for a normal x in (0, 1): x = 2^e (1 + f) with |f| at most 0.41, and a polynomial in f (Cephes).
+inline float minus_log(float x) {
+  constexpr std::int32_t root_half = 0x3f3504f3;
+  const std::int32_t above = std::bit_cast<std::int32_t>(x) - root_half;
+  const auto e = static_cast<float>(above >> 23);
+  const float f = std::bit_cast<float>((above & 0x7fffff) + root_half) - 1.0f, z = f * f;
+  float y = 7.0376836292e-2f;
+  y = y * f - 1.1514610310e-1f;
+  y = y * f + 1.1676998740e-1f;
+  y = y * f - 1.2420140846e-1f;
+  y = y * f + 1.4249322787e-1f;
+  y = y * f - 1.6668057665e-1f;
+  y = y * f + 2.0000714765e-1f;
+  y = y * f - 2.4999993993e-1f;
+  y = y * f + 3.3333331174e-1f;
+  y = y * f * z;
+  y = y - 2.12194440e-4f * e;
+  y = y - 0.5f * z;
+  return -(f + y + 0.693359375f * e);
+}
+
+/// Rounds half away from zero, as lround does; |x| below 2^23.
+inline std::int32_t rounded(float x) { return static_cast<std::int32_t>(x + std::copysign(0x1.fffffep-2f, x)); }
+inline std::int32_t rounded(double x) { return static_cast<std::int32_t>(x + std::copysign(0x1.fffffffffffffp-2, x)); }
+
+template <typename T>
+T held(T x) {
+  constexpr T most = 32767;
+  x = x > most ? most : x;
+  return x < -most ? -most : x;
+}
+
+}  // namespace
+
+SONAR_CLONES void draw_points(const DrawKey& key, std::int32_t first_i, std::int32_t first_j, double cell_size_m, Points& to) {
+  alignas(64) std::uint32_t i[block], j[block];
+  Draws d, of_blocks;
+  for (int b = 0; b < blocks; ++b) {  // a tile has as many blocks as a block has cells
+    i[b] = static_cast<std::uint32_t>(first_i / across + b % across);
+    j[b] = static_cast<std::uint32_t>(first_j / across + b / across);
+  }
+  draw({key.sheet, key.level, key.lo ^ block_key, key.hi}, i, j, of_blocks);
+  for (int b = 0; b < blocks; ++b) {
+    const std::int32_t at_i = first_i + b % across * across, at_j = first_j + b / across * across;
+    alignas(64) double quarter_u[block], quarter_v[block];
+    for (int l = 0; l < block; ++l) {
+      const int col = l % across, row = l / across;
+      i[l] = static_cast<std::uint32_t>(at_i + col);
+      j[l] = static_cast<std::uint32_t>(at_j + row);
+      quarter_u[l] = quarters[of_blocks.v[0][b] >> 4 * col & 15u][static_cast<std::size_t>(row)];
+      quarter_v[l] = quarters[of_blocks.v[1][b] >> 4 * row & 15u][static_cast<std::size_t>(col)];
+    }
+    draw(key, i, j, d);
+    const int at = b * block;
+    for (int l = 0; l < block; ++l) {
+      to.u[at + l] =
+          (static_cast<std::int32_t>(i[l]) + 0.25 * (quarter_u[l] + static_cast<double>(uniform(d.v[0][l])))) * cell_size_m;
+      to.v[at + l] =
+          (static_cast<std::int32_t>(j[l]) + 0.25 * (quarter_v[l] + static_cast<double>(uniform(d.v[1][l])))) * cell_size_m;
+      to.speckle_a[at + l] = d.v[2][l];
+      to.speckle_b[at + l] = d.v[3][l];
+    }
+  }
+}
+
+SONAR_CLONES bool own_block(const FacetTest& test, const Points& in, int which, std::int64_t facet, Owners& owners,
+                            BlockHeights& found) {
+  const FacetTest t = test;  // of its own, so that no store may change it
+  const auto& [e0, e1, e2] = t.edge;
+  const double *at_u = in.u + which * block, *at_v = in.v + which * block;
+  std::int64_t* owner = owners.facet + which * block;
+  double* height = owners.w + which * block;
+  std::int64_t twice = 0;
+  for (int l = 0; l < block; ++l) {
+    const double u = at_u[l], v = at_v[l];
+    const double w = t.w0 - (t.nu * (u - t.u0) + t.nv * (v - t.v0)) / t.nw;
+    const bool inside = (u > t.low_u) & (u < t.end_u) & (v > t.low_v) & (v < t.end_v) & (w >= t.low_w) & (w < t.end_w) &
+                        (e0.du * (v - e0.pv) - e0.dv * (u - e0.pu) >= e0.least) &
+                        (e1.du * (v - e1.pv) - e1.dv * (u - e1.pu) >= e1.least) &
+                        (e2.du * (v - e2.pv) - e2.dv * (u - e2.pu) >= e2.least);
+    found.w[l] = w;
+    found.owned[l] = inside ? -1 : 0;
+    twice |= inside ? ~(owner[l] >> 63) : 0;
+  }
+  if (twice) return false;
+  for (int l = 0; l < block; ++l) {
+    owner[l] = found.owned[l] ? facet : owner[l];
+    height[l] = found.owned[l] ? found.w[l] : height[l];
+  }
+  return true;
+}
+
+SONAR_CLONES float speckle(const std::uint32_t* a, const std::uint32_t* b, const double* root, int n, float* re, float* im) {
+  alignas(64) float most[block] = {};
+  for (int at = 0; at < n; at += block)
+    for (int l = 0; l < block; ++l) {
+      const float radius = std::sqrt(minus_log(uniform(a[at + l])));
+      // The angle in quarters of a turn and what is left of it, exactly.
+      const float turns = uniform(b[at + l]);
+      const auto quarter = static_cast<std::int32_t>(4.0f * turns + 0.5f);
+      const float x = (turns - 0.25f * static_cast<float>(quarter)) * 6.28318530717958647692f, z = x * x;
+      const float sine = ((-1.9515295891e-4f * z + 8.3321608736e-3f) * z - 1.6666654611e-1f) * z * x + x;
+      const float cosine =
+          ((2.443315711809948e-5f * z - 1.388731625493765e-3f) * z + 4.166664568298827e-2f) * z * z - 0.5f * z + 1.0f;
+      const bool odd = quarter & 1;
+      const float along = odd ? sine : cosine, up = odd ? cosine : sine;
+      const float unit_re = ((quarter + 1) & 2) ? -along : along, unit_im = (quarter & 2) ? -up : up;
+      const float x_re = static_cast<float>(static_cast<double>(radius * unit_re) * root[at + l]);
+      const float x_im = static_cast<float>(static_cast<double>(radius * unit_im) * root[at + l]);
+      re[at + l] = x_re;
+      im[at + l] = x_im;
+      const float size_re = std::abs(x_re), size_im = std::abs(x_im), size = size_re > size_im ? size_re : size_im;
+      most[l] = size > most[l] ? size : most[l];
+    }
+  float peak = 0;
+  for (const float m : most) peak = m > peak ? m : peak;
+  return peak;
+}
+
+SONAR_CLONES Extent pack_places(const double* place, int n, double middle, double unit, std::int16_t* counts) {
+  alignas(64) double low[block], high[block];
+  for (int l = 0; l < block; ++l) low[l] = high[l] = place[l] - middle;
+  for (int at = 0; at < n; at += block)
+    for (int l = 0; l < block; ++l) {
+      const double x = place[at + l] - middle;
+      low[l] = x < low[l] ? x : low[l];
+      high[l] = x > high[l] ? x : high[l];
+      counts[at + l] = static_cast<std::int16_t>(rounded(held(x / unit)));
+    }
+  Extent all{low[0], high[0]};
+  for (int l = 1; l < block; ++l) {
+    all.low = low[l] < all.low ? low[l] : all.low;
+    all.high = high[l] > all.high ? high[l] : all.high;
+  }
+  return all;
+}
+
+SONAR_CLONES void pack_weights(const float* weight, int n, float unit, std::int16_t* counts) {
+  for (int at = 0; at < n; at += block)
+    for (int l = 0; l < block; ++l) counts[at + l] = static_cast<std::int16_t>(rounded(held(weight[at + l] / unit)));
+}
+
+}  // namespace sonar::cell_lanes
