@@ -61,10 +61,12 @@ struct Blend {
   float weight[3];
 };
 Blend blend_at(double x) {
-  const double nearest = std::floor(x + 0.5), t = x - nearest;
+  const auto whole = static_cast<std::int32_t>(x + 0.5);
+  const std::int32_t nearest = whole - (whole > x + 0.5);  // the floor, without a call
+  const double t = x - nearest;
   const double w[3] = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
   const double scale = 1 / std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-  return {static_cast<std::int32_t>(nearest) - 1,
+  return {nearest - 1,
           {static_cast<float>(w[0] * scale), static_cast<float>(w[1] * scale), static_cast<float>(w[2] * scale)}};
 }
 
@@ -114,16 +116,29 @@ float TexturePatch::normal_at(std::int32_t i, std::int32_t j, std::int32_t k) {
   return p.normal;
 }
 
+/// Neighbouring cells have the same 27 points.
+void TexturePatch::stand_at(std::int32_t i, std::int32_t j, std::int32_t k) {
+  if (i == near_i_ && j == near_j_ && k == near_k_ && stands_) return;
+  near_i_ = i, near_j_ = j, near_k_ = k;
+  stands_ = true;
+  float* to = near_.data();
+  for (int up = 0; up < 3; ++up)
+    for (int across = 0; across < 3; ++across)
+      for (int along = 0; along < 3; ++along) *to++ = normal_at(i + along, j + across, k + up);
+}
+
 float TexturePatch::root_at(Vec3d place_m) {
   const double per_m = 1 / field_.lattice_m();
   const Blend x = blend_at(place_m.x * per_m), y = blend_at(place_m.y * per_m), z = blend_at(place_m.z * per_m);
-  float sum = 0;
-  for (int k = 0; k < 3; ++k)
-    for (int j = 0; j < 3; ++j) {
-      const float across = z.weight[k] * y.weight[j];
-      for (int i = 0; i < 3; ++i) sum += across * x.weight[i] * normal_at(x.first + i, y.first + j, z.first + k);
-    }
-  return field_.root_of(sum);
+  stand_at(x.first, y.first, z.first);
+  const auto blend = [](const float* w, float a, float b, float c) { return w[0] * a + w[1] * b + w[2] * c; };
+  float plane[3];
+  for (int k = 0; k < 3; ++k) {
+    const float* n = near_.data() + 9 * k;
+    plane[k] = blend(y.weight, blend(x.weight, n[0], n[1], n[2]), blend(x.weight, n[3], n[4], n[5]),
+                     blend(x.weight, n[6], n[7], n[8]));
+  }
+  return field_.root_of(blend(z.weight, plane[0], plane[1], plane[2]));
 }
 
 }  // namespace sonar

@@ -2,6 +2,7 @@
 // (docs/acoustics.md, section 3). build_tile multiplies the cells' speckle by its root, which makes their echoes K-distributed.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -43,9 +44,13 @@ class TexturePatch {
     float normal;
   };
   float normal_at(std::int32_t i, std::int32_t j, std::int32_t k);
+  void stand_at(std::int32_t i, std::int32_t j, std::int32_t k);
 
   const TextureField& field_;
   int object_;
+  bool stands_ = false;
+  std::int32_t near_i_ = 0, near_j_ = 0, near_k_ = 0;  // the first of the points about the last place
+  std::array<float, 27> near_{};                       // their normals, i fastest
   std::vector<Point> points_;
 };
 

@@ -50,6 +50,15 @@ Moments pairs(const Texture& texture, Vec3d along, double apart_m) {
   return m;
 }
 
+TEST(Texture, AValueDoesNotDependOnWhatWasAskedBefore) {
+  const TextureField field({1, 0.5f}, 5, Seed{11});
+  TexturePatch patch(field, 2);
+  for (int n = 0; n < 2000; ++n) {
+    const Vec3d p{3 * std::sin(0.1 * n), 2 * std::cos(0.37 * n), 0.3 * std::sin(1.7 * n)};
+    EXPECT_EQ(patch.root_at(p), TexturePatch(field, 2).root_at(p)) << n;
+  }
+}
+
 TEST(Texture, TheFieldIsGammaOfMeanOne) {
   for (const float shape : {0.5f, 1.0f, 4.0f, 20.0f}) {
     const Moments m = pairs({shape, 0.5f}, {1, 0, 0}, 0);
