@@ -4,9 +4,9 @@
 #include <bit>
 #include <cmath>
 
-// Compiled for two generations of processors, and chosen when the program starts. This file is built without contraction into
-// fused operations, so that both round alike.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+// Compiled for three instruction sets, and chosen when the program starts. This file is built without contraction into fused
+// operations, so that all round alike.
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
 #define SONAR_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
 #else

@@ -66,8 +66,7 @@ Blend blend_at(double x) {
   const double t = x - nearest;
   const double w[3] = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
   const double scale = 1 / std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-  return {nearest - 1,
-          {static_cast<float>(w[0] * scale), static_cast<float>(w[1] * scale), static_cast<float>(w[2] * scale)}};
+  return {nearest - 1, {static_cast<float>(w[0] * scale), static_cast<float>(w[1] * scale), static_cast<float>(w[2] * scale)}};
 }
 
 }  // namespace
@@ -135,8 +134,8 @@ float TexturePatch::root_at(Vec3d place_m) {
   float plane[3];
   for (int k = 0; k < 3; ++k) {
     const float* n = near_.data() + 9 * k;
-    plane[k] = blend(y.weight, blend(x.weight, n[0], n[1], n[2]), blend(x.weight, n[3], n[4], n[5]),
-                     blend(x.weight, n[6], n[7], n[8]));
+    plane[k] =
+        blend(y.weight, blend(x.weight, n[0], n[1], n[2]), blend(x.weight, n[3], n[4], n[5]), blend(x.weight, n[6], n[7], n[8]));
   }
   return field_.root_of(blend(z.weight, plane[0], plane[1], plane[2]));
 }
