@@ -5,8 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
-#include <numeric>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -290,6 +291,27 @@ TEST(CellTile, EqualsTheOneMadePointByPointOnATerrain) {
     compare(mesh, {.axis = 2, .level = level}, 2, nullptr, sum);
     EXPECT_GT(sum.cells, 100) << level;
   }
+}
+
+// The same digest on every processor: with AVX-512, with AVX2, with neither, and under sanitizers, where one way is compiled.
+TEST(CellTile, BytesDoNotDependOnTheInstructionSet) {
+  const Mesh mesh = heap(120, 8);
+  std::uint64_t digest = 0xcbf29ce484222325u;
+  const auto take = [&](std::uint32_t x) { digest = (digest ^ x) * 0x100000001b3u; };
+  int cells = 0;
+  TileAddress a{.object = 1, .axis = 1, .level = 5};
+  const std::vector<std::uint32_t> triangles = of_sheet(mesh, a);
+  for (a.i = -3; a.i <= 3; ++a.i)
+    for (a.j = -3; a.j <= 3; ++a.j)
+      for (a.k = -3; a.k <= 3; ++a.k) {
+        const CellTile tile = build_tile(a, mesh, triangles, 1, Seed{7});
+        cells += tile.count;
+        take(std::bit_cast<std::uint32_t>(tile.weight_unit));
+        for (int n = 0; n < tile.count * CellTile::columns; ++n)
+          take(static_cast<std::uint16_t>(tile.data[static_cast<std::size_t>(n)]));
+      }
+  EXPECT_GT(cells, 1000);
+  EXPECT_EQ(digest, 7953874126091771048u);
 }
 
 }  // namespace
