@@ -174,6 +174,23 @@ class Running(unittest.TestCase):
         self.assertEqual((code, text[:15]), (69, "sonard_client: "))
 
 
+class Lockstep(unittest.TestCase):
+    def test_one_thread_steps_and_reads(self):
+        with Daemon(config() + "clock: lockstep\n", SONARD) as daemon, OculusClient(daemon.address) as sonar:
+            control = Control(daemon.address)
+            sonar.fire(range_m=10, rate_hz=10)
+            deadline = time.monotonic() + 20
+            while not control.status()["sonars"][0].get("pinging"):
+                self.assertLess(time.monotonic(), deadline)
+            began = time.monotonic()
+            pings = sonar.pings_during(lambda: control.step(2.0))
+            self.assertLess(time.monotonic() - began, 10, "nobody waits for itself")
+            self.assertEqual([p.number for p in pings], list(range(1, 21)))
+            self.assertEqual(len(sonar.pings_during(lambda: control.step(0.1))), 1)
+            with self.assertRaises(ControlError):
+                sonar.pings_during(lambda: control.step(-1))
+
+
 class Token(unittest.TestCase):
     def test_a_token_opens_the_door(self):
         with tempfile.TemporaryDirectory() as folder:
