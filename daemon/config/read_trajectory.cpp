@@ -44,6 +44,12 @@ TrajectoryFiles::Named TrajectoryFiles::read(const Node& file, const motion::Rea
   const std::filesystem::path path = folder_ / name;
   for (const Known& k : known_)
     if (k.path == path && k.options == options) return k.named;
+  std::error_code ec;
+  if (!std::filesystem::exists(path, ec) || std::filesystem::is_directory(path, ec)) {
+    const std::filesystem::path folder = std::filesystem::absolute(folder_, ec).lexically_normal();
+    file.fail("no such file: \"" + name + "\"; looked in " + folder.string());
+    return {};
+  }
   auto loaded = motion::load_trajectories(path, options);
   if (!loaded) {
     file.fail(loaded.error().text);
