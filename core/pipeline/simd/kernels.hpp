@@ -96,9 +96,8 @@ struct Kernels {
   void (*sound_hits)(const HitsToSound&, int n, float* re, float* im);
   /// Adds the echoes' kernels to grid[2 (points + width)].
   void (*spread)(const SpreadGrid&, const SpreadEchoes&, int count, double* grid);
-  /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im). Reads samples of echoes up to the next
-  /// multiple of 16, and reads and writes the two aligned vectors that a pulse reaches into: 16 samples from the one of a
-  /// multiple of 8 at or before its first.
+  /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im). Reads and
+  /// writes the two aligned vectors that a pulse reaches into: 16 samples from that of a multiple of 8 at or before its first.
   void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column,
                      int lead);
   /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.

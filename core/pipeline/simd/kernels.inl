@@ -86,13 +86,14 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
   for (int from = 0; from < count; from += lanes) {
     alignas(64) float part[lanes];
     alignas(64) std::int32_t row_at[lanes], sample_at[lanes];
-    const Lanes sample = load(e.sample + from), whole = Lanes(_mm512_floor_ps(native(sample)));
+    const int n = count - from < lanes ? count - from : lanes;
+    const auto there = static_cast<__mmask16>(0xFFFFu >> (lanes - n));  // what lies behind the last may be any number
+    const Lanes sample = Lanes(_mm512_maskz_loadu_ps(there, e.sample + from)), whole = Lanes(_mm512_floor_ps(native(sample)));
     const Lanes position = (sample - whole) * steps;
     const LaneNumbers step = whole_part(position);
     store(part, position - as_floats(step));
     *reinterpret_cast<LaneNumbers*>(row_at) = step * 16;
     *reinterpret_cast<LaneNumbers*>(sample_at) = whole_part(whole) - (3 - lead);
-    const int n = count - from < lanes ? count - from : lanes;
     const float *re = e.re + from, *im = e.im + from, *rows = pulse.rows;
     const std::int32_t* column = e.column + from;
     for (int i = 0; i < n; ++i) {
