@@ -139,7 +139,6 @@ void Device::on_event(Session& from, const protocol::Event& event) {
     const bool joins = std::get<protocol::RequestPing>(event).joins;
     const bool served = joins && busy_ && under_way_settings_id_ == settings_id_;
     if (!served) pacer_.trigger(context_.clock.now(), joins);
-    state_.ping_is_owed = pacer_.trigger_waits();
   } else if (const auto* store = std::get_if<protocol::StoreAddress>(&event)) {
     state_.stored_address = store->address;
   } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
@@ -180,7 +179,9 @@ bool Device::settled() const {
   return !busy_ && std::all_of(sessions_.begin(), sessions_.end(), [](const SessionPointer& s) { return s->idle(); });
 }
 
+/// After whatever the pacer was told.
 void Device::arm() {
+  state_.ping_is_owed = pacer_.trigger_waits();
   if (context_.clock.stepped()) return;
   const auto next = pacer_.next_tick();
   if (!next) {

@@ -131,6 +131,28 @@ TEST(SteppedTalk, ASubscriptionTakesTheSonarAwayFromNobody) {
   reader.join();
 }
 
+TEST(SteppedTalk, NobodyIsOwedThePingOfAHostThatLeft) {
+  DaemonSetup setup = head("lockstep");
+  setup.profile = "blueview-m900-2250-130";
+  Daemon daemon(setup);
+  const auto clients = [&] { return daemon.status().sonars.at(0).clients.size(); };
+  {
+    Client leaves(daemon.address(), blueview::tcp_port);
+    leaves.send(bv::hello());
+    leaves.send(bv::ping(3, 1, 20000));
+    EXPECT_TRUE(eventually([&] { return clients() == 1 && daemon.log_text().find("settings: ") != std::string::npos; }));
+  }
+  EXPECT_TRUE(eventually([&] { return clients() == 0; }));
+  Client subscriber(daemon.address(), blueview::tcp_port);
+  subscriber.send(bv::hello());
+  subscriber.send(bv::two_numbers(FrameType::subscribe, 2, 1, 100));
+  std::thread reader([&] { subscriber.read_to_end(); });
+  EXPECT_TRUE(eventually([&] { return clients() == 1 && daemon.status().sonars.at(0).clients.at(0).bytes_written > 60; }));
+  EXPECT_EQ(std::get<Stepped>(daemon.ask(Step{0.5}).body).pings, 5u);
+  daemon.stop();
+  reader.join();
+}
+
 TEST(SteppedTalk, KeepAlivesAreBetweenThePings) {
   DaemonSetup setup;
   setup.more = "clock: stepped\n";
