@@ -54,7 +54,7 @@ class PacketFiller {
   }
   void clear() { count_ = 0; }
 
-  RayPacket packet;
+  RayPacket packet{};
   std::size_t traced = 0;
 
  private:

@@ -1,8 +1,11 @@
 // The only file that knows Embree; 3.x and 4.x differ in three places, all in the shim below.
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "core/scene/ray_origin.hpp"
@@ -17,26 +20,45 @@
 namespace sonar {
 namespace {
 
+// One query of 4, 8 or 16 rays; what `coherent` becomes differs between the versions.
 #if SONAR_EMBREE_MAJOR >= 4
-void intersect_16(RTCScene scene, const int* valid, RTCRayHit16* rays, bool coherent) {
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  arguments.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
-  rtcIntersect16(valid, scene, rays, &arguments);
-}
+struct Query : RTCIntersectArguments {
+  explicit Query(bool coherent) {
+    rtcInitIntersectArguments(this);
+    flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+  }
+};
+void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit4& rays) { rtcIntersect4(valid, scene, &rays, &query); }
+void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit8& rays) { rtcIntersect8(valid, scene, &rays, &query); }
+void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit16& rays) { rtcIntersect16(valid, scene, &rays, &query); }
 #else
-void intersect_16(RTCScene scene, const int* valid, RTCRayHit16* rays, bool coherent) {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-  rtcIntersect16(valid, scene, &context, rays);
-}
+struct Query : RTCIntersectContext {
+  explicit Query(bool coherent) {
+    rtcInitIntersectContext(this);
+    flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  }
+};
+void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit4& rays) { rtcIntersect4(valid, scene, &query, &rays); }
+void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit8& rays) { rtcIntersect8(valid, scene, &query, &rays); }
+void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit16& rays) { rtcIntersect16(valid, scene, &query, &rays); }
 #endif
+
+// SONARD_EMBREE_ISA holds Embree to a lesser instruction set than the processor's: the tests run on one machine what others do.
+std::string device_settings(int threads) {
+  std::string settings = "threads=" + std::to_string(threads);
+  const char* isa = std::getenv("SONARD_EMBREE_ISA");
+  if (isa == nullptr || *isa == '\0') return settings;
+  constexpr std::string_view known[] = {"sse2", "sse4.2", "avx", "avx2", "avx512"};
+  if (std::find(std::begin(known), std::end(known), isa) == std::end(known))
+    throw std::runtime_error(std::string("SONARD_EMBREE_ISA: unknown instruction set \"") + isa +
+                             "\"; use sse2, sse4.2, avx, avx2 or avx512");
+  return settings + ",max_isa=" + isa;
+}
 
 // Owners of Embree's reference-counted handles.
 struct Device {
   RTCDevice handle;
-  explicit Device(int threads) : handle(rtcNewDevice(("threads=" + std::to_string(threads)).c_str())) {
+  explicit Device(int threads) : handle(rtcNewDevice(device_settings(threads).c_str())) {
     if (!handle) throw std::runtime_error("the ray tracer (Embree) cannot start on this processor");
   }
   ~Device() { rtcReleaseDevice(handle); }
@@ -46,6 +68,12 @@ struct Device {
     const RTCError error = rtcGetDeviceError(handle);
     if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::runtime_error("not enough memory to build the scene for ray tracing");
     if (error != RTC_ERROR_NONE) throw std::runtime_error("the ray tracer failed with code " + std::to_string(error));
+  }
+  // The widest packet of rays that the processor's code traces as one. Wider ones are traced as a stream, which is slower, and
+  // whose Embree 3.13 reads rays that `valid` leaves out.
+  int widest_packet() const {
+    if (rtcGetDeviceProperty(handle, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) return 16;
+    return rtcGetDeviceProperty(handle, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0 ? 8 : 4;
   }
 };
 struct SceneHandle {
@@ -95,6 +123,9 @@ void add_object(const Device& device, Group& group, const Mesh& mesh, const Pose
   device.check();
 }
 
+template <class Packet>
+constexpr int lanes_of = std::extent_v<decltype(Packet::ray.org_x)>;
+
 bool same(const Pose& a, const Pose& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 }  // namespace
@@ -102,6 +133,7 @@ bool same(const Pose& a, const Pose& b) { return std::memcmp(&a, &b, sizeof a) =
 struct RayScene::Impl {
   std::shared_ptr<const Scene> scene;
   Device device;
+  int rays_at_once;
   Vec3d origin;
   std::vector<Group> groups;  // [0] everything static, [1 + b] body b
   SceneHandle top;            // instances of the groups; null when nothing moves
@@ -111,7 +143,10 @@ struct RayScene::Impl {
   RTCScene traced = nullptr;
 
   Impl(std::shared_ptr<const Scene> s, int build_threads)
-      : scene(std::move(s)), device(build_threads < 1 ? 1 : build_threads), origin(ray_origin_of(*scene)) {
+      : scene(std::move(s)),
+        device(build_threads < 1 ? 1 : build_threads),
+        rays_at_once(device.widest_packet()),
+        origin(ray_origin_of(*scene)) {
     const std::size_t bodies = scene->bodies_in_world.size();
     for (std::size_t i = 0; i <= bodies; ++i) groups.push_back(Group{SceneHandle(device), {}});
     for (std::size_t i = 0; i < scene->objects.size(); ++i) {
@@ -180,6 +215,60 @@ struct RayScene::Impl {
     }
     if (moved) rtcCommitScene(top.handle);
   }
+
+  template <class Packet>
+  void trace(RayPacket& rays, std::uint32_t active, Query& query) const {
+    constexpr int lanes = lanes_of<Packet>;
+    for (int first = 0; first < RayPacket::size; first += lanes) {
+      const std::uint32_t here = (active >> first) & ((1u << lanes) - 1u);
+      std::fill_n(rays.object + first, lanes, RayPacket::miss);
+      if (here != 0) trace_lanes<Packet>(rays, first, here, query);
+    }
+  }
+
+  /// Traces rays [first, first + lanes_of<Packet>), bit i of `active` for ray first + i.
+  template <class Packet>
+  void trace_lanes(RayPacket& rays, int first, std::uint32_t active, Query& query) const {
+    constexpr int lanes = lanes_of<Packet>;
+    alignas(64) int valid[lanes];
+    alignas(64) Packet q{};
+    for (int i = 0; i < lanes; ++i) valid[i] = (active >> i) & 1 ? -1 : 0;
+    const auto give = [&](float(&to)[lanes], const float* from) { std::memcpy(to, from + first, sizeof to); };
+    give(q.ray.org_x, rays.origin_x), give(q.ray.org_y, rays.origin_y), give(q.ray.org_z, rays.origin_z);
+    give(q.ray.dir_x, rays.direction_x), give(q.ray.dir_y, rays.direction_y), give(q.ray.dir_z, rays.direction_z);
+    give(q.ray.tfar, rays.far);
+    std::memset(q.ray.mask, 0xFF, sizeof q.ray.mask);
+    std::memset(q.hit.geomID, 0xFF, sizeof q.hit.geomID);
+    std::memset(q.hit.instID, 0xFF, sizeof q.hit.instID);
+    for (int i = 0; i < lanes;
+         ++i) {  // a ray that ends before it begins: no code path of Embree may follow what a caller left there
+      if (valid[i] != 0) continue;
+      q.ray.org_x[i] = q.ray.org_y[i] = q.ray.org_z[i] = q.ray.dir_y[i] = q.ray.dir_z[i] = 0;
+      q.ray.dir_x[i] = 1;
+      q.ray.tfar[i] = -1;
+    }
+    intersect(valid, traced, query, q);
+
+    const auto take = [&](auto* to, const auto* from) {
+      for (int i = 0; i < lanes; ++i) to[first + i] = valid[i] != 0 ? from[i] : to[first + i];
+    };
+    take(rays.far, q.ray.tfar), take(rays.triangle, q.hit.primID);
+    take(rays.normal_x, q.hit.Ng_x), take(rays.normal_y, q.hit.Ng_y), take(rays.normal_z, q.hit.Ng_z);
+    for (int i = 0; i < lanes; ++i)
+      if (valid[i] != 0 && q.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID)
+        take_object(rays, first + i, q.hit.geomID[i], q.hit.instID[0][i]);
+  }
+
+  void take_object(RayPacket& rays, int lane, unsigned geometry, unsigned instance) const {
+    const std::size_t group = instance == RTC_INVALID_GEOMETRY_ID ? 0 : instance;
+    rays.object[lane] = groups[group].objects[geometry];
+    if (group == 0) return;
+    const auto& m = turned[group].m;  // a body's normals come in the body's axes
+    const double n[3] = {rays.normal_x[lane], rays.normal_y[lane], rays.normal_z[lane]};
+    rays.normal_x[lane] = static_cast<float>(m[0][0] * n[0] + m[0][1] * n[1] + m[0][2] * n[2]);
+    rays.normal_y[lane] = static_cast<float>(m[1][0] * n[0] + m[1][1] * n[1] + m[1][2] * n[2]);
+    rays.normal_z[lane] = static_cast<float>(m[2][0] * n[0] + m[2][1] * n[1] + m[2][2] * n[2]);
+  }
 };
 
 RayScene::RayScene(std::shared_ptr<const Scene> scene, int build_threads)
@@ -191,44 +280,17 @@ void RayScene::place(std::span<const Pose> bodies_in_world) { impl_->place(bodie
 
 void RayScene::trace(RayPacket& rays, std::uint32_t active, bool coherent) const {
   static_assert(RayPacket::size == 16 && RayPacket::miss == RTC_INVALID_GEOMETRY_ID);
-  alignas(64) int valid[16];
-  alignas(64) RTCRayHit16 q;
-  for (int i = 0; i < 16; ++i) valid[i] = (active >> i) & 1 ? -1 : 0;
-  std::memcpy(q.ray.org_x, rays.origin_x, sizeof q.ray.org_x);
-  std::memcpy(q.ray.org_y, rays.origin_y, sizeof q.ray.org_y);
-  std::memcpy(q.ray.org_z, rays.origin_z, sizeof q.ray.org_z);
-  std::memcpy(q.ray.dir_x, rays.direction_x, sizeof q.ray.dir_x);
-  std::memcpy(q.ray.dir_y, rays.direction_y, sizeof q.ray.dir_y);
-  std::memcpy(q.ray.dir_z, rays.direction_z, sizeof q.ray.dir_z);
-  std::memcpy(q.ray.tfar, rays.far, sizeof q.ray.tfar);
-  std::memset(q.ray.tnear, 0, sizeof q.ray.tnear);
-  std::memset(q.ray.time, 0, sizeof q.ray.time);
-  std::memset(q.ray.mask, 0xFF, sizeof q.ray.mask);
-  std::memset(q.ray.id, 0, sizeof q.ray.id);
-  std::memset(q.ray.flags, 0, sizeof q.ray.flags);
-  std::memset(q.hit.geomID, 0xFF, sizeof q.hit.geomID);
-  std::memset(q.hit.instID, 0xFF, sizeof q.hit.instID);
-  intersect_16(impl_->traced, valid, &q, coherent);
-
-  std::memcpy(rays.far, q.ray.tfar, sizeof rays.far);
-  std::memcpy(rays.triangle, q.hit.primID, sizeof rays.triangle);
-  std::memcpy(rays.normal_x, q.hit.Ng_x, sizeof rays.normal_x);
-  std::memcpy(rays.normal_y, q.hit.Ng_y, sizeof rays.normal_y);
-  std::memcpy(rays.normal_z, q.hit.Ng_z, sizeof rays.normal_z);
-  for (int i = 0; i < 16; ++i) {
-    rays.object[i] = RayPacket::miss;
-    if (q.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-    const std::uint32_t instance = q.hit.instID[0][i];
-    const std::size_t group = instance == RTC_INVALID_GEOMETRY_ID ? 0 : instance;
-    rays.object[i] = impl_->groups[group].objects[q.hit.geomID[i]];
-    if (group == 0) continue;
-    const auto& m = impl_->turned[group].m;  // a body's normals come in the body's axes
-    const double n[3] = {q.hit.Ng_x[i], q.hit.Ng_y[i], q.hit.Ng_z[i]};
-    rays.normal_x[i] = static_cast<float>(m[0][0] * n[0] + m[0][1] * n[1] + m[0][2] * n[2]);
-    rays.normal_y[i] = static_cast<float>(m[1][0] * n[0] + m[1][1] * n[1] + m[1][2] * n[2]);
-    rays.normal_z[i] = static_cast<float>(m[2][0] * n[0] + m[2][1] * n[1] + m[2][2] * n[2]);
+  Query query(coherent);
+  switch (impl_->rays_at_once) {
+    case 16:
+      return impl_->trace<RTCRayHit16>(rays, active, query);
+    case 8:
+      return impl_->trace<RTCRayHit8>(rays, active, query);
+    default:
+      return impl_->trace<RTCRayHit4>(rays, active, query);
   }
 }
+int RayScene::rays_at_once() const { return impl_->rays_at_once; }
 
 std::string RayScene::version() { return "Embree " RTC_VERSION_STRING; }
 

@@ -20,6 +20,7 @@ RayScene::~RayScene() = default;
 const Scene& RayScene::scene() const { return *impl_->scene; }
 Vec3d RayScene::origin() const { return impl_->flat.origin(); }
 void RayScene::place(std::span<const Pose> bodies) { impl_->places = impl_->flat.place(bodies); }
+int RayScene::rays_at_once() const { return 1; }
 std::string RayScene::version() { return "the device's rays"; }
 
 void RayScene::trace(RayPacket& rays, std::uint32_t active, bool) const {

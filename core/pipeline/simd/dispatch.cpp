@@ -1,8 +1,26 @@
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+
 #include "core/pipeline/simd/kernels.hpp"
 
 namespace sonar::simd {
+namespace {
+
+SimdLevel level_from_environment() {
+  const char* given = std::getenv("SONARD_SIMD");
+  const std::string name = given == nullptr || *given == '\0' ? "auto" : given;
+  if (name == "auto") return SimdLevel::automatic;
+  if (name == "portable") return SimdLevel::portable;
+  if (name == "avx2") return SimdLevel::avx2;
+  if (name == "avx512") return SimdLevel::avx512;
+  throw std::runtime_error("SONARD_SIMD: unknown instruction set \"" + name + "\"; use auto, portable, avx2 or avx512");
+}
+
+}  // namespace
 
 const Kernels& kernels_for(SimdLevel level) {
+  if (level == SimdLevel::automatic) level = level_from_environment();
 #if defined(__x86_64__)
   const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   const bool has_avx512 = has_avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&

@@ -114,7 +114,8 @@ struct Kernels {
   void (*quantise_bytes)(const float* power, float gain, float half_gamma, float max_code, std::uint8_t* codes, int n);
 };
 
-/// The kernels of a level; `automatic` takes the best this processor has. A level it lacks falls back to the next lower one.
+/// The kernels of a level; `automatic` takes the one that the environment variable SONARD_SIMD names, or the best this processor
+/// has. A level it lacks falls back to the next lower one. Throws std::runtime_error when SONARD_SIMD names no level.
 const Kernels& kernels_for(SimdLevel level);
 
 extern const Kernels portable_kernels, avx2_kernels, avx512_kernels;

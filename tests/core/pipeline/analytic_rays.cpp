@@ -145,6 +145,7 @@ RayScene::~RayScene() = default;
 const Scene& RayScene::scene() const { return *impl_->scene; }
 Vec3d RayScene::origin() const { return {}; }
 void RayScene::place(std::span<const Pose> bodies_in_world) { impl_->place(bodies_in_world); }
+int RayScene::rays_at_once() const { return 1; }
 std::string RayScene::version() { return "analytic rays"; }
 
 void RayScene::trace(RayPacket& rays, std::uint32_t active, bool) const {

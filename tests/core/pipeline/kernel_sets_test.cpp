@@ -4,6 +4,10 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/random.hpp"
@@ -119,6 +123,50 @@ TEST(KernelSets, HitsOfTheFixedFanSoundAsDefined) {
       EXPECT_LT(std::sqrt(off / all), 1e-3) << kernels->name << ": the tabulated law is the coarsest part";
     }
   }
+}
+
+// A column's last packet of rays may hold one ray or all but one, and the tracer may take 4, 8 or 16 as one.
+TEST(KernelSets, AFixedFanOfAnyNumberOfRaysIsTraced) {
+  SceneMaker maker;
+  maker.add(height_field(-2, 14, -10, 10, 0.5, rough_relief(0.03, 40)), -20);
+  const auto scene = maker.make();
+  const char* was = std::getenv("SONARD_EMBREE_ISA");
+  const std::string kept = was == nullptr ? "" : was;
+  for (int rays = 1; rays <= 18; ++rays) {
+    std::vector<float> first;
+    for (const char* isa : {"sse2", "avx2", ""}) {
+      ::setenv("SONARD_EMBREE_ISA", isa, 1);
+      Sounding s(scene, oculus_high(), default_rows(10, 200), {.threads = 1, .engine = {}});
+      s.request.switches.fixed_fan = rays;
+      const std::vector<float> now = s.ping_from({0, 0, 2}, {0, 0.25, 0}).pressure_upa;
+      if (first.empty()) first = now;
+      double error = 0, power = 0;
+      for (std::size_t i = 0; i < now.size(); ++i) {
+        error += std::pow(static_cast<double>(now[i]) - static_cast<double>(first[i]), 2);
+        power += std::pow(static_cast<double>(first[i]), 2);
+      }
+      ASSERT_GT(power, 0) << rays << " rays, " << isa;
+      EXPECT_LT(error, 1e-4 * power) << rays << " rays, " << isa;
+    }
+  }
+  ::setenv("SONARD_EMBREE_ISA", kept.c_str(), 1);
+}
+
+// SONARD_SIMD holds everything that does not say otherwise, the tests' engines among it.
+TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
+  const char* was = std::getenv("SONARD_SIMD");
+  const std::string kept = was == nullptr ? "" : was;
+  for (const auto& [name, level] :
+       {std::pair{"portable", SimdLevel::portable}, {"avx2", SimdLevel::avx2}, {"avx512", SimdLevel::avx512}}) {
+    ::setenv("SONARD_SIMD", name, 1);
+    EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(level)) << name;
+    EXPECT_EQ(&simd::kernels_for(SimdLevel::portable), &simd::portable_kernels) << "what was asked for by itself stays";
+  }
+  ::setenv("SONARD_SIMD", "", 1);
+  EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(SimdLevel::avx512)) << "the best there is";
+  ::setenv("SONARD_SIMD", "avx1024", 1);
+  EXPECT_THROW(simd::kernels_for(SimdLevel::automatic), std::runtime_error);
+  ::setenv("SONARD_SIMD", kept.c_str(), 1);
 }
 
 }  // namespace

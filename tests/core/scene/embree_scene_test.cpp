@@ -1,7 +1,12 @@
 // The fast ray caster against the plain one: soups, moving bodies, far places, and scenes with nothing in them.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "core/scene/ray_scene.hpp"
 #include "tests/core/scene/scene_testing.hpp"
@@ -20,7 +25,7 @@ void compare(const Scene& scene, const RayScene& rays, std::span<const Pose> bod
              bool coherent, double tolerance_m) {
   int hits = 0;
   for (int n = 0; n < packets; ++n) {
-    RayPacket packet;
+    RayPacket packet{};
     Vec3d from[16], along[16];
     for (int i = 0; i < 16; ++i) {
       const Vec3 rounded = to_float(draw.point(6));  // both sides get the float place
@@ -145,7 +150,7 @@ TEST(RayScene, AnEmptySceneMissesEverywhere) {
     scene->bodies_in_world.resize(static_cast<std::size_t>(bodies));
     RayScene rays(scene, 1);
     rays.place(std::vector<Pose>(static_cast<std::size_t>(bodies), Pose{{1, 2, 3}, {}}));
-    RayPacket packet;
+    RayPacket packet{};
     for (int i = 0; i < 16; ++i) set_ray(packet, i, {}, {1, 0, 0}, 50);
     rays.trace(packet, 0xFFFF, true);
     for (int i = 0; i < 16; ++i) {
@@ -153,6 +158,93 @@ TEST(RayScene, AnEmptySceneMissesEverywhere) {
       EXPECT_EQ(packet.far[i], 50);
     }
   }
+}
+
+// Embree may trace 4, 8 or 16 rays as one, and which of them depends on the processor.
+class TracerWidth : public ::testing::TestWithParam<const char*> {
+ protected:
+  TracerWidth() { ::setenv("SONARD_EMBREE_ISA", GetParam(), 1); }
+  ~TracerWidth() override {
+    if (was_.empty())
+      ::unsetenv("SONARD_EMBREE_ISA");
+    else
+      ::setenv("SONARD_EMBREE_ISA", was_.c_str(), 1);
+  }
+
+ private:
+  static std::string held() {
+    const char* isa = std::getenv("SONARD_EMBREE_ISA");
+    return isa == nullptr ? "" : isa;
+  }
+  std::string was_ = held();
+};
+
+TEST_P(TracerWidth, AgreesWithBruteForce) {
+  Draw draw(7);
+  const auto scene = three_soups(draw, {});
+  const RayScene rays(scene, 1);
+  EXPECT_LE(rays.rays_at_once(), GetParam() == std::string("avx512") ? 16 : GetParam()[0] == 'a' ? 8 : 4);
+  compare(*scene, rays, {}, draw, 60, 30, true, 1e-4);
+  compare(*scene, rays, {}, draw, 60, 30, false, 1e-4);
+}
+
+// What a caller left in lanes that are not active: rays of an earlier packet, nothing, or bytes that are no numbers.
+TEST_P(TracerWidth, LanesThatAreNotActiveAreNotRead) {
+  Draw draw(8);
+  const auto scene = three_soups(draw, {});
+  const RayScene rays(scene, 1);
+  for (int n = 0; n < 200; ++n) {
+    RayPacket given{};
+    for (int i = 0; i < 16; ++i) {
+      const Vec3d d = draw.point(1);
+      set_ray(given, i, draw.point(4), (1 / length(d)) * d, 30);
+    }
+    RayPacket all = given;
+    rays.trace(all, 0xFFFF, true);
+    const std::uint32_t active = n < 16 ? 1u << n : static_cast<std::uint32_t>(draw(0, 65536));
+    RayPacket some = given;
+    for (int i = 0; i < 16; ++i) {
+      if ((active >> i) & 1) continue;
+      const float left =
+          std::array{std::numeric_limits<float>::quiet_NaN(), HUGE_VALF, 0.0f, -1e30f}[static_cast<std::size_t>(n) % 4];
+      some.origin_x[i] = some.origin_y[i] = some.origin_z[i] = left;
+      some.direction_x[i] = some.direction_y[i] = some.direction_z[i] = left;
+      some.far[i] = 5, some.triangle[i] = 77, some.normal_x[i] = 3;
+    }
+    rays.trace(some, active, true);
+    for (int i = 0; i < 16; ++i) {
+      if ((active >> i) & 1) {
+        ASSERT_EQ(some.object[i], all.object[i]) << "packet " << n << " lane " << i;
+        EXPECT_EQ(some.far[i], all.far[i]);
+        EXPECT_EQ(some.triangle[i], all.triangle[i]);
+        EXPECT_EQ(some.normal_x[i], all.normal_x[i]);
+      } else {
+        EXPECT_EQ(some.object[i], RayPacket::miss);
+        EXPECT_EQ(some.far[i], 5);
+        EXPECT_EQ(some.triangle[i], 77u);
+        EXPECT_EQ(some.normal_x[i], 3);
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Isa, TracerWidth, ::testing::Values("sse2", "sse4.2", "avx", "avx2", "avx512"), [](const auto& about) {
+  std::string name = about.param;
+  std::erase(name, '.');
+  return name;
+});
+
+TEST(RayScene, RefusesAnUnknownInstructionSet) {
+  const char* was = std::getenv("SONARD_EMBREE_ISA");
+  const std::string kept = was == nullptr ? "" : was;
+  ::setenv("SONARD_EMBREE_ISA", "avx3", 1);
+  try {
+    const RayScene rays(std::make_shared<Scene>(), 1);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::runtime_error& e) {
+    EXPECT_STREQ(e.what(), "SONARD_EMBREE_ISA: unknown instruction set \"avx3\"; use sse2, sse4.2, avx, avx2 or avx512");
+  }
+  ::setenv("SONARD_EMBREE_ISA", kept.c_str(), 1);
 }
 
 TEST(RayScene, NamesItsLibrary) { EXPECT_EQ(RayScene::version().rfind("Embree ", 0), 0u); }

@@ -22,7 +22,7 @@ std::shared_ptr<const Scene> shipped(const std::string& name) {
 // The object that a ray from `from` in direction azimuth, elevation hits, and how far away.
 std::pair<std::string, float> look(const RayScene& rays, Vec3d from, double azimuth_deg, double elevation_deg) {
   const double a = rad_from_deg(azimuth_deg), e = rad_from_deg(elevation_deg);
-  RayPacket packet;
+  RayPacket packet{};
   for (int i = 0; i < 16; ++i) {
     testing::set_ray(packet, i, from - rays.origin(), {std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e)}, 100);
   }
