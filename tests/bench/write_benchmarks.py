@@ -1,12 +1,16 @@
 #!/usr/bin/env python3
 """Writes docs/benchmarks.md, and its two pictures, from what `sonard bench --json` found.
 
-usage: write_benchmarks.py BENCH.json DOCS_FOLDER
+usage: write_benchmarks.py [--instruction-sets] BENCH.json [SET.json...] DOCS_FOLDER
+  BENCH.json  the whole run
+  SET.json    rates with one instruction set, the best first: the chapter "Instruction sets"
+  --instruction-sets  all files are SET.json: writes that chapter anew and keeps the rest of the page
 Standard library only. tests/tools/benchmarks.sh makes the JSON and calls this; nothing in the page is written by hand.
 """
 
 import json
 import math
+import re
 import sys
 from pathlib import Path
 
@@ -169,6 +173,40 @@ def lines_of(curves):
     return "\n".join(out + ["</svg>", ""])
 
 
+SETS = "## Instruction sets"
+
+
+def instruction_sets(reports, scene="local-search"):
+    """The chapter: rates and stages with each instruction set of one processor, the best first."""
+    found = [{r["case"]: r for r in report["results"] if r["scene"] == scene} for report in reports]
+    engines = [next(iter(results.values()))["engine"] for results in found]
+    names = [engine.split(", ")[1] for engine in engines]
+    lines = [SETS, "",
+             f"Processor: {reports[0]['processor']}; {engines[0].split(', ')[2]}. The hot loops (`--simd`) and the ray tracer "
+             "(`SONARD_EMBREE_ISA`) are held down together: `avx2` stands for most desktops and laptops, `portable` (Embree with SSE "
+             "4.2) for what is older. Pings/s; in brackets, how many times faster the first column is.", ""]
+    rows = []
+    for case in GOALS:
+        rates = [results[case]["pings_per_second"] for results in found if case in results]
+        if len(rates) == len(found):
+            rows.append([case, found[0][case]["description"], f"{rates[0]:.0f}"]
+                        + [f"{rate:.0f} ({rates[0] / rate:.2f})" for rate in rates[1:]])
+    lines += table(["case", "what"] + names, rows)
+    both = [case for case in ("P1", "P3d") if all(case in results for results in found)]
+    stage_names = sorted({stage for results in found for case in both for stage, ms in results[case]["thread_ms"].items() if ms >= 0.005})
+    lines += ["Stages, thread ms a ping:", ""]
+    lines += table(["case", "instruction set"] + stage_names,
+                   [[case, name] + [f"{results[case]['thread_ms'].get(stage, 0):.2f}" for stage in stage_names]
+                    for case in both for name, results in zip(names, found)])
+    return "\n".join(lines)
+
+
+def with_chapter(text, chapter):
+    """The page with its chapter on instruction sets made anew; behind the rates where there was none."""
+    kept = re.sub(rf"^{SETS}\n.*?(?=^## |\Z)", "", text, flags=re.M | re.S)
+    return re.sub(r"^(?=## Beside the published figures)", lambda _: chapter + "\n", kept, count=1, flags=re.M)
+
+
 def page(report, scene="local-search"):
     results = report["results"]
     ours = {case: by_threads(results, case, scene) for case in ("P1", "P2")}
@@ -206,7 +244,7 @@ def page(report, scene="local-search"):
     return "\n".join(lines)
 
 
-def write(report, folder):
+def write(report, folder, sets=()):
     folder.mkdir(parents=True, exist_ok=True)
     scene = "local-search"
     entries = [(name, rate, False) for name, rate in PAPER]
@@ -215,16 +253,26 @@ def write(report, folder):
         if found:
             r = found[max(found)]
             entries.append((f"{case}: {r['description']}", r["pings_per_second"], True))
-    (folder / (NAME + ".md")).write_text(page(report, scene), encoding="utf-8")
+    text = page(report, scene)
+    (folder / (NAME + ".md")).write_text(with_chapter(text, instruction_sets(sets, scene)) if sets else text, encoding="utf-8")
     (folder / "benchmarks-rates.svg").write_text(bars(entries), encoding="utf-8")
     if report.get("curves"):
         (folder / "benchmarks-curves.svg").write_text(lines_of(report["curves"]), encoding="utf-8")
 
 
 def main():
-    if len(sys.argv) != 3:
+    words = sys.argv[1:]
+    sets_only = words[:1] == ["--instruction-sets"]
+    if sets_only:
+        words = words[1:]
+    if len(words) < 2:
         sys.exit(__doc__.strip())
-    write(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")), Path(sys.argv[2]))
+    reports, folder = [json.loads(Path(name).read_text(encoding="utf-8")) for name in words[:-1]], Path(words[-1])
+    if sets_only:
+        file = folder / (NAME + ".md")
+        file.write_text(with_chapter(file.read_text(encoding="utf-8"), instruction_sets(reports)), encoding="utf-8")
+    else:
+        write(reports[0], folder, reports[1:])
 
 
 if __name__ == "__main__":

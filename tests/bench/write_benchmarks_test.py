@@ -48,6 +48,19 @@ class Page(unittest.TestCase):
                       "Must hold 500, goal 60: goal", "before the run: 5.5"):
             self.assertIn(words, page)
 
+    def test_instruction_sets_stand_beside_each_other(self):
+        sets = [{"processor": "test", "results": [dict(result("P1", 2, rate), engine=f"cpu, {name}, 2 threads, Embree")]}
+                for name, rate in (("avx2", 100), ("portable", 40))]
+        chapter = write_benchmarks.instruction_sets(sets)
+        self.assertIn("| case | what | avx2 | portable |", chapter)
+        self.assertIn("| P1 | P1 described | 100 | 40 (2.50) |", chapter)
+        self.assertIn("| P1 | portable | 3.80 | 3.34 |", chapter)
+        page = write_benchmarks.page({"processor": "test", "results": [result("P1", 2, 260)]})
+        once = write_benchmarks.with_chapter(page, chapter)
+        self.assertEqual(once.replace(chapter + "\n", ""), page)
+        again = write_benchmarks.with_chapter(once, chapter.replace("| 100 |", "| 120 |"))
+        self.assertEqual(again, once.replace("| 100 |", "| 120 |"), "the chapter is replaced, and all else is kept")
+
     def test_a_report_of_nothing_is_a_page(self):
         self.assertIn("# Benchmarks", write_benchmarks.page({"processor": "test", "results": [result("P2", 1, 10)]}))
 

@@ -1,16 +1,40 @@
 #!/usr/bin/env bash
-# Measures everything that docs/benchmarks.md says and writes it, with its pictures. usage: tests/tools/benchmarks.sh [BUILD_FOLDER]
+# Measures everything that docs/benchmarks.md says and writes it, with its pictures.
+# usage: tests/tools/benchmarks.sh [--instruction-sets] [BUILD_FOLDER]
+#   --instruction-sets  only that chapter: the rates with this processor's instruction sets and with lesser ones
 # Wants a quiet machine; takes five to ten minutes. BUILD_FOLDER (default build/release) must hold a built sonard.
 set -eu -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
+case "${1:-}" in
+  -h | --help) sed -n '2,6s/^# //p' "$0"; exit 0 ;;
+esac
+sets_only=
+if [ "${1:-}" = --instruction-sets ]; then
+  sets_only=1
+  shift
+fi
 build=${1:-build/release}
 sonard=$build/daemon/sonard
 [ -x "$sonard" ] || { echo "no $sonard; build it first, or name another build folder" >&2; exit 66; }
 threads=$(nproc)
 each=(--threads "$threads")
 [ "$threads" = 1 ] || each=(--threads 1 --threads "$threads")
-json=$build/benchmarks.json
-# A ratio that is missed (exit code 1) is in the page; anything else ends here.
-"$sonard" bench --scene local-search "${each[@]}" --pings 200 --curves --json "$json" || [ $? -eq 1 ]
-python3 tests/bench/write_benchmarks.py "$json" docs
-echo "docs/benchmarks.md is written; figures are in $json"
+
+# The hot loops (--simd) and the ray tracer (SONARD_EMBREE_ISA) held down together, from the best that this processor has.
+levels=(avx2:avx2 portable:sse4.2)
+! grep -qw avx512f /proc/cpuinfo 2>/dev/null || levels=(avx512:avx512 "${levels[@]}")
+sets=()
+for level in "${levels[@]}"; do
+  sets+=("$build/benchmarks-${level%%:*}.json")
+  SONARD_EMBREE_ISA=${level#*:} "$sonard" bench --simd "${level%%:*}" --scene local-search --threads "$threads" --pings 200 \
+    --case P1 --case P2 --case P3a --case P3b --case P3c --case P3d --case P4a --case P4b --json "${sets[-1]}"
+done
+if [ -n "$sets_only" ]; then
+  python3 tests/bench/write_benchmarks.py --instruction-sets "${sets[@]}" docs
+else
+  json=$build/benchmarks.json
+  # A ratio that is missed (exit code 1) is in the page; anything else ends here.
+  "$sonard" bench --scene local-search "${each[@]}" --pings 200 --curves --json "$json" || [ $? -eq 1 ]
+  python3 tests/bench/write_benchmarks.py "$json" "${sets[@]}" docs
+fi
+echo "docs/benchmarks.md is written; figures are in $build/benchmarks*.json"
