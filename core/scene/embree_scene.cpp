@@ -52,7 +52,8 @@ std::string device_settings(int threads) {
   if (std::find(std::begin(known), std::end(known), isa) == std::end(known))
     throw std::runtime_error(std::string("SONARD_EMBREE_ISA: unknown instruction set \"") + isa +
                              "\"; use sse2, sse4.2, avx, avx2 or avx512");
-  return settings + ",max_isa=" + isa;
+  // The best there is. Embree's name for it differs between versions, and a name that Embree does not know means SSE2.
+  return isa == std::string_view("avx512") ? settings : settings + ",max_isa=" + isa;
 }
 
 // Owners of Embree's reference-counted handles.
@@ -69,8 +70,8 @@ struct Device {
     if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::runtime_error("not enough memory to build the scene for ray tracing");
     if (error != RTC_ERROR_NONE) throw std::runtime_error("the ray tracer failed with code " + std::to_string(error));
   }
-  // The widest packet of rays that the processor's code traces as one. Wider ones are traced as a stream, which is slower, and
-  // whose Embree 3.13 reads rays that `valid` leaves out.
+  // The widest packet of rays that Embree has code for on this processor. It traces wider ones as a stream, which is slower, and
+  // in Embree 3.13 also reads rays that `valid` leaves out.
   int widest_packet() const {
     if (rtcGetDeviceProperty(handle, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) return 16;
     return rtcGetDeviceProperty(handle, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0 ? 8 : 4;
@@ -240,8 +241,8 @@ struct RayScene::Impl {
     std::memset(q.ray.mask, 0xFF, sizeof q.ray.mask);
     std::memset(q.hit.geomID, 0xFF, sizeof q.hit.geomID);
     std::memset(q.hit.instID, 0xFF, sizeof q.hit.instID);
-    for (int i = 0; i < lanes;
-         ++i) {  // a ray that ends before it begins: no code path of Embree may follow what a caller left there
+    // A ray that ends before it begins: no code path of Embree may follow what a caller left in an inactive lane.
+    for (int i = 0; i < lanes; ++i) {
       if (valid[i] != 0) continue;
       q.ray.org_x[i] = q.ray.org_y[i] = q.ray.org_z[i] = q.ray.dir_y[i] = q.ray.dir_z[i] = 0;
       q.ray.dir_x[i] = 1;

@@ -38,10 +38,10 @@ class RayScene {
   Vec3d origin() const;  // world position that float coordinates are relative to
   /// Moves the bodies; called by the thread that owns the scene, before tracing. Costs nothing when nothing moved.
   void place(std::span<const Pose> bodies_in_world);
-  /// First hits of the active lanes (bit i of `active`). The others may hold anything: they become misses and keep the rest. A
-  /// miss keeps `far` and has the normal 0. Thread-safe between calls of place().
+  /// First hits of the active lanes (bit i of `active`). Inactive lanes may hold anything; only their `object` changes, to miss.
+  /// An active ray that meets nothing keeps `far` and gets the normal 0. Thread-safe between calls of place().
   void trace(RayPacket& rays, std::uint32_t active, bool coherent) const;
-  /// How many rays the tracer takes as one on this processor: 16 with AVX-512, 8 with AVX, otherwise 4.
+  /// How many rays are traced together on this processor: 16 with AVX-512, 8 with AVX, otherwise 4.
   int rays_at_once() const;
   static std::string version();  // "Embree 3.13.5"
 

@@ -232,7 +232,7 @@ int run_bench(int argc, char** argv) {
   if (options.threads.empty()) options.threads.push_back(processors);
   try {
     return bench::run(options);
-  } catch (const EngineUnavailable& gone) {
+  } catch (const std::runtime_error& gone) {  // a device, or a ray tracer that cannot start
     return bench::complain({ErrorKind::unavailable, gone.what()});
   }
 }

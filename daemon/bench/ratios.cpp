@@ -116,8 +116,7 @@ std::vector<Ratio> measure_rays(std::shared_ptr<const Scene> scene, const BenchS
   const PingPlan plan = plan_of("P1");
   const RayScene rays(std::move(scene), 1);
   const PingScalars scalars = make_scalars(plan, Pinger(c, options).request(0, bench_pose(c, where, 0)), rays.origin());
-  return {
-      {"rays: one by one / packets of sixteen", trace_ms(rays, plan, scalars, 1), trace_ms(rays, plan, scalars, 16), 1.2, 1, 0}};
+  return {{"rays: one by one / full packets", trace_ms(rays, plan, scalars, 1), trace_ms(rays, plan, scalars, 16), 1.2, 1, 0}};
 }
 
 std::vector<Ratio> measure_detection(const BenchOptions& options) {

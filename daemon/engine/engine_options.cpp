@@ -55,7 +55,8 @@ Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const En
   if (given.device == "auto") engine.device = EngineDevice::automatic;
   if (given.device == "cpu") engine.device = EngineDevice::cpu;
   if (given.device == "cuda") engine.device = EngineDevice::cuda;
-  if (given.simd == "auto") engine.simd = SimdLevel::automatic;
+  // The best there is (a level that the processor lacks falls back), whatever SONARD_SIMD says.
+  if (given.simd == "auto") engine.simd = SimdLevel::avx512;
   if (given.simd == "portable") engine.simd = SimdLevel::portable;
   if (given.simd == "avx2") engine.simd = SimdLevel::avx2;
   if (given.simd == "avx512") engine.simd = SimdLevel::avx512;

@@ -203,8 +203,11 @@ def instruction_sets(reports, scene="local-search"):
 
 def with_chapter(text, chapter):
     """The page with its chapter on instruction sets made anew; behind the rates where there was none."""
+    anchor = "## Beside the published figures"
+    if f"\n{anchor}\n" not in text:
+        sys.exit(f'the page has no chapter "{anchor}" to put "{SETS}" before; make the whole page first')
     kept = re.sub(rf"^{SETS}\n.*?(?=^## |\Z)", "", text, flags=re.M | re.S)
-    return re.sub(r"^(?=## Beside the published figures)", lambda _: chapter + "\n", kept, count=1, flags=re.M)
+    return re.sub(rf"^(?={anchor})", lambda _: chapter + "\n", kept, count=1, flags=re.M)
 
 
 def page(report, scene="local-search"):

@@ -28,6 +28,7 @@ void RayScene::trace(RayPacket& rays, std::uint32_t active, bool) const {
   for (int i = 0; i < RayPacket::size; ++i) {
     rays.object[i] = RayPacket::miss;
     if (((active >> i) & 1u) == 0) continue;
+    rays.normal_x[i] = rays.normal_y[i] = rays.normal_z[i] = 0;
     const cuda::Ray ray{{rays.origin_x[i], rays.origin_y[i], rays.origin_z[i]},
                         {rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]}};
     const cuda::RayHit hit = trace_ray(view, ray, rays.far[i]);

@@ -116,6 +116,7 @@ TEST(CommandLine, TheOtherRunOptionsReplaceTheFilesValues) {
   EXPECT_EQ(c.engine.threads, 3);
   EXPECT_EQ(c.seed, 9u);
   EXPECT_EQ(c.engine.simd, SimdLevel::portable);
+  EXPECT_EQ(overridden({"--simd", "auto"}).engine.simd, SimdLevel::avx512) << "the best there is, whatever SONARD_SIMD says";
   EXPECT_EQ(c.engine.device, EngineDevice::cuda);
   EXPECT_EQ(text_of(c.sonars.at(0).bind_ip), "127.0.0.9");
   EXPECT_EQ(text_of(c.sonars.at(0).advertise_ip), "127.0.0.9");

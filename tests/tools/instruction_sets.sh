@@ -30,7 +30,7 @@ for level in "$@"; do
   printf -- '-- %d programs, hot loops %s, Embree %s\n' ${#programs[@]} "$SONARD_SIMD" "$SONARD_EMBREE_ISA"
   # One line a program that passes; the whole output of one that fails.
   printf '%s\0' "${programs[@]}" | xargs -0 -n 1 -P "${SONARD_TEST_JOBS:-2}" bash -c '
-    if output=$("$0" --gtest_brief=1 2>&1 </dev/null); then
+    if output=$(timeout 600 "$0" --gtest_brief=1 2>&1 </dev/null); then
       printf "%s: %s\n" "${0##*/}" "$(tail -n 1 <<<"$output")"
     else
       printf "%s FAILED\n%s\n" "$0" "$output"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds tests with sanitizers and runs them. usage: tests/tools/sanitized_tests.sh [asan|asan-all|tsan] [targets...]
-#   asan      address and undefined behaviour: what reads foreign bytes or files in the daemon and below it, and the fuzz targets over
-#             their seeds and made-up inputs; the default, and what .ci/run does. Clients are judged by their parsers' fuzz targets
+#   asan      address and undefined behaviour: what reads foreign bytes or files in the daemon and below it, the ray tracer, the core
+#             of the BlueView libraries, and the fuzz targets over their seeds and made-up inputs; the default, and what .ci/run does
 #   asan-all  the same over the whole functional suite, the shipped programs and the BlueView call sequences among it
 #   tsan      threads: protocol, control, daemon, clients, the BlueView call sequences, the pool, and the CPU pipeline over analytic
 #             rays in place of Embree, alone (analytic_rays_test) and under a whole daemon (daemon_analytic_test, with the daemon's)
@@ -23,10 +23,9 @@ preset=${kind%-all}
 left_out='^$'
 case $kind in
   asan)
-    wanted='^tests/(protocol|daemon)/.*_test$|^tests/core/(text|motion)/.*_test$|/core_load_scene_test$|/core_shapes_test$|^tests/fuzz/.*_fuzz$'
-    # What reads nothing foreign (engines and their choice), what another program of the list reads too (command lines, render files
-    # and replayed recordings: their parsers and the loopback tests).
-    left_out='/daemon_(analytic|changed_scene|choose_engine|command_line|fair_turns|render|replay|start_engine)_test$'
+    wanted='^tests/(protocol|daemon)/.*_test$|^tests/core/(text|motion)/.*_test$|/core_(load_scene|shapes|ray_scene)_test$|/bvtsdk_core_test$|^tests/fuzz/.*_fuzz$'
+    # What reads nothing foreign: engines, their choice and their turns, and command lines.
+    left_out='/daemon_(analytic|changed_scene|choose_engine|command_line|fair_turns|start_engine)_test$'
     ;;
   asan-all)
     wanted='^tests/.*(_test|_fuzz)$'

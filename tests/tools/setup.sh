@@ -54,6 +54,9 @@ build_jobs() {
   echo $((processors < by_memory ? processors : by_memory))
 }
 
+# ccache, where it is installed, passes over compilations with precompiled headers unless it is told.
+export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
+
 # configure PRESET [cmake arguments...]
 configure() {
   local log preset=$1

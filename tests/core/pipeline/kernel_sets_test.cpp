@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <cstddef>
-#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -15,6 +14,7 @@
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/scatter.hpp"
+#include "tests/core/held_variable.hpp"
 #include "tests/core/pipeline/kernel_sets.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
@@ -130,12 +130,10 @@ TEST(KernelSets, AFixedFanOfAnyNumberOfRaysIsTraced) {
   SceneMaker maker;
   maker.add(height_field(-2, 14, -10, 10, 0.5, rough_relief(0.03, 40)), -20);
   const auto scene = maker.make();
-  const char* was = std::getenv("SONARD_EMBREE_ISA");
-  const std::string kept = was == nullptr ? "" : was;
   for (int rays = 1; rays <= 18; ++rays) {
     std::vector<float> first;
     for (const char* isa : {"sse2", "avx2", ""}) {
-      ::setenv("SONARD_EMBREE_ISA", isa, 1);
+      const testing::HeldVariable held("SONARD_EMBREE_ISA", isa);
       Sounding s(scene, oculus_high(), default_rows(10, 200), {.threads = 1, .engine = {}});
       s.request.switches.fixed_fan = rays;
       const std::vector<float> now = s.ping_from({0, 0, 2}, {0, 0.25, 0}).pressure_upa;
@@ -149,24 +147,20 @@ TEST(KernelSets, AFixedFanOfAnyNumberOfRaysIsTraced) {
       EXPECT_LT(error, 1e-4 * power) << rays << " rays, " << isa;
     }
   }
-  ::setenv("SONARD_EMBREE_ISA", kept.c_str(), 1);
 }
 
-// SONARD_SIMD holds everything that does not say otherwise, the tests' engines among it.
+// SONARD_SIMD holds everything that does not say otherwise, the tests' engines included.
 TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
-  const char* was = std::getenv("SONARD_SIMD");
-  const std::string kept = was == nullptr ? "" : was;
   for (const auto& [name, level] :
        {std::pair{"portable", SimdLevel::portable}, {"avx2", SimdLevel::avx2}, {"avx512", SimdLevel::avx512}}) {
-    ::setenv("SONARD_SIMD", name, 1);
+    const testing::HeldVariable held("SONARD_SIMD", name);
     EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(level)) << name;
     EXPECT_EQ(&simd::kernels_for(SimdLevel::portable), &simd::portable_kernels) << "what was asked for by itself stays";
   }
-  ::setenv("SONARD_SIMD", "", 1);
+  const testing::HeldVariable none("SONARD_SIMD", "");
   EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(SimdLevel::avx512)) << "the best there is";
-  ::setenv("SONARD_SIMD", "avx1024", 1);
+  const testing::HeldVariable unknown("SONARD_SIMD", "avx1024");
   EXPECT_THROW(simd::kernels_for(SimdLevel::automatic), std::runtime_error);
-  ::setenv("SONARD_SIMD", kept.c_str(), 1);
 }
 
 }  // namespace
