@@ -21,11 +21,17 @@ enum class ImageType { xy = 0, r_theta = 1 };
 /// XY no more than make a million pixels, because a client keeps whole images on its stack. Off: as automatic.
 enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 
+/// How near an XY image begins: with the nearest corners of the sector, or with the sonar itself.
+enum class XyBottom { sector, sonar };
+/// BVE_XY=sector or sonar; sector when it says neither.
+XyBottom xy_bottom_from_environment();
+
 /// The lowest set flag wins (verified values; chosen: applied to the finished image).
 enum FilterFlags : int { no_filter = 0, mean_3x3 = 2, mean_9x2 = 16 };
 
 struct ImageSettings {
   ImageRes resolution = ImageRes::automatic;
+  XyBottom xy_bottom = xy_bottom_from_environment();
   /// Wishes; 0 = none. A size wins over a range resolution, that over `resolution` (chosen).
   float range_resolution_m = 0;                   // metres per row; at most a million pixels are made for it
   int requested_height = 0, requested_width = 0;  // XY keeps the height and adjusts the width (verified); a width alone sets both
@@ -47,7 +53,8 @@ struct ImageGeometry {
   double start_m = 0, stop_m = 0;  // of what is shown, sound speed override applied
 
   /// Any row and column, also outside the image: clients ask one past the end (verified). R-Theta labels a column by its
-  /// left edge (verified), XY a pixel by its centre (chosen).
+  /// left edge (verified). XY counts whole pixels from the origin (verified): x = (col - origin_col) * range_resolution_m to
+  /// starboard, y = (origin_row - row) * range_resolution_m ahead.
   double pixel_range_m(int row, int col) const;
   double pixel_bearing_deg(int row, int col) const;
   std::size_t pixel_count() const { return static_cast<std::size_t>(height) * static_cast<std::size_t>(width); }

@@ -31,11 +31,11 @@ PolarLookup::PolarLookup(const Key& key) : key_(key) {
   const double beam_deg = (key.fov_max_deg - key.fov_min_deg) / key.beams;
   const double end_m = std::min(key.stop_m, key.start_m + key.bins * key.bin_m * (1 + 1e-6));
   for (int row = 0; row < key.height; ++row) {
-    const double ahead_m = (key.height - row - 0.5) * key.pixel_m;
+    const double ahead_m = (key.origin_row - row) * key.pixel_m;
     if (ahead_m > end_m) continue;
     bool inside_before = false;
     for (int col = 0; col < key.width; ++col) {
-      const double starboard_m = (col + 0.5 - 0.5 * key.width) * key.pixel_m;
+      const double starboard_m = (col - key.origin_col) * key.pixel_m;
       const double range_m = std::sqrt(starboard_m * starboard_m + ahead_m * ahead_m);
       bool inside = range_m >= key.start_m && range_m <= end_m;
       double bearing_deg = 0;

@@ -17,15 +17,16 @@ class PolarLookup {
  public:
   struct Key {
     int height = 0, width = 0;
+    int origin_row = 0, origin_col = 0;  // the sonar
     double pixel_m = 0;
     double start_m = 0, stop_m = 0, bin_m = 0;
     double fov_min_deg = 0, fov_max_deg = 0;
     int beams = 0, bins = 0;
 
     bool operator==(const Key& o) const {
-      return height == o.height && width == o.width && pixel_m == o.pixel_m && start_m == o.start_m && stop_m == o.stop_m &&
-             bin_m == o.bin_m && fov_min_deg == o.fov_min_deg && fov_max_deg == o.fov_max_deg && beams == o.beams &&
-             bins == o.bins;
+      return height == o.height && width == o.width && origin_row == o.origin_row && origin_col == o.origin_col &&
+             pixel_m == o.pixel_m && start_m == o.start_m && stop_m == o.stop_m && bin_m == o.bin_m &&
+             fov_min_deg == o.fov_min_deg && fov_max_deg == o.fov_max_deg && beams == o.beams && bins == o.bins;
     }
   };
 

@@ -59,38 +59,75 @@ TEST(XyImage, ShowsATargetWhereItIsAndNotMirrored) {
       EXPECT_NEAR(image.pixel_range_m(row, col), range, 0.04) << range << " " << bearing;
       EXPECT_NEAR(image.pixel_bearing_deg(row, col), bearing, 0.6) << range << " " << bearing;
       // The picture itself, as an eye or OpenCV takes it: up is ahead, right is starboard.
-      const double ahead = (image.origin_row - spot.row - 0.5) * image.range_resolution_m;
-      const double starboard = (spot.col + 0.5 - image.origin_col) * image.range_resolution_m;
+      const double ahead = (image.origin_row - spot.row) * image.range_resolution_m;
+      const double starboard = (spot.col - image.origin_col) * image.range_resolution_m;
       EXPECT_NEAR(ahead, range * std::cos(bearing / 57.29578), 0.04);
       EXPECT_NEAR(starboard, range * std::sin(bearing / 57.29578), 0.04);
     }
 }
 
 TEST(XyImage, HasTheSizesOfItsDefinition) {
-  // 11 m, 400 bins: as many rows as bins; 45 degrees to each side.
+  // 1 to 11 m, 400 bins: as many rows as bins; 45 degrees to each side.
   const MagImage image = image_of(make_ping_with_target(5, 0), ImageType::xy);
+  const double shown_m = 11 - std::sqrt(0.5);
   EXPECT_EQ(image.height, 400);
-  EXPECT_EQ(image.width, 2 * static_cast<int>(std::ceil(400 * std::sin(45 / 57.29577951))));
-  EXPECT_DOUBLE_EQ(image.range_resolution_m, 11.0 / 400);
-  EXPECT_EQ(image.origin_row, 400);
+  EXPECT_EQ(image.width, 2 * static_cast<int>(std::ceil(11 * std::sqrt(0.5) / (shown_m / 400))));
+  EXPECT_NEAR(image.range_resolution_m, shown_m / 400, 1e-8);
+  EXPECT_EQ(image.origin_row, 400 + 27);  // 0.707 m of 25.7 mm
   EXPECT_EQ(image.origin_col, image.width / 2);
   EXPECT_EQ(image.bearing_resolution_deg, 0);
   EXPECT_EQ(image.fov_min_deg, -45);
   EXPECT_EQ(image.pixels.size(), image.pixel_count());
 }
 
-TEST(XyImage, KeepsARequestedHeightAndAdjustsTheWidth) {
-  // 45 degrees, 2-15 m, 480 rows asked for. A client of the real library noted 394 columns, which would be a sector of 48.5
-  // degrees by our definition; unknown: why.
-  PolarPing ping = make_ping(256, 500, 2, 0.026f, [](int, int) { return 100; });
-  ping.fov_min_deg = -22.5f;
-  ping.fov_max_deg = 22.5f;
+TEST(XyImage, PutsPixelsWhereTheVendorsLibraryPutThem) {
+  // A public table of every pixel's range and bearing, from a 45 degree head asked for 2 to 15 m and 640 x 480, follows
+  // x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m in 394 x 480. The sector and stop range that the ping had are the
+  // ones from which those four numbers follow.
+  PolarPing ping = make_ping(256, 500, 2, 0.02508f, [](int, int) { return 100; });
+  ping.fov_min_deg = -20.95f;
+  ping.fov_max_deg = 20.95f;
+  ASSERT_NEAR(ping.stop_m, 14.54, 1e-4);
   ImageSettings settings;
   settings.requested_height = 480;
   settings.requested_width = 640;
   const MagImage image = image_of(ping, ImageType::xy, settings);
   EXPECT_EQ(image.height, 480);
-  EXPECT_EQ(image.width, 368);
+  EXPECT_EQ(image.width, 394);
+  EXPECT_EQ(image.origin_row, 550);
+  EXPECT_EQ(image.origin_col, 197);
+  EXPECT_NEAR(image.range_resolution_m, 0.026401, 1e-6);
+  for (int row = 0; row <= 480; row += 60)
+    for (int col = 0; col <= 394; ++col) {
+      const double x = (col - 197) * 0.026401, y = (550 - row) * 0.026401;
+      EXPECT_NEAR(image.pixel_range_m(row, col), std::hypot(x, y), 0.001);
+      EXPECT_NEAR(image.pixel_bearing_deg(row, col), 57.29577951 * std::atan2(x, y), 1e-6);
+    }
+  EXPECT_NEAR(image.pixel_range_m(12, 360), 14.841354, 0.0005);  // an entry as it stands there
+  EXPECT_NEAR(image.pixel_bearing_deg(12, 360), 16.855444, 1e-5);
+}
+
+TEST(XyImage, ReachesToTheSonarWhenTheEnvironmentSaysSo) {
+  const PolarPing ping = make_ping_with_target(4, 0);
+  for (const bool sonar : {false, true}) {
+    ASSERT_EQ(setenv("BVE_XY", sonar ? "sonar" : "sector", 1), 0);
+    const ImageSettings settings;
+    unsetenv("BVE_XY");
+    const MagImage image = image_of(ping, ImageType::xy, settings);
+    EXPECT_EQ(image.origin_row == image.height, sonar);
+    const Spot spot = spot_of(image);
+    EXPECT_NEAR((image.origin_row - spot.row) * image.range_resolution_m, 4, 0.04);
+  }
+}
+
+TEST(XyImage, KeepsARequestedHeightAndAdjustsTheWidth) {
+  const PolarPing ping = make_ping(256, 500, 2, 0.026f, [](int, int) { return 100; });
+  ImageSettings settings;
+  settings.requested_height = 480;
+  settings.requested_width = 640;
+  const MagImage image = image_of(ping, ImageType::xy, settings);
+  EXPECT_EQ(image.height, 480);
+  EXPECT_EQ(image.width, 750);  // 15 m sin 45 degrees to each side, pixels of (15 m - 2 m cos 45 degrees) / 480
   settings.requested_height = 0;
   const MagImage wide = image_of(ping, ImageType::xy, settings);
   EXPECT_NEAR(wide.width, 640, 2);
@@ -111,11 +148,11 @@ TEST(XyImage, FollowsTheResolutionPolicies) {
   settings.resolution = ImageRes::high;
   EXPECT_EQ(height(), 1000);
   settings.resolution = ImageRes::automatic;
-  EXPECT_EQ(height(), 840);  // 900 rows would be more than a million pixels
+  EXPECT_EQ(height(), 825);  // 900 rows would be more than a million pixels
   settings.range_resolution_m = 0.05f;
-  EXPECT_EQ(height(), 190);  // 9.5 m
+  EXPECT_EQ(height(), 183);  // 9.5 m less 0.35 m
   settings.range_resolution_m = 1e-9f;
-  EXPECT_LE(height() * height() * std::sqrt(2), 1e6);
+  EXPECT_LE(height() * height() * std::sqrt(2) * 9.5 / 9.15, 1e6);
   settings.requested_height = 300;
   EXPECT_EQ(height(), 300);
 }

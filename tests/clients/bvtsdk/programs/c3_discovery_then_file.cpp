@@ -71,7 +71,10 @@ static void check_image(BVTPing ping, const std::string& colour_maps, const std:
   EXPECT_OK(BVTPing_GetImage(ping, &image));
   expect_targets_in_image("XY", image);
   const int height = BVTMagImage_GetHeight(image), width = BVTMagImage_GetWidth(image);
-  EXPECT(BVTMagImage_GetOriginRow(image) == height && BVTMagImage_GetOriginCol(image) == width / 2);
+  // The image begins where the sector does, 1 m cos 45 degrees ahead of the sonar.
+  EXPECT_NEAR((BVTMagImage_GetOriginRow(image) - height) * BVTMagImage_GetRangeResolution(image), 0.707,
+              BVTMagImage_GetRangeResolution(image));
+  EXPECT(BVTMagImage_GetOriginCol(image) == width / 2);
   const double beyond = BVTMagImage_GetPixelRange(image, height, width);  // one past the end
   EXPECT(beyond == beyond);
   EXPECT(BVTMagImage_GetRow(image, 1) == BVTMagImage_GetBits(image) + width && BVTMagImage_GetRow(image, height) == NULL);
