@@ -51,11 +51,22 @@ class SignalsBlocked {
 
 Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& link, SonarDescription& sonar,
                 const Patience& patience) {
-  std::string host, port = default_port();
-  if (!split_endpoint(endpoint, host, port)) return bad_parameter;
+  std::string host, port = default_port(), why;
+  const auto refuse = [&](int code, const std::string& reason) {
+    log(LogLevel::warning, "cannot open the sonar at \"" + endpoint + "\": " + reason);
+    return static_cast<Code>(code);
+  };
+  if (!split_endpoint(endpoint, host, port))
+    return refuse(bad_parameter, "write HOST or HOST:PORT, and a port from 1 to 65535 there or in BVE_PORT");
   Descriptor socket;
-  const Code code = connect_to(host, port, Clock::now() + patience.connect, socket);
-  if (code != success) return code;
+  const Code code = connect_to(host, port, Clock::now() + patience.connect, socket, why);
+  if (code == lookup_host) return refuse(code, why + "; check the host's name, or give its IPv4 address");
+  const std::string there = "TCP port " + port;
+  if (code != success)
+    return refuse(
+        code, there + ": " + why +
+                  "; check that sonard runs a BlueView sonar at that address; another port goes behind the host (HOST:PORT) or "
+                  "into BVE_PORT");
   std::unique_ptr<Link> fresh(new Link(std::move(socket), patience));
   Bytes hello, answer;
   put(hello, protocol_version);
@@ -63,10 +74,16 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
   put_text(hello, "libbvtsdk");
   const int greeted = fresh->ask(FrameType::hello, hello, answer, patience.connect);
   // Hosts retry on connection_timed_out and give up on all else, so a sonar that is just starting or ending counts as that.
-  if (greeted == bad_packet_type || greeted == bad_packet_version) return static_cast<Code>(greeted);
-  if (greeted != success) return connection_timed_out;
+  if (greeted == bad_packet_type) return refuse(greeted, "what answers at " + there + " is no sonar of sonard's; check the port");
+  if (greeted == bad_packet_version)
+    return refuse(greeted, "sonard at " + there + " speaks another version of the link; use library and sonard of one release");
+  if (greeted != success)
+    return refuse(connection_timed_out, there + " took the connection and " +
+                                            (greeted == socket_read_timeout ? "says nothing" : "closed it again") +
+                                            "; sonard is starting, ending or stopped: see its log, and open again");
   std::optional<SonarDescription> told = decode_description(answer);
-  if (!told) return bad_packet_type;
+  if (!told)
+    return refuse(bad_packet_type, "what answers at " + there + " describes no sonar; use library and sonard of one release");
   fresh->may_be_silent_ = told->may_be_silent();
   sonar = std::move(*told);
   link = std::move(fresh);

@@ -30,7 +30,7 @@ class Link {
  public:
   /// `endpoint` is "host" or "host:port"; the port is else that of the environment variable BVE_PORT, else 14750.
   /// bad_parameter, lookup_host, connection_timed_out (refused, unreachable, or silent), bad_packet_type (something else lives
-  /// there), bad_packet_version.
+  /// there), bad_packet_version. A failure is logged with its reason.
   static Code open(const std::string& endpoint, int abi, std::unique_ptr<Link>& link, SonarDescription& sonar,
                    const Patience& patience = {});
   /// Closes, and waits for the reader to end.

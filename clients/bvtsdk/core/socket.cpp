@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <memory>
+#include <system_error>
 
 namespace sonar::bvt {
 namespace {
@@ -20,12 +21,14 @@ int milliseconds_until(Deadline deadline) {
   return static_cast<int>(std::clamp<decltype(left)>(left, 0, 3600000));
 }
 
-bool finish_connecting(int fd, const addrinfo& address, Deadline deadline) {
-  if (connect(fd, address.ai_addr, address.ai_addrlen) == 0) return true;
-  if (errno != EINPROGRESS || wait_for(fd, POLLOUT, deadline) != success) return false;
+/// 0, or what went wrong as errno has it.
+int finish_connecting(int fd, const addrinfo& address, Deadline deadline) {
+  if (connect(fd, address.ai_addr, address.ai_addrlen) == 0) return 0;
+  if (errno != EINPROGRESS) return errno;
+  if (wait_for(fd, POLLOUT, deadline) != success) return ETIMEDOUT;
   int error = 0;
   socklen_t size = sizeof error;
-  return getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error == 0;
+  return getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &size) == 0 ? error : errno;
 }
 
 }  // namespace
@@ -48,16 +51,23 @@ bool split_endpoint(const std::string& endpoint, std::string& host, std::string&
   return !host.empty() && number && std::stoi(port) >= 1 && std::stoi(port) <= 65535;
 }
 
-Code connect_to(const std::string& host, const std::string& port, Deadline deadline, Descriptor& out) {
+Code connect_to(const std::string& host, const std::string& port, Deadline deadline, Descriptor& out, std::string& why) {
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
   hints.ai_flags = AI_NUMERICSERV;
   addrinfo* list = nullptr;
-  if (getaddrinfo(host.c_str(), port.c_str(), &hints, &list) != 0) return lookup_host;
+  if (const int error = getaddrinfo(host.c_str(), port.c_str(), &hints, &list)) {
+    why = gai_strerror(error);
+    return lookup_host;
+  }
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owner(list, &freeaddrinfo);
   for (const addrinfo* a = list; a; a = a->ai_next) {
     Descriptor fd(socket(a->ai_family, a->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, a->ai_protocol));
-    if (!fd || !finish_connecting(fd.fd(), *a, deadline)) continue;
+    const int error = fd ? finish_connecting(fd.fd(), *a, deadline) : errno;
+    if (error != 0) {
+      why = std::generic_category().message(error);
+      continue;
+    }
     const int on = 1;
     setsockopt(fd.fd(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     out = std::move(fd);

@@ -29,8 +29,8 @@ class Descriptor {
 bool split_endpoint(const std::string& endpoint, std::string& host, std::string& port);
 
 /// Connects to the first address of the host that takes it. lookup_host when the name is unknown, connection_timed_out when
-/// nobody takes it by the deadline or it is refused. The socket does not block.
-Code connect_to(const std::string& host, const std::string& port, Deadline deadline, Descriptor& out);
+/// nobody takes it by the deadline or it is refused; `why` is then what the system says. The socket does not block.
+Code connect_to(const std::string& host, const std::string& port, Deadline deadline, Descriptor& out, std::string& why);
 
 /// success, timeout (nothing came or went by the deadline), or failed. `events` as for poll().
 Code wait_for(int fd, short events, Deadline deadline);

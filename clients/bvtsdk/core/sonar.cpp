@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/bvtsdk/core/log.hpp"
+
 namespace sonar::bvt {
 namespace {
 
@@ -76,8 +78,12 @@ int Sonar::open(const std::string& type, const std::string& parameter, int abi) 
   reset();
   std::shared_ptr<Source> source;
   int code = bad_parameter;
-  if (type == "NET") code = open_live(parameter, abi, source);
-  if (type == "FILE") code = open_recording(parameter, source);
+  if (type == "NET")
+    code = open_live(parameter, abi, source);
+  else if (type == "FILE")
+    code = open_recording(parameter, source);
+  else
+    log(LogLevel::warning, "cannot open type \"" + type + "\": write NET and an address, or FILE and a path");
   if (code == success) use(std::move(source));
   return code;
 }

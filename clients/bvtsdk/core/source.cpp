@@ -176,7 +176,10 @@ Code open_recording(const std::string& path, std::shared_ptr<Source>& source) {
 Code create_recording(const std::string& path, const SonarDescription& sonar, std::shared_ptr<Source>& source) {
   auto writer = std::make_unique<RecordingWriter>();
   const Code code = writer->create(path, encode_description(sonar));
-  if (code == success) source = std::make_shared<WrittenSource>(sonar, std::move(writer));
+  if (code == success)
+    source = std::make_shared<WrittenSource>(sonar, std::move(writer));
+  else
+    log(LogLevel::warning, path + " cannot be created; check that its folder exists, may be written and has room");
   return code;
 }
 

@@ -8,7 +8,12 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <cstdio>
+#include <fstream>
 #include <future>
+#include <iterator>
+
+#include "clients/bvtsdk/core/log.hpp"
 
 namespace sonar::bvt {
 namespace {
@@ -285,6 +290,45 @@ TEST(Link, ClosingTellsWhoWaits) {
   asked.get_future().wait();
   link->close();
   EXPECT_EQ(code.get(), socket_closed);
+}
+
+/// What the library logs while `work` runs.
+template <class F>
+std::string logged(const F& work) {
+  const std::string path = testing::TempDir() + "bvtsdk_link_test.log";
+  std::remove(path.c_str());
+  EXPECT_TRUE(set_log_target(path));
+  work();
+  set_log_target("stderr");
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+TEST(LinkOpen, LogsWhatFailedWhereAndWhatToDo) {
+  std::unique_ptr<Link> link;
+  SonarDescription sonar;
+  const auto opening = [&](const std::string& endpoint) { return logged([&] { Link::open(endpoint, 4, link, sonar); }); };
+  using testing::AllOf, testing::HasSubstr;
+  EXPECT_THAT(
+      opening("127.83.1.18:1"),
+      AllOf(HasSubstr("\"127.83.1.18:1\": TCP port 1: Connection refused; check that sonard runs"), HasSubstr("BVE_PORT")));
+  EXPECT_THAT(opening("not an address"), AllOf(HasSubstr("\"not an address\""), HasSubstr("check the host's name")));
+  EXPECT_THAT(opening("127.0.0.1:port"), AllOf(HasSubstr("\"127.0.0.1:port\""), HasSubstr("HOST:PORT")));
+  FakeSonar gone([](Peer&) {});
+  EXPECT_THAT(logged([&] { gone.open(link); }), AllOf(HasSubstr(gone.endpoint()), HasSubstr("closed it again")));
+  FakeSonar silent([](Peer& peer) { peer.wait_for_the_end(); });
+  EXPECT_THAT(logged([&] { silent.open(link, {200ms, 10s, 50ms, 20s}); }), HasSubstr("says nothing"));
+  FakeSonar stranger([](Peer& peer) {
+    peer.send_raw(Bytes(64, 'H'));
+    peer.wait_for_the_end();
+  });
+  EXPECT_THAT(logged([&] { stranger.open(link); }), HasSubstr("check the port"));
+  FakeSonar right([](Peer& peer) {
+    peer.greet();
+    peer.wait_for_the_end();
+  });
+  EXPECT_EQ(logged([&] { right.open(link); }), "");
+  link.reset();
 }
 
 TEST(LinkOpen, TellsWhyNobodyCanBeReached) {
