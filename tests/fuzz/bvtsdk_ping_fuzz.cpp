@@ -66,8 +66,10 @@ void play_back(const std::uint8_t* data, std::size_t size, bool put_right) {
   RecordingReader reader;
   if (reader.open(File(fmemopen(bytes.data(), bytes.size(), "rb"))) != success) return;
   PolarPing ping;
-  for (int n = 0; n < std::min(reader.ping_count(0), 20); ++n)
+  for (int n = 0; n < std::min(reader.ping_count(0), 20); ++n) {
     if (reader.read_ping(0, n, ping) == success) use(ping, data[size - 1]);
+    require(reader.hello_of_ping(0, n).size() <= size);
+  }
   NavData nav;
   double time_s = 0;
   for (int n = 0; n < std::min(reader.nav_count(), 20); ++n)

@@ -2,6 +2,15 @@
 
 namespace sonar::bvt {
 
+void take_settings(HeadDescription& to, const HeadDescription& from) {
+  to.start_m = from.start_m;
+  to.stop_m = from.stop_m;
+  to.sound_speed_mps = from.sound_speed_mps;
+  to.gain_db = from.gain_db;
+  to.tvg_db_per_m = from.tvg_db_per_m;
+  to.fluid = from.fluid;
+}
+
 const HeadDescription* SonarDescription::head(int number) const {
   for (const HeadDescription& h : heads)
     if (h.id == number) return &h;

@@ -24,6 +24,9 @@ struct HeadDescription {
   std::int32_t fluid = 0;  // 0 salt, 1 fresh, 2 other
 };
 
+/// What a host may set of a head, from one description into another; the rest says what the head is.
+void take_settings(HeadDescription& to, const HeadDescription& from);
+
 struct SonarDescription {
   std::uint16_t version = 1;
   std::string model, name, serial, firmware;

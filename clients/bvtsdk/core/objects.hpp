@@ -3,6 +3,7 @@
 #pragma once
 
 #include "clients/bvtsdk/core/colour_maps.hpp"
+#include "clients/bvtsdk/core/description.hpp"
 #include "clients/bvtsdk/core/discovery.hpp"
 #include "clients/bvtsdk/core/handles.hpp"
 #include "clients/bvtsdk/core/imaging.hpp"
@@ -43,6 +44,7 @@ struct HeadImaging {
 
 struct PingObject : Object {
   PolarPing polar;
+  HeadDescription settings;  // the head's when it pinged
   HeadImaging imaging;
   std::shared_ptr<Imager> imager;  // the head's: it remembers its tables
   void* range_data = nullptr;      // 3.x: belongs to the ping and dies with it

@@ -42,7 +42,7 @@ bool place_of(FrameType type, BytesView payload, FramePlace& place) {
     place.time_s = reader.take<double>();
   } else if (type == FrameType::event_mark) {
     place.time_s = reader.take<double>();
-  } else {
+  } else if (type != FrameType::hello_ok) {
     return false;
   }
   return reader.ok();
@@ -61,7 +61,8 @@ Code RecordingWriter::create(const std::string& path, BytesView hello) {
   put(header, std::uint16_t{0});
   if (!write_all(file_.get(), header)) return file_write;
   size_ = header.size();
-  return put_frame(FrameType::hello_ok, hello, 0, 0);
+  hello_.assign(hello.data, hello.data + hello.size);
+  return put_frame(FrameType::hello_ok, hello_, 0, 0);
 }
 
 Code RecordingWriter::put_frame(FrameType type, BytesView payload, std::int32_t head, double time_s) {
@@ -77,13 +78,17 @@ Code RecordingWriter::put_frame(FrameType type, BytesView payload, std::int32_t 
     file_.reset();  // what follows half a frame would never be read; whole frames before it will
     return file_write;
   }
-  if (type != FrameType::hello_ok && type != FrameType::index) places_.push_back({type, head, time_s, size_});
+  if (size_ > file_header_size && type != FrameType::index) places_.push_back({type, head, time_s, size_});
   size_ += header.size() + payload.size + crc.size();
   return success;
 }
 
-Code RecordingWriter::put_ping(std::int32_t head, const PolarPing& ping) {
+Code RecordingWriter::put_ping(std::int32_t head, const PolarPing& ping, BytesView hello) {
   if (!file_) return file_not_open;
+  if (!std::equal(hello_.begin(), hello_.end(), hello.data, hello.data + hello.size)) {
+    hello_.assign(hello.data, hello.data + hello.size);
+    if (const Code code = put_frame(FrameType::hello_ok, hello_, 0, 0); code != success) return code;
+  }
   Bytes payload = encode_ping(ping);
   Bytes number;
   put(number, head);
@@ -171,6 +176,8 @@ Code RecordingReader::open(File file, std::string* why) {
   const std::uint64_t first = file_header_size + frame_header_size + hello_.size() + crc_size;
   has_index_ = read_index();
   if (!has_index_) scan(first);
+  for (Lane& lane : lanes_)
+    if (lane.type == FrameType::hello_ok) std::sort(lane.offsets.begin(), lane.offsets.end());  // searched; an index may lie
   return success;
 }
 
@@ -234,6 +241,17 @@ const std::vector<std::uint64_t>& RecordingReader::places(FrameType type, std::i
   static const std::vector<std::uint64_t> none;
   const auto lane = std::find_if(lanes_.begin(), lanes_.end(), [&](const Lane& l) { return l.type == type && l.head == head; });
   return lane == lanes_.end() ? none : lane->offsets;
+}
+
+Bytes RecordingReader::hello_of_ping(std::int32_t head, int n) {
+  const auto& pings = places(FrameType::ping_data, head);
+  const auto& hellos = places(FrameType::hello_ok);
+  if (n < 0 || static_cast<std::size_t>(n) >= pings.size()) return hello_;
+  const auto after = std::lower_bound(hellos.begin(), hellos.end(), pings[static_cast<std::size_t>(n)]);
+  FrameHeader header;
+  Bytes payload;
+  if (after == hellos.begin() || !read_frame(*(after - 1), header, payload) || header.type != FrameType::hello_ok) return hello_;
+  return payload;
 }
 
 Code RecordingReader::read_ping(std::int32_t head, int n, PolarPing& ping) {

@@ -2,9 +2,10 @@
 // what NET mode saw. The vendor's .son files are proprietary and are refused.
 //
 // File: "BVER", u16 version = 1, u16 0; then frames (frame.hpp), each followed by the CRC-32 of its header and payload:
-// HELLO_OK first, then PING_DATA, NAV_DATA (u16 bitmap, values, f64 time) and EVENT_MARK (f64 time, text key, text) in the order
-// they came. A closed file ends with an index frame: u32 entries, per entry u16 type, i32 head, f64 time, u64 offset of the
-// frame, and at last the u64 offset of the index frame itself. Without it the file is scanned up to the last whole frame.
+// HELLO_OK first, and again before a ping that was made with other settings, then PING_DATA, NAV_DATA (u16 bitmap, values, f64
+// time) and EVENT_MARK (f64 time, text key, text) in the order they came. A closed file ends with an index frame: u32 entries,
+// per entry u16 type, i32 head, f64 time, u64 offset of the frame, and at last the u64 offset of the index frame itself. Without
+// it the file is scanned up to the last whole frame.
 #pragma once
 
 #include <cstdint>
@@ -37,8 +38,8 @@ class RecordingWriter {
   /// Makes or overwrites the file. `hello`: payload of HELLO_OK, opaque here. file_create, file_write.
   Code create(const std::string& path, BytesView hello);
   /// Whole frames reach the file at once, so that it can be read while it grows. file_not_open, file_write.
-  /// `head` replaces the ping's.
-  Code put_ping(std::int32_t head, const PolarPing& ping);
+  /// `head` replaces the ping's. `hello`: payload of HELLO_OK with the settings the ping was made with.
+  Code put_ping(std::int32_t head, const PolarPing& ping, BytesView hello);
   Code put_nav(const NavData& nav, double time_s);
   Code put_event(const EventMark& mark);
   /// Appends the index and closes. The destructor closes too.
@@ -58,6 +59,7 @@ class RecordingWriter {
 
   File file_;
   std::uint64_t size_ = 0;
+  Bytes hello_;  // the last one written
   std::vector<FramePlace> places_;
 };
 
@@ -69,7 +71,9 @@ class RecordingReader {
   Code open(const std::string& path, std::string* why = nullptr);
   Code open(File file, std::string* why = nullptr);
 
-  const Bytes& hello() const { return hello_; }  // payload of HELLO_OK
+  const Bytes& hello() const { return hello_; }  // payload of the first HELLO_OK
+  /// Payload of the one that holds for ping n of a head; the first one's when there is no other.
+  Bytes hello_of_ping(std::int32_t head, int n);
   std::uint64_t size_bytes() const { return size_; }
   /// False when the last writer never closed the file, or its end is damaged.
   bool has_index() const { return has_index_; }

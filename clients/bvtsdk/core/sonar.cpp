@@ -66,8 +66,10 @@ int Head::get_ping(int n, std::shared_ptr<PingObject>& ping) {
   const milliseconds patience = ping_patience + 2 * milliseconds(std::clamp(ping_interval_ms, 0, 600000)) +
                                 milliseconds(static_cast<int>(2000 * std::clamp(travel_s, 0.0, 600.0)));
   auto fresh = std::make_shared<PingObject>();
-  const int code = source_->get_ping(now.id, n, patience, fresh->polar);
+  fresh->settings = now;
+  const int code = source_->get_ping(now.id, n, patience, fresh->polar, fresh->settings);
   if (code != success) return code;
+  take_settings(now, fresh->settings);
   fresh->imaging = imaging;
   fresh->imager = imager_;
   ping = std::move(fresh);
@@ -116,6 +118,15 @@ int Sonar::head(int number, std::shared_ptr<Head>& head) const {
   for (const std::shared_ptr<Head>& h : heads_)
     if (h->now.id == meant->id) head = h;
   return success;
+}
+
+SonarDescription Sonar::description() const {
+  SonarDescription out = source_->sonar();
+  for (std::size_t i = 0; i < out.heads.size(); ++i) {  // heads_ are in the same order
+    const std::lock_guard lock(heads_[i]->mutex);
+    take_settings(out.heads[i], heads_[i]->now);
+  }
+  return out;
 }
 
 int Sonar::put_event(const std::string& key, const std::string& text) {

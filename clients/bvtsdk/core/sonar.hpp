@@ -14,7 +14,7 @@ class Head : public Object {
  public:
   Head(std::shared_ptr<Source> source, const HeadDescription& description);
 
-  /// What was last applied. Other hosts of the same sonar are not asked.
+  /// What was last applied, or held when the ping of a recording was made. Other hosts of the same sonar are not asked.
   HeadDescription now;
   HeadImaging imaging;
   int transmit = 1, ping_interval_ms = 0, dynamic_power = 0, mount = 0;  // mount is kept and read back only
@@ -28,7 +28,7 @@ class Head : public Object {
   int set(Key key, float value, float& kept);
 
   int get_ping(int n, std::shared_ptr<PingObject>& ping);
-  int put_ping(const PolarPing& ping) { return source_->put_ping(now.id, ping); }
+  int put_ping(const PingObject& ping) { return source_->put_ping(now.id, ping.polar, ping.settings); }
   int ping_count() const { return source_->ping_count(now.id); }
 
   void* borrowed = nullptr;  // 3.x: the one handle, which belongs to the sonar
@@ -52,6 +52,8 @@ class Sonar : public Object {
   int head(int number, std::shared_ptr<Head>& head) const;
 
   const Source* source() const { return source_.get(); }  // null: not open
+  /// What it said of itself, with the settings that hold now. Waits for calls on its heads. Only while it is open.
+  SonarDescription description() const;
   int put_event(const std::string& key, const std::string& text);
   int set_local_clock(int on);
   int local_clock() const { return local_clock_; }

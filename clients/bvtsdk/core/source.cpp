@@ -26,7 +26,7 @@ class LiveSource : public Source {
   }
   int get(int head, RangeLimits& limits) override { return ask_limits(FrameType::get, address(head, Key::range), limits); }
 
-  int get_ping(int head, int, std::chrono::milliseconds patience, PolarPing& ping) override {
+  int get_ping(int head, int, std::chrono::milliseconds patience, PolarPing& ping, HeadDescription&) override {
     Bytes request, answer;
     put(request, static_cast<std::int32_t>(head));
     put(request, static_cast<std::uint32_t>(patience.count()));
@@ -81,17 +81,26 @@ class LiveSource : public Source {
   const std::unique_ptr<Link> link_;
 };
 
+void take_recorded_settings(RecordingReader& reader, int n, HeadDescription& head) {
+  const std::optional<SonarDescription> then = decode_description(reader.hello_of_ping(head.id, n));
+  if (!then) return;
+  for (const HeadDescription& h : then->heads)
+    if (h.id == head.id) take_settings(head, h);
+}
+
 class PlayedSource : public Source {
  public:
   PlayedSource(SonarDescription sonar, std::unique_ptr<RecordingReader> reader)
       : Source(std::move(sonar)), reader_(std::move(reader)) {}
 
-  int get_ping(int head, int n, std::chrono::milliseconds, PolarPing& ping) override {
+  int get_ping(int head, int n, std::chrono::milliseconds, PolarPing& ping, HeadDescription& settings) override {
     const std::lock_guard lock(mutex_);
     int& next = next_[head];
     const int wanted = n < 0 ? next : n;
     const int code = reader_->read_ping(head, wanted, ping);
-    if (code == success) next = wanted + 1;
+    if (code != success) return code;
+    next = wanted + 1;
+    take_recorded_settings(*reader_, wanted, settings);
     return code;
   }
   int ping_count(int head) const override { return reader_->ping_count(head); }
@@ -112,11 +121,13 @@ class PlayedSource : public Source {
 class WrittenSource : public Source {
  public:
   WrittenSource(SonarDescription sonar, std::unique_ptr<RecordingWriter> writer)
-      : Source(std::move(sonar)), writer_(std::move(writer)) {}
+      : Source(std::move(sonar)), now_(this->sonar()), writer_(std::move(writer)) {}
 
-  int put_ping(int head, const PolarPing& ping) override {
+  int put_ping(int head, const PolarPing& ping, const HeadDescription& settings) override {
     const std::lock_guard lock(mutex_);
-    return writer_->put_ping(head, ping);
+    for (HeadDescription& h : now_.heads)
+      if (h.id == head) take_settings(h, settings);
+    return writer_->put_ping(head, ping, encode_description(now_));
   }
   int put_event(const EventMark& mark) override {
     const std::lock_guard lock(mutex_);
@@ -143,6 +154,7 @@ class WrittenSource : public Source {
     return writer_->count(type);
   }
   mutable std::mutex mutex_;
+  SonarDescription now_;  // with the settings of the last ping
   const std::unique_ptr<RecordingWriter> writer_;
 };
 
@@ -169,6 +181,7 @@ Code open_recording(const std::string& path, std::shared_ptr<Source>& source) {
     log(LogLevel::warning, path + " does not say which sonar it is from; its head is damaged");
     return file_header_bad;
   }
+  for (HeadDescription& head : sonar->heads) take_recorded_settings(*reader, 0, head);
   source = std::make_shared<PlayedSource>(std::move(*sonar), std::move(reader));
   return success;
 }

@@ -50,8 +50,12 @@ class Source {
   virtual int get(int /*head*/, RangeLimits&) { return success; }
 
   /// n < 0: the next one. Live: always a new one, whatever n says; `patience` on top of the sonar's own time.
-  virtual int get_ping(int /*head*/, int /*n*/, std::chrono::milliseconds /*patience*/, PolarPing&) { return not_implemented; }
-  virtual int put_ping(int /*head*/, const PolarPing&) { return read_only_file; }
+  /// `settings`: the head's, which become those the ping was recorded with.
+  virtual int get_ping(int /*head*/, int /*n*/, std::chrono::milliseconds /*patience*/, PolarPing&,
+                       HeadDescription& /*settings*/) {
+    return not_implemented;
+  }
+  virtual int put_ping(int /*head*/, const PolarPing&, const HeadDescription& /*settings*/) { return read_only_file; }
   virtual int put_event(const EventMark&) { return read_only_file; }
   virtual int ping_count(int /*head*/) const { return 1; }
   virtual int ping_count() const { return 0; }  // of a recording, all heads

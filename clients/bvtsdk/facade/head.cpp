@@ -60,7 +60,7 @@ RetVal BVTHead_GetPing(BVTHead self, int number, BVTPing* out) {
   });
 }
 RetVal BVTHead_PutPing(BVTHead self, BVTPing ping) {
-  return on<Head>(self, [&](Head& o) -> int { return on<PingObject>(ping, [&](PingObject& p) { return o.put_ping(p.polar); }); });
+  return on<Head>(self, [&](Head& o) -> int { return on<PingObject>(ping, [&](PingObject& p) { return o.put_ping(p); }); });
 }
 
 // How later pings of this head turn into images; the sonar does not know of it.

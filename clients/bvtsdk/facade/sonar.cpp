@@ -41,7 +41,7 @@ RetVal BVTSonar_CreateFile(BVTSonar self, const char* file_name, BVTSonar source
   SonarDescription of;
   const int code = on<SonarObject>(source, [&](SonarObject& o) -> int {
     if (!o.source()) return net_not_connected;
-    of = o.source()->sonar();
+    of = o.description();
     return success;
   });
   return code != success ? code : on<SonarObject>(self, [&](SonarObject& o) { return o.create_file(file_name, of); });

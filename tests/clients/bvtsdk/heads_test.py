@@ -1,5 +1,8 @@
-"""Sonars with two heads, with strict head numbers and strict ranges, and with packed pings, through the 4.x library."""
+"""Sonars with two heads, with strict head numbers and strict ranges, and with packed pings, through the 4.x library; the settings
+that their recordings tell."""
 import ctypes
+import pathlib
+import tempfile
 import unittest
 
 from prefixes import Sonard, prefix
@@ -36,6 +39,9 @@ class Heads(unittest.TestCase):
     def set_range(self, head, start, stop):
         return self.sdk.BVTHead_SetRange(head, ctypes.c_float(start), ctypes.c_float(stop))
 
+    def gain(self, head):
+        return self.number(self.sdk.BVTHead_GetGainAdjustment, head, ctypes.c_float)
+
     def test_two_heads_have_their_own_frequencies_and_ranges(self):
         sonar = self.sonar("blueview-m900-2250-130", "compression: deflate")
         self.assertEqual(self.number(self.sdk.BVTSonar_GetHeadCount, sonar, ctypes.c_int), 2)
@@ -48,6 +54,35 @@ class Heads(unittest.TestCase):
             self.set_range(head, 1, 5)
             self.ping_works(head)
         self.assertEqual(self.head(sonar, 2), (NO_HEAD, 0))
+
+    def test_a_recording_tells_the_settings_of_its_pings(self):
+        sonar = self.sonar("blueview-p900-90", "compression: none")
+        _, head = self.head(sonar, 0)
+        folder = self.enterContext(tempfile.TemporaryDirectory())
+        file = str(pathlib.Path(folder) / "dive.son").encode()
+        recording = self.sdk.BVTSonar_Create()
+        self.set_range(head, 1, 5)
+        self.sdk.BVTHead_SetSoundSpeed(head, 1490)
+        self.assertEqual(self.sdk.BVTSonar_CreateFile(recording, file, sonar, b""), SUCCESS)
+        _, recorded = self.head(recording, 0)
+        self.assertEqual(self.number(self.sdk.BVTHead_GetSoundSpeed, recorded, ctypes.c_int), 1490)  # not that of connecting
+        for gain in (-6, -6, 3):
+            self.assertEqual(self.sdk.BVTHead_SetGainAdjustment(head, ctypes.c_float(gain)), SUCCESS)
+            ping = ctypes.c_longlong()
+            self.assertEqual(self.sdk.BVTHead_GetPing(head, -1, ctypes.byref(ping)), SUCCESS)
+            self.assertEqual(self.sdk.BVTHead_PutPing(recorded, ping.value), SUCCESS)
+            self.sdk.BVTPing_Destroy(ping.value)
+        self.sdk.BVTSonar_Destroy(recording)
+        player = self.sdk.BVTSonar_Create()
+        self.assertEqual(self.sdk.BVTSonar_Open(player, b"FILE", file), SUCCESS)
+        _, played = self.head(player, 0)
+        self.assertEqual(self.gain(played), -6)  # of the first ping
+        for wanted in (-6, -6, 3):
+            self.ping_works(played)
+            self.assertEqual(self.gain(played), wanted)
+        self.assertEqual(self.number(self.sdk.BVTHead_GetStopRange, played, ctypes.c_float), 5)
+        self.assertEqual(self.number(self.sdk.BVTHead_GetSoundSpeed, played, ctypes.c_int), 1490)
+        self.sdk.BVTSonar_Destroy(player)
 
     def test_strict_numbers_and_ranges(self):
         sonar = self.sonar("blueview-p900-90", "heads_base: strict, strict_range: on")

@@ -33,16 +33,16 @@ struct Recording : testing::Test {
   /// Pings 0, 1, 2 of head 0, ping 3 of head 1, a position and a mark between them.
   static void fill(RecordingWriter& writer, const std::string& to) {
     ASSERT_EQ(writer.create(to, hello), success);
-    ASSERT_EQ(writer.put_ping(0, ping_number(0)), success);
-    ASSERT_EQ(writer.put_ping(0, ping_number(1)), success);
+    ASSERT_EQ(writer.put_ping(0, ping_number(0), hello), success);
+    ASSERT_EQ(writer.put_ping(0, ping_number(1), hello), success);
     NavData nav;
     nav.present = nav_depth | nav_text;
     nav.depth_m = 33;
     nav.text = "by the wall";
     ASSERT_EQ(writer.put_nav(nav, 101.5), success);
-    ASSERT_EQ(writer.put_ping(1, ping_number(3)), success);
+    ASSERT_EQ(writer.put_ping(1, ping_number(3), hello), success);
     ASSERT_EQ(writer.put_event({102.25, "mine", "a suspicious shape"}), success);
-    ASSERT_EQ(writer.put_ping(0, ping_number(2)), success);
+    ASSERT_EQ(writer.put_ping(0, ping_number(2), hello), success);
   }
   std::string read() const {
     std::ifstream file(path, std::ios::binary);
@@ -189,7 +189,7 @@ TEST_F(Recording, IsRefusedWhenItIsNone) {
 
 TEST_F(Recording, IsNotWrittenWhereItCannotBe) {
   RecordingWriter writer;
-  EXPECT_EQ(writer.put_ping(0, ping_number(0)), file_not_open);
+  EXPECT_EQ(writer.put_ping(0, ping_number(0), hello), file_not_open);
   EXPECT_EQ(writer.put_event({}), file_not_open);
   EXPECT_EQ(writer.create(folder / "no" / "folder.son", hello), file_create);
   EXPECT_EQ(writer.close(), success);
@@ -199,11 +199,39 @@ TEST_F(Recording, IsNotWrittenWhereItCannotBe) {
   }
 }
 
+TEST_F(Recording, KeepsTheSettingsOfEachPing) {
+  const Bytes loud{1, 0, 9, 9}, quiet{1, 0, 5};
+  RecordingWriter writer;
+  ASSERT_EQ(writer.create(path, hello), success);
+  ASSERT_EQ(writer.put_ping(0, ping_number(0), loud), success);
+  ASSERT_EQ(writer.put_ping(1, ping_number(1), loud), success);
+  const std::uint64_t before = writer.size_bytes();
+  ASSERT_EQ(writer.put_ping(0, ping_number(2), loud), success);
+  const std::uint64_t unchanged = writer.size_bytes() - before;
+  ASSERT_EQ(writer.put_ping(0, ping_number(3), quiet), success);
+  EXPECT_LE(writer.size_bytes() - before, 2 * unchanged + frame_header_size + quiet.size() + 4);
+  for (const bool closed : {false, true}) {
+    if (closed) {
+      ASSERT_EQ(writer.close(), success);
+    }
+    RecordingReader reader;
+    ASSERT_EQ(reader.open(path), success);
+    EXPECT_EQ(reader.has_index(), closed);
+    EXPECT_EQ(reader.hello(), hello);
+    EXPECT_EQ(reader.hello_of_ping(0, 0), loud);
+    EXPECT_EQ(reader.hello_of_ping(1, 0), loud);
+    EXPECT_EQ(reader.hello_of_ping(0, 1), loud);
+    EXPECT_EQ(reader.hello_of_ping(0, 2), quiet);
+    EXPECT_EQ(reader.hello_of_ping(0, 3), hello);
+    EXPECT_EQ(reader.ping_count(0), 3);
+  }
+}
+
 TEST_F(Recording, StartsAnewWhenCreatedAgain) {
   RecordingWriter writer;
   fill(writer, path);
   ASSERT_EQ(writer.create(folder / "second.son", hello), success);
-  ASSERT_EQ(writer.put_ping(0, ping_number(9)), success);
+  ASSERT_EQ(writer.put_ping(0, ping_number(9), hello), success);
   ASSERT_EQ(writer.close(), success);
   RecordingReader reader;
   ASSERT_EQ(reader.open(path), success);
