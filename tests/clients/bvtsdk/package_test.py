@@ -89,6 +89,29 @@ class Package(unittest.TestCase):
             maps = {p.name: p.stat().st_size for p in (prefix(abi) / "colormaps").iterdir()}
             self.assertEqual(maps, {f"{n}.cmap": 3 * 4096 for n in ("jet", "bone", "hot", "copper", "cool", "green")})
 
+    def test_3x_handles_are_one_type_and_have_the_names_of_the_later_3x(self):
+        mixed = """#include <bvt_sdk.h>
+            int main(void) {
+              BVTHead head = BVTSonar_Create();  /* kept in a variable of another kind, as void* once allowed */
+              BVTPing ping = 0;
+              int code = BVTHead_GetPing(head, -1, &ping);
+              BVTSonar_Destroy(head);
+              return code;
+            }\n"""
+        named = """#include <bvt_sdk.h>
+            #include <memory>
+            int main() {
+              std::shared_ptr<BVTOpaqueSonar> sonar(BVTSonar_Create(), BVTSonar_Destroy);
+              std::shared_ptr<BVTOpaquePing> ping;
+              BVTHead head = nullptr;
+              return sonar && !ping ? BVTSonar_GetHead(sonar.get(), 0, &head) : 0;
+            }\n"""
+        for compiler, suffix, text, code in ((CC, ".c", mixed, 7), (CXX, ".cpp", mixed, 7), (CXX, ".cpp", named, 14003 % 256)):
+            with self.subTest(suffix=suffix, code=code):
+                done = self.build(compiler, 3, text, "-Werror", suffix=suffix, libraries=link(3))
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual(subprocess.run([pathlib.Path(self.folder.name) / "source.out"], check=False).returncode, code)
+
     def test_cmake_and_pkg_config_find_them(self):
         for abi in (3, 4):
             moved = pathlib.Path(self.folder.name) / f"moved{abi}"

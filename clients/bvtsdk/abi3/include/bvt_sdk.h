@@ -8,16 +8,20 @@ extern "C" {
 
 #define BVT_API __attribute__((visibility("default")))
 
-/* Handles. They are numbers, not addresses: never look behind them. Null is allowed wherever something is destroyed. */
-typedef struct BVTOpaqueSonar* BVTSonar;
-typedef struct BVTOpaqueHead* BVTHead;
-typedef struct BVTOpaquePing* BVTPing;
-typedef struct BVTOpaqueMagImage* BVTMagImage;
-typedef struct BVTOpaqueColorImage* BVTColorImage;
-typedef struct BVTOpaqueColorMapper* BVTColorMapper;
-typedef struct BVTOpaqueNavData* BVTNavData;
-typedef struct BVTOpaqueSonarDiscoveryAgent* BVTSonarDiscoveryAgent;
-typedef struct BVTOpaqueRangeData* BVTRangeData;
+/* Handles. They are numbers, not addresses: never look behind them. Null is allowed wherever something is destroyed. All are one
+ * pointer type, because hosts of the earlier 3.x, whose handles were all void*, keep one kind in a variable of another; calls
+ * answer BVT_INVALID_PTR to a handle of the wrong kind. Hosts of the later 3.x name the structs behind them. */
+typedef struct BVTOpaqueHandle BVTOpaqueSonar, BVTOpaqueHead, BVTOpaquePing, BVTOpaqueMagImage, BVTOpaqueColorImage,
+    BVTOpaqueColorMapper, BVTOpaqueNavData, BVTOpaqueSonarDiscoveryAgent, BVTOpaqueRangeData;
+typedef BVTOpaqueSonar* BVTSonar;
+typedef BVTOpaqueHead* BVTHead;
+typedef BVTOpaquePing* BVTPing;
+typedef BVTOpaqueMagImage* BVTMagImage;
+typedef BVTOpaqueColorImage* BVTColorImage;
+typedef BVTOpaqueColorMapper* BVTColorMapper;
+typedef BVTOpaqueNavData* BVTNavData;
+typedef BVTOpaqueSonarDiscoveryAgent* BVTSonarDiscoveryAgent;
+typedef BVTOpaqueRangeData* BVTRangeData;
 
 /* 0 is success. BVTError_GetName and BVTError_GetString explain the others. */
 typedef int RetVal;
