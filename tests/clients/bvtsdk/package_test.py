@@ -113,6 +113,7 @@ class Package(unittest.TestCase):
                 self.assertEqual(subprocess.run([pathlib.Path(self.folder.name) / "source.out"], check=False).returncode, code)
 
     def test_cmake_and_pkg_config_find_them(self):
+        plain = {name: value for name, value in os.environ.items() if name != "LD_LIBRARY_PATH"}
         for abi in (3, 4):
             moved = pathlib.Path(self.folder.name) / f"moved{abi}"
             shutil.copytree(prefix(abi), moved, symlinks=True)
@@ -123,18 +124,22 @@ class Package(unittest.TestCase):
                 "cmake_minimum_required(VERSION 3.16)\nproject(driver CXX)\n"
                 f"find_package(BVTSDK {abi} REQUIRED)\nadd_executable(driver main.cpp)\n"
                 "target_link_libraries(driver PRIVATE BVTSDK::bvtsdk)\nfile(GLOB maps ${BVTSDK_COLORMAPS}/jet.cmap)\n"
+                "install(TARGETS driver DESTINATION bin)\n"
                 "if(NOT maps)\n  message(FATAL_ERROR no maps)\nendif()\n")
             for command in (["cmake", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={moved}",
-                             f"-DCMAKE_CXX_COMPILER={CXX}"], ["cmake", "--build", project / "build"]):
+                             f"-DCMAKE_CXX_COMPILER={CXX}", f"-DCMAKE_INSTALL_PREFIX={project}/installed"],
+                            ["cmake", "--build", project / "build"], ["cmake", "--install", project / "build"]):
                 done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
                 self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-            self.assertEqual(subprocess.run([project / "build/driver"], check=False).returncode, abi)
+            for program in ("build/driver", "installed/bin/driver"):
+                self.assertEqual(subprocess.run([project / program], check=False, env=plain).returncode, abi, program)
             if shutil.which("pkg-config"):
                 flags = subprocess.run(["pkg-config", "--cflags", "--libs", "bvtsdk"], capture_output=True, text=True, check=True,
                                        env={**os.environ, "PKG_CONFIG_PATH": str(moved / "lib/pkgconfig")}).stdout.split()
                 done = subprocess.run([CXX, project / "main.cpp", *flags, "-o", project / "by_flags"], capture_output=True,
                                       text=True, check=False, timeout=120)
                 self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual(subprocess.run([project / "by_flags"], check=False, env=plain).returncode, abi)
 
 
 if __name__ == "__main__":
