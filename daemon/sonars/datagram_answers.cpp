@@ -17,7 +17,9 @@ bool bind_shared(udp::socket& socket, const udp::endpoint& at) {
   return !ec;
 }
 
+/// On the loopback, which is 127.0.0.0/8 whatever the netmask says, hosts of this machine ask 127.255.255.255.
 Ipv4 broadcast_of(const SonarConfig& sonar) {
+  if (sonar.bind_ip[0] == 127) return {127, 255, 255, 255};
   Ipv4 address{};
   for (std::size_t i = 0; i < address.size(); ++i)
     address[i] = static_cast<std::uint8_t>(sonar.bind_ip[i] | static_cast<std::uint8_t>(~sonar.netmask[i]));

@@ -16,6 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::uint16_t discovery_port = 14751;
+constexpr in_addr_t loopback_broadcast = 0x7FFFFFFF;  // 127.255.255.255: sonars of this machine, whatever their 127.x.y.z
 
 in_addr_t ipv4_of(const sockaddr* address) {
   sockaddr_in in;
@@ -25,7 +26,7 @@ in_addr_t ipv4_of(const sockaddr* address) {
 
 /// In network byte order.
 std::vector<in_addr_t> addresses_to_ask() {
-  std::vector<in_addr_t> out{htonl(INADDR_LOOPBACK), htonl(INADDR_BROADCAST)};
+  std::vector<in_addr_t> out{htonl(INADDR_LOOPBACK), htonl(loopback_broadcast), htonl(INADDR_BROADCAST)};
   ifaddrs* list = nullptr;
   if (getifaddrs(&list) == 0) {
     const std::unique_ptr<ifaddrs, decltype(&freeifaddrs)> owner(list, &freeifaddrs);

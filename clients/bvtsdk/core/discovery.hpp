@@ -12,8 +12,8 @@ namespace sonar::bvt {
 
 class DiscoveryAgent {
  public:
-  /// Forgets what was found and asks again: by broadcast, this host itself, and every address in the environment variable
-  /// BVE_DISCOVERY (separated by commas or spaces). failed without a socket.
+  /// Forgets what was found and asks again: by broadcast on every network, this machine's own among them, and every address in
+  /// the environment variable BVE_DISCOVERY (separated by commas or spaces). failed without a socket.
   Code start();
   /// Takes the last answers.
   void stop();

@@ -1,5 +1,4 @@
 """The call-sequence programs of programs/, one after the other, against a live daemon with the L targets in front of it."""
-import os
 import pathlib
 import tempfile
 import unittest
@@ -12,7 +11,6 @@ class Sequences(unittest.TestCase):
     def setUpClass(cls):
         cls.daemon = l_targets().__enter__()
         cls.folder = tempfile.TemporaryDirectory()
-        os.environ["BVE_DISCOVERY"] = f"127.0.0.99, {cls.daemon.address}"
 
     @classmethod
     def tearDownClass(cls):
