@@ -11,8 +11,10 @@ namespace {
 
 // Sources of the numbers below, facts only. VND: the vendor's own sample viewer as mirrored in public repositories. ENS:
 // ENSTABretagneRobotics oculus_driver. APL: liboculus, include/liboculus/Constants.h and part number list. BLU: BluEye-Robotics
-// oculus_driver. BAS: bastianschildknecht sonar_driver. CAP: the captured M1200d pings. unknown: no public source; the value is
-// our choice.
+// oculus_driver. BAS: bastianschildknecht sonar_driver. TID: tidewise drivers-sonar_oculus_m750d. CAT: the payload catalogue of
+// the open simulator OceanSim, which quotes the vendor's data sheet DA-148-P01443-10 (2026) for the M series and integrators'
+// pages for the C550d; the data sheet itself was not read. CAP: the captured M1200d pings. unknown: no public source; the value
+// is our choice.
 
 /// unknown: fitted. The pressure that reaches full scale at TVG 0 dB and gain 0 dB, so that the demo scene at gain 50, gamma 127
 /// has an 8-bit median of 30 to 60; of the others by the same brightness at half their range. Not by the captured M1200d pings:
@@ -49,17 +51,17 @@ struct ProfileRow {
   const FamilyRow* family = nullptr;
 };
 
-// 370 kHz and 200 m: VND, ENS; aperture and minimum range: BAS; elevation 20: VND; unknown: azimuth width 1.5.
-constexpr FamilyRow m370s{0.2, {370e3, 130, 1.5, 20, 200, fitted_full_scale_upa::m370s}, {}};
-// Frequencies and ranges: VND; unknown: apertures 120 and 70, widths 1.0 and 0.7 x 20.
-constexpr FamilyRow c550d{0.1,
+// 370 kHz and 200 m: VND, ENS; aperture and minimum range: BAS; elevation 20: VND; azimuth width 2.0: CAT, and what an array as
+// long as the M750d's (1.0 at 750 kHz) has.
+constexpr FamilyRow m370s{0.2, {370e3, 130, 2.0, 20, 200, fitted_full_scale_upa::m370s}, {}};
+// Frequencies and ranges: VND; apertures, elevation, minimum range: CAT; unknown: azimuth widths 1.0 and 0.7.
+constexpr FamilyRow c550d{0.2,
                           {550e3, 120, 1.0, 20, 100, fitted_full_scale_upa::c550d_low},
-                          {820e3, 70, 0.7, 20, 30, fitted_full_scale_upa::c550d_high}};
-// Frequencies, ranges, widths: APL, VND; aperture 130 low: BAS; unknown: aperture 70 high (BAS has 130, see -hf130).
+                          {820e3, 90, 0.7, 20, 30, fitted_full_scale_upa::c550d_high}};
+// Frequencies, ranges, azimuth widths: APL, VND; aperture 130 in both modes: BAS, TID, CAT; elevation 20 in both: CAT.
 constexpr ModeRow m750d_low{750e3, 130, 1.0, 20, 120, fitted_full_scale_upa::m750d_low};
-constexpr FamilyRow m750d{0.1, m750d_low, {1.2e6, 70, 0.6, 20, 40, fitted_full_scale_upa::m750d_high}};
-constexpr FamilyRow m750d_hf130{0.1, m750d_low, {1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m750d_high}};
-// Older hardware: 12 deg elevation in the high mode (APL).
+constexpr FamilyRow m750d{0.1, m750d_low, {1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m750d_high}};
+// Older hardware: 12 deg elevation in the high mode (APL); unknown: aperture 70, which no source at hand gives for it.
 constexpr FamilyRow m750d_old{0.1, m750d_low, {1.2e6, 70, 0.6, 12, 40, fitted_full_scale_upa::m750d_high}};
 // Low: BAS, APL, VND. High: frequency 140.625 MHz / 67 and aperture 60 from CAP, widths and range APL.
 constexpr ModeRow m1200d_low{1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m1200d_low};
@@ -67,10 +69,11 @@ constexpr FamilyRow m1200d{
     0.1, m1200d_low, {140.625e6 / 67, 60, 0.4, 12, 10, fitted_full_scale_upa::m1200d_high, m1200d_high_noise_figure_db}};
 // unknown: a single-frequency product by its name; the low mode of the M1200d is assumed.
 constexpr FamilyRow n1200s{0.1, m1200d_low, {}};
-// Frequencies, widths, ranges: APL, VND; unknown: apertures 130 and 40.
+// Frequencies, ranges, widths low: APL, VND; apertures: CAT. Azimuth width high: CAT has 0.25, what the array that has 0.6 at 1.2
+// MHz has at 3.0; APL's 0.4 is the figure of the M1200d's high mode.
 constexpr FamilyRow m3000d{0.1,
                            {1.2e6, 130, 0.6, 20, 30, fitted_full_scale_upa::m3000d_low},
-                           {3.0e6, 40, 0.4, 20, 5, fitted_full_scale_upa::m3000d_high}};
+                           {3.0e6, 40, 0.25, 20, 5, fitted_full_scale_upa::m3000d_high}};
 
 // Part numbers: older list ENS, BAS; newer list APL, VND, BLU. 1032, 1041 and 1042 are known to every client.
 constexpr ProfileRow profiles[] = {
@@ -79,7 +82,7 @@ constexpr ProfileRow profiles[] = {
     {"oculus-m1200d", "Oculus M1200d", 1042, &m1200d},
     {"oculus-m3000d", "Oculus M3000d", 2203, &m3000d},
     {"oculus-c550d", "Oculus C550d", 4713, &c550d},
-    {"oculus-m750d-hf130", "Oculus M750d, 130 deg in mode 2", 1032, &m750d_hf130},
+    {"oculus-m750d-hf130", "Oculus M750d, 130 deg in mode 2", 1032, &m750d},  // a name that configurations may hold
     {"oculus-m750d-hf12", "Oculus M750d, older hardware", 1032, &m750d_old},
     {"oculus-m373s", "Oculus M373s", 1209, &m370s},
     {"oculus-m373s-deep", "Oculus M373s deep", 1218, &m370s},
