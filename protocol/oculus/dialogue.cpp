@@ -19,13 +19,17 @@ using protocol::Reaction;
 using protocol::RequestPing;
 using protocol::StoreAddress;
 
-constexpr std::size_t notices_per_call = 8;  // a hostile client must not turn its bytes into more of ours
+constexpr std::size_t notices_per_call = 8;               // a hostile client must not turn its bytes into more of ours
+constexpr auto greeting_after = std::chrono::seconds(2);  // of a client's silence: whoever fires by itself does so at once
 
 class OculusDialogue final : public protocol::Dialogue {
  public:
   OculusDialogue(const DeviceState& device, Time now) : device_(device) {
     postpone_dummy(now);
-    if (text_option(device.options, option_name::boot_text) == "on") next_tick_ = now, greets_ = true;
+    const std::string_view boot_text = text_option(device.options, option_name::boot_text);
+    greets_silent_ = boot_text == "if_silent";
+    if (greets_silent_) greeting_at_ = now + greeting_after;
+    if (boot_text == "on") greeting_at_ = now;
   }
 
   Reaction on_bytes(protocol::BytesView received, Time now) override {
@@ -42,10 +46,10 @@ class OculusDialogue final : public protocol::Dialogue {
 
   Reaction on_tick(Time now) override {
     Reaction reaction;
-    if (now < next_tick_) return reaction;
-    if (greets_) {
+    if (now < next_tick()) return reaction;
+    if (greeting_at_ && now >= *greeting_at_) {
       reaction.replies.push_back(make_log(device_.id, "sonard: emulated " + device_.model->name + "\n"));
-      greets_ = false;
+      greeting_at_.reset();
     } else {
       reaction.replies.push_back(make_dummy(device_.id));
     }
@@ -53,9 +57,10 @@ class OculusDialogue final : public protocol::Dialogue {
     return reaction;
   }
 
-  Time next_tick() const override { return next_tick_; }
+  Time next_tick() const override { return greeting_at_ ? std::min(*greeting_at_, dummy_at_) : dummy_at_; }
   void on_ping_queued(Time now) override {
-    if (!greets_) postpone_dummy(now);
+    is_not_waiting();
+    postpone_dummy(now);
   }
 
  private:
@@ -78,6 +83,7 @@ class OculusDialogue final : public protocol::Dialogue {
   }
 
   void on_fire(wire::BytesView message, Time now, Reaction& reaction) {
+    is_not_waiting();
     const auto fire = parse_fire(message);
     if (!fire) return notice(reaction, "ignored a fire message of " + std::to_string(message.size()) + " bytes, 53 are needed");
     if (has_non_finite(fire->settings))
@@ -124,17 +130,22 @@ class OculusDialogue final : public protocol::Dialogue {
     if (notices_++ < notices_per_call) reaction.events.emplace_back(Notice{std::move(text)});
   }
 
+  void is_not_waiting() {
+    if (greets_silent_) greeting_at_.reset();
+  }
+
   void postpone_dummy(Time now) {
     const double period_ms = std::clamp(number_option(device_.options, option_name::dummy_period_ms), 10.0, 60000.0);
-    next_tick_ = now + nanoseconds_from(period_ms * 1e-3);
+    dummy_at_ = now + nanoseconds_from(period_ms * 1e-3);
   }
 
   const DeviceState& device_;
   Framer framer_{Sender::client};
   protocol::Bytes last_request_;
   DeviceState::StoredAddress stored_;  // as of this call: a read may follow its write in the same bytes
-  Time next_tick_{};
-  bool greets_ = false;
+  Time dummy_at_{};
+  std::optional<Time> greeting_at_;
+  bool greets_silent_ = false;  // only a client that has neither fired nor been sent a ping by then
   std::size_t notices_ = 0;
 };
 

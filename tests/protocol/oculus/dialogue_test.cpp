@@ -229,6 +229,30 @@ TEST(Dialogue, BootTextGreetsWhenAsked) {
   EXPECT_EQ(talk.dialogue->next_tick(), at(1));
 }
 
+bool greets_at(Conversation& talk, double when_s) {
+  for (const Bytes& reply : talk.dialogue->on_tick(at(when_s)).replies)
+    if (std::holds_alternative<LogText>(decode_message(reply))) return true;
+  return false;
+}
+
+// A client may wait for the text before it fires; those that do not must never see it.
+TEST(Dialogue, BootTextGreetsTheSilentOnceByDefault) {
+  Conversation waits;
+  EXPECT_FALSE(greets_at(waits, 1)) << "a dummy";
+  EXPECT_EQ(waits.dialogue->next_tick(), at(2));
+  EXPECT_TRUE(greets_at(waits, 2));
+  EXPECT_FALSE(greets_at(waits, 3)) << "once";
+
+  Conversation fires;
+  EXPECT_FALSE(greets_at(fires, 1));
+  fires.say(make_fire(fire(0, 1, PingRate::standby, 0x49, 5, 50)), 1.2);
+  Conversation looks_on;
+  looks_on.dialogue->on_ping_queued(at(1.5));
+  Conversation is_off("boot_text", "off");
+  for (Conversation* talk : {&fires, &looks_on, &is_off})
+    for (int second = 2; second < 9; ++second) EXPECT_FALSE(greets_at(*talk, second));
+}
+
 TEST(Dialogue, FirstPingsAreAnOption) {
   const auto& vendor = *protocol::vendors().front();
   EXPECT_FALSE(vendor.pings_before_first_request(device()));
