@@ -10,7 +10,6 @@ namespace sonar::bvt {
 namespace {
 
 constexpr std::uint8_t format_u16 = 1;
-enum Compression : std::uint8_t { plain = 0, deflate_stream = 1 };
 constexpr std::size_t deflate_at_best = 1032;  // zlib's own bound: no stream grows by more than this
 
 /// Calls visit(bit, value) for each number in the order of the link.
@@ -46,6 +45,23 @@ void samples_from(BytesView bytes, std::vector<std::uint16_t>& samples) {
     samples[i] = static_cast<std::uint16_t>(bytes.data[2 * i] | bytes.data[2 * i + 1] << 8);
 }
 
+void samples_from_planes(BytesView bytes, std::vector<std::uint16_t>& samples) {
+  const std::size_t n = bytes.size / 2;
+  samples.resize(n);
+  for (std::size_t i = 0; i < n; ++i) samples[i] = static_cast<std::uint16_t>(bytes.data[i] << 8 | bytes.data[n + i]);
+}
+
+Bytes bytes_of(const std::vector<std::uint16_t>& samples, Packing packing) {
+  const std::size_t n = samples.size();
+  const bool planes = packing == Packing::planes;
+  Bytes out(2 * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    out[planes ? n + i : 2 * i] = static_cast<std::uint8_t>(samples[i]);
+    out[planes ? i : 2 * i + 1] = static_cast<std::uint8_t>(samples[i] >> 8);
+  }
+  return out;
+}
+
 /// Exactly `size` bytes or nothing: a stream that wants to give more is cut off there and refused.
 Bytes inflated(BytesView body, std::size_t size) {
   if (size > deflate_at_best * body.size + 64) return {};
@@ -63,11 +79,18 @@ Bytes inflated(BytesView body, std::size_t size) {
   return out;
 }
 
+/// Runs only: what else repeats in noise is not worth the search. Empty when it cannot be had.
 Bytes deflated(BytesView body) {
-  Bytes out(compressBound(static_cast<uLong>(body.size)));
-  auto size = static_cast<uLongf>(out.size());
-  if (compress2(out.data(), &size, body.data, static_cast<uLong>(body.size), Z_BEST_SPEED) != Z_OK) return {};
-  out.resize(size);
+  z_stream stream{};
+  if (deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) return {};
+  Bytes out(deflateBound(&stream, static_cast<uLong>(body.size)));
+  stream.next_in = const_cast<Bytef*>(body.data);  // zlib does not write through it
+  stream.avail_in = static_cast<uInt>(body.size);
+  stream.next_out = out.data();
+  stream.avail_out = static_cast<uInt>(out.size());
+  const int end = deflate(&stream, Z_FINISH);
+  out.resize(end == Z_STREAM_END ? stream.total_out : 0);
+  deflateEnd(&stream);
   return out;
 }
 
@@ -119,7 +142,7 @@ std::optional<PolarPing> decode_ping(BytesView payload, std::string* why) {
   p.beams = reader.take<std::uint16_t>();
   p.bins = reader.take<std::uint16_t>();
   const auto format = reader.take<std::uint8_t>();
-  const auto compression = reader.take<std::uint8_t>();
+  const auto packing = static_cast<Packing>(reader.take<std::uint8_t>());
   p.nav = take_nav(reader);
   const std::size_t size = reader.take<std::uint32_t>();
   if (!reader.ok()) return refuse("it ends early or has navigation fields nobody knows");
@@ -129,28 +152,27 @@ std::optional<PolarPing> decode_ping(BytesView payload, std::string* why) {
   const std::size_t expected = 2 * static_cast<std::size_t>(p.beams) * static_cast<std::size_t>(p.bins);
   if (size != expected || size > longest_payload)
     return refuse(std::to_string(size) + " bytes of samples for " + std::to_string(p.beams) + " x " + std::to_string(p.bins));
-  if (compression == plain) {
+  if (packing == Packing::plain) {
     if (body.size != size) return refuse(std::to_string(body.size) + " bytes follow, " + std::to_string(size) + " are announced");
     samples_from(body, p.samples);
-  } else if (compression == deflate_stream) {
+  } else if (packing == Packing::deflate || packing == Packing::planes) {
     const Bytes samples = inflated(body, size);
-    if (samples.size() != size || size == 0) return refuse("its zlib stream does not hold what is announced");
-    samples_from(samples, p.samples);
+    if (samples.size() != size || size == 0) return refuse("its zlib stream is damaged, or does not hold what is announced");
+    packing == Packing::planes ? samples_from_planes(samples, p.samples) : samples_from(samples, p.samples);
   } else {
     return refuse("it is compressed in a way nobody knows");
   }
   return p;
 }
 
-Bytes encode_ping(const PolarPing& ping, bool deflate) {
-  Bytes samples;
-  samples.resize(2 * ping.samples.size());
-  for (std::size_t i = 0; i < ping.samples.size(); ++i) {
-    samples[2 * i] = static_cast<std::uint8_t>(ping.samples[i]);
-    samples[2 * i + 1] = static_cast<std::uint8_t>(ping.samples[i] >> 8);
+Bytes encode_ping(const PolarPing& ping, Packing packing) {
+  const std::size_t size = 2 * ping.samples.size();
+  Bytes body;
+  if (packing != Packing::plain && size > 0) body = deflated(bytes_of(ping.samples, packing));
+  if (body.empty()) {
+    packing = Packing::plain;
+    body = bytes_of(ping.samples, packing);
   }
-  const Bytes packed = deflate && !samples.empty() ? deflated(samples) : Bytes{};
-  const Bytes& body = packed.empty() ? samples : packed;
   Bytes out;
   out.reserve(256 + ping.nav.text.size() + body.size());
   put(out, ping.head);
@@ -166,9 +188,9 @@ Bytes encode_ping(const PolarPing& ping, bool deflate) {
   put(out, static_cast<std::uint16_t>(ping.beams));
   put(out, static_cast<std::uint16_t>(ping.bins));
   put(out, format_u16);
-  put(out, static_cast<std::uint8_t>(packed.empty() ? plain : deflate_stream));
+  put(out, static_cast<std::uint8_t>(packing));
   put_nav(out, ping.nav);
-  put(out, static_cast<std::uint32_t>(samples.size()));
+  put(out, static_cast<std::uint32_t>(size));
   out.insert(out.end(), body.begin(), body.end());
   return out;
 }

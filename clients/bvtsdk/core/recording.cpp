@@ -10,7 +10,7 @@
 namespace sonar::bvt {
 namespace {
 
-constexpr std::uint16_t newest_version = 1;
+constexpr std::uint16_t newest_version = 2;
 constexpr std::size_t file_header_size = 8;
 constexpr std::size_t crc_size = 4;
 constexpr std::size_t index_entry_size = 2 + 4 + 8 + 8;
@@ -89,7 +89,7 @@ Code RecordingWriter::put_ping(std::int32_t head, const PolarPing& ping, BytesVi
     hello_.assign(hello.data, hello.data + hello.size);
     if (const Code code = put_frame(FrameType::hello_ok, hello_, 0, 0); code != success) return code;
   }
-  Bytes payload = encode_ping(ping);
+  Bytes payload = encode_ping(ping, Packing::planes);
   Bytes number;
   put(number, head);
   std::copy(number.begin(), number.end(), payload.begin());  // the head comes first
@@ -169,7 +169,7 @@ Code RecordingReader::open(File file, std::string* why) {
     return refuse(file_header_bad, "is no recording of ours; the vendor's .son files are proprietary and cannot be read");
   const int version = start[4] | start[5] << 8;
   if (version > newest_version)
-    return refuse(file_too_new, "is a recording of version " + std::to_string(version) + "; this library reads version 1");
+    return refuse(file_too_new, "is a recording of version " + std::to_string(version) + "; this library reads versions 1 and 2");
   FrameHeader header;
   if (version < 1 || !read_frame(file_header_size, header, hello_) || header.type != FrameType::hello_ok)
     return refuse(file_header_bad, "does not say which sonar it came from; was it cut off at once?");
@@ -254,17 +254,24 @@ Bytes RecordingReader::hello_of_ping(std::int32_t head, int n) {
   return payload;
 }
 
-Code RecordingReader::read_ping(std::int32_t head, int n, PolarPing& ping) {
+Code RecordingReader::read_ping(std::int32_t head, int n, PolarPing& ping, std::string* why) {
   ping = PolarPing();
   const auto& offsets = places(FrameType::ping_data, head);
   if (n < 0) return ping_number_too_small;
   if (static_cast<std::size_t>(n) >= offsets.size()) return ping_number_too_large;
   FrameHeader header;
   Bytes payload;
-  if (!read_frame(offsets[static_cast<std::size_t>(n)], header, payload)) return file_read;
-  if (header.type != FrameType::ping_data) return bad_ping;
-  auto decoded = decode_ping(payload);
-  if (!decoded || decoded->head != head) return bad_ping;
+  const auto refuse = [&](Code code, const std::string& what) {
+    if (why)
+      *why = "ping " + std::to_string(n) + " of head " + std::to_string(head) + " cannot be read: " + what +
+             "; those before and behind it may still be";
+    return code;
+  };
+  if (!read_frame(offsets[static_cast<std::size_t>(n)], header, payload))
+    return refuse(file_read, "its frame is cut off, or does not match its checksum");
+  std::string reason = "another frame lies at its place";
+  auto decoded = header.type == FrameType::ping_data ? decode_ping(payload, &reason) : std::nullopt;
+  if (!decoded || decoded->head != head) return refuse(bad_ping, reason);
   ping = std::move(*decoded);
   return success;
 }

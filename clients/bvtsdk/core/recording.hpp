@@ -1,11 +1,11 @@
 // Recordings in our own format, BVER: pings, navigation and event marks as frames of the link, so that FILE mode plays back
 // what NET mode saw. The vendor's .son files are proprietary and are refused.
 //
-// File: "BVER", u16 version = 1, u16 0; then frames (frame.hpp), each followed by the CRC-32 of its header and payload:
-// HELLO_OK first, and again before a ping that was made with other settings, then PING_DATA, NAV_DATA (u16 bitmap, values, f64
-// time) and EVENT_MARK (f64 time, text key, text) in the order they came. A closed file ends with an index frame: u32 entries,
-// per entry u16 type, i32 head, f64 time, u64 offset of the frame, and at last the u64 offset of the index frame itself. Without
-// it the file is scanned up to the last whole frame.
+// File: "BVER", u16 version = 2 (1: samples are not packed), u16 0; then frames (frame.hpp), each followed by the CRC-32 of its
+// header and payload: HELLO_OK first, and again before a ping that was made with other settings, then PING_DATA, NAV_DATA (u16
+// bitmap, values, f64 time) and EVENT_MARK (f64 time, text key, text) in the order they came. A closed file ends with an index
+// frame: u32 entries, per entry u16 type, i32 head, f64 time, u64 offset of the frame, and at last the u64 offset of the index
+// frame itself. Without it the file is scanned up to the last whole frame.
 #pragma once
 
 #include <cstdint>
@@ -82,8 +82,9 @@ class RecordingReader {
   int ping_count(std::int32_t head) const { return static_cast<int>(places(FrameType::ping_data, head).size()); }
   int nav_count() const { return static_cast<int>(places(FrameType::nav_data).size()); }
   int event_count() const { return static_cast<int>(places(FrameType::event_mark).size()); }
-  /// ping_number_too_small, ping_number_too_large, file_read, bad_ping.
-  Code read_ping(std::int32_t head, int n, PolarPing& ping);
+  /// ping_number_too_small, ping_number_too_large; file_read and bad_ping for one that is damaged, and `why` is a line for the
+  /// log.
+  Code read_ping(std::int32_t head, int n, PolarPing& ping, std::string* why = nullptr);
   /// index_out_of_bounds, file_read. `time_s`: when it was recorded.
   Code read_nav(int n, NavData& nav, double& time_s);
   Code read_event(int n, EventMark& mark);

@@ -90,14 +90,16 @@ void take_recorded_settings(RecordingReader& reader, int n, HeadDescription& hea
 
 class PlayedSource : public Source {
  public:
-  PlayedSource(SonarDescription sonar, std::unique_ptr<RecordingReader> reader)
-      : Source(std::move(sonar)), reader_(std::move(reader)) {}
+  PlayedSource(SonarDescription sonar, std::string path, std::unique_ptr<RecordingReader> reader)
+      : Source(std::move(sonar)), path_(std::move(path)), reader_(std::move(reader)) {}
 
   int get_ping(int head, int n, std::chrono::milliseconds, PolarPing& ping, HeadDescription& settings) override {
     const std::lock_guard lock(mutex_);
     int& next = next_[head];
     const int wanted = n < 0 ? next : n;
-    const int code = reader_->read_ping(head, wanted, ping);
+    std::string why;
+    const int code = reader_->read_ping(head, wanted, ping, &why);
+    if (!why.empty()) log(LogLevel::warning, path_ + ": " + why);
     if (code != success) return code;
     next = wanted + 1;
     take_recorded_settings(*reader_, wanted, settings);
@@ -114,6 +116,7 @@ class PlayedSource : public Source {
 
  private:
   std::mutex mutex_;
+  const std::string path_;
   const std::unique_ptr<RecordingReader> reader_;
   std::map<int, int> next_;  // per head
 };
@@ -182,7 +185,7 @@ Code open_recording(const std::string& path, std::shared_ptr<Source>& source) {
     return file_header_bad;
   }
   for (HeadDescription& head : sonar->heads) take_recorded_settings(*reader, 0, head);
-  source = std::make_shared<PlayedSource>(std::move(*sonar), std::move(reader));
+  source = std::make_shared<PlayedSource>(std::move(*sonar), path, std::move(reader));
   return success;
 }
 

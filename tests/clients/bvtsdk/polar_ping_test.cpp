@@ -11,6 +11,8 @@ using namespace sonar::bvt;
 
 namespace {
 
+constexpr Packing every_packing[] = {Packing::plain, Packing::deflate, Packing::planes};
+
 PolarPing some_ping() {
   PolarPing p = make_ping(5, 7, 1.5f, 0.25f, [](int j, int k) { return 256 * j + k; });
   p.head = 1;
@@ -48,9 +50,9 @@ void expect_same(const PolarPing& a, const PolarPing& b) {
 }  // namespace
 
 TEST(PolarPing, ComesBackAsItWas) {
-  for (const bool deflate : {false, true}) {
-    const auto back = decode_ping(encode_ping(some_ping(), deflate));
-    ASSERT_TRUE(back) << deflate;
+  for (const Packing packing : every_packing) {
+    const auto back = decode_ping(encode_ping(some_ping(), packing));
+    ASSERT_TRUE(back) << static_cast<int>(packing);
     expect_same(*back, some_ping());
   }
 }
@@ -84,8 +86,8 @@ TEST(PolarPing, ReadsTheBytesOfTheDescription) {
 }
 
 TEST(PolarPing, IsRefusedWhenCutAnywhere) {
-  for (const bool deflate : {false, true}) {
-    const Bytes whole = encode_ping(some_ping(), deflate);
+  for (const Packing packing : every_packing) {
+    const Bytes whole = encode_ping(some_ping(), packing);
     for (std::size_t n = 0; n < whole.size(); ++n) {
       const auto exact = std::make_unique<std::uint8_t[]>(n);  // so that a sanitizer sees one byte too many
       std::copy_n(whole.begin(), n, exact.get());
@@ -122,9 +124,9 @@ TEST(PolarPing, IsRefusedWithFieldsThatAreNone) {
 
 TEST(PolarPing, IsNotInflatedPastWhatItAnnounces) {
   // A stream that holds 2 MB of zeros behind the announcement of 70 bytes, and one of 20 bytes behind that of 60 MB.
-  const Bytes small = encode_ping(some_ping(), true);
+  const Bytes small = encode_ping(some_ping(), Packing::deflate);
   const PolarPing zeros = make_ping(512, 2048, 1, 0.01f, [](int, int) { return 0; });
-  const Bytes big = encode_ping(zeros, true);
+  const Bytes big = encode_ping(zeros, Packing::deflate);
   ASSERT_LT(big.size(), 20000u);
   const std::size_t small_fixed = encode_ping(some_ping()).size() - 70;
   Bytes mixed(small.begin(), small.begin() + static_cast<std::ptrdiff_t>(small_fixed));
@@ -134,10 +136,22 @@ TEST(PolarPing, IsNotInflatedPastWhatItAnnounces) {
   PolarPing hungry = zeros;
   hungry.beams = 8000;
   hungry.bins = 4000;
-  Bytes bomb = encode_ping(hungry, true);
+  Bytes bomb = encode_ping(hungry, Packing::deflate);
   const std::uint32_t size = 2u * 8000 * 4000;
   for (std::size_t i = 0; i < 4; ++i) bomb[big_fixed - 4 + i] = static_cast<std::uint8_t>(size >> (8 * i));
   EXPECT_FALSE(decode_ping(bomb));
+}
+
+TEST(PolarPing, InPlanesIsSmallerThanInOneStream) {
+  std::uint32_t state = 1;
+  const PolarPing noise = make_ping(256, 500, 1, 0.02f, [&](int, int) {
+    state = state * 1664525u + 1013904223u;
+    return static_cast<int>(state >> 24) * static_cast<int>(state >> 24) / 512;  // as noise: mostly far below 256
+  });
+  const std::size_t plain = encode_ping(noise).size(), stream = encode_ping(noise, Packing::deflate).size();
+  const std::size_t planes = encode_ping(noise, Packing::planes).size();
+  EXPECT_LT(planes, 0.55 * static_cast<double>(plain));
+  EXPECT_LT(planes, 0.95 * static_cast<double>(stream));
 }
 
 TEST(PolarPing, WithoutSamplesIsAPingWithoutASignal) {
@@ -145,7 +159,7 @@ TEST(PolarPing, WithoutSamplesIsAPingWithoutASignal) {
   EXPECT_FALSE(p);  // stop = start
   PolarPing empty = make_ping(4, 0, 0, 0.1f, [](int, int) { return 0; });
   empty.stop_m = 10;
-  const auto q = decode_ping(encode_ping(empty, true));
+  const auto q = decode_ping(encode_ping(empty, Packing::planes));
   ASSERT_TRUE(q);
   EXPECT_FALSE(q->has_signal());
 }

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <filesystem>
 #include <fstream>
@@ -50,6 +51,14 @@ struct Recording : testing::Test {
   }
   void write(const std::string& bytes) const { std::ofstream(path, std::ios::binary) << bytes; }
 };
+
+void put_frame(std::string& file, FrameType type, const Bytes& payload) {
+  Bytes frame;
+  put_header(frame, {type, 0, 0, static_cast<std::uint32_t>(payload.size())});
+  frame.insert(frame.end(), payload.begin(), payload.end());
+  put(frame, static_cast<std::uint32_t>(crc32(0, frame.data(), static_cast<uInt>(frame.size()))));
+  file.append(frame.begin(), frame.end());
+}
 
 void expect_all(RecordingReader& reader) {
   EXPECT_EQ(reader.hello(), hello);
@@ -180,10 +189,10 @@ TEST_F(Recording, IsRefusedWhenItIsNone) {
   fill(writer, path);
   ASSERT_EQ(writer.close(), success);
   std::string newer = read();
-  newer[4] = 2;
+  newer[4] = 3;
   write(newer);
   EXPECT_EQ(reader.open(path, &why), file_too_new);
-  EXPECT_THAT(why, testing::HasSubstr("version 2"));
+  EXPECT_THAT(why, testing::HasSubstr("version 3"));
   EXPECT_EQ(reader.ping_count(0), 0);
 }
 
@@ -197,6 +206,50 @@ TEST_F(Recording, IsNotWrittenWhereItCannotBe) {
     EXPECT_EQ(writer.create("/dev/full", hello), file_write);
     EXPECT_FALSE(writer.is_open());
   }
+}
+
+TEST_F(Recording, HoldsPackedSamples) {
+  PolarPing quiet = make_ping(256, 400, 1, 0.02f, [](int j, int k) { return (j * 7 + k * 13) % 50; });
+  RecordingWriter writer;
+  ASSERT_EQ(writer.create(path, hello), success);
+  ASSERT_EQ(writer.put_ping(0, quiet, hello), success);
+  EXPECT_LT(writer.size_bytes(), quiet.samples.size());  // half of what they are
+  RecordingReader reader;
+  ASSERT_EQ(reader.open(path), success);
+  PolarPing ping;
+  ASSERT_EQ(reader.read_ping(0, 0, ping), success);
+  EXPECT_EQ(ping.samples, quiet.samples);
+}
+
+TEST_F(Recording, OfVersion1IsRead) {
+  std::string file("BVER\1\0\0\0", 8);
+  put_frame(file, FrameType::hello_ok, hello);
+  for (const int n : {0, 1}) put_frame(file, FrameType::ping_data, encode_ping(ping_number(n)));
+  write(file);
+  RecordingReader reader;
+  ASSERT_EQ(reader.open(path), success);
+  ASSERT_EQ(reader.ping_count(0), 2);
+  PolarPing ping;
+  ASSERT_EQ(reader.read_ping(0, 1, ping), success);
+  EXPECT_EQ(ping.samples, ping_number(1).samples);
+}
+
+TEST_F(Recording, NamesThePingWhoseStreamIsDamaged) {
+  std::string file("BVER\2\0\0\0", 8);
+  put_frame(file, FrameType::hello_ok, hello);
+  Bytes damaged = encode_ping(ping_number(0), Packing::planes);
+  damaged.back() ^= 0xFF;
+  put_frame(file, FrameType::ping_data, damaged);  // with a checksum that is right
+  put_frame(file, FrameType::ping_data, encode_ping(ping_number(1), Packing::planes));
+  write(file);
+  RecordingReader reader;
+  ASSERT_EQ(reader.open(path), success);
+  PolarPing ping;
+  std::string why;
+  EXPECT_EQ(reader.read_ping(0, 0, ping, &why), bad_ping);
+  EXPECT_THAT(why, testing::AllOf(testing::HasSubstr("ping 0 of head 0"), testing::HasSubstr("zlib stream")));
+  EXPECT_TRUE(ping.samples.empty());
+  EXPECT_EQ(reader.read_ping(0, 1, ping), success);
 }
 
 TEST_F(Recording, KeepsTheSettingsOfEachPing) {
