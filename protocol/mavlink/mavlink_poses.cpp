@@ -50,7 +50,8 @@ void MavlinkPoses::begin(std::uint8_t system, Time now) {
   system_ = us_.system = system;
   found_at_ = now;
   next_request_ = now;
-  has_autopilot_ = reported_ = sim_state_is_coarse_ = false;
+  has_autopilot_ = sim_state_is_coarse_ = global_has_fix_ = sim_state_has_fix_ = false;
+  told_.reset();
   autopilot_component_ = 1;
   heard_.clear();
   local_in_world_.reset();
@@ -95,9 +96,9 @@ bool MavlinkPoses::is_heard(const Frame& frame, Time now) {
   return true;
 }
 
-bool MavlinkPoses::is_fresh(std::uint32_t message, Time now) const {
+bool MavlinkPoses::has_come(std::uint32_t message, Time now, std::chrono::nanoseconds within) const {
   const auto known = heard_.find(message);
-  return known != heard_.end() && now - known->second.at <= source_silence;
+  return known != heard_.end() && now - known->second.at <= within;
 }
 
 // ---- what arrives
@@ -110,7 +111,10 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   }
   FrameReader frames(datagram);
   while (const auto frame = frames.next()) {
-    if (!is_meant(*frame, now)) continue;
+    if (!is_meant(*frame, now)) {
+      pass_over(*frame);
+      continue;
+    }
     last_heard_ = now;
     out.heard = true;
     if (is_heard(*frame, now)) on_frame(*frame, {now, out});
@@ -139,7 +143,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
     case Heartbeat::id:
       return take(message_in<Heartbeat>(frame), frame);
     case Attitude::id:
-      if (!is_fresh(AttitudeQuaternion::id, at.now)) take(attitude_of(message_in<Attitude>(frame)), at);
+      if (!has_come(AttitudeQuaternion::id, at.now, source_silence)) take(attitude_of(message_in<Attitude>(frame)), at);
       return;
     case AttitudeQuaternion::id:
       return take(attitude_of(message_in<AttitudeQuaternion>(frame)), at);
@@ -184,6 +188,7 @@ void MavlinkPoses::take(const LocalPositionNed& m, Moment at) {
 void MavlinkPoses::take(const GlobalPositionInt& m, Moment at) {
   note_boot_time(m.boot_ms);
   const auto place = placed(GlobalPositionInt::name, geodetic_of(m), at);
+  global_has_fix_ = place.has_value();
   if (!place) return;
   global_.put({m.boot_ms, *place, {0.01 * m.north_cmps, 0.01 * m.east_cmps, 0.01 * m.down_cmps}});
   join_pairs(at);
@@ -200,6 +205,7 @@ void MavlinkPoses::take(const GpsGlobalOrigin& m, Moment at) {
 void MavlinkPoses::take(const SimState& m, Moment at) {
   const auto place = placed(SimState::name, geodetic_of(m), at);
   sim_state_is_coarse_ = !has_exact_position(m);
+  sim_state_has_fix_ = place.has_value();
   if (place) offer(Source::sim_state, raw_pose(m), Stamp{}, *place, at);
 }
 

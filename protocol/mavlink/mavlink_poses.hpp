@@ -54,8 +54,11 @@ class MavlinkPoses {
   explicit MavlinkPoses(Settings settings);
   /// `now` never runs backwards, whatever its origin.
   Reaction on_datagram(BytesView datagram, Time now);
-  /// To be called some times a second: heartbeats, requests, and the sentence about who was found.
+  /// To be called some times a second: heartbeats, requests, and the sentence about who was found and what of a pose is missing:
+  /// when it changes whether poses come, and while none come again and again, ever more seldom.
   Reaction on_tick(Time now);
+  /// Empty while poses come; else one sentence that names all that is missing.
+  std::string trouble(Time now) const;
 
   const FrameCounts& counts() const { return counts_; }
   std::optional<std::uint8_t> system() const { return system_; }
@@ -96,12 +99,17 @@ class MavlinkPoses {
   control::Stamp stamp_of(Source source, std::uint64_t time_us);
   void on_reset_counter(Source source, std::uint8_t counter);
   void note_boot_time(std::int64_t ms);
-  bool is_fresh(std::uint32_t message, Time now) const;
   void refuse(std::string_view message, const std::string& why, Moment at);
   void judge(const FrameCounts& counts, Reaction& out);
-  std::string report() const;
-  std::string what_is_missing() const;
-  bool hears(std::uint32_t message) const { return heard_.contains(message); }
+  void tell(Time now, Reaction& out);
+  std::string report(Time now) const;
+  std::string what_is_missing(Time now) const;
+  bool hears(std::uint32_t message, Time now) const { return has_come(message, now, system_silence); }
+  bool has_come(std::uint32_t message, Time now, std::chrono::nanoseconds within) const;
+  bool has_poses(Time now) const;
+  void pass_over(const Frame& frame) {
+    if (frame.component != own_component) passed_over_ = {frame.system, frame.component};
+  }
   void request_messages(Reaction& out);
 
   Settings settings_;
@@ -109,8 +117,13 @@ class MavlinkPoses {
   FrameCounts counts_;
   std::optional<std::uint8_t> system_;
   std::uint8_t autopilot_ = 0, autopilot_component_ = 1;
-  bool has_autopilot_ = false, reported_ = false, sim_state_is_coarse_ = false;
-  Time found_at_{}, last_heard_{}, next_heartbeat_{}, next_request_{};
+  bool has_autopilot_ = false, sim_state_is_coarse_ = false;
+  bool global_has_fix_ = false, sim_state_has_fix_ = false;
+  Time found_at_{}, last_heard_{}, next_heartbeat_{}, next_request_{}, next_reminder_{};
+  std::optional<Time> begun_;  // first tick
+  std::optional<bool> told_;   // that poses come, or that they do not
+  std::chrono::nanoseconds reminder_period_{0};
+  std::optional<std::pair<int, int>> passed_over_;  // system and component that spoke last and are not meant
   std::map<std::uint32_t, Heard> heard_;
 
   Attitudes attitudes_;

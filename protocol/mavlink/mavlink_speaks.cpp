@@ -1,4 +1,4 @@
-// What MavlinkPoses says: heartbeats and requests to the autopilot, and one sentence to the user about whom it found.
+// What MavlinkPoses says: heartbeats and requests to the autopilot, and to the user whom it found and what poses still lack.
 #include <algorithm>
 #include <cmath>
 
@@ -9,7 +9,9 @@ namespace {
 
 constexpr std::chrono::nanoseconds heartbeat_period = std::chrono::seconds(1);
 constexpr std::chrono::nanoseconds listen_before_report = std::chrono::seconds(1);
+constexpr std::chrono::nanoseconds silence_before_report = std::chrono::seconds(5);  // from the start, while nobody speaks
 constexpr std::chrono::nanoseconds request_period = std::chrono::seconds(5);
+constexpr std::chrono::nanoseconds first_reminder = std::chrono::seconds(15), longest_reminder = std::chrono::minutes(10);
 
 // Values of minimal.xml and common.xml.
 constexpr std::uint8_t onboard_controller = 18, state_active = 4;
@@ -35,19 +37,33 @@ Reaction MavlinkPoses::on_tick(Time now) {
     beat.system_status = state_active;
     out.replies.push_back(framed(beat, us_));
   }
-  if (!system_) return out;
-  if (!reported_ && now - found_at_ >= listen_before_report) {
-    reported_ = true;
-    out.notices.push_back(report());
-  }
-  const auto since = [now](const std::optional<Time>& at) { return at && now - *at <= system_silence; };
-  const bool has_poses = std::any_of(yielded_.begin(), yielded_.end(), since);
-  if (settings_.request_rates && has_autopilot_ && now >= next_request_) {
-    if (!has_poses) request_messages(out);
+  tell(now, out);
+  if (system_ && settings_.request_rates && has_autopilot_ && now >= next_request_) {
+    if (!has_poses(now)) request_messages(out);
     next_request_ = now + request_period;
   }
   return out;
 }
+
+bool MavlinkPoses::has_poses(Time now) const {
+  return std::any_of(yielded_.begin(), yielded_.end(),
+                     [now](const std::optional<Time>& at) { return at && now - *at <= system_silence; });
+}
+
+/// Whoever starts the vehicle an hour later, or changes its streams, shall find the sentence at the end of the log.
+void MavlinkPoses::tell(Time now, Reaction& out) {
+  if (!begun_) begun_ = now;
+  if (system_ ? now - found_at_ < listen_before_report : now - *begun_ < silence_before_report) return;
+  const bool well = has_poses(now);
+  const bool is_news = told_ != well;
+  if (!is_news && (well || now < next_reminder_)) return;
+  reminder_period_ = is_news ? first_reminder : std::min(2 * reminder_period_, longest_reminder);
+  next_reminder_ = now + reminder_period_;
+  told_ = well;
+  out.notices.push_back(report(now));
+}
+
+std::string MavlinkPoses::trouble(Time now) const { return has_poses(now) ? std::string() : report(now); }
 
 void MavlinkPoses::request_messages(Reaction& out) {
   const auto ask = [&](std::uint32_t message, double rate_hz) {
@@ -67,44 +83,66 @@ void MavlinkPoses::request_messages(Reaction& out) {
 }
 
 /// "system 1 (ArduPilot) sends HEARTBEAT, ATTITUDE; no poses yet: ..."
-std::string MavlinkPoses::report() const {
+std::string MavlinkPoses::report(Time now) const {
+  if (!system_) {
+    if (!passed_over_) return "no poses yet: nothing has come; see that the autopilot or its router sends here";
+    const std::string who =
+        "system " + std::to_string(passed_over_->first) + ", component " + std::to_string(passed_over_->second);
+    const bool choosy = settings_.system_id != 0 || settings_.component_id != 0;
+    return "no poses yet: " + who + " speaks, and " +
+           (choosy ? "is not who system_id and component_id ask for" : "sends neither an autopilot's heartbeat nor a pose");
+  }
   std::string text = "system " + std::to_string(*system_);
   if (has_autopilot_) text += " (" + name_of_autopilot(autopilot_) + ")";
+  if (const auto silent = now - last_heard_; silent > system_silence)
+    return text + " has been silent for " + std::to_string(std::chrono::duration_cast<std::chrono::seconds>(silent).count()) +
+           " s: no poses";
   text += " sends ";
   bool first = true;
   for (const auto& [id, heard] : heard_) {
+    if (!hears(id, now)) continue;
     text.append(first ? "" : ", ").append(find_message(id)->name);
     first = false;
   }
   for (std::size_t s = 0; s < source_count; ++s) {
-    if (!yielded_[s]) continue;
+    if (!yielded_[s] || now - *yielded_[s] > system_silence) continue;
     text += std::string("; poses from ").append(name_of(static_cast<Source>(s)));
     const bool coarse = static_cast<Source>(s) == Source::sim_state && sim_state_is_coarse_;
     if (coarse) text += ", in steps of up to 0.4 m: lat_int and lon_int need MAVLink 2";
     return text;
   }
-  return text + "; no poses yet: " + what_is_missing();
+  const bool came_once = std::any_of(yielded_.begin(), yielded_.end(), [](const auto& at) { return at.has_value(); });
+  return text + (came_once ? "; no poses any more: " : "; no poses yet: ") + what_is_missing(now);
 }
 
-std::string MavlinkPoses::what_is_missing() const {
-  const bool attitude = hears(Attitude::id) || hears(AttitudeQuaternion::id);
-  const bool local = hears(LocalPositionNed::id), global = hears(GlobalPositionInt::id);
+std::string MavlinkPoses::what_is_missing(Time now) const {
+  const bool attitude = hears(Attitude::id, now) || hears(AttitudeQuaternion::id, now);
+  const bool local = hears(LocalPositionNed::id, now), global = hears(GlobalPositionInt::id, now);
+  const bool sim_state = hears(SimState::id, now);
   std::vector<std::string> lacks;
-  for (const std::uint32_t geodetic : {GlobalPositionInt::id, SimState::id})
-    if (hears(geodetic) && !(geodetic == GlobalPositionInt::id && local)) {
-      const std::string name(find_message(geodetic)->name);
-      lacks.push_back(name + (settings_.origin ? " has no fix" : " needs world.origin"));
-    }
-  if ((local || global) && !attitude) lacks.emplace_back("a position needs ATTITUDE or ATTITUDE_QUATERNION beside it");
-  if (attitude && !local && !global)
-    lacks.push_back(std::string("an attitude needs LOCAL_POSITION_NED") + (settings_.origin ? " or GLOBAL_POSITION_INT" : "") +
-                    " beside it");
-  const bool whole = hears(Odometry::id) || hears(AttPosMocap::id) || hears(VisionPositionEstimate::id);
-  if (lacks.empty() && whole) lacks.emplace_back("what came was refused");
-  if (lacks.empty() && attitude) lacks.emplace_back("positions and attitudes are never of the same time");
-  if (lacks.empty())
-    lacks.push_back(settings_.request_rates ? "it was asked for ODOMETRY, ATTITUDE_QUATERNION and LOCAL_POSITION_NED"
-                                            : "set its stream rates, or request_rates: true");
+  const auto lacks_place = [&](std::uint32_t id, bool has_fix) {
+    const std::string name(find_message(id)->name);
+    if (!settings_.origin || !has_fix) lacks.push_back(name + (settings_.origin ? " has no fix" : " needs world.origin"));
+  };
+  if (global && !local) lacks_place(GlobalPositionInt::id, global_has_fix_);
+  if (sim_state) lacks_place(SimState::id, sim_state_has_fix_);
+  for (const Source source : {Source::odometry, Source::sim_state, Source::mocap, Source::vision})
+    if (timeless_[static_cast<std::size_t>(source)])
+      lacks.push_back(std::string(name_of(source)) + " bears no time, which clock: follow needs");
+
+  const bool refused = hears(Odometry::id, now) || hears(AttPosMocap::id, now) || hears(VisionPositionEstimate::id, now);
+  if (refused && lacks.empty()) lacks.emplace_back("what came was refused");
+  if (refused || sim_state) {  // each of them would be enough
+  } else if (attitude && (local || global)) {
+    if (lacks.empty()) lacks.emplace_back("positions and attitudes are never of the same time");
+  } else {
+    if (!attitude) lacks.emplace_back("an attitude is missing (ATTITUDE_QUATERNION or ATTITUDE)");
+    if (!local && !global)
+      lacks.push_back(std::string("a position is missing (LOCAL_POSITION_NED, or GLOBAL_POSITION_INT") +
+                      (settings_.origin ? ")" : " with world.origin)"));
+    lacks.emplace_back(settings_.request_rates ? "they were asked for (request_rates), and have not come"
+                                               : "set its stream rates, or request_rates: true");
+  }
   std::string text;
   for (const std::string& l : lacks) text.append(text.empty() ? "" : "; ").append(l);
   return text;

@@ -1,4 +1,6 @@
 // What is said to the autopilot and to the user.
+#include <functional>
+
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
 namespace sonar::mavlink {
@@ -6,9 +8,11 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::Pair;
 
 std::vector<Frame> known_frames(const std::vector<Bytes>& datagrams) {
   std::vector<Frame> frames;
@@ -103,17 +107,95 @@ TEST(MavlinkSpeaks, TheFirstSentenceSaysWhatIsMissing) {
   Settings origin;
   origin.origin = Geodetic{rad_from_deg(47.6), rad_from_deg(-122.33), 0};
 
-  EXPECT_THAT(report_of({}, beat), HasSubstr("no poses yet: set its stream rates, or request_rates: true"));
+  EXPECT_THAT(report_of({}, beat),
+              EndsWith("no poses yet: an attitude is missing (ATTITUDE_QUATERNION or ATTITUDE); a position is "
+                       "missing (LOCAL_POSITION_NED, or GLOBAL_POSITION_INT with world.origin); set its stream "
+                       "rates, or request_rates: true"));
   EXPECT_THAT(report_of({}, beat + v(attitude(1, 0)) + v(global)),
               HasSubstr("no poses yet: GLOBAL_POSITION_INT needs world.origin"));
   EXPECT_THAT(report_of({}, beat + v(sim)), HasSubstr("SIM_STATE needs world.origin"));
-  EXPECT_THAT(report_of({}, v(local(1, 0, 0, 0))), HasSubstr("a position needs ATTITUDE or ATTITUDE_QUATERNION beside it"));
-  EXPECT_THAT(report_of({}, v(attitude(1, 0))), HasSubstr("an attitude needs LOCAL_POSITION_NED beside it"));
+  EXPECT_THAT(report_of({}, v(local(1, 0, 0, 0))),
+              AllOf(HasSubstr("no poses yet: an attitude is missing"), Not(HasSubstr("a position is missing"))));
+  EXPECT_THAT(report_of({}, v(attitude(1, 0))),
+              AllOf(HasSubstr("no poses yet: a position is missing"), Not(HasSubstr("an attitude is missing"))));
+  EXPECT_THAT(report_of({}, v(global)), AllOf(HasSubstr("GLOBAL_POSITION_INT needs world.origin; an attitude is missing")));
+  EXPECT_THAT(report_of(origin, v(global)), AllOf(HasSubstr("an attitude is missing"), Not(HasSubstr("no fix"))));
+  Settings asks;
+  asks.request_rates = true;
+  EXPECT_THAT(report_of(asks, beat), EndsWith("they were asked for (request_rates), and have not come"));
   EXPECT_THAT(report_of(origin, v(attitude(1, 0)) + v(GlobalPositionInt{})), HasSubstr("GLOBAL_POSITION_INT has no fix"));
   EXPECT_THAT(report_of(origin, v.version_1(sim)), HasSubstr("poses from SIM_STATE, in steps of up to 0.4 m"));
   Odometry broken = odometry(1, 0);
   broken.frame_id = 99;
   EXPECT_THAT(report_of({}, v(broken)), AllOf(HasSubstr("what came was refused"), Not(HasSubstr("request_rates"))));
+}
+
+/// The seconds at which a sentence was said, between two of them, and the sentences.
+std::vector<std::pair<int, std::string>> said(MavlinkPoses& poses, int from_s, int to_s,
+                                              const std::function<void(int)>& each = {}) {
+  std::vector<std::pair<int, std::string>> all;
+  for (int s = from_s; s < to_s; ++s) {
+    if (each) each(s);
+    for (const std::string& notice : poses.on_tick(at_s(s)).notices) all.emplace_back(s, notice);
+  }
+  return all;
+}
+
+TEST(MavlinkSpeaks, WhatIsMissingIsSaidAgainEverMoreSeldomAndWhenItIsThere) {
+  Sender v;
+  MavlinkPoses poses({});
+  const auto beats = [&](int s) { poses.on_datagram(v(autopilot_heartbeat()), at_s(s)); };
+  const auto missing = said(poses, 0, 121, beats);
+  std::vector<int> when;
+  for (const auto& [s, text] : missing) {
+    when.push_back(s);
+    EXPECT_THAT(text, HasSubstr("an attitude is missing"));
+  }
+  EXPECT_THAT(when, ElementsAre(1, 16, 46, 106));
+  EXPECT_THAT(poses.trouble(at_s(120)), HasSubstr("an attitude is missing"));
+
+  const auto tilts = [&](int s) { poses.on_datagram(v(attitude(static_cast<std::uint32_t>(1000 * s), 0)), at_s(s)); };
+  EXPECT_THAT(said(poses, 121, 230, tilts),
+              ElementsAre(Pair(226, AllOf(HasSubstr("a position is missing"), Not(HasSubstr("an attitude is missing"))))))
+      << "what has come is missing no more";
+  const auto poses_come = [&](int s) { poses.on_datagram(v(odometry(1'000'000ull * static_cast<unsigned>(s), 1)), at_s(s)); };
+  EXPECT_THAT(said(poses, 230, 900, poses_come), ElementsAre(Pair(230, HasSubstr("poses from ODOMETRY"))));
+  EXPECT_THAT(poses.trouble(at_s(900)), IsEmpty());
+  const auto silent = said(poses, 900, 921);
+  ASSERT_EQ(silent.size(), 2u);
+  EXPECT_EQ(silent[0].first, 905);
+  EXPECT_THAT(silent[0].second, HasSubstr("system 1 (ArduPilot) has been silent for 6 s: no poses"));
+}
+
+TEST(MavlinkSpeaks, PosesThatEndWhileTheSystemSpeaksAreReported) {
+  Sender v;
+  MavlinkPoses poses({});
+  poses.on_datagram(v(odometry(1, 0)), at_s(0));
+  const auto sentences = said(poses, 1, 10, [&](int s) { poses.on_datagram(v(autopilot_heartbeat()), at_s(s)); });
+  EXPECT_THAT(sentences, ElementsAre(Pair(1, HasSubstr("poses from ODOMETRY")),
+                                     Pair(6, AllOf(HasSubstr("sends HEARTBEAT; no poses any more: an attitude is missing"),
+                                                   Not(HasSubstr("sends HEARTBEAT, ODOMETRY"))))));
+}
+
+TEST(MavlinkSpeaks, ALinkOnWhichTheRightOneNeverSpeaksIsReported) {
+  MavlinkPoses nobody({});
+  EXPECT_THAT(said(nobody, 0, 10), ElementsAre(Pair(5, HasSubstr("no poses yet: nothing has come"))));
+  EXPECT_THAT(nobody.trouble(at_s(1)), HasSubstr("nothing has come"));
+
+  Settings settings;
+  settings.system_id = 2;
+  MavlinkPoses choosy(settings);
+  const auto speaks = [&](int s) { choosy.on_datagram(Sender{{1, 1, 0}}(odometry(1, 0)), at_s(s)); };
+  EXPECT_THAT(
+      said(choosy, 0, 10, speaks),
+      ElementsAre(Pair(5, "no poses yet: system 1, component 1 speaks, and is not who system_id and component_id ask for")));
+
+  MavlinkPoses station({});
+  Heartbeat beat = autopilot_heartbeat();
+  beat.autopilot = Heartbeat::no_autopilot;
+  const auto beats = [&](int s) { station.on_datagram(Sender{{255, 190, 0}}(beat), at_s(s)); };
+  EXPECT_THAT(said(station, 0, 10, beats),
+              ElementsAre(Pair(5, HasSubstr("system 255, component 190 speaks, and sends neither"))));
 }
 
 TEST(MavlinkSpeaks, AnotherSystemIsReportedToo) {
