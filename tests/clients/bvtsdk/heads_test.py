@@ -1,5 +1,5 @@
 """Sonars with two heads, with strict head numbers and strict ranges, and with packed pings, through the 4.x library; the settings
-that their recordings tell."""
+that their recordings tell; where they see ranges."""
 import ctypes
 import pathlib
 import tempfile
@@ -11,8 +11,9 @@ SUCCESS, NO_HEAD, BAD_RANGE = 0, 2010, 4009
 
 
 class Heads(unittest.TestCase):
-    def sonar(self, profile, options):
-        daemon = Sonard(scene="l-targets.yaml", profile=profile, pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}",
+    def sonar(self, profile, options, heading_deg=0):
+        daemon = Sonard(scene="l-targets.yaml", profile=profile,
+                        pose="{frame: ENU_FLU, xyz_m: [0, 0, 0], rpy_deg: [0, 0, %g]}" % heading_deg,
                         mount="{frame: FLU, xyz_m: [0, 0, 0]}\n    options: {" + options + "}")
         self.enterContext(daemon)
         self.sdk = ctypes.CDLL(prefix(4) / "lib/libbvtsdk.so.4")
@@ -54,6 +55,36 @@ class Heads(unittest.TestCase):
             self.set_range(head, 1, 5)
             self.ping_works(head)
         self.assertEqual(self.head(sonar, 2), (NO_HEAD, 0))
+
+    def ranges(self, head, threshold=None):
+        """Bearings with a range in a new ping, and all bearings; threshold None: as the library has it."""
+        generator, ping, profile = self.sdk.BVTImageGenerator_Create(), ctypes.c_longlong(), ctypes.c_longlong()
+        self.assertEqual(self.sdk.BVTImageGenerator_SetHead(generator, head), SUCCESS)
+        if threshold is not None:
+            self.assertEqual(self.sdk.BVTImageGenerator_SetRangeProfileIntensityThreshold(generator, threshold), SUCCESS)
+        self.assertEqual(self.sdk.BVTHead_GetPing(head, -1, ctypes.byref(ping)), SUCCESS)
+        self.assertEqual(self.sdk.BVTImageGenerator_GetRangeProfile(generator, ping.value, ctypes.byref(profile)), SUCCESS)
+        counts = [self.number(count, profile.value, ctypes.c_int)
+                  for count in (self.sdk.BVTRangeProfile_GetValidCount, self.sdk.BVTRangeProfile_GetCount)]
+        self.sdk.BVTRangeProfile_Destroy(profile.value)
+        self.sdk.BVTPing_Destroy(ping.value)
+        self.sdk.BVTImageGenerator_Destroy(generator)
+        return counts
+
+    def test_empty_water_has_no_ranges(self):
+        sonar = self.sonar("blueview-p900-90", "compression: none", heading_deg=180)
+        _, head = self.head(sonar, 0)
+        self.assertEqual(self.set_range(head, 1, 60), SUCCESS)  # where noise is strongest
+        self.assertEqual(self.ranges(head), [0, 512])
+        self.assertEqual(self.ranges(head, threshold=0), [512, 512])
+
+    def test_targets_have_ranges(self):
+        sonar = self.sonar("blueview-p900-90", "compression: none")
+        _, head = self.head(sonar, 0)
+        self.assertEqual(self.set_range(head, 1, 9), SUCCESS)
+        found, beams = self.ranges(head)
+        self.assertGreater(found, 3)
+        self.assertLess(found, beams / 2)
 
     def test_a_recording_tells_the_settings_of_its_pings(self):
         sonar = self.sonar("blueview-p900-90", "compression: none")

@@ -80,6 +80,21 @@ TEST(RangeList, TakesOnlyWhatIsAboveTheThreshold) {
   EXPECT_EQ(list_of(two_echoes(), settings).valid_count(), 1);
 }
 
+TEST(RangeList, OfNoiseIsEmptyUnlessTheThresholdIsLowered) {
+  std::uint32_t state = 1;
+  PolarPing noise = make_ping(64, 500, 1, 0.1f, [&](int, int) {
+    state = state * 1664525u + 1013904223u;
+    return 1 + static_cast<int>(state >> 19);  // to 8192
+  });
+  EXPECT_EQ(list_of(noise).valid_count(), 0);
+  RangeListSettings settings;
+  settings.threshold = 0;
+  EXPECT_EQ(list_of(noise, settings).valid_count(), 64);
+  noise.samples[30 * 500 + 200] = 12000;  // an echo
+  EXPECT_EQ(list_of(noise).valid_count(), 1);
+  EXPECT_NEAR(list_of(noise).range_m[30], 21.05, 1e-4);
+}
+
 TEST(RangeList, StartsWhereItIsTold) {
   RangeListSettings settings;
   settings.threshold = 1000;

@@ -194,7 +194,8 @@ BVT_API float BVTColorMapper_GetGamma(BVTColorMapper self);
 BVT_API RetVal BVTColorMapper_SetAutoMode(BVTColorMapper self, int on);
 BVT_API int BVTColorMapper_GetAutoMode(BVTColorMapper self);
 
-/* RangeData: one range a bearing, left to right; metres and degrees clockwise from ahead. Above 999: no echo. */
+/* RangeData: one range a bearing, left to right; metres and degrees clockwise from ahead. Above 999: no echo above the threshold,
+ * which is 10000 of 65535 until BVTHead_SetRangeDataThreshold sets another. */
 BVT_API int BVTRangeData_GetCount(BVTRangeData self);
 BVT_API float BVTRangeData_GetRangeValue(BVTRangeData self, int i);
 BVT_API float BVTRangeData_GetBearingValue(BVTRangeData self, int i);

@@ -248,7 +248,8 @@ BVT_API RetVal BVTColorMapper_GetGamma(BVTColorMapper self, float* out);
 BVT_API RetVal BVTColorMapper_SetAutoMode(BVTColorMapper self, int on);
 BVT_API RetVal BVTColorMapper_GetAutoMode(BVTColorMapper self, int* out);
 
-/* RangeProfile: one range a bearing, left to right; metres and degrees clockwise from ahead. Above 999: no echo. */
+/* RangeProfile: one range a bearing, left to right; metres and degrees clockwise from ahead. Above 999: no echo above the
+ * threshold, which is 10000 of 65535 until BVTImageGenerator_SetRangeProfileIntensityThreshold sets another. */
 BVT_API void BVTRangeProfile_Destroy(BVTRangeProfile self);
 BVT_API RetVal BVTRangeProfile_GetCount(BVTRangeProfile self, int* out);
 BVT_API RetVal BVTRangeProfile_GetValidCount(BVTRangeProfile self, int* out);
