@@ -5,19 +5,24 @@ import os
 import pathlib
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
 from running_sonard import BUILD, ROOT, free_address, run
 
+sys.path.insert(0, str(ROOT / "tests/architecture"))
+import check_links  # noqa: E402
+
 DOCUMENTS = "usr/share/doc/sonard/"
 WANTED = {
     "sonard": ["usr/bin/sonard", "usr/bin/sonarctl", "usr/lib/systemd/system/sonard.service", "usr/share/man/man8/sonard.8.gz",
                "usr/share/man/man1/sonarctl.1.gz", "usr/share/man/man5/sonard.yaml.5.gz", "usr/share/sonard/scenes/demo.yaml",
-               "usr/share/sonard/scenes/meshes/wreck.obj", "usr/share/doc/sonard/copyright", DOCUMENTS + "CHANGELOG.md.gz",
+               "usr/share/sonard/scenes/meshes/wreck.obj", "usr/share/doc/sonard/copyright", DOCUMENTS + "CHANGELOG.md",
                DOCUMENTS + "examples/sonard.yaml", "usr/share/sonard/python/sonard_client/__init__.py",
                "usr/share/sonard/python/sonard_client/convert/__main__.py",
-               "usr/share/sonard/ros2_bridge/package.xml"],
+               "usr/share/sonard/ros2_bridge/package.xml",
+               "usr/share/sonard/protocol/control/control.proto", DOCUMENTS + "docs/driver-test/test_driver.py"],
     "sonard-bvtsdk": ["usr/lib/sonard/bvt3/lib/libbvtsdk.so.3", "usr/lib/sonard/bvt4/lib/libbvtsdk.so.4",
                       "usr/lib/sonard/bvt4/include/bvt_sdk.h", "usr/lib/sonard/bvt3/lib/pkgconfig/bvtsdk.pc",
                       "usr/lib/sonard/bvt3/colormaps/jet.cmap", "usr/share/doc/sonard-bvtsdk/copyright"],
@@ -70,6 +75,11 @@ class Installed:
             looked = error.split("looked in ")[1]
             first = looked.strip().replace(" and ", ", ").split(", ")[1]
             self.assertEqual(pathlib.Path(first).resolve(), (self.root / self.prefix / "share/sonard/scenes").resolve(), error)
+
+    def test_every_link_of_the_pages_leads_to_what_is_installed(self):
+        self.assertTrue((self.root / DOCUMENTS / "docs/control.md").is_file())
+        for root in self.roots.values():
+            self.assertEqual(check_links.dead_links(root, installed=True), [])
 
     def test_the_example_configuration_is_valid(self):
         example = self.root / self.prefix / "share/doc/sonard/examples/sonard.yaml"
@@ -166,6 +176,7 @@ class Destdir(Installed, unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.folder.cleanup)
         cls.root = pathlib.Path(cls.folder.name)
+        cls.roots = {"all": cls.root}
         result = subprocess.run(["cmake", "--install", str(BUILD), "--prefix", "/usr"], stdin=subprocess.DEVNULL, capture_output=True,
                                 text=True, timeout=300, check=False, env={**os.environ, "DESTDIR": str(cls.root)})
         if result.returncode != 0:
