@@ -13,6 +13,8 @@ from .rotations import orientation, three
 
 Json = Dict[str, Any]
 
+_FIRST_ANSWER_S = 2.0  # a sonard says at once how it is, whatever it is doing: what is silent for longer is something else
+
 # 64 bits wide in control.proto, and therefore strings in its JSON; numbers here.
 _WIDE = {"seed", "pings", "refused", "served", "dropped", "skipped_ticks", "clients", "refused_clients", "pings_written",
          "pings_dropped", "bytes_written", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "now_ns", "unsent", "messages", "bytes"}
@@ -60,12 +62,13 @@ class Events(Iterator[Json]):
 class Control:
     """Control("127.0.0.1").set_sonar("front", range_m=5)
 
-    Each call is a connection of its own. OSError when nobody listens there; ControlError when the answer is not OK.
-    What is None stays as it is."""
+    Each call is a connection of its own. OSError when nobody listens there, or something else than sonard's HTTP;
+    ControlError when the answer is not OK. What is None stays as it is."""
 
     def __init__(self, host: str = "127.0.0.1", port: int = 8088, token: Optional[str] = None, timeout: float = 30.0) -> None:
         self.host, self.port, self.timeout = host, port, timeout
         self._headers = {"Authorization": f"Bearer {token}"} if token else {}
+        self._met = False
 
     # ---- asking
     def status(self) -> Json:
@@ -91,6 +94,7 @@ class Control:
         pose, scene. It ends when the daemon does. TimeoutError when none comes for `timeout` seconds; None waits for ever."""
         wanted = {"pings": pings, "clients": clients, "poses": poses, "scene": scene}
         query = urlencode({kind: 1 for kind, yes in wanted.items() if yes})
+        self._meet()
         connection = http.client.HTTPConnection(self.host, self.port, timeout=timeout)
         try:
             connection.request("GET", "/api/v1/events" + ("?" + query if query else ""), headers=self._headers)
@@ -187,8 +191,29 @@ class Control:
         return dict(_read_json(self._post("step", {"dt_s": dt_s}, timeout)))
 
     # ---- HTTP
+    def _meet(self) -> None:
+        """Once: does something there speak HTTP? Requests may take minutes, so that their own limits do not tell."""
+        if self._met:
+            return
+        wrong = (": something else listens there, or a sonard that is stopped; control.http is on port 8088 if the configuration "
+                 "says nothing else, and sonard's banner names it")
+        patience = min(self.timeout, _FIRST_ANSWER_S)
+        try:
+            self._exchange("GET", "/healthz", None, patience)
+        except ConnectionRefusedError:
+            raise
+        except socket.timeout:
+            raise TimeoutError(errno.ETIMEDOUT, f"{self.host}:{self.port} does not answer HTTP within {patience:g} s{wrong}") from None
+        except (http.client.HTTPException, ConnectionError):
+            raise ConnectionError(errno.EPROTO, f"{self.host}:{self.port} does not speak HTTP{wrong}") from None
+        self._met = True
+
     def _ask(self, method: str, path: str, body: Optional[bytes] = None, timeout: Optional[float] = None) -> "tuple[int, str]":
-        connection = http.client.HTTPConnection(self.host, self.port, timeout=timeout or self.timeout)
+        self._meet()
+        return self._exchange(method, path, body, timeout or self.timeout)
+
+    def _exchange(self, method: str, path: str, body: Optional[bytes], timeout: float) -> "tuple[int, str]":
+        connection = http.client.HTTPConnection(self.host, self.port, timeout=timeout)
         try:
             headers = dict(self._headers, **({"Content-Type": "application/json"} if body is not None else {}))
             connection.request(method, path, body, headers)

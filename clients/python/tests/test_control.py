@@ -4,6 +4,7 @@ import json
 import socket
 import sys
 import threading
+import time
 import unittest
 
 from common import PACKAGE  # and it is on the path
@@ -59,6 +60,36 @@ class Nobody(unittest.TestCase):
                 Control(port=port).status()
             with self.assertRaisesRegex(ConnectionRefusedError, f"no sonar listens at 127.0.0.1:{port}"):
                 OculusClient("127.0.0.1", port)
+
+
+class SomethingElse(unittest.TestCase):
+    """A wrong port is said to be one within about two seconds, however long requests may take."""
+
+    def expect(self, port, error, words):
+        for ask in (lambda c: c.status(), lambda c: c.load_scene("demo.yaml"), lambda c: c.events()):
+            begin = time.monotonic()
+            with self.assertRaisesRegex(error, f"127.0.0.1:{port} {words}.*something else listens there.*8088"):
+                ask(Control(port=port))
+            self.assertLess(time.monotonic() - begin, 6)  # 2 s on a quiet machine; requests alone: 30 s, 330 s, for ever
+
+    def test_that_is_silent(self):
+        with socket.create_server(("127.0.0.1", 0)) as silent:
+            self.expect(silent.getsockname()[1], TimeoutError, "does not answer HTTP within 2 s")
+
+    def test_that_speaks_otherwise(self):
+        for said in (b"SSH-2.0-Other\r\n", b""):
+            with socket.create_server(("127.0.0.1", 0)) as other:
+                def serve():
+                    for _ in range(3):
+                        connection = other.accept()[0]
+                        with connection:
+                            connection.sendall(said)
+                            connection.recv(4096)
+
+                thread = threading.Thread(target=serve)
+                thread.start()
+                self.expect(other.getsockname()[1], ConnectionError, "does not speak HTTP")
+                thread.join()
 
 
 class Asked(unittest.TestCase):
