@@ -79,20 +79,38 @@ class Driver:
 
     def __init__(self):
         self.pings = []  # (time of arrival, ping)
-        self.process = subprocess.Popen(shlex.split(DRIVER), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+        self.other_lines = []
+        self.errors = tempfile.NamedTemporaryFile("w")  # what it says on stderr, for the report of a failure
+        self.process = subprocess.Popen(shlex.split(DRIVER), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self.errors,
+                                        text=True)
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
 
     def _read(self):
         for line in self.process.stdout:
-            self.pings.append((time.monotonic(), read_ping(line)))
+            try:
+                self.pings.append((time.monotonic(), read_ping(line)))
+            except (ValueError, KeyError, TypeError):  # no line about a ping
+                self.other_lines.append(line)
+
+    def output(self):
+        """What it said beside pings: the last lines of it."""
+        errors = pathlib.Path(self.errors.name).read_text(encoding="utf-8", errors="replace")
+        return "".join((self.other_lines + errors.splitlines(keepends=True))[-20:]) or "(nothing)"
 
     def wait_for_pings(self, count, patience_s):
         """The next `count` pings from now on."""
         begin, deadline = len(self.pings), time.monotonic() + patience_s
         while len(self.pings) < begin + count:
+            if self.process.poll() is not None:
+                self.reader.join(10)  # it may have printed pings until its end
+                if len(self.pings) >= begin + count:
+                    break
+                raise AssertionError(f"the driver ended with code {self.process.returncode} after {len(self.pings) - begin} of "
+                                     f"{count} pings; it said:\n{self.output()}")
             if time.monotonic() > deadline:
-                raise AssertionError(f"{len(self.pings) - begin} of {count} pings within {patience_s} s")
+                raise AssertionError(f"{len(self.pings) - begin} of {count} pings within {patience_s} s; "
+                                     f"the driver said:\n{self.output()}")
             time.sleep(0.02)
         return [ping for _, ping in self.pings[begin:begin + count]]
 
@@ -101,6 +119,7 @@ class Driver:
         self.process.wait(10)
         self.reader.join(10)
         self.process.stdout.close()
+        self.errors.close()
 
 
 class DriverTest(unittest.TestCase):

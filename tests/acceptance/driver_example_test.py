@@ -2,6 +2,7 @@
 import os
 import subprocess
 import sys
+import time
 import unittest
 
 from running_sonard import ROOT, SONARD, free_address
@@ -9,13 +10,27 @@ from running_sonard import ROOT, SONARD, free_address
 EXAMPLE = ROOT / "docs/driver-test"
 
 
-class DriverExample(unittest.TestCase):
-    def test_the_page_is_true(self):
-        environment = {**os.environ, "SONARD": str(SONARD.resolve()), "ADDRESS": free_address()}
+def run_example(test, **more):
+    """The example's tests, or one of them, as a newcomer runs them."""
+    environment = {**os.environ, "SONARD": str(SONARD.resolve()), "ADDRESS": free_address(), **more}
+    if "DRIVER" not in more:
         environment.pop("DRIVER", None)
-        run = subprocess.run([sys.executable, "-B", "-m", "unittest", "-v", "test_driver.py"], cwd=EXAMPLE, env=environment,
-                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=240,
-                             check=False)
+    return subprocess.run([sys.executable, "-B", "-m", "unittest", "-v", test], cwd=EXAMPLE, env=environment,
+                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=240, check=False)
+
+
+class DriverExample(unittest.TestCase):
+    def test_a_driver_that_ends_is_noticed_at_once_with_what_it_said(self):
+        begin = time.monotonic()
+        run = run_example("test_driver.DriverTest.test_numbers_go_up_by_one",
+                          DRIVER="sh -c 'echo starting; echo no such device >&2; exit 3'")
+        self.assertEqual(run.returncode, 1, run.stdout)
+        self.assertIn("the driver ended with code 3 after 0 of 20 pings", run.stdout)
+        self.assertIn("starting\nno such device\n", run.stdout)
+        self.assertLess(time.monotonic() - begin, 20)  # 30 s is how long a driver may take for its pings
+
+    def test_the_page_is_true(self):
+        run = run_example("test_driver.py")
         self.assertEqual(run.returncode, 0, run.stdout)
         self.assertIn("Ran 4 tests", run.stdout)
 
