@@ -58,6 +58,8 @@ Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vend
   if (name.size() > longest_name || name.empty() || name.front() == '.' ||
       !std::all_of(name.begin(), name.end(), may_stand_in_name))
     return refuse("the name of a recording has letters, digits, - _ and . only, 128 at most, and no folder: run-1.mcap");
+  if (name.front() == '-')
+    return refuse("the name of a recording does not begin with -, which every program takes for an option: run-1.mcap");
   if (ending == endings.end()) return refuse("name the kind of file by its end: .mcap, .pcap, .oculus or .raw");
   if (ending->second != Kind::mcap && vendor != "oculus")
     return refuse("such files hold Oculus messages, and this is a sonar of another kind: end the name in .mcap");
