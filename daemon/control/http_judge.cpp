@@ -33,8 +33,9 @@ Judgement operation_of(const Route& route, const std::string& body) {
 
 /// Who asks, by which name, from which page. Empty answer = let through.
 std::optional<HttpAnswer> stopped_at_the_door(const HttpRequest& request, const HttpPolicy& policy) {
-  if (!request.has_host) return refused(400, "the Host header is missing");
-  if (!host_allowed(request.host, policy.reached, policy.hosts))
+  // HTTP/1.0 knows no Host (RFC 9112, 3.2). It is no way round the names: browsers always send one.
+  if (!request.has_host && !request.http_1_0) return refused(400, "the Host header is missing");
+  if (request.has_host && !host_allowed(request.host, policy.reached, policy.hosts))
     return refused(403, "Host is no name of this computer's that sonard knows: use its address, or name it in control.hosts");
   if (request.has_origin && !origin_allowed(request.origin, policy.reached, policy.hosts))
     return refused(403, "pages of other sites may not ask here (Origin)");

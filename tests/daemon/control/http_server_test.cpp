@@ -225,6 +225,17 @@ TEST(ControlHttp, OldClientsAndThoseWhoAskToContinue) {
     EXPECT_THAT(last.head, HasSubstr("\r\nConnection: close\r\n"));
     EXPECT_TRUE(client.tcp.read_to_end());
   }
+  {
+    HttpClient client(bench);
+    client.tcp.send("GET /healthz HTTP/1.0\r\n\r\n");
+    EXPECT_EQ(client.next().body, "ok\n") << "1.0 has no Host";
+  }
+  for (const std::string request : {"GET /healthz HTTP/1.1\r\n\r\n", "GET /healthz HTTP/1.0\r\nHost: evil.example\r\n\r\n",
+                                    "GET /api/v1/status HTTP/1.0\r\nOrigin: http://evil.example\r\n\r\n"}) {
+    HttpClient client(bench);
+    client.tcp.send(request);
+    EXPECT_EQ(client.next().status, request.find("1.1") != std::string::npos ? 400 : 403) << request;
+  }
   HttpClient client(bench);
   client.tcp.send(
       "POST /api/v1/sonar HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nExpect: 100-continue\r\n"
