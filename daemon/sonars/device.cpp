@@ -41,7 +41,8 @@ Device::Device(DeviceContext& context, const SonarConfig& config, std::uint32_t 
       beacon_(context.io),
       beacon_timer_(context.io),
       ping_timer_(context.io),
-      answers_(context.io, [this](protocol::BytesView datagram) { return vendor_.answer(datagram, state_); }) {
+      answers_(context.io, [this](protocol::BytesView datagram) { return vendor_.answer(datagram, state_); }),
+      visits_(context.io, context.log, config.name) {
   update_state(context.clock.now());
   use_initial_settings();
 }
@@ -88,6 +89,7 @@ void Device::stop(const std::string& why) {
   beacon_timer_.cancel();
   ping_timer_.cancel();
   answers_.stop();
+  visits_.end();
   pacer_.stop();
   beacon_.close(ec);
   if (started_) context_.recordings.end_of(config_.name, why);  // else one of the same name may go on

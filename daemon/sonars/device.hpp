@@ -21,6 +21,7 @@
 #include "daemon/sonars/metrics.hpp"
 #include "daemon/sonars/pacer.hpp"
 #include "daemon/sonars/session.hpp"
+#include "daemon/sonars/visit_log.hpp"
 #include "daemon/system/asio.hpp"
 #include "daemon/system/log.hpp"
 #include "daemon/time/clock.hpp"
@@ -113,7 +114,6 @@ class Device final : public SessionParent {
   asio::awaitable<void> turn_away(tcp::socket socket, Admission::Place place);
   asio::awaitable<void> announce();
   void admit(tcp::socket socket, Admission::Place place);
-  void say_visit(const std::string& what, std::vector<LogField> fields);
   void say_fault(const std::string& what);
   void welcome(tcp::socket socket, Admission::Place place);
   void on_membership();
@@ -168,7 +168,8 @@ class Device final : public SessionParent {
   bool busy_ = false, started_ = false, stopping_ = false, beacon_failed_ = false;
 
   DeviceFigures figures_;
-  LogLimiter refusals_, visits_, changes_, notices_, faults_;
+  LogLimiter refusals_, changes_, notices_, faults_;
+  VisitLog visits_;
   struct {
     std::uint32_t ping = 0;
     Time tick{}, at{};

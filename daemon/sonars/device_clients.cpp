@@ -21,12 +21,6 @@ bool has_left(tcp::socket& socket) {
 
 }  // namespace
 
-/// For what any visitor can cause, again and again.
-void Device::say_visit(const std::string& what, std::vector<LogField> fields) {
-  fields.insert(fields.begin(), {"sonar", config_.name});
-  say_at_times(context_.log, visits_, LogLevel::info, what, std::move(fields));
-}
-
 /// A mistake of ours, not of a client: it may cost that client its connection, never the others.
 void Device::say_fault(const std::string& what) { sonar::say_fault(context_.log, faults_, what, {"sonar", config_.name}); }
 
@@ -74,12 +68,13 @@ void Device::admit(tcp::socket socket, Admission::Place place) {
   }
   forget_who_left();
   if (config_.when_full == WhenClientsFull::queue && queue_.size() < longest_queue) {
-    say_visit("client waits for a place", {{"waiting", queue_.size() + 1}});
+    visits_.say(VisitLog::Kind::waits, "client waits for a place", {{"waiting", queue_.size() + 1}});
     queue_.push_back({std::move(socket), std::move(place)});
     return;
   }
   ++figures_.refused_clients;
-  say_visit("client turned away: " + std::to_string(config_.max_clients) + " already connected", {});
+  visits_.say(VisitLog::Kind::turned_away, "client turned away: " + std::to_string(config_.max_clients) + " already connected",
+              {});
   if (turning_away_ >= most_turned_away_at_once || stopping_) return;
   ++turning_away_;
   asio::co_spawn(
@@ -114,7 +109,8 @@ asio::awaitable<void> Device::turn_away(tcp::socket socket, Admission::Place pla
 
 void Device::forget_who_left() {
   const std::size_t left = std::erase_if(queue_, [](Waiting& waiting) { return has_left(waiting.socket); });
-  for (std::size_t i = 0; i < left; ++i) say_visit("client gone: it waited for a place", {{"waiting", queue_.size()}});
+  for (std::size_t i = 0; i < left; ++i)
+    visits_.say(VisitLog::Kind::gone, "client gone: it waited for a place", {{"waiting", queue_.size()}});
 }
 
 void Device::welcome(tcp::socket socket, Admission::Place place) {
@@ -123,7 +119,7 @@ void Device::welcome(tcp::socket socket, Admission::Place place) {
   update_state(now);
   auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket),
                                            vendor_.converse(state_, context_.clock.lived()), setup);
-  say_visit("client connected", {{"client", session->client()}});
+  visits_.say(VisitLog::Kind::connected, "client connected", {{"client", session->client()}});
   tell_of_client(*session, true, {});
   sessions_.push_back(session);
   session->start();
@@ -143,8 +139,8 @@ void Device::on_membership() {
 }
 
 void Device::on_over(Session& session, const std::string& why) {
-  say_visit(
-      "client gone: " + why,
+  visits_.say(
+      VisitLog::Kind::gone, "client gone: " + why,
       {{"client", session.client()}, {"pings", session.outbox().pings_written()}, {"dropped", session.outbox().pings_dropped()}});
   tell_of_client(session, false, why);
   keep_figures_of(session);
