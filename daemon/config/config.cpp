@@ -126,6 +126,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     sonar.outbox.when_full = outbox.optional("full").choice_or(
         WhenFull::replace_oldest, {{"replace_oldest", WhenFull::replace_oldest}, {"drop_newest", WhenFull::drop_newest}});
   }
+  sonar.overload = map.optional("overload").choice_or(Overload::slow, {{"slow", Overload::slow}, {"count", Overload::count}});
   const Node options = map.optional("options");
   if (profile) {
     sonar.profile = *profile;

@@ -27,6 +27,7 @@ namespace sonar {
 
 enum class WhenClientsFull { close_new, take_over, queue };
 enum class OnStale { hold, blank, stop };
+enum class Overload { slow, count };  // ticks without a ping: unseen by clients, or gaps in the ping numbers
 
 struct VehicleConfig {
   std::string name;
@@ -52,6 +53,7 @@ struct SonarConfig {
   int max_clients = 1;
   WhenClientsFull when_full = WhenClientsFull::close_new;
   OutboxRules outbox;
+  Overload overload = Overload::slow;
   protocol::OptionValues options;  // complete
 };
 struct PoseListener {

@@ -223,6 +223,15 @@ void Device::update_state(Time now) {
   state_.depth_m = depth_from_z(sonar.position_m.z);
 }
 
+/// A device that keeps its rhythm while its host does not keep up has numbers for the pings that were not made.
+PingNumber Device::next_number() {
+  const SkippedTicks& skipped = pacer_.skipped();
+  const std::uint64_t lost = skipped.late + skipped.busy;
+  const std::uint64_t since = lost - std::exchange(numbered_skips_, lost);
+  if (config_.overload == Overload::count && ping_number_ > 0) ping_number_ += static_cast<std::uint32_t>(since);
+  return PingNumber(++ping_number_);
+}
+
 void Device::ping(Time at) {
   const bool stale = context_.world.is_stale(config_.vehicle, at);
   const OnStale on_stale = context_.config.poses.on_stale;
@@ -233,7 +242,7 @@ void Device::ping(Time at) {
   update_state(at);
   PingRequest request;
   request.model = state_.model;
-  request.number = PingNumber(++ping_number_);
+  request.number = next_number();
   request.fired_at = at;
   request.vehicle_in_world = context_.world.vehicle_at(config_.vehicle, at);
   request.sonar_in_world = compose(request.vehicle_in_world, config_.mount);

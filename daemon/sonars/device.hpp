@@ -128,6 +128,7 @@ class Device final : public SessionParent {
   bool waits_for_pose(Time at) const;
   std::optional<Time> earliest(std::optional<Time> (Session::*of)() const) const;
   void ping(Time at);
+  PingNumber next_number();
   void on_ping(Simulator::Outcome outcome);
   void update_state(Time now);
   void keep_figures_of(const Session& session);
@@ -164,6 +165,7 @@ class Device final : public SessionParent {
   std::map<std::uint64_t, protocol::Bytes> requests_;  // settings_id -> the client's own bytes, echoed in its pings
   bool asked_ = false;                                 // a client that is still connected has sent settings
   std::uint32_t ping_number_ = 0;
+  std::uint64_t numbered_skips_ = 0;  // ticks that an overload has cost, as of the last ping
   bool transmits_ = true;  // as far as control is concerned
   bool busy_ = false, started_ = false, stopping_ = false, beacon_failed_ = false;
 

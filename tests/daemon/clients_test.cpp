@@ -60,6 +60,32 @@ TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {
   EXPECT_GE(daemon.figures().dropped, slow_ids.skipped_ids());
 }
 
+/// What an engine that takes 60 ms a ping makes of 40 Hz: the requests of a dozen pings that a client got.
+std::vector<PingRequest> overloaded(const std::string& sonar_lines) {
+  DaemonSetup setup;
+  setup.sonar_lines = sonar_lines;
+  setup.engine_takes = milliseconds(60);
+  Daemon daemon(setup);
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  for (int i = 0; i < 12; ++i) EXPECT_TRUE(client.next_ping());
+  daemon.stop();
+  EXPECT_GT(daemon.figures().skipped.busy, 0u);
+  return daemon.requests();
+}
+
+TEST(Clients, SeeAnOverloadInThePingNumbersWhereThatIsAskedFor) {
+  std::vector<PingRequest> slow = overloaded(""), counted = overloaded("    overload: count\n");
+  ASSERT_GE(slow.size(), 12u);
+  ASSERT_GE(counted.size(), 12u);
+  for (std::size_t i = 0; i < 12; ++i) {
+    EXPECT_EQ(static_cast<std::uint32_t>(slow[i].number), i + 1);
+    const auto ticks = (counted[i].fired_at - counted[0].fired_at) / milliseconds(25);
+    EXPECT_EQ(static_cast<std::int64_t>(counted[i].number), ticks + 1) << "a number for every tick";
+  }
+  EXPECT_GT(static_cast<std::uint32_t>(counted[11].number), 24u);
+}
+
 TEST(Clients, OneThatTakesNothingIsReset) {
   DaemonSetup setup;
   setup.more = "limits: {stall_s: 0.3}\n";

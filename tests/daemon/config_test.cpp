@@ -191,6 +191,13 @@ TEST(Config, LimitsAndPriorityAreRead) {
   EXPECT_THAT(why(base + "engine: {io_priority: 100}\n"), HasSubstr("engine.io_priority"));
 }
 
+TEST(Config, OverloadIsRead) {
+  EXPECT_EQ(parse(world + vehicles + sonar)->sonars.at(0).overload, Overload::slow);
+  EXPECT_EQ(parse(world + vehicles + sonar + "    overload: count\n")->sonars.at(0).overload, Overload::count);
+  EXPECT_THAT(why(world + vehicles + sonar + "    overload: counts\n"),
+              AllOf(StartsWith("sonard.yaml:7:15: sonars[0].overload: "), HasSubstr("did you mean \"count\"?")));
+}
+
 TEST(Config, UnknownKeysNameTheNearest) {
   EXPECT_THAT(why(world + vehicles + sonar + "    bind_pi: 127.0.0.3\n"),
               StartsWith("sonard.yaml:7:5: sonars[0].bind_pi: unknown key; did you mean \"bind_ip\"?"));
