@@ -20,6 +20,7 @@
 #include "daemon/sonars/datagram_answers.hpp"
 #include "daemon/sonars/metrics.hpp"
 #include "daemon/sonars/pacer.hpp"
+#include "daemon/sonars/rate_watch.hpp"
 #include "daemon/sonars/session.hpp"
 #include "daemon/sonars/visit_log.hpp"
 #include "daemon/system/asio.hpp"
@@ -172,6 +173,7 @@ class Device final : public SessionParent {
   DeviceFigures figures_;
   LogLimiter refusals_, changes_, notices_, faults_;
   VisitLog visits_;
+  RateWatch rate_watch_;
   struct {
     std::uint32_t ping = 0;
     Time tick{}, at{};

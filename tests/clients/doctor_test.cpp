@@ -235,6 +235,31 @@ TEST(Doctor, MeasuresTheRate) {
   expect(line(facts, "rate"), Level::warn, "one ping only", "sonarctl listen 127.0.0.2");
 }
 
+TEST(Doctor, SaysWhatComputingAllows) {
+  Facts facts = healthy();
+  SonarFacts& sonar = facts.sonars[0];
+  sonar.stream.computing_ms = 12;
+  EXPECT_THAT(line(facts, "rate").text, Not(HasSubstr("computing"))) << "as fast as an Oculus can be asked for";
+  sonar.stream.computing_ms = 52;
+  expect(line(facts, "rate"), Level::ok, "rate 10.0 Hz (asked 10)", "");
+  expect(line(facts, "rate"), Level::ok, ", computing takes 52 ms a ping: 19 Hz at most here", "");
+  sonar.stream.computing_ms = 193, sonar.stream.rate_hz = 5.2;
+  expect(line(facts, "rate"), Level::warn, "computing takes 193 ms a ping: 5.2 Hz at most here: the simulation is slower",
+         "engine.threads");
+
+  // Somebody else's sonar, by the figures that the daemon has.
+  sonar.stream = {};
+  sonar.clients = {"127.0.0.1:41022"};
+  sonar.says = facts.control.status->sonars[0];
+  sonar.says->pinging = true, sonar.says->rate_hz = 40;
+  sonar.says->figures.simulation_ms = 24;
+  EXPECT_THAT(text_from(judge(facts)), Not(HasSubstr("computing")));
+  sonar.says->figures.simulation_ms = 52, sonar.says->figures.skipped_ticks = 77;
+  expect(line(facts, "rate"), Level::warn,
+         "rate 40 Hz asked for by 127.0.0.1:41022, computing takes 52 ms a ping: 19 Hz at most here, 77 ticks skipped",
+         "fewer beams");
+}
+
 TEST(Doctor, ExpectsControlWhereADaemonIs) {
   Facts facts = healthy();
   facts.control.status.reset();

@@ -48,6 +48,7 @@ struct StreamFacts {
   std::optional<double> spread_p99_ms;
   // From the transmit instant to the last byte here, and how far the clocks differ, both from the control stream's events.
   std::optional<double> latency_p50_ms, latency_p99_ms;
+  std::optional<double> computing_ms;  // of one ping, the median, from the same events
 };
 struct SonarFacts {
   Endpoint at;

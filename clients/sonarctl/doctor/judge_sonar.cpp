@@ -9,6 +9,9 @@ namespace {
 using Outcome = StreamFacts::Outcome;
 using text::format;
 
+constexpr double fastest_hz = 40;  // that an Oculus can be asked for
+constexpr const char* less_to_compute = "fewer beams, less range, more threads (engine.threads), or less else on this computer";
+
 std::string joined(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
@@ -46,6 +49,7 @@ class SonarJudge {
     judge_status();
     judge_connection();
     if (sonar_.stream.outcome == Outcome::pings) judge_rate();
+    if (sonar_.stream.outcome == Outcome::not_tried) judge_rate_of_others();
   }
 
  private:
@@ -196,6 +200,26 @@ class SonarJudge {
     return {};
   }
 
+  /// What one ping takes: of those just seen, else the mean since the daemon's start; 0 = not known.
+  double computing_ms() const {
+    if (sonar_.stream.computing_ms) return *sonar_.stream.computing_ms;
+    return sonar_.says ? sonar_.says->figures.simulation_ms : 0;
+  }
+  bool too_slow_for(double rate_hz) const { return computing_ms() * rate_hz > 1000; }
+  std::string computing_text() const {
+    const double ms = computing_ms(), hz = 1000 / ms;
+    return "computing takes " + format("%.0f", ms) + " ms a ping: " + format("%.*f", hz < 10 ? 1 : 0, hz) + " Hz at most here";
+  }
+
+  /// The client that is connected asked for a rate, too.
+  void judge_rate_of_others() {
+    if (!sonar_.says || !sonar_.says->pinging || clock() != "realtime" || !too_slow_for(sonar_.says->rate_hz)) return;
+    add(Level::warn, "rate",
+        "rate " + format("%g", sonar_.says->rate_hz) + " Hz asked for by " + joined(sonar_.clients) + ", " + computing_text() +
+            ", " + std::to_string(sonar_.says->figures.skipped_ticks) + " ticks skipped",
+        less_to_compute);
+  }
+
   void judge_rate() {
     const StreamFacts& s = sonar_.stream;
     if (s.pings < 2)
@@ -210,11 +234,9 @@ class SonarJudge {
     std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
     if (expected_hz > 0) text += " (asked " + format("%g", expected_hz) + ")";
     text += latency_text();
-    if (expected_hz > 0 && s.rate_hz < 0.85 * expected_hz) {
-      if (sonar_.says) text += ", " + format("%.0f", sonar_.says->figures.simulation_ms) + " ms of computing a ping";
-      return add(Level::warn, "rate", text + ": the simulation is slower than the rate",
-                 "fewer beams, less range, more threads (engine.threads), or less else on this computer");
-    }
+    const bool slow = expected_hz > 0 && s.rate_hz < 0.85 * expected_hz;
+    if (too_slow_for(slow ? expected_hz : fastest_hz)) text += ", " + computing_text();
+    if (slow) return add(Level::warn, "rate", text + ": the simulation is slower than the rate", less_to_compute);
     if (s.missing > 0)
       return add(Level::warn, "rate", text + ", " + std::to_string(s.missing) + " pings missing",
                  "the reader or the network is too slow: outbox of the sonar, sonarctl listen");

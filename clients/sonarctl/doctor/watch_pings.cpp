@@ -55,18 +55,23 @@ class Watch {
     conclude();
   }
 
-  /// Seconds by which each ping came later than it was fired, as the control stream's events have it.
-  std::vector<double> delays_s(ControlClient& control, const std::string& sonar) const {
-    std::vector<double> delays;
+  /// Of each ping, as the control stream's events have it: by how much later it came than it was fired, and what it took.
+  struct Told {
+    std::vector<double> delays_s, computing_ms;
+  };
+  Told told(ControlClient& control, const std::string& sonar) const {
+    Told told;
     for (int i = 0; i < 1000; ++i) {
       const auto event = control.next_event(i == 0 ? 50ms : 0ms);
       if (!event || !*event) break;
       const auto* ping = std::get_if<control::PingEvent>(&(*event)->what);
       if (ping == nullptr || ping->sonar != sonar) continue;
       const auto arrived = arrived_unix_s_.find(ping->number);
-      if (arrived != arrived_unix_s_.end()) delays.push_back(arrived->second - static_cast<double>(ping->fired_at_ns) * 1e-9);
+      if (arrived == arrived_unix_s_.end()) continue;
+      told.delays_s.push_back(arrived->second - static_cast<double>(ping->fired_at_ns) * 1e-9);
+      told.computing_ms.push_back(ping->simulation_ms);
     }
-    return delays;
+    return told;
   }
 
  private:
@@ -134,7 +139,10 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
     return;
   }
   watch.run(std::move(*stream));
-  if (control != nullptr) take_delays(sonar, watch.delays_s(*control, sonar.name), clocks);
+  if (control == nullptr) return;
+  const Watch::Told told = watch.told(*control, sonar.name);
+  if (!told.computing_ms.empty()) facts.computing_ms = percentile(told.computing_ms, 0.5);
+  take_delays(sonar, told.delays_s, clocks);
 }
 
 }  // namespace sonar::clients::doctor

@@ -1,0 +1,28 @@
+// Does computing keep a sonar from the rate it was asked for? Looks at stretches of ticks and says so once. Pure: figures in, a
+// sentence out; used by Device.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace sonar {
+
+class RateWatch {
+ public:
+  /// After each ping. `ticks` and `busy` count since the start, `busy` those of them at which the ping before was still being
+  /// computed; the ping took `ping_s`; `rate_hz` is what the ticks have. A sentence, at most once in its life.
+  std::optional<std::string> look(std::uint64_t ticks, std::uint64_t busy, double ping_s, double rate_hz);
+
+ private:
+  void begin(std::uint64_t ticks, std::uint64_t busy, double rate_hz);
+
+  bool said_ = false;
+  int to_pass_over_ = 5;  // the first pings make what later ones find ready: they prove nothing
+  double rate_hz_ = 0;
+  std::uint64_t ticks_before_ = 0, busy_before_ = 0;
+  int pings_ = 0;
+  double ping_s_ = 0;  // of those, summed
+};
+
+}  // namespace sonar

@@ -1,0 +1,66 @@
+// Only a sonar that computing keeps from its rate is told of, once, with the figures that say what is possible.
+#include "daemon/sonars/rate_watch.hpp"
+
+#include <gmock/gmock.h>
+
+namespace sonar {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+/// A sonar whose pings take so long, each after the one before; what was said, if anything.
+struct Sonar {
+  double rate_hz, ping_s, waits_s;  // for others' pings
+  RateWatch watch{};
+  std::uint64_t ticks = 0, busy = 0;
+  std::string said{};
+
+  void ping(int times) {
+    for (int i = 0; i < times; ++i) {
+      const auto periods = static_cast<std::uint64_t>((ping_s + waits_s) * rate_hz) + 1;
+      ticks += periods;
+      busy += periods - 1;
+      if (const auto text = watch.look(ticks, busy, ping_s, rate_hz)) said += *text + "\n";
+    }
+  }
+};
+
+TEST(RateWatch, SaysOnceWhatComputingAllows) {
+  Sonar slow{40, 0.052, 0};
+  slow.ping(200);
+  EXPECT_THAT(slow.said, StartsWith("computing takes 52 ms a ping: 19 Hz at most here, 40 Hz are asked for"));
+  EXPECT_EQ(std::count(slow.said.begin(), slow.said.end(), '\n'), 1);
+}
+
+TEST(RateWatch, SaysNothingOfASonarThatKeepsUp) {
+  Sonar quick{40, 0.024, 0};
+  quick.ping(500);
+  EXPECT_EQ(quick.said, "");
+}
+
+TEST(RateWatch, TheFirstPingsProveNothing) {
+  Sonar cold{40, 2, 0};
+  cold.ping(3);
+  cold.ping_s = 0.02;
+  cold.ping(500);
+  EXPECT_EQ(cold.said, "");
+}
+
+TEST(RateWatch, KnowsThatOthersComputeToo) {
+  Sonar one_of_three{20, 0.03, 0.06};
+  one_of_three.ping(200);
+  EXPECT_THAT(one_of_three.said, HasSubstr("30 ms a ping, and other sonars are computed between: 10 Hz at most here"));
+}
+
+TEST(RateWatch, AnotherRateIsLookedAtAnew) {
+  Sonar sonar{10, 0.052, 0};
+  sonar.ping(100);
+  EXPECT_EQ(sonar.said, "");
+  sonar.rate_hz = 40;
+  sonar.ping(100);
+  EXPECT_THAT(sonar.said, HasSubstr("19 Hz at most here"));
+}
+
+}  // namespace
+}  // namespace sonar
