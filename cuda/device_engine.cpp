@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "core/pipeline/simulate.hpp"
+#include "core/pipeline/water_line.hpp"
 #include "cuda/prepare_ping.hpp"
 #include "cuda/steps.hpp"
 
@@ -46,9 +47,25 @@ class DeviceEngine final : public PingEngine {
     for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);  // memory goes when nothing uses it any more
   }
 
-  std::vector<Ping> run(std::span<const PingRequest> requests) override {
+  std::vector<Ping> run(std::span<const PingRequest> asked) override {
+    std::vector<PingRequest> room;
+    const std::span<const PingRequest> requests = in_water(asked, *scene_, room);
     for (const PingRequest& request : requests)
       if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
+    std::vector<Ping> pings = computed(requests);
+    tell_as_asked(asked, pings);
+    return pings;
+  }
+
+  std::string description() const override {
+    return (failed_ ? "cpu, after a failure of " : "cuda, ") + machine_->name() + ", " + kernels_.name + ", " +
+           std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
+  }
+  PingStatistics statistics() const override { return statistics_; }
+  std::vector<PingStatistics> statistics_of_each() const override { return each_; }
+
+ private:
+  std::vector<Ping> computed(std::span<const PingRequest> requests) {
     std::vector<Ping> pings(requests.size());
     each_.assign(requests.size(), {});
     if (!failed_) try {
@@ -72,14 +89,6 @@ class DeviceEngine final : public PingEngine {
     return pings;
   }
 
-  std::string description() const override {
-    return (failed_ ? "cpu, after a failure of " : "cuda, ") + machine_->name() + ", " + kernels_.name + ", " +
-           std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
-  }
-  PingStatistics statistics() const override { return statistics_; }
-  std::vector<PingStatistics> statistics_of_each() const override { return each_; }
-
- private:
   void run_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
     std::size_t which = 0;
     for (std::size_t i = 0; i < requests.size(); ++i) {

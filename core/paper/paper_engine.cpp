@@ -7,6 +7,7 @@
 
 #include "core/base/random.hpp"
 #include "core/paper/paper_ping.hpp"
+#include "core/pipeline/water_line.hpp"
 
 namespace sonar {
 namespace {
@@ -44,7 +45,9 @@ class Engine final : public PingEngine {
   std::vector<PingStatistics> statistics_of_each() const override { return each_; }
 
  private:
-  Ping compare(const PingRequest& request) {
+  Ping compare(const PingRequest& asked) {
+    std::vector<PingRequest> room;
+    const PingRequest& request = in_water({&asked, 1}, *scene_, room).front();
     if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
     if (!rays_) rays_ = std::make_unique<RayScene>(scene_, pool_.threads());
     if (!scene_->bodies_in_world.empty())
@@ -52,7 +55,10 @@ class Engine final : public PingEngine {
     if (!prepared_ || !prepared_->serves(request)) prepared_ = std::make_unique<paper::Prepared>(request, sum_);
     statistics_ = {};
     last_was_canonical_ = false;
-    return paper::simulate(*rays_, request, *prepared_, simd::kernels_for(options_.simd), pool_, options_.now_s, statistics_);
+    Ping ping =
+        paper::simulate(*rays_, request, *prepared_, simd::kernels_for(options_.simd), pool_, options_.now_s, statistics_);
+    tell_as_asked({&asked, 1}, {&ping, 1});
+    return ping;
   }
 
   std::shared_ptr<const Scene> scene_;

@@ -4,6 +4,7 @@
 
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simulate.hpp"
+#include "core/pipeline/water_line.hpp"
 
 namespace sonar {
 namespace {
@@ -25,11 +26,13 @@ class CpuEngine final : public PingEngine, private Interruption {
     pings.reserve(requests.size());
     const bool let_in = under_way_.request != nullptr;
     if (!let_in) each_.clear();
-    for (const PingRequest& request : requests) {
+    std::vector<PingRequest> room;
+    for (const PingRequest& request : in_water(requests, *scene_, room)) {
       if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
       pings.push_back(run(request));
       if (!let_in) each_.push_back(work_[0].statistics);
     }
+    tell_as_asked(requests, pings);
     return pings;
   }
 

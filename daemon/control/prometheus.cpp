@@ -88,6 +88,8 @@ constexpr SonarFamily sonar_families[] = {
      [](const DeviceFigures& f) { return static_cast<double>(f.refused); }},
     {"sonard_pings_unwanted_total", Type::counter, "Pings whose clients had gone or changed their settings when they were ready.",
      [](const DeviceFigures& f) { return static_cast<double>(f.unwanted); }},
+    {"sonard_pings_out_of_water_total", Type::counter, "Pings of noise only: the sonar was above the sea surface.",
+     [](const DeviceFigures& f) { return static_cast<double>(f.out_of_water); }},
     {"sonard_pings_served_total", Type::counter, "Pings written whole to at least one client.",
      [](const DeviceFigures& f) { return static_cast<double>(f.served); }},
     {"sonard_pings_offered_total", Type::counter, "Pings times the clients they were for.",

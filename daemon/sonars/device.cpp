@@ -8,6 +8,8 @@
 namespace sonar {
 namespace {
 
+constexpr auto air_is_news_after = std::chrono::minutes(1);  // a vehicle on waves comes out of the water with each of them
+
 protocol::DeviceState describe(const SonarConfig& config, const Water& water, Time now, bool simulated_time) {
   protocol::DeviceState s;
   s.name = config.name;
@@ -255,6 +257,7 @@ void Device::ping(Time at) {
   request.sonar_id = index_;
   request.seed = Seed(context_.config.seed);
   request.blank = (stale && on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
+  under_way_blank_ = request.blank;
   request.switches = context_.config.engine.switches;
   request.switches.keep_truth = context_.recordings.wants_truth(config_.name);
   under_way_names_ = context_.recordings.names();
@@ -271,6 +274,7 @@ void Device::on_ping(Simulator::Outcome outcome) {
     if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period())))
       context_.log.warning(*slow, {{"sonar", config_.name}});
   if (outcome.ping) gain_assist_.look_at(*outcome.ping);
+  if (outcome.ping) note_water(outcome.ping->request);
   if (outcome.refused) {
     ++figures_.refused;
     std::uint64_t unsaid = 0;
@@ -296,6 +300,18 @@ void Device::on_ping(Simulator::Outcome outcome) {
     ++figures_.unwanted;
   }
   context_.on_change();
+}
+
+/// The engine made noise of a ping that was asked for as any other: it knows where the sea surface is.
+void Device::note_water(const PingRequest& computed) {
+  const bool was_in_air = std::exchange(in_air_, computed.blank && !under_way_blank_);
+  if (!in_air_) return;
+  ++figures_.out_of_water;
+  const auto now = std::chrono::steady_clock::now();
+  if (was_in_air || (air_said_ != decltype(air_said_){} && now - air_said_ < air_is_news_after)) return;
+  air_said_ = now;
+  context_.log.warning("the sonar is above the sea surface and hears noise only: z = 0 is the surface, lower is negative",
+                       {{"sonar", config_.name}, {"z_m", computed.sonar_in_world.position_m.z}});
 }
 
 std::vector<StreamDigest> Device::digests() const {

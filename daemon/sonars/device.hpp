@@ -131,6 +131,7 @@ class Device final : public SessionParent {
   void ping(Time at);
   PingNumber next_number();
   void on_ping(Simulator::Outcome outcome);
+  void note_water(const PingRequest& computed);
   void update_state(Time now);
   void keep_figures_of(const Session& session);
 
@@ -161,13 +162,16 @@ class Device final : public SessionParent {
   GainAssist gain_assist_;
   std::uint64_t settings_id_ = 0;
   std::uint64_t under_way_settings_id_ = 0;            // of the ping that is being made
+  bool under_way_blank_ = false;                       // so asked for
   std::shared_ptr<const SceneNames> under_way_names_;  // of the scene it is made in
   std::uint64_t oldest_wanted_id_ = 0;                 // pings of settings before it belong to clients that have gone
   std::map<std::uint64_t, protocol::Bytes> requests_;  // settings_id -> the client's own bytes, echoed in its pings
   bool asked_ = false;                                 // a client that is still connected has sent settings
   std::uint32_t ping_number_ = 0;
   std::uint64_t numbered_skips_ = 0;  // ticks that an overload has cost, as of the last ping
-  bool transmits_ = true;  // as far as control is concerned
+  bool transmits_ = true;             // as far as control is concerned
+  bool in_air_ = false;               // at the last ping
+  std::chrono::steady_clock::time_point air_said_{};
   bool busy_ = false, started_ = false, stopping_ = false, beacon_failed_ = false;
 
   DeviceFigures figures_;

@@ -44,6 +44,7 @@ struct DeviceFigures {
   std::uint64_t pings = 0;                               // simulated
   std::uint64_t refused = 0;                             // of them by the engine: nothing came out
   std::uint64_t unwanted = 0;                            // of them: whoever they were for had gone or has asked for other ones
+  std::uint64_t out_of_water = 0;                        // of them: noise only, since the sonar was above the sea surface
   std::uint64_t served = 0;                              // written whole to at least one client
   std::uint64_t offered = 0;                             // to clients: a ping counts for each of them
   std::uint64_t sent = 0;                                // written whole to a client

@@ -16,6 +16,7 @@ namespace sonar::testing_daemon {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// A wall 0.2 m thick, square to the sonar's axis, and a ball behind the sonar.
 ScenePointer wall_at(double x_m) {
@@ -28,10 +29,17 @@ ScenePointer wall_at(double x_m) {
   return *scene;
 }
 
+/// The same below a surface of which only the place matters here.
+ScenePointer wall_below_the_surface() {
+  Scene scene = *wall_at(1.8);
+  scene.sea_surface.present = true;
+  return std::make_shared<const Scene>(std::move(scene));
+}
+
 /// As main.cpp puts it together, in a thread; stopped by the destructor.
 class RealDaemon {
  public:
-  RealDaemon() {
+  explicit RealDaemon(ScenePointer scene = wall_at(1.8)) {
     setup_.more = "control: {stream: off, http: '" + address() + ":8088'}\n";
     std::ofstream(::testing::TempDir() + "/scene.yaml") << "name: test\n";
     std::ofstream(file_) << yaml_of(setup_);
@@ -48,7 +56,7 @@ class RealDaemon {
     auto config = load_config(file_);
     if (!config) throw std::runtime_error(config.error().text);
     app_ = std::make_unique<App>(
-        *std::move(config), wall_at(1.8), [this](ScenePointer s) { return make_cpu_engine(std::move(s), pool_); }, options,
+        *std::move(config), std::move(scene), [this](ScenePointer s) { return make_cpu_engine(std::move(s), pool_); }, options,
         *log_);
     if (const auto opened = app_->open(); !opened) throw std::runtime_error(opened.error().text);
     thread_ = std::thread([this] { code_ = app_->run(); });
@@ -138,6 +146,32 @@ TEST(AnalyticDaemon, PingsWhileControlChangesTheSceneAndTheConfigurationIsReadAg
   const DeviceFigures f = daemon.app().devices().front().figures();
   EXPECT_EQ(f.ticks, f.pings + f.skipped_ticks);
   EXPECT_EQ(f.offered, f.sent + f.dropped);
+}
+
+TEST(AnalyticDaemon, TellsOnceThatASonarIsAboveTheSeaSurface) {
+  RealDaemon daemon(wall_below_the_surface());
+  Client client(daemon.address());
+  client.fire(fire_at(oculus::PingRate::hz40));
+  EXPECT_TRUE(sees_wall(client, 1.7));
+  EXPECT_THAT(daemon.log_text(), Not(HasSubstr("above the sea surface")));
+  const auto raise_to = [&](double z_m) {
+    const std::string body = R"({"frame": "ENU_FLU", "orientation": {"w": 1}, "position": {"z": )" + std::to_string(z_m) + "}}";
+    return daemon.http("POST", "/api/v1/pose", body);
+  };
+  EXPECT_THAT(raise_to(0.4), HasSubstr("\"OK\""));
+  EXPECT_TRUE(
+      eventually([&] { return daemon.log_text().find("above the sea surface and hears noise only") != std::string::npos; }));
+  EXPECT_TRUE(client.next_ping()) << "pings go on";
+  EXPECT_THAT(raise_to(-3), HasSubstr("\"OK\""));
+  EXPECT_TRUE(sees_wall(client, 1.7));
+  EXPECT_THAT(raise_to(0.4), HasSubstr("\"OK\""));
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(client.next_ping());
+  EXPECT_EQ(daemon.stop(), 0);
+  EXPECT_GT(daemon.app().devices().front().figures().out_of_water, 0u);
+  const std::string log = daemon.log_text();
+  const auto first = log.find("above the sea surface");
+  EXPECT_EQ(log.find("above the sea surface", first + 1), std::string::npos) << "waves bring no line each\n" << log;
+  EXPECT_THAT(log, HasSubstr("z_m=0.4"));
 }
 
 }  // namespace

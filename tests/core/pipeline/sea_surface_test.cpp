@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/paper/paper_engine.hpp"
 #include "core/pipeline/bubbles.hpp"
 #include "core/pipeline/multipath/multipath_legs.hpp"
 #include "core/pipeline/scattering_law.hpp"
@@ -134,6 +135,80 @@ TEST(SeaSurface, BubblesTakeTheirShareOfThePath) {
     record_oracle(no_number, "bubbles under the sea surface, loss there and back", 2 * 4 * 0.25 * r,
                   10 * std::log10(without / with), 0.3, "dB");
   }
+}
+
+/// Sea over a bed at 3 m, looked at from that height.
+struct OverABed {
+  Sounding sounding;
+  explicit OverABed(const std::string& surface = "sea_surface: {size_m: [60, 60]}\n")
+      : sounding(scene(surface), p900(), default_rows(10, 394)) {
+    sounding.request.switches.noise = true;
+  }
+  static std::shared_ptr<const Scene> scene(const std::string& surface) {
+    auto scene = parse_scene(surface +
+                                 "materials: {sand: {lambert_db: -20}}\n"
+                                 "objects: [{type: plane, material: sand, size_m: [60, 60], pose: {xyz_m: [0, 0, -3]}}]\n",
+                             "s.yaml", ".");
+    if (!scene) throw std::runtime_error(scene.error().text);
+    return *scene;
+  }
+  const Ping& from(double z_m, double climbs_mps = 0) {
+    sounding.request.sonar_moves.velocity_mps.z = climbs_mps;
+    return sounding.ping_from({0, 0, z_m}, {0, 0.35, 0});
+  }
+};
+
+TEST(SeaSurface, OneAtItSeesAsOneJustBelow) {
+  OverABed bed;
+  const auto below = bed.from(-0.001).samples;
+  for (const double z : {0.0, -1e-9, 5e-4, 0.001}) {
+    const Ping& ping = bed.from(z);
+    EXPECT_EQ(ping.samples, below) << z;
+    EXPECT_EQ(ping.request.sonar_in_world.position_m.z, z) << "told where it is";
+    EXPECT_FALSE(ping.request.blank);
+  }
+  double at_it = 0, deeper = 0;
+  for (int pass = 0; pass < 2; ++pass) {
+    bed.from(pass == 0 ? 0.0 : -0.02);
+    for (int row = bed.sounding.rows() / 2; row < bed.sounding.rows(); ++row)
+      for (int j = 200; j < 312; ++j) (pass == 0 ? at_it : deeper) += bed.sounding.power(row, j);
+  }
+  EXPECT_NEAR(10 * std::log10(at_it / deeper), 0, 0.5) << "the bed";
+}
+
+TEST(SeaSurface, OneAboveItHearsNoise) {
+  OverABed bed, without("");
+  const Ping& in_air = bed.from(0.0011);
+  EXPECT_TRUE(in_air.request.blank) << "so that it can be told";
+  const auto noise = in_air.samples;
+  bed.sounding.request.blank = true;
+  EXPECT_EQ(bed.from(-1).samples, noise);
+  bed.sounding.request.blank = false;
+  EXPECT_NE(bed.from(-1).samples, noise);
+  EXPECT_FALSE(without.from(1).request.blank) << "without a sea surface z = 0 is a place like any other";
+  EXPECT_NE(without.from(1).samples, noise);
+}
+
+TEST(SeaSurface, NobodyLeavesTheWaterDuringAPing) {
+  OverABed bed;
+  const auto at_rest = bed.from(-0.001).samples;
+  EXPECT_EQ(bed.from(-0.001, 5).samples, at_rest) << "5 m/s for 6.7 ms would be 33 mm";
+  EXPECT_EQ(bed.sounding.last().request.sonar_moves.velocity_mps.z, 5) << "told as it moves";
+  EXPECT_NE(bed.from(-0.001, -5).samples, at_rest) << "down it may";
+}
+
+TEST(SeaSurface, TheModesForComparisonKnowIt) {
+  auto scene = OverABed::scene("sea_surface: {size_m: [60, 60]}\n");
+  Parallel pool(1);
+  const auto engine = make_engine(scene, pool);
+  PingRequest request = OverABed().sounding.request;
+  request.switches.mode = Mode::paper;
+  const auto samples_from = [&](double z_m) {
+    request.sonar_in_world = {{0, 0, z_m}, quat_from_rpy({0, 0.35, 0})};
+    return engine->run({&request, 1}).at(0).samples;
+  };
+  EXPECT_EQ(samples_from(0), samples_from(-0.001));
+  EXPECT_NE(samples_from(0.5), samples_from(-0.001));
 }
 
 }  // namespace

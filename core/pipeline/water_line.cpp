@@ -1,0 +1,47 @@
+#include "core/pipeline/water_line.hpp"
+
+#include <algorithm>
+
+namespace sonar {
+namespace {
+
+/// Until the moment the scene is looked at, PingScalars::seen_at_s.
+double rise_m(const PingRequest& r) {
+  return std::max(0.0, r.sonar_moves.velocity_mps.z) * r.settings.range_m /
+         static_cast<double>(r.settings.device_sound_speed_mps);
+}
+
+bool is_above(const PingRequest& r) { return r.sonar_in_world.position_m.z > least_depth_m; }
+bool is_to_change(const PingRequest& r) {
+  return is_above(r) ? !r.blank : r.sonar_in_world.position_m.z + rise_m(r) > -least_depth_m;
+}
+
+void change(PingRequest& r) {
+  if (is_above(r)) {
+    r.blank = true;
+    return;
+  }
+  double& z = r.sonar_in_world.position_m.z;
+  double& climbs_mps = r.sonar_moves.velocity_mps.z;
+  z = std::min(z, -least_depth_m);
+  if (const double rise = rise_m(r); rise > 0) climbs_mps *= std::clamp((-least_depth_m - z) / rise, 0.0, 1.0);
+}
+
+}  // namespace
+
+std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room) {
+  if (!scene.sea_surface.present || std::none_of(requests.begin(), requests.end(), is_to_change)) return requests;
+  room.assign(requests.begin(), requests.end());
+  for (PingRequest& r : room)
+    if (is_to_change(r)) change(r);
+  return room;
+}
+
+void tell_as_asked(std::span<const PingRequest> requests, std::span<Ping> pings) {
+  for (std::size_t i = 0; i < pings.size(); ++i) {
+    pings[i].request.sonar_in_world = requests[i].sonar_in_world;
+    pings[i].request.sonar_moves = requests[i].sonar_moves;
+  }
+}
+
+}  // namespace sonar

@@ -1,0 +1,23 @@
+// Which side of the sea surface a sonar is on. Engines ask before they compute, so that a sonar that floats sees what one just
+// below the surface sees, and one in the air hears noise.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "core/sonar/ping.hpp"
+
+namespace sonar {
+
+/// Nobody is nearer to the sea surface, z = 0, than this [m]: who is, or is up to as much above it, is taken so deep.
+inline constexpr double least_depth_m = 1e-3;
+
+/// The requests as they are to be computed; those given where nothing is to be changed, else copies in `room`. In scenes with a
+/// sea surface: a sonar above it hears nothing (blank), one at it is put just below, and none leaves the water during its ping.
+std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room);
+
+/// Pings of such requests tell where their sonars really were; PingRequest::blank is left as it was computed.
+void tell_as_asked(std::span<const PingRequest> requests, std::span<Ping> pings);
+
+}  // namespace sonar
