@@ -92,14 +92,20 @@ void read_sonar(const Node& node, RenderJob& job) {
   read_ping(ping.map(), *job.model, !profile.vendor, job.settings);
 }
 
-/// The scene's keys inline, or the name of a file. `text` collects what the file says.
-std::shared_ptr<const Scene> read_scene_of(const Node& node, const std::filesystem::path& folder, const std::string& name) {
-  if (node.is_map()) return read_scene(node.map(), folder, name);
+/// The scene's keys inline, or the name of a file. What is wrong with the scene is bad data, as where a file of its own holds it.
+/// All else must have been read: errors of the document are taken for the scene's.
+Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::filesystem::path& folder, const std::string& name,
+                                                   const text::Document& document) {
+  if (node.is_map()) {
+    std::shared_ptr<const Scene> scene = read_scene(node.map(), folder, name);
+    if (auto error = document.finish()) return failure(ErrorKind::bad_data, std::move(error->text));
+    return scene;
+  }
   const SceneFile file = read_scene_file(node, folder);
-  if (node.text().empty() || (!file.built_in && !std::filesystem::exists(file.path))) return nullptr;
+  if (auto error = document.finish()) return tl::make_unexpected(*std::move(error));
   auto scene = load_scene(file);
-  if (!scene) node.fail(scene.error().text);
-  return scene.value_or(nullptr);
+  if (!scene) return failure(scene.error().kind, node.location() + ": " + node.path() + ": " + scene.error().text);
+  return *std::move(scene);
 }
 
 Result<RenderJob> read_job(const std::string& text, const std::string& name, const std::filesystem::path& folder,
@@ -115,12 +121,15 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   job.seed = root.optional("seed").unsigned_integer_or(1);
   job.engine = read_engine(root.optional("engine"));
   read_path(root.optional("poses"), folder, job);
-  job.scene = read_scene_of(root.required("scene"), folder, job.name);
+  const Node scene_node = root.required("scene");
   read_sonar(root.optional("sonar"), job);
   root.optional("sweep").map().entries();
   root.optional("let").map().entries();
   job.expectations = read_expectations(root.optional("expect"));
   if (auto error = document->finish()) return tl::make_unexpected(*error);
+  auto scene = read_scene_of(scene_node, folder, job.name, *document);
+  if (!scene) return tl::make_unexpected(scene.error());
+  job.scene = *std::move(scene);
   return job;
 }
 

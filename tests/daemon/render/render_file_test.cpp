@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "core/paper/paper_engine.hpp"
@@ -113,6 +114,25 @@ TEST(RenderFile, RefusesWithAPlace) {
   EXPECT_THAT(refusal(point + "expect: [{measure: peak_level_db, value: 1}]\n"), HasSubstr("within"));
   EXPECT_THAT(refusal(point + "expect: [{measure: peak_level_db}]\n"), HasSubstr("at_least"));
   EXPECT_THAT(refusal(point + "expect: [{measure: peek, at_most: 1}]\n"), HasSubstr("peak"));
+}
+
+TEST(RenderFile, WhatIsWrongWithASceneIsBadDataWhereverItStands) {
+  const auto kind = [](const std::string& text) {
+    const auto input = parse_render_file(text, "r.yaml", ".");
+    return input ? ErrorKind::bug : input.error().kind;
+  };
+  const std::string rest = "\nsonar: {ping: {range_m: 4}}\nexpect: []\n";
+  EXPECT_EQ(kind("scene: {objects: [{type: ball}]}" + rest), ErrorKind::bad_data);
+  EXPECT_EQ(kind("scene: {objects: [{type: sphere, radius_m: -1}]}" + rest), ErrorKind::bad_data);
+  EXPECT_EQ(kind("scene: {objects: [], object: 1}" + rest), ErrorKind::bad_data) << "an unknown key, found last";
+  const std::string file = testing::TempDir() + "/render_file_test_scene.yaml";
+  std::ofstream(file) << "objects: [{type: ball}]\n";
+  EXPECT_EQ(kind("scene: " + file + rest), ErrorKind::bad_data) << "as load_scene has it";
+  EXPECT_THAT(refusal("scene: " + file + rest), HasSubstr("r.yaml:1:8: scene: "));
+  // What is wrong with the render file itself is not.
+  EXPECT_EQ(kind("scene: {objects: []}\nsonar: {ping: {range_m: -4}}\n"), ErrorKind::config);
+  EXPECT_EQ(kind("scene: {objects: []}\nsonr: {}\n"), ErrorKind::config);
+  EXPECT_EQ(kind("scene: no-such-scene.yaml\n"), ErrorKind::config) << "as world.scene of a configuration";
 }
 
 std::vector<Verdict> judged(const std::string& expect) {
