@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <set>
 #include <stdexcept>
 #include <thread>
 
@@ -132,6 +133,14 @@ int check(const RenderInput& input) {
   return all_met ? 0 : not_as_expected;
 }
 
+/// A line each, however many steps a sweep has.
+void tell_notes(const RenderInput& input) {
+  std::set<std::string> notes{note_of_parts_left_out(input.jobs.front().engine.switches)};
+  for (const RenderJob& job : input.jobs) notes.insert(note_of_range(job));
+  for (const std::string& note : notes)
+    if (!note.empty()) std::fprintf(stderr, "sonard: %s\n", note.c_str());
+}
+
 OutputOptions output_options(const RenderCommand& command) {
   const auto wanted = [&](const char* format) {
     return std::find(command.formats.begin(), command.formats.end(), format) != command.formats.end();
@@ -162,8 +171,7 @@ int run_render(const RenderCommand& command) {
   if (!input) return complain(input.error());
   if (!command.report.empty()) return report_coverage(input->jobs);
   if (command.check_expectations) return check(*input);
-  const std::string note = note_of_parts_left_out(input->jobs.front().engine.switches);
-  if (!note.empty() && !command.quiet) std::fprintf(stderr, "sonard: %s\n", note.c_str());
+  if (!command.quiet) tell_notes(*input);
   ProgressLine line(command.quiet);
   Parallel pool(threads_of(input->jobs.front().engine));
   const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.tell(p); });

@@ -25,6 +25,7 @@ SonarModel plain_model() {
   mode.name = "plain";
   mode.centre_hz = 900e3f;
   mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(90));
+  mode.min_range_m = 1e-3f;
   mode.max_range_m = 1e5f;
   mode.source_level_db = 210;
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(1));

@@ -1,5 +1,9 @@
 #include "daemon/render/render_job.hpp"
 
+#include <algorithm>
+
+#include "core/text/format.hpp"
+
 namespace sonar::render {
 
 PingSettings device_settings(const protocol::Profile& profile, const protocol::OptionValues& options, const Water& water,
@@ -12,6 +16,16 @@ PingSettings device_settings(const protocol::Profile& profile, const protocol::O
   device.depth_m = depth_m;
   device.options = options;
   return profile.vendor->initial_settings(device).settings;
+}
+
+std::string note_of_range(const RenderJob& job) {
+  constexpr double rounding = 1 + 1e-6;
+  const double least_m = static_cast<double>(job.mode().min_range_m), most_m = static_cast<double>(job.mode().max_range_m);
+  const double range_m = job.settings.range_m;
+  if (range_m >= least_m / rounding && range_m <= most_m * rounding) return {};
+  return text::format("range %g m: %s in mode %s takes %g to %g m; rendered all the same, where the device would use %g m",
+                      range_m, job.model->name.c_str(), job.mode().name.c_str(), least_m, most_m,
+                      std::clamp(range_m, least_m, most_m));
 }
 
 PingRequest make_request(const RenderJob& job, PingNumber number, Time at) {

@@ -49,6 +49,9 @@ Result<RenderInput> load_render_input(const std::filesystem::path& file, const s
 /// A render file from text; paths in it are relative to `folder`.
 Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder);
 
+/// A sentence when the range is not one that the product can be set to: it is rendered all the same. Empty = it is.
+std::string note_of_range(const RenderJob& job);
+
 /// Everything a ping of the job depends on.
 PingRequest make_request(const RenderJob& job, PingNumber number, Time at);
 

@@ -135,6 +135,17 @@ TEST(RenderFile, WhatIsWrongWithASceneIsBadDataWhereverItStands) {
   EXPECT_EQ(kind("scene: no-such-scene.yaml\n"), ErrorKind::config) << "as world.scene of a configuration";
 }
 
+TEST(RenderFile, ARangeThatTheProductDoesNotHaveIsTold) {
+  const auto note = [](const std::string& sonar) { return note_of_range(parsed(point + "sonar: {" + sonar + "}\n").jobs.at(0)); };
+  EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: HF, range_m: 10}"), "");
+  EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: LF, range_m: 25}"), "");
+  EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: HF, range_m: 25}"),
+            "range 25 m: Oculus M1200d in mode HF takes 0.1 to 10 m; rendered all the same, where the device would use 10 m");
+  EXPECT_THAT(note("profile: oculus-m370s, ping: {range_m: 0.15}"), HasSubstr("takes 0.2 to 200 m"));
+  EXPECT_EQ(note("ping: {range_m: 1e4}"), "") << "a plain sonar is no product";
+  EXPECT_EQ(note("ping: {range_m: 0.01}"), "");
+}
+
 std::vector<Verdict> judged(const std::string& expect) {
   const RenderInput input = parsed(point + "sonar: {ping: {range_m: 6, beams: 65}}\nexpect: [" + expect + "]\n");
   auto verdicts = check_expectations(input.source, input.jobs, 1);
