@@ -24,7 +24,7 @@ constexpr float m370s = 2.2e10f, c550d_low = 1.9e10f, c550d_high = 1.4e10f, m750
 constexpr float m1200d_low = 1.5e10f, m1200d_high = 3.5e10f, m3000d_low = 1.4e10f, m3000d_high = 3.3e10f;
 }  // namespace fitted_full_scale_upa
 
-constexpr float source_level_db = 200;  // unknown: chosen; fits of published experiments vary by 50 dB
+constexpr float source_level_db = 200;  // unknown: chosen; Choi et al. 2025 fitted 170 dB to an M1200d, with gains of their own
 constexpr float tvg_ceiling_db = 80;    // unknown: chosen
 
 // unknown: fitted to the captured M1200d ping (docs/acoustics.md, section 9), and taken for all products, which share their

@@ -52,8 +52,8 @@ def chapter(sonard, folder):
 
 INTRODUCTION = """## Two cylinders in a square tank
 
-What the paper's code ships: a world with an upright and a lying cylinder under a P900; no figures are published for it but a rate
-of 3 Hz. Expected are returns from both cylinders, shadows behind them, and walls bright over all beams. Sizes of tank and
+The paper's section 4.1, whose world its code ships: an upright and a lying cylinder under a P900; no figures are published for it
+but a rate of 3 Hz. Expected are returns from both cylinders, shadows behind them, and walls bright over all beams. Sizes of tank and
 cylinders are ours where the world's file does not give them.
 
 What we measure: where the cylinders' peaks stand in the beam straight ahead (expected power, Lambert part, rows of one inch), and
