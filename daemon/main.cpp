@@ -13,6 +13,7 @@
 #include "daemon/bench/bench_command.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/config/effective_switches.hpp"
+#include "daemon/config/products.hpp"
 #include "daemon/control/token.hpp"
 #include "daemon/engine/choose_engine.hpp"
 #include "daemon/render/render_command.hpp"
@@ -91,6 +92,7 @@ int run(const RunCommand& command, Steady::time_point begin, bool& json) {
 
   Log log(config.log);
   for (const std::string& note : (*scene)->notes) log.info(note);
+  for (const std::string& note : notes_of_options(config)) log.info(note);
   if (const std::string note = note_of_parts_left_out(config.engine.switches); !note.empty()) log.info(note);
   Parallel pool(compute_threads(config.engine), compute_niceness);  // outlives the engine inside App
   // Engines speak on threads of their own, so each has a log of its own.
@@ -150,6 +152,7 @@ int check(const CheckCommand& command) {
   if (const std::string why = why_not_movable(**scene, *config); !why.empty()) return complain({ErrorKind::config, why});
   std::printf("%s: ok, %zu sonar%s; scene %s: ok, %zu triangles\n", command.config.c_str(), config->sonars.size(),
               config->sonars.size() == 1 ? "" : "s", config->scene.name().c_str(), (*scene)->triangle_count());
+  for (const std::string& note : notes_of_options(*config)) std::printf("%s\n", note.c_str());
   for (const VehicleConfig& v : config->vehicles)
     if (v.plan) std::printf("vehicle %s follows %s\n", v.name.c_str(), v.plan.about.c_str());
   for (const ObjectConfig& o : config->objects)

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/app.hpp"
+#include "daemon/config/products.hpp"
 #include "daemon/world/world_parts.hpp"
 
 namespace sonar {
@@ -107,6 +108,7 @@ void App::take_over(Config next) {
   std::string listed;
   for (const std::string& key : keys) listed += (listed.empty() ? "" : ", ") + key;
   if (!listed.empty()) log_.warning("reload: these need a restart and stay as they were: " + listed);
+  for (const std::string& note : notes_of_options(config_)) log_.info("reload: " + note);
   log_.info("reloaded: " + change.summary, {{"scene", scene().name}});
   if (events_.heard()) events_.tell({control::SceneEvent{config_.scene.name(), "reloaded: " + change.summary}});
   on_change();

@@ -130,7 +130,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
   const Node options = map.optional("options");
   if (profile) {
     sonar.profile = *profile;
-    sonar.options = read_options(options, *profile->vendor);
+    sonar.options = read_options(options, *profile->vendor, true);
     const auto tuned = profile->vendor->tuned(profile->model, sonar.options);
     if (!tuned) options.fail(tuned.error().text);
     sonar.profile.model = tuned.value_or(profile->model);

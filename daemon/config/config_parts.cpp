@@ -13,6 +13,17 @@ using text::Node;
 using text::Range;
 
 constexpr Range finite_place{.min = -1e7, .max = 1e7};
+/// An option's value, checked where it stands in the file.
+std::string read_option(const Node& value, const protocol::Option& option) {
+  if (option.allowed.empty()) {
+    const Range range = option.highest > 0 ? Range::between(option.lowest, option.highest) : Range::above(0);
+    if (value.text(64) != option.default_value) value.number(range);
+  } else {
+    value.choice_index(option.allowed);
+  }
+  return value.text(64);
+}
+
 constexpr double hot_c = 30;  // a widely used driver sends the sonar to standby above this (docs/protocols/oculus.md, section 4)
 
 Pose pose_from(const std::array<double, 3>& xyz_m, const std::array<double, 3>& rpy_deg) {
@@ -80,23 +91,21 @@ std::string why_no_water(const Water& water, bool allow_hot) {
   return {};
 }
 
-protocol::OptionValues read_options(const Node& node, const protocol::Vendor& vendor) {
-  protocol::OptionValues given;
+protocol::OptionValues read_options(const Node& node, const protocol::Vendor& vendor, bool others_too) {
+  protocol::OptionValues given, of_others;
   Map map = node.map();
-  for (const protocol::Option& option : vendor.options()) {  // asked for one by one: errors then stand where the mistake is
-    const Node value = map.optional(option.name);
-    if (!value.present()) continue;
-    if (option.allowed.empty()) {
-      const Range range = option.highest > 0 ? Range::between(option.lowest, option.highest) : Range::above(0);
-      if (value.text(64) != option.default_value) value.number(range);
-    } else {
-      value.choice_index(option.allowed);
-    }
-    given[std::string(option.name)] = value.text(64);
-  }
+  for (const protocol::Option& option : vendor.options())
+    if (const Node value = map.optional(option.name)) given[std::string(option.name)] = read_option(value, option);
+  if (others_too)
+    for (const protocol::Vendor* other : protocol::vendors())
+      for (const protocol::Option& option : other->options())
+        if (map.has(option.name) && !given.contains(std::string(option.name)))
+          of_others[std::string(option.name)] = read_option(map.optional(option.name), option);
   auto complete = check_options(vendor, given);
   if (!complete) node.fail(complete.error().text);
-  return complete.value_or(protocol::OptionValues{});
+  protocol::OptionValues all = complete.value_or(protocol::OptionValues{});
+  all.merge(of_others);
+  return all;
 }
 
 EngineConfig read_engine(const Node& node) {

@@ -27,8 +27,9 @@ SceneFile read_scene_file(const text::Node& node, const std::filesystem::path& d
 Water read_water(const text::Node& node, bool* allow_hot = nullptr);
 /// The same rules for water that came otherwise: empty, or one sentence.
 std::string why_no_water(const Water& water, bool allow_hot);
-/// Complete: defaults filled in.
-protocol::OptionValues read_options(const text::Node& node, const protocol::Vendor& vendor);
+/// Complete: defaults filled in. `others_too`: options that only other vendors have are checked and kept (products.hpp tells
+/// them).
+protocol::OptionValues read_options(const text::Node& node, const protocol::Vendor& vendor, bool others_too = false);
 EngineConfig read_engine(const text::Node& node);
 LimitConfig read_limits(const text::Node& node);
 

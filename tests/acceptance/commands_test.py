@@ -53,6 +53,13 @@ class Mistakes(unittest.TestCase):
         for word in words:
             self.assertIn(word, result.stderr)
 
+    def test_options_of_another_vendor_are_told(self):
+        text = (ROOT / "scenes/sonard.yaml").read_text(encoding="utf-8")
+        for profile, notes in (("oculus-m1200d", 0), ("blueview-p900-90", 2)):
+            result = check(text.replace("profile: oculus-m1200d", f"profile: {profile}"))
+            self.expect(result, 0)
+            self.assertEqual(result.stdout.count("is for Oculus sonars: without effect on BlueView P900-90"), notes, result.stdout)
+
     def test_usage_is_64(self):
         self.expect(run(SONARD, "--no-such-option"), 64, "--no-such-option")
         self.expect(run(SONARCTL), 64, "doctor, status, listen, view")

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "daemon/config/config.hpp"
+#include "daemon/config/products.hpp"
 
 namespace sonar {
 namespace {
@@ -55,6 +56,69 @@ TEST(ConfigMistakes, NamesAMistypedKeyThatSeveralSonarsShare) {
                   "  - {nmae: b, profile: oculus-m1200d, bind_ip: 127.0.0.3}\n"),
               HasSubstr("did you mean \"name\"?"));
   EXPECT_THAT(why(world + "vehicles: [{nmae: a}, {nmae: b}]\n" + sonar), HasSubstr("did you mean \"name\"?"));
+}
+
+/// The shipped example with another product, and nothing else changed.
+Result<Config> example_with(const std::string& profile) {
+  std::ifstream file(std::filesystem::path(SONARD_SOURCE_DIR) / "scenes/sonard.yaml");
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  const std::string theirs = "profile: oculus-m1200d";
+  text.replace(text.find(theirs), theirs.size(), "profile: " + profile);
+  return parse_config(text, "sonard.yaml", std::filesystem::path(SONARD_SOURCE_DIR) / "scenes");
+}
+
+TEST(ConfigMistakes, AnotherProductAloneLeavesTheExampleValid) {
+  for (const protocol::Vendor* vendor : protocol::vendors())
+    for (const auto& model : vendor->models()) {
+      const auto config = example_with(model->profile);
+      ASSERT_TRUE(config) << config.error().text;
+      EXPECT_EQ(config->sonars.at(0).profile.model->name, model->name);
+      EXPECT_EQ(config->sonars.at(0).max_clients, vendor->default_max_clients());
+    }
+}
+
+TEST(ConfigMistakes, OptionsOfAnotherVendorAreTold) {
+  EXPECT_THAT(notes_of_options(*example_with("oculus-m750d")), ::testing::IsEmpty());
+  EXPECT_THAT(
+      notes_of_options(*example_with("blueview-p900-90")),
+      ::testing::ElementsAre("sonar front: options.before_first_fire is for Oculus sonars: without effect on BlueView P900-90",
+                             "sonar front: options.gain_echo is for Oculus sonars: without effect on BlueView P900-90"));
+  const auto oculus = parse_config(world + vehicles + sonar + "    options: {heads_base: strict}\n", "sonard.yaml", directory());
+  ASSERT_TRUE(oculus) << oculus.error().text;
+  EXPECT_THAT(notes_of_options(*oculus),
+              ::testing::ElementsAre("sonar front: options.heads_base is for BlueView sonars: without effect on Oculus M1200d"));
+}
+
+TEST(ConfigMistakes, OptionsOfNobodyAreRefusedWithTheKnownOnes) {
+  const auto with = [](const std::string& options) {
+    return why(world + vehicles + "sonars:\n  - {name: a, profile: blueview-p900-90, bind_ip: 127.0.0.2, options: {" + options +
+               "}}\n");
+  };
+  EXPECT_THAT(with("before_frist_fire: pings"),
+              ::testing::AllOf(HasSubstr("sonars[0].options.before_frist_fire: unknown key"), HasSubstr("heads_base")));
+  EXPECT_THAT(with("strict_rnage: on"), HasSubstr("did you mean \"strict_range\"?"));
+  EXPECT_THAT(with("before_first_fire: pigns"), HasSubstr("did you mean \"pings\"?"));  // would be wrong there, too
+}
+
+TEST(ConfigMistakes, TheDemoTakesAnyProduct) {
+  for (const protocol::Vendor* vendor : protocol::vendors())
+    for (const auto& model : vendor->models()) {
+      auto config = demo_config();
+      ASSERT_TRUE(config);
+      const auto used = use_product(*config, model->profile);
+      ASSERT_TRUE(used) << used.error().text;
+      const SonarConfig& first = config->sonars.at(0);
+      EXPECT_EQ(first.profile.vendor, vendor);
+      EXPECT_EQ(first.profile.model->name, model->name);
+      EXPECT_EQ(first.max_clients, vendor->default_max_clients());
+      EXPECT_EQ(first.options, *protocol::check_options(*vendor, {}));
+    }
+  auto config = demo_config();
+  const auto refused = use_product(*config, "blueview-p900");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::usage);
+  EXPECT_THAT(refused.error().text,
+              ::testing::AllOf(HasSubstr("blueview-p900-90"), HasSubstr("oculus-m370s"), HasSubstr("blueview-mb2250-90")));
 }
 
 TEST(ConfigMistakes, PointsRenderFilesToTheirCommand) {

@@ -1,0 +1,54 @@
+#include "daemon/config/products.hpp"
+
+#include <algorithm>
+
+namespace sonar {
+namespace {
+
+bool has_option(const protocol::Vendor& vendor, std::string_view name) {
+  const auto options = vendor.options();
+  return std::any_of(options.begin(), options.end(), [name](const protocol::Option& o) { return o.name == name; });
+}
+
+std::string all_products() {
+  std::string names;
+  for (const protocol::Vendor* vendor : protocol::vendors())
+    for (const auto& model : vendor->models()) names.append(names.empty() ? "" : ", ").append(model->profile);
+  return names;
+}
+
+}  // namespace
+
+std::string title_of(const protocol::Vendor& vendor) {
+  const std::string& product = vendor.models().front()->name;
+  return product.substr(0, product.find(' '));
+}
+
+std::vector<std::string> notes_of_options(const Config& config) {
+  std::vector<std::string> notes;
+  for (const SonarConfig& sonar : config.sonars)
+    for (const auto& [name, value] : sonar.options) {
+      if (has_option(*sonar.profile.vendor, name)) continue;
+      for (const protocol::Vendor* vendor : protocol::vendors())
+        if (has_option(*vendor, name))
+          notes.push_back("sonar " + sonar.name + ": options." + name + " is for " + title_of(*vendor) +
+                          " sonars: without effect on " + sonar.profile.model->name);
+    }
+  return notes;
+}
+
+Result<void> use_product(Config& config, std::string_view profile) {
+  auto found = protocol::find_profile(profile);
+  if (!found) return failure(ErrorKind::usage, found.error().text + "; there are " + all_products());
+  auto options = protocol::check_options(*found->vendor, {});
+  if (!options) return tl::make_unexpected(options.error());
+  auto model = found->vendor->tuned(found->model, *options);
+  if (!model) return tl::make_unexpected(model.error());
+  SonarConfig& sonar = config.sonars.front();
+  sonar.profile = {found->vendor, *std::move(model)};
+  sonar.options = *std::move(options);
+  sonar.max_clients = found->vendor->default_max_clients();
+  return {};
+}
+
+}  // namespace sonar
