@@ -7,6 +7,8 @@
 #include <cmath>
 #include <fstream>
 
+#include "daemon/config/products.hpp"
+
 namespace sonar {
 namespace {
 
@@ -297,6 +299,10 @@ TEST(Config, TheShippedExampleIsValid) {
   const auto c = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/sonard.yaml");
   ASSERT_TRUE(c) << c.error().text;
   EXPECT_EQ(c->sonars.at(0).profile.model->profile, "oculus-m1200d");
+  const auto blueview = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/sonard-blueview.yaml");
+  ASSERT_TRUE(blueview) << blueview.error().text;
+  EXPECT_EQ(blueview->sonars.at(0).profile.model->profile, "blueview-p900-90");
+  EXPECT_TRUE(notes_of_options(*blueview).empty());
   const auto demo = demo_config();
   ASSERT_TRUE(demo) << demo.error().text;
   EXPECT_EQ(text_of(demo->sonars.at(0).bind_ip), "127.0.0.2");
