@@ -1,9 +1,11 @@
 #include "daemon/banner.hpp"
 
+#include <filesystem>
 #include <fstream>
 
 #include "core/text/format.hpp"
 #include "cuda/cuda_status.hpp"
+#include "protocol/blueview/frames.hpp"
 
 namespace sonar {
 namespace {
@@ -11,6 +13,26 @@ namespace {
 using text::format;
 
 std::string address_text(const Endpoint& e) { return text_of(e); }
+
+/// Where the drop-in SDK's library lies, installed with this program or built beside it; empty = not there.
+std::filesystem::path sdk_library_folder() {
+  std::error_code ec;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", ec);
+  for (const char* folder : {"../lib/sonard", ".."}) {
+    const auto place = (program.parent_path() / folder / "bvt4/lib").lexically_normal();
+    if (!ec && std::filesystem::exists(place / "libbvtsdk.so", ec)) return place;
+  }
+  return {};
+}
+
+/// How the host of a BlueView head comes to it: by a library, not by a driver as it is.
+std::string blueview_lines(std::string at, unsigned port) {
+  const std::string folder = sdk_library_folder().string();
+  if (port != blueview::tcp_port) at += format(":%u", port);
+  return "  driver  BVTSonar_Open(sonar, \"NET\", \"" + at + "\") with sonard's libbvtsdk: " +
+         (folder.empty() ? "package sonard-bvtsdk" : "LD_LIBRARY_PATH=" + folder + " (SDK 3.x: bvt3)") +
+         ", docs/bvtsdk.md\n  look    sonarctl view " + at + " --png ping.png\n";
+}
 
 std::string sonar_lines(const Device& device) {
   const PingSettings s = device.initial_settings();
@@ -25,7 +47,10 @@ std::string sonar_lines(const Device& device) {
     text += format("      status udp -> %s:%d (1 Hz)", to.address().to_string().c_str(), to.port());
   if (device.state().advertise_ip != device.config().bind_ip)
     text += "      advertised as " + text_of(device.state().advertise_ip);
-  return text + "\n";
+  text += "\n";
+  if (device.config().profile.vendor->name() == "blueview")
+    text += blueview_lines(text_of(device.state().advertise_ip), data.port());
+  return text;
 }
 
 std::string pose_line(const App& app) {

@@ -8,6 +8,7 @@
 
 #include "core/text/arguments.hpp"
 #include "core/text/nearest.hpp"
+#include "daemon/config/products.hpp"
 
 namespace sonar {
 namespace {
@@ -16,11 +17,17 @@ using text::number;
 using text::one_of;
 using text::whole_number;
 
-constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the names of the files
+constexpr std::uint64_t most_rendered_pings = 999999;      // six digits in the names of the files
+constexpr const char* blueview_demo = "blueview-p900-90";  // the best documented of them
 
 void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("config", run.config, "configuration file; without one sonard looks in the usual places, then runs the demo");
-  app.add_flag("--demo", run.demo, "run the built-in demo, whatever files there are");
+  app.add_option_function<std::string>(
+         "--demo", [&run](const std::string& maker) { run.demo = true, run.demo_of = maker; },
+         "run the built-in demo, whatever files there are; --demo blueview: with a BlueView head instead of an Oculus")
+      ->expected(0, 1)
+      ->type_name("TEXT:oculus|blueview");  // complaint() judges it: a file is not meant for a maker
+  app.add_option("--profile", run.profile, "run the demo with this product, as blueview-m900-130 (docs/configuration.md)");
   app.add_option(
          "--clock", run.clock,
          "realtime, or stepped (when clients have taken the last ping), lockstep (sonarctl step), follow (stamps of poses)")
@@ -87,11 +94,28 @@ Leave complain(const std::string& wrong) {
   return Leave{exit_code(ErrorKind::usage)};
 }
 
+bool is_like_a_file(std::string_view word) {
+  std::error_code ec;
+  return word.find_first_of("./") != std::string_view::npos || std::filesystem::exists(word, ec);
+}
+
+/// What makes no sense together; empty = nothing.
+std::string complaint(const RunCommand& run) {
+  const bool known = run.demo_of.empty() || run.demo_of == "oculus" || run.demo_of == "blueview";
+  const std::string file = !known && is_like_a_file(run.demo_of) ? run.demo_of : run.config;
+  if (run.demo && !file.empty()) return "--demo runs the built-in demo, not " + file + ": leave out one of the two";
+  if (!known)
+    return "there is no demo \"" + run.demo_of + "\"; there are oculus and blueview, and --profile NAME for any product";
+  if (!run.profile.empty() && !file.empty())
+    return "--profile chooses the demo's sonar, and " + file + " says itself what its sonars are: leave out one of the two";
+  if (!run.profile.empty() && !run.demo_of.empty())
+    return "--demo " + run.demo_of + " and --profile " + run.profile + " both choose the demo's sonar: leave out one of the two";
+  return {};
+}
+
 /// A first word that is no option, no command and nothing like a file; empty = it may be one of these.
 std::string unknown_command(std::string_view word) {
-  std::error_code ec;
-  const bool like_a_file = word.find_first_of("./") != std::string_view::npos || std::filesystem::exists(word, ec);
-  if (word.empty() || word[0] == '-' || like_a_file) return {};
+  if (word.empty() || word[0] == '-' || is_like_a_file(word)) return {};
   constexpr std::array<std::string_view, 5> commands{"run", "check", "render", "replay", "bench"};
   return "there is no command or file \"" + std::string(word) + "\"" + text::suggestion(word, commands, "the commands are");
 }
@@ -116,6 +140,7 @@ Command parse_command_line(int argc, char** argv) {
     app.footer(
         "examples:\n"
         "  sonard                           the configuration found in the usual places, else the demo\n"
+        "  sonard --demo blueview           the demo with a BlueView head; --profile NAME: with any product\n"
         "  sonard my.yaml --log-level debug\n"
         "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, replay FILE, bench; each has --help.\n"
         "Oculus sonars are wire-compatible. BlueView sonars are compatible with the vendor's SDK by libraries of our own, not on "
@@ -153,12 +178,15 @@ Command parse_command_line(int argc, char** argv) {
     if (wrong.empty()) return render;
     return complain(wrong + text::where_help_is(app));
   }
-  if (run.demo && !run.config.empty())
-    return complain("--demo runs the built-in demo, not " + run.config + ": leave out one of the two" + text::where_help_is(app));
+  if (const std::string wrong = complaint(run); !wrong.empty()) return complain(wrong + text::where_help_is(app));
+  if (run.demo_of == "blueview") run.profile = blueview_demo;
+  run.demo = run.demo || !run.profile.empty();
   return run;
 }
 
 Result<void> override_config(Config& config, const RunCommand& command) {
+  if (!command.profile.empty())
+    if (const auto r = use_product(config, command.profile); !r) return failure(r.error().kind, "--profile: " + r.error().text);
   if (const auto mode = std::find(clock_modes.begin(), clock_modes.end(), command.clock); mode != clock_modes.end())
     config.clock = static_cast<ClockMode>(mode - clock_modes.begin()), config.clock_place = "--clock";
   if (const auto r = override_engine(config.engine, config.seed, command.engine); !r) return r;

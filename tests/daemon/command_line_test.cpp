@@ -80,6 +80,32 @@ TEST(CommandLine, TheDemoTakesNoConfiguration) {
   EXPECT_EQ(usage_error({"run", "--demo"}), 0);
 }
 
+const RunCommand* run_of(const Command& command) { return std::get_if<RunCommand>(&command); }
+
+TEST(CommandLine, TheDemoHasTheSonarThatIsAskedFor) {
+  const auto sonar_of = [](const std::vector<std::string>& words) -> std::string {
+    const Command command = parse(words);
+    auto config = demo_config();
+    if (run_of(command) == nullptr || !run_of(command)->demo || !override_config(*config, *run_of(command))) return "refused";
+    return config->sonars.at(0).profile.model->profile;
+  };
+  EXPECT_EQ(sonar_of({"--demo"}), "oculus-m1200d");
+  EXPECT_EQ(sonar_of({"--demo", "oculus"}), "oculus-m1200d");
+  EXPECT_EQ(sonar_of({"--demo", "blueview"}), "blueview-p900-90");
+  EXPECT_EQ(sonar_of({"run", "--demo=blueview", "--threads", "1"}), "blueview-p900-90");
+  EXPECT_EQ(sonar_of({"--demo", "--threads", "1"}), "oculus-m1200d");
+  EXPECT_EQ(sonar_of({"--profile", "blueview-m900-130"}), "blueview-m900-130");
+  EXPECT_EQ(sonar_of({"--demo", "--profile", "oculus-m370s"}), "oculus-m370s");
+  EXPECT_EQ(sonar_of({"--profile", "oculus-m1300d"}), "refused");
+}
+
+TEST(CommandLine, TheDemosSonarIsChosenOnceAndNotForAConfiguration) {
+  EXPECT_EQ(usage_error({"--demo", "bluview"}), 64);
+  EXPECT_EQ(usage_error({"--demo", "blueview", "my.yaml"}), 64);
+  EXPECT_EQ(usage_error({"--demo", "blueview", "--profile", "oculus-m370s"}), 64);
+  EXPECT_EQ(usage_error({"my.yaml", "--profile", "oculus-m370s"}), 64);
+}
+
 TEST(CommandLine, TheModeReachesTheEngine) {
   EXPECT_EQ(overridden({"--mode", "paper"}).engine.switches.mode, Mode::paper);
   EXPECT_EQ(overridden({"--mode", "raster"}).engine.switches.mode, Mode::raster);
