@@ -12,8 +12,9 @@ namespace sonar::bvt {
 /// What a bearing without an echo above the threshold holds. Clients take anything above 999 as none (verified).
 inline constexpr float no_range_m = 1000;
 
-/// Until a host sets another. Unknown: the vendor's. Chosen above the noise of every profile at any range as it is without gain
-/// adjustment (measured: at most 8100, at 60 m), so that empty water has no ranges. Hosts set 1000, 2000 or 30000 (verified).
+/// Until a host sets another. Unknown: the vendor's. Chosen above the noise measured with the P900, P450, M450, M900 and MB
+/// profiles over their ranges without gain adjustment (at most 8100, at 60 m), so that empty water has no ranges. Hosts set 1000,
+/// 2000 or 30000 (verified).
 inline constexpr std::uint16_t default_range_threshold = 10000;
 
 struct RangeListSettings {
