@@ -3,8 +3,12 @@
 #include <png.h>
 
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <string>
 #include <system_error>
 
 namespace sonar {
@@ -48,24 +52,50 @@ void draw_text(Raster& raster, int left, int top, std::string_view text, Rgb col
   }
 }
 
-Result<void> write_png(const Raster& raster, const std::filesystem::path& file) {
+Result<std::vector<std::byte>> encode_png(const Raster& raster) {
   std::vector<std::uint8_t> rgb;
   rgb.reserve(raster.pixels.size() * 3);
   for (const Rgb& p : raster.pixels) rgb.insert(rgb.end(), {p.r, p.g, p.b});
-
-  std::error_code error;
-  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
-  const std::filesystem::path unfinished = file.string() + ".tmp";
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   image.width = static_cast<png_uint_32>(raster.width);
   image.height = static_cast<png_uint_32>(raster.height);
   image.format = PNG_FORMAT_RGB;
-  if (png_image_write_to_file(&image, unfinished.c_str(), 0, rgb.data(), 0, nullptr) == 0)
-    return failure(ErrorKind::io, "cannot write " + file.string() + ": " + image.message + "; is the folder there and writable?");
-  std::filesystem::rename(unfinished, file, error);
-  if (error) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + error.message());
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);  // what it comes to at most
+  std::vector<std::byte> bytes(size);
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, rgb.data(), 0, nullptr) == 0)
+    return failure(ErrorKind::bug, std::string("a picture could not be made: ") + image.message);
+  bytes.resize(size);
+  return bytes;
+}
+
+Result<void> write_whole_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts) {
+  const std::filesystem::path unfinished = file.string() + ".tmp";
+  const auto failed = [&](int why) {
+    std::error_code ignored;
+    std::filesystem::remove(unfinished, ignored);
+    return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(why));
+  };
+  std::FILE* out = std::fopen(unfinished.c_str(), "wb");
+  if (out == nullptr) return failed(errno);
+  int why = 0;
+  for (const auto part : parts)
+    if (why == 0 && std::fwrite(part.data(), 1, part.size(), out) != part.size()) why = errno;
+  if (std::fclose(out) != 0 && why == 0) why = errno;  // what waited in memory did not fit
+  std::error_code error;
+  if (why == 0) std::filesystem::rename(unfinished, file, error);
+  if (why != 0 || error) return failed(why != 0 ? why : error.value());
   return {};
+}
+
+Result<void> write_png(const Raster& raster, const std::filesystem::path& file) {
+  const auto bytes = encode_png(raster);
+  if (!bytes) return tl::make_unexpected(bytes.error());
+  std::error_code error;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
+  const auto done = write_whole_file(file, {*bytes});
+  if (done) return done;
+  return failure(ErrorKind::io, done.error().text + "; is there room, and is the folder writable?");
 }
 
 }  // namespace sonar

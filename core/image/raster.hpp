@@ -1,9 +1,11 @@
 // A picture in memory: RGB pixels, row 0 at the top, and the little drawing a fan image needs on top of its samples.
-// Filled by draw_fan, written by write_png.
+// Filled by draw_fan, written by write_png, whole or not at all as every file that is made for others to read.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
+#include <initializer_list>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -31,7 +33,14 @@ void blend(Raster& raster, int x, int y, Rgb colour, float opacity);
 void draw_text(Raster& raster, int left, int top, std::string_view text, Rgb colour, int scale);
 int text_width(std::string_view text, int scale);
 
-/// Written beside its final name and renamed, so that a reader never sees half a picture.
+/// The bytes of a PNG file.
+Result<std::vector<std::byte>> encode_png(const Raster& raster);
+
+/// One part after the other into a file that is written beside its final name and renamed: what has the name is whole. io: the
+/// file and the system's reason; of a file that cannot be written nothing is left.
+Result<void> write_whole_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts);
+
+/// Into a whole file; makes the folder.
 Result<void> write_png(const Raster& raster, const std::filesystem::path& file);
 
 }  // namespace sonar

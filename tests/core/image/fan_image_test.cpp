@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "core/base/geometry.hpp"
+#include "tests/small_disk.hpp"
 
 namespace sonar {
 namespace {
@@ -119,6 +120,23 @@ TEST(Png, IsWrittenWholeOrRefusedWithASentence) {
   EXPECT_FALSE(std::filesystem::exists(file.string() + ".tmp"));
   EXPECT_EQ(write_png(Raster(4, 4), "/dev/null/fan.png").error().kind, ErrorKind::io);
   std::filesystem::remove_all(folder);
+}
+
+TEST(Png, AFullDiskIsAnErrorThatNamesTheFileAndTheReason) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "fan_image_test_full.png";
+  std::filesystem::remove(file);
+  Raster noise(100, 100);
+  std::uint32_t state = 1;
+  for (Rgb& p : noise.pixels) p = {static_cast<std::uint8_t>((state = state * 1664525 + 1013904223) >> 24), 0, 0};
+  {
+    const SmallDisk disk(1000);
+    const auto r = write_png(noise, file);
+    ASSERT_FALSE(r);
+    EXPECT_EQ(r.error().kind, ErrorKind::io);
+    EXPECT_THAT(r.error().text, testing::HasSubstr("fan_image_test_full.png: File too large"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(file));
+  EXPECT_FALSE(std::filesystem::exists(file.string() + ".tmp"));
 }
 
 }  // namespace
