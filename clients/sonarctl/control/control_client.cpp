@@ -61,7 +61,7 @@ Result<ControlClient> ControlClient::open(const ControlOptions& options) {
                                                ": is one running there? Its banner names the address (--control HOST:PORT)");
   if (!socket) return tl::unexpected(socket.error());
   ControlClient client(std::move(*socket), *at);
-  const Result<control::Response> met = client.request(control::Hello{control::protocol_version, "sonarctl", *token});
+  const auto met = client.request(control::Hello{control::protocol_version, "sonarctl", *token}, greeting_patience);
   if (!met && token->empty() && met.error().text.find("wants a token") != std::string::npos)
     return failure(met.error().kind, "sonard at " + text_from(*at) +
                                          " wants a token: give --token-file FILE, the file that its control.token_file names");
@@ -77,6 +77,8 @@ Result<control::Response> ControlClient::request(Operation operation, std::chron
   for (;;) {
     Result<std::optional<control::Response>> answer = next_message(deadline, false);
     if (!answer) return tl::unexpected(answer.error());
+    if (!*answer && last_id_ == 1)  // the greeting
+      return tl::unexpected(no_control_stream("no greeting within " + std::to_string(patience.count() / 1000) + " s"));
     if (!*answer)
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " did not answer within " +
                                                  std::to_string(patience.count() / 1000) + " s: is it busy, or stopped?");
@@ -113,8 +115,9 @@ Result<std::optional<control::Event>> ControlClient::next_event(std::chrono::mil
 }
 
 Error ControlClient::no_control_stream(const std::string& why) const {
-  return {ErrorKind::bad_data, "what answers at tcp " + text_from(at_) + " is not sonard's control stream (" + why +
-                                   "); that is on tcp " + std::to_string(control_port) +
+  return {ErrorKind::bad_data, "what listens at tcp " + text_from(at_) + " is not sonard's control stream (" + why +
+                                   "): something else, or a sonard that is stopped. The control stream is on tcp " +
+                                   std::to_string(control_port) +
                                    " if the configuration says nothing else, and sonard's banner names it: --control HOST:PORT"};
 }
 
@@ -130,10 +133,11 @@ Result<std::optional<control::Response>> ControlClient::next_message(Clock::time
     }
     std::array<std::byte, 16384> chunk;
     const Read read = read_some(socket_, chunk, left_until(deadline));
+    if (read.what == Wait::closed && !heard_) return tl::unexpected(no_control_stream("it closes the connection"));
     if (read.what == Wait::closed)
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " closed the control stream" +
                                                  (read.error.empty() ? "" : ": " + read.error) +
-                                                 "; its log says why (not a control port, a token, a stop)");
+                                                 "; its log says why (a token, a stop)");
     if (read.what == Wait::timed_out || (read.what == Wait::interrupted && until_signal))
       return std::optional<control::Response>{};
     if (read.what != Wait::data) continue;

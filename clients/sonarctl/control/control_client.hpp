@@ -25,6 +25,8 @@ class ControlClient {
  public:
   using Operation = decltype(control::Request::op);
   static constexpr std::chrono::milliseconds usual_patience{10000};
+  /// A sonard greets at once, whatever it is doing: what is silent for longer is something else.
+  static constexpr std::chrono::milliseconds greeting_patience{2000};
 
   /// Connected and greeted. Refused with one sentence: nobody there, no sonard, the token.
   static Result<ControlClient> open(const ControlOptions& options);
