@@ -37,6 +37,17 @@ Result<Socket> open_socket(int type) {
   return socket;
 }
 
+/// Where nobody listens on a port of the ephemeral range, the system may choose that very port for our end: TCP then connects the
+/// socket to itself.
+bool is_connected_to_itself(const Socket& socket) {
+  sockaddr_in ours{}, theirs{};
+  socklen_t size = sizeof ours;
+  if (::getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&ours), &size) != 0) return false;
+  size = sizeof theirs;
+  if (::getpeername(socket.fd(), reinterpret_cast<sockaddr*>(&theirs), &size) != 0) return false;
+  return ours.sin_port == theirs.sin_port && ours.sin_addr.s_addr == theirs.sin_addr.s_addr;
+}
+
 /// 0, or the errno of one attempt that takes at most `patience`.
 int try_connect(const Socket& socket, const addrinfo& address, std::chrono::milliseconds patience) {
   const int flags = ::fcntl(socket.fd(), F_GETFL);
@@ -49,7 +60,7 @@ int try_connect(const Socket& socket, const addrinfo& address, std::chrono::mill
     ::getsockopt(socket.fd(), SOL_SOCKET, SO_ERROR, &error, &size);
   }
   ::fcntl(socket.fd(), F_SETFL, flags);
-  return error;
+  return error == 0 && is_connected_to_itself(socket) ? ECONNREFUSED : error;
 }
 
 }  // namespace

@@ -100,6 +100,16 @@ class Steering(unittest.TestCase):
             for expected in (f"{self.daemon.address}:{port}", word, "--control HOST:PORT", "14770"):
                 self.assertIn(expected, result.stderr)
 
+    def test_nobody_is_not_taken_for_somebody_on_a_port_that_the_system_gives_us_ourselves(self):
+        """Of two ports for outgoing connections one is asked for: soon the socket would be connected to itself."""
+        command = f"ip link set lo up && echo 52100 52101 > /proc/sys/net/ipv4/ip_local_port_range && exec {SONARCTL.resolve()} status"
+        if run("unshare", "-rn", "sh", "-c", command.split(" && exec")[0]).returncode != 0:
+            self.skipTest("no network namespace of its own")
+        result = run("unshare", "-rn", "sh", "-c", command + " --control 127.0.0.1:52100")
+        self.assertEqual(result.returncode, 69, result.stderr)
+        self.assertIn("no sonard answers on the control stream", result.stderr)
+
+
     def test_a_port_of_something_else_is_noticed_soon(self):
         with socket.create_server((self.daemon.address, 0)) as silent:
             for port in (14771, silent.getsockname()[1]):  # lines of JSON, where nothing is ever answered; a stranger
