@@ -51,10 +51,13 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
   app.add_option("--out", render.out, "folder for the files; made when it is not there");
   app.add_option("--pings", render.pings, "pings to render (1; with --poses: one for every line)")
       ->check(whole_number(1, most_rendered_pings));
+  app.add_option("--first", render.first, "number of the first ping, to make a part of a longer run (1)")
+      ->check(whole_number(1, most_rendered_pings));
   app.add_option("--format", render.formats, "npy, png, raw: any of them, comma between (default npy,png)")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(one_of({"npy", "png", "raw"}));
+  app.add_option("--image-rings", render.image_rings, "range rings in the pictures (default on)")->check(one_of({"on", "off"}));
   app.add_flag("--complex", render.complex, "also the complex beam signal, before magnitude and gain (npy)");
   app.add_option("--sonar", render.sonar, "which sonar of the configuration, when it has several");
   app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, TUM, EuRoC, KITTI");
@@ -85,6 +88,8 @@ std::string complaint(const RenderCommand& render) {
   if (writes && render.out.empty()) return "say where the files go: --out DIR";
   if (!writes && !render.out.empty()) return "--report and --check-expectations write no files: leave out --out";
   if (render.pose_rate_hz && render.poses.empty()) return "--pose-rate is about --poses FILE, which is not given";
+  if (render.first - 1 + render.pings.value_or(1) > most_rendered_pings)
+    return "--first and --pings go beyond ping " + std::to_string(most_rendered_pings) + ", the last that has a name";
   if (!render.pose_frame.empty() && render.poses.empty()) return "--pose-frame is about --poses FILE, which is not given";
   return {};
 }

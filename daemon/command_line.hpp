@@ -28,10 +28,12 @@ struct RunCommand {
 struct RenderCommand {
   std::string config;  // may be empty for the coverage report
   std::string out;
+  std::uint64_t first = 1;             // number of the first ping
   std::optional<std::uint64_t> pings;  // nothing: one, or one for every line of a file of poses
   std::vector<std::string> formats{"npy", "png"};
   std::optional<double> pose_rate_hz;  // of a KITTI file, which has no times
   std::string sonar, poses, pose_frame, report;
+  std::string image_rings = "on";
   std::optional<double> rate_hz;
   int batch = 1;
   bool complex = false, quiet = false, overwrite = false, check_expectations = false;

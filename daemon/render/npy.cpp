@@ -1,10 +1,6 @@
 #include "daemon/render/npy.hpp"
 
 #include <bit>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <system_error>
 
 namespace sonar::render {
 
@@ -23,29 +19,6 @@ std::string npy_header(std::string_view type, std::initializer_list<std::size_t>
   header += static_cast<char>(dictionary.size() & 0xff);
   header += static_cast<char>(dictionary.size() >> 8);
   return header + dictionary;
-}
-
-Result<void> write_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts) {
-  const std::filesystem::path unfinished = file.string() + ".tmp";
-  const auto failed = [&](int error) {
-    std::error_code ignored;
-    std::filesystem::remove(unfinished, ignored);
-    return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(error) +
-                                      "; make room or choose another --out; what is finished is kept");
-  };
-  std::FILE* out = std::fopen(unfinished.c_str(), "wb");
-  if (out == nullptr) return failed(errno);
-  for (const auto part : parts)
-    if (std::fwrite(part.data(), 1, part.size(), out) != part.size()) {
-      const int error = errno;
-      std::fclose(out);
-      return failed(error);
-    }
-  if (std::fclose(out) != 0) return failed(errno);
-  std::error_code error;
-  std::filesystem::rename(unfinished, file, error);
-  if (error) return failed(error.value());
-  return {};
 }
 
 }  // namespace sonar::render

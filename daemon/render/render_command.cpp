@@ -152,7 +152,9 @@ OutputOptions output_options(const RenderCommand& command) {
   options.raw = wanted("raw");
   options.complex = command.complex;
   options.overwrite = command.overwrite;
+  options.rings = command.image_rings != "off";
   options.batch = command.batch;
+  options.first = command.first;
   options.pings = command.pings;
   options.rate_hz = command.rate_hz;
   return options;

@@ -39,9 +39,10 @@ struct RenderJob {
 };
 
 struct RenderInput {
-  std::string source;           // the file
-  std::vector<RenderJob> jobs;  // one, or one for every step of the sweep
-  std::string text;             // all that the file and the scene's file say, for the digest of the inputs
+  std::string source;                   // the file
+  std::vector<RenderJob> jobs;          // one, or one for every step of the sweep
+  std::string text;                     // all that the file and the scene's file say, for the digest of the inputs
+  std::vector<std::string> notes = {};  // what was decided about them and should be known; into render.json
 };
 
 /// A configuration (it has `world:`) or a render file. `sonar`: which of a configuration's several sonars.

@@ -1,9 +1,8 @@
 #include "daemon/render/render_pings.hpp"
 
 #include <algorithm>
-#include <cctype>
+#include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -12,78 +11,11 @@
 #include "daemon/engine/start_engine.hpp"
 #include "daemon/render/npy.hpp"
 #include "daemon/render/sidecar.hpp"
-#include "daemon/render/sonar_version.hpp"
 
 namespace sonar::render {
 namespace {
 
-using nlohmann::json;
 using std::filesystem::path;
-
-constexpr const char* about_file = "render.json";
-
-std::string number_text(std::uint64_t number) {
-  const std::string digits = std::to_string(number);
-  return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
-}
-
-/// Names of a ping's files, the sidecar last.
-std::vector<path> files_of(const OutputOptions& o, std::uint64_t number) {
-  const path stem = o.folder / number_text(number);
-  const auto with = [&](const char* end) { return path(stem.string() + end); };
-  std::vector<path> files;
-  if (o.npy) files.push_back(with("_pressure.npy"));
-  if (o.npy) files.push_back(with("_samples.npy"));
-  if (o.complex) files.push_back(with("_beams.npy"));
-  if (o.raw) files.push_back(with("_samples.raw"));
-  if (o.png) files.push_back(with(".png"));
-  files.push_back(with(".json"));
-  return files;
-}
-
-json read_json(const path& file) {
-  std::ifstream in(file);
-  return json::parse(in, nullptr, false);
-}
-std::string inputs_of(const path& file) {
-  const json about = read_json(file);
-  return about.is_object() && about.contains("inputs") && about["inputs"].is_string() ? about["inputs"].get<std::string>() : "";
-}
-
-bool is_finished(const OutputOptions& o, std::uint64_t number, const std::string& digest) {
-  std::error_code ec;
-  for (const path& file : files_of(o, number))
-    if (!std::filesystem::is_regular_file(file, ec)) return false;
-  return inputs_of(files_of(o, number).back()) == digest;
-}
-
-/// NNNNNN.json, NNNNNN_pressure.npy and so on: ours to remove.
-bool is_of_a_ping(const path& file) {
-  const std::string name = file.filename().string();
-  const bool digits =
-      name.size() > 6 && std::all_of(name.begin(), name.begin() + 6, [](unsigned char c) { return std::isdigit(c); });
-  constexpr std::string_view ends[] = {"_pressure.npy", "_samples.npy", "_beams.npy", "_samples.raw", ".png", ".json"};
-  return digits && std::any_of(std::begin(ends), std::end(ends), [&](std::string_view end) { return name.substr(6) == end; });
-}
-
-/// Makes the folder, and holds it to one set of inputs.
-Result<void> claim_folder(const RenderInput& input, const OutputOptions& o, const std::string& digest) {
-  std::error_code ec;
-  std::filesystem::create_directories(o.folder, ec);
-  if (ec)
-    return failure(ErrorKind::io, "cannot make the folder " + o.folder.string() + ": " + ec.message() + "; choose another --out");
-  const path about = o.folder / about_file;
-  if (std::filesystem::exists(about, ec) && inputs_of(about) != digest) {
-    if (!o.overwrite)
-      return failure(ErrorKind::usage, o.folder.string() +
-                                           " holds pings of other inputs (configuration, scene or switches); choose "
-                                           "another --out, or give --overwrite to replace them");
-    for (const auto& entry : std::filesystem::directory_iterator(o.folder, ec))
-      if (is_of_a_ping(entry.path())) std::filesystem::remove(entry.path(), ec);
-  }
-  const json text{{"sonard", version}, {"inputs", digest}, {"from", input.source}};
-  return write_file(about, {bytes_of(text.dump(2) + "\n")});
-}
 
 PolarImage picture_of(const Ping& ping) {
   const PingSettings& s = ping.request.settings;
@@ -108,13 +40,16 @@ PolarImage picture_of(const Ping& ping) {
   return image;
 }
 
-Result<void> write_picture(const Ping& ping, const path& file) {
+Result<void> write_picture(const Ping& ping, bool rings, const path& file) {
   const auto colours = find_colour_map("viridis");
   if (!colours) return tl::make_unexpected(colours.error());
-  if (ping.request.settings.beam_count < 2) return write_png(Raster(64, 64), file);  // one beam is no fan
-  const auto fan = draw_fan(picture_of(ping), {.width_px = 1000, .colours = *colours, .rings = true});
-  if (!fan) return tl::make_unexpected(fan.error());
-  return write_png(*fan, file);
+  const bool is_fan = ping.request.settings.beam_count > 1;
+  const auto picture =
+      is_fan ? draw_fan(picture_of(ping), {.width_px = 1000, .colours = *colours, .rings = rings}) : Raster(64, 64);
+  if (!picture) return tl::make_unexpected(picture.error());
+  const auto png = encode_png(*picture);
+  if (!png) return tl::make_unexpected(png.error());
+  return write_output(file, {*png});
 }
 
 /// A ping on its way into files.
@@ -127,38 +62,37 @@ struct MadePing {
 };
 
 /// Everything but the sidecar first: where that stands, the ping is whole. Returns how many bytes that was.
-Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, const std::string& engine, const OutputOptions& o,
-                                 const std::string& digest) {
+Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, const std::string& engine,
+                                 const OutputFolder& folder) {
+  const OutputOptions& o = folder.options();
   const Ping& ping = made.ping;
   const PingSettings& s = ping.request.settings;
   const auto rows = static_cast<std::size_t>(s.range_bin_count), beams = static_cast<std::size_t>(s.beam_count);
   const char* codes = s.format.bits == 8 ? "|u1" : s.format.bits == 16 ? "<u2" : "<u4";
-  const std::string stem = (o.folder / number_text(made.number)).string();
+  const std::string stem = folder.stem(made.number);
   if (o.complex && ping.beam_signal_upa.empty())
     return failure(ErrorKind::usage,
                    "there is no complex beam signal in expected power and in the comparison modes; leave out --complex");
   Result<void> done;
   const auto put = [&](bool wanted, const char* end, const std::string& header, std::span<const std::byte> data) {
-    if (wanted && done) done = write_file(stem + end, {bytes_of(header), data});
+    if (wanted && done) done = write_output(stem + end, {bytes_of(header), data});
   };
   put(o.npy, "_pressure.npy", npy_header("<f4", {rows, beams}), std::as_bytes(std::span(ping.pressure_upa)));
   put(o.npy, "_samples.npy", npy_header(codes, {rows, beams}), ping.samples);
   put(o.complex, "_beams.npy", npy_header("<c8", {rows * static_cast<std::size_t>(s.samples_per_row), beams}),
       std::as_bytes(std::span(ping.beam_signal_upa)));
   put(o.raw, "_samples.raw", {}, ping.samples);
-  if (done && o.png) done = write_picture(ping, stem + ".png");
-  if (done) done = write_file(stem + ".json", {bytes_of(sidecar(job, ping, engine, made.count, digest).dump(1) + "\n")});
+  if (done && o.png) done = write_picture(ping, o.rings, stem + ".png");
+  if (done)
+    done = write_output(stem + ".json", {bytes_of(sidecar(job, ping, engine, made.count, folder.digest()).dump(1) + "\n")});
   if (!done) return tl::make_unexpected(done.error());
-  std::uint64_t bytes = 0;
-  std::error_code ec;
-  for (const path& file : files_of(o, made.number)) bytes += std::filesystem::file_size(file, ec);
-  return bytes;
+  return folder.size_of(made.number);
 }
 
 /// Makes the pings in one go, which is what a device wants; the CPU takes them one after the other, each by all threads. They are
 /// written side by side.
-Result<void> render_batch(const RenderJob& job, PingEngine& engine, const OutputOptions& o, const std::string& digest,
-                          Parallel& pool, std::vector<MadePing>& batch, Progress& progress) {
+Result<void> render_batch(const RenderJob& job, PingEngine& engine, const OutputFolder& folder, Parallel& pool,
+                          std::vector<MadePing>& batch, Progress& progress) {
   std::vector<PingRequest> requests;
   for (const MadePing& made : batch) requests.push_back(made.request);
   std::vector<Ping> pings = engine.run(requests);
@@ -168,7 +102,7 @@ Result<void> render_batch(const RenderJob& job, PingEngine& engine, const Output
     batch[i].count = counts.at(i);
   }
   const std::string description = engine.description();  // of all: what a device that fails had begun is made again
-  pool.for_each(batch.size(), [&](std::size_t i, int) { batch[i].written = write_ping(job, batch[i], description, o, digest); });
+  pool.for_each(batch.size(), [&](std::size_t i, int) { batch[i].written = write_ping(job, batch[i], description, folder); });
   for (const MadePing& made : batch) {
     if (!made.written) return tl::make_unexpected(made.written.error());
     progress.bytes += *made.written;
@@ -181,30 +115,40 @@ Result<void> render_batch(const RenderJob& job, PingEngine& engine, const Output
 
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& o) {
   const std::vector<Time> lines = times_of(job.path);
-  const auto too_many = [&](const std::string& there_are) {
-    return failure(ErrorKind::usage, "--pings " + std::to_string(*o.pings) + ": the poses are enough for " + there_are);
+  const std::uint64_t before = o.first - 1;
+  // How many pings there are from the first wanted on, of `all` that the poses are enough for.
+  const auto count_of = [&](std::uint64_t all, const char* how) -> Result<std::uint64_t> {
+    if (before < all && o.pings.value_or(1) <= all - before) return o.pings.value_or(all - before);
+    const std::string asked = (before > 0 ? " --first " + std::to_string(o.first) : std::string()) +
+                              (o.pings ? " --pings " + std::to_string(*o.pings) : std::string());
+    return failure(ErrorKind::usage, asked.substr(1) + ": the poses are enough for " + std::to_string(all) + how);
   };
   if (!lines.empty() && !o.rate_hz) {
-    if (o.pings && *o.pings > lines.size()) return too_many(std::to_string(lines.size()) + ", one at each line; or give --rate");
-    return std::vector<Time>(lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(o.pings.value_or(lines.size())));
+    const auto n = count_of(lines.size(), ", one at each line; or give --rate");
+    if (!n) return tl::make_unexpected(n.error());
+    const auto begin = lines.begin() + static_cast<std::ptrdiff_t>(before);
+    return std::vector<Time>(begin, begin + static_cast<std::ptrdiff_t>(*n));
   }
   const double usual_hz = job.settings.rate_hz > 0 ? static_cast<double>(job.settings.rate_hz) : 10;
   const double rate_hz = o.rate_hz.value_or(usual_hz);
   const Time begin = lines.empty() ? Time{} : lines.front();
   std::uint64_t n = o.pings.value_or(1);
   if (!lines.empty()) {
-    const auto fit = static_cast<std::uint64_t>(std::floor(seconds(lines.back() - begin) * rate_hz + 1e-6)) + 1;
-    if (o.pings && *o.pings > fit) return too_many(std::to_string(fit) + " at that rate");
-    n = o.pings.value_or(fit);
+    const auto fit =
+        count_of(static_cast<std::uint64_t>(std::floor(seconds(lines.back() - begin) * rate_hz + 1e-6)) + 1, " at that rate");
+    if (!fit) return tl::make_unexpected(fit.error());
+    n = *fit;
   }
   std::vector<Time> times;
-  for (std::uint64_t i = 0; i < n; ++i) times.push_back(begin + nanoseconds_from(static_cast<double>(i) / rate_hz));
+  for (std::uint64_t i = before; i < before + n; ++i) times.push_back(begin + nanoseconds_from(static_cast<double>(i) / rate_hz));
   return times;
 }
 
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, Parallel& pool,
                               const std::function<void(const Progress&)>& told) {
-  const std::string digest = digest_of(input, o.rate_hz.value_or(0));
+  if (o.first > 1 && input.jobs.size() > 1)
+    return failure(ErrorKind::usage,
+                   "--first: " + input.source + " sweeps values, and its pings are counted through all steps; leave it out");
   Progress progress;
   std::vector<std::vector<Time>> times;
   for (const RenderJob& job : input.jobs) {
@@ -213,14 +157,15 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
     progress.all += of_job->size();
     times.push_back(*std::move(of_job));
   }
-  if (const auto claimed = claim_folder(input, o, digest); !claimed) return tl::make_unexpected(claimed.error());
+  const auto folder = OutputFolder::claim(input, o, digest_of(input, o.rate_hz.value_or(0), o.png && !o.rings));
+  if (!folder) return tl::make_unexpected(folder.error());
   for (std::size_t j = 0; j < input.jobs.size(); ++j) {
     const RenderJob& job = input.jobs[j];
     std::unique_ptr<PingEngine> engine;  // not before it is needed: a finished folder costs no scene
     std::vector<MadePing> batch;
     for (std::size_t i = 0; i < times[j].size(); ++i) {
-      const std::uint64_t number = progress.done + batch.size() + 1;
-      const bool is_there = is_finished(o, number, digest);
+      const std::uint64_t number = o.first + progress.done + batch.size();
+      const bool is_there = folder->holds(number);
       if (!is_there) {
         MadePing& made = batch.emplace_back();
         made.number = number;
@@ -242,7 +187,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
         }
         const std::size_t made = batch.size();
         try {
-          if (auto done = render_batch(job, *engine, o, digest, pool, batch, progress); !done)
+          if (auto done = render_batch(job, *engine, *folder, pool, batch, progress); !done)
             return tl::make_unexpected(done.error());
         } catch (const std::invalid_argument& refused) {
           return failure(ErrorKind::config, input.source + ": " + refused.what());

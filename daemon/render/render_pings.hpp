@@ -3,31 +3,21 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
-#include <optional>
-#include <string>
+#include <vector>
 
 #include "core/base/parallel.hpp"
+#include "daemon/render/output_folder.hpp"
 #include "daemon/render/render_job.hpp"
 
 namespace sonar::render {
-
-struct OutputOptions {
-  std::filesystem::path folder;
-  bool npy = true, png = true, raw = false, complex = false;
-  int batch = 1;                       // pings that are made before they are written, by all threads at once
-  bool overwrite = false;              // pings of other inputs in the folder are removed
-  std::optional<std::uint64_t> pings;  // of each job; nothing: one, or one for every pose of the file
-  std::optional<double> rate_hz;       // nothing: as the settings say, or at every pose
-};
 
 struct Progress {
   std::uint64_t done = 0, all = 0, kept = 0;
   std::uint64_t bytes = 0;  // written
 };
 
-/// When the pings of a job are fired [s]. usage: more pings than the poses last.
+/// When the pings of a job are fired [s], from the first wanted on. usage: more pings than the poses last.
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& options);
 
 /// `told` after every ping, in order. Errors: io; what the engine refuses.

@@ -177,9 +177,10 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
           {"truth", truth_of(ping, *job.scene)}};
 }
 
-std::string digest_of(const RenderInput& input, double rate_hz) {
+std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictures) {
   Sha256 hash;
   add(hash, {version, input.text, rate_hz});
+  if (plain_pictures) add(hash, "plain pictures");
   for (const RenderJob& job : input.jobs) {
     add(hash, json_of(*job.model, job.mode()));
     hash.add(std::as_bytes(std::span(job.mode().waveform.samples)));

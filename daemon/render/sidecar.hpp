@@ -15,7 +15,7 @@ nlohmann::json sidecar(const RenderJob& job, const Ping& ping, const std::string
                        const std::string& digest);
 
 /// SHA-256 of what the pings depend on: the files' text, the scene as loaded, the sonar, switches, seed, poses and times.
-/// Threads and the number of pings do not count.
-std::string digest_of(const RenderInput& input, double rate_hz);
+/// Threads and the number of pings do not count. `plain_pictures`: without rings.
+std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictures = false);
 
 }  // namespace sonar::render

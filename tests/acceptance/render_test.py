@@ -1,5 +1,7 @@
 """sonard render as a user runs it: arrays that another language reads, runs that go on where they stopped, plain refusals."""
 import ast
+import contextlib
+import fcntl
 import json
 import math
 import os
@@ -30,6 +32,16 @@ def read_npy(path):
     values = struct.unpack_from("<" + str(count * len(code)) + code[0], data, 10 + length)
     assert len(data) == 10 + length + struct.calcsize("<" + code) * count
     return header["shape"], header["descr"], values
+
+
+@contextlib.contextmanager
+def open_folder(path):
+    path.mkdir()
+    handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        yield handle
+    finally:
+        os.close(handle)
 
 
 class Render(unittest.TestCase):
@@ -159,6 +171,44 @@ class Render(unittest.TestCase):
         poses.write_text("t,x,y,z\n0,0,0,0\n", encoding="utf-8")
         self.expect(self.render("--poses", poses, "--pose-frame", "ENU_FLU", "--format", "raw", out=self.path / "third"), 0, "1 of 1")
 
+    def test_a_part_of_a_run_is_the_same_pings(self):
+        options = ["--format", "raw,png"]
+        self.expect(self.render("--pings", "4", *options), 0)
+        part = self.path / "part"
+        self.expect(self.render("--first", "3", "--pings", "2", *options, out=part), 0, "2 of 2 pings")
+        names = {f"00000{n}{end}" for n in (3, 4) for end in (".json", ".png", "_samples.raw")}
+        self.assertEqual({p.name for p in part.iterdir()}, names | {"render.json"})
+        for name in names:
+            self.assertEqual((part / name).read_bytes(), (self.out / name).read_bytes(), name)
+        self.expect(self.render("--first", "4", "--pings", "2", *options, out=part), 0, "1 were there already")
+
+        poses = self.path / "poses.csv"
+        poses.write_text("# frame: ENU_FLU\nt,x,y,z\n0,0,0,0\n1,0.5,0,0\n2,1,0,0\n", encoding="utf-8")
+        third = self.path / "third"
+        self.expect(self.render("--poses", poses, "--first", "2", "--format", "raw", out=third), 0, "2 of 2 pings")
+        self.assertEqual(json.loads((third / "000002.json").read_text(encoding="utf-8"))["time_s"], 1)
+        self.expect(self.render("--poses", poses, "--first", "4", out=third), 64, "--first 4", "enough for 3")
+        self.expect(self.render("--poses", poses, "--first", "3", "--pings", "2", out=third), 64, "--first 3 --pings 2", "enough for 3")
+        self.expect(self.render("--first", "999999", "--pings", "2", out=third), 64, "999999")
+        sweep = self.path / "sweep.yaml"
+        sweep.write_text("scene: l-targets.yaml\nsweep: {r: [5, 6]}\nsonar: {ping: {range_m: $r}}\n", encoding="utf-8")
+        self.expect(self.render("--first", "2", config=sweep, out=self.path / "sweep"), 64, "--first", "sweeps")
+
+    def test_pictures_without_rings(self):
+        self.expect(self.render("--format", "png"), 0)
+        plain = self.path / "plain"
+        self.expect(self.render("--format", "png", "--image-rings", "off", out=plain), 0)
+        self.assertNotEqual((plain / "000001.png").read_bytes(), (self.out / "000001.png").read_bytes())
+        self.expect(self.render("--format", "png", "--image-rings", "off"), 64, "other inputs")
+        self.expect(self.render("--format", "png", "--image-rings", "no", out=plain), 64, "--image-rings")
+
+    def test_two_runs_at_once_do_not_share_a_folder(self):
+        with open_folder(self.out) as held:
+            fcntl.flock(held, fcntl.LOCK_EX)  # as another run holds it
+            self.expect(self.render(), 64, "another sonard render is writing into", "--out")
+            self.assertEqual(list(self.out.iterdir()), [])
+        self.expect(self.render("--format", "raw"), 0)
+
     def test_of_several_bodies_the_vehicles_own(self):
         poses = self.path / "both.csv"
         poses.write_text("# frame: ENU_FLU\nbody,t,x,y,z\nboat,0,9,0,0\nrov,0,0.25,0,0\n", encoding="utf-8")
@@ -179,7 +229,13 @@ class Render(unittest.TestCase):
             folder = self.path / "full"
             folder.mkdir()
             os.symlink("/dev/full", folder / "render.json.tmp")
-            self.expect(self.render(out=folder), 74, "No space left")
+            self.expect(self.render(out=folder), 74, "render.json: No space left")
+            for kind, name in (("npy", "000001_samples.npy"), ("png", "000001.png")):
+                folder = self.path / kind
+                folder.mkdir()
+                os.symlink("/dev/full", folder / (name + ".tmp"))
+                self.expect(self.render("--quiet", "--format", kind, out=folder), 74, name + ": No space left", "make room")
+                self.assertFalse([p.name for p in folder.iterdir() if p.name in (name, name + ".tmp", "000001.json")])
 
     def test_expectations_decide_the_exit_code(self):
         good = pathlib.Path(ROOT) / "tests/oracles/46-conical.yaml"
