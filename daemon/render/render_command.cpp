@@ -75,6 +75,12 @@ Result<motion::TrajectoryFile> poses_of(const RenderCommand& command) {
   return motion::load_trajectories(command.poses, options);
 }
 
+bool is_given_on(const EngineOptionsGiven& given, bool Switches::*part) {
+  for (std::size_t i = 0; i < named_switches.size(); ++i)
+    if (named_switches[i].is_on == part) return given.switches[i] == "on";
+  return false;
+}
+
 Result<RenderInput> input_of(const RenderCommand& command) {
   auto input = load_render_input(command.config, command.sonar);
   if (!input) return input;
@@ -88,6 +94,10 @@ Result<RenderInput> input_of(const RenderCommand& command) {
       if (!path) return tl::make_unexpected(path.error());
       job.path = *path;
     }
+  }
+  for (RenderJob& job : input->jobs) {
+    if (job.wants_motion || is_given_on(command.engine, &Switches::motion)) job.path.snapshots = false;
+    if (job.path.snapshots && input->notes.empty()) input->notes.push_back(note_of_snapshots(job.path));
   }
   return input;
 }
@@ -174,6 +184,7 @@ int run_render(const RenderCommand& command) {
   if (!command.report.empty()) return report_coverage(input->jobs);
   if (command.check_expectations) return check(*input);
   if (!command.quiet) tell_notes(*input);
+  for (const std::string& note : input->notes) std::fprintf(stderr, "sonard: %s\n", note.c_str());
   ProgressLine line(command.quiet);
   Parallel pool(threads_of(input->jobs.front().engine));
   const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.tell(p); });

@@ -227,9 +227,16 @@ Result<RenderInput> load_render_input(const std::filesystem::path& file, const s
   if (!text) return tl::make_unexpected(text.error());
   const auto outline = text::parse_yaml(*text, file.string(), {.error_kind = ErrorKind::config});
   if (!outline) return tl::make_unexpected(outline.error());
-  if (outline->root().has("world")) return from_config(file, *text, sonar);
-  if (!sonar.empty()) return failure(ErrorKind::usage, "--sonar is for configurations; " + file.string() + " is a render file");
-  return parse_render_file(*text, file.string(), file.parent_path());
+  Map root = outline->root();
+  const bool is_config = root.has("world");
+  if (!is_config && !sonar.empty())
+    return failure(ErrorKind::usage, "--sonar is for configurations; " + file.string() + " is a render file");
+  auto input = is_config ? from_config(file, *text, sonar) : parse_render_file(*text, file.string(), file.parent_path());
+  if (!input) return input;
+  const bool wants_motion =
+      root.optional("engine").map().optional("motion").choice_or<bool>(false, {{"on", true}, {"off", false}});
+  for (RenderJob& job : input->jobs) job.wants_motion = wants_motion;
+  return input;
 }
 
 }  // namespace sonar::render

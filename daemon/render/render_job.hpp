@@ -30,6 +30,7 @@ struct RenderJob {
   Pose mount;                // sonar in vehicle
   std::string vehicle_name;  // of a configuration; empty in render files
   VehiclePath path;
+  bool wants_motion = false;  // engine.motion: on is written in the file
   /// Of the scene's moving objects, in its order, on the same clock; null or not there: it rests.
   std::vector<std::shared_ptr<const motion::Trajectory>> body_paths;
   Values values;  // what the sweep set, and what `let` made of it

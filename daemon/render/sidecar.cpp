@@ -188,6 +188,7 @@ std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictu
                static_cast<int>(job.engine.simd) + 16 * static_cast<int>(job.engine.device), json_of(job.mount),
                json_of(job.path.initial), job.path.orbits});
     add_way(hash, job.path.trajectory, job.path.begins_at);
+    if (job.path.snapshots) add(hash, "snapshots");
     for (std::size_t i = 0; i < job.body_paths.size(); ++i) {
       if (job.body_paths[i]) add(hash, i);
       add_way(hash, job.body_paths[i], job.path.begins_at);

@@ -1,6 +1,9 @@
 #include "daemon/render/vehicle_path.hpp"
 
+#include <algorithm>
+
 #include "core/motion/jump.hpp"
+#include "core/text/format.hpp"
 #include "daemon/world/world.hpp"
 
 namespace sonar::render {
@@ -10,12 +13,37 @@ World circling(const Pose& initial) { return World({}, {{"vehicle", initial, tru
 
 }  // namespace
 
+Steps steps_of(const motion::Trajectory& trajectory) {
+  Steps steps;
+  const motion::Points& p = trajectory.points();
+  if (!p.velocities_mps.empty()) return steps;
+  for (std::size_t i = 0; i + 1 < p.times.size(); ++i) {
+    const motion::Motion m = trajectory.at(p.times[i]).moves;  // that of the way to the next one
+    const double mps = length(m.velocity_mps), radps = length(m.angular_velocity_radps);
+    ++steps.all;
+    if (!(mps <= fastest_vehicle_mps && radps <= fastest_vehicle_radps)) ++steps.too_far;
+    steps.fastest_mps = std::max(steps.fastest_mps, mps);
+    steps.fastest_radps = std::max(steps.fastest_radps, radps);
+  }
+  return steps;
+}
+
+std::string note_of_snapshots(const VehiclePath& path) {
+  const Steps steps = steps_of(*path.trajectory);
+  return text::format(
+      "the poses are taken as unconnected snapshots: %zu of %zu steps from one to the next are faster than a vehicle goes "
+      "(%g m/s, %g rad/s; the fastest: %.3g m/s, %.3g rad/s). The sonar rests within each ping; --motion on moves it",
+      steps.too_far, steps.all, fastest_vehicle_mps, fastest_vehicle_radps, steps.fastest_mps, steps.fastest_radps);
+}
+
 Result<VehiclePath> path_in(const motion::TrajectoryFile& file, const std::string& name, const std::string& body) {
   auto way = motion::trajectory_of(file, name, body);
   if (!way) return tl::make_unexpected(way.error());
   VehiclePath path;
   path.trajectory = *std::move(way);
   path.begins_at = Time{} + file.begins_at;
+  const Steps steps = steps_of(*path.trajectory);
+  path.snapshots = steps.too_far * steps_to_one_too_far > steps.all;
   return path;
 }
 
@@ -26,6 +54,7 @@ Pose vehicle_at(const VehiclePath& path, Time at) {
 
 Twist sonar_twist_at(const VehiclePath& path, const Pose& mount, Time at) {
   PoseHistory::Motion moves;
+  if (path.snapshots) return {};
   if (path.trajectory) {
     const motion::Motion told = path.trajectory->at(at - path.begins_at).moves;
     if (!motion::is_jump(told.velocity_mps, told.angular_velocity_radps))

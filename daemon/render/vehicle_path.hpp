@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "core/base/geometry.hpp"
@@ -18,9 +19,25 @@ struct VehiclePath {
   bool orbits = false;                                   // circles the world's z axis, as `trajectory: orbit`
   std::shared_ptr<const motion::Trajectory> trajectory;  // null = none
   Time begins_at{};                                      // the stamp that the trajectory counts from
+  bool snapshots = false;                                // its poses have nothing to do with each other: no motion
 };
 
-/// The vehicle's way in a file, in the file's own time; an empty name: of the only body in it. Errors: name:line: what.
+/// What carries an imaging sonar goes no faster: 10 knots, and three seconds for a full turn. A file of poses of which more than
+/// one step in `steps_to_one_too_far` is faster holds snapshots, not a way; unless it tells velocities itself.
+inline constexpr double fastest_vehicle_mps = 5, fastest_vehicle_radps = 2;
+inline constexpr std::size_t steps_to_one_too_far = 10;
+
+/// The steps of a trajectory from pose to pose.
+struct Steps {
+  std::size_t all = 0, too_far = 0;
+  double fastest_mps = 0, fastest_radps = 0;
+};
+Steps steps_of(const motion::Trajectory& trajectory);
+/// One sentence about a path that is taken for snapshots.
+std::string note_of_snapshots(const VehiclePath& path);
+
+/// The vehicle's way in a file, in the file's own time, or its snapshots; an empty name: of the only body in it. Errors:
+/// name:line: what.
 Result<VehiclePath> path_in(const motion::TrajectoryFile& file, const std::string& name, const std::string& body);
 
 Pose vehicle_at(const VehiclePath& path, Time at);

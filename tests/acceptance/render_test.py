@@ -171,6 +171,34 @@ class Render(unittest.TestCase):
         poses.write_text("t,x,y,z\n0,0,0,0\n", encoding="utf-8")
         self.expect(self.render("--poses", poses, "--pose-frame", "ENU_FLU", "--format", "raw", out=self.path / "third"), 0, "1 of 1")
 
+    def test_snapshots_do_not_smear(self):
+        """Poses further apart than a vehicle goes: pings as of a sonar at rest there, said once and in render.json."""
+        snapshots = self.path / "snapshots.csv"
+        snapshots.write_text("# frame: ENU_FLU\nt,x,y,z,yaw\n0,0,0,0,0\n1,0.3,0,0,-150\n2,6.3,0,0,0\n", encoding="utf-8")
+        options = ["--format", "raw", "--noise", "off"]
+        result = self.render("--poses", snapshots, "--quiet", *options)
+        self.expect(result, 0, "snapshots", "2 of 2 steps", "6 m/s", "--motion on")
+        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        about = json.loads((self.out / "render.json").read_text(encoding="utf-8"))
+        self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
+        side = json.loads((self.out / "000001.json").read_text(encoding="utf-8"))
+        self.assertEqual(side["twist"], {"velocity_mps": [0, 0, 0], "angular_rate_radps": [0, 0, 0]})
+        resting = self.path / "one.csv"
+        resting.write_text("# frame: ENU_FLU\nt,x,y,z,yaw\n0,0,0,0,0\n", encoding="utf-8")
+        self.expect(self.render("--poses", resting, *options, out=self.path / "resting"), 0)
+        raw = "000001_samples.raw"
+        self.assertEqual((self.out / raw).read_bytes(), (self.path / "resting" / raw).read_bytes())
+
+        moved = self.render("--poses", snapshots, "--motion", "on", *options, out=self.path / "moved")
+        self.expect(moved, 0)
+        self.assertNotIn("snapshots", moved.stderr)
+        self.assertNotEqual((self.out / raw).read_bytes(), (self.path / "moved" / raw).read_bytes())
+        self.expect(self.render("--poses", snapshots, "--motion", "on"), 64, "other inputs")
+        self.config.write_text(CONFIG + "engine: {motion: on}\n", encoding="utf-8")
+        asked = self.render("--poses", snapshots, *options, out=self.path / "asked")
+        self.assertNotIn("snapshots", asked.stderr)
+        self.assertEqual((self.path / "asked" / raw).read_bytes(), (self.path / "moved" / raw).read_bytes())
+
     def test_a_part_of_a_run_is_the_same_pings(self):
         options = ["--format", "raw,png"]
         self.expect(self.render("--pings", "4", *options), 0)

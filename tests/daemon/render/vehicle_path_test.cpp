@@ -40,13 +40,49 @@ TEST(VehiclePath, GoesOnBetweenTheLinesAndTellsItsMotion) {
 }
 
 TEST(VehiclePath, AJumpBetweenLinesIsNoMotion) {
-  const VehiclePath path = path_of("t,x,y,z,yaw\n0,0,0,0,0\n1,29,0,0,0\n2,60,0,0,0\n2.1,60,0,0,90\n3,60,0,0,90\n");
+  VehiclePath path = path_of("t,x,y,z,yaw\n0,0,0,0,0\n1,29,0,0,0\n2,60,0,0,0\n2.1,60,0,0,90\n3,60,0,0,90\n");
+  path.snapshots = false;  // as by --motion on
   expect_near(sonar_twist_at(path, {}, at(0.5)).velocity_mps, {29, 0, 0});
   const Twist far = sonar_twist_at(path, {{1, 0, 0}, {}}, at(1.5)), turned = sonar_twist_at(path, {{1, 0, 0}, {}}, at(2.05));
   expect_near(far.velocity_mps, {0, 0, 0});
   expect_near(turned.velocity_mps, {0, 0, 0});
   expect_near(turned.angular_rate_radps, {0, 0, 0});
   expect_near(vehicle_at(path, at(1.5)).position_m, {44.5, 0, 0});  // where it is stays what the lines say
+}
+
+std::string lines_of(int count, double step_m, double turn_deg) {
+  std::string text = "t,x,y,z,yaw\n";
+  for (int i = 0; i < count; ++i)
+    text += std::to_string(i) + "," + std::to_string(i * step_m) + ",0,0," + std::to_string(i * turn_deg) + "\n";
+  return text;
+}
+
+TEST(VehiclePath, PosesFurtherApartThanAVehicleGoesAreSnapshotsAndNoMotion) {
+  for (const auto& [step_m, turn_deg] : {std::pair{5.1, 0.0}, std::pair{0.0, 115.0}}) {
+    const VehiclePath path = path_of(lines_of(5, step_m, turn_deg));
+    EXPECT_TRUE(path.snapshots) << step_m << " " << turn_deg;
+    const Twist rests = sonar_twist_at(path, {{1, 0, 0}, {}}, at(2));
+    EXPECT_EQ(length(rests.velocity_mps) + length(rests.angular_rate_radps), 0) << step_m << " " << turn_deg;
+    expect_near(vehicle_at(path, at(2)).position_m, {2 * step_m, 0, 0});  // where it is stays what the lines say
+  }
+  for (const auto& [step_m, turn_deg] : {std::pair{4.9, 0.0}, std::pair{0.0, 114.0}, std::pair{1.0, 45.0}}) {
+    const VehiclePath path = path_of(lines_of(5, step_m, turn_deg));
+    EXPECT_FALSE(path.snapshots) << step_m << " " << turn_deg;
+    EXPECT_GT(length(sonar_twist_at(path, {{1, 0, 0}, {}}, at(2)).velocity_mps), 0) << step_m << " " << turn_deg;
+  }
+}
+
+TEST(VehiclePath, AMissionWithAFewJumpsIsNoRowOfSnapshots) {
+  const std::string slow = lines_of(20, 1, 0);  // 19 steps
+  EXPECT_FALSE(path_of(slow + "20,40,0,0,0\n").snapshots) << "1 of 20 steps";
+  EXPECT_FALSE(path_of(slow + "20,40,0,0,0\n21,80,0,0,0\n").snapshots) << "2 of 21";
+  EXPECT_TRUE(path_of(slow + "20,40,0,0,0\n21,80,0,0,0\n22,120,0,0,0\n").snapshots) << "3 of 22";
+  EXPECT_THAT(note_of_snapshots(path_of("t,x,y,z\n0,0,0,0\n1,20,0,0\n2,21,0,0\n")), HasSubstr("1 of 2 steps"));
+}
+
+TEST(VehiclePath, AFileThatTellsVelocitiesIsTakenAtItsWord) {
+  EXPECT_FALSE(path_of("t,x,y,z,vx,vy,vz\n0,0,0,0,20,0,0\n1,20,0,0,20,0,0\n2,40,0,0,20,0,0\n").snapshots);
+  EXPECT_TRUE(path_of("t,x,y,z\n0,0,0,0\n1,20,0,0\n2,40,0,0\n").snapshots);
 }
 
 TEST(VehiclePath, KeepsTheTimesOfItsFile) {
