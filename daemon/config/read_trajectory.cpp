@@ -46,8 +46,10 @@ TrajectoryFiles::Named TrajectoryFiles::read(const Node& file, const motion::Rea
     if (k.path == path && k.options == options) return k.named;
   std::error_code ec;
   if (!std::filesystem::exists(path, ec) || std::filesystem::is_directory(path, ec)) {
-    const std::filesystem::path folder = std::filesystem::absolute(folder_, ec).lexically_normal();
-    file.fail("no such file: \"" + name + "\"; looked in " + folder.string());
+    // An empty folder is the working directory, which has no name but this; a path from the root was looked for nowhere else.
+    const auto folder = std::filesystem::absolute(folder_.empty() ? "." : folder_, ec).lexically_normal();
+    const bool is_whole = std::filesystem::path(name).is_absolute();
+    file.fail("no such file: \"" + name + "\"" + (is_whole ? "" : "; looked in " + folder.string()));
     return {};
   }
   auto loaded = motion::load_trajectories(path, options);

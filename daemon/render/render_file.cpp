@@ -204,6 +204,17 @@ Result<RenderInput> from_config(const std::filesystem::path& file, const std::st
   return input;
 }
 
+bool is_scene(const Map& root) { return root.has("objects") && !root.has("scene") && !root.has("world"); }
+
+std::string what_to_do_with_a_scene(const std::filesystem::path& file) {
+  const std::string scene = std::filesystem::absolute(file).lexically_normal().string();
+  return file.string() +
+         " is a scene: it says what is there, not what looks at it. A render file names it and a sonar: echo '{scene: \"" +
+         scene +
+         "\", sonar: {profile: oculus-m1200d}, poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}}' > render.yaml && "
+         "sonard render render.yaml --out pings (docs/render.md)";
+}
+
 }  // namespace
 
 Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
@@ -228,6 +239,7 @@ Result<RenderInput> load_render_input(const std::filesystem::path& file, const s
   const auto outline = text::parse_yaml(*text, file.string(), {.error_kind = ErrorKind::config});
   if (!outline) return tl::make_unexpected(outline.error());
   Map root = outline->root();
+  if (is_scene(root)) return failure(ErrorKind::config, what_to_do_with_a_scene(file));
   const bool is_config = root.has("world");
   if (!is_config && !sonar.empty())
     return failure(ErrorKind::usage, "--sonar is for configurations; " + file.string() + " is a render file");

@@ -8,6 +8,7 @@ import os
 import pathlib
 import re
 import struct
+import subprocess
 import tempfile
 import unittest
 
@@ -236,6 +237,21 @@ class Render(unittest.TestCase):
             self.expect(self.render(), 64, "another sonard render is writing into", "--out")
             self.assertEqual(list(self.out.iterdir()), [])
         self.expect(self.render("--format", "raw"), 0)
+
+    def test_a_scene_is_told_from_a_render_file(self):
+        """And the command that is told works."""
+        scene = self.path / "my scene.yaml"
+        scene.write_text((ROOT / "scenes/l-targets.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+        result = self.render(config=scene)
+        self.expect(result, 78, "my scene.yaml is a scene", "render.yaml")
+        command = re.search(r"echo .* --out pings", result.stderr).group().replace("sonard render", f"'{SONARD.resolve()}' render")
+        done = subprocess.run(["sh", "-c", command], cwd=self.path, capture_output=True, text=True, timeout=300, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue((self.path / "pings/000001.png").exists())
+        empty = self.path / "empty.yaml"
+        empty.write_text("sonar: {}\n", encoding="utf-8")
+        self.expect(self.render(config=empty), 78, "empty.yaml", "scene")
+        self.assertNotIn('""', self.render(config=empty).stderr)
 
     def test_of_several_bodies_the_vehicles_own(self):
         poses = self.path / "both.csv"

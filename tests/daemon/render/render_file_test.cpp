@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -18,6 +19,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 RenderInput parsed(const std::string& text) {
   auto input = parse_render_file(text, "r.yaml", ".");
@@ -33,6 +35,20 @@ const std::string point =
     "scene: {objects: [{type: point, target_strength_db: -10, pose: {xyz_m: [4, 0, -10]}}]}\n"
     "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10]}}\nengine: {noise: off}\n"
     "water: {temperature_c: 10, salinity_psu: 0, sound_speed_mps: 1500}\n";
+
+TEST(RenderFile, AFileOfPosesThatIsNotThereIsToldWithWhereItWasLookedFor) {
+  const auto why = [](const std::string& name, const std::string& folder) {
+    return parse_render_file("scene: demo.yaml\nposes: {file: " + name + "}\n", "r.yaml", folder).error().text;
+  };
+  const std::string here = std::filesystem::current_path().string();
+  EXPECT_THAT(why("none.csv", ""), HasSubstr("no such file: \"none.csv\"; looked in " + here));  // a bare `sonard render r.yaml`
+  EXPECT_THAT(why("none.csv", "missions"), HasSubstr("looked in " + here + "/missions"));
+  EXPECT_THAT(why("/nowhere/none.csv", ""), AllOf(HasSubstr("no such file: \"/nowhere/none.csv\""), Not(HasSubstr("looked in"))));
+}
+
+TEST(RenderFile, WithoutASceneItIsToldToNameOne) {
+  EXPECT_THAT(refusal("sonar: {}\n"), AllOf(HasSubstr("scene"), Not(HasSubstr("no such file"))));
+}
 
 TEST(RenderFile, KeysReachTheSonarAndItsSettings) {
   const RenderInput input = parsed(point + R"(
