@@ -43,18 +43,19 @@ Span span_around(double centre, double width, std::size_t cells) {
 /// Mean sample over the pixel's footprint; a footprint smaller than a cell becomes one cell wide, which interpolates linearly.
 std::optional<float> footprint_mean(const PolarImage& image, double x_m, double y_m, double pixel_m) {
   const double range = std::hypot(x_m, y_m);
-  if (range >= image.range_m()) return std::nullopt;
+  if (range < image.start_m || range >= image.range_m()) return std::nullopt;
   const std::optional<double> beam = beam_at(image.azimuth_rad, std::atan2(-x_m, y_m));
   if (!beam) return std::nullopt;
   const double beam_spacing = (image.azimuth_rad.front() - image.azimuth_rad.back()) / static_cast<double>(image.beams - 1);
   const double beams_wide = pixel_m / std::max(range, pixel_m) / beam_spacing;
-  const Span rows = span_around(range / image.row_spacing_m, std::max(1.0, pixel_m / image.row_spacing_m), image.rows);
+  const double row = (range - image.start_m) / image.row_spacing_m;
+  const Span rows = span_around(row, std::max(1.0, pixel_m / image.row_spacing_m), image.rows);
   const Span beams = span_around(*beam + 0.5, std::max(1.0, beams_wide), image.beams);
   double sum = 0, weights = 0;
-  for (std::size_t row = rows.first; row <= rows.last; ++row) {
+  for (std::size_t r = rows.first; r <= rows.last; ++r) {
     for (std::size_t b = beams.first; b <= beams.last; ++b) {
-      const double weight = std::max(0.0, rows.weight(row)) * std::max(0.0, beams.weight(b));
-      sum += weight * static_cast<double>(image.at(row, b));
+      const double weight = std::max(0.0, rows.weight(r)) * std::max(0.0, beams.weight(b));
+      sum += weight * static_cast<double>(image.at(r, b));
       weights += weight;
     }
   }
@@ -84,7 +85,8 @@ void draw_rings(Raster& raster, const PolarImage& image, const FanLayout& layout
 Result<void> check(const PolarImage& image, const FanStyle& style) {
   if (style.width_px < 64 || style.width_px > 8000)
     return failure(ErrorKind::usage, "a picture " + std::to_string(style.width_px) + " pixels wide: choose 64 to 8000");
-  if (image.rows < 1 || image.beams < 2 || !(image.row_spacing_m > 0) || !std::isfinite(image.row_spacing_m))
+  if (image.rows < 1 || image.beams < 2 || !(image.row_spacing_m > 0) || !std::isfinite(image.row_spacing_m) ||
+      !(image.start_m >= 0) || !std::isfinite(image.start_m))
     return failure(ErrorKind::bad_data, "the ping has no picture: " + std::to_string(image.rows) + " rows of " +
                                             std::to_string(image.beams) + " beams, nothing to draw");
   for (std::size_t i = 1; i < image.beams; ++i)

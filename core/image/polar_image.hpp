@@ -9,13 +9,14 @@ namespace sonar {
 
 struct PolarImage {
   std::size_t rows = 0, beams = 0;
-  double row_spacing_m = 0;         // row i covers [i, i + 1) * row_spacing_m
+  double row_spacing_m = 0;         // row i covers start_m + [i, i + 1) * row_spacing_m
   std::vector<double> azimuth_rad;  // [beams], positive to port, strictly falling
   std::vector<float> samples;       // [rows][beams], codes as sent
   float full_scale = 255;           // the code drawn brightest
+  double start_m = 0;               // nothing is known nearer than that
 
   float at(std::size_t row, std::size_t beam) const { return samples[row * beams + beam]; }
-  double range_m() const { return static_cast<double>(rows) * row_spacing_m; }
+  double range_m() const { return start_m + static_cast<double>(rows) * row_spacing_m; }
 };
 
 }  // namespace sonar

@@ -71,6 +71,21 @@ TEST(Fan, PlacesASampleWhereItsRangeAndBearingSay) {
   EXPECT_NEAR((4 + 10 / pixel_m - c.y - 0.5) * pixel_m, 5.025 * std::cos(rad_from_deg(30)), 2 * pixel_m);
 }
 
+TEST(Fan, ShowsNothingNearerThanItsStart) {
+  PolarImage image = black_fan(100, 61, 30);
+  image.row_spacing_m = 0.05;
+  image.start_m = 5;
+  image.samples[50 * 61 + 30] = 255;  // ahead, 7.525 m
+  const Centroid c = brightest_place(*draw_fan(image, plain_gray(800)));
+  const double pixel_m = 2 * 10 * std::sin(rad_from_deg(30)) / (800 - 8);
+  EXPECT_NEAR((4 + 10 / pixel_m - c.y - 0.5) * pixel_m, 7.525, 2 * pixel_m);
+  std::fill(image.samples.begin(), image.samples.end(), 50.0f);
+  const Raster fan = *draw_fan(image, plain_gray(800));
+  const auto grey_at = [&](double range_m) { return fan.at(400, static_cast<int>(4 + (10 - range_m) / pixel_m)); };
+  EXPECT_EQ(grey_at(4.9).b, 23) << "the background";
+  EXPECT_EQ(grey_at(5.1).b, 50);
+}
+
 TEST(Fan, KeepsTheMeanWhenPixelsAreCoarserThanSamples) {
   PolarImage image = black_fan(1000, 512, 60);
   for (std::size_t i = 0; i < image.samples.size(); ++i) image.samples[i] = i % 2 == 0 ? 200.0f : 100.0f;
