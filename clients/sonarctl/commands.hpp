@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/sonarctl/net.hpp"
+#include "clients/sonarctl/ping_stream.hpp"
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
 #include "core/image/draw_fan.hpp"
@@ -21,9 +21,11 @@ namespace sonar::clients {
 /// Where pings come from: a device or a recording.
 struct SourceOptions {
   Endpoint device{"127.0.0.2", 52100};
+  SonarKind kind = SonarKind::oculus;
   bool discover = false;                     // take the device from its status broadcast
   std::filesystem::path recording;           // instead of a device
   std::optional<oculus::FireRequest> asked;  // settings to send
+  HeadWish head;                             // the same for a BlueView head
   double connect_patience_s = 2;
   double silence_limit_s = 10;  // no byte for so long is an error
 };

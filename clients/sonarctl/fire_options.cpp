@@ -12,6 +12,8 @@ using text::number;
 using text::one_of;
 using text::whole_number;
 
+constexpr const char* settings_group = "Settings of the sonar";
+
 const std::map<std::string, oculus::PingRate>& rates() {
   using oculus::PingRate;
   static const std::map<std::string, PingRate> by_name{{"2", PingRate::hz2},   {"5", PingRate::hz5},
@@ -23,8 +25,10 @@ const std::map<std::string, oculus::PingRate>& rates() {
 }  // namespace
 
 void FireArguments::add_to(CLI::App& app) {
-  const auto group = [](CLI::Option* option) { return option->group("Settings of the sonar")->capture_default_str(); };
-  group(app.add_option("--mode", mode, "1 low frequency, wide; 2 high frequency, narrow"))->check(whole_number(1, 2));
+  command = &app;
+  const auto group = [](CLI::Option* option) { return option->group(settings_group)->capture_default_str(); };
+  group(app.add_option("--mode", mode, "1 low frequency, wide; 2 high frequency, narrow; a BlueView sonar's head, from 1"))
+      ->check(whole_number(1, 2));
   CLI::Option* metres = group(app.add_option("--range", range_m, "metres"))->check(number(0.0, 1000.0));
   group(app.add_option("--range-percent", range_percent, "of the mode's maximum, instead of metres"))
       ->check(number(0.0, 100.0))
@@ -37,9 +41,25 @@ void FireArguments::add_to(CLI::App& app) {
   group(app.add_option("--speed-of-sound", sound_speed_mps, "m/s; 0 = the sonar computes it"))->check(number(0.0, 2000.0));
   group(app.add_option("--salinity", salinity_ppt, "ppt"))->check(number(0.0, 50.0));
   group(app.add_option("--version", version, "of the messages"))->check(whole_number(0, 2));
-  app.add_flag("--gains", row_gains, "a gain in front of every row")->group("Settings of the sonar");
-  app.add_flag("--gain-assist", gain_assist, "flag bit 4")->group("Settings of the sonar");
-  app.add_flag("--trigger", trigger, "one ping for each request (network trigger)")->group("Settings of the sonar");
+  app.add_flag("--gains", row_gains, "a gain in front of every row")->group(settings_group);
+  app.add_flag("--gain-assist", gain_assist, "flag bit 4")->group(settings_group);
+  app.add_flag("--trigger", trigger, "one ping for each request (network trigger)")->group(settings_group);
+}
+
+HeadWish FireArguments::head_wish() const {
+  HeadWish wish;
+  if (command == nullptr) return wish;
+  const auto typed = [this](const char* name) { return command->count(name) > 0; };
+  if (typed("--mode")) wish.head = static_cast<std::size_t>(mode - 1);
+  if (typed("--range")) wish.range_m = range_m;
+  if (typed("--gain")) wish.gain_percent = gain_percent;
+  if (typed("--rate") && rate != "standby") wish.rate_hz = std::stod(rate);
+  for (const CLI::Option* option : command->get_options()) {
+    const std::string name = option->get_name();
+    const bool for_heads = name == "--mode" || name == "--range" || name == "--gain" || (name == "--rate" && rate != "standby");
+    if (option->get_group() == settings_group && option->count() > 0 && !for_heads) wish.oculus_only.push_back(name);
+  }
+  return wish;
 }
 
 oculus::FireRequest FireArguments::request() const {

@@ -23,8 +23,12 @@ std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_
 
 class Listener {
  public:
-  Listener(const ListenOptions& options, Endpoint device, PingStream stream)
-      : options_(options), device_(std::move(device)), stream_(std::move(stream)), log_(options.source.asked) {}
+  Listener(const ListenOptions& options, PingStream stream)
+      : options_(options),
+        stream_(std::move(stream)),
+        asked_(stream_.is_blueview() ? std::nullopt : options.source.asked),
+        heard_(stream_.is_blueview()),
+        log_(asked_) {}
 
   /// Until the wished time or number of pings is over; a sentence when the device stops before.
   Result<void> run() {
@@ -34,9 +38,9 @@ class Listener {
       if (item.what == Wait::data) {
         last_message_ = Clock::now();
         heard_ = true;
-        if (Result<void> taken = take(*item.message); !taken) return taken;
+        if (Result<void> taken = item.ping ? take_ping(*item.ping) : take(*item.other); !taken) return taken;
       } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
-        return tl::unexpected(silence(options_.source, device_, heard_, "nothing more",
+        return tl::unexpected(silence(options_.source, stream_.device(), heard_, "nothing more",
                                       "drivers give up after 10 s; is the daemon stopped or stuck?"));
       }
     }
@@ -44,7 +48,9 @@ class Listener {
   }
 
   PingSummary summary() const { return log_.summary(stream_.junk_bytes()); }
-  const std::optional<oculus::DecodedPing>& last_ping() const { return last_ping_; }
+  /// Settings were sent that pings echo.
+  bool asked() const { return asked_.has_value(); }
+  const std::optional<AnyPing>& last_ping() const { return last_ping_; }
   std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }
 
  private:
@@ -61,7 +67,6 @@ class Listener {
   }
 
   Result<void> take(const oculus::Received& message) {
-    if (const auto* ping = std::get_if<oculus::DecodedPing>(&message)) return take_ping(*ping);
     if (std::holds_alternative<oculus::DummyMessage>(message)) log_.add_dummy();
     if (const auto* other = std::get_if<oculus::OtherMessage>(&message); other != nullptr && !options_.json)
       std::printf("other message, type 0x%04x, %zu bytes: %s\n", static_cast<unsigned>(other->header.type), other->size,
@@ -71,7 +76,7 @@ class Listener {
     return {};
   }
 
-  Result<void> take_ping(const oculus::DecodedPing& ping) {
+  Result<void> take_ping(const AnyPing& ping) {
     const double at_s = seconds_since(start_);
     if (!last_ping_) first_ping_after_s_ = first_ping_time();
     const PingReport report = log_.add(ping, at_s);
@@ -90,18 +95,18 @@ class Listener {
   }
 
   const ListenOptions& options_;
-  Endpoint device_;
-  bool heard_ = false;
   PingStream stream_;
+  std::optional<oculus::FireRequest> asked_;
+  bool heard_;
   PingLog log_;
   Clock::time_point start_ = Clock::now(), last_message_ = start_;
-  std::optional<oculus::DecodedPing> last_ping_;
+  std::optional<AnyPing> last_ping_;
   std::optional<double> first_ping_after_s_;
 };
 
 Result<void> report(const ListenOptions& options, const Listener& listener) {
   const PingSummary summary = listener.summary();
-  const bool asked = options.source.asked.has_value();
+  const bool asked = listener.asked();
   std::puts(options.json ? json_from(summary, asked).c_str() : text_from(summary, asked).c_str());
   if (listener.first_ping_after_s() && !options.json)
     std::printf("first ping after %.3f s%s\n", *listener.first_ping_after_s(),
@@ -126,12 +131,12 @@ Result<void> report(const ListenOptions& options, const Listener& listener) {
 Result<void> listen(const ListenOptions& options) {
   const Result<Endpoint> device = find_device(options.source, !options.json);
   if (!device) return tl::unexpected(device.error());
-  auto stream = PingStream::open(*device, options.source.asked, milliseconds_from(options.source.connect_patience_s));
+  auto stream = open_stream(options.source, *device);
   if (!stream) return tl::unexpected(stream.error());
   if (!options.record.empty())
     if (Result<void> recording = stream->record_to(options.record); !recording) return recording;
-  if (!options.json) std::printf("connected to %s\n", text_from(*device).c_str());
-  Listener listener(options, *device, std::move(*stream));
+  if (!options.json) std::printf("connected to %s\n", stream->about().c_str());
+  Listener listener(options, std::move(*stream));
   const Result<void> ran = listener.run();
   const Result<void> reported = report(options, listener);
   return ran ? reported : ran;

@@ -84,22 +84,36 @@ Result<Endpoint> parse_endpoint(const std::string& text, const Endpoint& fallbac
 }
 
 Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patience) {
+  auto connected = connect_first({to}, patience);
+  if (!connected) return tl::unexpected(connected.error());
+  return std::move(connected->socket);
+}
+
+Result<Connected> connect_first(const std::vector<Endpoint>& places, std::chrono::milliseconds patience) {
   using namespace std::chrono_literals;
   const auto deadline = std::chrono::steady_clock::now() + patience;
-  auto addresses = resolve(to, SOCK_STREAM);
-  if (!addresses) return tl::unexpected(addresses.error());
+  std::vector<AddressList> addresses;
+  std::string names;
+  for (const Endpoint& place : places) {
+    auto found = resolve(place, SOCK_STREAM);
+    if (!found) return tl::unexpected(found.error());
+    addresses.push_back(std::move(*found));
+    names += (names.empty() ? "" : " or ") + text_from(place);
+  }
   for (;;) {
-    auto socket = open_socket(SOCK_STREAM);
-    if (!socket) return socket;
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-    const int error = try_connect(*socket, **addresses, std::max(left, 100ms));
-    if (error == 0) {
+    int error = 0;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      auto socket = open_socket(SOCK_STREAM);
+      if (!socket) return tl::unexpected(socket.error());
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+      error = try_connect(*socket, *addresses[i], std::max<std::chrono::milliseconds>(left / (places.size() - i), 100ms));
+      if (error != 0) continue;
       const int yes = 1;
       ::setsockopt(socket->fd(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-      return socket;
+      return Connected{std::move(*socket), i};
     }
     if (std::chrono::steady_clock::now() + 10ms >= deadline)
-      return failure(ErrorKind::unavailable, "cannot connect to tcp " + text_from(to) + ": " + std::strerror(error) +
+      return failure(ErrorKind::unavailable, "cannot connect to tcp " + names + ": " + std::strerror(error) +
                                                  ". Is sonard running there? Its banner names the address of each sonar");
     std::this_thread::sleep_for(5ms);
   }

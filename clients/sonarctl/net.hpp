@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/base/result.hpp"
 
@@ -40,6 +41,12 @@ class Socket {
 
 /// Retries until `patience` is over, so that a daemon that is still starting is met.
 Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patience);
+/// The same for several places, tried in turn: the socket of the first that accepts, and which that is.
+struct Connected {
+  Socket socket;
+  std::size_t which = 0;
+};
+Result<Connected> connect_first(const std::vector<Endpoint>& places, std::chrono::milliseconds patience);
 Result<Socket> connect_udp(const Endpoint& to);
 /// Bound with address reuse: other listeners on this machine keep their share of broadcasts.
 Result<Socket> listen_udp(const Endpoint& at);

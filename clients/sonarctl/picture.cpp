@@ -2,7 +2,18 @@
 
 #include <algorithm>
 
+#include "core/base/geometry.hpp"
+
 namespace sonar::clients {
+
+namespace {
+
+/// Of samples that rarely come near their maximum: what so many of a thousand do not exceed.
+float brightest_of(std::vector<float> samples, std::size_t per_mille) {
+  const auto place = samples.begin() + static_cast<std::ptrdiff_t>((samples.size() - 1) * per_mille / 1000);
+  std::nth_element(samples.begin(), place, samples.end());
+  return std::max(1.0f, *place);
+}
 
 Result<PolarImage> picture_of(const oculus::DecodedPing& ping) {
   if (!ping.has_image || ping.rows() == 0 || ping.beams() == 0)
@@ -17,13 +28,31 @@ Result<PolarImage> picture_of(const oculus::DecodedPing& ping) {
   for (std::size_t row = 0; row < image.rows; ++row)
     for (std::size_t beam = 0; beam < image.beams; ++beam) image.samples.push_back(static_cast<float>(ping.sample(row, beam)));
   image.full_scale = 254;
-  if (ping.bytes_per_sample() > 1) {
-    std::vector<float> sorted = image.samples;
-    const auto place = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) * 999 / 1000);
-    std::nth_element(sorted.begin(), place, sorted.end());
-    image.full_scale = std::max(1.0f, *place);
-  }
+  if (ping.bytes_per_sample() > 1) image.full_scale = brightest_of(image.samples, 999);
   return image;
+}
+
+Result<PolarImage> picture_of(const bvt::PolarPing& ping) {
+  if (!ping.has_signal()) return failure(ErrorKind::bad_data, "ping " + std::to_string(ping.number) + " holds no samples");
+  PolarImage image;
+  image.rows = static_cast<std::size_t>(ping.bins);
+  image.beams = static_cast<std::size_t>(ping.beams);
+  image.row_spacing_m = static_cast<double>(ping.bin_m);
+  image.start_m = static_cast<double>(ping.start_m);
+  for (std::size_t beam = 0; beam < image.beams; ++beam)
+    image.azimuth_rad.push_back(-rad_from_deg(ping.bearing_deg(static_cast<double>(beam))));
+  image.samples.reserve(image.rows * image.beams);
+  for (std::size_t row = 0; row < image.rows; ++row)
+    for (std::size_t beam = 0; beam < image.beams; ++beam) image.samples.push_back(ping.samples[beam * image.rows + row]);
+  image.full_scale = brightest_of(image.samples, 990);
+  return image;
+}
+
+}  // namespace
+
+Result<PolarImage> picture_of(const AnyPing& ping) {
+  if (const auto* of_oculus = std::get_if<oculus::DecodedPing>(&ping)) return picture_of(*of_oculus);
+  return picture_of(std::get<BlueViewPing>(ping).polar);
 }
 
 }  // namespace sonar::clients

@@ -17,15 +17,18 @@ using text::whole_number;
 /// Options that belong to a source of pings; finish() turns their texts into a SourceOptions once the line is parsed.
 struct SourceArguments {
   std::string address;
-  std::uint16_t port = 52100;
-  bool discover = false, as_it_is = false;
+  std::uint16_t port = 0;  // 0 = the usual ones
+  bool discover = false, as_it_is = false, is_blueview = false;
   std::string recording;
   double patience_s = 2;
   FireArguments fire;
 
   void add_to(CLI::App& app, bool recordings) {
     app.add_option("ADDRESS", address, "address of the sonar, HOST or HOST:PORT (default 127.0.0.2)")->check(clients::address());
-    app.add_option("--port", port, "TCP port of the sonar")->check(whole_number(1, 65535))->capture_default_str();
+    app.add_option("--port", port,
+                   "TCP port of the sonar (default: 52100 of an Oculus or 14750 of a BlueView head, whichever answers)")
+        ->check(whole_number(1, 65535));
+    app.add_flag("--blueview", is_blueview, "a BlueView head is there; needed on other ports than 14750");
     app.add_flag("--discover", discover, "take the address from the status broadcast on udp 52102");
     app.add_option("--wait", patience_s, "seconds to go on trying to connect")->check(number(0))->capture_default_str();
     if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
@@ -35,13 +38,21 @@ struct SourceArguments {
 
   Result<SourceOptions> finish() const {
     SourceOptions source;
-    const Result<Endpoint> device = parse_endpoint(address, {"127.0.0.2", port});
+    Result<Endpoint> device = parse_endpoint(address, {"127.0.0.2", port});
     if (!device) return tl::unexpected(device.error());
+    const bool any_port = device->port == 0;
+    if (any_port) device->port = is_blueview ? blueview::tcp_port : oculus::tcp_port;
+    source.kind = SonarKind::oculus;
+    if (is_blueview || device->port == blueview::tcp_port)
+      source.kind = SonarKind::blueview;
+    else if (any_port && !discover)
+      source.kind = SonarKind::either;
     source.device = *device;
     source.discover = discover;
     source.recording = recording;
     source.connect_patience_s = patience_s;
     if (!as_it_is && recording.empty()) source.asked = fire.request();
+    if (!as_it_is) source.head = fire.head_wish();
     return source;
   }
 };
@@ -75,6 +86,7 @@ Run add_listen(CLI::App& app) {
       "  sonarctl listen --seconds 60\n"
       "  sonarctl listen 127.0.0.3 --mode 1 --range 30 --beams 512 --pings 100 --quiet\n"
       "  sonarctl listen --discover --json | head\n"
+      "  sonarctl listen 127.0.0.3 --range 20          a BlueView head there is found by itself\n"
       "exit code 0 only when every ping was sound and the settings were echoed as asked");
   struct Arguments {
     ListenOptions options;

@@ -21,17 +21,19 @@ std::string echo_text(const PingSummary& summary) {
 
 }  // namespace
 
-PingReport PingLog::add(const oculus::DecodedPing& ping, Seconds at) {
+PingReport PingLog::add(const AnyPing& any, Seconds at) {
   PingReport report;
-  report.errors = ping.violations;
-  for (std::string& error : sequence_.add(ping)) report.errors.push_back(std::move(error));
   arrivals_.push_back(at);
   ++summary_.pings;
-  summary_.bytes += ping.message.size();
+  summary_.bytes += facts_of(any).message_size;
+  const auto* ping = std::get_if<oculus::DecodedPing>(&any);
+  if (ping == nullptr) return report;  // a head's pings were judged when they were decoded, and others may ask for some of them
+  report.errors = ping->violations;
+  for (std::string& error : sequence_.add(*ping)) report.errors.push_back(std::move(error));
   summary_.identity_errors += report.errors.size();
   summary_.missing_ids = sequence_.skipped_ids();
   if (asked_) {
-    report.echo_mismatches = oculus::echo_violations(*asked_, ping);
+    report.echo_mismatches = oculus::echo_violations(*asked_, *ping);
     if (report.echo_mismatches.empty() && !summary_.echo_satisfied_at) summary_.echo_satisfied_at = summary_.pings;
     if (!report.echo_mismatches.empty() && summary_.echo_satisfied_at) ++summary_.echo_lost;
   }
@@ -73,11 +75,10 @@ std::vector<std::string> complaints(const PingSummary& summary, bool asked) {
   return found;
 }
 
-std::string line_from(const oculus::DecodedPing& ping, const PingReport& report) {
-  const oculus::PingResultV2& f = ping.head.fixed;
-  std::string line =
-      format("ping %u  %u x %u  %zu bit  %.2f m  %.4f MHz  %zu bytes", f.ping_id, unsigned{f.row_count}, unsigned{f.beam_count},
-             8 * ping.bytes_per_sample(), f.row_count * f.range_resolution_m, f.frequency_hz / 1e6, ping.message.size());
+std::string line_from(const AnyPing& ping, const PingReport& report) {
+  const PingFacts f = facts_of(ping);
+  std::string line = format("ping %u  %u x %u  %u bit  %.2f m  %.4f MHz  %zu bytes", f.number, f.rows, f.beams, f.bits, f.range_m,
+                            f.frequency_hz / 1e6, f.message_size);
   for (const std::string& error : report.errors) line += "\n  error: " + error;
   for (const std::string& mismatch : report.echo_mismatches) line += "\n  echo: " + mismatch;
   return line;
@@ -93,16 +94,16 @@ std::string text_from(const PingSummary& s, bool asked) {
   return text;
 }
 
-std::string json_from(const oculus::DecodedPing& ping, const PingReport& report, Seconds at) {
-  const oculus::PingResultV2& f = ping.head.fixed;
-  const nlohmann::json out{{"ping", f.ping_id},
+std::string json_from(const AnyPing& ping, const PingReport& report, Seconds at) {
+  const PingFacts f = facts_of(ping);
+  const nlohmann::json out{{"ping", f.number},
                            {"at_s", at},
-                           {"rows", f.row_count},
-                           {"beams", f.beam_count},
-                           {"bits", 8 * ping.bytes_per_sample()},
-                           {"row_m", f.range_resolution_m},
+                           {"rows", f.rows},
+                           {"beams", f.beams},
+                           {"bits", f.bits},
+                           {"row_m", f.row_m},
                            {"frequency_hz", f.frequency_hz},
-                           {"bytes", ping.message.size()},
+                           {"bytes", f.message_size},
                            {"errors", report.errors},
                            {"echo_mismatches", report.echo_mismatches}};
   return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "protocol/oculus/decode.hpp"
+#include "clients/sonarctl/any_ping.hpp"
 
 namespace sonar::clients {
 
@@ -33,7 +33,7 @@ class PingLog {
   /// `asked`: the fire message sent, if any.
   explicit PingLog(std::optional<oculus::FireRequest> asked) : asked_(std::move(asked)) {}
 
-  PingReport add(const oculus::DecodedPing& ping, Seconds at);
+  PingReport add(const AnyPing& ping, Seconds at);
   void add_dummy() { ++summary_.dummies; }
   const PingSummary& counts() const { return summary_; }  // so far, without rate and intervals
   PingSummary summary(std::uint64_t junk_bytes) const;
@@ -51,9 +51,9 @@ double percentile(std::vector<double> values, double share);
 /// Sentences that say why the stream is not what a driver needs; empty = all is well.
 std::vector<std::string> complaints(const PingSummary& summary, bool asked);
 
-std::string line_from(const oculus::DecodedPing& ping, const PingReport& report);  // one line a ping
+std::string line_from(const AnyPing& ping, const PingReport& report);  // one line a ping
 std::string text_from(const PingSummary& summary, bool asked);
-std::string json_from(const oculus::DecodedPing& ping, const PingReport& report, Seconds at);
+std::string json_from(const AnyPing& ping, const PingReport& report, Seconds at);
 std::string json_from(const PingSummary& summary, bool asked);
 
 }  // namespace sonar::clients

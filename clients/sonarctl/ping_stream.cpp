@@ -1,41 +1,69 @@
 #include "clients/sonarctl/ping_stream.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <iterator>
 
 namespace sonar::clients {
 
-Result<PingStream> PingStream::open(const Endpoint& device, std::optional<oculus::FireRequest> asked,
+namespace {
+
+constexpr std::chrono::milliseconds answer_patience(3000);  // of a head, at least: it may be busy computing
+
+}  // namespace
+
+Result<PingStream> PingStream::open(const Endpoint& device, SonarKind kind, Settings settings,
                                     std::chrono::milliseconds patience) {
-  auto socket = connect_tcp(device, patience);
-  if (!socket) return tl::unexpected(socket.error());
-  PingStream stream(std::move(*socket), std::move(asked));
+  std::vector<Endpoint> places{device};
+  if (kind == SonarKind::either) places.push_back({device.host, blueview::tcp_port});
+  auto connected = connect_first(places, patience);
+  if (!connected) return tl::unexpected(connected.error());
+  const Endpoint& place = places[connected->which];
+  if (kind == SonarKind::blueview || connected->which == 1) {
+    auto head = BlueViewStream::open(std::move(connected->socket), settings.head, std::max(patience, answer_patience));
+    if (head) return PingStream(place, *std::move(head));
+    const Error& error = head.error();
+    return failure(error.kind, error.kind == ErrorKind::usage ? error.text : "tcp " + text_from(place) + " " + error.text);
+  }
+  PingStream stream(place, std::move(connected->socket), std::move(settings.oculus));
   if (stream.asked_)
     if (Result<void> sent = stream.ask_again(); !sent) return tl::unexpected(sent.error());
   return stream;
 }
 
-Result<void> PingStream::ask_again() { return write_all(socket_, oculus::make_fire(*asked_)); }
+Result<void> PingStream::ask_again() { return asked_ ? write_all(socket_, oculus::make_fire(*asked_)) : Result<void>{}; }
 
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
+  if (blueview_)
+    return failure(ErrorKind::usage, "only the bytes of Oculus sonars are recorded, and there is a BlueView head at " +
+                                         text_from(device_) + "; hosts record it with BVTSonar_CreateFile");
   record_.open(file, std::ios::binary | std::ios::trunc);
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
   return {};
 }
 
 PingStream::Item PingStream::next(std::chrono::milliseconds patience) {
+  if (blueview_) {
+    BlueViewStream::Item item = blueview_->next(patience);
+    Item out{item.what, {}, {}, std::move(item.error)};
+    if (item.ping) out.ping = *std::move(item.ping);
+    return out;
+  }
   const auto deadline = std::chrono::steady_clock::now() + patience;
   for (;;) {
-    if (auto message = decoder_.next()) return {Wait::data, std::move(message), {}};
+    if (auto message = decoder_.next()) {
+      if (auto* ping = std::get_if<oculus::DecodedPing>(&*message)) return {Wait::data, std::move(*ping), {}, {}};
+      return {Wait::data, {}, std::move(message), {}};
+    }
     std::array<std::byte, 65536> chunk;
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
     const Read read = read_some(socket_, chunk, left);
-    if (read.what != Wait::data) return {read.what, std::nullopt, read.error};
+    if (read.what != Wait::data) return {read.what, {}, {}, read.error};
     const auto received = std::span<const std::byte>(chunk).first(read.size);
     if (record_.is_open()) {
       for (const std::byte b : received) record_.put(static_cast<char>(b));
-      if (!record_) return {Wait::closed, std::nullopt, "the recording cannot be written any further: is the disk full?"};
+      if (!record_) return {Wait::closed, {}, {}, "the recording cannot be written any further: is the disk full?"};
     }
     decoder_.append(received);
   }

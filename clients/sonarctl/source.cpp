@@ -14,7 +14,7 @@ namespace {
 /// Pings that may still be under way with older settings when ours arrive.
 constexpr int stale_pings = 4;
 
-Result<oculus::DecodedPing> fetch_recorded(const SourceOptions& source, std::size_t number) {
+Result<AnyPing> fetch_recorded(const SourceOptions& source, std::size_t number) {
   auto pings = read_recording(source.recording);
   if (!pings) return tl::unexpected(pings.error());
   if (number < pings->size()) return std::move((*pings)[number]);
@@ -22,25 +22,30 @@ Result<oculus::DecodedPing> fetch_recorded(const SourceOptions& source, std::siz
                                        ", not " + std::to_string(number));
 }
 
-Result<oculus::DecodedPing> fetch_live(const SourceOptions& source) {
+Result<AnyPing> fetch_live(const SourceOptions& source) {
   const Result<Endpoint> device = find_device(source, false);
   if (!device) return tl::unexpected(device.error());
-  auto stream = PingStream::open(*device, source.asked, milliseconds_from(source.connect_patience_s));
+  auto stream = open_stream(source, *device);
   if (!stream) return tl::unexpected(stream.error());
   const auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
-  bool heard = false;
+  bool heard = stream->is_blueview();  // it greeted
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
     PingStream::Item item = stream->next(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(500)));
     if (item.what == Wait::closed)
-      return failure(ErrorKind::io,
-                     "the device closed the connection before a ping came: another client may hold it (clients.max)");
+      return failure(ErrorKind::io, item.error.empty() || !stream->is_blueview()
+                                        ? "the device closed the connection before a ping came: another client may hold it "
+                                          "(clients.max)"
+                                        : "no ping came: " + item.error);
     if (item.what != Wait::data && left.count() <= 0)
-      return tl::unexpected(silence(source, *device, heard, "no ping", "is the sonar in standby?"));
+      return tl::unexpected(
+          silence(source, *device, heard, "no ping",
+                  stream->is_blueview() ? "does its time stand (clock), or is the daemon stuck?" : "is the sonar in standby?"));
     heard = heard || item.what == Wait::data;
-    auto* ping = item.what == Wait::data ? std::get_if<oculus::DecodedPing>(&*item.message) : nullptr;
-    if (ping == nullptr) continue;
-    if (!source.asked || oculus::echo_violations(*source.asked, *ping).empty() || ++stale > stale_pings) return std::move(*ping);
+    if (!item.ping) continue;
+    const auto* ping = std::get_if<oculus::DecodedPing>(&*item.ping);
+    const bool as_asked = ping == nullptr || !source.asked || oculus::echo_violations(*source.asked, *ping).empty();
+    if (as_asked || ++stale > stale_pings) return *std::move(item.ping);
   }
   return failure(ErrorKind::io, "interrupted before a ping came");
 }
@@ -58,6 +63,10 @@ Error silence(const SourceOptions& source, const Endpoint& device, bool heard, c
                                       " sonard's banner names the address of each sonar"};
 }
 
+Result<PingStream> open_stream(const SourceOptions& source, const Endpoint& device) {
+  return PingStream::open(device, source.kind, {source.asked, source.head}, milliseconds_from(source.connect_patience_s));
+}
+
 Result<Endpoint> find_device(const SourceOptions& source, bool say) {
   if (!source.discover) return source.device;
   auto found = discover(std::chrono::seconds(5));
@@ -67,7 +76,7 @@ Result<Endpoint> find_device(const SourceOptions& source, bool say) {
   return found->device;
 }
 
-Result<oculus::DecodedPing> fetch_ping(const SourceOptions& source, std::size_t number) {
+Result<AnyPing> fetch_ping(const SourceOptions& source, std::size_t number) {
   return source.recording.empty() ? fetch_live(source) : fetch_recorded(source, number);
 }
 

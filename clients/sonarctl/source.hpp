@@ -5,7 +5,6 @@
 #include <chrono>
 
 #include "clients/sonarctl/commands.hpp"
-#include "clients/sonarctl/ping_stream.hpp"
 
 namespace sonar::clients {
 
@@ -17,7 +16,10 @@ Result<Endpoint> find_device(const SourceOptions& source, bool say);
 /// `what` did not come within source.silence_limit_s, or, when not one Oculus message ever came (`heard`), that it did not.
 Error silence(const SourceOptions& source, const Endpoint& device, bool heard, const std::string& what, const std::string& hint);
 
+/// A connection to the device with the settings asked for.
+Result<PingStream> open_stream(const SourceOptions& source, const Endpoint& device);
+
 /// Ping `number` of a recording, or the first of a device that was made with the settings asked for.
-Result<oculus::DecodedPing> fetch_ping(const SourceOptions& source, std::size_t number);
+Result<AnyPing> fetch_ping(const SourceOptions& source, std::size_t number);
 
 }  // namespace sonar::clients

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -9,19 +10,16 @@
 namespace sonar::clients {
 namespace {
 
-Result<PolarImage> fetch_picture(const SourceOptions& source, std::size_t number) {
-  const Result<oculus::DecodedPing> ping = fetch_ping(source, number);
-  if (!ping) return tl::unexpected(ping.error());
-  return picture_of(*ping);
-}
+/// Codes from which on a sample is saturated: an Oculus of 8 bits stops at 254.
+float saturation_of(const PingFacts& ping) { return ping.bits == 8 ? 254.0f : std::ldexp(1.0f, static_cast<int>(ping.bits)) - 1; }
 
-nlohmann::json speckle_figures(const PolarImage& image, const Window& w) {
+nlohmann::json speckle_figures(const PolarImage& image, const Window& w, float saturation) {
   return {
       {"rows", {w.row_begin, w.row_end}},
       {"beams", {w.beam_begin, w.beam_end}},
       {"mean", mean(image, w)},
       {"percentiles_1_5_25_50_75_95_99", percentiles(image, w, {0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99})},
-      {"saturated_share", share_at_least(image, w, 254)},
+      {"saturated_share", share_at_least(image, w, saturation)},
       {"correlation_of_adjacent_beams", {correlation(image, w, 0, 1), correlation(image, w, 0, 2), correlation(image, w, 0, 3)}},
       {"correlation_of_adjacent_rows", {correlation(image, w, 1, 0), correlation(image, w, 2, 0), correlation(image, w, 3, 0)}}};
 }
@@ -52,11 +50,14 @@ void print_plain(const nlohmann::json& figures, const std::string& prefix) {
 }  // namespace
 
 Result<void> stats(const StatsOptions& options) {
-  const Result<PolarImage> image = fetch_picture(options.source, options.ping);
+  const Result<AnyPing> ping = fetch_ping(options.source, options.ping);
+  if (!ping) return tl::unexpected(ping.error());
+  const Result<PolarImage> image = picture_of(*ping);
   if (!image) return tl::unexpected(image.error());
   const Result<Window> window = parse_window(options.window, *image);
   if (!window) return tl::unexpected(window.error());
-  nlohmann::json figures{{"window", speckle_figures(*image, *window)}, {"range", range_figures(*image)}};
+  nlohmann::json figures{{"window", speckle_figures(*image, *window, saturation_of(facts_of(*ping)))},
+                         {"range", range_figures(*image)}};
   if (!options.shadow.empty()) {
     const Result<Window> shadow = parse_window(options.shadow, *image), around = parse_window(options.surroundings, *image);
     if (!shadow) return tl::unexpected(shadow.error());

@@ -41,7 +41,7 @@ Result<std::vector<std::string>> lines_of(const ViewOptions& options, const Pola
 }
 
 Result<void> view_one(const ViewOptions& options) {
-  const Result<oculus::DecodedPing> ping = fetch_ping(options.source, options.ping);
+  const Result<AnyPing> ping = fetch_ping(options.source, options.ping);
   if (!ping) return tl::unexpected(ping.error());
   const Result<PolarImage> image = picture_of(*ping);
   if (!image) return tl::unexpected(image.error());
@@ -63,14 +63,13 @@ Result<void> view_one(const ViewOptions& options) {
 
 class LiveView {
  public:
-  LiveView(const ViewOptions& options, Endpoint device, PingStream stream)
-      : options_(options), device_(std::move(device)), stream_(std::move(stream)) {}
+  LiveView(const ViewOptions& options, PingStream stream) : options_(options), stream_(std::move(stream)) {}
 
   /// Ends well when interrupted, when enough pings were seen, or when nobody reads the output any more.
   Result<void> run() {
     const LiveScreen screen(options_.terminal && terminal_facts().is_terminal);
     double heard_s = now_s();
-    bool heard = false;
+    bool heard = stream_.is_blueview();  // it greeted
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
       PingStream::Item item = stream_.next(std::chrono::milliseconds(500));
       if (item.what == Wait::closed)
@@ -79,10 +78,10 @@ class LiveView {
       if (item.what == Wait::data) heard_s = now_s();
       heard = heard || item.what == Wait::data;
       if (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s)
-        return tl::unexpected(silence(options_.source, device_, heard, "nothing more", "is the daemon stopped or stuck?"));
-      const auto* ping = item.what == Wait::data ? std::get_if<oculus::DecodedPing>(&*item.message) : nullptr;
-      if (ping == nullptr) continue;
-      const Result<bool> read = show(*ping, screen);
+        return tl::unexpected(
+            silence(options_.source, stream_.device(), heard, "nothing more", "is the daemon stopped or stuck?"));
+      if (!item.ping) continue;
+      const Result<bool> read = show(*item.ping, screen);
       if (!read) return tl::unexpected(read.error());
       if (!*read) break;
     }
@@ -91,7 +90,7 @@ class LiveView {
 
  private:
   /// False when nobody reads.
-  Result<bool> show(const oculus::DecodedPing& ping, const LiveScreen& screen) {
+  Result<bool> show(const AnyPing& ping, const LiveScreen& screen) {
     figures_.add(ping, now_s());
     const Result<PolarImage> image = picture_of(ping);
     if (!image) return tl::unexpected(image.error());
@@ -109,7 +108,6 @@ class LiveView {
   }
 
   const ViewOptions& options_;
-  Endpoint device_;
   PingStream stream_;
   ViewFigures figures_;
 };
@@ -117,9 +115,9 @@ class LiveView {
 Result<void> view_live(const ViewOptions& options) {
   const Result<Endpoint> device = find_device(options.source, false);
   if (!device) return tl::unexpected(device.error());
-  auto stream = PingStream::open(*device, options.source.asked, milliseconds_from(options.source.connect_patience_s));
+  auto stream = open_stream(options.source, *device);
   if (!stream) return tl::unexpected(stream.error());
-  const Result<void> ran = LiveView(options, *device, std::move(*stream)).run();
+  const Result<void> ran = LiveView(options, std::move(*stream)).run();
   if (!options.terminal && terminal_facts().is_terminal) std::puts("");
   return ran;
 }

@@ -6,14 +6,14 @@
 
 namespace sonar::clients {
 
-void ViewFigures::add(const oculus::DecodedPing& ping, Seconds at) {
-  sequence_.add(ping);  // what else is broken, listen tells
+void ViewFigures::add(const AnyPing& any, Seconds at) {
+  if (const auto* ping = std::get_if<oculus::DecodedPing>(&any)) sequence_.add(*ping);  // what else is broken, listen tells
   arrivals_.push_back(at);
   if (arrivals_.size() > remembered) arrivals_.pop_front();
   ++pings_;
-  const oculus::PingResultV2& f = ping.head.fixed;
-  ping_text_ = text::format("ping %u  %.2f m  %.4g MHz  %u beams x %u rows", f.ping_id, f.row_count * f.range_resolution_m,
-                            f.frequency_hz / 1e6, unsigned{f.beam_count}, unsigned{f.row_count});
+  const PingFacts f = facts_of(any);
+  ping_text_ =
+      text::format("ping %u  %.2f m  %.4g MHz  %u beams x %u rows", f.number, f.range_m, f.frequency_hz / 1e6, f.beams, f.rows);
 }
 
 std::string ViewFigures::text() const {

@@ -11,7 +11,7 @@ namespace sonar::clients {
 
 class ViewFigures {
  public:
-  void add(const oculus::DecodedPing& ping, Seconds at);
+  void add(const AnyPing& ping, Seconds at);
   std::uint64_t pings() const { return pings_; }
   /// "ping 123  10.00 m  2.1 MHz  512 beams x 437 rows  10.0 Hz  no gaps"; the rate from the second ping on.
   std::string text() const;

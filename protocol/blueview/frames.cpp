@@ -103,9 +103,9 @@ std::optional<Frame> Framer::next() {
     broken_ = "does not speak BVE1: a frame starts with other letters";
     return std::nullopt;
   }
-  if (frame.header.payload_length > longest_request) {
-    broken_ = "announces a request of " + std::to_string(frame.header.payload_length) + " bytes, at most " +
-              std::to_string(longest_request) + " are taken";
+  if (frame.header.payload_length > longest_) {
+    broken_ = "announces a message of " + std::to_string(frame.header.payload_length) + " bytes, at most " +
+              std::to_string(longest_) + " are taken";
     return std::nullopt;
   }
   if (left.size() < header_size + frame.header.payload_length) return std::nullopt;

@@ -120,6 +120,8 @@ struct Frame {
 /// Cuts a stream into frames. Anything but a frame ends it: broken() then says why, and nothing more comes out.
 class Framer {
  public:
+  /// `longest`: payload that is taken; a host passes longest_payload.
+  explicit Framer(std::size_t longest = longest_request) : longest_(longest) {}
   void append(wire::BytesView received);
   /// The next whole frame; valid until the next call.
   std::optional<Frame> next();
@@ -127,7 +129,7 @@ class Framer {
 
  private:
   wire::Bytes buffer_;
-  std::size_t begin_ = 0;
+  std::size_t longest_, begin_ = 0;
   std::string broken_;
 };
 

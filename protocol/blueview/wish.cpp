@@ -42,6 +42,8 @@ Result<void> set_rate(SonarSettings& all, double rate_hz, const protocol::Device
 
 }  // namespace
 
+float gain_db_from(double percent) { return static_cast<float>(half_gain_db * (percent / 50 - 1)); }
+
 Result<protocol::ChangeSettings> wished(const protocol::Wish& wish, const protocol::DeviceState& device) {
   SonarSettings all = settings_from(device.request, device);
   if (wish.mode) {
@@ -56,8 +58,7 @@ Result<protocol::ChangeSettings> wished(const protocol::Wish& wish, const protoc
     if (auto r = set_rate(all, *wish.rate_hz, device); !r) return tl::make_unexpected(r.error());
   if (wish.gain_percent) {
     if (*wish.gain_percent < 0 || *wish.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
-    const double gain_db = half_gain_db * (*wish.gain_percent / 50 - 1);
-    if (auto r = set(all, Key::gain, static_cast<float>(gain_db), device); !r) return tl::make_unexpected(r.error());
+    if (auto r = set(all, Key::gain, gain_db_from(*wish.gain_percent), device); !r) return tl::make_unexpected(r.error());
   }
   if (wish.beams) {
     const auto beams = static_cast<std::uint32_t>(ping_settings(all, device).beam_count);

@@ -320,8 +320,56 @@ TEST(Doctor, FindsBlueViewHeads) {
   head.name = "bow", head.listens = "127.0.0.4:14750", head.advertised = "127.0.0.4";
   facts.control.status->sonars.push_back(head);
   expect(line(facts, "blueview"), Level::warn, "BlueView sonar bow at 127.0.0.4:14750 does not answer discovery", "udp 14751");
+  facts.address_given = true;  // 127.0.0.2: the other one was not asked
+  EXPECT_THAT(text_from(judge(facts)), Not(HasSubstr("does not answer discovery")));
   facts.heads = {{"127.0.0.4:14750", "P900-90", "123"}};
   expect(line(facts, "blueview"), Level::ok, "BlueView head P900-90 (123) answers discovery at tcp 127.0.0.4:14750", "");
+}
+
+/// A BlueView head that pings, and the daemon that says so.
+Facts healthy_head() {
+  Facts facts = healthy();
+  facts.status.heard.clear();  // heads send no status
+  SonarFacts& sonar = facts.sonars[0];
+  sonar.at.port = 14750, sonar.blueview = true;
+  sonar.stream.rows = 315, sonar.stream.bits = 16, sonar.stream.asked_hz = 0;
+  control::SonarStatus& said = facts.control.status->sonars[0];
+  said.profile = "blueview-p900-90", said.listens = "127.0.0.2:14750", said.rate_hz = 15;
+  sonar.says = said;
+  facts.heads = {{"127.0.0.2:14750", "BlueView P900-90", "7001"}};
+  facts.kernel_ports.reserved = "";
+  return facts;
+}
+
+TEST(Doctor, LooksAtAHeadAsItsHostsDo) {
+  Facts facts = healthy_head();
+  facts.sonars[0].stream.rate_hz = 14.9;
+  EXPECT_EQ(text_from(judge(facts)),
+            "ok    tcp 127.0.0.2:14750 accepts, first ping decoded after 96 ms: 512 beams x 315 ranges, 16 bit, size fields "
+            "consistent\n"
+            "ok    rate 14.9 Hz (at most 15), image latency 18 ms p50, 21 ms p99\n"
+            "ok    control tcp 127.0.0.1:14770 answers: sonard 0.1.0, 1 sonar, realtime clock\n"
+            "ok    trace backend: embree, avx2\n"
+            "ok    poses of rov: demo orbit\n"
+            "ok    http://127.0.0.1:8088/healthz says ok\n"
+            "ok    BlueView head BlueView P900-90 (7001) answers discovery at tcp 127.0.0.2:14750\n"
+            "7 checks, 0 errors, 0 warnings\n");
+  facts.sonars[0].stream.rate_hz = 6;
+  expect(line(facts, "rate"), Level::warn, "rate 6.0 Hz (at most 15)", "engine.threads");
+}
+
+TEST(Doctor, SaysWhatIsWrongWithAHead) {
+  Facts facts = healthy_head();
+  StreamFacts& s = facts.sonars[0].stream;
+  s = {};
+  s.outcome = Outcome::no_ping;
+  s.error = "tcp 127.0.0.2:14750 does not speak BVE1: a frame starts with other letters";
+  expect(line(facts, "ping"), Level::fail, s.error, "another program has the port");
+  s.error.clear();
+  s.outcome = Outcome::closed_without_a_byte;
+  expect(line(facts, "ping"), Level::warn, "all its places are taken", "clients.max");
+  s.outcome = Outcome::refused;
+  expect(line(facts, "ping"), Level::fail, "refuses the connection", "sonard --demo blueview");
 }
 
 TEST(Doctor, SpeaksJson) {

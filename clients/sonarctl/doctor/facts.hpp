@@ -36,7 +36,7 @@ struct StatusFacts {
 
 struct StreamFacts {
   enum class Outcome { not_tried, refused, unreachable, closed_without_a_byte, no_ping, pings } outcome = Outcome::not_tried;
-  std::string error;   // of the connection
+  std::string error;   // of the connection, or of the greeting
   bool asked = false;  // settings were sent: nobody else was connected
   std::uint64_t junk_bytes = 0, dummies = 0;
   double first_ping_ms = 0, waited_s = 0;
@@ -52,6 +52,7 @@ struct StreamFacts {
 };
 struct SonarFacts {
   Endpoint at;
+  bool blueview = false;   // a BlueView head, no Oculus
   std::string name;        // from the control stream; empty = not known
   std::string unresolved;  // why its name has no address
   bool on_this_host = false;

@@ -5,6 +5,7 @@
 #include "clients/sonarctl/doctor/probes.hpp"
 #include "clients/sonarctl/doctor/proc_net.hpp"
 #include "clients/sonarctl/doctor/watch_pings.hpp"
+#include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/messages.hpp"
 
 namespace sonar::clients::doctor {
@@ -16,6 +17,7 @@ constexpr auto status_patience = 2500ms;  // status messages come every second
 constexpr auto first_status = 1300ms;     // to learn who is connected
 const Endpoint usual_http{"127.0.0.1", 8088};
 constexpr auto short_patience = 700ms, own_patience = 200ms;
+constexpr auto head_patience = 400ms, head_patience_here = 100ms;  // for an answer to discovery
 
 class Gathering {
  public:
@@ -28,21 +30,22 @@ class Gathering {
     facts_.address_given = !questions_.address.empty();
     const auto control = parse_endpoint(questions_.control, {"127.0.0.1", control_port});
     const auto http = parse_endpoint(questions_.http, usual_http);
-    const auto given = parse_endpoint(questions_.address, {"127.0.0.2", oculus::tcp_port});
+    auto given = parse_endpoint(questions_.address, {"127.0.0.2", 0});
     if (!control) return tl::unexpected(control.error());
     if (!http) return tl::unexpected(http.error());
     if (!given) return tl::unexpected(given.error());
 
     ask_control(*control);
     ask_http(*http);
+    given->host = ipv4_of(given->host).value_or(given->host);  // a name that has no address is told by look_at()
     const DiscoveryQuestion heads(facts_.address_given ? std::vector{given->host} : std::vector<std::string>{});
     const auto sockets = tcp_sockets();
     const auto programs = programs_by_socket();
     note_daemons(sockets, programs);
-    find_sonars(*given);
+    find_sonars(*given, heads);
     for (SonarFacts& sonar : facts_.sonars) look_at(sonar, sockets, programs);
     hear_all();
-    facts_.heads = heads.answers();
+    heads.take_answers(facts_.heads, Steady::now());
     facts_.kernel_ports = kernel_ports();
     return std::move(facts_);
   }
@@ -90,39 +93,71 @@ class Gathering {
     facts_.http = ask_health(at, given, until(at.host.starts_with("127.") ? own_patience : short_patience));
   }
 
-  /// Whoever listens on the sonars' port and is a sonard.
+  /// Whoever listens on the sonars' ports and is a sonard.
   void note_daemons(const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
     for (const SocketLine& socket : sockets) {
-      if (socket.state != listening || socket.local_port != oculus::tcp_port) continue;
+      const bool of_sonars = socket.local_port == oculus::tcp_port || socket.local_port == blueview::tcp_port;
+      if (socket.state != listening || !of_sonars) continue;
       PortHolder holder = holder_of(socket, programs);
       if (holder.program == "sonard") facts_.daemons.push_back(std::move(holder));
     }
   }
 
-  void find_sonars(const Endpoint& given) {
-    if (facts_.address_given) return add_sonar(given, "");
-    const std::string oculus_port = std::string(":").append(std::to_string(oculus::tcp_port));
+  void find_sonars(const Endpoint& given, const DiscoveryQuestion& heads) {
+    if (facts_.address_given) {
+      const auto patience = is_on_this_host(given.host) ? head_patience_here : head_patience;
+      if (!facts_.control.status) heads.take_answers(facts_.heads, no_later_than(Steady::now() + patience));
+      return add_sonar(with_port(given), "");
+    }
     if (facts_.control.status)
-      for (const control::SonarStatus& s : facts_.control.status->sonars)
-        if (s.listens.ends_with(oculus_port)) add_sonar({s.advertised, oculus::tcp_port}, s.name);
+      for (const control::SonarStatus& s : facts_.control.status->sonars) add_sonar({s.advertised, port_of(s)}, s.name);
     if (facts_.sonars.empty()) {
       status_.listen("", no_later_than(start_ + first_status));
       for (const HeardStatus& heard : status_.facts().heard) add_sonar({heard.advertised, oculus::tcp_port}, "");
+      heads.take_answers(facts_.heads, Steady::now());
+      for (const BlueViewHead& head : facts_.heads) add_sonar(*parse_endpoint(head.at, {}), "");
     }
-    const bool other_heads = facts_.control.status && !facts_.control.status->sonars.empty();
-    if (facts_.sonars.empty() && !other_heads) add_sonar(given, "");
+    if (facts_.sonars.empty()) add_sonar(with_port(given), "");
   }
+
+  static std::uint16_t port_of(const control::SonarStatus& s) {
+    const std::uint16_t usual = is_blueview(s) ? blueview::tcp_port : oculus::tcp_port;
+    return parse_endpoint(s.listens, {"", usual}).value_or(Endpoint{"", usual}).port;
+  }
+  static bool is_blueview(const control::SonarStatus& s) { return s.profile.starts_with("blueview-"); }
+  static bool is_at(const control::SonarStatus& s, const std::string& host) {
+    return s.advertised == host || s.listens.starts_with(host + ":");
+  }
+
+  /// Where no port was given: that of the sonar that is known to be there.
+  Endpoint with_port(const Endpoint& given) const {
+    if (given.port != 0) return given;
+    if (facts_.control.status)
+      for (const control::SonarStatus& s : facts_.control.status->sonars)
+        if (is_at(s, given.host)) return {given.host, port_of(s)};
+    for (const BlueViewHead& head : facts_.heads)
+      if (head.at.starts_with(given.host + ":")) return *parse_endpoint(head.at, {});
+    return {given.host, oculus::tcp_port};
+  }
+  bool is_blueview(const Endpoint& at) const {
+    if (facts_.control.status)
+      for (const control::SonarStatus& s : facts_.control.status->sonars)
+        if (is_at(s, at.host) && port_of(s) == at.port) return is_blueview(s);
+    return at.port == blueview::tcp_port || std::any_of(facts_.heads.begin(), facts_.heads.end(),
+                                                        [&at](const BlueViewHead& head) { return head.at == text_from(at); });
+  }
+
   void add_sonar(const Endpoint& at, const std::string& name) {
     SonarFacts sonar;
     sonar.at = at;
+    sonar.blueview = is_blueview(at);
     sonar.name = name;
     facts_.sonars.push_back(std::move(sonar));
   }
 
   const control::SonarStatus* said_of(const SonarFacts& sonar, const control::DaemonStatus& status) const {
     for (const control::SonarStatus& s : status.sonars)
-      if (s.listens == text_from(sonar.at) || s.advertised + ":" + std::to_string(oculus::tcp_port) == text_from(sonar.at))
-        return &s;
+      if (is_at(s, sonar.at.host) && port_of(s) == sonar.at.port) return &s;
     return nullptr;
   }
 
@@ -138,7 +173,7 @@ class Gathering {
     for (const SocketLine& socket : sockets)
       if (socket.state == established && socket.local_port == sonar.at.port && socket.local_host == sonar.at.host)
         sonar.clients.push_back(socket.remote_host + ":" + std::to_string(socket.remote_port));
-    if (!sonar.clients.empty()) return;
+    if (!sonar.clients.empty() || sonar.blueview) return;
     status_.listen(sonar.at.host, no_later_than(start_ + first_status));
     for (const HeardStatus& heard : status_.facts().heard)
       if (!heard.client.empty() && (heard.advertised == sonar.at.host || heard.from == sonar.at.host))
@@ -176,7 +211,8 @@ class Gathering {
   }
 
   void hear_all() {
-    for (const SonarFacts& sonar : facts_.sonars) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
+    for (const SonarFacts& sonar : facts_.sonars)  // heads say nothing of themselves before they are asked
+      if (!sonar.blueview) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
     status_.finish();
     facts_.status = status_.facts();
   }

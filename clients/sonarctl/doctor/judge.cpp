@@ -53,7 +53,8 @@ std::vector<Finding> judge(const Facts& facts) {
   for (const SonarFacts& sonar : facts.sonars) judge_sonar(facts, sonar, findings);
   judge_identities(facts.status, findings);
   judge_daemon(facts, findings);
-  judge_ports(facts.kernel_ports, findings);
+  const bool heads_only = std::all_of(facts.sonars.begin(), facts.sonars.end(), [](const SonarFacts& s) { return s.blueview; });
+  if (!heads_only || facts.sonars.empty()) judge_ports(facts.kernel_ports, findings);  // theirs are below that range
   return findings;
 }
 

@@ -78,13 +78,19 @@ void judge_http(const Facts& facts, std::vector<Finding>& findings) {
   }
 }
 
+/// Where one address was given, the others were not asked.
+bool was_looked_at(const Facts& facts, const control::SonarStatus& sonar) {
+  return !facts.address_given || std::any_of(facts.sonars.begin(), facts.sonars.end(),
+                                             [&sonar](const SonarFacts& s) { return s.at.host == sonar.advertised; });
+}
+
 void judge_heads(const Facts& facts, std::vector<Finding>& findings) {
   for (const BlueViewHead& head : facts.heads)
     findings.push_back({Level::ok, "blueview",
                         "BlueView head " + head.model + " (" + head.serial + ") answers discovery at tcp " + head.at, ""});
   if (!facts.control.status) return;
   for (const control::SonarStatus& sonar : facts.control.status->sonars) {
-    if (!sonar.listens.ends_with(":14750")) continue;
+    if (!sonar.listens.ends_with(":14750") || !was_looked_at(facts, sonar)) continue;
     const auto answered = [&sonar](const BlueViewHead& head) {
       return head.at == sonar.advertised + ":14750" || head.at == sonar.listens;
     };

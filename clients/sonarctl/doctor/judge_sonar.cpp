@@ -46,7 +46,7 @@ class SonarJudge {
     if (sonar_.time_was_over)
       return add(Level::warn, "ping", sonar_.at.host + " was not looked at: the time was over",
                  "give more with --within SECONDS, or its address alone");
-    judge_status();
+    if (!sonar_.blueview) judge_status();
     judge_connection();
     if (sonar_.stream.outcome == Outcome::pings) judge_rate();
     if (sonar_.stream.outcome == Outcome::not_tried) judge_rate_of_others();
@@ -133,6 +133,8 @@ class SonarJudge {
   void judge_no_ping() {
     const StreamFacts& s = sonar_.stream;
     const std::string waited = " within " + format("%.1f", s.waited_s) + " s";
+    if (!s.error.empty())  // no sonard greets like that
+      return add(Level::fail, "ping", s.error, "another program has the port; stop it, or give the sonar's own address");
     if (s.junk_bytes > 0 && s.dummies == 0) {
       std::string who;
       for (const PortHolder& holder : sonar_.listeners) who = ": " + text_of(holder) + " listens on " + holder.at;
@@ -170,7 +172,9 @@ class SonarJudge {
     for (const HeardStatus& heard : facts_.status.heard)
       if (heard.advertised != sonar_.at.host)
         return "a status broadcast names a sonar at " + heard.advertised + ": sonarctl doctor " + heard.advertised;
-    if (sonar_.on_this_host) return "start it: sonard serves its demo on 127.0.0.2, sonard FILE what a configuration says";
+    if (sonar_.on_this_host)
+      return "start it: sonard serves its demo on 127.0.0.2 (a BlueView head: sonard --demo blueview), sonard FILE what a "
+             "configuration says";
     return "start sonard on that computer; its banner names the address of each sonar";
   }
 
@@ -230,9 +234,9 @@ class SonarJudge {
                  format("%.1f", s.rate_hz) + " pings a second of ours; the daemon's time is another (clock: " + clock() +
                      ") and has passed meanwhile",
                  "");
-    const double expected_hz = s.asked ? s.asked_hz : sonar_.says ? sonar_.says->rate_hz : 0;
+    const double expected_hz = s.asked && !sonar_.blueview ? s.asked_hz : sonar_.says ? sonar_.says->rate_hz : 0;
     std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
-    if (expected_hz > 0) text += " (asked " + format("%g", expected_hz) + ")";
+    if (expected_hz > 0) text += (sonar_.blueview ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
     text += latency_text();
     const bool slow = expected_hz > 0 && s.rate_hz < 0.85 * expected_hz;
     if (too_slow_for(slow ? expected_hz : fastest_hz)) text += ", " + computing_text();

@@ -169,9 +169,8 @@ DiscoveryQuestion::DiscoveryQuestion(const std::vector<std::string>& hosts) {
       ::sendto(socket_->fd(), question.data(), question.size(), 0, generic(*to), sizeof *to);  // no network, no answer
 }
 
-std::vector<BlueViewHead> DiscoveryQuestion::answers() const {
-  std::vector<BlueViewHead> heads;
-  while (const auto datagram = receive(*socket_, Steady::now())) {
+void DiscoveryQuestion::take_answers(std::vector<BlueViewHead>& heads, Steady::time_point deadline) const {
+  while (const auto datagram = receive(*socket_, heads.empty() ? deadline : Steady::now())) {
     wire::Reader reader(datagram->bytes);
     std::array<std::uint8_t, 4> mark{};
     std::uint16_t version = 0, port = 0;
@@ -186,7 +185,6 @@ std::vector<BlueViewHead> DiscoveryQuestion::answers() const {
     const bool known = std::any_of(heads.begin(), heads.end(), [&head](const BlueViewHead& h) { return h.at == head.at; });
     if (!known) heads.push_back(std::move(head));
   }
-  return heads;
 }
 
 HttpFacts ask_health(const Endpoint& at, bool given, std::chrono::milliseconds patience) {

@@ -36,11 +36,12 @@ class StatusListener {
   StatusFacts facts_;
 };
 
-/// Broadcasts on this computer and its networks, or asks `hosts` alone; answers are read by `answers`.
+/// Broadcasts on this computer and its networks, or asks `hosts` alone (IPv4); answers are read by `take_answers`.
 class DiscoveryQuestion {
  public:
   explicit DiscoveryQuestion(const std::vector<std::string>& hosts);
-  std::vector<BlueViewHead> answers() const;
+  /// Adds those that are new; waits for the first until `deadline`.
+  void take_answers(std::vector<BlueViewHead>& heads, Steady::time_point deadline) const;
 
  private:
   std::optional<Socket> socket_;

@@ -42,8 +42,8 @@ class Watch {
       const PingStream::Item item = stream.next(std::min<std::chrono::milliseconds>(50ms, left_until(deadline_)));
       ended = item.what == Wait::closed;
       if (item.what != Wait::data) continue;
-      if (const auto* ping = std::get_if<oculus::DecodedPing>(&*item.message))
-        take(*ping);
+      if (item.ping)
+        take(*item.ping);
       else
         ++others;
     }
@@ -80,21 +80,21 @@ class Watch {
     return facts_.pings > 0 ? seconds_since(first_) * 1s >= watch_time : Steady::now() >= give_up_;
   }
 
-  void take(const oculus::DecodedPing& ping) {
+  void take(const AnyPing& ping) {
     const double at_s = seconds_since(start_);
+    const PingFacts seen = facts_of(ping);
     if (facts_.pings == 0) {
       first_ = Steady::now();
       facts_.first_ping_ms = 1000 * at_s;
-      facts_.beams = ping.head.fixed.beam_count;
-      facts_.rows = ping.head.fixed.row_count;
-      facts_.bits = static_cast<unsigned>(8 * ping.bytes_per_sample());
+      facts_.beams = seen.beams, facts_.rows = seen.rows, facts_.bits = seen.bits;
     }
     const PingReport report = log_.add(ping, at_s);
     ++facts_.pings;
     if (!report.errors.empty() && ++facts_.broken == 1) facts_.first_complaint = report.errors.front();
     if (facts_.pings == 1) return;  // the first is computed with everything still to be made: its time is told apart
-    arrived_unix_s_[ping.head.fixed.ping_id] = unix_now_s();
-    if (ping.head.fixed.ping_start_time_s > 0) behind_stamp_s_.push_back(at_s - ping.head.fixed.ping_start_time_s);
+    arrived_unix_s_[seen.number] = unix_now_s();
+    if (const auto* stamped = std::get_if<oculus::DecodedPing>(&ping); stamped && stamped->head.fixed.ping_start_time_s > 0)
+      behind_stamp_s_.push_back(at_s - stamped->head.fixed.ping_start_time_s);
   }
 
   void conclude() {
@@ -114,6 +114,13 @@ class Watch {
   std::vector<double> behind_stamp_s_;
 };
 
+/// Of a connection that failed, or a head's greeting.
+Outcome outcome_of(const Error& error) {
+  if (error.kind == ErrorKind::io) return Outcome::closed_without_a_byte;
+  if (error.kind == ErrorKind::bad_data) return Outcome::no_ping;
+  return error.text.find("refused") != std::string::npos ? Outcome::refused : Outcome::unreachable;
+}
+
 void take_delays(SonarFacts& sonar, const std::vector<double>& delays_s, ControlFacts& clocks) {
   if (delays_s.empty()) return;
   const double p50 = percentile(delays_s, 0.5), p99 = percentile(delays_s, 0.99);
@@ -127,15 +134,16 @@ void take_delays(SonarFacts& sonar, const std::vector<double>& delays_s, Control
 
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks) {
   StreamFacts& facts = sonar.stream;
-  std::optional<oculus::FireRequest> asked;
-  if (sonar.clients.empty()) asked = usual_request();
-  facts.asked = asked.has_value();
-  facts.asked_hz = facts.asked ? 10 : 0;
+  Settings settings;
+  if (sonar.clients.empty()) settings.oculus = usual_request();
+  facts.asked = sonar.blueview || settings.oculus.has_value();  // heads are asked for every ping
+  facts.asked_hz = settings.oculus && !sonar.blueview ? 10 : 0;
   Watch watch(facts, deadline);
-  auto stream = PingStream::open(sonar.at, asked, std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
+  auto stream = PingStream::open(sonar.at, sonar.blueview ? SonarKind::blueview : SonarKind::oculus, std::move(settings),
+                                 std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
   if (!stream) {
     facts.error = stream.error().text;
-    facts.outcome = facts.error.find("refused") != std::string::npos ? Outcome::refused : Outcome::unreachable;
+    facts.outcome = outcome_of(stream.error());
     return;
   }
   watch.run(std::move(*stream));

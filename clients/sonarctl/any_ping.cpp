@@ -1,0 +1,31 @@
+#include "clients/sonarctl/any_ping.hpp"
+
+namespace sonar::clients {
+
+PingFacts facts_of(const AnyPing& any) {
+  PingFacts facts;
+  if (const auto* ping = std::get_if<oculus::DecodedPing>(&any)) {
+    const oculus::PingResultV2& f = ping->head.fixed;
+    facts = {f.ping_id,
+             f.beam_count,
+             f.row_count,
+             static_cast<unsigned>(8 * ping->bytes_per_sample()),
+             f.range_resolution_m,
+             f.row_count * f.range_resolution_m,
+             f.frequency_hz,
+             ping->message.size()};
+  } else {
+    const auto& [polar, frequency_hz, size] = std::get<BlueViewPing>(any);
+    facts = {polar.number,
+             static_cast<unsigned>(polar.beams),
+             static_cast<unsigned>(polar.bins),
+             16,
+             static_cast<double>(polar.bin_m),
+             static_cast<double>(polar.stop_m),
+             frequency_hz,
+             size};
+  }
+  return facts;
+}
+
+}  // namespace sonar::clients

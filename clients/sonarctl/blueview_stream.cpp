@@ -1,0 +1,157 @@
+#include "clients/sonarctl/blueview_stream.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "protocol/blueview/wish.hpp"
+
+namespace sonar::clients {
+namespace {
+
+using namespace std::chrono_literals;
+using blueview::FrameType;
+using blueview::Put;
+
+constexpr auto keep_alive_after = 2s;  // of our silence
+constexpr std::uint16_t abi = 4;       // which of the SDKs: both get the same
+
+bvt::Bytes sdk_bytes(wire::BytesView bytes) {
+  bvt::Bytes out(bytes.size());
+  std::transform(bytes.begin(), bytes.end(), out.begin(), [](std::byte b) { return std::to_integer<std::uint8_t>(b); });
+  return out;
+}
+
+/// "there is no head 3 (code 2010)"
+std::string text_of_error(wire::BytesView payload) {
+  wire::Reader reader(payload);
+  std::int32_t code = 0;
+  reader("code", code);
+  return blueview::take_text(reader, "text") + " (code " + std::to_string(code) + ")";
+}
+
+}  // namespace
+
+Result<BlueViewStream> BlueViewStream::open(Socket socket, const HeadWish& wish, std::chrono::milliseconds patience) {
+  BlueViewStream stream(std::move(socket));
+  if (Result<void> greeted = stream.greet(patience); !greeted) return tl::unexpected(greeted.error());
+  if (Result<void> applied = stream.apply(wish, patience); !applied) return tl::unexpected(applied.error());
+  return stream;
+}
+
+Result<void> BlueViewStream::greet(std::chrono::milliseconds patience) {
+  wire::Bytes hello;
+  const Put write(hello);
+  write("proto", blueview::protocol_version);
+  write("abi", abi);
+  blueview::put_text(hello, "sonarctl");
+  const auto answer = ask(FrameType::hello, hello, patience);
+  if (!answer) return tl::unexpected(answer.error());
+  auto sonar = bvt::decode_description(sdk_bytes(*answer));
+  if (!sonar || sonar->heads.empty()) return failure(ErrorKind::bad_data, "greets without saying what heads it has");
+  sonar_ = *std::move(sonar);
+  return {};
+}
+
+Result<void> BlueViewStream::apply(const HeadWish& wish, std::chrono::milliseconds patience) {
+  if (!wish.oculus_only.empty())
+    return failure(ErrorKind::usage, wish.oculus_only.front() + " is for Oculus sonars, and there is a " + sonar_.model +
+                                         ": it takes --mode (its heads, from 1), --range, --gain and --rate");
+  if (wish.head >= sonar_.heads.size())
+    return failure(ErrorKind::usage, sonar_.model + " has " + std::to_string(sonar_.heads.size()) + " head(s), no mode " +
+                                         std::to_string(wish.head + 1));
+  head_ = wish.head;
+  const bvt::HeadDescription& head = sonar_.heads[head_];
+  if (wish.range_m &&
+      (*wish.range_m <= static_cast<double>(head.start_m) || *wish.range_m > static_cast<double>(head.max_range_m)))
+    return failure(ErrorKind::usage, sonar_.model + " sees from " + std::to_string(std::lround(head.start_m)) + " to " +
+                                         std::to_string(std::lround(head.max_range_m)) + " m: give --range between");
+  Result<void> done;
+  if (wish.range_m) done = set(blueview::Key::stop_range, static_cast<float>(*wish.range_m), patience);
+  if (done && wish.gain_percent) done = set(blueview::Key::gain, blueview::gain_db_from(*wish.gain_percent), patience);
+  if (done && wish.rate_hz)
+    done = set(blueview::Key::ping_interval, static_cast<std::int32_t>(std::lround(1000 / *wish.rate_hz)), patience);
+  return done;
+}
+
+Result<void> BlueViewStream::set(blueview::Key key, const blueview::Value& value, std::chrono::milliseconds patience) {
+  wire::Bytes payload;
+  const Put write(payload);
+  write("head", sonar_.heads[head_].id);
+  write("key", key);
+  blueview::put_value(payload, value);
+  const auto answer = ask(FrameType::set, payload, patience);
+  if (!answer) return tl::unexpected(answer.error());
+  return {};
+}
+
+Result<wire::Bytes> BlueViewStream::ask(FrameType type, wire::BytesView payload, std::chrono::milliseconds patience) {
+  const auto deadline = Clock::now() + patience;
+  const std::uint32_t id = ++last_id_;
+  if (Result<void> sent = send(type, id, payload); !sent) return tl::unexpected(sent.error());
+  for (;;) {
+    while (const auto frame = framer_.next()) {
+      if (frame->header.request_id != id) continue;
+      if (frame->header.type == FrameType::error)
+        return failure(ErrorKind::bad_data, "refuses: " + text_of_error(frame->payload));
+      return wire::Bytes(frame->payload.begin(), frame->payload.end());
+    }
+    if (!framer_.broken().empty()) return failure(ErrorKind::bad_data, framer_.broken());
+    const Read read = receive(deadline);
+    if (read.what == Wait::closed)
+      return failure(ErrorKind::io, "closed the connection before it answered: all its places are taken (clients.max)");
+    if (read.what == Wait::timed_out) return failure(ErrorKind::unavailable, "does not answer on the BlueView link");
+    if (read.what == Wait::interrupted) return failure(ErrorKind::io, "interrupted");
+  }
+}
+
+Result<void> BlueViewStream::send(FrameType type, std::uint32_t id, wire::BytesView payload) {
+  sent_at_ = Clock::now();
+  return write_all(socket_, blueview::make_frame(type, id, payload));
+}
+
+Read BlueViewStream::receive(Clock::time_point deadline) {
+  for (;;) {
+    if (Clock::now() >= sent_at_ + keep_alive_after)
+      if (Result<void> sent = send(FrameType::keep_alive, 0, {}); !sent) return {Wait::closed, 0, sent.error().text};
+    const auto until = std::min(deadline, sent_at_ + keep_alive_after);
+    const Read read = read_some(socket_, chunk_, std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()));
+    if (read.what == Wait::timed_out && Clock::now() < deadline) continue;
+    if (read.what == Wait::data) framer_.append(std::span<const std::byte>(chunk_).first(read.size));
+    return read;
+  }
+}
+
+BlueViewStream::Item BlueViewStream::next(std::chrono::milliseconds patience) {
+  const auto deadline = Clock::now() + patience;
+  for (;;) {
+    if (!asked_) {
+      wire::Bytes payload;
+      const Put write(payload);
+      write("head", sonar_.heads[head_].id);
+      write("timeout_ms", std::uint32_t{0});  // we wait as long as we like
+      if (Result<void> sent = send(FrameType::ping, ++last_id_, payload); !sent) return {Wait::closed, {}, sent.error().text};
+      asked_ = true;
+    }
+    while (const auto frame = framer_.next())
+      if (Item item = take(*frame); item.what != Wait::timed_out) return item;
+    if (!framer_.broken().empty()) return {Wait::closed, {}, framer_.broken()};
+    if (!asked_) continue;
+    if (const Read read = receive(deadline); read.what != Wait::data) return {read.what, {}, read.error};
+  }
+}
+
+/// Wait::timed_out: nothing for the user.
+BlueViewStream::Item BlueViewStream::take(const blueview::Frame& frame) {
+  if (frame.header.request_id != last_id_) return {};
+  if (frame.header.type == FrameType::error)
+    return {Wait::closed, {}, "the sonar refuses to ping: " + text_of_error(frame.payload)};
+  if (frame.header.type != FrameType::ping_data) return {};
+  asked_ = false;
+  std::string why;
+  auto polar = bvt::decode_ping(sdk_bytes(frame.payload), &why);
+  if (!polar) return {Wait::closed, {}, why};
+  const double frequency_hz = sonar_.heads[head_].centre_hz;
+  return {Wait::data, BlueViewPing{*std::move(polar), frequency_hz, blueview::header_size + frame.payload.size()}, {}};
+}
+
+}  // namespace sonar::clients

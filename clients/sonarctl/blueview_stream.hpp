@@ -1,0 +1,64 @@
+// A host on the BlueView link (docs/protocols/blueview-link.md) over one blocking socket: greeting, settings, and pings, each of
+// which it asks for as drivers do. Used by ping_stream.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/bvtsdk/core/description.hpp"
+#include "clients/sonarctl/any_ping.hpp"
+#include "clients/sonarctl/net.hpp"
+#include "core/base/result.hpp"
+#include "protocol/blueview/frames.hpp"
+
+namespace sonar::clients {
+
+/// What the user wants set; what is not given stays as the sonar has it.
+struct HeadWish {
+  std::size_t head = 0;  // from 0, in the order of the greeting
+  std::optional<double> range_m, rate_hz, gain_percent;
+  std::vector<std::string> oculus_only;  // options typed that no BlueView head has
+};
+
+class BlueViewStream {
+ public:
+  /// Greets and sets. `patience`: for every answer. io: closed without a word; bad_data: something else lives there; unavailable:
+  /// silence; usage: a wish that no head can fulfil.
+  static Result<BlueViewStream> open(Socket socket, const HeadWish& wish, std::chrono::milliseconds patience);
+
+  struct Item {
+    Wait what = Wait::timed_out;
+    std::optional<BlueViewPing> ping;  // with Wait::data
+    std::string error;
+  };
+  /// Asks for a ping, unless one is on its way, and waits for it.
+  Item next(std::chrono::milliseconds patience);
+  /// "BlueView P900-90, serial 7001"
+  std::string about() const { return sonar_.model + ", serial " + sonar_.serial; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  explicit BlueViewStream(Socket socket) : socket_(std::move(socket)) {}
+  Result<wire::Bytes> ask(blueview::FrameType type, wire::BytesView payload, std::chrono::milliseconds patience);
+  Result<void> greet(std::chrono::milliseconds patience);
+  Result<void> apply(const HeadWish& wish, std::chrono::milliseconds patience);
+  Result<void> set(blueview::Key key, const blueview::Value& value, std::chrono::milliseconds patience);
+  Result<void> send(blueview::FrameType type, std::uint32_t id, wire::BytesView payload);
+  /// More bytes into the framer; sends keep-alives meanwhile.
+  Read receive(Clock::time_point deadline);
+  Item take(const blueview::Frame& frame);
+
+  Socket socket_;
+  blueview::Framer framer_{blueview::longest_payload};
+  bvt::SonarDescription sonar_;
+  std::size_t head_ = 0;  // index into sonar_.heads
+  std::uint32_t last_id_ = 0;
+  bool asked_ = false;  // for a ping that has not come yet
+  Clock::time_point sent_at_{};
+  std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
+};
+
+}  // namespace sonar::clients
