@@ -1,8 +1,10 @@
 """docs/bvtsdk.md, "BlueView in five minutes": what the banner says, the first look, and the program as it is printed there."""
 import pathlib
 import re
+import signal
 import subprocess
 import tempfile
+import time
 import unittest
 
 from prefixes import BUILD, ROOT, Sonard, prefix, run
@@ -15,7 +17,8 @@ class FiveMinutes(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.at = pathlib.Path(cls.folder.name)
         cls.daemon = Sonard(profile="blueview-p900-90", trajectory="orbit",
-                            mount="{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}").__enter__()
+                            mount="{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}\n"
+                                  "    options: {before_first_fire: pings}").__enter__()  # left from an Oculus
         cls.address = cls.daemon.address
 
     @classmethod
@@ -28,6 +31,15 @@ class FiveMinutes(unittest.TestCase):
         self.assertIn(f'BVTSonar_Open(sonar, "NET", "{self.address}")', text)
         self.assertIn(f"LD_LIBRARY_PATH={BUILD}/bvt4/lib", text)
         self.assertIn(f"sonarctl view {self.address} --png ping.png", text)
+
+    def test_an_option_of_an_oculus_is_told_to_do_nothing(self):
+        note = "sonar front: options.before_first_fire is for Oculus sonars: without effect on BlueView P900-90"
+        self.assertIn(f"info  {note}", self.daemon.log())
+        self.daemon.process.send_signal(signal.SIGHUP)
+        deadline = time.monotonic() + 60
+        while "reloaded: " not in self.daemon.log() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        self.assertIn(f"info  reload: {note}", self.daemon.log())
 
     def test_the_first_look(self):
         result = run(SONARCTL, "view", self.address, "--png", self.at / "ping.png", "--width", "600")
