@@ -8,6 +8,7 @@
 
 #include "core/text/arguments.hpp"
 #include "core/text/nearest.hpp"
+#include "daemon/config/move_addresses.hpp"
 #include "daemon/config/products.hpp"
 
 namespace sonar {
@@ -36,6 +37,13 @@ void add_run_options(CLI::App& app, RunCommand& run) {
   add_engine_options(app, run.engine);
   app.add_option("--bind", run.bind, "address of the first sonar instead of its bind_ip and advertise_ip")
       ->envname("SONARD_BIND");
+  app.add_option(
+         "--offset", run.offset,
+         "for another sonard on this computer: sonars move from 127.0.0.x to 127.0.N.x, ports of poses and control up by 10 N")
+      ->check(whole_number(0, highest_offset))
+      ->envname("SONARD_OFFSET");
+  app.add_option("--clients", run.clients, "clients that each sonar serves at a time, instead of its clients.max")
+      ->check(whole_number(1, 16));
   app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings")->check(whole_number());
   app.add_flag("--digest", run.digest, "print the SHA-256 of every client's byte stream at the end");
   app.add_option("--log-format", run.log_format, "text or json (default text)")
@@ -200,6 +208,11 @@ Result<void> override_config(Config& config, const RunCommand& command) {
   if (command.log_level == "info") config.log.level = LogLevel::info;
   if (command.log_level == "warning") config.log.level = LogLevel::warning;
   if (command.log_level == "error") config.log.level = LogLevel::error;
+  if (command.clients)
+    for (SonarConfig& sonar : config.sonars) sonar.max_clients = *command.clients;
+  if (command.offset > 0)
+    if (const auto r = move_addresses(config, command.offset, command.bind.empty()); !r)
+      return failure(r.error().kind, "--offset: " + r.error().text);
   if (!command.bind.empty())
     if (const auto r = rebind(config, command.bind); !r) return failure(r.error().kind, "--bind: " + r.error().text);
   return check_time_can_pass(config);

@@ -23,6 +23,8 @@ struct RunCommand {
   bool digest = false;
   // Empty = as the configuration says.
   std::string clock, log_format, log_level, bind;
+  std::optional<int> clients;
+  int offset = 0;
   EngineOptionsGiven engine;
 };
 struct RenderCommand {

@@ -1,5 +1,6 @@
-// What follows from a sonar's own address, and moving it to another one.
+// What follows from a sonar's own address, and moving it, or all that a daemon listens on, elsewhere.
 #include "daemon/config/config.hpp"
+#include "daemon/config/move_addresses.hpp"
 
 namespace sonar {
 
@@ -27,6 +28,49 @@ Result<void> rebind(Config& config, std::string_view address) {
                      text_of(*ip) + " is already used by sonar \"" + other.name + "\"; each sonar needs its own address");
   first.bind_ip = first.advertise_ip = *ip;
   derive_addresses(first);
+  return {};
+}
+
+namespace {
+
+tl::unexpected<Error> cannot_move(const std::string& what) { return failure(ErrorKind::usage, what); }
+
+Result<void> move_sonar(SonarConfig& sonar, int offset) {
+  for (Ipv4* const ip : {&sonar.bind_ip, &sonar.advertise_ip}) {
+    if (!is_loopback(*ip))
+      return cannot_move("moves sonars on 127.x.x.x, and sonar \"" + sonar.name + "\" has " + text_of(*ip) +
+                         ": give it an address of its own in the configuration");
+    if ((*ip)[2] + offset > 255)
+      return cannot_move("there is no room for " + text_of(*ip) + " that far on; give a smaller number");
+    (*ip)[2] = static_cast<std::uint8_t>((*ip)[2] + offset);
+  }
+  derive_addresses(sonar);
+  return {};
+}
+
+Result<void> move_port(Endpoint& at, int offset) {
+  if (at.port == 0) return {};
+  const int port = at.port + ports_an_offset * offset;
+  if (port > 65535) return cannot_move("there is no port that far above " + text_of(at) + "; give a smaller number");
+  at.port = static_cast<std::uint16_t>(port);
+  return {};
+}
+
+}  // namespace
+
+Result<void> move_addresses(Config& config, int offset, bool first_too) {
+  for (SonarConfig& sonar : config.sonars) {
+    const int id = sonar.device_id + 100 * offset;
+    if (id > 65535) return cannot_move("there is no device_id that far above " + std::to_string(sonar.device_id));
+    sonar.device_id = static_cast<std::uint16_t>(id);
+    if (&sonar == &config.sonars.front() && !first_too) continue;
+    if (auto r = move_sonar(sonar, offset); !r) return r;
+  }
+  for (PoseListener* const listener : {&config.poses.protobuf, &config.poses.json, &config.control.stream, &config.control.http})
+    if (auto r = move_port(listener->at, offset); !r) return r;
+  for (MavlinkConfig& link : config.poses.mavlink)
+    if (!link.dials)
+      if (auto r = move_port(link.at, offset); !r) return r;
   return {};
 }
 

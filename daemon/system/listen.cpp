@@ -21,7 +21,10 @@ Error explain(const error_code& ec, Endpoint at) {
   std::string text = "cannot listen on " + text_of(at) + ": ";
   if (ec == asio::error::address_in_use) {
     const std::string port = std::to_string(at.port);
-    text += "port in use by another program (another sonard? see: ss -anp | grep " + port + ")";
+    text +=
+        "port in use by another program (another sonard? --offset 1, 2, ... starts one beside it, sonard replay --ip; see: ss "
+        "-anp | grep " +
+        port + ")";
     const auto [low, high] = ephemeral_range();
     if (at.port >= low && at.port <= high)
       text += "; it lies in the ephemeral range " + std::to_string(low) + "-" + std::to_string(high) +

@@ -155,6 +155,64 @@ TEST(CommandLine, AddressesThatCannotServeAreRefused) {
   EXPECT_THROW(overridden({"--bind", "localhost"}), std::runtime_error);
 }
 
+/// Addresses, ports and device ids, in words: all that two daemons on one computer must not share.
+std::string places_of(const Config& c) {
+  std::string text;
+  for (const SonarConfig& s : c.sonars)
+    text += text_of(s.bind_ip) + " " + text_of(s.advertise_ip) + " " + text_of(s.status_to.at(0)) + " " +
+            std::to_string(s.device_id) + "\n";
+  for (const PoseListener& l : {c.poses.protobuf, c.poses.json, c.control.stream, c.control.http})
+    text += l.enabled ? text_of(l.at) + "\n" : "off\n";
+  for (const MavlinkConfig& m : c.poses.mavlink) text += text_of(m.at) + "\n";
+  return text;
+}
+Result<Config> moved(const std::vector<std::string>& words, const std::string& bind_ip, const std::string& poses) {
+  auto config = parse_config("world: {scene: demo.yaml}\nvehicles: [{name: rov}]\nposes: " + poses +
+                                 "\nsonars:\n  - {name: a, profile: oculus-m1200d, bind_ip: " + bind_ip +
+                                 "}\n  - {name: b, profile: oculus-m750d, bind_ip: 127.0.0.3}\n",
+                             "test.yaml", {});
+  if (!config) return config;
+  if (const auto r = override_config(*config, std::get<RunCommand>(parse(words))); !r) return tl::make_unexpected(r.error());
+  return config;
+}
+
+TEST(CommandLine, ClientsAreOfEverySonar) {
+  EXPECT_EQ(overridden({"--demo"}).sonars.at(0).max_clients, 1);
+  const Config c = *moved({"run", "x.yaml", "--clients", "5"}, "127.0.0.2", "{}");
+  EXPECT_EQ(c.sonars.at(0).max_clients, 5);
+  EXPECT_EQ(c.sonars.at(1).max_clients, 5);
+  EXPECT_EQ(usage_error({"--demo", "--clients", "0"}), 64);
+  EXPECT_EQ(usage_error({"--demo", "--clients", "17"}), 64);
+}
+
+TEST(CommandLine, AnOffsetMovesWhatTwoDaemonsWouldShare) {
+  const std::string poses = "{json: off, mavlink: [{endpoint: 'udpin:127.0.0.1:14551'}, {endpoint: 'udpout:127.0.0.1:14600'}]}";
+  EXPECT_EQ(places_of(*moved({"run", "x.yaml", "--offset", "2"}, "127.0.0.2", poses)),
+            "127.0.2.2 127.0.2.2 127.255.255.255:0 7201\n127.0.2.3 127.0.2.3 127.255.255.255:0 7202\n"
+            "127.0.0.1:14790\noff\n127.0.0.1:14790\n127.0.0.1:8108\n127.0.0.1:14571\n127.0.0.1:14600\n");
+  EXPECT_EQ(places_of(*moved({"run", "x.yaml", "--offset", "0"}, "192.168.2.42", poses)),
+            places_of(*moved({"run", "x.yaml"}, "192.168.2.42", poses)));
+}
+
+TEST(CommandLine, AnOffsetLeavesTheAddressThatWasGivenWithIt) {
+  const Config c = *moved({"run", "x.yaml", "--offset", "1", "--bind", "192.168.2.42"}, "127.0.0.2", "{}");
+  EXPECT_EQ(text_of(c.sonars.at(0).bind_ip), "192.168.2.42");
+  EXPECT_EQ(text_of(c.sonars.at(1).bind_ip), "127.0.1.3");
+}
+
+TEST(CommandLine, WhatAnOffsetCannotMoveIsSaid) {
+  const auto why = [](const std::string& offset, const std::string& bind_ip, const std::string& poses) {
+    const auto config = moved({"run", "x.yaml", "--offset", offset}, bind_ip, poses);
+    return config ? std::string("moved") : config.error().text;
+  };
+  EXPECT_THAT(why("1", "192.168.2.42", "{}"),
+              ::testing::StartsWith("--offset: moves sonars on 127.x.x.x, and sonar \"a\" has 192.168.2.42: give it"));
+  EXPECT_THAT(why("9", "127.0.250.2", "{}"), ::testing::HasSubstr("there is no room for 127.0.250.2"));
+  EXPECT_THAT(why("9", "127.0.0.2", "{json: '127.0.0.1:65500'}"), ::testing::HasSubstr("no port that far above 127.0.0.1:65500"));
+  EXPECT_EQ(why("9", "127.0.0.2", "{json: '127.0.0.1:0'}"), "moved");
+  EXPECT_EQ(usage_error({"--demo", "--offset", "100"}), 64);
+}
+
 TEST(CommandLine, WrongValuesAreUsageErrors) {
   EXPECT_EQ(usage_error({"run", "--noise", "maybe"}), 64);
   EXPECT_EQ(usage_error({"run", "--fixed-fan", "-1"}), 64);

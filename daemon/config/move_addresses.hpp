@@ -1,0 +1,17 @@
+// A second daemon beside the first one on the same computer: `--offset N`.
+#pragma once
+
+#include "daemon/config/config.hpp"
+
+namespace sonar {
+
+inline constexpr int highest_offset = 99;
+inline constexpr int ports_an_offset = 10;  // daemons listen on ports next to each other: 14770, 14771
+
+/// Moves everything that could be in another daemon's way: sonars from 127.0.0.x to 127.0.N.x, because drivers know their ports,
+/// device ids up by 100 N, because drivers tell sonars apart by them, and the ports of poses and control up by 10 N. Ports that
+/// the system chooses (0) and MAVLink endpoints that are dialled stay. `first_too`: the first sonar's address as well. Errors are
+/// sentences for the command line.
+Result<void> move_addresses(Config& config, int offset, bool first_too);
+
+}  // namespace sonar
