@@ -23,11 +23,12 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
           [this](const ScenePointer& now) {
             world_.use_objects(bodies_of(*now, config_), clock_.now());
             recordings_.use_scene(*now);
+            say_notes();
           },
           [this] { on_change(); }),
       admission_(config_.limits, log_),
       pose_intake_(
-          world_, clock_, log_, [this] { on_change(); }, &events_),
+          world_, clock_, log_, [this] { on_change(); }, &events_, &plausibility_),
       pose_server_(io_, config_.poses, pose_intake_, log_),
       mavlink_server_(io_, config_, pose_intake_, log_),
       context_{io_,
@@ -48,7 +49,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                }},
       fleet_(context_),
       operations_({config_, clock_, world_, stepped_time_, simulator_, changes_, admission_, pose_intake_, fleet_, events_,
-                   recordings_, control_, log_, [this] { on_change(); }, options_.load_scene}),
+                   recordings_, control_, mavlink_server_, plausibility_, log_, [this] { on_change(); }, options_.load_scene}),
       control_(io_, config_.control, config_.limits, operations_, events_, pose_intake_, log_),
       signals_(io_),
       house_timer_(io_),
@@ -56,6 +57,12 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       notify_(
           io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {
   recordings_.use_scene(*changes_.scene());
+  say_notes();
+}
+
+/// What of the configuration and the scene was probably not meant.
+void App::say_notes() {
+  for (const Note& note : plausibility_.use(config_, *changes_.scene())) log_.warning(text_of(note));
 }
 
 Result<void> App::open() {

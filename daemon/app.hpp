@@ -26,6 +26,7 @@
 #include "daemon/system/notify.hpp"
 #include "daemon/time/clock.hpp"
 #include "daemon/time/stepped_time.hpp"
+#include "daemon/world/plausibility.hpp"
 #include "daemon/world/scene_changes.hpp"
 #include "daemon/world/world.hpp"
 
@@ -83,6 +84,7 @@ class App {
   void skip_time();
   void advance_time(Time to);
   bool enough_served() const;
+  void say_notes();
   void wait_for_signal();
   void reload();  // reload.cpp, as the next
   void take_over(Config next);
@@ -96,6 +98,7 @@ class App {
   Clock clock_;
   Events events_;
   World world_;
+  Plausibility plausibility_;
   SteppedTime stepped_time_;
   Simulator simulator_;
   Recordings recordings_;

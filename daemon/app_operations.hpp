@@ -14,6 +14,7 @@
 namespace sonar {
 
 class ControlServer;
+class MavlinkServer;
 
 struct AppParts {
   Config& config;
@@ -28,6 +29,8 @@ struct AppParts {
   Events& events;
   Recordings& recordings;
   const ControlServer& control;  // asked where it listens, once all is made
+  const MavlinkServer& mavlink;
+  const Plausibility& plausibility;
   Log& log;
   std::function<void()> on_change;                                   // something stepped time may have waited for
   std::function<Result<ScenePointer>(const SceneFile&)> load_scene;  // empty: scenes cannot be loaded

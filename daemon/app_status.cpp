@@ -2,6 +2,7 @@
 #include "daemon/app_operations.hpp"
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/prometheus.hpp"
+#include "daemon/poses/mavlink_server.hpp"
 
 namespace sonar {
 namespace {
@@ -78,6 +79,8 @@ control::DaemonStatus AppOperations::status() const {
   s.control = served_at(parts_.control.stream());
   s.http = served_at(parts_.control.http());
   s.recordings = parts_.recordings.status();
+  s.notes = parts_.plausibility.all();
+  for (control::Note& note : parts_.mavlink.notes()) s.notes.push_back(std::move(note));
   return s;
 }
 

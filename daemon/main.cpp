@@ -19,6 +19,7 @@
 #include "daemon/render/render_command.hpp"
 #include "daemon/system/real_time.hpp"
 #include "daemon/system/standard_streams.hpp"
+#include "daemon/world/plausibility.hpp"
 #include "daemon/world/world_parts.hpp"
 
 namespace sonar {
@@ -157,6 +158,8 @@ int check(const CheckCommand& command) {
     if (v.plan) std::printf("vehicle %s follows %s\n", v.name.c_str(), v.plan.about.c_str());
   for (const ObjectConfig& o : config->objects)
     if (o.plan) std::printf("object %s follows %s\n", o.name.c_str(), o.plan.about.c_str());
+  for (const Note& note : notes_on(*config, **scene, surroundings_of(*config, **scene)))
+    std::printf("note: %s\n", text_of(note).c_str());
   return 0;
 }
 

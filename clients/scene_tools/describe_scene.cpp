@@ -81,10 +81,8 @@ DescribedObject describe(const Scene& scene, const Object& object, const Outline
   out.triangles = object.mesh->triangles.size();
   out.visible = object.visible;
   if (object.body >= 0) out.moves_with = scene.body_names[static_cast<std::size_t>(object.body)];
-  for (const Vec3& v : object.mesh->vertices) {
-    out.own.add(to_double(v));
-    out.in_world.add(transform(object.in_world, to_double(v)));
-  }
+  out.own = extent_of(*object.mesh);
+  for (const Vec3& v : object.mesh->vertices) out.in_world.add(transform(object.in_world, to_double(v)));
   const std::set<std::uint16_t> used(object.mesh->material.begin(), object.mesh->material.end());
   for (const std::uint16_t m : used) out.materials.push_back(scene.materials[m].name);
   return out;
@@ -104,16 +102,6 @@ std::vector<DescribedMaterial> describe_materials(const Scene& scene) {
 }
 
 }  // namespace
-
-void Extent::add(Vec3d p) {
-  low_m = {std::min(low_m.x, p.x), std::min(low_m.y, p.y), std::min(low_m.z, p.z)};
-  high_m = {std::max(high_m.x, p.x), std::max(high_m.y, p.y), std::max(high_m.z, p.z)};
-}
-void Extent::add(const Extent& other) {
-  if (other.empty()) return;
-  add(other.low_m);
-  add(other.high_m);
-}
 
 Result<SceneDescription> describe_scene(const fs::path& file) {
   const Result<Loaded> loaded = load(file);

@@ -7,20 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
+#include "core/scene/extent.hpp"
 
 namespace sonar::scene_tools {
-
-/// Along the axes it is given in; empty while low > high.
-struct Extent {
-  Vec3d low_m{1e300, 1e300, 1e300}, high_m{-1e300, -1e300, -1e300};
-  void add(Vec3d p);
-  void add(const Extent& other);
-  bool empty() const { return low_m.x > high_m.x; }
-  Vec3d size_m() const { return empty() ? Vec3d{} : high_m - low_m; }
-  Vec3d centre_m() const { return empty() ? Vec3d{} : 0.5 * (low_m + high_m); }
-};
 
 struct DescribedObject {
   std::string name = {}, kind = {}, file = {};  // kind: as the scene says it (box, mesh, seabed, point, ...)

@@ -8,7 +8,7 @@
 namespace sonar::scene_tools {
 namespace {
 
-constexpr double far_m = 1000, huge_m = 200, tiny_m = 0.005, wide_m = 5;
+constexpr double far_m = 1000, tiny_m = 0.005, wide_m = 5;
 constexpr std::size_t many_triangles = 2'000'000;
 
 std::string list_of(const std::vector<std::string>& names) {
@@ -27,11 +27,6 @@ std::vector<std::string> names_where(const SceneDescription& scene, const Wanted
   return names;
 }
 
-double longest_m(const DescribedObject& o) {
-  const Vec3d size = o.own.size_m();
-  return std::max({size.x, size.y, size.z});
-}
-
 /// Something to see below: ground by its name, anything that is wide both ways, or what all the rest stands in: a tank.
 bool is_ground(const DescribedObject& o, const SceneDescription& scene) {
   const Vec3d all = scene.in_world.size_m();
@@ -42,13 +37,13 @@ bool is_ground(const DescribedObject& o, const SceneDescription& scene) {
 }
 
 void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
-  const auto say = [&](const DescribedObject& o, const char* guess) {
-    out.warnings.push_back(o.name + ": " + o.file + " is " + length_text(longest_m(o)) + " long; " + guess);
+  const auto say = [&](const DescribedObject& o, std::string_view guess) {
+    out.warnings.push_back((o.name + ": " + o.file + " is " + length_text(o.own.longest_m()) + " long; ").append(guess));
   };
   for (const DescribedObject& o : scene.objects) {
     if (o.kind != "mesh") continue;
-    if (longest_m(o) > huge_m) say(o, "if the file is in centimetres or millimetres, set scale: 0.01 or 0.001");
-    if (longest_m(o) < tiny_m) say(o, "lengths are metres after scale: is scale too small?");
+    if (o.own.longest_m() > huge_mesh_m) say(o, huge_mesh_cure);
+    if (o.own.longest_m() < tiny_m) say(o, "lengths are metres after scale: is scale too small?");
   }
 }
 

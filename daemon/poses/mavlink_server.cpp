@@ -71,6 +71,14 @@ std::vector<std::string> MavlinkServer::endpoints() const {
   for (const Link& l : links_) all.push_back(text_of(l.config));
   return all;
 }
+std::vector<control::Note> MavlinkServer::notes() const {
+  std::vector<control::Note> all;
+  for (const Link& l : links_)
+    if (const std::string trouble = l.poses.trouble(wire_time()); !trouble.empty())
+      all.push_back(
+          {l.config.vehicle, l.name + ": " + trouble, "docs/autopilots.md says what makes a pose, and how to have it sent"});
+  return all;
+}
 Endpoint MavlinkServer::listens_at(std::size_t link) const {
   return link < links_.size() ? std::next(links_.begin(), static_cast<std::ptrdiff_t>(link))->config.at : Endpoint{};
 }

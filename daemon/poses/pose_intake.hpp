@@ -9,14 +9,16 @@
 #include "daemon/operations.hpp"
 #include "daemon/system/log.hpp"
 #include "daemon/time/clock.hpp"
+#include "daemon/world/plausibility.hpp"
 #include "daemon/world/world.hpp"
 
 namespace sonar {
 
 class PoseIntake {
  public:
-  PoseIntake(World& world, const Clock& clock, Log& log, std::function<void()> on_pose, Events* events = nullptr)
-      : world_(world), clock_(clock), log_(log), on_pose_(std::move(on_pose)), events_(events) {}
+  PoseIntake(World& world, const Clock& clock, Log& log, std::function<void()> on_pose, Events* events = nullptr,
+             Plausibility* plausibility = nullptr)
+      : world_(world), clock_(clock), log_(log), on_pose_(std::move(on_pose)), events_(events), plausibility_(plausibility) {}
 
   /// The refusal's sentence, or empty.
   std::string take(control::PoseSample sample, const Sender& sender);
@@ -32,6 +34,7 @@ class PoseIntake {
   Log& log_;
   std::function<void()> on_pose_;
   Events* events_;
+  Plausibility* plausibility_;
   LogLimiter refusals_, notices_;
   std::chrono::nanoseconds wall_shift_{0};  // our time = WALL stamp + shift
 };

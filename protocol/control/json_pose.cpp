@@ -72,7 +72,7 @@ Result<Frame> frame_of(const json& object) {
 }
 
 /// Attitude angles or quaternion, body to world, in the frame of the message.
-Result<std::array<double, 4>> orientation_of(const json& object, std::string& fields) {
+Result<std::array<double, 4>> orientation_of(const json& object, std::string& fields, double& largest_angle_rad) {
   const auto quaternion = numbers<4>(object, "quaternion");
   if (!quaternion) return tl::unexpected(quaternion.error());
   const auto attitude = numbers<3>(object, "attitude");
@@ -85,6 +85,7 @@ Result<std::array<double, 4>> orientation_of(const json& object, std::string& fi
   for (const double angle : **attitude)
     if (!std::isfinite(angle)) return refused("attitude has a NaN or infinite component");
   fields += " attitude";
+  largest_angle_rad = largest_of(**attitude);
   const Quatd q = quat_from_rpy({(**attitude)[0], (**attitude)[1], (**attitude)[2]});
   return std::array<double, 4>{q.w, q.x, q.y, q.z};
 }
@@ -106,7 +107,7 @@ Result<PoseSample> sample_from(const json& object) {
   sample.fields = stamp->domain == ClockDomain::sim ? "timestamp position" : "position";
   raw.frame = *frame;
   raw.position_m = **position;
-  const auto orientation = orientation_of(object, sample.fields);
+  const auto orientation = orientation_of(object, sample.fields, raw.largest_angle_rad);
   if (!orientation) return tl::unexpected(orientation.error());
   raw.orientation_wxyz = *orientation;
   const auto velocity = numbers<3>(object, "velocity");

@@ -117,6 +117,11 @@ struct RecordingStatus {
   std::uint64_t pings = 0, messages = 0, bytes = 0;  // messages of the sonar, bytes of the file
   std::string why;                                   // it ended
 };
+/// What the daemon allows and its user probably did not mean, or still has to do: a sentence, and what to change.
+struct Note {
+  std::string vehicle;  // that it is about; empty = the scene, a sonar
+  std::string text, cure;
+};
 struct DaemonStatus {
   std::string version, config, scene, clock, engine;
   std::uint64_t seed = 0;
@@ -129,6 +134,7 @@ struct DaemonStatus {
   std::string control, http;   // addresses listened on; empty = not served
   std::int64_t now_ns = 0;     // the daemon's time
   std::vector<RecordingStatus> recordings;
+  std::vector<Note> notes;
 };
 /// A step is done.
 struct Stepped {

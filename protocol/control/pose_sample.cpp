@@ -1,5 +1,6 @@
 #include "protocol/control/pose_sample.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace sonar::control {
@@ -31,6 +32,10 @@ Vec3d vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 std::string_view name_of(Frame frame) { return frame == Frame::ned_frd ? "NED/FRD" : "ENU/FLU"; }
 
+double largest_of(const std::array<double, 3>& rpy_rad) {
+  return std::max({std::abs(rpy_rad[0]), std::abs(rpy_rad[1]), std::abs(rpy_rad[2])});
+}
+
 Result<PoseSample> checked(PoseSample sample, const RawPose& raw) {
   if (!raw.frame) return refused("frame is missing: say NED_FRD or ENU_FLU, there is no default");
   if (!all_finite(raw.position_m)) return refused("position has a NaN or infinite component");
@@ -48,6 +53,7 @@ Result<PoseSample> checked(PoseSample sample, const RawPose& raw) {
   const Pose as_sent{vec(raw.position_m), normalized(Quatd{o[0], o[1], o[2], o[3]})};
   const bool ned = *raw.frame == Frame::ned_frd;
   sample.sent_in = *raw.frame;
+  sample.largest_angle_rad = raw.largest_angle_rad;
   sample.pose = ned ? enu_flu_from_ned_frd(as_sent) : as_sent;
   if (raw.velocity_mps) sample.velocity_mps = ned ? flu_from_frd(vec(*raw.velocity_mps)) : vec(*raw.velocity_mps);
   if (raw.angular_velocity_radps)

@@ -133,6 +133,11 @@ void fill(v1::RecordingStatus& out, const RecordingStatus& s) {
   out.set_bytes(s.bytes);
   out.set_why(s.why);
 }
+void fill(v1::Note& out, const Note& note) {
+  out.set_vehicle(note.vehicle);
+  out.set_text(note.text);
+  out.set_cure(note.cure);
+}
 RecordingStatus from(const v1::RecordingStatus& m) {
   return {m.sonar(), m.file(), m.running(), m.pings(), m.messages(), m.bytes(), m.why()};
 }
@@ -172,6 +177,7 @@ void fill(v1::DaemonStatus& out, const DaemonStatus& s) {
   out.set_http(s.http);
   for (const RecordingStatus& recording : s.recordings) fill(*out.add_recordings(), recording);
   out.set_now_ns(s.now_ns);
+  for (const Note& note : s.notes) fill(*out.add_notes(), note);
 }
 void fill(v1::Stepped& out, const Stepped& s) {
   out.set_now_ns(s.now_ns);
@@ -196,6 +202,7 @@ DaemonStatus from(const v1::DaemonStatus& m) {
   s.http = m.http();
   for (const v1::RecordingStatus& recording : m.recordings()) s.recordings.push_back(from(recording));
   s.now_ns = m.now_ns();
+  for (const v1::Note& note : m.notes()) s.notes.push_back({note.vehicle(), note.text(), note.cure()});
   return s;
 }
 

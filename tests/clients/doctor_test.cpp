@@ -277,6 +277,19 @@ TEST(Doctor, ExpectsControlWhereADaemonIs) {
   EXPECT_THAT(text_from(judge(facts)), HasSubstr("warn  the sonard there does not serve 127.0.0.2"));
 }
 
+TEST(Doctor, SaysWhatTheDaemonNotedAndNotThatAllIsWellWithThoseVehicles) {
+  Facts facts = healthy();
+  facts.control.status->vehicles.push_back({"boat", "initial pose", false, {}});
+  facts.control.status->notes = {{"boat", "mavlink udpin:127.0.0.1:14551: no poses yet", "see the streams"},
+                                 {"", "wreck is long", "scale"}};
+  const std::string text = text_from(judge(facts));
+  EXPECT_THAT(text, HasSubstr("warn  mavlink udpin:127.0.0.1:14551: no poses yet; see the streams\n"));
+  EXPECT_THAT(text, HasSubstr("warn  wreck is long; scale\n"));
+  EXPECT_THAT(text, Not(HasSubstr("poses of boat")));
+  EXPECT_THAT(text, HasSubstr("ok    poses of rov: demo orbit\n"));
+  EXPECT_FALSE(any_failed(judge(facts)));
+}
+
 TEST(Doctor, LooksAtPosesHttpAndClocks) {
   Facts facts = healthy();
   facts.control.status->vehicles[0] = {"rov", "json 127.0.0.1", true, {}};

@@ -44,6 +44,11 @@ TEST(JsonPose, ReadsQuaternionFrameAndVehicle) {
   EXPECT_NEAR(rotate(s->pose.orientation, {1, 0, 0}).x, 1, 1e-12);
 }
 
+TEST(JsonPose, KeepsTheLargestAngleThatWasSent) {
+  EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"attitude":[1,-90,45]})")->largest_angle_rad, 90);
+  EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"quaternion":[1,0,0,0]})")->largest_angle_rad, 0);
+}
+
 TEST(JsonPose, RefusesWithASentence) {
   EXPECT_EQ(why("nonsense"), "line is not JSON");
   EXPECT_EQ(why(""), "line is not JSON");

@@ -122,6 +122,7 @@ std::string text_from(const control::DaemonStatus& s) {
   text +=
       line("poses", format("%llu accepted, %llu refused, %llu late, %llu replaced, %llu over the rate", wide(s.poses.accepted),
                            wide(s.poses.refused), wide(s.poses.late), wide(s.poses.replaced), wide(s.poses.over_rate)));
+  for (const control::Note& n : s.notes) text += line("note", n.text + (n.cure.empty() ? "" : "; " + n.cure));
   for (const control::RecordingStatus& r : s.recordings) text += line("recording", recording_text(r));
   for (const control::ObjectStatus& o : s.objects) text += line("object", text_from(o));
   return text;

@@ -44,14 +44,21 @@ void judge_control(const Facts& facts, std::vector<Finding>& findings) {
   if (!status.engine.empty()) findings.push_back({Level::ok, "engine", "trace backend: " + status.engine, ""});
 }
 
+/// Then all is not well with its poses, and the notes say what.
+bool has_notes(const control::DaemonStatus& status, const std::string& vehicle) {
+  return std::any_of(status.notes.begin(), status.notes.end(),
+                     [&vehicle](const control::Note& note) { return note.vehicle == vehicle; });
+}
+
 void judge_poses(const control::DaemonStatus& status, std::vector<Finding>& findings) {
   for (const control::VehicleStatus& v : status.vehicles) {
     if (v.stale)
       findings.push_back({Level::warn, "poses", "poses of " + v.name + " have stopped, the last came from " + v.source,
                           "start the sender again, or set poses.on_stale to what you want meanwhile"});
-    else
+    else if (!has_notes(status, v.name))
       findings.push_back({Level::ok, "poses", "poses of " + v.name + ": " + v.source, ""});
   }
+  for (const control::Note& note : status.notes) findings.push_back({Level::warn, "note", note.text, note.cure});
   if (status.poses.refused > 0)
     findings.push_back(
         {Level::warn, "poses",

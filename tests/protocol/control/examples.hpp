@@ -86,6 +86,7 @@ inline DaemonStatus full_status() {
   s.now_ns = 1234567890123456780;
   s.recordings = {{"front", "recordings/run-1.mcap", true, 31, 32, 33, ""},
                   {"front", "recordings/run-0.pcap", false, 34, 35, 36, "the disk is full"}};
+  s.notes = {{"rov", "the sonar of rov is 3 m above the water", "say the frame"}, {"", "wreck is 1200 m long", "set scale"}};
   return s;
 }
 

@@ -32,6 +32,9 @@ TEST(ControlResponses, AStatusArrivesWhole) {
   EXPECT_EQ(status.poses.over_rate, 25u);
   EXPECT_EQ(status.environment.sound_speed_mps, 0.0);
   EXPECT_EQ(status.now_ns, 1234567890123456780);
+  EXPECT_EQ(status.notes.at(0).vehicle, "rov");
+  EXPECT_EQ(status.notes.at(1).text, "wreck is 1200 m long");
+  EXPECT_EQ(status.notes.at(1).cure, "set scale");
 }
 
 TEST(ControlResponses, AStepArrivesWhole) {

@@ -1,0 +1,46 @@
+// The box that things fill along some axes, and what its size may give away. Used to judge scenes and poses: `sonarctl scene`,
+// daemon/world/plausibility.
+#pragma once
+
+#include <algorithm>
+#include <string_view>
+
+#include "core/base/geometry.hpp"
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+
+/// Along the axes it is given in [m]; empty while low > high.
+struct Extent {
+  Vec3d low_m{1e300, 1e300, 1e300}, high_m{-1e300, -1e300, -1e300};
+  void add(Vec3d p) {
+    low_m = {std::min(low_m.x, p.x), std::min(low_m.y, p.y), std::min(low_m.z, p.z)};
+    high_m = {std::max(high_m.x, p.x), std::max(high_m.y, p.y), std::max(high_m.z, p.z)};
+  }
+  void add(const Extent& other) {
+    if (other.empty()) return;
+    add(other.low_m);
+    add(other.high_m);
+  }
+  bool empty() const { return low_m.x > high_m.x; }
+  Vec3d size_m() const { return empty() ? Vec3d{} : high_m - low_m; }
+  Vec3d centre_m() const { return empty() ? Vec3d{} : 0.5 * (low_m + high_m); }
+  double longest_m() const {
+    const Vec3d size = size_m();
+    return std::max({size.x, size.y, size.z});
+  }
+  /// From the nearest point of the box; 0 inside.
+  double distance_m(Vec3d p) const {
+    const auto outside = [](double low, double at, double high) { return std::max({low - at, 0.0, at - high}); };
+    return length(Vec3d{outside(low_m.x, p.x, high_m.x), outside(low_m.y, p.y, high_m.y), outside(low_m.z, p.z, high_m.z)});
+  }
+};
+
+/// Along the mesh's own axes.
+Extent extent_of(const Mesh& mesh);
+
+/// A mesh longer than this was probably not written in metres.
+inline constexpr double huge_mesh_m = 200;
+inline constexpr std::string_view huge_mesh_cure = "if the file is in centimetres or millimetres, set scale: 0.01 or 0.001";
+
+}  // namespace sonar

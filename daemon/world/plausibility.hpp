@@ -1,0 +1,68 @@
+// What is allowed and was probably not meant: poses above the water, degrees taken for radians, quaternions in the wrong order,
+// sonars upside down, meshes in millimetres. Pure functions from facts to notes; `sonard check`, the log at the start, the log
+// when a pose shows it and the daemon's status (for `sonarctl doctor`) all have theirs from here.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/scene/extent.hpp"
+#include "daemon/config/config.hpp"
+#include "protocol/control/operations.hpp"
+
+namespace sonar {
+
+using control::Note;
+
+/// "the sonar of rov is 3.0 m above the water's surface (z = 0); ENU_FLU counts z upwards ..."
+std::string text_of(const Note& note);
+
+/// What poses are judged against.
+struct Surroundings {
+  Extent scene;                // where the scene puts what can be seen
+  double longest_range_m = 0;  // of any sonar
+};
+Surroundings surroundings_of(const Config& config, const Scene& scene);
+
+/// A vehicle, by name, and where its sonars sit on it (FLU).
+struct Carrier {
+  std::string vehicle;
+  std::vector<Pose> mounts;
+};
+std::vector<Carrier> carriers_of(const Config& config);
+
+std::vector<Note> notes_on_mounts(const Config& config);
+std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around);
+/// At most one on the place, and one on the attitude.
+std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
+/// `largest_angle_rad`: of roll, pitch and yaw as they were sent; 0 when a quaternion was.
+std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad);
+/// Of a moving object when the carrier has no mounts: its place is not judged then.
+std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around);
+
+/// All that is known before the first pose.
+std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surroundings& around);
+
+/// The notes of a running daemon: of its configuration and scene, and of the newest pose of each vehicle.
+class Plausibility {
+ public:
+  /// At the start, and after either of the two has changed; returns what has not been returned before.
+  std::vector<Note> use(const Config& config, const Scene& scene);
+  /// Of a vehicle's pose that was accepted; returns what has not been returned before of this vehicle.
+  std::vector<Note> use(const control::PoseSample& sample);
+  /// What holds now. Poses take the place of what was noted on their vehicle's start or trajectory.
+  std::vector<Note> all() const;
+
+ private:
+  std::vector<Note> untold(const std::vector<Note>& notes);
+
+  Surroundings around_;
+  std::vector<Carrier> carriers_;
+  std::vector<Note> of_setup_;
+  std::map<std::string, std::vector<Note>> of_poses_;  // by vehicle
+  std::set<std::string> told_;
+};
+
+}  // namespace sonar
