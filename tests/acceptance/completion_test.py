@@ -35,7 +35,7 @@ class Completion(unittest.TestCase):
         self.assertIn("--centre", complete("sonarctl", "pose", "circle", "--"))
         self.assertNotIn("--centre", complete("sonarctl", "view", "--"))
         self.assertEqual(complete("sonarctl", "listen", "--rate", "st"), ["standby"])
-        self.assertEqual(complete("sonard", "--cl"), ["--clock"])
+        self.assertEqual(complete("sonard", "--clo"), ["--clock"])
         self.assertEqual(complete("sonard", "--clock", "st"), ["stepped"])
         self.assertIn("render", complete("sonard", "re"))
 
