@@ -4,8 +4,8 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 
+#include "core/base/regular_file.hpp"
 #include "core/motion/columns.hpp"
 #include "core/motion/stamp.hpp"
 #include "core/text/nearest.hpp"
@@ -14,7 +14,7 @@ namespace sonar::motion {
 namespace {
 
 constexpr std::size_t most_bodies = 256;
-constexpr std::uintmax_t most_bytes = std::uintmax_t{1} << 30;
+constexpr std::size_t most_bytes = std::size_t{1} << 30;
 
 constexpr std::array<std::string_view, 5> format_names{"auto", "csv", "tum", "euroc", "kitti"};
 constexpr std::array<std::string_view, 2> frame_names{"ENU_FLU", "NED_FRD"};
@@ -229,21 +229,8 @@ class Reader {
 };
 
 Result<std::string> text_of(const std::filesystem::path& file) {
-  std::error_code ec;
-  const auto type = std::filesystem::status(file, ec).type();
-  const bool readable = type == std::filesystem::file_type::regular || type == std::filesystem::file_type::fifo;
-  std::FILE* const in = readable ? std::fopen(file.c_str(), "rb") : nullptr;
-  if (in == nullptr)
-    return failure(ErrorKind::missing_file, "cannot read the poses in " + file.string() + "; is the file there?");
-  std::string text;
-  if (const auto size = std::filesystem::file_size(file, ec); !ec && size <= most_bytes) text.reserve(size + 1);
-  std::array<char, std::size_t{1} << 16> part;
-  for (std::size_t n = 0; text.size() <= most_bytes && (n = std::fread(part.data(), 1, part.size(), in)) > 0;)
-    text.append(part.data(), n);
-  const bool failed = std::ferror(in) != 0;
-  std::fclose(in);
-  if (failed) return failure(ErrorKind::io, "reading the poses in " + file.string() + " failed");
-  if (text.size() > most_bytes)
+  auto text = read_regular(file, most_bytes);
+  if (text && text->size() > most_bytes)
     return failure(ErrorKind::bad_data, file.string() + ": more than a gigabyte of poses; split the file");
   return text;
 }

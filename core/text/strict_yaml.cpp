@@ -6,13 +6,10 @@
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <sstream>
-#include <system_error>
 #include <unordered_set>
 
+#include "core/base/regular_file.hpp"
 #include "core/text/yaml_tree.hpp"
 
 namespace sonar::text {
@@ -197,20 +194,9 @@ Result<Document> parse_yaml(std::string_view text, std::string name, const YamlL
 }
 
 Result<Document> parse_yaml_file(const std::filesystem::path& file, const YamlLimits& limits) {
-  const std::string name = file.string();
-  std::error_code status;
-  if (std::filesystem::is_directory(file, status)) {
-    return failure(ErrorKind::missing_file, name + ": is a folder, not a YAML file");
-  }
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return failure(ErrorKind::missing_file, name + ": cannot be opened: " + std::strerror(errno));
-  std::string text;
-  std::array<char, 1 << 16> chunk{};
-  while (text.size() <= limits.max_bytes && (in.read(chunk.data(), chunk.size()), in.gcount() > 0)) {
-    text.append(chunk.data(), static_cast<std::size_t>(in.gcount()));
-  }
-  if (in.bad()) return failure(ErrorKind::io, name + ": cannot be read: " + std::strerror(errno));
-  return parse_yaml(text, name, limits);
+  const auto text = read_regular(file, limits.max_bytes);
+  if (!text) return tl::make_unexpected(text.error());
+  return parse_yaml(*text, file.string(), limits);
 }
 
 }  // namespace sonar::text

@@ -1,9 +1,9 @@
 #include "daemon/control/token.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <system_error>
 
+#include "core/base/regular_file.hpp"
 #include "daemon/system/sha256.hpp"
 
 namespace sonar {
@@ -24,12 +24,9 @@ tl::unexpected<Error> unusable(const std::filesystem::path& file, const std::str
 }  // namespace
 
 Result<Token> Token::read(const std::filesystem::path& file, std::string& warning) {
-  std::ifstream in(file, std::ios::binary);
-  std::string text(2 * longest, '\0');
-  if (in) in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (!in.is_open() || in.bad() || std::filesystem::is_directory(file))
-    return unusable(file, "cannot be read; make one: (umask 077; openssl rand -hex 24 > " + file.string() + ")");
-  text.resize(static_cast<std::size_t>(in.gcount()));
+  const auto read = read_regular(file, 2 * longest);
+  if (!read) return unusable(file, "cannot be read; make one: (umask 077; openssl rand -hex 24 > " + file.string() + ")");
+  std::string text = *read;
   const auto first = text.find_first_not_of(blanks);
   text = first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(blanks) - first + 1);
   if (text.size() < shortest) return unusable(file, "a token has at least 16 characters: openssl rand -hex 24");

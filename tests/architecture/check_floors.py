@@ -72,7 +72,7 @@ FORBIDDEN = [
     ("thread", r"core/|protocol/|cuda/|clients/", r"core/base/parallel\.|clients/bvtsdk/core/link\.", r"\bstd::(j?thread|async)\b|\bpthread_create\b",
      "compute threads live in core/base/parallel.* only, the keep-alive thread of a link in its own file"),
     ("socket", r"core/|protocol/", None, r"#\s*include\s*<(sys/socket|netinet/|arpa/|poll|netdb)", "only daemon/ and clients/ touch sockets"),
-    ("file", r"core/|protocol/", r"core/text/strict_yaml\.cpp|core/scene/files/|core/image/raster\.cpp|core/motion/trajectory_file\.cpp|protocol/recording/store\.cpp",
+    ("file", r"core/|protocol/", r"core/base/(regular_file|memory_left)\.cpp|core/image/raster\.cpp|protocol/recording/store\.cpp",
      r"\bstd::[io]?fstream\b|(?<![\w:>.])(std::|::)?fopen\s*\(|(?<![\w>])::open(at)?\s*\(|#\s*include\s*<fcntl\.h>",
      "bytes come in as arguments; only the loaders named in this rule, and recordings through protocol/recording/store.cpp, open files "
      "(docs/decisions/0015-files-on-floor-two.md)"),

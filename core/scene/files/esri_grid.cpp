@@ -2,18 +2,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <optional>
 #include <string>
 
+#include "core/base/regular_file.hpp"
 #include "core/scene/shapes/terrain.hpp"
 #include "core/text/decimal.hpp"
 
 namespace sonar {
 namespace {
+
+constexpr std::size_t most_bytes = std::size_t{512} << 20;
 
 // Words of a file with their line numbers, read through one block of memory.
 class Words {
@@ -97,15 +98,10 @@ Result<Header> read_header(Words& words) {
 
 Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, double z_scale) {
   const auto bad = [&](std::string what) { return failure(ErrorKind::bad_data, file.string() + ": " + std::move(what)); };
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + std::strerror(errno));
-  std::string text;
-  std::array<char, 1 << 16> chunk{};
-  while (in.read(chunk.data(), chunk.size()), in.gcount() > 0) {
-    text.append(chunk.data(), static_cast<std::size_t>(in.gcount()));
-    if (text.size() > std::size_t{512} << 20) return bad("larger than 512 MiB; cut it or use a coarser grid");
-  }
-  Words words(std::move(text));
+  auto text = read_regular(file, most_bytes);
+  if (!text) return tl::make_unexpected(text.error());
+  if (text->size() > most_bytes) return bad("larger than 512 MiB; cut it or use a coarser grid");
+  Words words(*std::move(text));
   const auto header = read_header(words);
   if (!header) return bad(header.error().text);
   const auto columns = static_cast<std::size_t>(header->columns), rows = static_cast<std::size_t>(header->rows);

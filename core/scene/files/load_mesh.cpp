@@ -4,16 +4,20 @@
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
+#include <assimp/DefaultIOSystem.h>
 #include <algorithm>
+#include <array>
 #include <assimp/Importer.hpp>
-#include <fstream>
 
+#include "core/base/memory_left.hpp"
+#include "core/base/regular_file.hpp"
 #include "core/scene/shapes/polygon.hpp"
 
 namespace sonar {
 namespace {
 
 constexpr std::uintmax_t max_file_bytes = std::uintmax_t{2} << 30;
+constexpr std::uintmax_t memory_of_a_byte = 8;  // of a file while it is read: the importer's scene, corners, the mesh
 
 std::string extension_of(const std::filesystem::path& file) {
   std::string e = file.extension().string();
@@ -28,12 +32,20 @@ std::string first_line(std::string s) {
   return s.substr(0, std::min<std::size_t>(s.find('\n'), 200));
 }
 
+// What a mesh file names in turn, materials or buffers, is opened by the importer: regular files only, as everywhere.
+class RegularFiles final : public Assimp::DefaultIOSystem {
+ public:
+  bool Exists(const char* file) const override { return open_regular(file).has_value(); }
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    return open_regular(file) ? DefaultIOSystem::Open(file, mode) : nullptr;
+  }
+};
+
 // Assimp 5.2 never comes back from a PLY header that does not end.
 bool has_ply_header(const std::filesystem::path& file) {
+  const auto in = open_regular(file);
   std::string head(64 << 10, '\0');
-  std::ifstream in(file, std::ios::binary);
-  in.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(in.gcount()));
+  head.resize(in ? std::fread(head.data(), 1, head.size(), in->get()) : 0);
   const std::size_t end = head.find("end_header");
   return head.starts_with("ply") && end != std::string::npos && head.find('\n', end) != std::string::npos;
 }
@@ -75,12 +87,16 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
   const auto bad = [&](std::string what) { return failure(ErrorKind::bad_data, name + ": " + std::move(what)); };
   const bool on_disk = request.in_memory.empty();
   std::error_code error;
-  if (on_disk && !std::filesystem::is_regular_file(request.file, error)) {
+  if (on_disk && !std::filesystem::exists(request.file, error)) {
     return failure(ErrorKind::missing_file,
                    "no mesh file at " + request.file.string() + "; paths are relative to the scene file");
   }
+  if (const auto opened = on_disk ? open_regular(request.file) : OpenFile(); !opened) return tl::make_unexpected(opened.error());
   if (on_disk && std::filesystem::file_size(request.file, error) > max_file_bytes)
     return bad("is larger than 2 GiB; simplify it");
+  if (on_disk)
+    if (auto room = check_memory_for(name, memory_of_a_byte * std::filesystem::file_size(request.file, error)); !room)
+      return tl::make_unexpected(room.error());
   const std::string extension = extension_of(request.file);
   static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
   if (std::find(known.begin(), known.end(), extension) == known.end()) {
@@ -90,6 +106,7 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
     return bad("cannot be read: not a PLY file with a whole header");
 
   Assimp::Importer importer;
+  importer.SetIOHandler(new RegularFiles);  // is the importer's then
   const bool dae = extension == ".dae";
   const bool y_up_by_default = extension == ".gltf" || extension == ".glb" || dae;  // Assimp turns a tagged DAE to y up
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());

@@ -3,10 +3,9 @@
 
 #include <csetjmp>
 #include <cstdio>
-#include <cstring>
-#include <memory>
 #include <string>
 
+#include "core/base/regular_file.hpp"
 #include "core/scene/shapes/terrain.hpp"
 
 namespace sonar {
@@ -74,11 +73,11 @@ bool read_picture(std::FILE* file, Picture& picture, std::vector<png_byte>& row)
 
 Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double size_x_m, double size_y_m, double low_m,
                                     double high_m) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(file.c_str(), "rb"), std::fclose);
-  if (!in) return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + std::strerror(errno));
+  const auto in = open_regular(file);
+  if (!in) return tl::make_unexpected(in.error());
   Picture picture;
   std::vector<png_byte> row;
-  if (!read_picture(in.get(), picture, row)) {
+  if (!read_picture(in->get(), picture, row)) {
     return failure(ErrorKind::bad_data, file.string() + ": not usable as heights: " + picture.error);
   }
   HeightGrid grid;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/memory_left.hpp"
 #include "core/scene/shapes/primitives.hpp"
 
 namespace sonar {
@@ -20,8 +21,12 @@ Shape with_material(Mesh mesh, std::uint16_t material, const Primitive& primitiv
   return Shape{std::make_shared<const Mesh>(std::move(mesh)), {}, primitive};
 }
 
+constexpr std::uint64_t memory_of_a_height = 64;  // bytes, while a grid becomes a mesh
+
 Shape from_grid(const Result<HeightGrid>& grid, std::uint16_t material, const Node& at, bool centred) {
   if (!grid) return at.fail(grid.error().text), Shape{};
+  if (auto room = check_memory_for("its mesh", memory_of_a_height * grid->z_m.size()); !room)
+    return at.fail(room.error().text), Shape{};
   auto made = mesh_from_grid(*grid);
   if (!made) return at.fail(made.error().text), Shape{};
   Shape shape = with_material(std::move(made->mesh), material);

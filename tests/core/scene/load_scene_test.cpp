@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/scene_testing.hpp"
@@ -142,6 +143,26 @@ objects:
               HasSubstr("objects[0].materials.hul: the mesh has no material of this name; did you mean \"hull\"?"));
   EXPECT_THAT(refusal(object("type: mesh, file: none.obj, material: ice"), files.folder()),
               StartsWith("s.yaml:2:24: objects[0].file: no mesh file at "));
+}
+
+TEST(LoadScene, FilesThatAreNoneAreSaidToBeAndNeverWaitedFor) {
+  TemporaryFiles files;
+  for (const char* pipe : {"p.png", "p.asc", "p.obj", "p.ply", "p.yaml", "p.mtl"})
+    ASSERT_EQ(::mkfifo(files.path(pipe).c_str(), 0600), 0);
+  const auto is_said = [&](const std::string& text) {
+    EXPECT_THAT(refusal(text, files.folder()), HasSubstr(": is a FIFO, not a regular file")) << text;
+  };
+  is_said(object("type: heightmap, file: p.png, size_m: [1, 1], height_m: [0, 1], material: sand"));
+  is_said(object("type: heightmap, file: p.asc, material: sand"));
+  is_said(object("type: mesh, file: p.obj, material: ice"));
+  is_said(object("type: mesh, file: p.ply, material: ice"));
+  is_said("material_library: p.yaml\n" + object("type: sphere, radius_m: 1, material: steel"));
+  const auto scene = load_scene(files.path("p.yaml"));
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().text, HasSubstr("p.yaml: is a FIFO"));
+  files.write("m.obj", "mtllib p.mtl\nv 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 3 2\n");
+  EXPECT_EQ(parsed(object("type: mesh, file: m.obj, material: ice"), files.folder())->objects.size(), 1u)
+      << "materials are named in the scene: those of the file that cannot be read cost nothing";
 }
 
 TEST(LoadScene, HeightmapsStandInTheirOwnCoordinates) {

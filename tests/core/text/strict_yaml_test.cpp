@@ -243,7 +243,7 @@ TEST(StrictYaml, FilesThatCannotBeRead) {
   EXPECT_EQ(missing.error().text, "no/such/file.yaml: cannot be opened: No such file or directory");
   const auto folder = parse_yaml_file(SONARD_SOURCE_DIR);
   ASSERT_FALSE(folder);
-  EXPECT_THAT(folder.error().text, HasSubstr("is a folder, not a YAML file"));
+  EXPECT_THAT(folder.error().text, HasSubstr("is a folder, not a regular file"));
 }
 
 TEST(StrictYaml, ErrorsCarryTheKindAskedFor) {

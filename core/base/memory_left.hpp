@@ -1,0 +1,24 @@
+// How much memory this process may still take before the system ends it: what the computer has left, and what the control groups
+// it runs in leave of their limits. A load that would go beyond is refused while that costs nothing else.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/base/result.hpp"
+
+namespace sonar {
+
+/// The least of /proc/meminfo (available and swap) and every control group above us, version 2 or 1, less what is used of it;
+/// file cache that can be given back counts as free. Nothing when none of them says.
+std::optional<std::uint64_t> memory_left_bytes();
+
+/// Refused, as unavailable, when `what` needs more than is left, a tenth of it kept back. `bytes` is an estimate of its peak.
+Result<void> check_memory_for(const std::string& what, std::uint64_t bytes);
+
+/// Where proc/ and sys/ lie: "/", and another folder in tests, which set it before any thread asks.
+std::filesystem::path& memory_root();
+
+}  // namespace sonar

@@ -1,0 +1,71 @@
+#include "core/base/regular_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include "core/base/memory_left.hpp"
+
+namespace sonar {
+namespace {
+
+const char* kind_of(mode_t mode) {
+  if (S_ISDIR(mode)) return "folder";
+  if (S_ISFIFO(mode)) return "FIFO";
+  if (S_ISSOCK(mode)) return "socket";
+  return "device";
+}
+
+tl::unexpected<Error> not_opened(const std::filesystem::path& file) {
+  return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + std::strerror(errno));
+}
+
+}  // namespace
+
+Result<OpenFile> open_regular(const std::filesystem::path& file) {
+  struct stat status {};
+  const auto is_other = [&] {
+    return failure(ErrorKind::missing_file,
+                   file.string() + ": is a " + kind_of(status.st_mode) + ", not a regular file; save the contents in one");
+  };
+  if (::stat(file.c_str(), &status) != 0) return not_opened(file);
+  if (!S_ISREG(status.st_mode)) return is_other();  // opening a device may set it off
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+  if (descriptor < 0) return not_opened(file);
+  OpenFile opened(::fdopen(descriptor, "rb"));
+  if (!opened) {
+    ::close(descriptor);
+    return not_opened(file);
+  }
+  // Another file may have taken the name meanwhile; O_NONBLOCK has kept us from waiting for it, and means nothing for this one.
+  if (::fstat(descriptor, &status) != 0) return not_opened(file);
+  if (!S_ISREG(status.st_mode)) return is_other();
+  return opened;
+}
+
+Result<std::string> read_regular(const std::filesystem::path& file, std::size_t most_bytes) {
+  auto in = open_regular(file);
+  if (!in) return tl::make_unexpected(in.error());
+  std::string text;
+  struct stat status {};
+  if (::fstat(::fileno(in->get()), &status) == 0 && status.st_size > 0) {
+    const std::size_t bytes = std::min(static_cast<std::size_t>(status.st_size), most_bytes) + 1;
+    if (auto room = check_memory_for(file.string(), bytes); !room) return tl::make_unexpected(room.error());
+    text.reserve(bytes);
+  }
+  std::array<char, std::size_t{1} << 16> part;
+  while (text.size() <= most_bytes) {
+    const std::size_t n = std::fread(part.data(), 1, std::min(part.size(), most_bytes + 1 - text.size()), in->get());
+    if (n == 0) break;
+    text.append(part.data(), n);
+  }
+  if (std::ferror(in->get()) != 0) return failure(ErrorKind::io, file.string() + ": cannot be read: " + std::strerror(errno));
+  return text;
+}
+
+}  // namespace sonar

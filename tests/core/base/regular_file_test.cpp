@@ -1,0 +1,48 @@
+// Only regular files are opened: what else has the name is said, and never waited for.
+#include "core/base/regular_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+
+namespace sonar {
+namespace {
+
+using testing::HasSubstr;
+
+struct RegularFile : testing::Test {
+  RegularFile() { std::filesystem::create_directories(folder); }
+  ~RegularFile() override { std::filesystem::remove_all(folder); }
+  std::string refusal(const std::filesystem::path& file) {
+    const auto opened = open_regular(file);
+    if (opened) return "opened";
+    EXPECT_EQ(opened.error().kind, ErrorKind::missing_file);
+    return opened.error().text;
+  }
+  std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / ("regular-file-" + std::to_string(getpid()));
+};
+
+TEST_F(RegularFile, IsReadWholeOrOneByteBeyondTheLimit) {
+  const auto file = folder / "a.txt";
+  std::ofstream(file) << "four";
+  EXPECT_EQ(*read_regular(file, 100), "four");
+  EXPECT_EQ(*read_regular(file, 4), "four");
+  EXPECT_EQ(*read_regular(file, 2), "fou") << "enough to see that it is too long";
+  std::filesystem::create_symlink(file, folder / "link");
+  EXPECT_EQ(*read_regular(folder / "link", 100), "four");
+}
+
+TEST_F(RegularFile, WhatElseHasTheNameIsSaid) {
+  EXPECT_EQ(refusal(folder / "none"), (folder / "none").string() + ": cannot be opened: No such file or directory");
+  EXPECT_THAT(refusal(folder), HasSubstr(": is a folder, not a regular file"));
+  EXPECT_THAT(refusal("/dev/zero"), HasSubstr("/dev/zero: is a device, not a regular file"));
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT(refusal(folder / "pipe"), HasSubstr("pipe: is a FIFO, not a regular file; save the contents in one"));
+  EXPECT_EQ(read_regular(folder / "pipe", 10).error().kind, ErrorKind::missing_file);
+}
+
+}  // namespace
+}  // namespace sonar
