@@ -29,7 +29,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       admission_(config_.limits, log_),
       pose_intake_(
           world_, clock_, log_, [this] { on_change(); }, &events_, &plausibility_),
-      pose_server_(io_, config_.poses, pose_intake_, log_),
+      pose_server_(io_, config_.poses, config_.limits, admission_, pose_intake_, log_),
       mavlink_server_(io_, config_, pose_intake_, log_),
       context_{io_,
                clock_,
@@ -50,7 +50,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       fleet_(context_),
       operations_({config_, clock_, world_, stepped_time_, simulator_, changes_, admission_, pose_intake_, fleet_, events_,
                    recordings_, control_, mavlink_server_, plausibility_, log_, [this] { on_change(); }, options_.load_scene}),
-      control_(io_, config_.control, config_.limits, operations_, events_, pose_intake_, log_),
+      control_(io_, config_.control, config_.limits, admission_, operations_, events_, pose_intake_, log_),
       signals_(io_),
       house_timer_(io_),
       stop_timer_(io_),

@@ -52,6 +52,8 @@ struct SonarConfig {
   std::uint16_t device_id = 0;
   int max_clients = 1;
   WhenClientsFull when_full = WhenClientsFull::close_new;
+  int max_observers = 4;            // who only look on; 0 = nobody
+  std::uint16_t observer_port = 0;  // 0 = any that is free
   OutboxRules outbox;
   Overload overload = Overload::slow;
   protocol::OptionValues options;  // complete
@@ -91,10 +93,12 @@ struct LimitConfig {
   int clients = 256;                             // of all sonars together; 16 of one: SonarConfig::max_clients
   int control_clients = 32;                      // of the stream, and of HTTP
   std::size_t input_bytes_per_s = 1u << 20;      // of one client; more is read more slowly
+  std::size_t pose_bytes_per_s = 2u << 20;       // of all pose connections together
   std::size_t control_message_bytes = 1u << 20;  // of one message of the stream, one body of HTTP
   std::chrono::milliseconds stall{10000};        // a client that takes no byte for so long is reset
   std::chrono::milliseconds dead_peer{15000};    // one whose computer answers nothing
   int spare_descriptors = 32;                    // never given to clients
+  std::chrono::milliseconds load{120000};        // a scene that takes longer to load is trouble
 };
 /// Recordings that control may ask for (docs/recording.md).
 struct RecordingConfig {

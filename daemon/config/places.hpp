@@ -14,17 +14,17 @@ template <class Connection>
 class Places {
  public:
   using Pointer = std::shared_ptr<Connection>;
-  static constexpr auto silence_before_eviction = std::chrono::seconds(1);  // newcomers do not push out those who are busy
+  using Silence = std::chrono::steady_clock::duration;
 
-  explicit Places(std::size_t most) : most_(most) {}
+  /// Newcomers do not push out those who were heard within `busy`.
+  explicit Places(std::size_t most, Silence busy = std::chrono::seconds(1)) : most_(most), busy_(busy) {}
   /// True when there is room for one more. `evicted` is told whom that costs its place.
   template <class Evicted>
   bool make_room(Evicted&& evicted) {
     if (taken_.size() < most_) return true;
     const auto longest = std::min_element(taken_.begin(), taken_.end(),
                                           [](const Pointer& a, const Pointer& b) { return a->heard_at < b->heard_at; });
-    if (longest == taken_.end() || std::chrono::steady_clock::now() - (*longest)->heard_at < silence_before_eviction)
-      return false;
+    if (longest == taken_.end() || std::chrono::steady_clock::now() - (*longest)->heard_at < busy_) return false;
     evicted(**longest);
     (*longest)->close();
     taken_.erase(longest);
@@ -39,6 +39,7 @@ class Places {
 
  private:
   std::size_t most_;
+  Silence busy_;
   std::list<Pointer> taken_;
 };
 

@@ -1,5 +1,6 @@
-// The accepting half of both control servers: a listener, and places for connections that are given up by the most silent. What a
-// Connection does with its socket is its own business.
+// The accepting half of both control servers: a listener, and places for connections that are given up by the most silent. Where
+// a token is needed, those who have not shown it yet have places of their own, and push out each other only. What a Connection
+// does with its socket is its own business.
 #pragma once
 
 #include <string>
@@ -38,14 +39,15 @@ class ConnectionDoor {
     error_code ec;
     acceptor_.close(ec);
     places_.close_all();
+    strangers_.close_all();
     leaving_.close_all();
   }
   /// Port 0 = not listening.
   Endpoint at() const { return at_; }
 
  private:
-  static constexpr auto accept_pause = std::chrono::milliseconds(100);
-  static constexpr std::size_t most_leaving = 16;
+  using Steady = std::chrono::steady_clock;
+  static constexpr std::size_t most_strangers = 16, most_leaving = 16;
 
   void keep_accepting() {
     asio::co_spawn(
@@ -57,16 +59,9 @@ class ConnectionDoor {
         });
   }
   asio::awaitable<void> accept() {
-    while (!stopping_) {
-      error_code ec;
-      tcp::socket socket = co_await acceptor_.async_accept(into(ec));
+    while (auto socket = co_await context_.admission.next_visitor(acceptor_, Admission::Purpose::control)) {
       if (stopping_) co_return;
-      if (ec) {
-        asio::steady_timer pause(context_.io, accept_pause);
-        co_await pause.async_wait(into(ec));
-        continue;
-      }
-      admit(std::move(socket));
+      admit(*std::move(socket));
     }
   }
   void admit(tcp::socket socket) {
@@ -75,20 +70,31 @@ class ConnectionDoor {
     if (ec) return;  // gone already
     const std::string address = peer.address().to_string();
     const Sender sender{protocol_ + " tcp " + address + ":" + std::to_string(peer.port()), protocol_ + " " + address};
-    const bool room = places_.make_room([this](const Connection& evicted) {
-      say_at_times(context_.log, context_.notices, LogLevel::info,
-                   "control connection closed: silent for longest, and its place was needed", {{"from", evicted.sender().id}});
-    });
-    if (!room) {
-      say_refused(context_, std::to_string(places_.most()) + " connections are open and busy already", sender.id);
-      return turn_away(std::move(socket), sender);
-    }
+    const bool stranger = context_.token.needed();
+    Places<Connection>& places = stranger ? strangers_ : places_;
+    if (!make_room(places, sender)) return turn_away(std::move(socket), sender);
     end_when_silent(socket, context_.limits.dead_peer);
     socket.set_option(tcp::no_delay(true), ec);
     auto connection = std::make_shared<Connection>(context_, std::move(socket), sender);
-    places_.add(connection);
+    places.add(connection);
+    if (stranger) connection->asks_for_place([this, weak = std::weak_ptr(connection)] { return let_in(weak.lock()); });
     run(connection, connection->read());
     run(connection, connection->write());
+  }
+  bool make_room(Places<Connection>& places, const Sender& sender) {
+    const bool room = places.make_room([this](const Connection& evicted) {
+      say_at_times(context_.log, context_.notices, LogLevel::info,
+                   "control connection closed: silent for longest, and its place was needed", {{"from", evicted.sender().id}});
+    });
+    if (!room) say_refused(context_, std::to_string(places.most()) + " connections are open and busy already", sender.id);
+    return room;
+  }
+  /// It has shown the token. False: there is no place.
+  bool let_in(const std::shared_ptr<Connection>& connection) {
+    if (!make_room(places_, connection->sender())) return false;
+    strangers_.remove(connection);
+    places_.add(connection);
+    return true;
   }
   /// It is told why, and lives for a moment; beyond so many it is closed without a word.
   void turn_away(tcp::socket socket, const Sender& sender) {
@@ -106,6 +112,7 @@ class ConnectionDoor {
       if (fault) connection->close();
       if (!connection->over()) return;
       places_.remove(connection);
+      strangers_.remove(connection);
       leaving_.remove(connection);
     });
   }
@@ -113,7 +120,7 @@ class ConnectionDoor {
   ControlContext& context_;
   std::string protocol_;
   tcp::acceptor acceptor_;
-  Places<Connection> places_, leaving_{most_leaving};
+  Places<Connection> places_, strangers_{most_strangers, Steady::duration{}}, leaving_{most_leaving};
   Endpoint at_;
   bool stopping_ = false;
 };

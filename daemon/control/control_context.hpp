@@ -7,6 +7,7 @@
 #include "daemon/control/token.hpp"
 #include "daemon/operations.hpp"
 #include "daemon/poses/pose_intake.hpp"
+#include "daemon/sonars/admission.hpp"
 #include "daemon/system/asio.hpp"
 #include "daemon/system/log.hpp"
 
@@ -17,6 +18,7 @@ struct ControlContext {
   asio::io_context& io;
   const ControlConfig& config;
   const LimitConfig& limits;
+  Admission& admission;
   Operations& operations;
   Events& events;
   PoseIntake& poses;

@@ -2,9 +2,11 @@
 
 namespace sonar {
 
-ControlServer::ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Operations& operations,
-                             Events& events, PoseIntake& poses, Log& log)
-    : context_{io, config, limits, operations, events, poses, log}, stream_(context_, "protobuf"), http_(context_, "http") {}
+ControlServer::ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Admission& admission,
+                             Operations& operations, Events& events, PoseIntake& poses, Log& log)
+    : context_{io, config, limits, admission, operations, events, poses, log},
+      stream_(context_, "protobuf"),
+      http_(context_, "http") {}
 
 Result<void> ControlServer::read_token() {
   const ControlConfig& config = context_.config;

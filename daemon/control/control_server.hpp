@@ -13,8 +13,8 @@ namespace sonar {
 class ControlServer {
  public:
   /// All of it outlives the server.
-  ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Operations& operations,
-                Events& events, PoseIntake& poses, Log& log);
+  ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Admission& admission,
+                Operations& operations, Events& events, PoseIntake& poses, Log& log);
 
   /// Reads the token and opens both listeners. A default address that is taken is a warning; one from the file is an error.
   Result<void> open();

@@ -12,6 +12,8 @@ using control::StatusCode;
 constexpr auto never = std::chrono::steady_clock::time_point::max();
 constexpr std::chrono::seconds goodbye_limit{2};  // for what the client still sends when it has been told to go
 
+const HttpRefusal too_many{503, "too many connections are open"};
+
 std::string_view phrase_of(unsigned status) {
   constexpr std::array<std::pair<unsigned, std::string_view>, 14> phrases = {{{200, "OK"},
                                                                               {400, "Bad Request"},
@@ -92,7 +94,7 @@ void HttpConnection::close() {
 }
 
 void HttpConnection::turn_away() {
-  refusal_ = HttpRefusal{503, "too many connections are open"};
+  refusal_ = too_many;
   discards_ = true;
 }
 
@@ -185,7 +187,17 @@ asio::awaitable<void> HttpConnection::write() {
   goodbye();
 }
 
+/// False: it shows the token, and there is no place for it.
+bool HttpConnection::has_place(const HttpRequest& request) {
+  if (!let_in_ || !context_.token.matches(bearer_token(request.authorization))) return true;
+  return std::exchange(let_in_, nullptr)();
+}
+
 asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
+  if (!has_place(request)) {
+    refusal_ = too_many;
+    co_return;
+  }
   Judgement judgement = judge(request, {context_.token, reached_.ip, context_.config.hosts});
   if (!judgement.pose_refusal.empty()) context_.poses.refuse(judgement.pose_refusal, sender_);
   const Head head{request.http_1_0, request.method == "HEAD", !request.keep_alive};

@@ -2,6 +2,7 @@
 // write() answers them. Owned by the HTTP server's places and by its own coroutines.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,6 +25,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   bool over() const { return !socket_.is_open(); }
   /// Before it reads: there is no place for it. It says 503 and hears the client out for a moment.
   void turn_away();
+  /// Before it reads: it is a stranger until it shows the token; `let_in` then says whether there is a place for it.
+  void asks_for_place(std::function<bool()> let_in) { let_in_ = std::move(let_in); }
   const Sender& sender() const { return sender_; }
 
   Steady::time_point heard_at = Steady::now();
@@ -34,6 +37,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   };
   void hand_over();
   asio::awaitable<void> answer(HttpRequest request);
+  bool has_place(const HttpRequest& request);
   asio::awaitable<HttpAnswer> make_answer(Wanted wanted);
   asio::awaitable<HttpAnswer> carry_out(control::Operation operation);
   asio::awaitable<void> stream_events(control::Subscribe wanted, Head head);
@@ -53,11 +57,12 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   std::optional<HttpRequest> request_;  // read, not yet answered
   std::optional<HttpRefusal> refusal_;  // of what cannot be read
   EventQueue events_;
-  bool continue_asked_ = false;  // "100 Continue" is wanted
-  bool busy_ = false;            // a request is being answered
-  bool discards_ = false;        // what the client sends, it does not count any more
-  bool ended_ = false;           // the client sends nothing more
-  bool said_all_ = false;        // nor do we
+  std::function<bool()> let_in_;  // empty: it is in
+  bool continue_asked_ = false;   // "100 Continue" is wanted
+  bool busy_ = false;             // a request is being answered
+  bool discards_ = false;         // what the client sends, it does not count any more
+  bool ended_ = false;            // the client sends nothing more
+  bool said_all_ = false;         // nor do we
 };
 
 }  // namespace sonar

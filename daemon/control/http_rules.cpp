@@ -95,6 +95,12 @@ std::string_view bearer_token(std::string_view authorization) {
   return first == std::string_view::npos ? std::string_view{} : authorization.substr(first);
 }
 
+bool begins_http_request(std::string_view bytes) {
+  constexpr std::array<std::string_view, 9> methods{"GET ",     "HEAD ",    "POST ",  "PUT ",  "DELETE ",
+                                                    "CONNECT ", "OPTIONS ", "TRACE ", "PATCH "};
+  return std::any_of(methods.begin(), methods.end(), [bytes](std::string_view method) { return bytes.starts_with(method); });
+}
+
 bool is_json(std::string_view content_type) {
   std::string_view type = cut(content_type, ';');
   while (!type.empty() && (type.back() == ' ' || type.back() == '\t')) type.remove_suffix(1);

@@ -2,6 +2,7 @@
 // answer out; no sockets. daemon/control/http_judge.hpp puts the rules in order.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -31,6 +32,11 @@ bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std
 std::string_view bearer_token(std::string_view authorization);
 /// "application/json", whatever parameters follow.
 bool is_json(std::string_view content_type);
+
+/// Whether these are the first bytes of an HTTP request: for ports that speak something else. The first longest_http_method of
+/// them are enough to tell.
+bool begins_http_request(std::string_view bytes);
+inline constexpr std::size_t longest_http_method = 8;  // "OPTIONS "
 
 struct Route {
   enum class Kind { unknown, help, health, metrics, status, events, operation };

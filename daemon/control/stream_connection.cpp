@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "daemon/control/http_rules.hpp"
+
 namespace sonar {
 namespace {
 
@@ -60,6 +62,10 @@ asio::awaitable<void> StreamConnection::read() {
     if (ec || over()) break;
     heard_at = Steady::now();
     received += n;
+    if (speaks_http(std::span(buffer).first(n))) {
+      say_refused(context_, "HTTP on the control stream, which is protobuf: HTTP is asked at control.http", sender_.id);
+      break;
+    }
     parser_.feed(std::span(buffer).first(n));
     while (!ending_ && !over()) {
       const auto message = parser_.next();
@@ -82,6 +88,15 @@ asio::awaitable<void> StreamConnection::read() {
   wake_writer_.cancel();  // it writes what is left, and closes
 }
 
+/// A browser may send it for any page; what it sends must not count, however it reads as protobuf.
+bool StreamConnection::speaks_http(std::span<const std::byte> received) {
+  for (const std::byte b : received) {
+    if (first_bytes_.size() == longest_http_method) break;
+    first_bytes_ += static_cast<char>(b);
+  }
+  return begins_http_request(first_bytes_);
+}
+
 /// False: the conversation is over.
 bool StreamConnection::take(control::BytesView message) {
   const auto request = control::decode_request(message);
@@ -91,7 +106,7 @@ bool StreamConnection::take(control::BytesView message) {
     else
       say_refused(context_, request.error().why, sender_.id);
     answer({request.error().id, StatusCode::refused, request.error().why, false});
-    return greeted_;
+    return greeted_ && request.error().is_protobuf;
   }
   if (const auto* hello = std::get_if<control::Hello>(&request->op)) return greet(request->id, *hello);
   if (!greeted_) return refuse_and_end(request->id, "the first message must be a Hello");
@@ -106,6 +121,11 @@ bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
   if (!context_.token.matches(hello.token))
     return refuse_and_end(id, hello.token.empty() ? "this daemon wants a token in the Hello, from its control.token_file"
                                                   : "the token in the Hello is not that of control.token_file");
+  if (let_in_ && !let_in_()) {
+    answer({id, StatusCode::failed, "all places are taken by clients that are busy; try again, or close one", false});
+    return false;
+  }
+  let_in_ = nullptr;
   greeted_ = true;
   greeting_->none();
   context_.log.debug("control client", {{"from", sender_.id}, {"name", hello.name.substr(0, 64)}});

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -28,11 +29,14 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   bool over() const { return !socket_.is_open(); }
   /// Before it reads: there is no place for it.
   void turn_away() { ending_ = true; }
+  /// Before it reads: it is a stranger until it shows the token; `let_in` then says whether there is a place for it.
+  void asks_for_place(std::function<bool()> let_in) { let_in_ = std::move(let_in); }
   const Sender& sender() const { return sender_; }
 
   Steady::time_point heard_at = Steady::now();  // or written to: a subscriber says nothing
 
  private:
+  bool speaks_http(std::span<const std::byte> received);
   bool take(control::BytesView message);
   bool greet(std::uint64_t id, const control::Hello& hello);
   bool take_greeted(const control::Request& request);
@@ -53,6 +57,8 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   std::size_t under_way_ = 0;           // requests whose answer is not in answers_ yet
   EventQueue events_;
   Events::Token subscription_;
+  std::string first_bytes_;                // until they are enough to know HTTP by
+  std::function<bool()> let_in_;           // empty: it is in
   bool greeted_ = false, ending_ = false;  // ending: the last answer is being written
 };
 

@@ -1,18 +1,21 @@
 #include "daemon/poses/pose_server.hpp"
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
 #include "daemon/system/listen.hpp"
 #include "protocol/control/control.hpp"
-#include "protocol/control/json_pose.hpp"
 
 namespace sonar {
 namespace {
 
 constexpr std::size_t most_connections = 32;
-constexpr auto accept_pause = std::chrono::milliseconds(100);
-constexpr std::chrono::milliseconds dead_after{30000};  // a sender whose computer answers nothing
+constexpr std::size_t most_lines_of_a_datagram = 64;
+constexpr std::size_t work_of_a_turn = 4096;    // bytes; then others have theirs
+constexpr std::size_t least_work = 64;          // bytes that cost as much as a read, or a line, does beside its own
+constexpr std::size_t most_unread = 64u << 10;  // bytes; a sender with more waiting is behind
+constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
 
 Sender sender_of(bool json, const char* transport, const asio::ip::address& ip, std::uint16_t port) {
   const std::string encoding = json ? "json" : "protobuf";
@@ -22,8 +25,16 @@ Sender sender_of(bool json, const char* transport, const asio::ip::address& ip, 
 
 }  // namespace
 
-PoseServer::PoseServer(asio::io_context& io, const PoseConfig& config, PoseIntake& intake, Log& log)
-    : io_(io), config_(config), intake_(intake), log_(log), connections_(most_connections) {}
+PoseServer::PoseServer(asio::io_context& io, const PoseConfig& config, const LimitConfig& limits, Admission& admission,
+                       PoseIntake& intake, Log& log)
+    : io_(io),
+      config_(config),
+      limits_(limits),
+      admission_(admission),
+      intake_(intake),
+      log_(log),
+      connections_(most_connections),
+      together_(limits.pose_bytes_per_s) {}
 
 Result<Endpoint> PoseServer::open(Listener& listener, Endpoint at) {
   if (listener.encoding == Encoding::json) {
@@ -94,11 +105,17 @@ void PoseServer::stop() {
 
 // ---- what arrives
 
-void PoseServer::on_line(const std::string& text, const Sender& sender) {
-  if (const auto sample = control::parse_json_pose(text))
+bool PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
+  if (line.too_long) {
+    intake_.refuse("line is longer than 4096 bytes", sender);
+    return false;
+  }
+  const auto sample = control::parse_json_pose(line.text);
+  if (sample)
     intake_.take(*sample, sender);
   else
     intake_.refuse(sample.error().text, sender);
+  return sample || control::is_json_object(line.text);
 }
 
 void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from) {
@@ -107,8 +124,10 @@ void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes
     control::LineParser lines;
     lines.feed(bytes);
     lines.feed(std::array{std::byte{'\n'}});
-    while (const auto line = lines.next())
-      line->too_long ? intake_.refuse("line is longer than 4096 bytes", sender) : on_line(line->text, sender);
+    for (std::size_t taken = 0; const auto line = lines.next(); ++taken) {
+      if (taken == most_lines_of_a_datagram) return intake_.refuse("a datagram has at most 64 lines; the rest is lost", sender);
+      if (!on_line(*line, sender)) return;
+    }
     return;
   }
   if (const auto sample = control::decode_pose_datagram(bytes))
@@ -136,16 +155,9 @@ asio::awaitable<void> PoseServer::receive(Listener& listener) {
 // ---- JSON lines by TCP
 
 asio::awaitable<void> PoseServer::accept(Listener& listener) {
-  while (!stopping_) {
-    error_code ec;
-    tcp::socket socket = co_await listener.acceptor.async_accept(into(ec));
+  while (auto socket = co_await admission_.next_visitor(listener.acceptor, Admission::Purpose::client)) {
     if (stopping_) co_return;
-    if (ec) {
-      asio::steady_timer pause(io_, accept_pause);
-      co_await pause.async_wait(into(ec));
-      continue;
-    }
-    admit(std::move(socket));
+    admit(*std::move(socket));
   }
 }
 
@@ -157,12 +169,14 @@ void PoseServer::admit(tcp::socket socket) {
   if (!is_admitted(config_.allow_from, peer.address()))
     return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
   const bool room = connections_.make_room([this](const Connection& evicted) {
-    say_at_times(log_, notices_, LogLevel::info, "pose connection closed: silent for longest, and its place was needed",
+    say_at_times(log_, notices_, LogLevel::info,
+                 "pose connection closed: silent for longest, or behind, and its place was needed",
                  {{"from", evicted.sender.id}});
   });
   if (!room) return intake_.refuse(std::to_string(most_connections) + " connections are open and busy already", sender);
-  end_when_silent(socket, dead_after);
-  auto connection = std::make_shared<Connection>(Connection{std::move(socket), sender});
+  end_when_silent(socket, limits_.dead_peer);
+  together_.use(limits_.pose_bytes_per_s);
+  auto connection = std::make_shared<Connection>(std::move(socket), sender, limits_.input_bytes_per_s);
   connections_.add(connection);
   asio::co_spawn(
       io_, [this, connection] { return read_lines(connection); },
@@ -174,21 +188,50 @@ void PoseServer::admit(tcp::socket socket) {
 }
 
 asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
-  control::LineParser lines;
-  std::array<std::byte, 4096> buffer;
-  while (!stopping_) {
-    error_code ec;
-    const std::size_t n = co_await connection->socket.async_read_some(asio::buffer(buffer), into(ec));
+  Connection& c = *connection;
+  std::array<std::byte, work_of_a_turn> buffer;
+  error_code ec;
+  while (true) {
+    const std::size_t n = co_await c.socket.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || stopping_) co_return;
-    connection->heard_at = std::chrono::steady_clock::now();
-    lines.feed(std::span(buffer).first(n));
-    while (const auto line = lines.next()) {
-      if (line->too_long)
-        intake_.refuse("line is longer than 4096 bytes", connection->sender);
-      else
-        on_line(line->text, connection->sender);
+    c.lines.feed(std::span(buffer).first(n));
+    std::size_t work_bytes = n + least_work;
+    for (Turn turn = Turn::not_over; turn == Turn::not_over; work_bytes = 0) {
+      turn = take_turn(c, work_bytes);
+      if (turn == Turn::end) co_return;
+      co_await rest(c, work_bytes);
+      if (!c.socket.is_open() || stopping_) co_return;
     }
+    if (c.socket.available(ec) < most_unread) c.heard_at = std::chrono::steady_clock::now();
   }
+}
+
+/// Some of the lines that have come; what they cost is added.
+PoseServer::Turn PoseServer::take_turn(Connection& c, std::size_t& work_bytes) {
+  for (std::size_t taken = 0; taken < work_of_a_turn;) {
+    const auto line = c.lines.next();
+    if (!line && c.lines.may_become_object()) return Turn::over;
+    if (!line) intake_.refuse(no_json, c.sender);
+    if (!line || !on_line(*line, c.sender)) {
+      say_at_times(log_, notices_, LogLevel::warning, std::string("pose connection closed: ") + no_json, {{"from", c.sender.id}});
+      return Turn::end;
+    }
+    taken += line->text.size() + least_work;
+    work_bytes += least_work;
+  }
+  return Turn::not_over;
+}
+
+/// The others' turns; longer when it, or all together, send more than limits allow: the rest waits in the kernel.
+asio::awaitable<void> PoseServer::rest(Connection& c, std::size_t work_bytes) {
+  const auto now = std::chrono::steady_clock::now();
+  const auto own = c.rate.pause_after(work_bytes, now), of_all = together_.pause_after(work_bytes, now);
+  if (own.count() > 0)
+    say_at_times(log_, notices_, LogLevel::info,
+                 "pose connection is read more slowly: it sends more than limits.input_bytes_per_s", {{"from", c.sender.id}});
+  error_code ec;
+  c.turn.expires_after(std::max(own, of_all));
+  co_await c.turn.async_wait(into(ec));
 }
 
 }  // namespace sonar

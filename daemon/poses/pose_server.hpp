@@ -1,5 +1,6 @@
 // Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. Owned by App; the control stream is a server of its own
-// (daemon/control/). A malformed message costs its sender a counted refusal and, now and then, a log line; never more.
+// (daemon/control/). A malformed message costs its sender a counted refusal and, now and then, a log line; a connection that
+// does not speak JSON is closed. What connections send is worked on in turns of bounded work, and no faster than limits allow.
 #pragma once
 
 #include <list>
@@ -11,14 +12,19 @@
 #include "daemon/config/config.hpp"
 #include "daemon/config/places.hpp"
 #include "daemon/poses/pose_intake.hpp"
+#include "daemon/sonars/admission.hpp"
+#include "daemon/sonars/input_rate.hpp"
 #include "daemon/system/asio.hpp"
 #include "daemon/system/log.hpp"
+#include "protocol/control/json_pose.hpp"
 
 namespace sonar {
 
 class PoseServer {
  public:
-  PoseServer(asio::io_context& io, const PoseConfig& config, PoseIntake& intake, Log& log);
+  /// All of it outlives the server.
+  PoseServer(asio::io_context& io, const PoseConfig& config, const LimitConfig& limits, Admission& admission, PoseIntake& intake,
+             Log& log);
 
   Result<void> open();
   void start();
@@ -35,14 +41,20 @@ class PoseServer {
     udp::socket datagrams;
     tcp::acceptor acceptor;  // of JSON lines only
   };
-  /// One TCP sender; closed by stop(), or when its place is needed and it has been silent for longest.
+  /// One TCP sender; closed by stop(), or when its place is needed and it has been silent, or behind, for longest.
   struct Connection {
+    Connection(tcp::socket s, Sender from, std::size_t bytes_per_s)
+        : socket(std::move(s)), sender(std::move(from)), turn(socket.get_executor()), rate(bytes_per_s) {}
     tcp::socket socket;
     Sender sender;
-    std::chrono::steady_clock::time_point heard_at = std::chrono::steady_clock::now();
+    asio::steady_timer turn;  // until more of what it sent is worked on
+    InputRate rate;
+    control::LineParser lines;
+    std::chrono::steady_clock::time_point heard_at = std::chrono::steady_clock::now();  // with little left unread
     void close() {
       error_code ec;
       socket.close(ec);
+      turn.cancel();
     }
   };
   using ConnectionPointer = std::shared_ptr<Connection>;
@@ -54,18 +66,25 @@ class PoseServer {
   asio::awaitable<void> receive(Listener& listener);
   asio::awaitable<void> accept(Listener& listener);
   asio::awaitable<void> read_lines(ConnectionPointer connection);
+  enum class Turn { over, not_over, end };  // no whole line is left; one may be; the connection speaks no JSON
+  Turn take_turn(Connection& connection, std::size_t& work_bytes);
+  asio::awaitable<void> rest(Connection& connection, std::size_t work_bytes);
   void admit(tcp::socket socket);
 
   void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);
-  void on_line(const std::string& text, const Sender& sender);
+  /// False: it is no JSON.
+  bool on_line(const control::LineParser::Line& line, const Sender& sender);
 
   asio::io_context& io_;
   const PoseConfig& config_;
+  const LimitConfig& limits_;
+  Admission& admission_;
   PoseIntake& intake_;
   Log& log_;
   LogLimiter notices_, faults_;
   std::list<Listener> listeners_;
   Places<Connection> connections_;
+  InputRate together_;  // of all connections
   Endpoint protobuf_at_, json_at_;
   bool stopping_ = false;
 };

@@ -11,7 +11,8 @@
 namespace sonar {
 namespace {
 
-constexpr auto spell = std::chrono::seconds(60);  // without a refusal: the next one is news again
+constexpr auto accept_pause = std::chrono::milliseconds(100);  // after an accept that failed
+constexpr auto spell = std::chrono::seconds(60);               // without a refusal: the next one is news again
 
 int open_reserve() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
 
@@ -22,12 +23,13 @@ void close_politely(int descriptor) {
   ::shutdown(descriptor, SHUT_WR);
 }
 
-/// The first number that is not for clients; the kernel hands out the lowest free one.
-std::uint64_t first_spare(const LimitConfig& limits) {
+/// The first number that is not for them; the kernel hands out the lowest free one.
+std::uint64_t first_spare(const LimitConfig& limits, Admission::Purpose purpose) {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return ~std::uint64_t{0};
   const auto most = static_cast<std::uint64_t>(limit.rlim_cur);
-  return most - std::min(static_cast<std::uint64_t>(limits.spare_descriptors), most / 2);
+  const auto spare = std::min(static_cast<std::uint64_t>(limits.spare_descriptors), most / 2);
+  return most - (purpose == Admission::Purpose::control ? spare / 2 : spare);
 }
 
 }  // namespace
@@ -57,14 +59,17 @@ void Admission::say(Steady::time_point& last, const char* what) {
   last = now;
 }
 
-Admission::Place Admission::enter(const tcp::socket& socket) {
+bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
   // The descriptor's number says how many are in use below it: all.
-  if (static_cast<std::uint64_t>(const_cast<tcp::socket&>(socket).native_handle()) >= first_spare(limits_)) {
-    ++for_descriptors_;
-    say(descriptors_said_,
-        "file descriptors run out: clients are turned away until some are free (raise LimitNOFILE or ulimit -n)");
-    return {};
-  }
+  if (static_cast<std::uint64_t>(const_cast<tcp::socket&>(socket).native_handle()) < first_spare(limits_, purpose)) return true;
+  ++for_descriptors_;
+  say(descriptors_said_,
+      "file descriptors run out: clients are turned away until some are free (raise LimitNOFILE or ulimit -n)");
+  return false;
+}
+
+Admission::Place Admission::enter(const tcp::socket& socket) {
+  if (!leaves_spare(socket, Purpose::client)) return {};
   if (*count_ >= static_cast<std::uint64_t>(limits_.clients)) {
     ++for_places_;
     say(places_said_, "all places taken: clients are turned away until one is free (limits.clients)");
@@ -72,6 +77,23 @@ Admission::Place Admission::enter(const tcp::socket& socket) {
   }
   ++*count_;
   return {count_.get(), [count = count_](const void*) { --*count; }};
+}
+
+asio::awaitable<std::optional<tcp::socket>> Admission::next_visitor(tcp::acceptor& acceptor, Purpose purpose) {
+  while (true) {
+    error_code ec;
+    tcp::socket socket = co_await acceptor.async_accept(into(ec));
+    if (!acceptor.is_open()) co_return std::nullopt;
+    if (ec) {
+      if (send_away(acceptor, ec)) continue;
+      asio::steady_timer pause(acceptor.get_executor(), accept_pause);
+      co_await pause.async_wait(into(ec));
+    } else if (leaves_spare(socket, purpose)) {
+      co_return std::move(socket);
+    } else {
+      close_politely(socket);
+    }
+  }
 }
 
 bool Admission::send_away(tcp::acceptor& acceptor, const error_code& why) {

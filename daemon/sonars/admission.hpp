@@ -1,14 +1,16 @@
 // How many strangers may be connected at a time, over all sonars, and what happens when file descriptors run out.
-// Owned by App, asked by every Device for each socket it accepts. I/O thread only.
+// Owned by App, asked by every listener for each socket it accepts. I/O thread only.
 //
 // The last descriptors below the process's limit are never given to clients: whatever else the daemon needs one for (a log, a
-// scene, a control client) finds one. Should they run out all the same, one kept in reserve lets visitors in to be sent away;
-// without it they would stay in the listener's queue, which would report them again and again.
+// scene) finds one. Of these, half are for control alone, so that somebody can ask what is the matter. Should they run out all
+// the same, one kept in reserve lets visitors in to be sent away; without it they would stay in the listener's queue, which would
+// report them again and again.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "daemon/config/config.hpp"
 #include "daemon/system/asio.hpp"
@@ -29,10 +31,15 @@ class Admission {
   Admission(const Admission&) = delete;
   Admission& operator=(const Admission&) = delete;
 
+  enum class Purpose { client, control };
+
   /// For a socket just accepted. An empty place: it must be closed; the log has been told, once for each spell of it.
   Place enter(const tcp::socket& socket);
   /// accept() failed with `why`. True when that was for want of descriptors and the visitor has been sent away: accept again.
   bool send_away(tcp::acceptor& acceptor, const error_code& why);
+  /// The next visitor of a listener without places of ours, whose descriptor is none of the spare ones. Nothing: the listener is
+  /// closed.
+  asio::awaitable<std::optional<tcp::socket>> next_visitor(tcp::acceptor& acceptor, Purpose purpose);
 
   /// Connected now: clients, those who wait and those being turned away.
   std::uint64_t now() const { return *count_; }
@@ -42,6 +49,7 @@ class Admission {
  private:
   using Steady = std::chrono::steady_clock;
   void say(Steady::time_point& last, const char* what);
+  bool leaves_spare(const tcp::socket& socket, Purpose purpose);
 
   const LimitConfig& limits_;
   Log& log_;

@@ -13,6 +13,8 @@ class InputRate {
   using Steady = std::chrono::steady_clock;
   /// What may come at once after a pause: a second's worth. 0 bytes a second: no limit.
   explicit InputRate(std::size_t bytes_per_s) : rate_(static_cast<double>(bytes_per_s)), tokens_(rate_) {}
+  /// From now on.
+  void use(std::size_t bytes_per_s) { rate_ = static_cast<double>(bytes_per_s); }
 
   /// `bytes` were read; 0 = read on.
   Steady::duration pause_after(std::size_t bytes, Steady::time_point now) {

@@ -13,7 +13,7 @@ Result<PoseSample> decode_pose_datagram(BytesView datagram) {
 
 tl::expected<Request, RefusedRequest> decode_request(BytesView bytes) {
   v1::Request message;
-  if (!parse(message, bytes)) return tl::unexpected(RefusedRequest{0, "message is not a Request"});
+  if (!parse(message, bytes)) return tl::unexpected(RefusedRequest{0, "message is not a Request", false, false});
   return from(message);
 }
 

@@ -50,7 +50,8 @@ Result<PoseSample> decode_pose_datagram(BytesView datagram);
 struct RefusedRequest {  // a Response can still name it
   std::uint64_t id = 0;
   std::string why;
-  bool pose = false;  // it should have been a pose
+  bool pose = false;        // it should have been a pose
+  bool is_protobuf = true;  // a Request, if a wrong one
 };
 /// One message of the stream, without its length. A message that is not protobuf has id 0.
 tl::expected<Request, RefusedRequest> decode_request(BytesView message);

@@ -135,6 +135,12 @@ Result<PoseSample> parse_json_pose(std::string_view line) {
   return sample_from(object);
 }
 
+bool is_json_object(std::string_view line) {
+  const auto first = line.find_first_not_of(" \t\r\n");
+  return first != std::string_view::npos && line[first] == '{' && line.size() <= longest_line && !too_deep(line) &&
+         json::accept(line.begin(), line.end());
+}
+
 void LineParser::feed(std::span<const std::byte> received) {
   buffer_.erase(0, start_);  // once for all lines that next() gave out
   start_ = 0;
@@ -160,6 +166,11 @@ std::optional<LineParser::Line> LineParser::next() {
     if (!text.empty() && text.back() == '\r') text.pop_back();
     if (text.find_first_not_of(" \t") != std::string::npos) return Line{std::move(text), false};
   }
+}
+
+bool LineParser::may_become_object() const {
+  const auto first = buffer_.find_first_not_of(" \t\r\n", start_);
+  return first == std::string::npos || buffer_[first] == '{';
 }
 
 }  // namespace sonar::control

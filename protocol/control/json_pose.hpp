@@ -22,6 +22,8 @@ inline constexpr std::size_t longest_line = 4096;
 ///   frame       "NED_FRD" (default, as ArduPilot) or "ENU_FLU": then position, velocity and attitude are ENU and FLU
 ///   vehicle     name, may be absent when there is one vehicle
 Result<PoseSample> parse_json_pose(std::string_view line);
+/// Whether the line is a JSON object at all, whatever its keys: what is not speaks another protocol.
+bool is_json_object(std::string_view line);
 
 /// Cuts a byte stream into lines. A line beyond the limit is swallowed to its end and reported once.
 class LineParser {
@@ -32,6 +34,9 @@ class LineParser {
   };
   void feed(std::span<const std::byte> received);
   std::optional<Line> next();
+  /// The line that has begun can still become a JSON object: only blanks have come of it, or its first sign is a brace. A request
+  /// line of HTTP never can.
+  bool may_become_object() const;
 
  private:
   std::string buffer_;     // never longer than one line and one read

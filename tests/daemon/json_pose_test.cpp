@@ -81,6 +81,13 @@ TEST(JsonPose, EveryTruncationIsRefusedQuietly) {
   EXPECT_EQ(why(line), "accepted");
 }
 
+TEST(JsonPose, WhatIsNoObjectIsKnownFromItsFirstSign) {
+  EXPECT_TRUE(is_json_object("{}") && is_json_object(R"( {"frame":"NWU"})"));
+  for (const std::string line : {"", "[]", "3", "{", "{\"a\":}", "POST / HTTP/1.1", "{} {}"})
+    EXPECT_FALSE(is_json_object(line)) << line;
+  EXPECT_FALSE(is_json_object("{" + std::string(2000, '[')));
+}
+
 std::span<const std::byte> bytes(const std::string& s) { return std::as_bytes(std::span(s.data(), s.size())); }
 
 TEST(LineParser, EverySplitGivesTheSameLines) {
@@ -94,6 +101,19 @@ TEST(LineParser, EverySplitGivesTheSameLines) {
     }
     ASSERT_EQ(lines, (std::vector<std::string>{"one", "two", "three"})) << "cut at " << cut;
   }
+}
+
+TEST(LineParser, ARequestLineIsKnownBeforeItEnds) {
+  LineParser parser;
+  EXPECT_TRUE(parser.may_become_object());
+  parser.feed(bytes("{\"position\":[0,0,0]}\n  \r\n {\"pos"));
+  EXPECT_TRUE(parser.next());
+  EXPECT_FALSE(parser.next());
+  EXPECT_TRUE(parser.may_become_object());
+  parser.feed(bytes("\n PO"));
+  EXPECT_TRUE(parser.next());
+  EXPECT_FALSE(parser.next());
+  EXPECT_FALSE(parser.may_become_object());
 }
 
 TEST(LineParser, ManyLinesInOneReadTakeTimeInProportion) {

@@ -134,6 +134,52 @@ TEST(Limits, TheLastDescriptorsAreNotForClients) {
   setrlimit(RLIMIT_NOFILE, &was);
 }
 
+asio::awaitable<void> let_in(Admission& admission, tcp::acceptor& acceptor, Admission::Purpose purpose,
+                             std::vector<tcp::socket>& in) {
+  while (auto socket = co_await admission.next_visitor(acceptor, purpose)) in.push_back(*std::move(socket));
+}
+
+TEST(Limits, TheLastDescriptorsAreNotForPosesAndHalfOfThemForControl) {
+  LimitConfig limits;
+  limits.spare_descriptors = 30;
+  std::string said;
+  LogOptions options;
+  options.sink = [&](LogLevel, const std::string& line) { said += line; };
+  Log log(options);
+  Admission admission(limits, log);
+  asio::io_context io;
+  rlimit was{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &was), 0);
+  const auto visited = [&](Admission::Purpose purpose) {
+    tcp::acceptor acceptor(io, {asio::ip::make_address(own_address()), 0});
+    std::vector<tcp::socket> in, visitors;
+    asio::co_spawn(io, let_in(admission, acceptor, purpose, in), asio::detached);
+    const int next = ::open("/dev/null", O_RDONLY);
+    ::close(next);
+    rlimit low = was;
+    low.rlim_cur = static_cast<rlim_t>(next) + 40;
+    EXPECT_EQ(setrlimit(RLIMIT_NOFILE, &low), 0);
+    for (int i = 0; i < 20; ++i) {  // two descriptors each: ours and theirs
+      visitors.emplace_back(io);
+      visitors.back().connect(acceptor.local_endpoint());
+      io.restart();
+      io.poll();
+    }
+    setrlimit(RLIMIT_NOFILE, &was);
+    acceptor.close();
+    io.restart();
+    io.run();
+    return in.size();
+  };
+  const std::size_t poses = visited(Admission::Purpose::client), control = visited(Admission::Purpose::control);
+  EXPECT_GT(poses, 0u);
+  EXPECT_LE(poses, 6u);
+  EXPECT_GT(control, poses);
+  EXPECT_LE(control, 14u);
+  EXPECT_EQ(admission.refused_for_descriptors(), 40 - poses - control);
+  EXPECT_EQ(count(said, "file descriptors run out"), 1u);
+}
+
 TEST(Threads, ThatComputeAreNiceAndSoAreThoseTheyStart) {
   int own = 0, started = 0;
   const auto niceness = [] { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); };

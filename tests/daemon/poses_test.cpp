@@ -197,7 +197,9 @@ TEST(PoseRules, WallStampsFollowAClockThatWasSetAfterTheStart) {
   config.json.enabled = false;
   config.protobuf.at = {*parse_ipv4(own_address()), 0};
   PoseIntake intake(world, clock, log, [&io] { io.stop(); });
-  PoseServer server(io, config, intake, log);
+  const LimitConfig limits;
+  Admission admission(limits, log);
+  PoseServer server(io, config, limits, admission, intake, log);
   ASSERT_TRUE(server.open());
   server.start();
   const auto accepted_at = [&](Time stamp) {

@@ -56,7 +56,8 @@ class ControlBench {
     };
     log_ = std::make_unique<Log>(options);
     intake_ = std::make_unique<PoseIntake>(world, clock_, *log_, [] {});
-    server = std::make_unique<ControlServer>(io, config, limits, operations, events, *intake_, *log_);
+    admission_ = std::make_unique<Admission>(limits, *log_);
+    server = std::make_unique<ControlServer>(io, config, limits, *admission_, operations, events, *intake_, *log_);
     const auto opened = server->open();
     if (!opened) throw std::runtime_error(opened.error().text);
     server->start();
@@ -100,6 +101,7 @@ class ControlBench {
   std::string log_text_;
   std::unique_ptr<Log> log_;
   std::unique_ptr<PoseIntake> intake_;
+  std::unique_ptr<Admission> admission_;
   std::thread thread_;
 };
 

@@ -14,10 +14,11 @@ struct Listeners : ::testing::Test {
     options.sink = [this](LogLevel, const std::string& line) { log_text += line + "\n"; };
     log = std::make_unique<Log>(options);
     intake = std::make_unique<PoseIntake>(world, clock, *log, [] {});
+    admission = std::make_unique<Admission>(limits, *log);
     config.stream.at = config.http.at = {*parse_ipv4(own_address()), 0};
   }
   Result<void> open() {
-    server = std::make_unique<ControlServer>(io, config, limits, operations, events, *intake, *log);
+    server = std::make_unique<ControlServer>(io, config, limits, *admission, operations, events, *intake, *log);
     return server->open();
   }
   asio::io_context io{1};
@@ -30,6 +31,7 @@ struct Listeners : ::testing::Test {
   std::string log_text;
   std::unique_ptr<Log> log;
   std::unique_ptr<PoseIntake> intake;
+  std::unique_ptr<Admission> admission;
   std::unique_ptr<ControlServer> server;
 };
 

@@ -80,6 +80,13 @@ TEST(HttpRules, Routes) {
     EXPECT_EQ(route(none).kind, Kind::unknown) << none;
 }
 
+TEST(HttpRules, ARequestIsKnownByItsFirstBytes) {
+  for (const char* begins : {"GET / HT", "POST /", "OPTIONS ", "PUT *", "HEAD /x"})
+    EXPECT_TRUE(begins_http_request(begins)) << begins;
+  for (const char* other : {"", "GET", "GETX /", "OPTIONS", "\x08\x12\x06", "get / HT"})
+    EXPECT_FALSE(begins_http_request(other)) << other;
+}
+
 TEST(HttpRules, Subscriptions) {
   const auto of = [](const char* target) { return subscription_of(*parse_target(target)); };
   EXPECT_TRUE(of("/e")->pings && of("/e")->clients && of("/e")->poses && of("/e")->scene) << "nothing said: everything";

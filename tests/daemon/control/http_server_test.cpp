@@ -1,6 +1,7 @@
 // HTTP over loopback: documents, operations, events, keep-alive, limits, token, stop.
 #include <gmock/gmock.h>
 
+#include <list>
 #include <nlohmann/json.hpp>
 
 #include "tests/daemon/control/control_bench.hpp"
@@ -261,6 +262,30 @@ TEST(ControlHttp, TooManyAreToldSoAndTheSilentGiveWay) {
   EXPECT_EQ(d.get("/healthz").status, 200);
   a.tcp.read_to_end();
   EXPECT_TRUE(a.tcp.ended);
+}
+
+TEST(ControlHttp, StrangersPushOutNobodyWhoShowedTheToken) {
+  const TokenFile file;
+  ControlConfig config;
+  config.token_file = file.path;
+  LimitConfig limits;
+  limits.control_clients = 3;
+  ControlBench bench(config, limits);
+  const std::string token = std::string("Authorization: Bearer ") + TokenFile::text + "\r\n";
+  HttpClient events(bench);
+  events.send("GET", "/api/v1/events?pings=1", "", token);
+  ASSERT_FALSE(events.until("\r\n\r\n").empty());
+  std::this_thread::sleep_for(milliseconds(1200));  // silent long enough to be pushed out
+  std::list<Client> strangers;
+  for (int i = 0; i < 40; ++i) strangers.emplace_back(bench.address, bench.http_port());
+  for (int i = 0; i < 20; ++i) {
+    HttpClient asks(bench);
+    ASSERT_EQ(asks.get("/api/v1/status", token).status, 200) << "request " << i;
+    asks.tcp.finish_sending();
+    EXPECT_TRUE(asks.tcp.read_to_end());
+  }
+  bench.on_io([&] { bench.events.tell(ping_event(1)); });
+  EXPECT_FALSE(events.until("\r\n").empty()) << "it keeps its place";
 }
 
 TEST(ControlHttp, ThoseTurnedAwayReadWhyWhateverTheyHaveSent) {

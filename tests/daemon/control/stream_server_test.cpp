@@ -224,6 +224,87 @@ TEST(ControlStream, StrangersGetFourKilobytesAndThePlacesGoToTheBusy) {
   EXPECT_TRUE(b.next());
 }
 
+TEST(ControlStream, BytesThatAreNoProtobufEndTheConnection) {
+  ControlBench bench;
+  StreamClient client(bench);
+  client.greet();
+  client.send({2, control::RemoveObject{}});
+  EXPECT_EQ(client.next()->code, StatusCode::refused) << "wrong, but protobuf: it costs the answer only";
+  client.tcp.send(control::delimited(bytes_of("\xff\xff\xff")));
+  client.send({3, control::GetStatus{}});
+  const auto last = client.next();
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->code, StatusCode::refused);
+  EXPECT_EQ(last->text, "message is not a Request");
+  EXPECT_FALSE(client.next());
+  EXPECT_TRUE(client.tcp.ended);
+  EXPECT_EQ(bench.operations.asked, 0) << "nothing after them counts";
+}
+
+TEST(ControlStream, HttpIsKnownAndEnds) {
+  ControlBench bench;
+  for (const std::string begins : {"POST /", "GET /%08%01"}) {
+    Client page(bench.address, bench.stream_port());
+    page.send(begins.substr(0, 2));
+    page.send(begins.substr(2));  // no whole line, no whole message: it need not come
+    page.read_to_end();
+    EXPECT_TRUE(page.ended);
+    EXPECT_EQ(page.bytes_read, 0u);
+  }
+  EXPECT_THAT(bench.log_text(), HasSubstr("HTTP on the control stream"));
+}
+
+TEST(ControlStream, StrangersPushOutNobodyWhoShowedTheToken) {
+  const TokenFile file;
+  ControlConfig config;
+  config.token_file = file.path;
+  LimitConfig limits;
+  limits.control_clients = 3;
+  ControlBench bench(config, limits);
+  std::list<StreamClient> subscribers;
+  for (int i = 0; i < 2; ++i) {
+    subscribers.emplace_back(bench).greet(TokenFile::text);
+    subscribers.back().send({2, control::Subscribe{true, false, false, false}});
+    ASSERT_TRUE(subscribers.back().next());
+  }
+  std::this_thread::sleep_for(milliseconds(1200));  // silent long enough to be pushed out
+  std::list<Client> strangers;
+  for (int i = 0; i < 40; ++i) strangers.emplace_back(bench.address, bench.stream_port());
+  for (int i = 0; i < 20; ++i) {
+    StreamClient asks(bench);
+    asks.greet(TokenFile::text);
+    asks.send({2, control::GetStatus{}});
+    ASSERT_TRUE(asks.next()) << "request " << i;
+    asks.tcp.finish_sending();
+    EXPECT_TRUE(asks.tcp.read_to_end());
+  }
+  bench.on_io([&] { bench.events.tell(ping_event(1)); });
+  for (StreamClient& s : subscribers) EXPECT_TRUE(s.next()) << "they keep their places";
+}
+
+TEST(ControlStream, WithoutAPlaceTheTokenIsAnsweredThatItIsFull) {
+  const TokenFile file;
+  ControlConfig config;
+  config.token_file = file.path;
+  LimitConfig limits;
+  limits.control_clients = 1;
+  ControlBench bench(config, limits);
+  StreamClient busy(bench);
+  busy.greet(TokenFile::text);
+  for (int i = 0; i < 50; ++i) {  // on a slow machine it may have been silent for a second
+    StreamClient late(bench);
+    late.send({1, control::Hello{1, "test", TokenFile::text}});
+    const auto answer = late.next();
+    ASSERT_TRUE(answer);
+    if (answer->code == StatusCode::ok) continue;
+    EXPECT_EQ(answer->code, StatusCode::failed);
+    EXPECT_THAT(answer->text, HasSubstr("all places are taken"));
+    EXPECT_TRUE(late.tcp.read_to_end());
+    return;
+  }
+  FAIL() << "everybody was let in";
+}
+
 TEST(ControlStream, StopsWithClientsSubscribersAndWorkUnderWay) {
   ControlBench bench;
   StreamClient idle(bench), subscriber(bench), waiting(bench);
