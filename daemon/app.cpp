@@ -54,6 +54,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       signals_(io_),
       house_timer_(io_),
       stop_timer_(io_),
+      reload_timer_(io_),
       notify_(
           io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {
   recordings_.use_scene(*changes_.scene());
@@ -106,7 +107,7 @@ void App::wait_for_signal() {
     if (signal == SIGHUP && stopping_) {
       on_change();  // look() may have cancelled before we wait again
     } else if (signal == SIGHUP) {
-      reload();
+      on_hangup();
     } else {
       if (stopping_) ::_exit(128 + signal);
       stop(signal == SIGINT ? "interrupted" : "terminated");
@@ -127,6 +128,7 @@ void App::stop(const std::string& why) {
   mavlink_server_.stop();
   control_.stop();
   house_timer_.cancel();
+  reload_timer_.cancel();
   changes_.stop();
   fleet_.stop();
   recordings_.finish();
@@ -211,6 +213,9 @@ asio::awaitable<void> App::keep_house() {
       log_.warning(stale.sentence);
       if (events_.heard()) events_.tell({control::PoseEvent{stale.vehicle, true, stale.sentence}});
     }
+    const bool loads_slowly = changes_.building_for() > config_.limits.load;
+    if (loads_slowly && !slow_load_said_) log_.warning(operations_.trouble());
+    slow_load_said_ = loads_slowly;
     fleet_.sweep();
     for (Device& d : fleet_.devices()) d.forget_who_left();
     error_code ec;

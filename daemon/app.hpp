@@ -47,6 +47,8 @@ class App {
  public:
   /// After stop() run() returns by then, whatever is still under way.
   static constexpr std::chrono::milliseconds stop_limit{1800};
+  /// From the beginning of one reload to that of the next, however often it is asked for.
+  static constexpr std::chrono::milliseconds reload_pause{500};
 
   /// `make_engine` is kept: later scenes get theirs on another thread. What it refers to must outlive the App.
   App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);
@@ -86,7 +88,8 @@ class App {
   bool enough_served() const;
   void say_notes();
   void wait_for_signal();
-  void reload();  // reload.cpp, as the next
+  void on_hangup();  // reload.cpp, as the next
+  void reload();
   void take_over(Config next);
   std::string status_line() const;
   asio::awaitable<void> keep_house();
@@ -112,10 +115,13 @@ class App {
   AppOperations operations_;
   ControlServer control_;
   asio::signal_set signals_;
-  asio::steady_timer house_timer_, stop_timer_;
+  asio::steady_timer house_timer_, stop_timer_, reload_timer_;
   Notify notify_;
   bool look_posted_ = false, stopping_ = false;
-  int reloads_ = 0;  // asked for and not yet done
+  int reloads_ = 0;            // begun, or waiting for one that is under way
+  bool reload_waits_ = false;  // for reload_pause to be over
+  std::chrono::steady_clock::time_point no_reload_before_{};
+  bool slow_load_said_ = false;
   int exit_code_ = 0;
 };
 

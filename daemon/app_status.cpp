@@ -50,6 +50,10 @@ std::string AppOperations::trouble() const {
   if (under_way > longest_ping)
     return "the simulation has been at one ping for " +
            std::to_string(std::chrono::duration_cast<std::chrono::seconds>(under_way).count()) + " s";
+  if (const auto loading = parts_.changes.building_for(); loading > parts_.config.limits.load)
+    return "a change of the scene has been loading for " +
+           std::to_string(std::chrono::duration_cast<std::chrono::seconds>(loading).count()) +
+           " s, longer than limits.load_s; reloads and changes of the scene wait for it";
   return parts_.fleet.trouble();
 }
 

@@ -63,6 +63,22 @@ std::vector<std::string> keep_what_needs_a_restart(const Config& now, Config& ne
   return keys;
 }
 
+/// A storm of them is as good as two: one now, one for all that come before its pause is over.
+void App::on_hangup() {
+  if (reload_waits_) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (now >= no_reload_before_) {
+    no_reload_before_ = now + reload_pause;
+    return reload();
+  }
+  reload_waits_ = true;
+  reload_timer_.expires_at(no_reload_before_);
+  reload_timer_.async_wait([this](const error_code& ec) {
+    reload_waits_ = false;
+    if (!ec && !stopping_) on_hangup();
+  });
+}
+
 /// The file is read and its scene made ready where nobody waits for it; then everything changes in one moment.
 void App::reload() {
   if (!options_.read_config || !options_.load_scene) return log_.info("reload: there is no configuration file; nothing changed");

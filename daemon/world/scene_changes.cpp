@@ -28,6 +28,10 @@ void SceneChanges::stop() {
   waiting_.clear();
 }
 
+std::chrono::steady_clock::duration SceneChanges::building_for() const {
+  return building_ ? std::chrono::steady_clock::now() - building_since_ : std::chrono::steady_clock::duration{};
+}
+
 void SceneChanges::submit(Change change) {
   if (stopped_) return;
   if (!change.make && !busy()) return change.done({});
@@ -39,6 +43,7 @@ void SceneChanges::begin() {
   under_way_ = true;
   if (!waiting_.front().make) return finish(Built{scene_, nullptr});
   building_ = true;
+  building_since_ = std::chrono::steady_clock::now();
   // Without `done`: what that holds (a connection, say) must not end on another thread.
   asio::post(thread_, [this, make = waiting_.front().make, now = scene_] {
     auto built = std::make_shared<Result<Built>>(build(make, now));

@@ -6,6 +6,7 @@
 // time that moment lies before the next step, which waits for it.
 #pragma once
 
+#include <chrono>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -44,6 +45,8 @@ class SceneChanges {
   bool is_full() const { return waiting_.size() >= most_waiting; }
   /// The thread is at work, perhaps for a Change that nobody waits for any more: the destructor would wait for it.
   bool is_building() const { return building_; }
+  /// How long it has been at the change that is under way; 0 = none is.
+  std::chrono::steady_clock::duration building_for() const;
   void stop();
 
   const ScenePointer& scene() const { return scene_; }
@@ -66,6 +69,7 @@ class SceneChanges {
   std::deque<Change> waiting_;  // the first is under way
   bool under_way_ = false;      // until its `done` has returned, which may submit another
   bool stopped_ = false, building_ = false;
+  std::chrono::steady_clock::time_point building_since_{};
   asio::thread_pool thread_{1};
 };
 

@@ -4,9 +4,11 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <fstream>
 #include <future>
 #include <thread>
 
+#include "core/base/memory_left.hpp"
 #include "daemon/reload.hpp"
 #include "tests/daemon/loopback.hpp"
 
@@ -61,6 +63,64 @@ TEST(Reload, AStormOfHangupsIsReadTwice) {
   ASSERT_TRUE(reload(daemon, "reloaded:", 3)) << "and a later one again";
   daemon.stop();
   EXPECT_EQ(times(daemon.log_text(), "reloaded:"), 3u) << "the first, one for all that came meanwhile, the later one";
+}
+
+TEST(Reload, AStormOfQuickOnesIsNoMoreThanTwoASecond) {
+  Daemon daemon(with_file());
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(client.next_ping());
+  const auto begin = Steady::now();
+  while (Steady::now() - begin < milliseconds(1200)) {
+    ASSERT_EQ(kill(getpid(), SIGHUP), 0);
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  ASSERT_TRUE(client.next_ping());
+  const double lasted_s = std::chrono::duration<double>(Steady::now() - begin).count();
+  EXPECT_GE(times(daemon.log_text(), "reloaded:"), 2u);
+  EXPECT_LE(static_cast<double>(times(daemon.log_text(), "reloaded:")), 2 + 2 * lasted_s);
+  daemon.stop();
+}
+
+TEST(Reload, ASceneThatTheMemoryDoesNotSufficeForKeepsEverything) {
+  const std::filesystem::path root = std::filesystem::path(::testing::TempDir()) / own_address();
+  std::filesystem::create_directories(root / "proc");
+  std::ofstream(root / "proc/meminfo") << "MemAvailable: 1 kB\n";
+  DaemonSetup setup = with_file();
+  setup.options.load_scene = [root](const SceneFile&) -> Result<ScenePointer> {
+    memory_root() = root;  // what is left once the files are read
+    return small_scene(true);
+  };
+  Daemon daemon(setup);
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(client.next_ping());
+  ASSERT_TRUE(reload(daemon, "of memory, and 0 MiB are left to this process"));
+  EXPECT_THAT(daemon.log_text(), HasSubstr("the configuration stays as it was"));
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
+  memory_root() = "/";
+  std::filesystem::remove_all(root);
+}
+
+TEST(Reload, ALoadThatLastsTooLongIsTrouble) {
+  std::promise<void> let_go;
+  DaemonSetup setup = with_file();
+  setup.more = "limits: {load_s: 1}\n";
+  setup.options.load_scene = [goes = let_go.get_future().share()](const SceneFile&) -> Result<ScenePointer> {
+    goes.wait();
+    return std::make_shared<const Scene>();
+  };
+  Daemon daemon(setup);
+  const auto trouble = [&] {
+    std::string text;
+    daemon.on_io_thread([&] { text = daemon.app().operations().trouble(); });
+    return text;
+  };
+  ASSERT_EQ(kill(getpid(), SIGHUP), 0);
+  EXPECT_TRUE(eventually([&] { return trouble().find("a change of the scene has been loading for 1 s") == 0; }));
+  EXPECT_TRUE(eventually([&] { return times(daemon.log_text(), "longer than limits.load_s") == 1; })) << "said once";
+  let_go.set_value();
+  EXPECT_TRUE(eventually([&] { return trouble().empty(); }));
 }
 
 TEST(Reload, UntouchedSonarsStreamOnWhileOthersComeChangeAndGo) {
