@@ -28,6 +28,9 @@ struct SourceOptions {
   HeadWish head;                             // the same for a BlueView head
   double connect_patience_s = 2;
   double silence_limit_s = 10;  // no byte for so long is an error
+  bool observe = false;         // look on: take no client's place, ask for nothing
+  std::string control;          // HOST:PORT of sonard's control stream, which says where observers connect; empty = its default
+  std::filesystem::path token_file;
 };
 
 struct ListenOptions {

@@ -23,12 +23,13 @@ std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_
 
 class Listener {
  public:
-  Listener(const ListenOptions& options, PingStream stream)
+  Listener(const ListenOptions& options, OpenedStream opened)
       : options_(options),
-        stream_(std::move(stream)),
+        stream_(std::move(opened.stream)),
         asked_(stream_.is_blueview() ? std::nullopt : options.source.asked),
         heard_(stream_.is_blueview()),
-        log_(asked_) {}
+        log_(asked_),
+        start_(opened.connected_at) {}
 
   /// Until the wished time or number of pings is over; a sentence when the device stops before.
   Result<void> run() {
@@ -99,7 +100,7 @@ class Listener {
   std::optional<oculus::FireRequest> asked_;
   bool heard_;
   PingLog log_;
-  Clock::time_point start_ = Clock::now(), last_message_ = start_;
+  Clock::time_point start_, last_message_ = Clock::now();
   std::optional<AnyPing> last_ping_;
   std::optional<double> first_ping_after_s_;
 };
@@ -128,15 +129,17 @@ Result<void> report(const ListenOptions& options, const Listener& listener) {
 
 }  // namespace
 
-Result<void> listen(const ListenOptions& options) {
+Result<void> listen(const ListenOptions& given) {
+  ListenOptions options = given;
   const Result<Endpoint> device = find_device(options.source, !options.json);
   if (!device) return tl::unexpected(device.error());
-  auto stream = open_stream(options.source, *device);
-  if (!stream) return tl::unexpected(stream.error());
+  auto opened = open_stream(options.source, *device);
+  if (!opened) return tl::unexpected(opened.error());
+  if (opened->observes) options.source.asked.reset(), options.triggered = false;
   if (!options.record.empty())
-    if (Result<void> recording = stream->record_to(options.record); !recording) return recording;
-  if (!options.json) std::printf("connected to %s\n", stream->about().c_str());
-  Listener listener(options, std::move(*stream));
+    if (Result<void> recording = opened->stream.record_to(options.record); !recording) return recording;
+  if (!options.json) std::printf("connected to %s\n", opened->stream.about().c_str());
+  Listener listener(options, *std::move(opened));
   const Result<void> ran = listener.run();
   const Result<void> reported = report(options, listener);
   return ran ? reported : ran;

@@ -153,6 +153,12 @@ Read read_some(const Socket& socket, std::span<std::byte> into, std::chrono::mil
   return {Wait::closed, 0, size < 0 ? std::strerror(errno) : ""};
 }
 
+bool ends_without_a_byte(const Socket& socket, std::chrono::milliseconds patience) {
+  pollfd ready{socket.fd(), POLLIN, 0};
+  std::byte first{};
+  return ::poll(&ready, 1, static_cast<int>(patience.count())) == 1 && ::recv(socket.fd(), &first, 1, MSG_PEEK) <= 0;
+}
+
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t size = ::send(socket.fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);

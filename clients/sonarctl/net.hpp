@@ -59,6 +59,8 @@ struct Read {
   std::string error;  // why a connection is closed, when it was not simply ended
 };
 Read read_some(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience);
+/// Nothing is read. False when a byte is there, or neither comes within `patience`.
+bool ends_without_a_byte(const Socket& socket, std::chrono::milliseconds patience);
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);
 
 }  // namespace sonar::clients

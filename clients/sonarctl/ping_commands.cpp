@@ -18,7 +18,9 @@ using text::whole_number;
 struct SourceArguments {
   std::string address;
   std::uint16_t port = 0;  // 0 = the usual ones
-  bool discover = false, as_it_is = false, is_blueview = false;
+  bool discover = false, as_it_is = false, observe = false, is_blueview = false;
+  std::string control;
+  std::filesystem::path token_file;
   std::string recording;
   double patience_s = 2;
   FireArguments fire;
@@ -33,6 +35,10 @@ struct SourceArguments {
     app.add_option("--wait", patience_s, "seconds to go on trying to connect")->check(number(0))->capture_default_str();
     if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
     app.add_flag("--as-it-is", as_it_is, "send no settings, only look (many sonars then send no pings)");
+    app.add_flag("--observe", observe, "look on: take no client's place, ask for nothing, wait for its clients' pings");
+    app.add_option("--control", control, "HOST:PORT of sonard's control stream, which says where observers connect")
+        ->check(clients::address());
+    app.add_option("--token-file", token_file, "the daemon's control.token_file, when it has one");
     fire.add_to(app);
   }
 
@@ -51,6 +57,9 @@ struct SourceArguments {
     source.discover = discover;
     source.recording = recording;
     source.connect_patience_s = patience_s;
+    source.observe = observe;
+    source.control = control;
+    source.token_file = token_file;
     if (!as_it_is && recording.empty()) source.asked = fire.request();
     if (!as_it_is) source.head = fire.head_wish();
     return source;

@@ -34,6 +34,10 @@ Result<PingStream> PingStream::open(const Endpoint& device, SonarKind kind, Sett
 
 Result<void> PingStream::ask_again() { return asked_ ? write_all(socket_, oculus::make_fire(*asked_)) : Result<void>{}; }
 
+bool PingStream::is_turned_away(std::chrono::milliseconds patience) const {
+  return !blueview_ && ends_without_a_byte(socket_, patience);
+}
+
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (blueview_)
     return failure(ErrorKind::usage, "only the bytes of Oculus sonars are recorded, and there is a BlueView head at " +

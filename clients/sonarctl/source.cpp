@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "clients/sonarctl/control/control_client.hpp"
 #include "core/text/format.hpp"
 
 namespace sonar::clients {
@@ -13,6 +14,7 @@ namespace {
 
 /// Pings that may still be under way with older settings when ours arrive.
 constexpr int stale_pings = 4;
+constexpr std::chrono::milliseconds first_byte_within{500};  // who has no place for us says so at once
 
 Result<AnyPing> fetch_recorded(const SourceOptions& source, std::size_t number) {
   auto pings = read_recording(source.recording);
@@ -22,11 +24,46 @@ Result<AnyPing> fetch_recorded(const SourceOptions& source, std::size_t number) 
                                        ", not " + std::to_string(number));
 }
 
-Result<AnyPing> fetch_live(const SourceOptions& source) {
+/// Where its sonard lets observers connect.
+Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& device) {
+  auto control = ControlClient::open({source.control, source.token_file});
+  if (!control) return tl::unexpected(control.error());
+  const auto status = control->status();
+  if (!status) return tl::unexpected(status.error());
+  const std::string port = ":" + std::to_string(device.port);
+  for (const control::SonarStatus& s : status->sonars) {
+    if (s.listens != text_from(device) && s.advertised + port != text_from(device) && s.listens != "0.0.0.0" + port) continue;
+    if (s.observers.empty())
+      return failure(ErrorKind::unavailable, "sonard has no port for observers of it (observers: in its configuration)");
+    auto at = parse_endpoint(s.observers, device);
+    if (at) at->host = device.host;
+    return at;
+  }
+  return failure(ErrorKind::unavailable, "the sonard at " + text_from(control->at()) + " serves no sonar at " +
+                                             text_from(device) + "; --control names another");
+}
+
+Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device) {
+  if (source.kind == SonarKind::blueview)
+    return failure(ErrorKind::usage, "only Oculus sonars have observers; a BlueView head has places for several hosts");
+  const auto at = observers_of(source, device);
+  if (!at) return tl::unexpected(at.error());
+  const auto now = std::chrono::steady_clock::now();
+  auto stream = PingStream::open(*at, SonarKind::oculus, {}, milliseconds_from(source.connect_patience_s));
+  if (!stream) return tl::unexpected(stream.error());
+  std::fprintf(stderr, "sonarctl: looking on at %s: nothing is asked of the sonar, pings come as its clients want them\n",
+               text_from(*at).c_str());
+  return OpenedStream{*std::move(stream), now, true};
+}
+
+Result<AnyPing> fetch_live(const SourceOptions& given) {
+  SourceOptions source = given;
   const Result<Endpoint> device = find_device(source, false);
   if (!device) return tl::unexpected(device.error());
-  auto stream = open_stream(source, *device);
-  if (!stream) return tl::unexpected(stream.error());
+  auto opened = open_stream(source, *device);
+  if (!opened) return tl::unexpected(opened.error());
+  PingStream* const stream = &opened->stream;
+  if (opened->observes) source.asked.reset();
   const auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
   bool heard = stream->is_blueview();  // it greeted
   for (int stale = 0; interrupted == 0;) {
@@ -52,6 +89,21 @@ Result<AnyPing> fetch_live(const SourceOptions& source) {
 
 }  // namespace
 
+Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device) {
+  if (source.observe) return observe(source, device);
+  const auto now = std::chrono::steady_clock::now();
+  auto stream =
+      PingStream::open(device, source.kind, {source.asked, source.head}, milliseconds_from(source.connect_patience_s));
+  if (!stream) return tl::unexpected(stream.error());
+  if (!stream->is_turned_away(first_byte_within)) return OpenedStream{*std::move(stream), now};
+  auto observed = observe(source, device);
+  if (observed) return observed;
+  return failure(ErrorKind::io,
+                 "the device closed the connection before a ping came: another client may hold it (clients.max); "
+                 "nor can it be looked on at: " +
+                     observed.error().text);
+}
+
 std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::milliseconds(static_cast<std::int64_t>(s * 1000)); }
 
 Error silence(const SourceOptions& source, const Endpoint& device, bool heard, const std::string& what, const std::string& hint) {
@@ -61,10 +113,6 @@ Error silence(const SourceOptions& source, const Endpoint& device, bool heard, c
                                       ": is that an Oculus sonar?" +
                                       (source.asked ? "" : " Some send nothing before settings come (--as-it-is sends none).") +
                                       " sonard's banner names the address of each sonar"};
-}
-
-Result<PingStream> open_stream(const SourceOptions& source, const Endpoint& device) {
-  return PingStream::open(device, source.kind, {source.asked, source.head}, milliseconds_from(source.connect_patience_s));
 }
 
 Result<Endpoint> find_device(const SourceOptions& source, bool say) {

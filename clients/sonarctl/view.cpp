@@ -115,9 +115,9 @@ class LiveView {
 Result<void> view_live(const ViewOptions& options) {
   const Result<Endpoint> device = find_device(options.source, false);
   if (!device) return tl::unexpected(device.error());
-  auto stream = open_stream(options.source, *device);
-  if (!stream) return tl::unexpected(stream.error());
-  const Result<void> ran = LiveView(options, std::move(*stream)).run();
+  auto opened = open_stream(options.source, *device);
+  if (!opened) return tl::unexpected(opened.error());
+  const Result<void> ran = LiveView(options, std::move(opened->stream)).run();
   if (!options.terminal && terminal_facts().is_terminal) std::puts("");
   return ran;
 }

@@ -7,6 +7,7 @@
 #include "core/text/decimal.hpp"
 #include "core/text/strict_yaml.hpp"
 #include "daemon/config/config_parts.hpp"
+#include "daemon/config/products.hpp"
 #include "daemon/config/read_trajectory.hpp"
 
 namespace sonar {
@@ -119,6 +120,14 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
                                                                   {"queue", WhenClientsFull::queue}});
   } else if (profile) {
     sonar.max_clients = profile->vendor->default_max_clients();
+  }
+  const int observers_of_product = profile ? default_max_observers(*profile->vendor) : 0;
+  sonar.max_observers = observers_of_product;
+  if (Node node = map.optional("observers")) {
+    Map observers = node.map();
+    sonar.max_observers = static_cast<int>(observers.optional("max").integer_or(observers_of_product, 0, 16));
+    sonar.observer_port = static_cast<std::uint16_t>(observers.optional("port").integer_or(0, 0, 65535));
+    if (observers_of_product == 0) sonar.max_observers = 0;
   }
   if (Node node = map.optional("outbox")) {
     Map outbox = node.map();

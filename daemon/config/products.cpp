@@ -24,6 +24,8 @@ std::string title_of(const protocol::Vendor& vendor) {
   return product.substr(0, product.find(' '));
 }
 
+int default_max_observers(const protocol::Vendor& vendor) { return vendor.default_max_clients() > 1 ? 0 : 4; }
+
 std::vector<std::string> notes_of_options(const Config& config) {
   std::vector<std::string> notes;
   for (const SonarConfig& sonar : config.sonars)
@@ -48,6 +50,7 @@ Result<void> use_product(Config& config, std::string_view profile) {
   sonar.profile = {found->vendor, *std::move(model)};
   sonar.options = *std::move(options);
   sonar.max_clients = found->vendor->default_max_clients();
+  sonar.max_observers = default_max_observers(*found->vendor);
   return {};
 }
 

@@ -13,6 +13,9 @@ namespace sonar {
 /// "Oculus", "BlueView": as the names of the vendor's products begin.
 std::string title_of(const protocol::Vendor& vendor);
 
+/// Places for those who only look on: none of a product that has places for several clients.
+int default_max_observers(const protocol::Vendor& vendor);
+
 /// A sentence for each option that the configuration gives to a sonar of another vendor. Such options have no effect: a
 /// configuration stays valid when only its `profile` is changed.
 std::vector<std::string> notes_of_options(const Config& config);

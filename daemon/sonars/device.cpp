@@ -44,6 +44,7 @@ Device::Device(DeviceContext& context, const SonarConfig& config, std::uint32_t 
       beacon_timer_(context.io),
       ping_timer_(context.io),
       answers_(context.io, [this](protocol::BytesView datagram) { return vendor_.answer(datagram, state_); }),
+      observers_(context, config_, [this] { return vendor_.converse(state_, context_.clock.lived()); }),
       visits_(context.io, context.log, config.name) {
   update_state(context.clock.now());
   use_initial_settings();
@@ -69,7 +70,7 @@ Result<void> Device::open() {
       }
     }
   }
-  return {};
+  return observers_.open();
 }
 
 tcp::endpoint Device::data_endpoint() const {
@@ -81,6 +82,7 @@ void Device::start() {
   started_ = true;
   keep_accepting();
   answers_.start();
+  observers_.start();
   if (beacon_period_.count() > 0) keep_announcing();
 }
 
@@ -92,6 +94,7 @@ void Device::stop(const std::string& why) {
   ping_timer_.cancel();
   answers_.stop();
   visits_.end();
+  observers_.stop(why);
   pacer_.stop();
   beacon_.close(ec);
   if (started_) context_.recordings.end_of(config_.name, why);  // else one of the same name may go on
@@ -101,7 +104,7 @@ void Device::stop(const std::string& why) {
   for (const SessionPointer& s : sessions) s->finish(why);
 }
 
-bool Device::gone() const { return sessions_.empty() && leaving_.empty() && turning_away_ == 0 && !busy_; }
+bool Device::gone() const { return sessions_.empty() && leaving_.empty() && observers_.gone() && turning_away_ == 0 && !busy_; }
 
 // ---- settings
 
@@ -213,6 +216,7 @@ void Device::step(Time now) {
 void Device::tick_sessions() {
   const auto sessions = sessions_;
   for (const SessionPointer& s : sessions) s->tick(context_.clock.lived());
+  observers_.tick();
 }
 
 void Device::skip(std::chrono::nanoseconds by) {
@@ -292,6 +296,7 @@ void Device::on_ping(Simulator::Outcome outcome) {
     for (const SessionPointer& s : sessions_)
       for (protocol::Event& event : s->push_ping(bytes, request, made_with, context_.clock.lived()))
         wishes.emplace_back(s, std::move(event));
+    observers_.push_ping(bytes, request, made_with);
     for (const auto& [session, event] : wishes) on_event(*session, event);
     record(outcome, bytes, now);
     tell_of_ping(*outcome.ping, outcome.seconds);

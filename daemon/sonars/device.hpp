@@ -19,6 +19,7 @@
 #include "daemon/sonars/admission.hpp"
 #include "daemon/sonars/datagram_answers.hpp"
 #include "daemon/sonars/metrics.hpp"
+#include "daemon/sonars/observers.hpp"
 #include "daemon/sonars/pacer.hpp"
 #include "daemon/sonars/rate_watch.hpp"
 #include "daemon/sonars/session.hpp"
@@ -145,6 +146,7 @@ class Device final : public SessionParent {
   udp::socket beacon_;
   asio::steady_timer beacon_timer_, ping_timer_;
   DatagramAnswers answers_;
+  Observers observers_;
   std::chrono::milliseconds beacon_period_{0};
   std::vector<udp::endpoint> status_to_;
 

@@ -45,6 +45,8 @@ control::SonarStatus Device::status(Time now) const {
   s.beams = static_cast<std::uint32_t>(settings_.beam_count);
   s.rows = static_cast<std::uint32_t>(settings_.range_bin_count);
   s.in_world = compose(context_.world.vehicle_at(config_.vehicle, now), config_.mount);
+  if (const Endpoint at = observers_.at(); at.port != 0) s.observers = text_of(at);
+  s.observing = static_cast<std::uint32_t>(observers_.count());
   for (const SessionPointer& client : sessions_) s.clients.push_back(told(*client));
   s.figures = told(figures());
   return s;

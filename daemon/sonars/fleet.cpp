@@ -26,8 +26,8 @@ bool goes_on(const SonarConfig& a, const SonarConfig& b) {
          a.bind_ip == b.bind_ip && a.advertise_ip == b.advertise_ip && a.netmask == b.netmask &&
          std::equal(a.status_to.begin(), a.status_to.end(), b.status_to.begin(), b.status_to.end(), same_endpoint) &&
          a.device_id == b.device_id && a.max_clients == b.max_clients && a.when_full == b.when_full &&
-         a.outbox.depth == b.outbox.depth && a.outbox.when_full == b.outbox.when_full && a.overload == b.overload &&
-         a.options == b.options;
+         a.max_observers == b.max_observers && a.observer_port == b.observer_port && a.outbox.depth == b.outbox.depth &&
+         a.outbox.when_full == b.outbox.when_full && a.overload == b.overload && a.options == b.options;
 }
 
 Result<void> Fleet::open(const Config& config) {

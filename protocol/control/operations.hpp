@@ -82,6 +82,8 @@ struct SonarFigures {
 };
 struct SonarStatus {
   std::string name, profile, listens, advertised;
+  std::string observers;        // where they connect who only look on, as `listens`; empty = nowhere
+  std::uint32_t observing = 0;  // of them, now
   std::vector<std::string> status_to;
   bool pinging = false, transmits = true;
   double range_m = 0, rate_hz = 0, gain_db = 0, frequency_hz = 0;

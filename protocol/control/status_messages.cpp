@@ -38,6 +38,8 @@ void fill(v1::SonarStatus& out, const SonarStatus& s) {
   out.set_profile(s.profile);
   out.set_listens(s.listens);
   out.set_advertised(s.advertised);
+  out.set_observers(s.observers);
+  out.set_observing(s.observing);
   for (const std::string& to : s.status_to) out.add_status_to(to);
   out.set_pinging(s.pinging);
   out.set_range_m(s.range_m);
@@ -58,6 +60,8 @@ SonarStatus from(const v1::SonarStatus& m) {
   s.profile = m.profile();
   s.listens = m.listens();
   s.advertised = m.advertised();
+  s.observers = m.observers();
+  s.observing = m.observing();
   s.status_to.assign(m.status_to().begin(), m.status_to().end());
   s.pinging = m.pinging();
   s.range_m = m.range_m();

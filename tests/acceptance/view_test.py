@@ -4,12 +4,15 @@ import pathlib
 import pty
 import select
 import signal
+import socket
 import subprocess
 import tempfile
+import threading
 import time
 import unittest
 
-from running_sonard import SONARCTL, Sonard
+from oculus_reader import Client, fire_message
+from running_sonard import SONARCTL, Sonard, run
 
 
 def in_a_terminal(command, until, end, **environment):
@@ -73,6 +76,38 @@ class View(unittest.TestCase):
             self.assertEqual(len(result.stdout.splitlines()), 3)
             self.assertEqual(png.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
             self.assertEqual([p.name for p in pathlib.Path(folder).iterdir()], ["ping.png"])  # nothing unfinished lies about
+
+    def test_beside_a_driver_it_looks_on(self):
+        control = ("--control", f"{self.daemon.address}:14770")
+        with tempfile.TemporaryDirectory() as folder, Client(self.daemon.address) as driver:
+            driver.send(fire_message(range_=3.0))
+            reads = threading.Thread(target=self.read_until_closed, args=(driver,))
+            reads.start()
+            try:
+                png = pathlib.Path(folder) / "ping.png"
+                for command in (("view", "--png", png, "--live", "--pings", "2"), ("view", "--png", png), ("stats",),
+                                ("listen", "--pings", "2"), ("listen", "--observe", "--pings", "2", "--range", "7")):
+                    result = self.daemon.ctl(command[0], *command[1:], *control)
+                    self.assertEqual(result.returncode, 0, (command, result.stdout, result.stderr))
+                    self.assertIn(f"sonarctl: looking on at {self.daemon.address}:", result.stderr)
+                turned_away = self.daemon.ctl("view", "--png", png, "--control", f"{self.daemon.address}:1")
+                self.assertEqual(turned_away.returncode, 74, turned_away.stderr)
+                self.assertIn("nor can it be looked on at: ", turned_away.stderr)
+                status = run(SONARCTL, "status", *control).stdout
+                self.assertRegex(status, r"clients +1 now, \d+ since")
+                self.assertIn("  3 m  ", status)
+                self.assertIn(f"observers at {self.daemon.address}:", status)
+            finally:
+                driver.socket.shutdown(socket.SHUT_RDWR)
+                reads.join(20)
+
+    @staticmethod
+    def read_until_closed(client):
+        try:
+            while True:
+                client.message()
+        except (OSError, EOFError, AssertionError):
+            pass
 
     def test_contradictions_are_named(self):
         for arguments, word in [((), "--term"), (("--term", "--live", "--from-raw", "x"), "--ping"),

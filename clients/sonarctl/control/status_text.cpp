@@ -34,6 +34,7 @@ std::string sonar_text(const control::SonarStatus& s) {
   std::string links = "tcp " + s.listens;
   if (!s.advertised.empty() && !s.listens.starts_with(s.advertised + ":")) links += "  advertised as " + s.advertised;
   for (const std::string& to : s.status_to) links += "  status -> " + to;
+  if (!s.observers.empty()) links += format("  observers at %s (%u now)", s.observers.c_str(), s.observing);
   text += line("  links", links);
   text += line("  place", place_text(s.in_world));
   const control::SonarFigures& f = s.figures;

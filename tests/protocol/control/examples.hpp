@@ -63,6 +63,8 @@ inline DaemonStatus full_status() {
   sonar.profile = "oculus-m1200d";
   sonar.listens = "127.0.0.2:52100";
   sonar.advertised = "127.0.0.3";
+  sonar.observers = "127.0.0.3:41003";
+  sonar.observing = 2;
   sonar.status_to = {"127.255.255.255:52102", "10.0.0.7:52102"};
   sonar.pinging = true;
   sonar.transmits = false;
