@@ -173,7 +173,7 @@ TEST(Limits, TheLastDescriptorsAreNotForPosesAndHalfOfThemForControl) {
   };
   const std::size_t poses = visited(Admission::Purpose::client), control = visited(Admission::Purpose::control);
   EXPECT_GT(poses, 0u);
-  EXPECT_LE(poses, 6u);
+  EXPECT_LE(poses, 10u);
   EXPECT_GT(control, poses);
   EXPECT_LE(control, 14u);
   EXPECT_EQ(admission.refused_for_descriptors(), 40 - poses - control);
