@@ -30,9 +30,11 @@ Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& devic
   if (!control) return tl::unexpected(control.error());
   const auto status = control->status();
   if (!status) return tl::unexpected(status.error());
-  const std::string port = ":" + std::to_string(device.port);
+  const std::string port = std::string(":").append(std::to_string(device.port));
   for (const control::SonarStatus& s : status->sonars) {
-    if (s.listens != text_from(device) && s.advertised + port != text_from(device) && s.listens != "0.0.0.0" + port) continue;
+    if (s.listens != text_from(device) && s.advertised + port != text_from(device) &&
+        s.listens != std::string("0.0.0.0").append(port))
+      continue;
     if (s.observers.empty())
       return failure(ErrorKind::unavailable, "sonard has no port for observers of it (observers: in its configuration)");
     auto at = parse_endpoint(s.observers, device);
