@@ -42,8 +42,8 @@ class PingStream {
   Item next(std::chrono::milliseconds patience);
   /// Sends the settings once more. Nothing to do for heads: they answered.
   Result<void> ask_again();
-  /// The connection is ended before the first byte; known when that byte comes, and no later than `patience`. Never that of a head,
-  /// which has greeted.
+  /// The connection is ended before the first byte; known when that byte comes, and no later than `patience`. Never that of a
+  /// head, which has greeted.
   bool is_turned_away(std::chrono::milliseconds patience) const;
   /// Also writes every received byte to this file. usage: of a BlueView head.
   Result<void> record_to(const std::filesystem::path& file);

@@ -94,8 +94,7 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device) {
   if (source.observe) return observe(source, device);
   const auto now = std::chrono::steady_clock::now();
-  auto stream =
-      PingStream::open(device, source.kind, {source.asked, source.head}, milliseconds_from(source.connect_patience_s));
+  auto stream = PingStream::open(device, source.kind, {source.asked, source.head}, milliseconds_from(source.connect_patience_s));
   if (!stream) return tl::unexpected(stream.error());
   if (!stream->is_turned_away(first_byte_within)) return OpenedStream{*std::move(stream), now};
   auto observed = observe(source, device);

@@ -77,7 +77,7 @@ int Head::get_ping(int n, std::shared_ptr<PingObject>& ping) {
 }
 
 int Sonar::open(const std::string& type, const std::string& parameter, int abi) {
-  reset();
+  if (type == "NET") reset();
   std::shared_ptr<Source> source;
   int code = bad_parameter;
   if (type == "NET")
@@ -86,8 +86,10 @@ int Sonar::open(const std::string& type, const std::string& parameter, int abi) 
     code = open_recording(parameter, source);
   else
     log(LogLevel::warning, "cannot open type \"" + type + "\": write NET and an address, or FILE and a path");
-  if (code == success) use(std::move(source));
-  return code;
+  if (code != success) return code;
+  reset();
+  use(std::move(source));
+  return success;
 }
 
 int Sonar::create_file(const std::string& path, const SonarDescription& of) {

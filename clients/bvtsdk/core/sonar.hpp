@@ -42,7 +42,8 @@ class Sonar : public Object {
  public:
   ~Sonar() override { reset(); }
 
-  /// "NET" and an address, or "FILE" and a path. Whatever was open before is closed first, also when it fails.
+  /// "NET" and an address, or "FILE" and a path. What was open is closed: for NET first, also when it fails; for FILE once the
+  /// file is open, because hosts look for the next part of a recording in this way and go on with what they have (verified).
   int open(const std::string& type, const std::string& parameter, int abi);
   /// Becomes a new recording of that sonar.
   int create_file(const std::string& path, const SonarDescription& of);

@@ -62,6 +62,10 @@ RetVal BVTPing_GetRangeData(BVTPing self, BVTRangeData* out) {
       const auto fresh = std::make_shared<RangeListObject>();
       const int code = make_range_list(o.polar, o.imaging.ranges, fresh->list);
       if (code != success) return code;
+      // Hosts turn ranges into rows of the ping's image with it (verified), which is right only when it is that image's.
+      ImageGeometry image;
+      if (plan_image(o.polar, o.imaging.type, o.imaging.image, image) == success)
+        fresh->list.range_resolution_m = image.range_resolution_m;
       o.range_data = handles().add(fresh);
     }
     *out = static_cast<BVTRangeData>(o.range_data);

@@ -70,6 +70,9 @@ static void check_image(BVTPing ping, const std::string& colour_maps, const std:
   BVTMagImage image = NULL;
   EXPECT_OK(BVTPing_GetImage(ping, &image));
   expect_targets_in_image("XY", image);
+  BVTSDK::RangeData ranges;  // hosts turn ranges into rows with the range data's resolution
+  EXPECT_OK(BVTPing_GetRangeData(ping, ranges));
+  EXPECT_NEAR(ranges.GetRangeResolution(), BVTMagImage_GetRangeResolution(image), 1e-9);
   const int height = BVTMagImage_GetHeight(image), width = BVTMagImage_GetWidth(image);
   // The image begins where the sector does, 1 m cos 45 degrees ahead of the sonar.
   EXPECT_NEAR((BVTMagImage_GetOriginRow(image) - height) * BVTMagImage_GetRangeResolution(image), 0.707,
@@ -130,6 +133,7 @@ int main(int count, char** arguments) {
   }
   EXPECT_CODE(BVTSonar_Open(sonar, "FILE", (recording + ".ppm").c_str()), BVT_FILE_HEADER_BAD);  // as a vendor's .son is
   EXPECT_CODE(BVTSonar_Open(sonar, "FILE", (recording + ".lost").c_str()), BVT_FILE_OPEN);
+  EXPECT(BVTHead_GetPingCount(head) == 2);  // what was open still is: hosts look for the next part of a recording in this way
   BVTSonar_Destroy(sonar);
   EXPECT_CODE(BVTHead_SetRange(head, 1, 9), BVT_INVALID_PTR);
   return 0;
