@@ -9,7 +9,7 @@ namespace sonar {
 
 namespace {
 
-constexpr std::uint64_t memory_of_a_triangle = 400;  // bytes, while its acceleration structure is built
+constexpr std::uint64_t memory_of_a_triangle = 250;  // bytes, while its acceleration structure is built; measured: 120 to 230
 
 std::uint64_t triangles_of(const Scene& scene) {
   std::uint64_t triangles = 0;

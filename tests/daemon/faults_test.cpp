@@ -58,7 +58,8 @@ struct PoseFaults : ::testing::Test {
       if (++poses == 1) throw std::runtime_error("no such luck");
       io.stop();
     });
-    server = std::make_unique<PoseServer>(io, config, *intake, *log);
+    admission = std::make_unique<Admission>(limits, *log);
+    server = std::make_unique<PoseServer>(io, config, limits, *admission, *intake, *log);
     if (const auto r = server->open(); !r) throw std::runtime_error(r.error().text);
     server->start();
   }
@@ -69,9 +70,11 @@ struct PoseFaults : ::testing::Test {
   const Clock clock{false};
   World world{PoseRules{}, {{"rov", {}, false}}, {}, clock.now()};
   PoseConfig config;
+  LimitConfig limits;
   std::string log_text;
   std::unique_ptr<Log> log;
   std::unique_ptr<PoseIntake> intake;
+  std::unique_ptr<Admission> admission;
   std::unique_ptr<PoseServer> server;
   int poses = 0;
 };
