@@ -47,7 +47,7 @@ Result<void> BlueViewStream::greet(std::chrono::milliseconds patience) {
   const auto answer = ask(FrameType::hello, hello, patience);
   if (!answer) return tl::unexpected(answer.error());
   auto sonar = bvt::decode_description(sdk_bytes(*answer));
-  if (!sonar || sonar->heads.empty()) return failure(ErrorKind::bad_data, "greets without saying what heads it has");
+  if (!sonar || sonar->heads.empty()) return failure(ErrorKind::bad_data, "sends a greeting that describes no heads");
   sonar_ = *std::move(sonar);
   return {};
 }
@@ -98,7 +98,10 @@ Result<wire::Bytes> BlueViewStream::ask(FrameType type, wire::BytesView payload,
     if (!framer_.broken().empty()) return failure(ErrorKind::bad_data, framer_.broken());
     const Read read = receive(deadline);
     if (read.what == Wait::closed)
-      return failure(ErrorKind::io, "closed the connection before it answered: all its places are taken (clients.max)");
+      return failure(ErrorKind::io,
+                     sonar_.heads.empty()
+                         ? "closed the connection before it answered: all its places are taken (clients.max)"
+                         : "closed the connection before it answered: the daemon stopped, or closed it; see its log");
     if (read.what == Wait::timed_out) return failure(ErrorKind::unavailable, "does not answer on the BlueView link");
     if (read.what == Wait::interrupted) return failure(ErrorKind::io, "interrupted");
   }

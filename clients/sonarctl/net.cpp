@@ -106,7 +106,8 @@ Result<Connected> connect_first(const std::vector<Endpoint>& places, std::chrono
       auto socket = open_socket(SOCK_STREAM);
       if (!socket) return tl::unexpected(socket.error());
       const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-      error = try_connect(*socket, *addresses[i], std::max<std::chrono::milliseconds>(left / (places.size() - i), 100ms));
+      error = try_connect(*socket, *addresses[i],
+                          std::max<std::chrono::milliseconds>(left / static_cast<int>(places.size() - i), 100ms));
       if (error != 0) continue;
       const int yes = 1;
       ::setsockopt(socket->fd(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);

@@ -35,7 +35,8 @@ struct SourceArguments {
     app.add_option("--wait", patience_s, "seconds to go on trying to connect")->check(number(0))->capture_default_str();
     if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
     app.add_flag("--as-it-is", as_it_is, "send no settings, only look (many sonars then send no pings)");
-    app.add_flag("--observe", observe, "look on: take no client's place, ask for nothing, wait for its clients' pings");
+    app.add_flag("--observe", observe,
+                 "receive the pings that clients ask for, without taking a client's place or sending settings");
     app.add_option("--control", control, "HOST:PORT of sonard's control stream, which says where observers connect")
         ->check(clients::address());
     app.add_option("--token-file", token_file, "the daemon's control.token_file, when it has one");
@@ -46,6 +47,9 @@ struct SourceArguments {
     SourceOptions source;
     Result<Endpoint> device = parse_endpoint(address, {"127.0.0.2", port});
     if (!device) return tl::unexpected(device.error());
+    if (discover && is_blueview)
+      return failure(ErrorKind::usage,
+                     "--discover finds Oculus sonars only: leave it out, and give the address of the BlueView head");
     const bool any_port = device->port == 0;
     if (any_port) device->port = is_blueview ? blueview::tcp_port : oculus::tcp_port;
     source.kind = SonarKind::oculus;

@@ -27,7 +27,8 @@ PingReport PingLog::add(const AnyPing& any, Seconds at) {
   ++summary_.pings;
   summary_.bytes += facts_of(any).message_size;
   const auto* ping = std::get_if<oculus::DecodedPing>(&any);
-  if (ping == nullptr) return report;  // a head's pings were judged when they were decoded, and others may ask for some of them
+  summary_.of_head = ping == nullptr;
+  if (summary_.of_head) return report;  // judged when it was decoded
   report.errors = ping->violations;
   for (std::string& error : sequence_.add(*ping)) report.errors.push_back(std::move(error));
   summary_.identity_errors += report.errors.size();
@@ -85,8 +86,11 @@ std::string line_from(const AnyPing& ping, const PingReport& report) {
 }
 
 std::string text_from(const PingSummary& s, bool asked) {
-  std::string text = format("pings %llu, missing ids %llu, identity errors %llu, junk bytes %llu, dummies %llu\n", wide(s.pings),
-                            wide(s.missing_ids), wide(s.identity_errors), wide(s.junk_bytes), wide(s.dummies));
+  std::string text = format("pings %llu", wide(s.pings));
+  if (!s.of_head)
+    text += format(", missing ids %llu, identity errors %llu, junk bytes %llu, dummies %llu", wide(s.missing_ids),
+                   wide(s.identity_errors), wide(s.junk_bytes), wide(s.dummies));
+  text += "\n";
   text += format("rate %.2f Hz, interval p50 %.1f ms, p99 %.1f ms, longest %.1f ms, %.2f MB/s", s.rate_hz, s.interval_p50_ms,
                  s.interval_p99_ms, s.interval_max_ms,
                  s.pings > 0 ? s.rate_hz * static_cast<double>(s.bytes) / static_cast<double>(s.pings) / 1e6 : 0.0);
@@ -120,6 +124,8 @@ std::string json_from(const PingSummary& s, bool asked) {
                      {"interval_p50_ms", s.interval_p50_ms},
                      {"interval_p99_ms", s.interval_p99_ms},
                      {"interval_max_ms", s.interval_max_ms}};
+  if (s.of_head)
+    for (const char* key : {"missing_ids", "identity_errors", "junk_bytes", "dummies"}) out[key] = nullptr;
   if (asked) out["echo_satisfied_at"] = s.echo_satisfied_at ? nlohmann::json(*s.echo_satisfied_at) : nlohmann::json(nullptr);
   return nlohmann::json{{"summary", out}}.dump();
 }

@@ -23,7 +23,8 @@ struct PingReport {
 struct PingSummary {
   std::uint64_t pings = 0, bytes = 0, missing_ids = 0, identity_errors = 0, dummies = 0, junk_bytes = 0;
   std::optional<std::uint64_t> echo_satisfied_at;  // number of the ping, from 1; nothing = never, or nothing was asked
-  std::uint64_t echo_lost = 0;                     // pings after that one whose echo differed
+  bool of_head = false;  // a BlueView head: its numbers may skip, since other hosts ask for pings too, and nothing is echoed
+  std::uint64_t echo_lost = 0;  // pings after that one whose echo differed
   double rate_hz = 0;
   double interval_p50_ms = 0, interval_p99_ms = 0, interval_max_ms = 0;
 };

@@ -24,6 +24,9 @@ Result<AnyPing> fetch_recorded(const SourceOptions& source, std::size_t number) 
                                        ", not " + std::to_string(number));
 }
 
+constexpr const char* heads_have_no_observers =
+    "only Oculus sonars have observers; a BlueView head has places for several hosts: leave out --observe";
+
 /// Where its sonard lets observers connect.
 Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& device) {
   auto control = ControlClient::open({source.control, source.token_file});
@@ -36,24 +39,30 @@ Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& devic
         s.listens != std::string("0.0.0.0").append(port))
       continue;
     if (s.observers.empty())
-      return failure(ErrorKind::unavailable, "sonard has no port for observers of it (observers: in its configuration)");
+      return failure(ErrorKind::unavailable, "this sonar has no places for observers (observers.max is 0)");
     auto at = parse_endpoint(s.observers, device);
     if (at) at->host = device.host;
     return at;
   }
+  for (const control::SonarStatus& s : status->sonars)
+    if (s.advertised == device.host && s.profile.starts_with("blueview"))
+      return failure(ErrorKind::usage, heads_have_no_observers);
   return failure(ErrorKind::unavailable, "the sonard at " + text_from(control->at()) + " serves no sonar at " +
                                              text_from(device) + "; --control names another");
 }
 
 Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device) {
-  if (source.kind == SonarKind::blueview)
-    return failure(ErrorKind::usage, "only Oculus sonars have observers; a BlueView head has places for several hosts");
+  if (source.kind == SonarKind::blueview) return failure(ErrorKind::usage, heads_have_no_observers);
   const auto at = observers_of(source, device);
   if (!at) return tl::unexpected(at.error());
-  const auto now = std::chrono::steady_clock::now();
   auto stream = PingStream::open(*at, SonarKind::oculus, {}, milliseconds_from(source.connect_patience_s));
   if (!stream) return tl::unexpected(stream.error());
-  std::fprintf(stderr, "sonarctl: looking on at %s: nothing is asked of the sonar, pings come as its clients want them\n",
+  const auto now = std::chrono::steady_clock::now();
+  if (stream->is_turned_away(first_byte_within))
+    return failure(ErrorKind::io,
+                   "tcp " + text_from(*at) + " closed the connection: all places for observers are taken (observers.max)");
+  std::fprintf(stderr,
+               "sonarctl: connected to %s as an observer: no settings are sent, pings have the settings of the sonar's clients\n",
                text_from(*at).c_str());
   return OpenedStream{*std::move(stream), now, true};
 }
@@ -76,10 +85,12 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
                                         ? "the device closed the connection before a ping came: another client may hold it "
                                           "(clients.max)"
                                         : "no ping came: " + item.error);
-    if (item.what != Wait::data && left.count() <= 0)
-      return tl::unexpected(
-          silence(source, *device, heard, "no ping",
-                  stream->is_blueview() ? "does its time stand (clock), or is the daemon stuck?" : "is the sonar in standby?"));
+    if (item.what != Wait::data && left.count() <= 0) {
+      const char* const hint = stream->is_blueview() ? "is the daemon's clock stopped (clock), or the daemon stuck?"
+                               : opened->observes    ? "the sonar has no client that asks for pings"
+                                                     : "is the sonar in standby?";
+      return tl::unexpected(silence(source, *device, heard, "no ping", hint));
+    }
     heard = heard || item.what == Wait::data;
     if (!item.ping) continue;
     const auto* ping = std::get_if<oculus::DecodedPing>(&*item.ping);
@@ -93,15 +104,15 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
 
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device) {
   if (source.observe) return observe(source, device);
-  const auto now = std::chrono::steady_clock::now();
   auto stream = PingStream::open(device, source.kind, {source.asked, source.head}, milliseconds_from(source.connect_patience_s));
   if (!stream) return tl::unexpected(stream.error());
+  const auto now = std::chrono::steady_clock::now();
   if (!stream->is_turned_away(first_byte_within)) return OpenedStream{*std::move(stream), now};
   auto observed = observe(source, device);
   if (observed) return observed;
   return failure(ErrorKind::io,
                  "the device closed the connection before a ping came: another client may hold it (clients.max); "
-                 "nor can it be looked on at: " +
+                 "connecting as an observer failed too: " +
                      observed.error().text);
 }
 

@@ -7,7 +7,7 @@
 namespace sonar::clients {
 
 void ViewFigures::add(const AnyPing& any, Seconds at) {
-  if (const auto* ping = std::get_if<oculus::DecodedPing>(&any)) sequence_.add(*ping);  // what else is broken, listen tells
+  if (const auto* ping = std::get_if<oculus::DecodedPing>(&any)) sequence_.add(*ping), has_sequence_ = true;  // listen tells more
   arrivals_.push_back(at);
   if (arrivals_.size() > remembered) arrivals_.pop_front();
   ++pings_;
@@ -20,8 +20,10 @@ std::string ViewFigures::text() const {
   std::string text = ping_text_;
   if (arrivals_.size() < 2) return text;
   const double rate_hz = static_cast<double>(arrivals_.size() - 1) / std::max(1e-9, arrivals_.back() - arrivals_.front());
+  text += text::format("  %.1f Hz", rate_hz);
+  if (!has_sequence_) return text;
   const std::uint64_t gaps = sequence_.skipped_ids();
-  return text + text::format("  %.1f Hz  ", rate_hz) + (gaps == 0 ? "no gaps" : std::to_string(gaps) + " missed");
+  return text + (gaps == 0 ? "  no gaps" : "  " + std::to_string(gaps) + " missed");
 }
 
 }  // namespace sonar::clients

@@ -19,6 +19,7 @@ class ViewFigures {
  private:
   static constexpr std::size_t remembered = 20;  // arrivals the rate is taken from
   oculus::PingSequence sequence_;
+  bool has_sequence_ = false;  // not of heads, whose numbers may skip
   std::deque<Seconds> arrivals_;
   std::uint64_t pings_ = 0;
   std::string ping_text_;

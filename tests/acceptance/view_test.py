@@ -89,10 +89,10 @@ class View(unittest.TestCase):
                                 ("listen", "--pings", "2"), ("listen", "--observe", "--pings", "2", "--range", "7")):
                     result = self.daemon.ctl(command[0], *command[1:], *control)
                     self.assertEqual(result.returncode, 0, (command, result.stdout, result.stderr))
-                    self.assertIn(f"sonarctl: looking on at {self.daemon.address}:", result.stderr)
+                    self.assertIn(f"sonarctl: connected to {self.daemon.address}:", result.stderr)
                 turned_away = self.daemon.ctl("view", "--png", png, "--control", f"{self.daemon.address}:1")
                 self.assertEqual(turned_away.returncode, 74, turned_away.stderr)
-                self.assertIn("nor can it be looked on at: ", turned_away.stderr)
+                self.assertIn("connecting as an observer failed too: ", turned_away.stderr)
                 status = run(SONARCTL, "status", *control).stdout
                 self.assertRegex(status, r"clients +1 now, \d+ since")
                 self.assertIn("  3 m  ", status)

@@ -74,12 +74,14 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
   put_text(hello, "libbvtsdk");
   const int greeted = fresh->ask(FrameType::hello, hello, answer, patience.connect);
   // Hosts retry on connection_timed_out and give up on all else, so a sonar that is just starting or ending counts as that.
-  if (greeted == bad_packet_type) return refuse(greeted, "what answers at " + there + " is no sonar of sonard's; check the port");
+  if (greeted == bad_packet_type)
+    return refuse(greeted, "what answers at " + there + " is not sonard's BlueView link; check the port");
   if (greeted == bad_packet_version)
     return refuse(greeted, "sonard at " + there + " speaks another version of the link; use library and sonard of one release");
   if (greeted != success)
-    return refuse(connection_timed_out, there + " took the connection and " +
-                                            (greeted == socket_read_timeout ? "says nothing" : "closed it again") +
+    return refuse(connection_timed_out, there +
+                                            (greeted == socket_read_timeout ? " accepts the connection but sends no greeting"
+                                                                            : " accepts the connection and closes it at once") +
                                             "; sonard is starting, ending or stopped: see its log, and open again");
   std::optional<SonarDescription> told = decode_description(answer);
   if (!told)

@@ -124,7 +124,7 @@ NavData take_nav(Reader& reader) {
 
 std::optional<PolarPing> decode_ping(BytesView payload, std::string* why) {
   const auto refuse = [&](const std::string& what) {
-    if (why) *why = "a ping came that is none: " + what;
+    if (why) *why = "invalid ping: " + what;
     return std::nullopt;
   };
   Reader reader(payload);
@@ -145,7 +145,7 @@ std::optional<PolarPing> decode_ping(BytesView payload, std::string* why) {
   const auto packing = static_cast<Packing>(reader.take<std::uint8_t>());
   p.nav = take_nav(reader);
   const std::size_t size = reader.take<std::uint32_t>();
-  if (!reader.ok()) return refuse("it ends early or has navigation fields nobody knows");
+  if (!reader.ok()) return refuse("it ends early or has unknown navigation fields");
   const BytesView body = reader.rest();
   if (const std::string what = complaint(p); !what.empty()) return refuse(what);
   if (format != format_u16) return refuse("its samples have format " + std::to_string(format) + ", only 1 is known");
@@ -160,7 +160,7 @@ std::optional<PolarPing> decode_ping(BytesView payload, std::string* why) {
     if (samples.size() != size || size == 0) return refuse("its zlib stream is damaged, or does not hold what is announced");
     packing == Packing::planes ? samples_from_planes(samples, p.samples) : samples_from(samples, p.samples);
   } else {
-    return refuse("it is compressed in a way nobody knows");
+    return refuse("unknown compression " + std::to_string(static_cast<int>(packing)));
   }
   return p;
 }

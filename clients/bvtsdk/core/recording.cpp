@@ -264,7 +264,7 @@ Code RecordingReader::read_ping(std::int32_t head, int n, PolarPing& ping, std::
   const auto refuse = [&](Code code, const std::string& what) {
     if (why)
       *why = "ping " + std::to_string(n) + " of head " + std::to_string(head) + " cannot be read: " + what +
-             "; those before and behind it may still be";
+             "; other pings may still be readable";
     return code;
   };
   if (!read_frame(offsets[static_cast<std::size_t>(n)], header, payload))

@@ -239,7 +239,7 @@ class SonarJudge {
     if (expected_hz > 0) text += (sonar_.blueview ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
     text += latency_text();
     const bool slow = expected_hz > 0 && s.rate_hz < 0.85 * expected_hz;
-    if (too_slow_for(slow ? expected_hz : fastest_hz)) text += ", " + computing_text();
+    if (too_slow_for(slow || sonar_.blueview ? expected_hz : fastest_hz)) text += ", " + computing_text();
     if (slow) return add(Level::warn, "rate", text + ": the simulation is slower than the rate", less_to_compute);
     if (s.missing > 0)
       return add(Level::warn, "rate", text + ", " + std::to_string(s.missing) + " pings missing",

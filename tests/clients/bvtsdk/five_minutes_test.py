@@ -60,6 +60,9 @@ class FiveMinutes(unittest.TestCase):
             self.assertIn(f"tcp {self.address}:14750 accepts, first ping decoded after", result.stdout)
             self.assertIn("BlueView head BlueView P900-90 (7001) answers discovery", result.stdout)
             self.assertNotIn("start it", result.stdout)
+            if control == 14770:
+                self.assertEqual(result.returncode, 0, result.stdout)
+                self.assertNotRegex(result.stdout, r"(?m)^fail")
             self.assertNotIn("52102", result.stdout, "heads send no status")
 
     def test_the_printed_program(self):

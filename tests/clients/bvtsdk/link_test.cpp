@@ -315,9 +315,9 @@ TEST(LinkOpen, LogsWhatFailedWhereAndWhatToDo) {
   EXPECT_THAT(opening("not an address"), AllOf(HasSubstr("\"not an address\""), HasSubstr("check the host's name")));
   EXPECT_THAT(opening("127.0.0.1:port"), AllOf(HasSubstr("\"127.0.0.1:port\""), HasSubstr("HOST:PORT")));
   FakeSonar gone([](Peer&) {});
-  EXPECT_THAT(logged([&] { gone.open(link); }), AllOf(HasSubstr(gone.endpoint()), HasSubstr("closed it again")));
+  EXPECT_THAT(logged([&] { gone.open(link); }), AllOf(HasSubstr(gone.endpoint()), HasSubstr("closes it at once")));
   FakeSonar silent([](Peer& peer) { peer.wait_for_the_end(); });
-  EXPECT_THAT(logged([&] { silent.open(link, {200ms, 10s, 50ms, 20s}); }), HasSubstr("says nothing"));
+  EXPECT_THAT(logged([&] { silent.open(link, {200ms, 10s, 50ms, 20s}); }), HasSubstr("sends no greeting"));
   FakeSonar stranger([](Peer& peer) {
     peer.send_raw(Bytes(64, 'H'));
     peer.wait_for_the_end();
