@@ -11,6 +11,7 @@
 
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
+#include "clients/sonarctl/source.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/json_pose.hpp"
 #include "protocol/oculus/encode_ping.hpp"
@@ -148,6 +149,23 @@ TEST(Listen, RefusesBrokenSizesJunkAndWrongEchoes) {
   const Result<void> done = listen(quiet(deaf.endpoint(), 3));
   EXPECT_EQ(done.error().kind, ErrorKind::bad_data);
   EXPECT_THAT(done.error().text, HasSubstr("never became"));
+}
+
+/// `--seconds` and the time of the first ping do not include the wait for a device that starts late.
+TEST(Listen, CountsTimeFromTheConnection) {
+  SourceOptions source;
+  source.device.host = "127.83.1.9";
+  const Socket device = bound(SOCK_STREAM, source.device.port);
+  source.connect_patience_s = 20;
+  const auto begin = std::chrono::steady_clock::now();
+  std::thread starts_late([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    ::listen(device.fd(), 1);
+  });
+  const auto opened = open_stream(source, source.device);
+  starts_late.join();
+  ASSERT_TRUE(opened) << opened.error().text;
+  EXPECT_GE(opened->connected_at - begin, std::chrono::milliseconds(500));
 }
 
 TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
