@@ -89,7 +89,7 @@ struct PingRequest {
   std::uint64_t settings_id = 0;  // which client request these settings came from: the echo belongs to the ping
   std::uint32_t sonar_id = 0;     // keys the receiver noise
   Seed seed{};
-  bool blank = false;  // no scene, noise only (on_stale: blank)
+  bool blank = false;  // no scene, noise only: on_stale: blank, or the sonar is out of the water
   Switches switches;
 };
 
