@@ -11,13 +11,13 @@ double rise_m(const PingRequest& r) {
          static_cast<double>(r.settings.device_sound_speed_mps);
 }
 
-bool is_above(const PingRequest& r) { return r.sonar_in_world.position_m.z > least_depth_m; }
+bool is_above(const Pose& sonar_in_world) { return sonar_in_world.position_m.z > least_depth_m; }
 bool is_to_change(const PingRequest& r) {
-  return is_above(r) ? !r.blank : r.sonar_in_world.position_m.z + rise_m(r) > -least_depth_m;
+  return is_above(r.sonar_in_world) ? !r.blank : r.sonar_in_world.position_m.z + rise_m(r) > -least_depth_m;
 }
 
 void change(PingRequest& r) {
-  if (is_above(r)) {
+  if (is_above(r.sonar_in_world)) {
     r.blank = true;
     return;
   }
@@ -28,6 +28,8 @@ void change(PingRequest& r) {
 }
 
 }  // namespace
+
+bool is_in_air(const Pose& sonar_in_world, const Scene& scene) { return scene.sea_surface.present && is_above(sonar_in_world); }
 
 std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room) {
   if (!scene.sea_surface.present || std::none_of(requests.begin(), requests.end(), is_to_change)) return requests;

@@ -13,6 +13,9 @@ namespace sonar {
 /// Nobody is nearer to the sea surface, z = 0, than this [m]: who is, or is up to as much above it, is taken so deep.
 inline constexpr double least_depth_m = 1e-3;
 
+/// Whether a sonar there is above the sea surface and hears noise only; false in scenes without one.
+bool is_in_air(const Pose& sonar_in_world, const Scene& scene);
+
 /// The requests as they are to be computed; those given where nothing is to be changed, else copies in `room`. In scenes with a
 /// sea surface: a sonar above it hears nothing (blank), one at it is put just below, and none leaves the water during its ping.
 std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room);

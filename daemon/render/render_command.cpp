@@ -179,10 +179,11 @@ int run_render(const RenderCommand& command) {
       if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return complain(r.error());
     return report_coverage(jobs);
   }
-  const auto input = input_of(command);
+  auto input = input_of(command);
   if (!input) return complain(input.error());
   if (!command.report.empty()) return report_coverage(input->jobs);
   if (command.check_expectations) return check(*input);
+  if (std::string note = note_of_air(*input, output_options(command)); !note.empty()) input->notes.push_back(std::move(note));
   if (!command.quiet) tell_notes(*input);
   for (const std::string& note : input->notes) std::fprintf(stderr, "sonard: %s\n", note.c_str());
   ProgressLine line(command.quiet);

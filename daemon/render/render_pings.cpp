@@ -7,6 +7,8 @@
 #include <stdexcept>
 
 #include "core/image/draw_fan.hpp"
+#include "core/pipeline/water_line.hpp"
+#include "core/text/format.hpp"
 #include "daemon/engine/choose_engine.hpp"
 #include "daemon/engine/start_engine.hpp"
 #include "daemon/render/npy.hpp"
@@ -142,6 +144,21 @@ Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions
   std::vector<Time> times;
   for (std::uint64_t i = before; i < before + n; ++i) times.push_back(begin + nanoseconds_from(static_cast<double>(i) / rate_hz));
   return times;
+}
+
+std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
+  std::size_t all = 0, in_air = 0;
+  for (const RenderJob& job : input.jobs) {
+    const auto times = firing_times(job, o);
+    if (!times) return {};
+    all += times->size();
+    for (const Time at : *times) in_air += is_in_air(compose(vehicle_at(job.path, at), job.mount), *job.scene) ? 1 : 0;
+  }
+  if (in_air == 0) return {};
+  return text::format(
+      "%zu of %zu pings: the sonar is above the sea surface and hears noise only (z = 0 is the surface, lower is negative); was "
+      "NED taken for ENU? Check the poses and their frame",
+      in_air, all);
 }
 
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, Parallel& pool,

@@ -20,6 +20,9 @@ struct Progress {
 /// When the pings of a job are fired [s], from the first wanted on. usage: more pings than the poses last.
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& options);
 
+/// One sentence when the sonar is above the sea surface in some of them; else empty, and where the times are refused.
+std::string note_of_air(const RenderInput& input, const OutputOptions& options);
+
 /// `told` after every ping, in order. Errors: io; what the engine refuses.
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& options, Parallel& pool,
                               const std::function<void(const Progress&)>& told);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/pipeline/water_line.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/render/sonar_version.hpp"
 #include "daemon/system/sha256.hpp"
@@ -167,6 +168,7 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
            }()},
           {"sonar_in_world", json_of(r.sonar_in_world)},
           {"vehicle_in_world", json_of(r.vehicle_in_world)},
+          {"above_sea_surface", is_in_air(r.sonar_in_world, *job.scene)},
           {"twist",
            {{"velocity_mps", json_of(r.sonar_moves.velocity_mps)},
             {"angular_rate_radps", json_of(r.sonar_moves.angular_rate_radps)}}},

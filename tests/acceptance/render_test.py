@@ -200,6 +200,25 @@ class Render(unittest.TestCase):
         self.assertNotIn("snapshots", asked.stderr)
         self.assertEqual((self.path / "asked" / raw).read_bytes(), (self.path / "moved" / raw).read_bytes())
 
+    def test_a_sonar_above_the_sea_surface_is_told(self):
+        scene = self.path / "sea.yaml"
+        scene.write_text((ROOT / "scenes/l-targets.yaml").read_text(encoding="utf-8") +
+                         "sea_surface: {size_m: [20, 20], lambert_db: -30}\n", encoding="utf-8")
+        self.config.write_text(CONFIG.replace(f"{ROOT}/scenes/l-targets.yaml", str(scene)), encoding="utf-8")
+        poses = self.path / "poses.csv"
+        poses.write_text("# frame: ENU_FLU\nt,x,y,z\n0,0,0,-2\n1,0,0,2\n", encoding="utf-8")
+        options = ["--poses", poses, "--quiet", "--format", "raw"]
+        for _ in range(2):  # the second finds all pings there
+            result = self.render(*options)
+            self.expect(result, 0, "1 of 2 pings", "above the sea surface", "noise only", "NED")
+            self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        about = json.loads((self.out / "render.json").read_text(encoding="utf-8"))
+        self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
+        for number, is_above in ((1, False), (2, True)):
+            side = json.loads((self.out / f"{number:06}.json").read_text(encoding="utf-8"))
+            self.assertIs(side["above_sea_surface"], is_above)
+        self.assertEqual(self.render(*options, "--pings", "1", out=self.path / "below").stderr, "")
+
     def test_a_part_of_a_run_is_the_same_pings(self):
         options = ["--format", "raw,png"]
         self.expect(self.render("--pings", "4", *options), 0)
