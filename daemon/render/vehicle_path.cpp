@@ -11,14 +11,27 @@ namespace {
 
 World circling(const Pose& initial) { return World({}, {{"vehicle", initial, true}}, {}, Time{}); }
 
+/// Without the poses that follow another in less than `shortest_step`; the last one stays where it is the only other.
+motion::Trajectory thinned(const motion::Points& all) {
+  motion::Points kept;
+  for (std::size_t i = 0; i < all.times.size(); ++i) {
+    const bool is_far = kept.times.empty() || all.times[i] - kept.times.back() >= shortest_step;
+    if (!is_far && (i + 1 < all.times.size() || kept.times.size() > 1)) continue;
+    kept.times.push_back(all.times[i]);
+    kept.poses.push_back(all.poses[i]);
+  }
+  return motion::Trajectory(std::move(kept));
+}
+
 }  // namespace
 
 Steps steps_of(const motion::Trajectory& trajectory) {
   Steps steps;
-  const motion::Points& p = trajectory.points();
-  if (!p.velocities_mps.empty()) return steps;
-  for (std::size_t i = 0; i + 1 < p.times.size(); ++i) {
-    const motion::Motion m = trajectory.at(p.times[i]).moves;  // that of the way to the next one
+  if (!trajectory.points().velocities_mps.empty()) return steps;
+  const motion::Trajectory way = thinned(trajectory.points());
+  const std::vector<motion::Ns>& times = way.points().times;
+  for (std::size_t i = 0; i + 1 < times.size(); ++i) {
+    const motion::Motion m = way.at(times[i]).moves;  // that of the way to the next one
     const double mps = length(m.velocity_mps), radps = length(m.angular_velocity_radps);
     ++steps.all;
     if (!(mps <= fastest_vehicle_mps && radps <= fastest_vehicle_radps)) ++steps.too_far;

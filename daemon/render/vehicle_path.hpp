@@ -22,12 +22,14 @@ struct VehiclePath {
   bool snapshots = false;                                // its poses have nothing to do with each other: no motion
 };
 
-/// What carries an imaging sonar goes no faster: 10 knots, and three seconds for a full turn. A file of poses of which more than
-/// one step in `steps_to_one_too_far` is faster holds snapshots, not a way; unless it tells velocities itself.
-inline constexpr double fastest_vehicle_mps = 5, fastest_vehicle_radps = 2;
+/// What carries an imaging sonar goes no faster: a fast boat, and a towfish that rolls. A file of poses of which more than one
+/// step in `steps_to_one_too_far` is faster holds snapshots, not a way; unless it tells velocities itself.
+inline constexpr double fastest_vehicle_mps = 15, fastest_vehicle_radps = 5;
 inline constexpr std::size_t steps_to_one_too_far = 10;
+/// Poses closer in time than this are one step: jitter of a fast log is no motion.
+inline constexpr motion::Ns shortest_step = std::chrono::milliseconds(100);
 
-/// The steps of a trajectory from pose to pose.
+/// The steps of a trajectory.
 struct Steps {
   std::size_t all = 0, too_far = 0;
   double fastest_mps = 0, fastest_radps = 0;

@@ -175,10 +175,10 @@ class Render(unittest.TestCase):
     def test_snapshots_do_not_smear(self):
         """Poses further apart than a vehicle goes: pings as of a sonar at rest there, said once and in render.json."""
         snapshots = self.path / "snapshots.csv"
-        snapshots.write_text("# frame: ENU_FLU\nt,x,y,z,yaw\n0,0,0,0,0\n1,0.3,0,0,-150\n2,6.3,0,0,0\n", encoding="utf-8")
+        snapshots.write_text("# frame: ENU_FLU\nt,x,y,z,yaw\n0,0,0,0,0\n0.5,0.3,0,0,-150\n1,8.3,0,0,0\n", encoding="utf-8")
         options = ["--format", "raw", "--noise", "off"]
         result = self.render("--poses", snapshots, "--quiet", *options)
-        self.expect(result, 0, "snapshots", "2 of 2 steps", "6 m/s", "--motion on")
+        self.expect(result, 0, "snapshots", "2 of 2 steps", "16 m/s", "--motion on")
         self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
         about = json.loads((self.out / "render.json").read_text(encoding="utf-8"))
         self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())

@@ -50,26 +50,40 @@ TEST(VehiclePath, AJumpBetweenLinesIsNoMotion) {
   expect_near(vehicle_at(path, at(1.5)).position_m, {44.5, 0, 0});  // where it is stays what the lines say
 }
 
-std::string lines_of(int count, double step_m, double turn_deg) {
+std::string lines_of(int count, double step_m, double turn_deg, double period_s = 1) {
   std::string text = "t,x,y,z,yaw\n";
   for (int i = 0; i < count; ++i)
-    text += std::to_string(i) + "," + std::to_string(i * step_m) + ",0,0," + std::to_string(i * turn_deg) + "\n";
+    text += std::to_string(i * period_s) + "," + std::to_string(i * step_m) + ",0,0," + std::to_string(i * turn_deg) + "\n";
   return text;
 }
 
 TEST(VehiclePath, PosesFurtherApartThanAVehicleGoesAreSnapshotsAndNoMotion) {
-  for (const auto& [step_m, turn_deg] : {std::pair{5.1, 0.0}, std::pair{0.0, 115.0}}) {
-    const VehiclePath path = path_of(lines_of(5, step_m, turn_deg));
+  struct Step {
+    double step_m, turn_deg, period_s;
+  };
+  for (const auto& [step_m, turn_deg, period_s] : {Step{15.1, 0, 1}, Step{0, 144, 0.5}, Step{5, 0, 0.033}}) {
+    const VehiclePath path = path_of(lines_of(5, step_m, turn_deg, period_s));
     EXPECT_TRUE(path.snapshots) << step_m << " " << turn_deg;
-    const Twist rests = sonar_twist_at(path, {{1, 0, 0}, {}}, at(2));
+    const Twist rests = sonar_twist_at(path, {{1, 0, 0}, {}}, at(2 * period_s));
     EXPECT_EQ(length(rests.velocity_mps) + length(rests.angular_rate_radps), 0) << step_m << " " << turn_deg;
-    expect_near(vehicle_at(path, at(2)).position_m, {2 * step_m, 0, 0});  // where it is stays what the lines say
+    expect_near(vehicle_at(path, at(2 * period_s)).position_m, {2 * step_m, 0, 0});  // where it is stays what the lines say
   }
-  for (const auto& [step_m, turn_deg] : {std::pair{4.9, 0.0}, std::pair{0.0, 114.0}, std::pair{1.0, 45.0}}) {
-    const VehiclePath path = path_of(lines_of(5, step_m, turn_deg));
+  for (const auto& [step_m, turn_deg, period_s] : {Step{14.9, 0, 1}, Step{6.2, 0, 1}, Step{0, 143, 0.5}, Step{1, 45, 1}}) {
+    const VehiclePath path = path_of(lines_of(5, step_m, turn_deg, period_s));
     EXPECT_FALSE(path.snapshots) << step_m << " " << turn_deg;
-    EXPECT_GT(length(sonar_twist_at(path, {{1, 0, 0}, {}}, at(2)).velocity_mps), 0) << step_m << " " << turn_deg;
+    EXPECT_GT(length(sonar_twist_at(path, {{1, 0, 0}, {}}, at(2 * period_s)).velocity_mps), 0) << step_m << " " << turn_deg;
   }
+}
+
+TEST(VehiclePath, TheJitterOfAFastLogIsNoRowOfSnapshots) {
+  std::string text = "t,x,y,z,yaw\n";
+  for (int i = 0; i <= 100; ++i)
+    text += std::to_string(0.01 * i) + "," + std::to_string(0.015 * i + (i % 3 == 0 ? 0.2 : 0)) + ",0,0," +
+            std::to_string(i % 2 == 0 ? 6 : 0) + "\n";
+  const VehiclePath path = path_of(text);  // line to line 20 m/s and 10 rad/s
+  EXPECT_FALSE(path.snapshots);
+  EXPECT_EQ(steps_of(*path.trajectory).all, 10u);
+  EXPECT_TRUE(path_of("t,x,y,z\n0,0,0,0\n0.01,3,0,0\n").snapshots) << "a file that is shorter than a step has one";
 }
 
 TEST(VehiclePath, AMissionWithAFewJumpsIsNoRowOfSnapshots) {
