@@ -43,6 +43,14 @@ bool is_of_a_ping(const path& file) {
   return digits && std::any_of(std::begin(ends), std::end(ends), [&](std::string_view end) { return name.substr(6) == end; });
 }
 
+/// NNNNNN.json as sonard has ever written it: then files of that number are ours.
+bool is_sidecar(const path& file) {
+  std::ifstream in(file);
+  const json side = json::parse(in, nullptr, false);
+  constexpr const char* keys[] = {"sonard", "inputs", "ping", "settings"};
+  return side.is_object() && std::all_of(std::begin(keys), std::end(keys), [&](const char* key) { return side.contains(key); });
+}
+
 Result<std::vector<path>> pings_in(const path& folder) {
   std::error_code ec;
   std::vector<path> found;
@@ -67,11 +75,20 @@ Result<int> lock(const path& folder) {
 Result<void> make_way(const OutputOptions& o, const std::string& digest) {
   std::error_code ec;
   const path about = o.folder / about_file;
-  const bool is_told = std::filesystem::exists(about, ec);
-  if (is_told && inputs_of(about) == digest) return {};
+  const std::string told = inputs_of(about);
+  if (told == digest) return {};
+  const bool is_told = !told.empty();
+  if (!is_told && std::filesystem::exists(about, ec))
+    return failure(ErrorKind::usage, about.string() + " is not sonard's, and is not overwritten; choose another --out");
   const auto others = pings_in(o.folder);
   if (!others) return tl::make_unexpected(others.error());
   if (!is_told && others->empty()) return {};
+  for (const path& file : *others)
+    if (!is_told && !is_sidecar(file.parent_path() / (file.filename().string().substr(0, 6) + ".json")))
+      return failure(ErrorKind::usage,
+                     file.string() +
+                         " may not be sonard's: the folder has no render.json, and no sidecar of sonard has that "
+                         "number; it is not overwritten: choose another --out");
   if (!o.overwrite)
     return failure(ErrorKind::usage, o.folder.string() +
                                          (is_told ? " holds pings of other inputs (configuration, scene, poses or switches)"

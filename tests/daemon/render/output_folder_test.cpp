@@ -34,6 +34,7 @@ class OutputFolders : public testing::Test {
 
   OutputOptions options_;
   std::vector<std::string> notes_;
+  const std::string sidecar_ = R"({"sonard": "0.1.0", "inputs": "x", "ping": 1, "settings": {}})";
 };
 
 TEST_F(OutputFolders, IsHeldByOneRunAtATime) {
@@ -57,12 +58,33 @@ TEST_F(OutputFolders, NeverMixesThePingsOfTwoInputs) {
   ASSERT_TRUE(claim("a"));
   EXPECT_THAT(claim("b").error().text, HasSubstr("holds pings of other inputs"));
   std::filesystem::remove(options_.folder / "render.json");
+  put("000001.json", sidecar_);
   EXPECT_THAT(claim("a").error().text, HasSubstr("no render.json")) << "of which inputs these are, nobody knows";
   EXPECT_TRUE(std::filesystem::exists(options_.folder / "000001.png"));
   options_.overwrite = true;
   ASSERT_TRUE(claim("b"));
   EXPECT_FALSE(std::filesystem::exists(options_.folder / "000001.png"));
   EXPECT_TRUE(std::filesystem::exists(options_.folder / "notes.txt"));
+}
+
+TEST_F(OutputFolders, FilesOfOthersAreNotRemovedEvenIfTheyHaveNumbers) {
+  std::filesystem::create_directories(options_.folder);
+  options_.overwrite = true;
+  put("000001.png", "ours");
+  put("000001.json", sidecar_);
+  put("000002.png", "a camera's");
+  EXPECT_THAT(claim("a").error().text, AllOf(HasSubstr("000002.png may not be sonard's"), HasSubstr("--out")));
+  put("000002.json", R"({"camera": 2})");
+  EXPECT_FALSE(claim("a"));
+  EXPECT_TRUE(std::filesystem::exists(options_.folder / "000001.png"));
+  EXPECT_TRUE(std::filesystem::exists(options_.folder / "000002.png"));
+  std::filesystem::remove(options_.folder / "000002.png");
+  std::filesystem::remove(options_.folder / "000002.json");
+  put("render.json", "{}");
+  EXPECT_THAT(claim("a").error().text, HasSubstr("render.json is not sonard's"));
+  std::filesystem::remove(options_.folder / "render.json");
+  EXPECT_TRUE(claim("a"));
+  EXPECT_FALSE(std::filesystem::exists(options_.folder / "000001.png"));
 }
 
 TEST_F(OutputFolders, HoldsAPingWhenAllItsFilesAreThereOfTheseInputs) {
