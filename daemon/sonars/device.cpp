@@ -275,7 +275,8 @@ void Device::on_ping(Simulator::Outcome outcome) {
   figures_.simulation_s += outcome.seconds;
   figures_.simulation.add(outcome.seconds);
   if (!settings_.triggered && pacer_.period().count() > 0)
-    if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period())))
+    if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period()),
+                                           context_.config.sonars.size() > 1))
       context_.log.warning(*slow, {{"sonar", config_.name}});
   if (outcome.ping) gain_assist_.look_at(*outcome.ping);
   if (outcome.ping) note_water(outcome.ping->request);

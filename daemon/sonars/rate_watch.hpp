@@ -11,8 +11,9 @@ namespace sonar {
 class RateWatch {
  public:
   /// After each ping. `ticks` and `busy` count since the start, `busy` those of them at which the ping before was still being
-  /// computed; the ping took `ping_s`; `rate_hz` is what the ticks have. A sentence, at most once in its life.
-  std::optional<std::string> look(std::uint64_t ticks, std::uint64_t busy, double ping_s, double rate_hz);
+  /// computed; the ping took `ping_s`; `rate_hz` is what the ticks have; `has_others`: other sonars are computed too. A sentence,
+  /// at most once in its life.
+  std::optional<std::string> look(std::uint64_t ticks, std::uint64_t busy, double ping_s, double rate_hz, bool has_others);
 
  private:
   void begin(std::uint64_t ticks, std::uint64_t busy, double rate_hz);
@@ -22,7 +23,7 @@ class RateWatch {
   double rate_hz_ = 0;
   std::uint64_t ticks_before_ = 0, busy_before_ = 0;
   int pings_ = 0;
-  double ping_s_ = 0;  // of those, summed
+  double ping_s_ = 0, longest_s_ = 0;  // of those: summed, and the longest
 };
 
 }  // namespace sonar

@@ -21,7 +21,7 @@ struct Sonar {
       const auto periods = static_cast<std::uint64_t>((ping_s + waits_s) * rate_hz) + 1;
       ticks += periods;
       busy += periods - 1;
-      if (const auto text = watch.look(ticks, busy, ping_s, rate_hz)) said += *text + "\n";
+      if (const auto text = watch.look(ticks, busy, ping_s, rate_hz, waits_s > 0)) said += *text + "\n";
     }
   }
 };
@@ -51,6 +51,17 @@ TEST(RateWatch, KnowsThatOthersComputeToo) {
   Sonar one_of_three{20, 0.03, 0.06};
   one_of_three.ping(200);
   EXPECT_THAT(one_of_three.said, HasSubstr("30 ms a ping, and other sonars are computed between: 10 Hz at most here"));
+}
+
+TEST(RateWatch, DoesNotBlameOthersWhereThereAreNone) {
+  Sonar uneven{20, 0.02, 0};
+  for (int i = 0; i < 50; ++i) {
+    uneven.ping_s = 0.02;
+    uneven.ping(2);
+    uneven.ping_s = 0.09;
+    uneven.ping(1);
+  }
+  EXPECT_THAT(uneven.said, HasSubstr(" ms a ping, single pings up to 90 ms: 15 Hz at most here, 20 Hz are asked for"));
 }
 
 TEST(RateWatch, AnotherRateIsLookedAtAnew) {
