@@ -10,8 +10,9 @@ inline constexpr int ports_an_offset = 10;  // daemons listen on ports next to e
 
 /// Moves everything that could be in another daemon's way: sonars from 127.0.0.x to 127.0.N.x, because drivers know their ports,
 /// device ids up by 100 N, because drivers tell sonars apart by them, and the ports of poses and control up by 10 N. Ports that
-/// the system chooses (0) and MAVLink endpoints that are dialled stay. `first_too`: the first sonar's address as well. Errors are
-/// sentences for the command line.
+/// the system chooses (0) and MAVLink endpoints that are dialled stay. `first_too`: the first sonar's address as well. Refused
+/// where something would come to lie on something else of the same configuration unmoved. Errors are sentences for the command
+/// line.
 Result<void> move_addresses(Config& config, int offset, bool first_too);
 
 }  // namespace sonar

@@ -56,9 +56,51 @@ Result<void> move_port(Endpoint& at, int offset) {
   return {};
 }
 
+struct Listening {
+  std::string key;
+  Endpoint at;
+  bool udp, tcp;
+};
+bool meet(const Listening& a, const Listening& b) {
+  const bool same_ip = a.at.ip == b.at.ip || a.at.ip == Ipv4{} || b.at.ip == Ipv4{};
+  return same_ip && a.at.port == b.at.port && ((a.udp && b.udp) || (a.tcp && b.tcp));
+}
+std::vector<Listening> listening_of(const Config& c) {
+  std::vector<Listening> all;
+  const auto add = [&](const std::string& key, bool enabled, const Endpoint& at, bool udp, bool tcp) {
+    if (enabled && at.port != 0) all.push_back({key, at, udp, tcp});
+  };
+  add("poses.protobuf", c.poses.protobuf.enabled, c.poses.protobuf.at, true, false);
+  add("poses.json", c.poses.json.enabled, c.poses.json.at, true, true);
+  add("control.stream", c.control.stream.enabled, c.control.stream.at, false, true);
+  add("control.http", c.control.http.enabled, c.control.http.at, false, true);
+  for (const MavlinkConfig& link : c.poses.mavlink) add("poses.mavlink", !link.dials, link.at, true, false);
+  return all;
+}
+
+/// What is moved must not be where the daemon of the same configuration that is not moved has something else.
+Result<void> check_apart(const Config& moved, const Config& unmoved) {
+  const std::string instead = " without an offset; give another number";
+  for (const SonarConfig& a : moved.sonars)
+    for (const SonarConfig& b : unmoved.sonars) {
+      if (a.name == b.name) continue;
+      if (a.device_id == b.device_id)
+        return cannot_move("sonar \"" + a.name + "\" would have device_id " + std::to_string(a.device_id) + ", which sonar \"" +
+                           b.name + "\" has" + instead);
+      if (a.bind_ip == b.bind_ip)
+        return cannot_move("sonar \"" + a.name + "\" would have " + text_of(a.bind_ip) + ", which sonar \"" + b.name + "\" has" +
+                           instead);
+    }
+  for (const Listening& a : listening_of(moved))
+    for (const Listening& b : listening_of(unmoved))
+      if (meet(a, b)) return cannot_move(a.key + " would be at " + text_of(a.at) + ", where " + b.key + " is" + instead);
+  return {};
+}
+
 }  // namespace
 
 Result<void> move_addresses(Config& config, int offset, bool first_too) {
+  const Config unmoved = config;
   for (SonarConfig& sonar : config.sonars) {
     const int id = sonar.device_id + 100 * offset;
     if (id > 65535) return cannot_move("there is no device_id that far above " + std::to_string(sonar.device_id));
@@ -71,7 +113,7 @@ Result<void> move_addresses(Config& config, int offset, bool first_too) {
   for (MavlinkConfig& link : config.poses.mavlink)
     if (!link.dials)
       if (auto r = move_port(link.at, offset); !r) return r;
-  return {};
+  return check_apart(config, unmoved);
 }
 
 }  // namespace sonar

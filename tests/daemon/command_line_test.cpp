@@ -210,6 +210,18 @@ TEST(CommandLine, WhatAnOffsetCannotMoveIsSaid) {
   EXPECT_THAT(why("9", "127.0.250.2", "{}"), ::testing::HasSubstr("there is no room for 127.0.250.2"));
   EXPECT_THAT(why("9", "127.0.0.2", "{json: '127.0.0.1:65500'}"), ::testing::HasSubstr("no port that far above 127.0.0.1:65500"));
   EXPECT_EQ(why("9", "127.0.0.2", "{json: '127.0.0.1:0'}"), "moved");
+  // What would lie on something of the daemon that is not moved.
+  const auto links = [](const std::string& more) { return "{mavlink: [{endpoint: 'udpin:127.0.0.1:14550'}" + more + "]}"; };
+  EXPECT_EQ(
+      why("22", "127.0.0.2", links("")),
+      "--offset: poses.mavlink would be at 127.0.0.1:14770, where poses.protobuf is without an offset; give another number");
+  EXPECT_EQ(why("21", "127.0.0.2", links("")), "moved");
+  EXPECT_THAT(why("1", "127.0.0.2", links(", {endpoint: 'udpin:127.0.0.1:14560'}")),
+              ::testing::HasSubstr("127.0.0.1:14560, where poses.mavlink is"));
+  EXPECT_EQ(why("1", "127.0.0.2", links(", {endpoint: 'udpout:127.0.0.1:14560'}")), "moved");
+  EXPECT_THAT(why("1", "127.0.0.2, device_id: 6902", "{}"),
+              ::testing::HasSubstr("sonar \"a\" would have device_id 7002, which sonar \"b\" has without an offset"));
+  EXPECT_THAT(why("1", "127.0.1.3", "{}"), ::testing::HasSubstr("sonar \"b\" would have 127.0.1.3, which sonar \"a\" has"));
   EXPECT_EQ(usage_error({"--demo", "--offset", "100"}), 64);
 }
 
