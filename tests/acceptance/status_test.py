@@ -119,7 +119,7 @@ class Steering(unittest.TestCase):
                 self.assertEqual(result.returncode, 65, result.stderr)
                 for expected in (f"{self.daemon.address}:{port}", what, "something else", "14770"):
                     self.assertIn(expected, result.stderr)
-                self.assertLess(time.monotonic() - begin, 8)  # 2 s on a quiet machine; the answer to a request may take 10 s
+                self.assertLess(time.monotonic() - begin, 20)  # 2 s on a quiet machine; that it waited no longer, the message says
 
 
 class Secrets(unittest.TestCase):
