@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
 #include "core/motion/columns.hpp"
 #include "core/motion/stamp.hpp"
@@ -15,6 +16,7 @@ namespace {
 
 constexpr std::size_t most_bodies = 256;
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
+constexpr std::uint64_t memory_of_a_line = 200;  // bytes: a stamp, a pose and two velocities, and a copy while a vector grows
 
 constexpr std::array<std::string_view, 5> format_names{"auto", "csv", "tum", "euroc", "kitti"};
 constexpr std::array<std::string_view, 2> frame_names{"ENU_FLU", "NED_FRD"};
@@ -247,6 +249,8 @@ Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::stri
 Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options) {
   const auto text = text_of(file);
   if (!text) return tl::make_unexpected(text.error());
+  const auto lines = static_cast<std::uint64_t>(std::count(text->begin(), text->end(), '\n')) + 1;
+  if (auto room = check_memory_for(file.string(), memory_of_a_line * lines); !room) return tl::make_unexpected(room.error());
   return parse_trajectories(*text, file.string(), options);
 }
 

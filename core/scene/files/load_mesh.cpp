@@ -18,6 +18,8 @@ namespace {
 
 constexpr std::uintmax_t max_file_bytes = std::uintmax_t{2} << 30;
 constexpr std::uintmax_t memory_of_a_byte = 8;  // of a file while it is read; measured: 5 of STL, and other formats are denser
+constexpr std::uint64_t memory_of_a_triangle = 200;  // bytes, while they are gathered and cleaned
+constexpr int deepest_node = 200;
 
 std::string extension_of(const std::filesystem::path& file) {
   std::string e = file.extension().string();
@@ -50,6 +52,23 @@ bool has_ply_header(const std::filesystem::path& file) {
   return head.starts_with("ply") && end != std::string::npos && head.find('\n', end) != std::string::npos;
 }
 
+/// At most, of every mesh of the file.
+std::vector<std::uint64_t> triangles_of_meshes(const aiScene& scene) {
+  std::vector<std::uint64_t> triangles(scene.mNumMeshes);
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m)
+    for (unsigned f = 0; f < scene.mMeshes[m]->mNumFaces; ++f)
+      triangles[m] += std::max(scene.mMeshes[m]->mFaces[f].mNumIndices, 2u) - 2;
+  return triangles;
+}
+/// Of a node and those below it: many nodes may show the same mesh.
+std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint64_t>& of_meshes, int depth = 0) {
+  if (depth > deepest_node) return 0;
+  std::uint64_t triangles = 0;
+  for (unsigned m = 0; m < node.mNumMeshes; ++m) triangles += of_meshes[node.mMeshes[m]];
+  for (unsigned c = 0; c < node.mNumChildren; ++c) triangles += triangles_of_nodes(*node.mChildren[c], of_meshes, depth + 1);
+  return triangles;
+}
+
 struct Corners {
   std::vector<Vec3d> at;
   std::vector<std::uint16_t> material;
@@ -57,11 +76,11 @@ struct Corners {
 
 // Node transforms in double: far offsets in a node must not cost the vertices their millimetres.
 void gather(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>& parent, int depth, Corners& out) {
-  if (depth > 200) return;
+  if (depth > deepest_node) return;
   const aiMatrix4x4t<double> here = parent * aiMatrix4x4t<double>(node.mTransformation);
   for (unsigned m = 0; m < node.mNumMeshes; ++m) {
     const aiMesh& mesh = *scene.mMeshes[node.mMeshes[m]];
-    for (unsigned f = 0; f < mesh.mNumFaces && out.at.size() <= 3 * max_mesh_triangles; ++f) {
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
       if (face.mNumIndices < 3) continue;  // points and lines
       std::vector<Vec3d> polygon;
@@ -115,7 +134,13 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
               : importer.ReadFileFromMemory(request.in_memory.data(), request.in_memory.size(), 0, extension.c_str() + 1);
   if (!scene || !scene->mRootNode) return bad("cannot be read: " + first_line(importer.GetErrorString()));
 
+  const std::uint64_t triangles = triangles_of_nodes(*scene->mRootNode, triangles_of_meshes(*scene));
+  if (triangles > max_mesh_triangles)
+    return bad("has more than " + std::to_string(max_mesh_triangles) + " triangles; simplify it");
+  if (auto room = check_memory_for(name, memory_of_a_triangle * triangles); !room) return tl::make_unexpected(room.error());
   Corners corners;
+  corners.at.reserve(3 * triangles);
+  corners.material.reserve(triangles);
   gather(*scene, *scene->mRootNode, aiMatrix4x4t<double>(), 0, corners);
   const bool y_up = request.up ? *request.up == UpAxis::y : y_up_by_default;
   for (Vec3d& p : corners.at) p = request.scale * (y_up ? z_up_from_y_up(p) : p);

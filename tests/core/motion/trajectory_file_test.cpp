@@ -8,8 +8,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
+
+#include "core/base/memory_left.hpp"
 
 namespace sonar::motion {
 namespace {
@@ -180,6 +183,25 @@ TEST(TrajectoryFile, OneThatIsMissingIsSaidToBe) {
     ASSERT_FALSE(file) << place;
     EXPECT_EQ(file.error().kind, ErrorKind::missing_file);
   }
+}
+
+TEST(TrajectoryFile, PosesThatTheMemoryDoesNotSufficeForAreRefused) {
+  const std::filesystem::path root = testing::TempDir() + "poses-memory-" + std::to_string(getpid());
+  std::filesystem::create_directories(root / "proc");
+  std::ofstream(root / "proc/meminfo") << "MemAvailable: 1500 kB\n";
+  std::ofstream out(root / "poses.csv");
+  out << "t,x,y,z,roll,pitch,yaw\n";
+  for (int i = 0; i < 10000; ++i) out << i << ",0,0,0,0,0,0\n";  // 170 kB of text
+  out.close();
+  memory_root() = root;
+  const auto refused = load_trajectories(root / "poses.csv", enu);
+  memory_root() = "/";
+  const auto read = load_trajectories(root / "poses.csv", enu);
+  std::filesystem::remove_all(root);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::unavailable);
+  EXPECT_THAT(refused.error().text, HasSubstr("poses.csv would take about 1 MiB of memory, and 1 MiB are left"));
+  EXPECT_TRUE(read);
 }
 
 /// The page shows what can be read: every block of it that is marked with a format.

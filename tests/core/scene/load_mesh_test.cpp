@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "core/base/memory_left.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/temporary_files.hpp"
 
@@ -50,12 +51,18 @@ std::string collada(const std::string& axis) {
          "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
 }
 
-// A GLB with the wedge's vertices and triangles, as the glTF 2.0 container asks.
-std::string glb() {
+// A GLB with the wedge's vertices and triangles, as the glTF 2.0 container asks; so many nodes show it.
+std::string glb(int nodes = 1) {
   const float vertices[12] = {0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 3};
   const std::uint16_t indices[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  std::string numbers = "0", shown = R"({"mesh":0})";
+  for (int i = 1; i < nodes; ++i) {
+    numbers += "," + std::to_string(i);
+    shown += R"(,{"mesh":0})";
+  }
   std::string json =
-      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[)" + numbers + R"(]}],"nodes":[)" + shown +
+      "],"
       R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"buffers":[{"byteLength":72}],)"
       R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":24}],)"
       R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[2,1,3]},)"
@@ -119,6 +126,16 @@ TEST_F(LoadMesh, ZUpFormats) {
   expect_extent(good("a.stl", stl), {0, 0, 0}, {2, 1, 3});
   expect_extent(good("a.ply", ply), {0, 0, 0}, {2, 1, 3});
   expect_extent(good("A.OBJ", obj), {0, 0, 0}, {2, 1, 3});
+}
+
+TEST_F(LoadMesh, NodesThatShowTheSameMeshAreCountedBeforeTheyTakeMemory) {
+  std::filesystem::create_directories(files_.path("proc"));
+  files_.write("proc/meminfo", "MemAvailable: 6000 kB\n");
+  memory_root() = files_.folder();
+  const std::string refused = refusal("many.glb", glb(10000)), few = refusal("few.glb", glb(10));
+  memory_root() = "/";
+  EXPECT_THAT(refused, HasSubstr("many.glb would take about 7 MiB of memory, and 5 MiB are left"));
+  EXPECT_EQ(few, "accepted");
 }
 
 TEST_F(LoadMesh, YUpFormatsAreTurned) {
