@@ -1,4 +1,4 @@
-// How many strangers may be connected at a time, over all sonars, and what happens when file descriptors run out.
+// How many clients may be connected at a time, over all sonars, and what happens when file descriptors run out.
 // Owned by App, asked by every listener for each socket it accepts. I/O thread only.
 //
 // The last descriptors below the process's limit are never given to clients: whatever else the daemon needs one for (a log, a
@@ -35,6 +35,8 @@ class Admission {
 
   /// For a socket just accepted. An empty place: it must be closed; the log has been told, once for each spell of it.
   Place enter(const tcp::socket& socket);
+  /// For one whose listener has places of its own. False: likewise.
+  bool leaves_spare(const tcp::socket& socket, Purpose purpose);
   /// accept() failed with `why`. True when that was for want of descriptors and the visitor has been sent away: accept again.
   bool send_away(tcp::acceptor& acceptor, const error_code& why);
   /// The next visitor of a listener without places of ours, whose descriptor is none of the spare ones. Nothing: the listener is
@@ -49,7 +51,6 @@ class Admission {
  private:
   using Steady = std::chrono::steady_clock;
   void say(Steady::time_point& last, const char* what);
-  bool leaves_spare(const tcp::socket& socket, Purpose purpose);
 
   const LimitConfig& limits_;
   Log& log_;

@@ -66,18 +66,18 @@ asio::awaitable<void> Observers::accept() {
       co_await pause.async_wait(into(ec));
       continue;
     }
-    auto place = context_.admission.enter(socket);
-    if (place && sessions_.size() < static_cast<std::size_t>(config_.max_observers)) {
-      admit(std::move(socket), std::move(place));
+    const bool spare = context_.admission.leaves_spare(socket, Admission::Purpose::client);
+    if (spare && sessions_.size() < static_cast<std::size_t>(config_.max_observers)) {
+      admit(std::move(socket));
     } else {
-      if (place) say("observer turned away: " + std::to_string(config_.max_observers) + " look on already", nullptr);
+      if (spare) say("observer turned away: " + std::to_string(config_.max_observers) + " look on already", nullptr);
       close_politely(socket);
     }
   }
 }
 
-void Observers::admit(tcp::socket socket, Admission::Place place) {
-  const Session::Setup setup{config_.outbox, false, ++ever_, context_.config.limits, std::move(place)};
+void Observers::admit(tcp::socket socket) {
+  const Session::Setup setup{config_.outbox, false, ++ever_, context_.config.limits, {}};
   auto session = std::make_shared<Session>(*this, context_.clock, std::move(socket), converse_(), setup);
   say("observer connected", session.get());
   sessions_.push_back(session);

@@ -10,7 +10,6 @@
 #include <string>
 
 #include "core/base/result.hpp"
-#include "daemon/sonars/admission.hpp"
 #include "daemon/sonars/session.hpp"
 #include "daemon/system/asio.hpp"
 #include "daemon/system/log.hpp"
@@ -50,7 +49,7 @@ class Observers final : public SessionParent {
  private:
   void keep_accepting();
   asio::awaitable<void> accept();
-  void admit(tcp::socket socket, Admission::Place place);
+  void admit(tcp::socket socket);
   void say(const std::string& what, const Session* of);
 
   DeviceContext& context_;
