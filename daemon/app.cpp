@@ -213,9 +213,9 @@ asio::awaitable<void> App::keep_house() {
       log_.warning(stale.sentence);
       if (events_.heard()) events_.tell({control::PoseEvent{stale.vehicle, true, stale.sentence}});
     }
-    const bool loads_slowly = changes_.building_for() > config_.limits.load;
-    if (loads_slowly && !slow_load_said_) log_.warning(operations_.trouble());
-    slow_load_said_ = loads_slowly;
+    const std::string slow_load = operations_.slow_load();
+    if (!slow_load.empty() && !slow_load_said_) log_.warning(slow_load);
+    slow_load_said_ = !slow_load.empty();
     fleet_.sweep();
     for (Device& d : fleet_.devices()) d.forget_who_left();
     error_code ec;

@@ -43,6 +43,8 @@ class AppOperations final : public Operations {
   void perform(const control::Operation& operation, const Sender& sender, Done done) override;
   std::string metrics() const override;
   std::string trouble() const override;
+  /// A change of the scene takes longer than limits.load_s: a sentence; empty when none does.
+  std::string slow_load() const;
 
  private:
   using Edit = std::function<Result<ScenePointer>(const Scene&)>;

@@ -50,11 +50,16 @@ std::string AppOperations::trouble() const {
   if (under_way > longest_ping)
     return "the simulation has been at one ping for " +
            std::to_string(std::chrono::duration_cast<std::chrono::seconds>(under_way).count()) + " s";
-  if (const auto loading = parts_.changes.building_for(); loading > parts_.config.limits.load)
-    return "a change of the scene has been loading for " +
-           std::to_string(std::chrono::duration_cast<std::chrono::seconds>(loading).count()) +
-           " s, longer than limits.load_s; reloads and changes of the scene wait for it";
-  return parts_.fleet.trouble();
+  const std::string loading = slow_load();
+  return loading.empty() ? parts_.fleet.trouble() : loading;
+}
+
+std::string AppOperations::slow_load() const {
+  const auto loading = parts_.changes.building_for();
+  if (loading <= parts_.config.limits.load) return {};
+  return "a change of the scene has been loading for " +
+         std::to_string(std::chrono::duration_cast<std::chrono::seconds>(loading).count()) +
+         " s, longer than limits.load_s; reloads and changes of the scene wait for it";
 }
 
 control::DaemonStatus AppOperations::status() const {
