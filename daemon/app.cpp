@@ -23,9 +23,12 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
           [this](const ScenePointer& now) {
             world_.use_objects(bodies_of(*now, config_), clock_.now());
             recordings_.use_scene(*now);
-            say_notes();
+            notes_due_ = true;
           },
-          [this] { on_change(); }),
+          [this] {
+            say_new_notes();
+            on_change();
+          }),
       admission_(config_.limits, log_),
       pose_intake_(
           world_, clock_, log_, [this] { on_change(); }, &events_, &plausibility_),
@@ -58,11 +61,12 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       notify_(
           io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {
   recordings_.use_scene(*changes_.scene());
-  say_notes();
+  say_new_notes();
 }
 
-/// What of the configuration and the scene was probably not meant.
-void App::say_notes() {
+/// What of the configuration and the scene was probably not meant. Not before a reload has changed both.
+void App::say_new_notes() {
+  if (!std::exchange(notes_due_, false)) return;
   for (const Note& note : plausibility_.use(config_, *changes_.scene())) log_.warning(text_of(note));
 }
 

@@ -86,7 +86,7 @@ class App {
   void skip_time();
   void advance_time(Time to);
   bool enough_served() const;
-  void say_notes();
+  void say_new_notes();
   void wait_for_signal();
   void on_hangup();  // reload.cpp, as the next
   void reload();
@@ -122,6 +122,7 @@ class App {
   bool reload_waits_ = false;  // for reload_pause to be over
   std::chrono::steady_clock::time_point no_reload_before_{};
   bool slow_load_said_ = false;
+  bool notes_due_ = true;  // the configuration or the scene is another one
   int exit_code_ = 0;
 };
 

@@ -116,7 +116,7 @@ void App::take_over(Config next) {
   world_.use_vehicles(vehicles_of(config_), clock_.now());
   world_.use_objects(bodies_of(scene(), config_), clock_.now());
   world_.show_again();
-  say_notes();
+  notes_due_ = true;
   const Fleet::Change change = fleet_.take_over(before, config_);
   if (other_water)
     for (Device& d : fleet_.devices()) d.use_water(config_.water);
