@@ -57,7 +57,9 @@ void read_vehicles(const Node& node, TrajectoryFiles& files, Config& config) {
     Map map = item.map();
     VehicleConfig vehicle;
     read_name(map, 64, names, vehicle.name);
-    vehicle.initial_pose = read_world_pose(map.optional("initial_pose"));
+    const Node initial_pose = map.optional("initial_pose");
+    vehicle.has_initial_pose = initial_pose.present();
+    vehicle.initial_pose = read_world_pose(initial_pose);
     vehicle.plan = files.read_plan(map.optional("trajectory"), vehicle.name, &vehicle.orbits);
     config.vehicles.push_back(std::move(vehicle));
   }

@@ -33,7 +33,8 @@ struct VehicleConfig {
   std::string name;
   Pose initial_pose;  // in world
   bool orbits = false;
-  motion::Plan plan{};  // instead
+  motion::Plan plan{};            // instead
+  bool has_initial_pose = false;  // from the file, not the default
 };
 /// A moving object of the scene that follows a trajectory.
 struct ObjectConfig {

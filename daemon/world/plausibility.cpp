@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/motion/trajectory_file.hpp"
+#include "core/pipeline/water_line.hpp"
 #include "core/text/format.hpp"
 
 namespace sonar {
@@ -14,11 +15,13 @@ namespace {
 
 using text::format;
 
-constexpr double turned_over = -0.5;  // the z axis points down, by more than 30 deg below the horizon
-constexpr double tilted = 0.5;        // it is further than 60 deg from upright
-constexpr double whole_turn_rad = 2 * pi;
-constexpr double ground_flatness = 0.05;  // height over width: what is flatter is ground, which may be long
-constexpr double long_ranges = 5;         // lengths of the longest range that an object may have
+constexpr double turned_over = -0.5;            // the z axis points down, by more than 30 deg below the horizon
+constexpr double tilted = 0.5;                  // it is further than 60 deg from upright
+constexpr double most_turns_rad = 10 * 2 * pi;  // that an unwrapped heading has
+constexpr std::size_t most_looked_at = 10000;   // poses of a trajectory, triangles of a mesh
+constexpr double ground_flatness = 0.05;        // height over width: what is flatter is ground, which may be long
+constexpr double least_ground_m = 2;            // its width: a plate is no ground
+constexpr double long_ranges = 5;               // lengths of the longest range that an object may have
 
 // Each cure is one kind of note: a kind is told once.
 constexpr const char* surface_cure =
@@ -46,37 +49,55 @@ struct Doubt {
   const char* cure;
 };
 
-std::optional<Doubt> doubt_of_place(const std::string& vehicle, Vec3d sonar_m, const Surroundings& around) {
-  const Extent& scene = around.scene;
-  const std::string subject = "the sonar of " + vehicle;
-  const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // then the scene is what is wrong
-  if (sonar_m.z > 0 && !lies_above)
-    return Doubt{subject + format(" is %.1f m above the water's surface (z = 0)", sonar_m.z), surface_cure};
-  if (scene.empty()) return std::nullopt;
-  const bool within = scene.distance_m({sonar_m.x, sonar_m.y, scene.low_m.z}) == 0;
-  if (within && sonar_m.z < scene.low_m.z)
-    return Doubt{
-        subject + format(" is %.1f m below the lowest point of the scene (z = %.1f)", scene.low_m.z - sonar_m.z, scene.low_m.z),
-        surface_cure};
-  const double away_m = scene.distance_m(sonar_m);
-  if (away_m <= around.longest_range_m) return std::nullopt;
-  const bool exchanged = scene.distance_m({sonar_m.y, sonar_m.x, sonar_m.z}) <= around.longest_range_m;
-  return Doubt{subject + format(" is %.0f m from everything in the scene, and hears no further than %.0f m", away_m,
-                                around.longest_range_m),
-               exchanged ? exchanged_cure : far_cure};
+/// The lowest point of all ground above or below that place; none when there is no ground.
+std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around) {
+  std::optional<double> lowest;
+  for (const Extent& ground : around.ground)
+    if (ground.distance_m({place_m.x, place_m.y, ground.low_m.z}) == 0)
+      lowest = std::min(lowest.value_or(ground.low_m.z), ground.low_m.z);
+  return lowest;
 }
 
-std::optional<Doubt> doubt_of_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
+enum class Place { fine, above_water, below_ground, far_away };
+Place judge_place(Vec3d sonar_m, const Surroundings& around) {
+  const Extent& scene = around.scene;
+  const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // then the scene is what is wrong
+  if (sonar_m.z > least_depth_m && !lies_above) return Place::above_water;
+  if (const auto ground_m = lowest_ground_m(sonar_m, around); ground_m && sonar_m.z < *ground_m) return Place::below_ground;
+  return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Place::far_away : Place::fine;
+}
+
+/// Of the first sonar of a carrier that is at no good place.
+std::optional<Vec3d> doubtful_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
   for (const Pose& mount : carrier.mounts)
-    if (auto doubt = doubt_of_place(carrier.vehicle, compose(vehicle_in_world, mount).position_m, around)) return doubt;
+    if (const Vec3d at_m = compose(vehicle_in_world, mount).position_m; judge_place(at_m, around) != Place::fine) return at_m;
   return std::nullopt;
 }
 
+std::optional<Doubt> doubt_of_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
+  const auto sonar_m = doubtful_place(carrier, vehicle_in_world, around);
+  if (!sonar_m) return std::nullopt;
+  const std::string subject = "the sonar of " + carrier.vehicle;
+  const Place place = judge_place(*sonar_m, around);
+  if (place == Place::above_water)
+    return Doubt{subject + format(" is %.1f m above the water's surface (z = 0)", sonar_m->z), surface_cure};
+  if (place == Place::below_ground) {
+    const double ground_m = lowest_ground_m(*sonar_m, around).value_or(0);
+    return Doubt{subject + format(" is %.1f m below the lowest point of the ground (z = %.1f)", ground_m - sonar_m->z, ground_m),
+                 surface_cure};
+  }
+  const bool exchanged = around.scene.distance_m({sonar_m->y, sonar_m->x, sonar_m->z}) <= around.longest_range_m;
+  return Doubt{subject + format(" is %.0f m from everything in the scene, and hears no further than %.0f m",
+                                around.scene.distance_m(*sonar_m), around.longest_range_m),
+               exchanged ? exchanged_cure : far_cure};
+}
+
+bool is_upside_down(Quatd q) { return upright(q) <= turned_over; }
+
 std::optional<Doubt> doubt_of_attitude(const std::string& body, Quatd q) {
-  const double up = upright(q);
-  if (up > turned_over) return std::nullopt;
-  return Doubt{body + format(" is upside down, %.0f deg from upright", deg_from_rad(std::acos(std::clamp(up, -1.0, 1.0)))),
-               turned_cure};
+  if (!is_upside_down(q)) return std::nullopt;
+  const double from_upright_rad = std::acos(std::clamp(upright(q), -1.0, 1.0));
+  return Doubt{body + format(" is upside down, %.0f deg from upright", deg_from_rad(from_upright_rad)), turned_cure};
 }
 
 /// As if the file had w at the other end of the four numbers, and in the frame that they were written in.
@@ -106,18 +127,26 @@ bool is_out_of_order(const std::vector<Pose>& poses) {
   return 10 * lying >= poses.size() && 100 * explained >= 99 * lying;
 }
 
-/// The first doubt there is along the way, and of how many poses.
-std::optional<Doubt> doubt_of_all(const motion::Plan& plan, const std::function<std::optional<Doubt>(const Pose&)>& doubt_of) {
-  std::optional<Doubt> first;
-  std::size_t count = 0;
-  const std::vector<Pose>& poses = plan.trajectory->points().poses;
-  for (const Pose& p : poses)
-    if (auto doubt = doubt_of(p)) {
-      ++count;
-      if (!first) first = std::move(doubt);
-    }
-  if (first) first->text += format(", in %zu of %zu poses of ", count, poses.size()) + plan.file;
-  return first;
+/// All, or every second, third, ...: no more than most_looked_at.
+std::vector<Pose> some_poses_of(const motion::Plan& plan) {
+  const std::vector<Pose>& all = plan.trajectory->points().poses;
+  const std::size_t step = 1 + (all.size() - 1) / most_looked_at;
+  std::vector<Pose> some;
+  for (std::size_t i = 0; i < all.size(); i += step) some.push_back(all[i]);
+  return some;
+}
+
+/// The doubt of the first pose that is doubtful, and how many are.
+std::optional<Doubt> doubt_of_all(const std::vector<Pose>& poses, const motion::Plan& plan,
+                                  const std::function<bool(const Pose&)>& is_doubtful,
+                                  const std::function<std::optional<Doubt>(const Pose&)>& doubt_of) {
+  const auto first = std::find_if(poses.begin(), poses.end(), is_doubtful);
+  if (first == poses.end()) return std::nullopt;
+  std::optional<Doubt> doubt = doubt_of(*first);
+  const auto count = static_cast<std::size_t>(std::count_if(first, poses.end(), is_doubtful));
+  const char* which = poses.size() < plan.trajectory->size() ? "poses looked at" : "poses";
+  if (doubt) doubt->text += format(", in %zu of %zu %s of ", count, poses.size(), which) + plan.file;
+  return doubt;
 }
 
 void add(std::vector<Note>& notes, const std::string& vehicle, const std::optional<Doubt>& doubt) {
@@ -134,18 +163,86 @@ Extent in_world(const Extent& own, const Pose& place) {
   return out;
 }
 
+/// All triangles face up, of those looked at: seen from above it hides nothing of itself.
+bool is_height_field(const Mesh& mesh) {
+  const std::size_t step = 1 + mesh.triangles.size() / most_looked_at;
+  for (std::size_t i = 0; i < mesh.triangles.size(); i += step) {
+    const auto& [a, b, c] = mesh.triangles[i];
+    const Vec3 p = mesh.vertices[a];
+    if (cross(mesh.vertices[b] - p, mesh.vertices[c] - p).z <= 0) return false;
+  }
+  return !mesh.triangles.empty();
+}
+
+MeshShape shape_of(const Mesh& mesh) {
+  MeshShape shape{extent_of(mesh)};
+  const Vec3d size = shape.own.size_m();
+  shape.is_ground = size.z < ground_flatness * std::min(size.x, size.y) || is_height_field(mesh);
+  return shape;
+}
+
+/// The sheet that the loader makes of the scene's sea_surface.
+bool is_sea_surface(const Scene& scene, const Object& o) {
+  return scene.sea_surface.present && o.primitive.kind == Primitive::Kind::plane && o.name == "sea surface";
+}
+
+bool is_same(const Extent& a, const Extent& b) {
+  const auto same = [](Vec3d p, Vec3d q) { return p.x == q.x && p.y == q.y && p.z == q.z; };
+  return same(a.low_m, b.low_m) && same(a.high_m, b.high_m);
+}
+/// Poses are judged alike.
+bool is_same(const Surroundings& a, const Surroundings& b) {
+  return is_same(a.scene, b.scene) && a.longest_range_m == b.longest_range_m &&
+         std::equal(a.ground.begin(), a.ground.end(), b.ground.begin(), b.ground.end(),
+                    [](const Extent& x, const Extent& y) { return is_same(x, y); });
+}
+
+std::vector<std::shared_ptr<const motion::Trajectory>> trajectories_of(const Config& config) {
+  std::vector<std::shared_ptr<const motion::Trajectory>> all;
+  for (const VehicleConfig& v : config.vehicles) all.push_back(v.plan.trajectory);
+  for (const ObjectConfig& o : config.objects) all.push_back(o.plan.trajectory);
+  return all;
+}
+
+std::vector<Note> notes_on_plans(const Config& config, const Surroundings& around) {
+  const std::vector<Carrier> carriers = carriers_of(config);
+  std::vector<Note> notes;
+  for (std::size_t v = 0; v < carriers.size(); ++v)
+    if (const motion::Plan& plan = config.vehicles[v].plan) add(notes, notes_on_trajectory(carriers[v], plan, around));
+  for (const ObjectConfig& o : config.objects)
+    if (o.plan)
+      for (Note& n : notes_on_trajectory({o.name, {}}, o.plan, around)) notes.push_back({"", n.text, n.cure});
+  return notes;
+}
+
+/// All but those on plans. Where a vehicle waits for its first pose, and nobody said where, there is nothing to judge.
+std::vector<Note> notes_on_start(const Config& config, const Scene& scene, const Surroundings& around) {
+  const std::vector<Carrier> carriers = carriers_of(config);
+  std::vector<Note> notes = notes_on_mounts(config);
+  add(notes, notes_on_scene(scene, around));
+  for (std::size_t v = 0; v < carriers.size(); ++v) {
+    const VehicleConfig& vehicle = config.vehicles[v];
+    if (!vehicle.plan && (vehicle.has_initial_pose || vehicle.orbits))
+      add(notes, notes_on_pose(carriers[v], vehicle.initial_pose, around));
+  }
+  return notes;
+}
+
 }  // namespace
 
 std::string text_of(const Note& note) { return note.text + (note.cure.empty() ? "" : "; " + note.cure); }
 
-Surroundings surroundings_of(const Config& config, const Scene& scene) {
+Surroundings surroundings_of(const Config& config, const Scene& scene, const MeshShapes& known) {
   Surroundings around;
-  std::map<const Mesh*, Extent> known;  // instances share their mesh
   for (const Object& o : scene.objects) {
-    if (!o.visible) continue;
-    const auto [own, is_new] = known.try_emplace(o.mesh.get());
-    if (is_new) own->second = extent_of(*o.mesh);
-    around.scene.add(in_world(own->second, o.in_world));
+    if (!o.visible || is_sea_surface(scene, o)) continue;
+    const auto [at, is_new] = around.meshes.try_emplace(o.mesh);  // instances share their mesh
+    if (const auto before = known.find(o.mesh); is_new) at->second = before == known.end() ? shape_of(*o.mesh) : before->second;
+    const Extent there = in_world(at->second.own, o.in_world);
+    around.scene.add(there);
+    const bool lies_flat = std::abs(upright(o.in_world.orientation)) > tilted;
+    const bool is_wide = std::min(there.size_m().x, there.size_m().y) >= least_ground_m;
+    if (at->second.is_ground && lies_flat && is_wide && o.body < 0) around.ground.push_back(there);
   }
   for (const PointTarget& p : scene.point_targets) around.scene.add(scene.in_world(p, scene.bodies_in_world));
   for (const SonarConfig& s : config.sonars)
@@ -174,19 +271,19 @@ std::vector<Note> notes_on_mounts(const Config& config) {
 
 std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around) {
   std::vector<Note> notes;
-  if (!around.scene.empty() && around.scene.low_m.z >= 0)
+  if (scene.sea_surface.present && !around.scene.empty() && around.scene.low_m.z >= 0)
     notes.push_back({"", "nothing of the scene lies below the water's surface, z = 0", lift_cure});
   const double allowed_m = std::max(huge_mesh_m, long_ranges * around.longest_range_m);
   std::set<const Mesh*> seen;
   for (const Object& o : scene.objects) {
-    if (!o.visible || o.primitive.kind == Primitive::Kind::plane || !seen.insert(o.mesh.get()).second) continue;
-    const Extent own = extent_of(*o.mesh);
-    const Vec3d size = own.size_m();
-    const bool is_ground = size.z < ground_flatness * std::min(size.x, size.y);
-    if (own.longest_m() <= allowed_m || is_ground) continue;
-    notes.push_back(
-        {"", o.name + format(" is %.0f m long, and no sonar hears further than %.0f m", own.longest_m(), around.longest_range_m),
-         std::string(huge_mesh_cure)});
+    // A primitive's size is in the scene file, in metres; only files have a unit of their own.
+    if (!o.visible || o.primitive.kind != Primitive::Kind::none || !seen.insert(o.mesh.get()).second) continue;
+    const MeshShape& shape = around.meshes.at(o.mesh);
+    const double length_m = shape.own.longest_m();
+    if (length_m <= allowed_m || shape.is_ground) continue;
+    notes.push_back({"",
+                     o.name + format(" is %.0f m long, and no sonar hears further than %.0f m", length_m, around.longest_range_m),
+                     std::string(huge_mesh_cure)});
   }
   return notes;
 }
@@ -199,35 +296,30 @@ std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_w
 }
 
 std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad) {
-  if (!(largest_angle_rad > whole_turn_rad)) return {};
+  if (!(largest_angle_rad > most_turns_rad)) return {};
   return {{vehicle, "the attitude of " + vehicle + format(" has an angle of %.4g rad", largest_angle_rad), angle_cure}};
 }
 
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around) {
+  const std::vector<Pose> poses = some_poses_of(plan);
+  const auto is_misplaced = [&](const Pose& p) { return doubtful_place(carrier, p, around).has_value(); };
+  const auto is_turned = [](const Pose& p) { return is_upside_down(p.orientation); };
   std::vector<Note> notes;
-  add(notes, carrier.vehicle, doubt_of_all(plan, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
-  if (has_nameless_quaternions(plan) && is_out_of_order(plan.trajectory->points().poses))
+  add(notes, carrier.vehicle,
+      doubt_of_all(poses, plan, is_misplaced, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
+  if (has_nameless_quaternions(plan) && is_out_of_order(poses))
     add(notes, carrier.vehicle,
         Doubt{"the quaternions of " + plan.file + " turn " + carrier.vehicle + " over, and would not with w at the other end",
               order_cure});
   else
     add(notes, carrier.vehicle,
-        doubt_of_all(plan, [&](const Pose& p) { return doubt_of_attitude(carrier.vehicle, p.orientation); }));
+        doubt_of_all(poses, plan, is_turned, [&](const Pose& p) { return doubt_of_attitude(carrier.vehicle, p.orientation); }));
   return notes;
 }
 
 std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surroundings& around) {
-  const std::vector<Carrier> carriers = carriers_of(config);
-  std::vector<Note> notes = notes_on_mounts(config);
-  add(notes, notes_on_scene(scene, around));
-  for (std::size_t v = 0; v < carriers.size(); ++v) {
-    const VehicleConfig& vehicle = config.vehicles[v];
-    add(notes, vehicle.plan ? notes_on_trajectory(carriers[v], vehicle.plan, around)
-                            : notes_on_pose(carriers[v], vehicle.initial_pose, around));
-  }
-  for (const ObjectConfig& o : config.objects)
-    if (o.plan)
-      for (Note& n : notes_on_trajectory({o.name, {}}, o.plan, around)) notes.push_back({"", n.text, n.cure});
+  std::vector<Note> notes = notes_on_start(config, scene, around);
+  add(notes, notes_on_plans(config, around));
   return notes;
 }
 
@@ -241,13 +333,27 @@ std::vector<Note> Plausibility::untold(const std::vector<Note>& notes) {
 }
 
 std::vector<Note> Plausibility::use(const Config& config, const Scene& scene) {
-  around_ = surroundings_of(config, scene);
+  Surroundings around = surroundings_of(config, scene, around_.meshes);
+  auto played = trajectories_of(config);
+  if (played != played_ || !is_same(around, around_)) of_plans_ = notes_on_plans(config, around);
+  around_ = std::move(around);
+  played_ = std::move(played);
   carriers_ = carriers_of(config);
-  of_setup_ = notes_on(config, scene, around_);
-  std::erase_if(of_poses_, [this](const auto& of_pose) {
-    return std::none_of(carriers_.begin(), carriers_.end(), [&](const Carrier& c) { return c.vehicle == of_pose.first; });
-  });
-  return untold(of_setup_);
+  of_setup_ = notes_on_start(config, scene, around_);
+  add(of_setup_, of_plans_);
+  std::map<std::string, LastPose> before;
+  before.swap(of_poses_);
+  for (const Carrier& c : carriers_)
+    if (const auto last = before.find(c.vehicle); last != before.end()) judge(c, of_poses_[c.vehicle] = last->second);
+  return untold(all());
+}
+
+void Plausibility::judge(const Carrier& carrier, LastPose& last) const {
+  last.notes = notes_on_pose(carrier, last.vehicle_in_world, around_);
+  auto degrees = notes_on_angles(carrier.vehicle, last.largest_angle_rad);
+  if (degrees.empty()) return;
+  std::erase_if(last.notes, [](const Note& n) { return n.cure == turned_cure; });  // it follows from that
+  add(last.notes, std::move(degrees));
 }
 
 std::vector<Note> Plausibility::use(const control::PoseSample& sample) {
@@ -255,20 +361,17 @@ std::vector<Note> Plausibility::use(const control::PoseSample& sample) {
     return c.vehicle == sample.name || sample.name.empty();  // it is the only one then
   });
   if (carrier == carriers_.end()) return {};
-  std::vector<Note>& notes = of_poses_[carrier->vehicle];
-  notes = notes_on_pose(*carrier, sample.pose, around_);
-  if (auto degrees = notes_on_angles(carrier->vehicle, sample.largest_angle_rad); !degrees.empty()) {
-    std::erase_if(notes, [](const Note& n) { return n.cure == turned_cure; });  // it follows from that
-    add(notes, std::move(degrees));
-  }
-  return notes.empty() ? notes : untold(notes);
+  LastPose& last = of_poses_[carrier->vehicle];
+  last = {sample.pose, sample.largest_angle_rad, {}};
+  judge(*carrier, last);
+  return untold(last.notes);
 }
 
 std::vector<Note> Plausibility::all() const {
   std::vector<Note> notes;
   std::copy_if(of_setup_.begin(), of_setup_.end(), std::back_inserter(notes),
                [this](const Note& n) { return !of_poses_.contains(n.vehicle); });
-  for (const auto& [vehicle, of_pose] : of_poses_) notes.insert(notes.end(), of_pose.begin(), of_pose.end());
+  for (const auto& [vehicle, last] : of_poses_) notes.insert(notes.end(), last.notes.begin(), last.notes.end());
   return notes;
 }
 

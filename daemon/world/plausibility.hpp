@@ -4,6 +4,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -19,12 +20,22 @@ using control::Note;
 /// "the sonar of rov is 3.0 m above the water's surface (z = 0); ENU_FLU counts z upwards ..."
 std::string text_of(const Note& note);
 
-/// What poses are judged against.
+/// What a mesh shows of itself, along its own axes.
+struct MeshShape {
+  Extent own;
+  bool is_ground = false;  // flat, or every triangle faces up: it may be long
+};
+using MeshShapes = std::map<std::shared_ptr<const Mesh>, MeshShape>;
+
+/// What poses are judged against. The sea surface is no part of it.
 struct Surroundings {
   Extent scene;                // where the scene puts what can be seen
+  std::vector<Extent> ground;  // of each plane, seabed and height map that stands still
   double longest_range_m = 0;  // of any sonar
+  MeshShapes meshes;           // that can be seen
 };
-Surroundings surroundings_of(const Config& config, const Scene& scene);
+/// `known`: of a scene before, whose meshes need no second look.
+Surroundings surroundings_of(const Config& config, const Scene& scene, const MeshShapes& known = {});
 
 /// A vehicle, by name, and where its sonars sit on it (FLU).
 struct Carrier {
@@ -34,12 +45,13 @@ struct Carrier {
 std::vector<Carrier> carriers_of(const Config& config);
 
 std::vector<Note> notes_on_mounts(const Config& config);
+/// `around`: of this scene.
 std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around);
 /// At most one on the place, and one on the attitude.
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
 /// `largest_angle_rad`: of roll, pitch and yaw as they were sent; 0 when a quaternion was.
 std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad);
-/// Of a moving object when the carrier has no mounts: its place is not judged then.
+/// Of at most some 10,000 poses, evenly spread. Of a moving object when the carrier has no mounts: its place is not judged then.
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around);
 
 /// All that is known before the first pose.
@@ -48,7 +60,8 @@ std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surro
 /// The notes of a running daemon: of its configuration and scene, and of the newest pose of each vehicle.
 class Plausibility {
  public:
-  /// At the start, and after either of the two has changed; returns what has not been returned before.
+  /// At the start, and after either of the two has changed; returns what has not been returned before. Trajectories and poses
+  /// are judged again where the scene's places have changed.
   std::vector<Note> use(const Config& config, const Scene& scene);
   /// Of a vehicle's pose that was accepted; returns what has not been returned before of this vehicle.
   std::vector<Note> use(const control::PoseSample& sample);
@@ -56,12 +69,19 @@ class Plausibility {
   std::vector<Note> all() const;
 
  private:
+  struct LastPose {
+    Pose vehicle_in_world;
+    double largest_angle_rad = 0;
+    std::vector<Note> notes;
+  };
   std::vector<Note> untold(const std::vector<Note>& notes);
+  void judge(const Carrier& carrier, LastPose& last) const;
 
   Surroundings around_;
   std::vector<Carrier> carriers_;
-  std::vector<Note> of_setup_;
-  std::map<std::string, std::vector<Note>> of_poses_;  // by vehicle
+  std::vector<std::shared_ptr<const motion::Trajectory>> played_;  // what of_plans_ is of; a reload reads new ones
+  std::vector<Note> of_plans_, of_setup_;                          // the second has the first
+  std::map<std::string, LastPose> of_poses_;                       // by vehicle
   std::set<std::string> told_;
 };
 

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "core/scene/files/load_scene.hpp"
 #include "protocol/mavlink/frames.hpp"
 #include "tests/daemon/loopback.hpp"
 
@@ -79,12 +80,36 @@ TEST(Plausibility, AVehicleAboveTheWater) {
   // A boat at the surface with its sonar below the keel is as it should be; one on the mast is not.
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: NED_FRD, xyz_m: [0, 0, -0.3]}", "{frame: FRD, xyz_m: [0, 0, 0.6]}")),
               IsEmpty());
-  EXPECT_THAT(notes(config_with("", "{frame: FLU, xyz_m: [0, 0, 2]}")), ElementsAre(HasSubstr("is 2.0 m above")));
+  EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 0]}", "{frame: FLU, xyz_m: [0, 0, 2]}")),
+              ElementsAre(HasSubstr("is 2.0 m above")));
+  EXPECT_THAT(at("xyz_m: [-7, 0, 0.0009]"), IsEmpty()) << "as near as pings take it for the surface";
+}
+
+TEST(Plausibility, APlaceThatNobodyGaveIsNotJudged) {
+  const std::string up = "{frame: FLU, xyz_m: [0, 0, 0.2]}";
+  EXPECT_THAT(notes(config_with("", up)), IsEmpty());
+  EXPECT_THAT(notes(config_with(", trajectory: orbit", up)), ElementsAre(HasSubstr("is 0.2 m above")));
+}
+
+Scene scene_of(const std::string& yaml) {
+  auto scene = parse_scene(yaml, "scene.yaml", {});
+  if (!scene) throw std::runtime_error(scene.error().text);
+  return **scene;
+}
+
+TEST(Plausibility, TheSeaSurfaceIsNeitherGroundNorSomethingToSee) {
+  const Config config = config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -2]}");
+  EXPECT_THAT(notes(config, scene_of("sea_surface: {}\nobjects: []\n")), IsEmpty());
+  EXPECT_THAT(
+      notes(config, scene_of("sea_surface: {}\nmaterials: {bright: {lambert_db: -10}}\nobjects:\n"
+                             "  - {name: bed, type: plane, material: bright, size_m: [40, 40], pose: {xyz_m: [0, 0, 1]}}\n")),
+      ElementsAre(HasSubstr("nothing of the scene lies below"),
+                  HasSubstr("is 3.0 m below the lowest point of the ground (z = 1.0)")));
 }
 
 TEST(Plausibility, NedTakenForEnuBelowTheBedAndFarAway) {
   EXPECT_THAT(at("xyz_m: [3, 0, -9]"),
-              ElementsAre(AllOf(HasSubstr("is 4.0 m below the lowest point of the scene (z = -5.0)"), HasSubstr("NED"))));
+              ElementsAre(AllOf(HasSubstr("is 4.0 m below the lowest point of the ground (z = -5.0)"), HasSubstr("NED"))));
   Scene strip = bed_scene();
   strip.objects[0].in_world.position_m = {0, 500, -5};
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [500, 0, -2]}"), strip),
@@ -93,11 +118,30 @@ TEST(Plausibility, NedTakenForEnuBelowTheBedAndFarAway) {
   EXPECT_THAT(at("xyz_m: [3000, 0, -3]"), ElementsAre(HasSubstr("positions are metres from the world's 0, 0, 0")));
 }
 
+TEST(Plausibility, OnlyGroundIsWhatASonarCanBeBelow) {
+  const auto below = [](double z_m, std::vector<Object> things) {
+    Scene scene = bed_scene(std::move(things));
+    scene.objects.erase(scene.objects.begin());  // no bed
+    return notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, " + std::to_string(z_m) + "]}"), scene);
+  };
+  EXPECT_THAT(below(-8, {box("hull", {20, 5, 5}, {0, 0, -2.5})}), IsEmpty());
+  EXPECT_THAT(below(-4, {box("buoy", {1, 1, 1}, {-3, 0, -2}), box("buoy 2", {1, 1, 1}, {3, 0, -2})}), IsEmpty());
+  Object shelf = bed_scene().objects[0], bed = shelf;
+  shelf.in_world.position_m.z = -2;
+  EXPECT_THAT(below(-4, {shelf, bed}), IsEmpty()) << "under an overhang";
+  EXPECT_THAT(below(-6, {shelf, bed}), ElementsAre(HasSubstr("is 1.0 m below the lowest point of the ground (z = -5.0)")));
+  bed.in_world.orientation = quat_from_rpy({rad_from_deg(90), 0, 0});
+  EXPECT_THAT(below(-25, {bed}), IsEmpty()) << "a wall";
+}
+
 TEST(Plausibility, ASceneThatLiesAboveTheWaterIsTheMistakeItself) {
   Scene dry = bed_scene();
+  dry.sea_surface.present = true;
   dry.objects[0].in_world.position_m = {0, 0, 0};
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry),
               ElementsAre(HasSubstr("nothing of the scene lies below the water's surface, z = 0; move the scene down")));
+  dry.sea_surface.present = false;
+  EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry), IsEmpty()) << "a tank on its floor";
 }
 
 TEST(Plausibility, AnUpsideDownMount) {
@@ -115,6 +159,14 @@ TEST(Plausibility, AMeshInMillimetres) {
                             "millimetres, set scale: 0.01 or 0.001")));
   EXPECT_THAT(notes(config, bed_scene({box("wreck", {120, 30, 25}, {0, 0, -5})})), IsEmpty());
   EXPECT_THAT(notes(config, bed_scene({box("survey", {1200, 900, 12}, {0, 0, -5})})), IsEmpty()) << "ground may be long";
+  Object ridge = bed_scene().objects[0];
+  auto relief = std::make_shared<Mesh>(*ridge.mesh);
+  relief->vertices = {{-600, -400, 0}, {600, -400, 200}, {600, 400, 0}, {-600, 400, 200}};
+  ridge.name = "ridge", ridge.mesh = relief, ridge.in_world.position_m.z = -210;
+  EXPECT_THAT(notes(config, bed_scene({ridge})), IsEmpty()) << "with relief too";
+  Object quay = box("quay", {1200, 300, 250}, {0, 0, -5});
+  quay.primitive.kind = Primitive::Kind::box;
+  EXPECT_THAT(notes(config, bed_scene({quay})), IsEmpty()) << "its size is in the scene file, in metres";
 }
 
 // ---- trajectories
@@ -164,7 +216,42 @@ TEST(Plausibility, ATrajectoryAboveTheWaterOrUpsideDown) {
               ElementsAre(AllOf(HasSubstr("rov is upside down"), HasSubstr("in 1 of 1 poses of dive.csv"))));
 }
 
+TEST(Plausibility, OfALongTrajectorySomePosesAreLookedAt) {
+  std::string lines = "# frame: ENU_FLU\n";
+  for (int i = 0; i < 25000; ++i) lines += std::to_string(i) + " 0 0 2 0 0 0 1\n";
+  EXPECT_THAT(notes(playing(lines)), ElementsAre(HasSubstr("in 8334 of 8334 poses looked at of dive.tum")));
+}
+
 // ---- a running daemon
+
+TEST(Plausibility, TheLastPoseIsJudgedAgainWhenTheSceneChanges) {
+  const Config config = config_with("");
+  Scene elsewhere = bed_scene();
+  elsewhere.objects[0].in_world.position_m.x = 500;
+  Plausibility plausibility;
+  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty());
+  control::PoseSample sample;
+  sample.name = "rov", sample.pose.position_m = {480, 0, -3};
+  EXPECT_THAT(texts_of(plausibility.use(sample)), ElementsAre(HasSubstr("m from everything in the scene")));
+  EXPECT_THAT(plausibility.use(config, elsewhere), IsEmpty());
+  EXPECT_THAT(plausibility.all(), IsEmpty());
+  sample.pose.position_m = {480, 0, -9};
+  EXPECT_EQ(plausibility.use(sample).size(), 1u) << "below that ground";
+  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "far away again: said before";
+  EXPECT_THAT(texts_of(plausibility.all()), ElementsAre(HasSubstr("m from everything in the scene")));
+}
+
+TEST(Plausibility, ATrajectoryIsJudgedAgainWhenTheSceneChanges) {
+  const Config config = playing("# frame: ENU_FLU\n0 480 0 -3 0 0 0 1\n");
+  Scene elsewhere = bed_scene();
+  elsewhere.objects[0].in_world.position_m.x = 500;
+  Plausibility plausibility;
+  EXPECT_THAT(plausibility.use(config, elsewhere), IsEmpty());
+  EXPECT_EQ(plausibility.use(config, bed_scene()).size(), 1u);
+  EXPECT_EQ(plausibility.all().size(), 1u);
+  EXPECT_THAT(plausibility.use(config, elsewhere), IsEmpty());
+  EXPECT_THAT(plausibility.all(), IsEmpty());
+}
 
 struct RunningNotes : ::testing::Test {
   void send(const std::string& pose) {
@@ -197,7 +284,7 @@ TEST_F(RunningNotes, APoseAboveTheWaterIsLoggedOnceAndInTheStatusWhileItHolds) {
 }
 
 TEST_F(RunningNotes, DegreesSentAsRadians) {
-  send(R"({"position":[0,0,3],"attitude":[0,0,-3.1]})");
+  send(R"({"position":[0,0,3],"attitude":[0,0,7.1]})");  // a heading that is counted on after a whole turn
   EXPECT_THAT(daemon.status().notes, IsEmpty());
   send(R"({"position":[0,0,3],"attitude":[0,-10,-90]})");
   EXPECT_THAT(
