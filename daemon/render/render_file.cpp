@@ -1,8 +1,7 @@
 // Reads what `sonard render` is given: a configuration, or a render file with its sweep.
 #include <algorithm>
-#include <fstream>
-#include <sstream>
 
+#include "core/base/regular_file.hpp"
 #include "core/text/strict_yaml.hpp"
 #include "daemon/config/config_parts.hpp"
 #include "daemon/config/read_trajectory.hpp"
@@ -157,11 +156,9 @@ Result<std::vector<Values>> read_steps(const text::Document& document) {
 }
 
 Result<std::string> text_of_file(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (!std::filesystem::is_regular_file(file) || !in || !(text << in.rdbuf()))
-    return failure(ErrorKind::missing_file, "cannot read " + file.string() + "; is it a file, and not empty?");
-  return text.str();
+  auto text = read_regular(file, text::YamlLimits{}.max_bytes);  // of one that is too long, enough to be refused as such
+  if (text && text->empty()) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": it is empty");
+  return text;
 }
 
 Result<RenderInput> from_config(const std::filesystem::path& file, const std::string& text, const std::string& sonar) {

@@ -1,6 +1,8 @@
 // Render files: what their keys reach, what they refuse, and that an expectation that is wrong fails.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -44,6 +46,16 @@ TEST(RenderFile, AFileOfPosesThatIsNotThereIsToldWithWhereItWasLookedFor) {
   EXPECT_THAT(why("none.csv", ""), HasSubstr("no such file: \"none.csv\"; looked in " + here));  // a bare `sonard render r.yaml`
   EXPECT_THAT(why("none.csv", "missions"), HasSubstr("looked in " + here + "/missions"));
   EXPECT_THAT(why("/nowhere/none.csv", ""), AllOf(HasSubstr("no such file: \"/nowhere/none.csv\""), Not(HasSubstr("looked in"))));
+}
+
+TEST(RenderFile, AFifoIsRefusedAndNotWaitedFor) {
+  const std::string fifo = testing::TempDir() + "render-" + std::to_string(getpid()) + ".yaml";
+  ASSERT_EQ(mkfifo(fifo.c_str(), 0600), 0);
+  const auto input = load_render_input(fifo, "");
+  std::filesystem::remove(fifo);
+  ASSERT_FALSE(input);
+  EXPECT_EQ(input.error().kind, ErrorKind::missing_file);
+  EXPECT_THAT(input.error().text, HasSubstr("is a FIFO, not a regular file"));
 }
 
 TEST(RenderFile, WithoutASceneItIsToldToNameOne) {
