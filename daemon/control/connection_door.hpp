@@ -1,6 +1,6 @@
 // The accepting half of both control servers: a listener, and places for connections that are given up by the most silent. Where
-// a token is needed, those who have not shown it yet have places of their own, and push out each other only. What a Connection
-// does with its socket is its own business.
+// a token is needed, those who have not shown it yet have places of their own, and push out each other only, first those of the
+// address that holds most. What a Connection does with its socket is its own business.
 #pragma once
 
 #include <string>
@@ -120,7 +120,8 @@ class ConnectionDoor {
   ControlContext& context_;
   std::string protocol_;
   tcp::acceptor acceptor_;
-  Places<Connection> places_, strangers_{most_strangers, Steady::duration{}}, leaving_{most_leaving};
+  Places<Connection> places_, leaving_{most_leaving};
+  Places<Connection> strangers_{most_strangers, Steady::duration{}, [](const Connection& c) { return c.sender().source; }};
   Endpoint at_;
   bool stopping_ = false;
 };
