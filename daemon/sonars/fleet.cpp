@@ -14,6 +14,16 @@ bool same(const Pose& a, const Pose& b) {
          a.orientation.z == b.orientation.z;
 }
 
+/// Those of the vendor: a file may also have options of others, which are without effect.
+bool same_options(const SonarConfig& a, const SonarConfig& b) {
+  const auto own = a.profile.vendor->options();
+  return std::all_of(own.begin(), own.end(), [&](const protocol::Option& option) {
+    const auto in_a = a.options.find(std::string(option.name)), in_b = b.options.find(std::string(option.name));
+    return in_a == a.options.end() || in_b == b.options.end() ? in_a == a.options.end() && in_b == b.options.end()
+                                                              : in_a->second == in_b->second;
+  });
+}
+
 const SonarConfig* named(const std::vector<SonarConfig>& sonars, const std::string& name) {
   const auto it = std::find_if(sonars.begin(), sonars.end(), [&](const SonarConfig& s) { return s.name == name; });
   return it == sonars.end() ? nullptr : &*it;
@@ -27,7 +37,7 @@ bool goes_on(const SonarConfig& a, const SonarConfig& b) {
          std::equal(a.status_to.begin(), a.status_to.end(), b.status_to.begin(), b.status_to.end(), same_endpoint) &&
          a.device_id == b.device_id && a.max_clients == b.max_clients && a.when_full == b.when_full &&
          a.max_observers == b.max_observers && a.observer_port == b.observer_port && a.outbox.depth == b.outbox.depth &&
-         a.outbox.when_full == b.outbox.when_full && a.overload == b.overload && a.options == b.options;
+         a.outbox.when_full == b.outbox.when_full && a.overload == b.overload && same_options(a, b);
 }
 
 Result<void> Fleet::open(const Config& config) {
