@@ -8,6 +8,7 @@
 #include "daemon/operations.hpp"
 #include "daemon/poses/pose_intake.hpp"
 #include "daemon/sonars/admission.hpp"
+#include "daemon/sonars/shared_rate.hpp"
 #include "daemon/system/asio.hpp"
 #include "daemon/system/log.hpp"
 
@@ -24,6 +25,7 @@ struct ControlContext {
   PoseIntake& poses;
   Log& log;
   Token token = {};
+  SharedRate pose_rate{limits.pose_bytes_per_s};  // of poses that nobody wants an answer to
   LogLimiter refusals = {}, notices = {}, faults = {};
 };
 

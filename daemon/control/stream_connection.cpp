@@ -1,5 +1,6 @@
 #include "daemon/control/stream_connection.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "daemon/control/http_rules.hpp"
@@ -11,12 +12,19 @@ using control::Response;
 using control::StatusCode;
 
 constexpr std::size_t longest_before_hello = 4096;  // strangers get no megabyte
+constexpr std::size_t work_of_a_turn = 4096;        // bytes; then others have theirs
+constexpr std::size_t least_work = 64;              // bytes that cost as much as a message does beside its own
 constexpr auto never = std::chrono::steady_clock::time_point::max();
 
 StatusCode code_of(OperationResult::Code code) {
   return code == OperationResult::Code::done      ? StatusCode::ok
          : code == OperationResult::Code::refused ? StatusCode::refused
                                                   : StatusCode::failed;
+}
+
+/// Nobody waits for an answer to it.
+bool is_unasked(std::uint64_t id, const auto& operation) {
+  return id == 0 && std::holds_alternative<control::PoseSample>(operation);
 }
 
 Response response_of(std::uint64_t id, OperationResult result) {
@@ -53,7 +61,7 @@ void StreamConnection::close() {
 // ---- requests
 
 asio::awaitable<void> StreamConnection::read() {
-  std::vector<std::byte> buffer(16384);
+  std::vector<std::byte> buffer(work_of_a_turn);
   std::size_t received = 0;
   greeting_->within(greeting_limit);
   while (!over() && !ending_) {
@@ -67,6 +75,7 @@ asio::awaitable<void> StreamConnection::read() {
       break;
     }
     parser_.feed(std::span(buffer).first(n));
+    Work work{n};
     while (!ending_ && !over()) {
       const auto message = parser_.next();
       if (!message) {
@@ -75,17 +84,28 @@ asio::awaitable<void> StreamConnection::read() {
         break;
       }
       if (!*message) break;
-      ending_ = !take(**message);
+      ending_ = !take(**message, work);
       while (!over() && answers_.size() + under_way_ >= most_open_requests) co_await wake_reader_.async_wait(into(ec));
     }
     if (!greeted_ && received > longest_before_hello) ending_ = true;
-    if (const auto pause = rate_.pause_after(n, Steady::now()); pause.count() > 0 && !ending_ && !over()) {
-      rest_.expires_after(pause);
-      co_await rest_.async_wait(into(ec));
-    }
+    if (!ending_ && !over()) co_await rest(work);
   }
   ending_ = true;
   wake_writer_.cancel();  // it writes what is left, and closes
+}
+
+/// What a client sends beyond the limits, or beyond its share of poses, waits in the kernel.
+asio::awaitable<void> StreamConnection::rest(const Work& work) {
+  const auto now = Steady::now();
+  auto pause = rate_.pause_after(work.bytes, now);
+  if (work.pose_bytes > 0) {
+    if (!pose_rate_) pose_rate_ = context_.pose_rate.join(context_.limits.pose_bytes_per_s);
+    pause = std::max(pause, context_.pose_rate.pause_after(*pose_rate_, work.pose_bytes, now));
+  }
+  if (pause.count() == 0) co_return;
+  error_code ec;
+  rest_.expires_after(pause);
+  co_await rest_.async_wait(into(ec));
 }
 
 /// A browser may send it for any page; what it sends must not count, however it reads as protobuf.
@@ -98,7 +118,8 @@ bool StreamConnection::speaks_http(std::span<const std::byte> received) {
 }
 
 /// False: the conversation is over.
-bool StreamConnection::take(control::BytesView message) {
+bool StreamConnection::take(control::BytesView message, Work& work) {
+  work.bytes += least_work;
   const auto request = control::decode_request(message);
   if (!request) {
     if (request.error().pose && greeted_)
@@ -110,6 +131,7 @@ bool StreamConnection::take(control::BytesView message) {
   }
   if (const auto* hello = std::get_if<control::Hello>(&request->op)) return greet(request->id, *hello);
   if (!greeted_) return refuse_and_end(request->id, "the first message must be a Hello");
+  if (is_unasked(request->id, request->op)) work.pose_bytes += message.size() + least_work;
   return take_greeted(*request);
 }
 
@@ -158,7 +180,7 @@ bool StreamConnection::take_greeted(const control::Request& request) {
 
 /// The answer may come later than others, and later than this connection lives.
 void StreamConnection::perform(std::uint64_t id, const control::Operation& operation) {
-  const bool unasked = std::holds_alternative<control::PoseSample>(operation) && id == 0;  // nobody waits for an answer
+  const bool unasked = is_unasked(id, operation);
   if (!unasked) ++under_way_;
   context_.operations.perform(operation, sender_, [weak = weak_from_this(), id, unasked](OperationResult result) {
     const auto self = weak.lock();

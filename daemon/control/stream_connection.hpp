@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "daemon/control/control_context.hpp"
@@ -37,7 +38,11 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
 
  private:
   bool speaks_http(std::span<const std::byte> received);
-  bool take(control::BytesView message);
+  struct Work {
+    std::size_t bytes = 0, pose_bytes = 0;  // pose_bytes: those of poses that nobody wants an answer to, counted in both
+  };
+  bool take(control::BytesView message, Work& work);
+  asio::awaitable<void> rest(const Work& work);
   bool greet(std::uint64_t id, const control::Hello& hello);
   bool take_greeted(const control::Request& request);
   void perform(std::uint64_t id, const control::Operation& operation);
@@ -53,8 +58,9 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   asio::steady_timer wake_reader_, wake_writer_, rest_;
   control::DelimitedParser parser_;
   InputRate rate_;
-  std::deque<control::Bytes> answers_;  // framed
-  std::size_t under_way_ = 0;           // requests whose answer is not in answers_ yet
+  std::optional<SharedRate::Part> pose_rate_;  // from the first pose that nobody wants an answer to
+  std::deque<control::Bytes> answers_;         // framed
+  std::size_t under_way_ = 0;                  // requests whose answer is not in answers_ yet
   EventQueue events_;
   Events::Token subscription_;
   std::string first_bytes_;                // until they are enough to know HTTP by

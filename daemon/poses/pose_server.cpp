@@ -12,9 +12,9 @@ namespace {
 
 constexpr std::size_t most_connections = 32;
 constexpr std::size_t most_lines_of_a_datagram = 64;
-constexpr std::size_t work_of_a_turn = 4096;    // bytes; then others have theirs
-constexpr std::size_t least_work = 64;          // bytes that cost as much as a read, or a line, does beside its own
-constexpr std::size_t most_unread = 64u << 10;  // bytes; a sender with more waiting is behind
+constexpr std::size_t work_of_a_turn = 4096;  // bytes; then others have theirs
+constexpr std::size_t least_work = 64;        // bytes that cost as much as a read, or a line, does beside its own
+constexpr int most_not_json = 8;              // lines in a row that begin as JSON objects and are none
 constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
 
 Sender sender_of(bool json, const char* transport, const asio::ip::address& ip, std::uint16_t port) {
@@ -105,17 +105,15 @@ void PoseServer::stop() {
 
 // ---- what arrives
 
-bool PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
+PoseServer::Heard PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
   if (line.too_long) {
     intake_.refuse("line is longer than 4096 bytes", sender);
-    return false;
+    return Heard::no_json;
   }
   const auto sample = control::parse_json_pose(line.text);
-  if (sample)
-    intake_.take(*sample, sender);
-  else
-    intake_.refuse(sample.error().text, sender);
-  return sample || control::is_json_object(line.text);
+  if (sample) return intake_.take(*sample, sender).empty() ? Heard::pose : Heard::object;
+  intake_.refuse(sample.error().text, sender);
+  return control::is_json_object(line.text) ? Heard::object : Heard::no_json;
 }
 
 void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from) {
@@ -126,7 +124,7 @@ void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes
     lines.feed(std::array{std::byte{'\n'}});
     for (std::size_t taken = 0; const auto line = lines.next(); ++taken) {
       if (taken == most_lines_of_a_datagram) return intake_.refuse("a datagram has at most 64 lines; the rest is lost", sender);
-      if (!on_line(*line, sender)) return;
+      on_line(*line, sender);
     }
     return;
   }
@@ -170,13 +168,13 @@ void PoseServer::admit(tcp::socket socket) {
     return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
   const bool room = connections_.make_room([this](const Connection& evicted) {
     say_at_times(log_, notices_, LogLevel::info,
-                 "pose connection closed: silent for longest, or behind, and its place was needed",
+                 "pose connection closed: without a pose, or beyond the limits, for longest, and its place was needed",
                  {{"from", evicted.sender.id}});
   });
   if (!room) return intake_.refuse(std::to_string(most_connections) + " connections are open and busy already", sender);
   end_when_silent(socket, limits_.dead_peer);
-  together_.use(limits_.pose_bytes_per_s);
-  auto connection = std::make_shared<Connection>(std::move(socket), sender, limits_.input_bytes_per_s);
+  auto connection = std::make_shared<Connection>(std::move(socket), sender, limits_.input_bytes_per_s,
+                                                 together_.join(limits_.pose_bytes_per_s));
   connections_.add(connection);
   asio::co_spawn(
       io_, [this, connection] { return read_lines(connection); },
@@ -195,42 +193,46 @@ asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
     const std::size_t n = co_await c.socket.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || stopping_) co_return;
     c.lines.feed(std::span(buffer).first(n));
-    std::size_t work_bytes = n + least_work;
-    for (Turn turn = Turn::not_over; turn == Turn::not_over; work_bytes = 0) {
-      turn = take_turn(c, work_bytes);
+    Work work{n + least_work};
+    for (Turn turn = Turn::not_over; turn == Turn::not_over; work = {}) {
+      turn = take_turn(c, work);
       if (turn == Turn::end) co_return;
-      co_await rest(c, work_bytes);
+      co_await rest(c, work);
       if (!c.socket.is_open() || stopping_) co_return;
     }
-    if (c.socket.available(ec) < most_unread) c.heard_at = std::chrono::steady_clock::now();
   }
 }
 
 /// Some of the lines that have come; what they cost is added.
-PoseServer::Turn PoseServer::take_turn(Connection& c, std::size_t& work_bytes) {
+PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   for (std::size_t taken = 0; taken < work_of_a_turn;) {
     const auto line = c.lines.next();
     if (!line && c.lines.may_become_object()) return Turn::over;
     if (!line) intake_.refuse(no_json, c.sender);
-    if (!line || !on_line(*line, c.sender)) {
+    const Heard heard = line ? on_line(*line, c.sender) : Heard::no_json;
+    c.not_json = heard == Heard::no_json ? c.not_json + 1 : 0;
+    if (c.not_json == most_not_json || (heard == Heard::no_json && !(line && line->begins_object))) {
       say_at_times(log_, notices_, LogLevel::warning, std::string("pose connection closed: ") + no_json, {{"from", c.sender.id}});
       return Turn::end;
     }
     taken += line->text.size() + least_work;
-    work_bytes += least_work;
+    work.bytes += least_work;
+    work.has_pose |= heard == Heard::pose;
   }
   return Turn::not_over;
 }
 
-/// The others' turns; longer when it, or all together, send more than limits allow: the rest waits in the kernel.
-asio::awaitable<void> PoseServer::rest(Connection& c, std::size_t work_bytes) {
+/// The others' turns; longer when it sends more than limits allow it, or its share of all: the rest waits in the kernel.
+asio::awaitable<void> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
-  const auto own = c.rate.pause_after(work_bytes, now), of_all = together_.pause_after(work_bytes, now);
+  const auto own = c.rate.pause_after(work.bytes, now), of_all = together_.pause_after(c.of_all, work.bytes, now);
   if (own.count() > 0)
     say_at_times(log_, notices_, LogLevel::info,
                  "pose connection is read more slowly: it sends more than limits.input_bytes_per_s", {{"from", c.sender.id}});
+  const auto pause = std::max(own, of_all);
+  if (work.has_pose && pause.count() == 0) c.heard_at = now;
   error_code ec;
-  c.turn.expires_after(std::max(own, of_all));
+  c.turn.expires_after(pause);
   co_await c.turn.async_wait(into(ec));
 }
 

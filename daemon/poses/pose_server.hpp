@@ -1,6 +1,7 @@
 // Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. Owned by App; the control stream is a server of its own
-// (daemon/control/). A malformed message costs its sender a counted refusal and, now and then, a log line; a connection that
-// does not speak JSON is closed. What connections send is worked on in turns of bounded work, and no faster than limits allow.
+// (daemon/control/). A malformed message costs its sender a counted refusal and, now and then, a log line; a connection
+// that does not speak JSON is closed. What connections send is worked on in turns of bounded work, and no faster than limits
+// allow.
 #pragma once
 
 #include <list>
@@ -14,6 +15,7 @@
 #include "daemon/poses/pose_intake.hpp"
 #include "daemon/sonars/admission.hpp"
 #include "daemon/sonars/input_rate.hpp"
+#include "daemon/sonars/shared_rate.hpp"
 #include "daemon/system/asio.hpp"
 #include "daemon/system/log.hpp"
 #include "protocol/control/json_pose.hpp"
@@ -41,16 +43,22 @@ class PoseServer {
     udp::socket datagrams;
     tcp::acceptor acceptor;  // of JSON lines only
   };
-  /// One TCP sender; closed by stop(), or when its place is needed and it has been silent, or behind, for longest.
+  /// One TCP sender; closed by stop(), or when its place is needed and it has sent no pose, or too much, for longest.
   struct Connection {
-    Connection(tcp::socket s, Sender from, std::size_t bytes_per_s)
-        : socket(std::move(s)), sender(std::move(from)), turn(socket.get_executor()), rate(bytes_per_s) {}
+    Connection(tcp::socket s, Sender from, std::size_t bytes_per_s, SharedRate::Part part)
+        : socket(std::move(s)),
+          sender(std::move(from)),
+          turn(socket.get_executor()),
+          rate(bytes_per_s),
+          of_all(std::move(part)) {}
     tcp::socket socket;
     Sender sender;
     asio::steady_timer turn;  // until more of what it sent is worked on
     InputRate rate;
+    SharedRate::Part of_all;
     control::LineParser lines;
-    std::chrono::steady_clock::time_point heard_at = std::chrono::steady_clock::now();  // with little left unread
+    int not_json = 0;                                                                   // lines in a row
+    std::chrono::steady_clock::time_point heard_at = std::chrono::steady_clock::now();  // a pose, within the limits
     void close() {
       error_code ec;
       socket.close(ec);
@@ -67,13 +75,17 @@ class PoseServer {
   asio::awaitable<void> accept(Listener& listener);
   asio::awaitable<void> read_lines(ConnectionPointer connection);
   enum class Turn { over, not_over, end };  // no whole line is left; one may be; the connection speaks no JSON
-  Turn take_turn(Connection& connection, std::size_t& work_bytes);
-  asio::awaitable<void> rest(Connection& connection, std::size_t work_bytes);
+  struct Work {
+    std::size_t bytes = 0;
+    bool has_pose = false;  // one that counts
+  };
+  Turn take_turn(Connection& connection, Work& work);
+  asio::awaitable<void> rest(Connection& connection, const Work& work);
   void admit(tcp::socket socket);
 
   void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);
-  /// False: it is no JSON.
-  bool on_line(const control::LineParser::Line& line, const Sender& sender);
+  enum class Heard { pose, object, no_json };  // a pose that counts; another JSON object; neither
+  Heard on_line(const control::LineParser::Line& line, const Sender& sender);
 
   asio::io_context& io_;
   const PoseConfig& config_;
@@ -84,7 +96,7 @@ class PoseServer {
   LogLimiter notices_, faults_;
   std::list<Listener> listeners_;
   Places<Connection> connections_;
-  InputRate together_;  // of all connections
+  SharedRate together_;  // of all connections
   Endpoint protobuf_at_, json_at_;
   bool stopping_ = false;
 };

@@ -8,6 +8,7 @@ namespace {
 
 using nlohmann::json;
 constexpr int deepest_nesting = 8;
+constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";  // .NET writes one
 constexpr double latest_timestamp_s = 1e-9 * static_cast<double>(largest_stamp_ns);
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
@@ -31,6 +32,11 @@ bool too_deep(std::string_view text) {
     if (c == '}' || c == ']') --depth;
   }
   return false;
+}
+
+bool begins_object(std::string_view line) {
+  const auto first = line.find_first_not_of(" \t\r\n");
+  return first != std::string_view::npos && line[first] == '{';
 }
 
 template <std::size_t N>
@@ -136,9 +142,7 @@ Result<PoseSample> parse_json_pose(std::string_view line) {
 }
 
 bool is_json_object(std::string_view line) {
-  const auto first = line.find_first_not_of(" \t\r\n");
-  return first != std::string_view::npos && line[first] == '{' && line.size() <= longest_line && !too_deep(line) &&
-         json::accept(line.begin(), line.end());
+  return begins_object(line) && line.size() <= longest_line && !too_deep(line) && json::accept(line.begin(), line.end());
 }
 
 void LineParser::feed(std::span<const std::byte> received) {
@@ -147,28 +151,40 @@ void LineParser::feed(std::span<const std::byte> received) {
   for (const std::byte b : received) buffer_.push_back(static_cast<char>(b));
 }
 
+/// False: the first bytes may yet become a byte order mark.
+bool LineParser::begin() {
+  if (begun_) return true;
+  if (buffer_.size() < byte_order_mark.size() && byte_order_mark.starts_with(buffer_)) return false;
+  if (buffer_.starts_with(byte_order_mark)) start_ = byte_order_mark.size();
+  return begun_ = true;
+}
+
 std::optional<LineParser::Line> LineParser::next() {
+  if (!begin()) return std::nullopt;
   while (true) {
     const std::size_t end = buffer_.find('\n', start_);
     if (end == std::string::npos) {
       const bool too_long = !swallowing_ && buffer_.size() - start_ > longest_line;
       if (!swallowing_ && !too_long) return std::nullopt;
+      const bool object = begins_object(std::string_view(buffer_).substr(start_));
       buffer_.clear();
       start_ = 0;
       if (!too_long) return std::nullopt;
       swallowing_ = true;
-      return Line{{}, true};
+      return Line{{}, true, object};
     }
     std::string text = buffer_.substr(start_, end - start_);
     start_ = end + 1;
     if (std::exchange(swallowing_, false)) continue;  // the tail of a line already reported
-    if (text.size() > longest_line) return Line{{}, true};
+    const bool object = begins_object(text);
+    if (text.size() > longest_line) return Line{{}, true, object};
     if (!text.empty() && text.back() == '\r') text.pop_back();
-    if (text.find_first_not_of(" \t") != std::string::npos) return Line{std::move(text), false};
+    if (text.find_first_not_of(" \t") != std::string::npos) return Line{std::move(text), false, object};
   }
 }
 
 bool LineParser::may_become_object() const {
+  if (!begun_) return true;
   const auto first = buffer_.find_first_not_of(" \t\r\n", start_);
   return first == std::string::npos || buffer_[first] == '{';
 }

@@ -25,12 +25,14 @@ Result<PoseSample> parse_json_pose(std::string_view line);
 /// Whether the line is a JSON object at all, whatever its keys: what is not speaks another protocol.
 bool is_json_object(std::string_view line);
 
-/// Cuts a byte stream into lines. A line beyond the limit is swallowed to its end and reported once.
+/// Cuts a byte stream into lines. A line beyond the limit is swallowed to its end and reported once. A byte order mark at the
+/// start of the stream is skipped.
 class LineParser {
  public:
   struct Line {
     std::string text;
     bool too_long = false;
+    bool begins_object = false;  // its first sign is a brace
   };
   void feed(std::span<const std::byte> received);
   std::optional<Line> next();
@@ -39,9 +41,11 @@ class LineParser {
   bool may_become_object() const;
 
  private:
+  bool begin();
   std::string buffer_;     // never longer than one line and one read
   std::size_t start_ = 0;  // of the next line
   bool swallowing_ = false;
+  bool begun_ = false;  // the stream, after its mark
 };
 
 }  // namespace sonar::control

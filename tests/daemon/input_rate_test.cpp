@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "daemon/sonars/shared_rate.hpp"
+
 namespace sonar {
 namespace {
 
@@ -40,6 +42,48 @@ TEST(InputRate, APauseIsNotSavedUpForMoreThanASecond) {
 TEST(InputRate, NoRateIsNoLimit) {
   InputRate rate(0);
   EXPECT_EQ(rate.pause_after(std::size_t{1} << 40, Steady::time_point{}).count(), 0);
+}
+
+/// Bytes of so many floods, and of a client that sends `modest` bytes every 100 ms, read within 20 s; `waited`: the latter's
+/// time.
+struct Shared {
+  std::size_t of_floods = 0;
+  Steady::duration waited{};
+};
+Shared twenty_seconds(int floods, std::size_t modest) {
+  SharedRate rate(10000);
+  std::vector<SharedRate::Part> parts;
+  for (int i = 0; i <= floods; ++i) parts.push_back(rate.join(10000));
+  const auto begin = Steady::time_point(std::chrono::hours(5));
+  std::vector<Steady::time_point> turns(parts.size(), begin);
+  Shared out;
+  for (auto now = begin; now < begin + std::chrono::seconds(20); now += milliseconds(1))
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (turns[i] > now) continue;
+      const bool is_modest = i == parts.size() - 1;
+      const auto pause = rate.pause_after(parts[i], is_modest ? modest : 1000, now);
+      turns[i] = now + pause + milliseconds(is_modest ? 100 : 1);
+      is_modest ? void(out.waited += pause) : void(out.of_floods += 1000);
+    }
+  return out;
+}
+
+TEST(SharedRate, HoldsTheRateAndOnlyThoseAboveTheirShareWait) {
+  const Shared with_modest = twenty_seconds(9, 90);  // 900 bytes a second of 1000
+  EXPECT_EQ(with_modest.waited.count(), 0);
+  EXPECT_GE(with_modest.of_floods, 150000u);
+  EXPECT_LE(with_modest.of_floods, 240000u) << "20 s worth, a second's and 4 KiB each at once, the last reads";
+  EXPECT_GT(twenty_seconds(9, 500).waited, std::chrono::seconds(1)) << "five times its share";
+}
+
+TEST(SharedRate, OneAloneHasAllOfItAndThoseWhoLeftCountNoMore) {
+  SharedRate rate(10000);
+  auto now = Steady::time_point(std::chrono::hours(5));
+  auto part = rate.join(10000);
+  for (int i = 0; i < 100; ++i) {
+    const auto gone = rate.join(10000);
+  }
+  for (int i = 0; i < 100; ++i, now += milliseconds(100)) EXPECT_EQ(rate.pause_after(part, 1000, now).count(), 0);
 }
 
 }  // namespace

@@ -116,6 +116,34 @@ TEST(LineParser, ARequestLineIsKnownBeforeItEnds) {
   EXPECT_FALSE(parser.may_become_object());
 }
 
+TEST(LineParser, AByteOrderMarkAtTheStartIsSkipped) {
+  const std::string mark = "\xef\xbb\xbf", stream = mark + "{}\n" + mark + "{}\n";
+  for (std::size_t cut = 0; cut <= stream.size(); ++cut) {
+    LineParser parser;
+    std::vector<std::string> lines;
+    for (const auto& part : {stream.substr(0, cut), stream.substr(cut)}) {
+      parser.feed(bytes(part));
+      while (auto line = parser.next()) lines.push_back(line->text);
+      if (lines.empty()) {
+        EXPECT_TRUE(parser.may_become_object()) << cut;
+      }
+    }
+    ASSERT_EQ(lines, (std::vector<std::string>{"{}", mark + "{}"})) << "cut at " << cut;
+  }
+}
+
+TEST(LineParser, TellsWhatBeginsAsAnObject) {
+  const auto begins = [](const std::string& line) {
+    LineParser parser;
+    parser.feed(bytes(line));
+    const auto first = parser.next();
+    return first && first->begins_object;
+  };
+  const std::string longest(5000, 'x');
+  EXPECT_TRUE(begins("{\n") && begins(" \t{NaN}\n") && begins("{" + longest) && begins("{" + longest + "\n"));
+  EXPECT_FALSE(begins("POST / HTTP/1.1\n") || begins("[{}]\n") || begins(longest) || begins(longest + "\n"));
+}
+
 TEST(LineParser, ManyLinesInOneReadTakeTimeInProportion) {
   // 32 MiB of two-byte lines: moving the rest up after each of them would copy 280 TB, hours of work.
   std::string stream;
