@@ -15,18 +15,19 @@ namespace {
 
 using text::format;
 
-constexpr double turned_over = -0.5;            // the z axis points down, by more than 30 deg below the horizon
-constexpr double tilted = 0.5;                  // it is further than 60 deg from upright
-constexpr double most_turns_rad = 10 * 2 * pi;  // that an unwrapped heading has
-constexpr std::size_t most_looked_at = 10000;   // poses of a trajectory, triangles of a mesh
-constexpr double ground_flatness = 0.05;        // height over width: what is flatter is ground, which may be long
-constexpr double least_ground_m = 2;            // its width: a plate is no ground
-constexpr double long_ranges = 5;               // lengths of the longest range that an object may have
+constexpr double turned_over = -0.5;           // the z axis points down, by more than 30 deg below the horizon
+constexpr double tilted = 0.5;                 // it is further than 60 deg from upright
+constexpr std::size_t most_looked_at = 10000;  // poses of a trajectory, triangles of a mesh
+constexpr double ground_flatness = 0.05;       // height over width: what is flatter is ground, which may be long
+constexpr double least_ground_m = 2;           // its width: a plate is no ground
+constexpr double long_ranges = 5;              // lengths of the longest range that an object may have
 
 // Each cure is one kind of note: a kind is told once.
 constexpr const char* surface_cure =
     "was NED taken for ENU, or the reverse? ENU_FLU counts z upwards, NED_FRD downwards: 3 m deep is z = -3 in the one and z = 3 "
     "in the other; say the frame that was sent";
+constexpr const char* depth_cure =
+    "the scene is less deep than that: see the origin that depths are counted from, and the unit (metres)";
 constexpr const char* exchanged_cure = "with x and y exchanged it would be in the scene: ENU_FLU has east first, NED_FRD north";
 constexpr const char* far_cure =
     "positions are metres from the world's 0, 0, 0: see the unit and the origin that they are sent in";
@@ -84,7 +85,7 @@ std::optional<Doubt> doubt_of_place(const Carrier& carrier, const Pose& vehicle_
   if (place == Place::below_ground) {
     const double ground_m = lowest_ground_m(*sonar_m, around).value_or(0);
     return Doubt{subject + format(" is %.1f m below the lowest point of the ground (z = %.1f)", ground_m - sonar_m->z, ground_m),
-                 surface_cure};
+                 depth_cure};
   }
   const bool exchanged = around.scene.distance_m({sonar_m->y, sonar_m->x, sonar_m->z}) <= around.longest_range_m;
   return Doubt{subject + format(" is %.0f m from everything in the scene, and hears no further than %.0f m",
@@ -296,7 +297,7 @@ std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_w
 }
 
 std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad) {
-  if (!(largest_angle_rad > most_turns_rad)) return {};
+  if (!(largest_angle_rad > 0)) return {};
   return {{vehicle, "the attitude of " + vehicle + format(" has an angle of %.4g rad", largest_angle_rad), angle_cure}};
 }
 

@@ -49,7 +49,7 @@ std::vector<Note> notes_on_mounts(const Config& config);
 std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around);
 /// At most one on the place, and one on the attitude.
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
-/// `largest_angle_rad`: of roll, pitch and yaw as they were sent; 0 when a quaternion was.
+/// `largest_angle_rad`: as in PoseSample.
 std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad);
 /// Of at most some 10,000 poses, evenly spread. Of a moving object when the carrier has no mounts: its place is not judged then.
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around);

@@ -91,7 +91,7 @@ Result<std::array<double, 4>> orientation_of(const json& object, std::string& fi
   for (const double angle : **attitude)
     if (!std::isfinite(angle)) return refused("attitude has a NaN or infinite component");
   fields += " attitude";
-  largest_angle_rad = largest_of(**attitude);
+  largest_angle_rad = angle_beyond_radians(**attitude);
   const Quatd q = quat_from_rpy({(**attitude)[0], (**attitude)[1], (**attitude)[2]});
   return std::array<double, 4>{q.w, q.x, q.y, q.z};
 }

@@ -40,7 +40,7 @@ struct PoseSample {
   std::optional<Vec3d> angular_velocity_radps;  // body axes, FLU
   std::uint32_t reset_counter = 0;              // a change means: do not interpolate across
   bool hidden = false;                          // objects only: out of the scene for now
-  double largest_angle_rad = 0;                 // of roll, pitch, yaw as they were sent; 0 = as a quaternion
+  double largest_angle_rad = 0;                 // of roll, pitch, yaw that can hardly be radians; 0 = they may be, or a quaternion
   Frame sent_in = Frame::enu_flu;               // for the log
   std::string fields;                           // for the log: what the message contained
 };
@@ -52,10 +52,11 @@ struct RawPose {
   std::array<double, 4> orientation_wxyz{};
   std::optional<std::array<double, 3>> velocity_mps;
   std::optional<std::array<double, 3>> angular_velocity_radps;
-  double largest_angle_rad = 0;  // of roll, pitch, yaw, where the orientation was sent as angles
+  double largest_angle_rad = 0;  // as in PoseSample
 };
-/// Of angles, whatever their signs.
-double largest_of(const std::array<double, 3>& rpy_rad);
+/// The largest angle, whatever its sign, where one of them can hardly be radians: a roll or pitch of more than half a turn, or a
+/// yaw of more than ten turns, since headings are sent unwrapped, too. Else 0.
+double angle_beyond_radians(const std::array<double, 3>& rpy_rad);
 /// Fills pose and velocities of `sample` from `raw`, or refuses with one sentence: no frame, NaN or infinity, absurd size, or a
 /// quaternion whose norm is off by more than 1e-3 (a smaller drift is renormalised).
 Result<PoseSample> checked(PoseSample sample, const RawPose& raw);

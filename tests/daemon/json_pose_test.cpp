@@ -46,6 +46,8 @@ TEST(JsonPose, ReadsQuaternionFrameAndVehicle) {
 
 TEST(JsonPose, KeepsTheLargestAngleThatWasSent) {
   EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"attitude":[1,-90,45]})")->largest_angle_rad, 90);
+  EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"attitude":[0,-5,45]})")->largest_angle_rad, 45) << "no pitch is half a turn";
+  EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"attitude":[0,1.5,-45]})")->largest_angle_rad, 0) << "a heading of 7 turns";
   EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"quaternion":[1,0,0,0]})")->largest_angle_rad, 0);
 }
 

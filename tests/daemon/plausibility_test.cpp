@@ -108,8 +108,8 @@ TEST(Plausibility, TheSeaSurfaceIsNeitherGroundNorSomethingToSee) {
 }
 
 TEST(Plausibility, NedTakenForEnuBelowTheBedAndFarAway) {
-  EXPECT_THAT(at("xyz_m: [3, 0, -9]"),
-              ElementsAre(AllOf(HasSubstr("is 4.0 m below the lowest point of the ground (z = -5.0)"), HasSubstr("NED"))));
+  EXPECT_THAT(at("xyz_m: [3, 0, -9]"), ElementsAre(AllOf(HasSubstr("is 4.0 m below the lowest point of the ground (z = -5.0)"),
+                                                         HasSubstr("the origin that depths are counted from"))));
   Scene strip = bed_scene();
   strip.objects[0].in_world.position_m = {0, 500, -5};
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [500, 0, -2]}"), strip),
@@ -239,6 +239,16 @@ TEST(Plausibility, TheLastPoseIsJudgedAgainWhenTheSceneChanges) {
   EXPECT_EQ(plausibility.use(sample).size(), 1u) << "below that ground";
   EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "far away again: said before";
   EXPECT_THAT(texts_of(plausibility.all()), ElementsAre(HasSubstr("m from everything in the scene")));
+}
+
+TEST(Plausibility, AboveTheWaterAndBelowTheGroundAreTwoMistakes) {
+  Plausibility plausibility;
+  EXPECT_THAT(plausibility.use(config_with(""), bed_scene()), IsEmpty());
+  control::PoseSample sample;
+  sample.name = "rov", sample.pose.position_m = {0, 0, -30};
+  EXPECT_THAT(texts_of(plausibility.use(sample)), ElementsAre(HasSubstr("below the lowest point of the ground")));
+  sample.pose.position_m.z = 3;
+  EXPECT_THAT(texts_of(plausibility.use(sample)), ElementsAre(HasSubstr("above the water's surface")));
 }
 
 TEST(Plausibility, ATrajectoryIsJudgedAgainWhenTheSceneChanges) {
