@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/base/regular_file.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/config/nearest_scene.hpp"
 
@@ -56,6 +57,12 @@ Pose read_mount(const Node& node) {
 SceneFile read_scene_file(const Node& node, const std::filesystem::path& directory) {
   const std::string given = node.text();
   if (auto found = find_scene(given, directory)) return *std::move(found);
+  std::error_code ec;
+  if (const auto place = directory / given; !given.empty() && std::filesystem::exists(place, ec))
+    if (const auto opened = open_regular(place); !opened) {
+      node.fail(opened.error().text);
+      return {given};
+    }
   const std::string near = nearest_scene(given, directory);
   const std::string meant = near.empty() ? "; looked in " : "; did you mean \"" + near + "\"? Looked in ";
   node.fail("no such file: \"" + given.substr(0, 256) + "\"" + meant + scene_folders(directory));

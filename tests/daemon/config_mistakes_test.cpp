@@ -1,6 +1,7 @@
 // Mistakes of the first hour in a configuration: what is meant is named, not only that something is wrong.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -44,6 +45,11 @@ TEST(ConfigMistakes, NamesTheNearestSceneToOneThatIsNot) {
   EXPECT_THAT(refusal("demoo.yaml"), HasSubstr("did you mean \"demo.yaml\"?"));  // part of the program
   EXPECT_THAT(refusal("local-search"), HasSubstr("did you mean \"local-search.yaml\"?"));
   EXPECT_THAT(refusal("scenes/demo.yml"), HasSubstr("did you mean \"demo.yaml\"?"));
+}
+
+TEST(ConfigMistakes, SaysWhatASceneFileIsThatCannotBeRead) {
+  ASSERT_EQ(mkfifo((directory() + "/fifo.yaml").c_str(), 0600), 0);
+  EXPECT_THAT(why("world: {scene: fifo.yaml}\n" + vehicles + sonar), HasSubstr("fifo.yaml: is a FIFO, not a regular file"));
 }
 
 TEST(ConfigMistakes, NamesAMistypedKeyThatSeveralSonarsShare) {
