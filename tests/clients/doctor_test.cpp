@@ -296,7 +296,7 @@ TEST(Doctor, LooksAtPosesHttpAndClocks) {
   expect(line(facts, "poses"), Level::warn, "poses of rov have stopped, the last came from json 127.0.0.1", "on_stale");
   facts.control.status->vehicles[0].stale = false;
   facts.control.status->poses.refused = 3;
-  EXPECT_THAT(text_from(judge(facts)), HasSubstr("warn  3 poses were refused, 0 accepted"));
+  EXPECT_THAT(text_from(judge(facts)), HasSubstr("warn  3 messages were refused as poses, 0 accepted"));
   facts.http.code = 0;
   expect(line(facts, "http"), Level::warn, "does not answer", "--http");
   facts.http.code = 503, facts.http.text = "no ping for 5 s";

@@ -60,10 +60,10 @@ void judge_poses(const control::DaemonStatus& status, std::vector<Finding>& find
   }
   for (const control::Note& note : status.notes) findings.push_back({Level::warn, "note", note.text, note.cure});
   if (status.poses.refused > 0)
-    findings.push_back(
-        {Level::warn, "poses",
-         std::to_string(status.poses.refused) + " poses were refused, " + std::to_string(status.poses.accepted) + " accepted",
-         "sonard's log says why of each kind: the frame, a norm, a name, the clock"});
+    findings.push_back({Level::warn, "poses",
+                        std::to_string(status.poses.refused) + " messages were refused as poses, " +
+                            std::to_string(status.poses.accepted) + " accepted",
+                        "see sonard's log for the reason: not JSON, the frame, a quaternion's norm, a name, the clock"});
 }
 
 void judge_http(const Facts& facts, std::vector<Finding>& findings) {
