@@ -40,9 +40,9 @@ struct PoseSample {
   std::optional<Vec3d> angular_velocity_radps;  // body axes, FLU
   std::uint32_t reset_counter = 0;              // a change means: do not interpolate across
   bool hidden = false;                          // objects only: out of the scene for now
-  double largest_angle_rad = 0;                 // of roll, pitch, yaw that can hardly be radians; 0 = they may be, or a quaternion
-  Frame sent_in = Frame::enu_flu;               // for the log
-  std::string fields;                           // for the log: what the message contained
+  double largest_angle_rad = 0;    // of roll, pitch, yaw that can hardly be radians; 0 = they may be, or a quaternion
+  Frame sent_in = Frame::enu_flu;  // for the log
+  std::string fields;              // for the log: what the message contained
 };
 
 /// The numbers of a message before anybody believed them. Velocities are in body axes of `frame`.
