@@ -9,6 +9,13 @@
 #include "daemon/world/world_parts.hpp"
 
 namespace sonar {
+namespace {
+
+/// As stop_limit, while recordings are written. Less than the unit's TimeoutStopSec.
+constexpr std::chrono::milliseconds files_limit{8000};
+
+}  // namespace
+
 App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory& make_engine, AppOptions options, Log& log)
     : config_(std::move(config)),
       options_(std::move(options)),
@@ -139,7 +146,12 @@ void App::stop(const std::string& why) {
   // Clients have been sent away by then. What still holds us up, a long ping say, is not waited for.
   stop_timer_.expires_after(stop_limit);
   stop_timer_.async_wait([this](const error_code& ec) {
-    if (!ec) io_.stop();
+    if (ec) return;
+    if (recordings_.idle()) return io_.stop();
+    stop_timer_.expires_after(files_limit - stop_limit);  // pings that still wait for their file
+    stop_timer_.async_wait([this](const error_code& again) {
+      if (!again) io_.stop();
+    });
   });
   on_change();
 }
