@@ -5,7 +5,7 @@
 namespace sonar::cuda {
 namespace {
 
-constexpr std::size_t alignment = 256;
+constexpr std::size_t slice_alignment = 256;
 
 }  // namespace
 
@@ -16,8 +16,8 @@ Arena::~Arena() {
   }
 }
 
-Arena::Place Arena::take_bytes(std::size_t bytes) {
-  const std::size_t wanted = (bytes + alignment - 1) / alignment * alignment;
+Arena::Place Arena::allocate_bytes(std::size_t bytes) {
+  const std::size_t wanted = (bytes + slice_alignment - 1) / slice_alignment * slice_alignment;
   auto it = std::find_if(chunks_.begin(), chunks_.end(), [&](const Chunk& c) { return c.size - c.used >= wanted; });
   if (it == chunks_.end()) {
     chunks_.push_back({});

@@ -1,4 +1,4 @@
-// Memory of one batch of pings, taken piece by piece and given back all at once: on the device, on the host, or on both alike,
+// Memory of one batch of pings, taken slice by slice and given back all at once: on the device, on the host, or on both alike,
 // so that many small tables travel in one copy. Pieces stay where they are until clear().
 #pragma once
 
@@ -21,25 +21,25 @@ class Arena {
   Arena& operator=(const Arena&) = delete;
 
   template <class T>
-  struct Piece {
+  struct Slice {
     T* device = nullptr;  // null on Where::host
     T* host = nullptr;    // null on Where::device
     std::size_t count = 0;
   };
   /// Not initialised; of nothing, null.
   template <class T>
-  Piece<T> take(std::size_t count) {
+  Slice<T> allocate(std::size_t count) {
     static_assert(std::is_trivially_copyable_v<T>);
     if (count == 0) return {};
-    const Place at = take_bytes(count * sizeof(T));
+    const Place at = allocate_bytes(count * sizeof(T));
     return {static_cast<T*>(at.device), static_cast<T*>(at.host), count};
   }
   /// The device's copy of `values`, which upload() will send. Where::both only.
   template <class T>
   T* put(std::span<const T> values) {
-    const Piece<T> piece = take<T>(values.size());
-    if (!values.empty()) std::memcpy(static_cast<void*>(piece.host), values.data(), values.size_bytes());
-    return piece.device;
+    const Slice<T> slice = allocate<T>(values.size());
+    if (!values.empty()) std::memcpy(static_cast<void*>(slice.host), values.data(), values.size_bytes());
+    return slice.device;
   }
   template <class T, class Allocator>
   T* put(const std::vector<T, Allocator>& values) {
@@ -61,7 +61,7 @@ class Arena {
     void* device;
     void* host;
   };
-  Place take_bytes(std::size_t bytes);
+  Place allocate_bytes(std::size_t bytes);
 
   Machine& machine_;
   Where where_;

@@ -1,11 +1,10 @@
 // Kernel bodies from columns to codes: the receive pattern, points and other sonars on top, crosstalk, envelope, gain and
-// quantisation, as couple, disturbances and receive do it (core/pipeline).
+// quantisation, as form_beams, interference and receive do it (core/pipeline).
 #pragma once
 
 #include <cmath>
 
 #include "cuda/device_types.hpp"
-#include "cuda/fast_math.hpp"
 
 namespace sonar::cuda {
 
@@ -43,11 +42,11 @@ SONAR_HD inline void add_points(const PingView& p, std::uint32_t j, std::int32_t
 }
 
 /// Sample `i` of [panels][samples]: the four beams of a panel at once, which listen to the same columns.
-SONAR_HD inline void couple(const PingView& p, std::uint32_t i) {
+SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
   const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
   const std::uint32_t panel = i / samples;
   const auto n = static_cast<std::int32_t>(i % samples);
-  const CouplingRow& row = p.panels[panel];
+  const BeamWeightRow& row = p.panels[panel];
   const float* weight = p.weights + row.weights;
   const float* column = p.signals + 2 * (static_cast<std::int64_t>(row.first_column) * p.samples + n);
   float re[beams_a_panel] = {}, im[beams_a_panel] = {};
@@ -106,6 +105,7 @@ SONAR_HD inline void receive(const PingView& p, std::uint32_t i) {
   const float power = sum / static_cast<float>(p.per_row);
   if (p.pressure != nullptr) p.pressure[i] = std::sqrt(power);
   const auto max_code = static_cast<float>(p.max_code);
+  // Eq. 37, as codes_of (core/pipeline/simd/quantise.inl).
   const float v = exp2_of(p.half_gamma * log2_of(larger(power * p.row_power_factor[row], 1e-30f)));
   const float code = smaller(std::floor(v * max_code + 0.5f), max_code);
   // 2^32 - 1 is no float: compare before the conversion can overflow.

@@ -14,9 +14,6 @@ constexpr std::size_t most_in_leaf = 4;
 constexpr int deepest_by_area = 32;  // deeper down items are halved by number, which ends within another 32 levels
 constexpr float node_cost = 1.2f;    // of a step down, in triangle tests
 
-constexpr float huge = std::numeric_limits<float>::infinity();
-constexpr Box nothing{{huge, huge, huge}, {-huge, -huge, -huge}};
-
 void grow(Box& box, const Box& by) {
   for (int k = 0; k < 3; ++k) {
     box.low[k] = std::min(box.low[k], by.low[k]);
@@ -31,7 +28,7 @@ float twice_centre(const Box& b, int axis) { return b.low[axis] + b.high[axis]; 
 
 struct Split {
   int axis = -1, bin = 0;
-  float cost = huge;
+  float cost = huge_distance;
 };
 
 class Builder {
@@ -47,8 +44,8 @@ class Builder {
       nodes_.push_back({});
       const Box all = bounds(0, index_.size());
       set_child(root, 0, all, index_.empty() ? 0 : leaf(0, index_.size()));
-      set_child(root, 1, nothing, 0);
-      if (index_.empty()) set_child(root, 0, nothing, 0);
+      set_child(root, 1, no_box, 0);
+      if (index_.empty()) set_child(root, 0, no_box, 0);
       return root;
     }
     return split(0, index_.size(), 0);
@@ -56,7 +53,7 @@ class Builder {
 
  private:
   Box bounds(std::size_t from, std::size_t to) const {
-    Box box = nothing;
+    Box box = no_box;
     for (std::size_t i = from; i < to; ++i) grow(box, items_[index_[i]]);
     return box;
   }
@@ -91,7 +88,7 @@ class Builder {
 
   /// By the cheapest of the planes between bins; where all centres are one, by number.
   std::size_t divide(std::size_t from, std::size_t to) {
-    Box centres = nothing;
+    Box centres = no_box;
     for (std::size_t i = from; i < to; ++i)
       for (int k = 0; k < 3; ++k) {
         const float c = twice_centre(items_[index_[i]], k);
@@ -114,7 +111,7 @@ class Builder {
   void consider(std::size_t from, std::size_t to, const Box& centres, int axis, Split& best) const {
     if (!(centres.high[axis] > centres.low[axis])) return;
     std::array<Box, bins> box;
-    box.fill(nothing);
+    box.fill(no_box);
     std::array<std::size_t, bins> count{};
     for (std::size_t i = from; i < to; ++i) {
       const Box& item = items_[index_[i]];
@@ -123,14 +120,14 @@ class Builder {
       ++count[b];
     }
     std::array<float, bins> above{};
-    Box all = nothing;
+    Box all = no_box;
     std::size_t number = 0;
     for (std::size_t b = bins - 1; b > 0; --b) {
       grow(all, box[b]);
       number += count[b];
-      above[b - 1] = number == 0 ? huge : half_area(all) * static_cast<float>(number);
+      above[b - 1] = number == 0 ? huge_distance : half_area(all) * static_cast<float>(number);
     }
-    all = nothing;
+    all = no_box;
     number = 0;
     for (std::size_t b = 0; b + 1 < bins; ++b) {
       grow(all, box[b]);

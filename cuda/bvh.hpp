@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,9 @@ namespace sonar::cuda {
 struct Box {
   float low[3], high[3];
 };
+inline constexpr float huge_distance = std::numeric_limits<float>::infinity();
+/// Holds no point; its union with a box is that box.
+inline constexpr Box no_box{{huge_distance, huge_distance, huge_distance}, {-huge_distance, -huge_distance, -huge_distance}};
 
 /// Appends the nodes to `nodes`, and to `order` the items, leaf after leaf: a leaf's first item is a place in `order`. Returns
 /// the root's index; there is always one, also over nothing. Deterministic. Cost: about 1 us an item.

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "cuda/counting.hpp"
 #include "cuda/device_types.hpp"
-#include "cuda/fast_math.hpp"
 
 namespace sonar::cuda {
 
@@ -28,6 +28,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float dx = t.position_unit_m * cell_value(t, cell_x, cell), dy = t.position_unit_m * cell_value(t, cell_y, cell),
               dz = t.position_unit_m * cell_value(t, cell_z, cell);
   const float qx = t.from_sonar_object[0], qy = t.from_sonar_object[1], qz = t.from_sonar_object[2];
+  // As see_cells (core/pipeline/simd/cells.inl): r^2 = r0^2 + e, without a difference of large numbers.
   const float e = dx * (2 * qx + dx) + dy * (2 * qy + dy) + dz * (2 * qz + dz);
   const float r = std::sqrt(larger(t.range_m * t.range_m + e, 1e-6f));
   const float inverse_r = 1.0f / r;
@@ -43,6 +44,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
         sample > g.first_sample && sample < g.last_sample && r >= t.fade_in_from_m && r < t.fade_out_to_m))
     return false;
   at.column = static_cast<std::int32_t>(column);
+  // Depth map between two bins, with the tolerance of docs/acoustics.md, section 3.
   const auto below = static_cast<std::int32_t>(bin);
   const float* map = p.depth + static_cast<std::int64_t>(at.column) * (g.bins + 1) + below;
   const float seen = map[0] + (bin - static_cast<float>(below)) * (map[1] - map[0]);
@@ -57,25 +59,13 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   return true;
 }
 
-SONAR_HD inline float cross_fade(const TileView& t, float r) {
-  const float in = (r - t.fade_in_from_m) * t.fade_in_per_m, out = (t.fade_out_to_m - r) * t.fade_out_per_m;
-  return larger(smaller(smaller(in, out), 1.0f), 0.0f);
-}
-SONAR_HD inline float elevation_pattern(const float* e, float w) {
-  return e[0] + w * (e[1] + w * (e[2] + w * (e[3] + w * (e[4] + w * (e[5] + w * (e[6] + w * (e[7] + w * e[8])))))));
-}
-SONAR_HD inline float law_at(const float* law, float cosine) {
-  const float at = static_cast<float>(law_steps) * std::sqrt(larger(1.0f - cosine, 0.0f));
-  const auto step = static_cast<std::int32_t>(at);
-  return law[step] + (at - static_cast<float>(step)) * (law[step + 1] - law[step]);
-}
-
-SONAR_HD inline Echo sound_cell(const PingView& p, const TileView& t, int cell) {
+SONAR_HD inline Echo scatter_cell(const PingView& p, const TileView& t, int cell) {
   Echo echo{0, 0, 0, -1};
   CellPlace at{};
   if (!place_cell(p, t, cell, at)) return echo;
   const SeaView& g = p.sea;
-  const float law = t.law != nullptr ? law_at(t.law, at.cosine) : at.cosine;
+  // Eq. 6 of docs/acoustics.md, as scatter_cells has it.
+  const float law = t.law != nullptr ? law_root(t.law, at.cosine) : at.cosine;
   const float re = cell_value(t, cell_weight_re, cell), im = cell_value(t, cell_weight_im, cell);
   echo.sample = at.sample;
   echo.column = at.column;
@@ -84,13 +74,12 @@ SONAR_HD inline Echo sound_cell(const PingView& p, const TileView& t, int cell) 
     const float per_area = re != 0 || im != 0 ? 1.0f / slope : 0.0f;  // padding is no cell
     const float amplitude = t.area_amplitude * law * elevation_pattern(g.elevation, at.sine2) *
                             std::exp(-g.decay_per_m * at.offset) / (at.range * at.range);
-    echo.re = amplitude * amplitude * cross_fade(t, at.range) * per_area;
+    echo.re = amplitude * amplitude * level_weight(t, at.range) * per_area;
     return echo;
   }
   const float d = -g.decay_per_m * at.offset;
-  const float loss = 1.0f + d * (1.0f + d * (0.5f + d * (1.0f / 6.0f + d * (1.0f / 24.0f))));
-  const float amplitude = t.amplitude * std::sqrt(cross_fade(t, at.range)) * law * elevation_pattern(g.elevation, at.sine2) *
-                          loss / (at.range * at.range);
+  const float amplitude = t.amplitude * std::sqrt(level_weight(t, at.range)) * law * elevation_pattern(g.elevation, at.sine2) *
+                          exp_near_0(d) / (at.range * at.range);
   const float turns = -(t.phase_turns + g.turns_per_m * at.offset);
   const float cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
   echo.re = re * cs - im * sn;
@@ -113,7 +102,7 @@ SONAR_HD inline std::uint32_t tile_of(const PingView& p, std::uint32_t i) {
 
 SONAR_HD inline void scatter(const PingView& p, std::uint32_t i) {
   const std::uint32_t tile = tile_of(p, i);
-  p.echoes[i] = sound_cell(p, p.tiles[tile], static_cast<int>(i - p.tile_first_slot[tile]));
+  p.echoes[i] = scatter_cell(p, p.tiles[tile], static_cast<int>(i - p.tile_first_slot[tile]));
 }
 
 /// How many of a slot's chunk come before it in the same column, and how many the chunk has there.
@@ -164,6 +153,7 @@ SONAR_HD inline void sum_columns(const PingView& p, std::uint32_t i) {
   float* signal = p.signals + 2 * static_cast<std::int64_t>(k) * p.samples;
   for (int n = part; n < p.samples; n += parts) signal[2 * n] = signal[2 * n + 1] = 0;
   if (p.slots == 0) return;
+  // Eq. 8: the pulse's row for the echo's place between two samples.
   const int reach = p.taps / 2 - 1;
   const float steps = static_cast<float>(p.pulse_steps);
   const Echo* echo = p.sorted + p.column_at[k];

@@ -43,8 +43,8 @@ bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
     if (!cells[i]) more += values(*tiles[i].tile);
   if (more == 0) return true;
   if (!tiles_.empty() && bytes() + more * sizeof(std::int16_t) > budget_bytes_) return false;
-  const auto host = staging.take<std::int16_t>(more);
-  const auto device = memory_.take<std::int16_t>(more);
+  const auto host = staging.allocate<std::int16_t>(more);
+  const auto device = memory_.allocate<std::int16_t>(more);
   std::size_t at = 0;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (cells[i]) continue;

@@ -20,7 +20,7 @@ class CellStore {
   CellStore(Machine& machine, std::size_t budget_bytes);
 
   /// Where each tile's cells lie on the device, in the order of `tiles`. What was not there is queued on `lane`; it travels by
-  /// way of `staging`, which must live until that is done. False: they do not fit in beside those that are held; clear() first,
+  /// way of `staging`, which must stay until that is done. False: they do not fit in beside those that are held; clear() first,
   /// when no ping under way needs them.
   bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();

@@ -1,4 +1,4 @@
-// Kernel bodies that complete the columns' signals: ghosts, the water's own reverberation, the transmitter's pattern, receiver
+// Kernel bodies that complete the columns' signals: multipath, volume reverberation, the transmitter's pattern, receiver
 // noise and leak, as simulate() does (core/pipeline/simulate.cpp), which begins with the noise: sums differ by rounding.
 #pragma once
 
@@ -8,9 +8,6 @@
 #include "cuda/device_types.hpp"
 
 namespace sonar::cuda {
-
-inline constexpr std::uint32_t leak_noise_key = 0x6c65616bu, every_ping_key = 0xFFFFFFFFu;  // as in disturbances.cpp
-inline constexpr std::uint32_t volume_noise_columns = 1u << 24;                             // as in volume.cpp
 
 struct Complex {
   float re = 0, im = 0;
@@ -30,13 +27,13 @@ SONAR_HD inline void add_noise(const float* table, const NoisePlace& place, std:
 }
 
 SONAR_HD inline NoisePlace place_of(const NoiseKey& key, std::uint32_t sonar, std::uint32_t ping, std::uint32_t column) {
-  return noise_place(key.seed_low, key.seed_high, sonar, ping, column);
+  return noise_place(key.seed, sonar, ping, column);
 }
 
 /// Sample `i` of [columns][samples].
-SONAR_HD inline void ghosts(const PingView& p, std::uint32_t i) {
+SONAR_HD inline void add_multipath(const PingView& p, std::uint32_t i) {
   const auto samples = static_cast<std::uint32_t>(p.samples);
-  const float* from = p.ghosts + (i / samples) * p.ghost_stride + 2 * static_cast<std::int64_t>(i % samples);
+  const float* from = p.multipath + (i / samples) * p.multipath_stride + 2 * static_cast<std::int64_t>(i % samples);
   p.signals[2 * static_cast<std::int64_t>(i)] += from[0];
   p.signals[2 * static_cast<std::int64_t>(i) + 1] += from[1];
 }
@@ -54,11 +51,12 @@ SONAR_HD inline void volume(const PingView& p, std::uint32_t k) {
     const VolumeSlice& slice = p.slices[i];
     const auto inverse_x = static_cast<double>(map[slice.bin]);
     if (!(inverse_x > 0)) continue;
+    // The sample at which this slice of the fan ends at a surface.
     const double sample = per_x * slice.range_per_x / inverse_x * p.volume_samples_per_m - p.volume_sample_offset;
     if (sample < static_cast<double>(p.samples))
       blocked[static_cast<std::int64_t>(sample > 0 ? sample : 0.0) * columns] += slice.weight;
   }
-  const NoisePlace place = place_of(p.noise_key, p.noise_key.sonar, p.noise_key.ping, volume_noise_columns + k);
+  const NoisePlace place = place_of(p.noise_key, p.noise_key.sonar, p.noise_key.ping, first_volume_column + k);
   float* signal = p.signals + 2 * static_cast<std::int64_t>(k) * p.samples;
   double open = p.open_fan;
   for (int n = 0; n < p.samples; ++n) {
@@ -103,8 +101,8 @@ SONAR_HD inline void finish_columns(const PingView& p, std::uint32_t i) {
       s.re += rms * rms;
     } else {
       Complex grain;
-      add_noise(p.noise_table, place_of(key, key.sonar ^ leak_noise_key, every_ping_key, k), n, p.leak_steady, grain);
-      add_noise(p.noise_table, place_of(key, key.sonar ^ leak_noise_key, key.ping, k), n, p.leak_changing, grain);
+      add_noise(p.noise_table, place_of(key, leak_sonar(key.sonar), every_ping, k), n, p.leak_steady, grain);
+      add_noise(p.noise_table, place_of(key, leak_sonar(key.sonar), key.ping, k), n, p.leak_changing, grain);
       s.re += rms * grain.re;
       s.im += rms * grain.im;
     }

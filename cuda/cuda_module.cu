@@ -1,4 +1,4 @@
-// The CUDA module: a kernel for every step, whose body is the header's, and thin calls of the runtime. Knows nothing of scenes.
+// The CUDA module: a kernel for every step, whose body is the header's, and thin calls of the runtime. It contains no scenes.
 #include <cuda_runtime.h>
 
 #include <cstdio>
@@ -114,7 +114,7 @@ int open(void** machine) {
   return cudaSuccess;
 }
 
-/// The runtime keeps a thread's last error, also one that was told; the next launch must not find it.
+/// The runtime keeps a thread's last error, also one that was reported; the next launch must not find it.
 cudaError_t told(cudaError_t error) {
   if (error != cudaSuccess) cudaGetLastError();
   return error;

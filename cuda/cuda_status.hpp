@@ -1,5 +1,5 @@
 // What this build and this machine can do with CUDA, in a few words for the banner.
-// Stands apart from cuda_engine.hpp so that the daemon's texts need not know engines.
+// Stands apart from cuda_engine.hpp so that the daemon's texts need no engine.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 namespace sonar {
 
 /// "not installed" (there is no CUDA module), "no device", "no device (<the driver's reason>)", what is wrong with the module, or
-/// "NVIDIA H200, 139.8 GiB, compute 9.0". Asks every time: a device can go.
+/// "NVIDIA H200, 139.8 GiB, compute 9.0". Queried every time: a device can disappear.
 std::string cuda_status();
 
 }  // namespace sonar

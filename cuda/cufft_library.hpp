@@ -30,15 +30,15 @@ class CufftLibrary {
     void* library = dlopen(SONAR_CUFFT_NAME(CUFFT_VER_MAJOR), RTLD_NOW | RTLD_LOCAL);
     if (!library) return;
     bool all = true;
-    const auto take = [&](auto& function, const char* name) {
+    const auto look_up = [&](auto& function, const char* name) {
       function = reinterpret_cast<std::decay_t<decltype(function)>>(dlsym(library, name));
       all = all && function != nullptr;
     };
-    take(plan_many_, "cufftPlanMany");
-    take(set_stream_, "cufftSetStream");
-    take(exec_, "cufftExecZ2Z");
-    take(destroy_, "cufftDestroy");
-    take(version_, "cufftGetVersion");
+    look_up(plan_many_, "cufftPlanMany");
+    look_up(set_stream_, "cufftSetStream");
+    look_up(exec_, "cufftExecZ2Z");
+    look_up(destroy_, "cufftDestroy");
+    look_up(version_, "cufftGetVersion");
     loaded_ = all;
   }
   bool loaded() const { return loaded_; }

@@ -7,7 +7,9 @@
 #include <set>
 #include <stdexcept>
 
+#include "core/pipeline/check_request.hpp"
 #include "core/pipeline/simulate.hpp"
+#include "core/pipeline/truth.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "cuda/prepare_ping.hpp"
 #include "cuda/steps.hpp"
@@ -24,7 +26,7 @@ constexpr Stage stage_of(Step step) {
   if (step <= Step::place) return Stage::scatter;
   if (step <= Step::unfold) return Stage::synthesize;
   if (step <= Step::finish_columns) return Stage::noise;
-  return step == Step::receive ? Stage::receive : Stage::couple;
+  return step == Step::receive ? Stage::receive : Stage::form_beams;
 }
 
 class DeviceEngine final : public PingEngine {
@@ -40,9 +42,8 @@ class DeviceEngine final : public PingEngine {
         rays_(scene, pool.threads()),
         preparer_(*machine_, scene, rays_, kernels_, pool, device_options_.cell_bytes, options.now_s),
         batch_(static_cast<std::size_t>(std::max(1, device_options_.batch))),
-        rooms_{BatchRoom(*machine_, 0, batch_), BatchRoom(*machine_, 1, batch_)} {
-    work_.now_s = options.now_s;
-  }
+        rooms_{BatchRoom(*machine_, 0, batch_), BatchRoom(*machine_, 1, batch_)},
+        work_(options.now_s) {}
   ~DeviceEngine() override {
     for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);  // memory goes when nothing uses it any more
   }
@@ -135,7 +136,7 @@ class DeviceEngine final : public PingEngine {
   Ping by_cpu(const PingRequest& request) {
     place(request);
     Ping ping = simulate(rays_, *cells_, request, kernels_, work_, pool_);
-    statistics_ = work_.statistics;
+    statistics_ = work_.statistics();
     return ping;
   }
 
@@ -164,7 +165,7 @@ class DeviceEngine final : public PingEngine {
     room.results.download(room.lane);
   }
 
-  /// In one piece, or in three where transforms stand between.
+  /// In one slice, or in three where transforms stand between.
   void run_steps(const BatchRoom& room, Launch launch) {
     const auto run_to = [&](int to) {
       launch.to = to;
@@ -190,7 +191,7 @@ class DeviceEngine final : public PingEngine {
     machine_->wait(room.lane);
     if (options_.now_s) share_times(room);
     for (std::size_t i = 0; i < room.pings.size(); ++i) {
-      pings[room.pings[i].index] = take(room.pings[i], room.views[i]);
+      pings[room.pings[i].index] = ping_from(room.pings[i], room.views[i]);
       each_[room.pings[i].index] = statistics_;
     }
     empty(room);
@@ -205,7 +206,7 @@ class DeviceEngine final : public PingEngine {
         ping.statistics.seconds[static_cast<std::size_t>(stage_of(static_cast<Step>(step)))] += seconds.of[step] / pings;
     }
   }
-  Ping take(BatchRoom::Ping& from, const PingView& view) {
+  Ping ping_from(BatchRoom::Ping& from, const PingView& view) {
     Ping ping = std::move(from.ping);
     const auto copy = [](void* to, const void* host, std::size_t bytes) {
       if (bytes > 0) std::memcpy(to, host, bytes);

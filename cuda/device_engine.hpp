@@ -17,7 +17,7 @@ struct DeviceEngineOptions {
   int batch = 8;                                  // pings that are launched together
   std::size_t work_bytes = std::size_t{1} << 30;  // of a batch on the device: where pings are large, fewer go together
   bool cpu_after_failure = true;                  // else a device that fails is the end: run() throws EngineUnavailable
-  /// Told, once each: what the CPU computes instead, and why. May be empty.
+  /// Called once for each reason: what the CPU computes instead, and why. May be empty.
   std::function<void(const std::string&)> say = {};
 };
 

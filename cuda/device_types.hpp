@@ -6,16 +6,16 @@
 
 #include "core/base/geometry.hpp"
 #include "core/base/host_device.hpp"
+#include "core/base/random.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 
 namespace sonar::cuda {
 
 inline constexpr std::uint32_t no_object = 0xFFFFFFFFu;  // what a ray that hits nothing has met
-inline constexpr int elevation_terms = 9;                // of the elevation pattern, as simd::elevation_terms
-inline constexpr int law_steps = 128;                    // of a tabulated scattering law, as simd::law_steps
 inline constexpr std::uint32_t slots_a_chunk = 256;      // cells that are sorted into columns together
 inline constexpr std::uint32_t counters_a_ping = 2;
-inline constexpr std::uint32_t beams_a_panel = 4;  // as CouplingPanel has
+inline constexpr std::uint32_t beams_a_panel = 4;  // as BeamPanel has
 inline constexpr std::uint32_t sum_parts = 32;     // threads that share the sum of one column: a warp
 
 /// Boxes of both children, one line of the cache. Links as in bvh_link.
@@ -58,7 +58,7 @@ struct TracerView {
   std::int32_t still_root = -1, has_still = 0, body_count = 0, unused = 0;
 };
 
-/// One ray of the fan, as FanSample with its SurfaceMet (core/pipeline/fan_refinement.hpp).
+/// One ray of the fan, as FanSample with its SurfaceHit (core/pipeline/fan_refinement.hpp).
 struct FanRay {
   float elevation_rad, tangent, forward;
   std::uint32_t object;
@@ -92,7 +92,7 @@ struct TileView {
 
 struct alignas(16) Echo {
   float sample, re, im;
-  std::int32_t column;  // -1 = not heard
+  std::int32_t column;  // -1 = no echo
 };
 
 /// simd::GroupView for all columns at once, and the fan.
@@ -105,7 +105,7 @@ struct SeaView {
   float origin[3], world_from_sonar[9], far_m, pulse_width_m, truth_half_width_rad;
 };
 
-struct CouplingRow {  // beams_a_panel beams, see CouplingPanel
+struct BeamWeightRow {  // beams_a_panel beams, see BeamPanel
   std::int32_t first_column, count;
   std::uint32_t weights, unused;
 };
@@ -131,10 +131,11 @@ struct SpectralView {
 };
 
 struct NoiseKey {
-  std::uint32_t seed_low, seed_high, sonar, ping;
+  RandomKey seed;
+  std::uint32_t sonar, ping;
 };
 
-/// Everything about one ping. Pointers into the device's memory; null = that part is not heard.
+/// Everything about one ping. Pointers into the device's memory; null = that part is absent.
 struct PingView {
   TracerView tracer;
   SeaView sea;
@@ -144,10 +145,10 @@ struct PingView {
   const float* pulse_rows;               // null where `spectral` serves
   const float* transmit;                 // [columns]
   const float* weights;
-  const CouplingRow* panels;  // [beams / 4, rounded up]
-  const double* beam_sines;   // [beams]
-  const double* column_u;     // [columns], in double
-  const float* noise_table;   // complex, table_samples of them
+  const BeamWeightRow* panels;  // [beams / 4, rounded up]
+  const double* beam_sines;     // [beams]
+  const double* column_u;       // [columns], in double
+  const float* noise_table;     // complex, table_samples of them
   ReceivePattern pattern;
   std::int32_t taps, pulse_steps, samples, per_row, rows, beams;
   SpectralView spectral;  // grids and folded are the ping's own
@@ -166,9 +167,9 @@ struct PingView {
   std::uint32_t* column_at;  // [columns]: where the column's echoes begin
   Echo* sorted;              // [slots]
   // columns
-  float* signals;       // complex [columns][samples]
-  const float* ghosts;  // complex [columns][ghost_stride]
-  std::int64_t ghost_stride;
+  float* signals;          // complex [columns][samples]
+  const float* multipath;  // complex [columns][multipath_stride]
+  std::int64_t multipath_stride;
   const VolumeSlice* slices;
   const double* open_power;    // [samples]
   const double* column_width;  // [columns]
@@ -211,11 +212,11 @@ enum class Step : std::int32_t {
   spread,
   fold,
   unfold,
-  ghosts,
+  multipath,
   volume,
   finish_columns,
   point_weights,
-  couple,
+  form_beams,
   crosstalk_sum,
   crosstalk_add,
   receive,

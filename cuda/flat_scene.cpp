@@ -9,10 +9,8 @@
 namespace sonar::cuda {
 namespace {
 
-constexpr float huge = std::numeric_limits<float>::infinity();
-
 struct Bounds {
-  Box box{{huge, huge, huge}, {-huge, -huge, -huge}};
+  Box box = no_box;
   void add(const float (&p)[3]) {
     for (int k = 0; k < 3; ++k) {
       box.low[k] = std::min(box.low[k], p[k]);

@@ -38,7 +38,7 @@ constexpr std::array<Loop, sizeof...(step)> loops_of(std::index_sequence<step...
 }
 constexpr auto loops = loops_of(std::make_index_sequence<static_cast<std::size_t>(Step::steps)>());
 
-constexpr std::align_val_t alignment{256};  // as the device gives it
+constexpr std::align_val_t host_alignment{256};  // as the device gives it
 
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -47,13 +47,13 @@ class HostLoops final : public Machine {
   explicit HostLoops(LoopOrder order) : order_(order) {}
   std::string name() const override { return "host loops"; }
   void* allocate(std::size_t bytes) override {
-    void* const at = ::operator new(bytes, alignment);
+    void* const at = ::operator new(bytes, host_alignment);
     if (order_ != LoopOrder::forwards) std::memset(at, 0xFF, bytes);
     return at;
   }
-  void release(void* device) override { ::operator delete(device, alignment); }
-  void* allocate_host(std::size_t bytes) override { return ::operator new(bytes, alignment); }
-  void release_host(void* host) override { ::operator delete(host, alignment); }
+  void release(void* device) override { ::operator delete(device, host_alignment); }
+  void* allocate_host(std::size_t bytes) override { return ::operator new(bytes, host_alignment); }
+  void release_host(void* host) override { ::operator delete(host, host_alignment); }
   void upload(int, void* to_device, const void* from, std::size_t bytes) override { std::memcpy(to_device, from, bytes); }
   void download(int, void* to, const void* from_device, std::size_t bytes) override { std::memcpy(to, from_device, bytes); }
   void run(int lane, const Launch& launch) override {

@@ -26,10 +26,10 @@ class Machine {
   /// Queued; `from` must stay as it is until the lane has been waited for.
   virtual void upload(int lane, void* to_device, const void* from, std::size_t bytes) = 0;
   virtual void download(int lane, void* to, const void* from_device, std::size_t bytes) = 0;
-  /// Queues steps, one after the other. A launch that is timed is for benchmarks: each step is then told apart.
+  /// Queues steps, one after the other. A launch that is timed is for benchmarks: each step is then timed on its own.
   virtual void run(int lane, const Launch& launch) = 0;
   /// Empty when transform() can be had; else what is missing, and pulses by way of the spectrum are the CPU's. What it takes is
-  /// loaded by the first to ask.
+  /// loaded at the first call.
   virtual std::string why_no_transforms() const = 0;
   /// Queues x[k] = sum_n x[n] e^{-+ i 2 pi k n / size} over `rows` rows of complex values, one after the other on the device, in
   /// place, not scaled. Timed when the launch before it on the lane was.

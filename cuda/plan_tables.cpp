@@ -9,8 +9,6 @@
 
 namespace sonar::cuda {
 
-static_assert(elevation_terms == simd::elevation_terms && law_steps == simd::law_steps);
-
 PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
     : model_(request.model),
       seed_(request.seed),
@@ -26,15 +24,15 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   }
   std::vector<BaseElevation> base;
   for (const float angle : p.fan.elevation_rad) base.push_back({angle, std::cos(angle), std::sin(angle)});
-  std::vector<CouplingRow> rows;
-  for (const CouplingPanel& panel : p.coupling.panels)
+  std::vector<BeamWeightRow> rows;
+  for (const BeamPanel& panel : p.beam_weights.panels)
     rows.push_back({panel.first_column, panel.count, static_cast<std::uint32_t>(panel.weights), 0});
 
   view_.column_sines = memory_.put(sines);
   view_.base_elevations = memory_.put(base);
   view_.pulse_rows = memory_.put(p.pulse_rows);
   view_.transmit = memory_.put(p.columns.transmit);
-  view_.weights = memory_.put(p.coupling.weights);
+  view_.weights = memory_.put(p.beam_weights.weights);
   view_.panels = memory_.put(rows);
   view_.beam_sines = memory_.put(p.beam_sine);
   view_.column_u = memory_.put(u);

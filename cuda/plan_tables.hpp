@@ -13,7 +13,7 @@ namespace sonar::cuda {
 
 class PlanTables {
  public:
-  /// Queues the tables on `lane`. They live as long as this.
+  /// Queues the tables on `lane`. They are valid as long as this.
   PlanTables(Machine& machine, int lane, const PingRequest& request);
 
   bool serves(const PingRequest& request) const;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/pipeline/bubbles.hpp"
-#include "core/pipeline/disturbances.hpp"
+#include "core/pipeline/form_beams.hpp"
+#include "core/pipeline/interference.hpp"
 #include "core/pipeline/receive.hpp"
 #include "core/pipeline/truth.hpp"
 #include "core/pipeline/volume.hpp"
@@ -13,7 +13,7 @@ namespace sonar::cuda {
 namespace {
 
 constexpr std::size_t table_chunk = 4u << 20, work_chunk = 64u << 20, result_chunk = 4u << 20, cell_chunk = 8u << 20;
-constexpr std::size_t tiles_at_once = 256;  // that one worker writes
+constexpr std::size_t tiles_per_part = 256;  // that one worker writes
 
 }  // namespace
 
@@ -24,7 +24,7 @@ BatchRoom::BatchRoom(Machine& machine, int which_lane, std::size_t most_pings)
       results(machine, Arena::Where::both, result_chunk),
       cells(machine, Arena::Where::host, cell_chunk),
       view_memory_(machine, Arena::Where::both, 0),
-      view_table_(view_memory_.take<PingView>(most_pings)) {}
+      view_table_(view_memory_.allocate<PingView>(most_pings)) {}
 
 const PingView* BatchRoom::upload() {
   std::copy(views.begin(), views.end(), view_table_.host);
@@ -94,12 +94,12 @@ bool PingPreparer::add(const PingRequest& request, std::size_t index, std::share
     add_water(m);
     if (m.plan.spectral) {
       SpectralView& v = m.view.spectral;
-      v.grids = room.work.take<double>(2 * m.columns() * static_cast<std::size_t>(v.points)).device;
-      v.folded = room.work.take<double>(2 * m.columns() * static_cast<std::size_t>(v.period)).device;
+      v.grids = room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.points)).device;
+      v.folded = room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.period)).device;
     }
   }
   add_receiver(m);
-  take_results(m);
+  allocate_results(m);
   m.ping.index = index;
   m.ping.plan = std::move(plan);
   room.views.push_back(m.view);
@@ -147,60 +147,54 @@ void PingPreparer::place_fan(Making& m) {
   m.view.tracer.bodies = m.room.tables.put(places.bodies);
   m.view.tracer.body_count = static_cast<std::int32_t>(places.bodies.size());
   const auto elevations = static_cast<std::size_t>(sea.elevations);
-  m.view.fan_rays = m.room.work.take<FanRay>(elevations * m.columns()).device;
-  m.view.depth = m.room.work.take<float>(m.columns() * static_cast<std::size_t>(sea.bins + 1)).device;
-  if (m.request.switches.keep_truth) m.view.first_hits = m.room.work.take<FirstHit>((elevations - 1) * m.columns()).device;
+  m.view.fan_rays = m.room.work.allocate<FanRay>(elevations * m.columns()).device;
+  m.view.depth = m.room.work.allocate<float>(m.columns() * static_cast<std::size_t>(sea.bins + 1)).device;
+  if (m.request.switches.keep_truth) m.view.first_hits = m.room.work.allocate<FirstHit>((elevations - 1) * m.columns()).device;
 }
 
-/// Point targets, mirror echoes, other sonars; ghosts, of which those of points are points and those of surfaces columns.
+PingContext PingPreparer::context_of(const Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws) const {
+  return {rays_, cells, m.bodies, laws, m.plan, m.scalars, kernels_, pool_};
+}
+
+/// Point targets, specular echoes, other sonars; multipath echoes: those of points as points, those of surfaces as columns.
 void PingPreparer::find_points(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws) {
-  std::vector<PointEcho> points = scatter_points(rays_, m.bodies, m.plan, m.scalars);
-  const std::vector<PulseHeard> pulses = hear_other_sonars(rays_, m.plan, m.scalars, m.request);
-  if (m.request.switches.specular) mirror_echoes_.find(rays_, m.bodies, m.plan, m.scalars, points);
+  const PingContext context = context_of(m, cells, laws);
+  std::vector<PointEcho> points = scatter_points(context);
+  const std::vector<ReceivedPulse> pulses = receive_other_sonars(context, m.request);
+  if (m.request.switches.specular) specular_echoes_.find(context, points);
   if (m.request.switches.multipath) {
-    const MultipathCounts counts =
-        sound_ghosts(rays_, cells, m.bodies, laws, m.plan, m.scalars, kernels_, pool_, multipath_, points);
+    const MultipathCounts counts = simulate_multipath(context, multipath_, points);
     m.ping.statistics.rays += counts.rays;
     m.ping.statistics.echoes += counts.echoes;
-    if (multipath_.heard) {
-      m.view.ghosts = m.room.tables.put(multipath_.columns.data) + 2 * multipath_.columns.lead;
-      m.view.ghost_stride = multipath_.columns.stride;
+    if (multipath_.has_echoes) {
+      m.view.multipath = m.room.tables.put(multipath_.columns.data) + 2 * multipath_.columns.lead;
+      m.view.multipath_stride = multipath_.columns.stride;
     }
   }
   add_points(m, points, pulses);
 }
 
-/// Their pulses on the sample grid, as core/pipeline/couple.cpp and disturbances.cpp put them there.
-void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std::span<const PulseHeard> pulses) {
+/// Their pulses on the sample grid.
+void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std::span<const ReceivedPulse> pulses) {
   const PingPlan& plan = m.plan;
   std::vector<PulseInBeams> in_beams;
-  const auto add = [&](double sine, int from, const std::vector<std::complex<double>>& values) {
+  const auto add = [&](double sine, const SampledPulse& pulse) {
+    const auto& [from, values] = pulse;
+    if (values.empty()) return;
     static_assert(sizeof(std::complex<double>) == 2 * sizeof(double));
-    const auto piece = m.room.tables.take<double>(2 * values.size());
-    std::memcpy(piece.host, values.data(), 2 * sizeof(double) * values.size());
-    in_beams.push_back({sine, piece.device, from, from + static_cast<int>(values.size())});
+    const auto slice = m.room.tables.allocate<double>(2 * values.size());
+    std::memcpy(slice.host, values.data(), 2 * sizeof(double) * values.size());
+    in_beams.push_back({sine, slice.device, from, from + static_cast<int>(values.size())});
   };
-  std::vector<std::complex<double>> values;
-  for (const PointEcho& point : points) {
-    const int middle = static_cast<int>(std::floor(point.sample));
-    const int from = std::max(middle - plan.taps / 2 + 1, 0), to = std::min(middle + plan.taps / 2 + 1, plan.samples);
-    if (from >= to) continue;
-    values.clear();
-    for (int n = from; n < to; ++n)
-      values.push_back(point.amplitude * plan.pulse_shape.at(plan.sample_time_s * (n - point.sample)));
-    add(point.sine, from, values);
-  }
+  for (const PointEcho& point : points) add(point.sine, place_pulse(point, plan, 0, plan.samples));
   m.view.point_count = static_cast<std::int32_t>(in_beams.size());
   m.view.points = m.room.tables.put(in_beams);
   in_beams.clear();
-  for (const PulseHeard& pulse : pulses) {
-    const Tone tone = tone_of(pulse, 0, plan.samples);
-    if (!tone.values.empty()) add(pulse.sine, tone.first_sample, tone.values);
-  }
+  for (const ReceivedPulse& pulse : pulses) add(pulse.sine, tone_of(pulse, 0, plan.samples));
   m.view.pulse_count = static_cast<std::int32_t>(in_beams.size());
   m.view.pulses = m.room.tables.put(in_beams);
   m.view.point_weights =
-      m.room.work.take<double>(static_cast<std::size_t>(m.view.point_count + m.view.pulse_count) * m.beams()).device;
+      m.room.work.allocate<double>(static_cast<std::size_t>(m.view.point_count + m.view.pulse_count) * m.beams()).device;
 }
 
 bool PingPreparer::find_tiles(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws, int lane) {
@@ -214,7 +208,7 @@ bool PingPreparer::find_tiles(Making& m, SurfaceCells& cells, const std::vector<
   in.levels = plan.levels;
   const std::vector<TileInView>& seen = cells.in_view(in, pool_);
   if (!store_.find(seen, lane, m.room.cells, tile_cells_, pool_)) return false;
-  prepare_tiles(seen, cells, *scene_, laws, plan, m.scalars, pool_, tiles_);
+  prepare_tiles(context_of(m, cells, laws), seen, tiles_);
   m.ping.statistics.tiles = seen.size();
   m.ping.statistics.tiles_built = cells.built_last_time();
   m.ping.statistics.cell_bytes = cells.cached_bytes();
@@ -222,9 +216,9 @@ bool PingPreparer::find_tiles(Making& m, SurfaceCells& cells, const std::vector<
   return true;
 }
 
-/// A tile as the device knows it.
-TileView PingPreparer::view_of(const TileToSound& to_sound, const std::int16_t* cells, const float* law) {
-  const simd::TileSeen& seen = to_sound.seen;
+/// A tile in the device's layout.
+TileView PingPreparer::view_of(const PreparedTile& prepared, const std::int16_t* cells, const float* law) {
+  const simd::TileSeen& seen = prepared.seen;
   const CellTile& tile = *seen.tile;
   TileView t{};
   t.cells = cells;
@@ -251,11 +245,11 @@ TileView PingPreparer::view_of(const TileToSound& to_sound, const std::int16_t* 
 void PingPreparer::lay_out_tiles(Making& m, const std::vector<LawTable>& laws) {
   std::vector<const float*> law_on_device;
   for (const LawTable& law : laws) law_on_device.push_back(m.room.tables.put(law.root));
-  const auto tiles = m.room.tables.take<TileView>(tiles_.size());
-  const auto first_slot = m.room.tables.take<std::uint32_t>(tiles_.size() + 1);
-  pool_.for_each((tiles_.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
-    const std::size_t end = std::min(tiles_.size(), (part + 1) * tiles_at_once);
-    for (std::size_t i = part * tiles_at_once; i < end; ++i)
+  const auto tiles = m.room.tables.allocate<TileView>(tiles_.size());
+  const auto first_slot = m.room.tables.allocate<std::uint32_t>(tiles_.size() + 1);
+  pool_.for_each((tiles_.size() + tiles_per_part - 1) / tiles_per_part, [&](std::size_t part, int) {
+    const std::size_t end = std::min(tiles_.size(), (part + 1) * tiles_per_part);
+    for (std::size_t i = part * tiles_per_part; i < end; ++i)
       tiles.host[i] = view_of(tiles_[i], tile_cells_[i], law_on_device[static_cast<std::size_t>(tiles_[i].seen.tile->material)]);
   });
   std::uint32_t slots = 0;
@@ -272,18 +266,18 @@ void PingPreparer::lay_out_tiles(Making& m, const std::vector<LawTable>& laws) {
   view.slots = slots;
   view.chunks = (slots + slots_a_chunk - 1) / slots_a_chunk;
   Arena& work = m.room.work;
-  view.echoes = work.take<Echo>(slots).device;
-  view.sorted = work.take<Echo>(slots).device;
-  view.rank = work.take<std::uint32_t>(slots).device;
-  view.in_chunk = work.take<std::uint32_t>(view.chunks * m.columns()).device;
-  view.in_column = work.take<std::uint32_t>(m.columns()).device;
-  view.column_at = work.take<std::uint32_t>(m.columns()).device;
+  view.echoes = work.allocate<Echo>(slots).device;
+  view.sorted = work.allocate<Echo>(slots).device;
+  view.rank = work.allocate<std::uint32_t>(slots).device;
+  view.in_chunk = work.allocate<std::uint32_t>(view.chunks * m.columns()).device;
+  view.in_column = work.allocate<std::uint32_t>(m.columns()).device;
+  view.column_at = work.allocate<std::uint32_t>(m.columns()).device;
 }
 
 /// Reverberation of the water itself.
 void PingPreparer::add_water(Making& m) {
   const Volume volume(scene_->water_column, m.plan, m.scalars);
-  if (!volume.is_heard()) return;
+  if (!volume.is_audible()) return;
   std::vector<VolumeSlice> slices;
   for (const Volume::Slice& s : volume.slices()) slices.push_back({s.range_per_x, s.weight, s.bin, 0});
   std::vector<double> width;
@@ -292,7 +286,7 @@ void PingPreparer::add_water(Making& m) {
   m.view.slice_count = static_cast<std::int32_t>(slices.size());
   m.view.open_power = m.room.tables.put(volume.open_power_upa2());
   m.view.column_width = m.room.tables.put(width);
-  m.view.blocked = m.room.work.take<double>(m.samples() * m.columns()).device;
+  m.view.blocked = m.room.work.allocate<double>(m.samples() * m.columns()).device;
   m.view.open_fan = volume.open_fan();
   m.view.volume_samples_per_m = m.scalars.samples_per_m;
   m.view.volume_sample_offset = m.scalars.sample_offset;
@@ -301,40 +295,39 @@ void PingPreparer::add_water(Making& m) {
 /// Noise, leak, crosstalk and gains.
 void PingPreparer::add_receiver(Making& m) {
   PingView& view = m.view;
-  const auto seed = static_cast<std::uint64_t>(m.request.seed);
-  view.noise_key = {static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32), m.request.sonar_id,
+  view.noise_key = {key_of(m.request.seed, Domain::noise_place), m.request.sonar_id,
                     static_cast<std::uint32_t>(m.request.number)};
   view.has_noise = m.request.switches.noise ? 1 : 0;
   view.noise_rms = static_cast<float>(m.plan.column_noise_upa);
   const Leak leak(m.plan, m.request.switches);
-  if (leak.is_heard() && !m.request.blank) {
+  if (leak.is_audible() && !m.request.blank) {
     view.leak_rms = m.room.tables.put(leak.rms_upa());
     view.leak_samples = static_cast<std::int32_t>(leak.rms_upa().size());
     view.leak_steady = static_cast<float>(std::sqrt(1 - Leak::changing_share));
     view.leak_changing = static_cast<float>(std::sqrt(Leak::changing_share));
   }
   const Crosstalk crosstalk(m.plan, m.request.switches);
-  if (crosstalk.is_heard()) {
+  if (crosstalk.is_audible()) {
     const Crosstalk::Mix mix = crosstalk.mix(m.plan.expected_power);
     view.crosstalk_own = mix.own;
     view.crosstalk_leaked = mix.leaked;
-    view.crosstalk = m.room.work.take<float>(2 * m.samples()).device;
+    view.crosstalk = m.room.work.allocate<float>(2 * m.samples()).device;
   }
   view.row_power_factor = m.room.tables.put(m.plan.row_power_factor);
-  view.signals = m.room.work.take<float>(2 * m.samples() * m.columns()).device;
-  view.beam_signals = m.room.work.take<float>(2 * m.samples() * m.beams()).device;
+  view.signals = m.room.work.allocate<float>(2 * m.samples() * m.columns()).device;
+  view.beam_signals = m.room.work.allocate<float>(2 * m.samples() * m.beams()).device;
 }
 
 /// Room for what comes back.
-void PingPreparer::take_results(Making& m) {
+void PingPreparer::allocate_results(Making& m) {
   Ping& ping = m.ping.ping;
   ping.request = m.request;
   shape_ping(m.plan, m.request.switches, ping);
-  m.ping.codes = m.room.results.take<std::uint8_t>(ping.samples.size());
-  m.ping.pressure = m.room.results.take<float>(ping.pressure_upa.size());
-  m.ping.beams = m.room.results.take<float>(2 * ping.beam_signal_upa.size());
-  m.ping.counters = m.room.results.take<std::uint32_t>(counters_a_ping);
-  if (m.request.switches.keep_truth) m.ping.truth = m.room.results.take<FirstHit>(m.columns());
+  m.ping.codes = m.room.results.allocate<std::uint8_t>(ping.samples.size());
+  m.ping.pressure = m.room.results.allocate<float>(ping.pressure_upa.size());
+  m.ping.beams = m.room.results.allocate<float>(2 * ping.beam_signal_upa.size());
+  m.ping.counters = m.room.results.allocate<std::uint32_t>(counters_a_ping);
+  if (m.request.switches.keep_truth) m.ping.truth = m.room.results.allocate<FirstHit>(m.columns());
   PingView& view = m.view;
   view.codes = m.ping.codes.device;
   view.pressure = m.ping.pressure.device;

@@ -1,13 +1,13 @@
 // The CPU's share of a ping that the device computes: which tiles are in view and what this ping makes of them, echoes that are
-// points, ghosts by way of mirrors, a few hundred numbers of the water and the receiver. Fills a PingView; nothing here is slow
-// but ghosts, which are summed by core/pipeline/multipath and sent as columns.
+// points, echoes via mirrors, a few hundred numbers of the water and the receiver. Fills a PingView; nothing here is slow but
+// multipath, whose echoes are summed by core/pipeline/multipath and sent as columns.
 #pragma once
 
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "core/pipeline/disturbances.hpp"
+#include "core/pipeline/interference.hpp"
 #include "core/pipeline/multipath/multipath.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/ping_scalars.hpp"
@@ -28,10 +28,10 @@ struct BatchRoom {
     sonar::Ping ping;   // sized, not filled
     std::size_t index;  // of its request
     std::shared_ptr<const PlanTables> plan;
-    Arena::Piece<std::uint8_t> codes;
-    Arena::Piece<float> pressure, beams;
-    Arena::Piece<FirstHit> truth;
-    Arena::Piece<std::uint32_t> counters;
+    Arena::Slice<std::uint8_t> codes;
+    Arena::Slice<float> pressure, beams;
+    Arena::Slice<FirstHit> truth;
+    Arena::Slice<std::uint32_t> counters;
     PingStatistics statistics;
   };
   int lane;
@@ -45,7 +45,7 @@ struct BatchRoom {
 
  private:
   Arena view_memory_;
-  Arena::Piece<PingView> view_table_;
+  Arena::Slice<PingView> view_table_;
 };
 
 /// Scene and cells of an engine, and what it keeps between pings.
@@ -63,28 +63,29 @@ class PingPreparer {
  private:
   struct Making;
   void place_fan(Making& m);
+  PingContext context_of(const Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws) const;
   void find_points(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws);
-  void add_points(Making& m, std::span<const PointEcho> points, std::span<const PulseHeard> pulses);
+  void add_points(Making& m, std::span<const PointEcho> points, std::span<const ReceivedPulse> pulses);
   bool find_tiles(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws, int lane);
-  static TileView view_of(const TileToSound& to_sound, const std::int16_t* cells, const float* law);
+  static TileView view_of(const PreparedTile& prepared, const std::int16_t* cells, const float* law);
   void lay_out_tiles(Making& m, const std::vector<LawTable>& laws);
   void add_water(Making& m);
   void add_receiver(Making& m);
-  void take_results(Making& m);
+  void allocate_results(Making& m);
   double now() const { return now_s_ ? now_s_() : 0; }
 
   std::shared_ptr<const Scene> scene_;
   const RayScene& rays_;
   const simd::Kernels& kernels_;
   Parallel& pool_;
-  double (*now_s_)();  // null = nobody asks how long things take
+  double (*now_s_)();  // null = times are not measured
   FlatScene flat_;
   Arena scene_memory_;
   TracerView tracer_;
   CellStore store_;
-  MirrorEchoes mirror_echoes_;
+  SpecularEchoes specular_echoes_;
   MultipathWork multipath_;
-  std::vector<TileToSound> tiles_;
+  std::vector<PreparedTile> tiles_;
   std::vector<const std::int16_t*> tile_cells_;
 };
 

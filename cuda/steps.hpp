@@ -44,15 +44,15 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
       return p.spectral.grids != nullptr ? columns * static_cast<std::uint32_t>(p.spectral.period) : 0;
     case Step::unfold:
       return p.spectral.grids != nullptr ? columns * samples : 0;
-    case Step::ghosts:
-      return p.ghosts != nullptr ? columns * samples : 0;
+    case Step::multipath:
+      return p.multipath != nullptr ? columns * samples : 0;
     case Step::volume:
       return p.slices != nullptr ? columns : 0;
     case Step::finish_columns:
       return columns * samples;
     case Step::point_weights:
       return static_cast<std::uint32_t>(p.point_count + p.pulse_count) * beams;
-    case Step::couple:
+    case Step::form_beams:
       return (beams + beams_a_panel - 1) / beams_a_panel * samples;
     case Step::crosstalk_sum:
       return p.crosstalk != nullptr ? samples : 0;
@@ -82,11 +82,11 @@ SONAR_HD inline void run_step(const PingView& p, std::uint32_t i) {
   if constexpr (step == Step::spread) spread(p, i);
   if constexpr (step == Step::fold) fold(p, i);
   if constexpr (step == Step::unfold) unfold(p, i);
-  if constexpr (step == Step::ghosts) ghosts(p, i);
+  if constexpr (step == Step::multipath) add_multipath(p, i);
   if constexpr (step == Step::volume) volume(p, i);
   if constexpr (step == Step::finish_columns) finish_columns(p, i);
   if constexpr (step == Step::point_weights) point_weights(p, i);
-  if constexpr (step == Step::couple) couple(p, i);
+  if constexpr (step == Step::form_beams) form_beams(p, i);
   if constexpr (step == Step::crosstalk_sum) crosstalk_sum(p, i);
   if constexpr (step == Step::crosstalk_add) crosstalk_add(p, i);
   if constexpr (step == Step::receive) receive(p, i);

@@ -18,12 +18,13 @@
 
 #include "core/base/result.hpp"
 #include "core/sonar/ping.hpp"
+#include "core/text/ipv4.hpp"
 
 namespace sonar::protocol {
 
 using Bytes = std::vector<std::byte>;
 using BytesView = std::span<const std::byte>;
-using Ipv4 = std::array<std::uint8_t, 4>;  // 192.168.1.2 = {192, 168, 1, 2}
+using text::Ipv4;
 
 /// One named choice of a protocol's unknowns, settable under `options:` of a sonar in the configuration.
 struct Option {
@@ -48,30 +49,28 @@ struct DeviceState {
   std::uint16_t id = 0;  // serial number, never 0
   std::shared_ptr<const SonarModel> model;
   Ipv4 advertise_ip{}, netmask{255, 255, 255, 0};
-  Ipv4 connected_client{};  // 0.0.0.0 when nobody is connected
+  Ipv4 connected_client{};  // 0.0.0.0 without a client
   std::array<std::uint8_t, 6> mac{};
   Time powered_up_at{};
   Water water;  // at the device, as measured by its sensors
   double depth_m = 0;
-  OptionValues options;         // complete: defaults filled in by check_options
-  Bytes request;                // ChangeSettings::request of the settings that hold now
-  bool ping_is_owed = false;    // somebody asked for one ping and waits for it
-  bool simulated_time = false;  // it may stand while people wait
-  struct StoredAddress {        // what a client wrote; stored, never applied
+  OptionValues options;                            // complete: defaults filled in by check_options
+  std::shared_ptr<const VendorSettings> settings;  // now; null = Vendor::initial_settings
+  bool simulated_time = false;                     // it may stop while clients wait
+  struct StoredAddress {                           // what a client wrote; stored, never applied
     std::uint32_t ip = 0, netmask = 0;
     bool dhcp = false;
   } stored_address;
 };
 
-/// The client replaced the device's settings, perhaps by the same ones: some drivers repeat them at ping rate. `request`: its own
-/// bytes, echoed in the pings made with them.
+/// The client replaced the device's settings, perhaps by the same ones: some drivers repeat them at ping rate.
 struct ChangeSettings {
   PingSettings settings;
-  Bytes request;
+  std::shared_ptr<const VendorSettings> vendor_settings;
   std::string summary;  // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
 };
-/// What somebody who is no client of the vendor's protocol wants of the sonar; what is not given stays as it is. Finite.
-struct Wish {
+/// Settings override from the control protocol. Unset fields keep their value; all values must be finite.
+struct SettingsOverride {
   std::optional<double> range_m, rate_hz, gain_percent;  // rate 0 = standby; gain 0 to 100 of what a client can turn it
   std::optional<std::uint32_t> mode, beams;              // mode: index into SonarModel::modes
 };
@@ -104,21 +103,21 @@ class Dialogue {
   virtual ~Dialogue() = default;
   /// Any split of the stream, any garbage. Never throws, never grows without bound.
   virtual Reaction on_bytes(BytesView received, Time now) = 0;
-  /// Keep-alives. Called at or after next_tick().
-  virtual Reaction on_tick(Time now) = 0;
+  /// Keep-alives and subscriptions. Called at or after next_tick(). `ping_pending`: a client has asked the device for one ping,
+  /// which has not been started.
+  virtual Reaction on_tick(Time now, bool ping_pending) = 0;
   virtual Time next_tick() const = 0;
-  /// When on_tick() will ask for a ping by itself. Time that steps by itself passes as far as that, and not for keep-alives
-  /// alone.
-  virtual std::optional<Time> next_wish() const { return std::nullopt; }
+  /// Time of the next ping that on_tick() will request by itself. Stepped time advances to it, but not for keep-alives alone.
+  virtual std::optional<Time> next_ping_request() const { return std::nullopt; }
   /// A client that says nothing for longer has gone. By the wall's clock, whatever the time is that the dialogue is told of:
   /// clients live by theirs. Nothing: it may be silent.
   virtual std::optional<std::chrono::milliseconds> longest_silence() const { return std::nullopt; }
   /// A ping was put into this client's outbox: keep-alives only fill silence.
   virtual void on_ping_queued(Time now) = 0;
-  /// A ping is ready, made with the settings of that request; its shared bytes are so many. Most clients take every ping as it
-  /// is; where hosts ask for pings one by one, only those that asked get it. Calls on_ping_queued itself when anything is
-  /// delivered.
-  virtual Delivery on_ping(BytesView made_with, std::size_t shared_bytes, Time now) {
+  /// A ping is ready, made with `made_with` (null: the initial settings); its framed size is `shared_bytes`. Most clients take
+  /// every ping as it is; where hosts request single pings, only those that requested one get it. Calls on_ping_queued itself
+  /// when anything is delivered.
+  virtual Delivery on_ping(const VendorSettings* made_with, std::size_t shared_bytes, Time now) {
     static_cast<void>(made_with), static_cast<void>(shared_bytes);
     on_ping_queued(now);
     return {{Bytes{}}, {}};
@@ -142,11 +141,11 @@ class Vendor {
   /// The model that a device with these (complete) options emulates; asked once, when its configuration is read.
   virtual Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
                                                           const OptionValues& options) const = 0;
-  /// What the device does before any client spoke (its stored configuration). `request` may be empty.
+  /// What the device does before any client spoke (its stored configuration).
   virtual ChangeSettings initial_settings(const DeviceState& device) const = 0;
-  /// What a client of this vendor would have asked for who wants that and is content with the rest of what holds now
-  /// (DeviceState::request). Refused with a sentence that says what the product can do.
-  virtual Result<ChangeSettings> wished(const Wish& wish, const DeviceState& device) const = 0;
+  /// The settings that a client of this vendor would have requested: those that hold now (DeviceState::settings) with the
+  /// override applied. A refusal states what the product can do.
+  virtual Result<ChangeSettings> apply_override(const SettingsOverride& wanted, const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;
   /// Empty when the vendor has no beacon.
   virtual Bytes beacon(const DeviceState& device, Time now) const = 0;
@@ -157,16 +156,16 @@ class Vendor {
   }
   /// The state must outlive the dialogue.
   virtual std::unique_ptr<Dialogue> converse(const DeviceState& device, Time now) const = 0;
-  /// Once per ping, shared by all sessions. `request`: ChangeSettings::request of the settings the ping was made with.
-  virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device, BytesView request) const = 0;
+  /// Once per ping, shared by all sessions; with the settings the ping was made with (PingRequest::vendor_settings).
+  virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const = 0;
 };
 
-/// Fills in defaults; refuses unknown names and values with a sentence that names the nearest valid one.
+/// Fills in defaults. Unknown names and values are errors that suggest the nearest valid one.
 Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& given);
 
 /// Adding a vendor = one folder + one line in vendors.cpp.
 std::span<const Vendor* const> vendors();
-/// The vendor and model behind a profile name, or a sentence with the nearest names.
+/// The vendor and model of a profile name, or an error that suggests the nearest name.
 struct Profile {
   const Vendor* vendor = nullptr;
   std::shared_ptr<const SonarModel> model;

@@ -18,31 +18,31 @@ struct Options {
   std::vector<std::string> models;
 };
 
-/// Touched by the one thread that delivers messages; the main thread only waits.
+/// Used only by the thread that delivers messages; the main thread waits.
 struct Following {
   std::vector<FollowedModel> models;
   Socket socket;
-  bool heard = false, unheard = false;
+  bool has_received = false, was_refused = false;
   std::size_t sent = 0;
 
-  void take(const ignition::msgs::Pose_V& message) {
+  void on_poses(const ignition::msgs::Pose_V& message) {
     const std::vector<std::string> lines = lines_from(message, models);
     for (const std::string& line : lines) {
-      // Refused is about the datagram before: a sonard that restarts must not end the simulation's bridge.
+      // The error concerns the previous datagram. A restart of sonard must not end the bridge.
       const bool refused = !write_all(socket, std::as_bytes(std::span(line)));
-      if (refused && !unheard) std::fprintf(stderr, "gazebo_bridge: sonard does not listen there yet\n");
-      unheard = refused;
+      if (refused && !was_refused) std::fprintf(stderr, "gazebo_bridge: no sonard listens there yet\n");
+      was_refused = refused;
     }
     sent += lines.size();
-    if (!heard) tell_first(message);
-    heard = true;
+    if (!has_received) report_first(message);
+    has_received = true;
   }
 
-  void tell_first(const ignition::msgs::Pose_V& message) const {
+  void report_first(const ignition::msgs::Pose_V& message) const {
     std::fprintf(stderr, "gazebo_bridge: %d poses in the first message, %zu of %zu models followed\n", message.pose_size(), sent,
                  models.size());
     if (sent == models.size()) return;
-    std::fprintf(stderr, "gazebo_bridge: not all of them are there; it has:");
+    std::fprintf(stderr, "gazebo_bridge: not every model was found; the message has:");
     for (int i = 0; i < message.pose_size(); ++i) std::fprintf(stderr, " %s", message.pose(i).name().c_str());
     std::fprintf(stderr, "\n");
   }
@@ -68,8 +68,8 @@ int follow(const Options& options) {
   Following following{std::move(models), *std::move(socket)};
   const std::string topic = options.topic.empty() ? "/world/" + options.world + "/pose/info" : options.topic;
   ignition::transport::Node node;
-  std::function<void(const ignition::msgs::Pose_V&)> take = [&](const ignition::msgs::Pose_V& m) { following.take(m); };
-  if (!node.Subscribe(topic, take)) return complain({ErrorKind::unavailable, "cannot subscribe to " + topic});
+  std::function<void(const ignition::msgs::Pose_V&)> on_poses = [&](const ignition::msgs::Pose_V& m) { following.on_poses(m); };
+  if (!node.Subscribe(topic, on_poses)) return complain({ErrorKind::unavailable, "cannot subscribe to " + topic});
   std::fprintf(stderr, "gazebo_bridge: %s to %s\n", topic.c_str(), text_from(*to).c_str());
   ignition::transport::waitForShutdown();
   node.Unsubscribe(topic);

@@ -1,5 +1,5 @@
-// From what a Gazebo world says of its models to lines of JSON as sonard takes poses; without Gazebo, so that it is tested.
-// Used by the bridge's main.cpp. Gazebo's world is ENU and its bodies FLU, as sonard's: only words and checks are needed.
+// Converts model poses of a Gazebo world to JSON lines of poses for sonard; without Gazebo, for tests.
+// Used by the bridge's main.cpp. Gazebo's world is ENU and its bodies FLU, as sonard's: only formatting and checks are needed.
 #pragma once
 
 #include <cmath>
@@ -29,7 +29,7 @@ inline Result<FollowedModel> parse_followed(const std::string& text) {
   return followed;
 }
 
-/// One pose; ENU_FLU, stamped with the simulation's time. No line for a pose that is no number or no rotation.
+/// One pose; ENU_FLU, stamped with the simulation's time. No line for a non-finite pose or an invalid rotation.
 inline std::optional<std::string> json_line(const Pose& body_in_world, std::int64_t stamp_ns, const std::string& vehicle) {
   const Vec3d& p = body_in_world.position_m;
   const Quatd& q = body_in_world.orientation;
@@ -43,9 +43,9 @@ inline std::optional<std::string> json_line(const Pose& body_in_world, std::int6
   return line.dump() + "\n";
 }
 
-/// The lines of one message; `Message` is ignition.msgs.Pose_V, or anything of its shape. Of poses with the same name the first
-/// counts: models come before their links, whose poses are told in their model and not in the world. A time that was told before
-/// is left out: Gazebo repeats the last one while it is paused.
+/// The lines of one message; `Message` is ignition.msgs.Pose_V, or anything of its shape. Uses the first of several poses with
+/// one name: models precede their links, whose poses are relative to the model. Skips a repeated time: Gazebo repeats the last
+/// message while paused.
 template <class Message>
 std::vector<std::string> lines_from(const Message& message, std::vector<FollowedModel>& followed) {
   std::vector<std::string> lines;

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the file says and a loaded scene has forgotten.
+/// Facts of the file that a loaded scene does not keep.
 struct Outline {
   struct Kind {
     std::string type, file;
@@ -43,7 +43,7 @@ Outline outline_of(const text::Document& document) {
   return outline;
 }
 
-/// Both are YAML, and lie in the same folder.
+/// Configurations and scenes are both YAML, and often in one folder.
 bool is_configuration(const fs::path& file) {
   const auto document = text::parse_yaml_file(file);
   return document && document->root().has("world") && document->root().has("sonars");

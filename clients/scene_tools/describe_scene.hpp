@@ -1,5 +1,5 @@
-// What is in a scene file, in figures a reader can compare with what was meant: `sonarctl scene info`, and the ground that
-// `sonarctl scene check` stands on. The scene is loaded by the loader that the daemon uses.
+// Describes the content of a scene file in numbers that its author can check: `sonarctl scene info` and the basis of
+// `sonarctl scene check`. Uses the scene loader of the daemon.
 #pragma once
 
 #include <cstdint>
@@ -13,17 +13,17 @@
 namespace sonar::scene_tools {
 
 struct DescribedObject {
-  std::string name = {}, kind = {}, file = {};  // kind: as the scene says it (box, mesh, seabed, point, ...)
+  std::string name = {}, kind = {}, file = {};  // kind: as in the scene (box, mesh, seabed, point, ...)
   std::vector<std::string> materials = {};
   std::size_t triangles = 0;
   Extent own = {}, in_world = {};  // along its own axes, and the world's; where the scene puts it
-  std::string moves_with = {};     // the moving object it is or hangs on
+  std::string moves_with = {};     // the moving object that it is or is attached to
   bool visible = true;
 };
 
 struct DescribedMaterial {
   std::string name, law;
-  double strength_db = 0;  // straight on, at the trend's reference frequency
+  double strength_db = 0;  // at normal incidence and the trend's reference frequency
   double roughness_m = 0, reflection = 0;
   std::size_t objects = 0, triangles = 0;  // 0: defined, or only started from, and not used
 };
@@ -42,12 +42,12 @@ struct SceneDescription {
   std::vector<std::string> notes;  // the loader's
 };
 
-/// Errors and their kinds are the daemon's own. `file` may also be the name of a scene that is built in.
+/// Errors as of the daemon. `file` may also name a built-in scene.
 Result<SceneDescription> describe_scene(const std::filesystem::path& file);
 
-/// What its author would want to know about a sound scene, a sentence each.
+/// Remarks on a valid scene for its author.
 struct Remarks {
-  std::vector<std::string> warnings;  // probably not meant
+  std::vector<std::string> warnings;  // probably unintended
   std::vector<std::string> notes;
 };
 Remarks remarks_on(const SceneDescription& scene);

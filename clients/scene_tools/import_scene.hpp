@@ -1,5 +1,5 @@
-// `sonarctl scene import`: a Gazebo world or model, or a URDF, becomes a scene file of ours, with what the disk has to say:
-// meshes and heightmaps found and tried, materials chosen, the result written and checked.
+// `sonarctl scene import`: converts a Gazebo world or model, or a URDF, to a scene file: finds and tries meshes
+// and heightmaps, chooses materials, writes and checks the result.
 #pragma once
 
 #include <filesystem>
@@ -27,8 +27,8 @@ struct Imported {
   std::vector<std::string> left_out;
 };
 
-/// Errors: file:line: what. Nothing is written unless everything was understood; a scene that does not load stays on disk for
-/// its error to be looked up.
+/// Errors: file:line: what. Writes nothing unless everything was converted; a scene that does not load stays on disk for
+/// inspection.
 Result<Imported> import_scene(const ImportOptions& options);
 
 }  // namespace sonar::scene_tools

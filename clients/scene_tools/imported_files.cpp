@@ -31,7 +31,7 @@ MeshFile mesh_at(const fs::path& file) {
   return request;
 }
 
-/// The mesh with another scale for every axis, as an OBJ about its own origin.
+/// The mesh scaled differently per axis, as an OBJ about its own origin.
 std::string stretched_obj(const CentredMesh& centred, Vec3d scale) {
   std::string out = "# stretched by sonarctl scene import\n";
   for (const Vec3& v : centred.mesh.vertices) {
@@ -77,7 +77,7 @@ bool FileResolver::resolve_mesh(PlacedShape& placed, const fs::path& file) {
   return true;
 }
 
-/// Formats are told by their names; the rest by the loader that the daemon uses.
+/// The suffix gives the format; the daemon's loader checks the rest.
 std::string FileResolver::why_not(const fs::path& file) {
   static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
   if (std::find(known.begin(), known.end(), extension_of(file)) == known.end())
@@ -121,7 +121,7 @@ bool FileResolver::resolve_heightmap(PlacedShape& placed, const fs::path& file) 
   return true;
 }
 
-/// Relative to the scene, so that both can be moved together; absolute where they have nothing in common but the root.
+/// Relative to the scene, so that both can be moved together; absolute where they share only the root.
 std::string FileResolver::path_to_write(const fs::path& file) const {
   std::error_code error;
   const fs::path target = fs::weakly_canonical(fs::absolute(file, error), error);

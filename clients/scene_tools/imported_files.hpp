@@ -1,5 +1,5 @@
-// Mesh and heightmap files that an imported world names: found, tried with the scene's own loader, and converted where a scene
-// cannot say what the world says. Internal to import_scene.
+// Mesh and heightmap files that an imported world names: found, tried with the scene's loader, and converted where a scene
+// cannot express them. Internal to import_scene.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace sonar::scene_tools {
 class FileResolver {
  public:
   FileResolver(const Library& library, std::filesystem::path scene, bool skip_missing, bool try_files, Findings& findings);
-  /// Sets what is to be written for a shape that lies in a file. False: left out, and listed.
+  /// Sets the scene entry of a shape from a file. False: omitted and listed.
   bool resolve(PlacedShape& placed);
   /// Writes the meshes that had to be converted into a folder beside the scene.
   Result<void> write_converted();

@@ -1,4 +1,4 @@
-// What a Gazebo or URDF file says that a scene of ours can hold: shapes placed in the world, and the models they belong to.
+// The content of a Gazebo or URDF file that a scene can hold: shapes placed in the world, and their models.
 // Filled by read_world, completed by import_scene (files found, materials chosen), written by scene_text.
 #pragma once
 
@@ -27,7 +27,7 @@ struct PlacedShape {
   Pose in_world;
   std::size_t model = 0;              // index into ImportedWorld::models
   std::string link = {}, label = {};  // of the visual or collision
-  std::string material = {};          // in: what the file calls its look; out: a material of ours
+  std::string material = {};          // in: name of its appearance in the file; out: a material of the scene
   Place at = {};
 };
 
@@ -46,7 +46,7 @@ struct ImportedWorld {
   std::vector<std::shared_ptr<const XmlFile>> files;  // that the places above are in
 };
 
-/// Where a reader finds the files that its file names. `find` answers with an empty path when there is none.
+/// Access of a reader to referenced files. `find` returns an empty path for a missing file.
 struct Library {
   std::function<std::filesystem::path(std::string_view uri, const std::filesystem::path& from_file)> find;
   std::function<Result<std::string>(const std::filesystem::path&)> read;
@@ -54,13 +54,13 @@ struct Library {
 
 struct ReadOptions {
   bool collisions = false;    // collision shapes instead of visual ones
-  bool skip_missing = false;  // models that are not found are left out instead of refused
+  bool skip_missing = false;  // omits missing models instead of failing
 };
 
 inline constexpr std::size_t max_shapes = 20'000;
 
-/// The world of an SDF, world or URDF text, told by its root element; `path` begins the errors. Bounded in depth, models and
-/// shapes, whatever the text and whatever it includes.
+/// The world of an SDF, world or URDF text, identified by its root element; `path` begins the errors. Bounded in depth, models
+/// and shapes, for any text and its includes.
 Result<ImportedWorld> read_world(std::string_view text, const std::filesystem::path& path, const Library& library,
                                  const ReadOptions& options, Findings& findings);
 

@@ -35,7 +35,7 @@ class GeometryReader {
     return 1;
   }
   void refuse(std::string why) { why_not_ = std::move(why); }
-  /// The shape, unless a length was impossible: then it is listed.
+  /// The shape; an invalid length is listed instead.
   std::optional<Shape> finish(const Shape& shape) {
     if (findings_.failed()) return std::nullopt;
     if (why_not_.empty()) return shape;
@@ -66,7 +66,7 @@ Shape read_plane(GeometryReader& in, Pose& offset) {
     else
       in.refuse("its normal has no length");
   }
-  shape.size_m = {100, 100, 0};  // collision planes have no end
+  shape.size_m = {100, 100, 0};  // collision planes are infinite
   if (in.has("size")) {
     const auto size = in.numbers("size", 2);
     shape.size_m = {in.checked(size[0], "size"), in.checked(size[1], "size"), 0};
@@ -85,7 +85,7 @@ Shape read_mesh(const Element& element, GeometryReader& in) {
   if (shape.uri.empty()) in.refuse("names no file");
   if (!(least > 0)) in.refuse("its scale is 0");
   if (element.child("submesh"))
-    in.refuse(std::string("only a part (submesh) of ") + plain(shape.uri, 200) + " is wanted; save it as a file of its own");
+    in.refuse(std::string("only a part (submesh) of ") + plain(shape.uri, 200) + " is referenced; save it as a separate file");
   return shape;
 }
 
@@ -144,10 +144,9 @@ std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, 
 void add_shape(ImportedWorld& world, PlacedShape shape, Findings& findings) {
   const Vec3d p = shape.in_world.position_m;
   if (world.shapes.size() >= max_shapes)
-    return findings.fail(shape.at,
-                         std::string("more than ") + std::to_string(max_shapes) + " shapes; a scene has no more objects");
+    return findings.fail(shape.at, std::string("more than ") + std::to_string(max_shapes) + " shapes, the limit of a scene");
   if (!is_finite(p) || !is_finite(shape.in_world.orientation) || length(p) > 1e7)
-    return findings.fail(shape.at, "stands farther than 10 000 km from the origin of the world");
+    return findings.fail(shape.at, "lies farther than 10 000 km from the origin of the world");
   world.shapes.push_back(std::move(shape));
 }
 

@@ -7,14 +7,14 @@
 
 namespace sonar::scene_tools {
 
-/// The one shape inside <geometry>; sizes stand in child elements (SDF) or attributes (URDF). Empty when a scene cannot hold it,
-/// which is then listed, or when it is no shape at all. `offset` receives what turns and moves the shape in its own frame.
+/// The one shape inside <geometry>; sizes are in child elements (SDF) or attributes (URDF). Empty when a scene cannot hold it,
+/// which is then listed, or for another element. `offset` receives the pose of the shape in its own frame.
 std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, Pose& offset);
 
 /// Adds a shape; an error beyond max_shapes.
 void add_shape(ImportedWorld& world, PlacedShape shape, Findings& findings);
 
-/// "sensor "camera"": how an element is called in the list of what was left out.
+/// "sensor "camera"": name of an element in the list of omissions.
 std::string called(const Element& element);
 
 Result<ImportedWorld> read_sdf(std::shared_ptr<const XmlFile> file, const Library& library, const ReadOptions& options,

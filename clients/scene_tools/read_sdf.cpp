@@ -1,4 +1,4 @@
-// Gazebo worlds and models: walks the tree of models, places what has a shape and lists what a scene cannot hold.
+// Gazebo worlds and models: walks the tree of models, places shapes and lists elements that a scene cannot hold.
 #include <algorithm>
 #include <array>
 #include <span>
@@ -13,7 +13,7 @@ bool is_one_of(std::string_view name, std::span<const std::string_view> names) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// What says nothing about shapes, and whose absence nobody will miss in a sonar picture.
+// Elements without shapes, which do not affect a sonar image.
 constexpr std::array<std::string_view, 12> quiet_in_world{
     "physics", "scene", "gravity", "magnetic_field", "atmosphere", "wind", "audio", "gui", "name", "joint", "frame", "include"};
 constexpr std::array<std::string_view, 9> quiet_in_model{
@@ -37,7 +37,7 @@ class SdfReader {
       read(*nested, compose(in_world, model_in_parent(*nested, nested->placing.element.place(), findings_)));
   }
 
-  ImportedWorld take() { return std::move(world_); }
+  ImportedWorld world() { return std::move(world_); }
 
  private:
   void list_what_is_left_out(const SdfModel& model) {
@@ -109,7 +109,7 @@ Result<ImportedWorld> read_sdf(std::shared_ptr<const XmlFile> file, const Librar
   SdfReader reader(options, findings);
   reader.read(*root_model, {});
   if (findings.failed()) return tl::make_unexpected(*findings.error());
-  ImportedWorld world = reader.take();
+  ImportedWorld world = reader.world();
   world.files = tree.included_files();
   world.name = plain(top.attribute("name"));
   if (world.name.empty() && !world.models.empty()) world.name = plain(world.models.front().path);

@@ -1,4 +1,4 @@
-// Robots in URDF: links hang on joints, every joint at zero; the root link stands at the world's origin.
+// Robots in URDF: links attached by joints, every joint at zero; the root link is at the world's origin.
 #include <map>
 #include <set>
 
@@ -72,12 +72,12 @@ class UrdfReader {
     joints_.push_back(joint);
   }
 
-  /// From the links that hang on nothing outwards.
+  /// From the root links outwards.
   void hang_links() {
     for (const Joint& joint : joints_)
       for (const std::string& end : {joint.parent, joint.child})
         if (!links_.contains(end))
-          return findings_.fail(joint.element.place(), called(joint.element) + ": there is no link \"" + plain(end) + "\"");
+          return findings_.fail(joint.element.place(), called(joint.element) + ": no link \"" + plain(end) + "\"");
     std::vector<std::string> ready;
     for (const std::string& link : links_)
       if (!joint_of_.contains(link)) in_world_[link] = Pose{}, ready.push_back(link);

@@ -42,7 +42,7 @@ fs::path file_at(const fs::path& place) {
   return is_file(place) ? place : fs::path();
 }
 
-/// "%20" and the like, which addresses have and paths do not.
+/// Decodes "%20" and similar escapes of addresses.
 std::string without_escapes(std::string_view text) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -59,7 +59,7 @@ std::string without_escapes(std::string_view text) {
   return out;
 }
 
-/// In the folders, or beside the file that asks and above it: models lie next to each other, packages hold who names them.
+/// Searches the folders, then beside and above the referencing file: models lie next to each other, packages contain their files.
 fs::path look_around(const fs::path& wanted, const fs::path& from_file, const std::vector<fs::path>& folders) {
   for (const fs::path& folder : folders)
     if (const fs::path found = file_at(folder / wanted); !found.empty()) return found;

@@ -1,4 +1,4 @@
-// Where the files named by Gazebo and URDF files are on this disk: model://, package://, file:// and plain paths.
+// Finds files referenced by Gazebo and URDF files on this disk: model://, package://, file:// and plain paths.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +13,7 @@ namespace sonar::scene_tools {
 /// for packages, ROS_PACKAGE_PATH.
 std::vector<std::filesystem::path> resource_folders(const std::vector<std::filesystem::path>& given);
 
-/// The file that `uri` names in `from_file`, else an empty path. A folder stands for the SDF in it that model.config names, or
+/// The file that `uri` names in `from_file`, else an empty path. For a folder, the SDF in it that model.config names, or
 /// model.sdf. Beside the folders: next to `from_file`, and up to eight folders above it.
 std::filesystem::path find_resource(std::string_view uri, const std::filesystem::path& from_file,
                                     const std::vector<std::filesystem::path>& folders);
@@ -21,7 +21,7 @@ std::filesystem::path find_resource(std::string_view uri, const std::filesystem:
 /// At most max_xml_bytes of a file.
 Result<std::string> read_text(const std::filesystem::path& path);
 
-/// The disk, as readers want it.
+/// File access for the readers.
 Library library_on_disk(const std::vector<std::filesystem::path>& given);
 
 }  // namespace sonar::scene_tools

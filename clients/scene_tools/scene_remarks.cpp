@@ -1,9 +1,9 @@
-// What a sound scene may still have wrong with it: things that no loader can know, and that show only as an empty picture.
+// Probable mistakes in a valid scene, which a loader cannot detect and which show only as an empty image.
 #include <algorithm>
 #include <cmath>
 
 #include "clients/scene_tools/describe_scene.hpp"
-#include "clients/scene_tools/figures.hpp"
+#include "clients/scene_tools/number_text.hpp"
 
 namespace sonar::scene_tools {
 namespace {
@@ -27,7 +27,7 @@ std::vector<std::string> names_where(const SceneDescription& scene, const Wanted
   return names;
 }
 
-/// Something to see below: ground by its name, anything that is wide both ways, or what all the rest stands in: a tank.
+/// A bottom: ground by its name, an object wide in both directions, or a tank that contains all others.
 bool is_ground(const DescribedObject& o, const SceneDescription& scene) {
   const Vec3d all = scene.in_world.size_m();
   const Vec3d size = o.in_world.size_m();
@@ -37,13 +37,13 @@ bool is_ground(const DescribedObject& o, const SceneDescription& scene) {
 }
 
 void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
-  const auto say = [&](const DescribedObject& o, std::string_view guess) {
+  const auto warn = [&](const DescribedObject& o, std::string_view guess) {
     out.warnings.push_back((o.name + ": " + o.file + " is " + length_text(o.own.longest_m()) + " long; ").append(guess));
   };
   for (const DescribedObject& o : scene.objects) {
     if (o.kind != "mesh") continue;
-    if (o.own.longest_m() > huge_mesh_m) say(o, huge_mesh_cure);
-    if (o.own.longest_m() < tiny_m) say(o, "lengths are metres after scale: is scale too small?");
+    if (o.own.longest_m() > huge_mesh_m) warn(o, huge_mesh_cure);
+    if (o.own.longest_m() < tiny_m) warn(o, "lengths are metres after scale: is scale too small?");
   }
 }
 
@@ -51,13 +51,13 @@ void remark_on_places(const SceneDescription& scene, Remarks& out) {
   const auto far =
       names_where(scene, [](const DescribedObject& o) { return !o.in_world.empty() && length(o.in_world.centre_m()) > far_m; });
   if (!far.empty())
-    out.warnings.push_back(std::string("more than 1 km from the origin, where no sonar of ours hears them from: ") +
-                           list_of(far));
+    out.warnings.push_back(std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far));
   const auto above = names_where(
       scene, [](const DescribedObject& o) { return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > 0; });
   if (!above.empty()) out.warnings.push_back(std::string("wholly above z = 0, the water's surface: ") + list_of(above));
   if (std::none_of(scene.objects.begin(), scene.objects.end(), [&](const DescribedObject& o) { return is_ground(o, scene); }))
-    out.warnings.push_back("no seabed: nothing is ground or 5 m wide both ways, so beams that miss the objects stay black");
+    out.warnings.push_back(
+        "no seabed: no object is ground or 5 m wide in both directions, so beams that miss the objects stay black");
 }
 
 }  // namespace
@@ -65,7 +65,7 @@ void remark_on_places(const SceneDescription& scene, Remarks& out) {
 Remarks remarks_on(const SceneDescription& scene) {
   Remarks out;
   if (scene.objects.empty()) {
-    out.warnings.push_back("nothing is in it: every ping will be noise");
+    out.warnings.push_back("the scene is empty: every ping will be noise");
     return out;
   }
   remark_on_sizes(scene, out);

@@ -79,7 +79,7 @@ void SdfTree::add_frame(SdfModel& model, const Element& element, std::string bas
   const auto [place, is_new] = model.frames.try_emplace(name, frame);
   if (is_new || !is_link) return;
   if (place->second.element.name() == "link") return findings_.fail(element.place(), called(element) + ": a name used twice");
-  place->second = std::move(frame);  // joints may be called as links are
+  place->second = std::move(frame);  // joints may share names with links
 }
 
 void SdfTree::add_model(SdfModel& parent, const Element& element, const Element& include, int include_depth) {
@@ -150,7 +150,7 @@ void SdfTree::add_include(SdfModel& parent, const Element& include, int include_
 
 namespace {
 
-/// The frame's pose from what the file says about it, once; where it has been asked for already, poses go in a circle.
+/// The pose of a frame, resolved once; a repeated request means that poses refer to each other in a circle.
 template <class Place_it>
 Pose once(SdfFrame& frame, const Place& asked_by, Findings& findings, int depth, const Place_it& place_it) {
   if (frame.in_model) return *frame.in_model;

@@ -1,5 +1,4 @@
-// A ping of either kind of sonar, and what listen, view and stats say of it. What only one kind has, they look up in its own
-// type.
+// A ping of either kind of sonar, and the facts that listen, view and stats print. Facts of one kind only are read from its type.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +11,7 @@ namespace sonar::clients {
 
 struct BlueViewPing {
   bvt::PolarPing polar;
-  double frequency_hz = 0;       // of the head, as its sonar's greeting says
+  double frequency_hz = 0;       // of the head, from the greeting of its sonar
   std::size_t message_size = 0;  // bytes
 };
 using AnyPing = std::variant<oculus::DecodedPing, BlueViewPing>;
@@ -20,7 +19,7 @@ using AnyPing = std::variant<oculus::DecodedPing, BlueViewPing>;
 struct PingFacts {
   std::uint32_t number = 0;
   unsigned beams = 0, rows = 0, bits = 0;
-  double row_m = 0, range_m = 0;  // range_m: the last row's far end
+  double row_m = 0, range_m = 0;  // range_m: far end of the last row
   double frequency_hz = 0;
   std::size_t message_size = 0;  // bytes
 };

@@ -1,6 +1,8 @@
-// What values on sonarctl's command line may be, beside numbers and choices (core/text/arguments.hpp).
+// Options that several commands of sonarctl share, and checks of their values beside those of core/text/arguments.hpp.
 #pragma once
 
+#include <cstdint>
+#include <filesystem>
 #include <string>
 
 #include "protocol/control/pose_sample.hpp"
@@ -16,7 +18,18 @@ namespace sonar::clients {
 CLI::Validator address();
 CLI::Validator colour_map();
 
-/// --frame: enu or ned, in small letters or capitals.
+/// --frame: enu or ned, in lower or upper case.
 void add_frame_option(CLI::App& command, control::Frame& frame, const std::string& help);
+/// --control and --token-file.
+void add_control_options(CLI::App& command, std::string& address, std::filesystem::path& token_file);
+
+struct DeviceArguments {
+  std::string address;
+  std::uint16_t port = 0;  // 0 = the default
+  bool discover = false;
+  double patience_s = 2;
+  /// ADDRESS, --port, --discover and --wait.
+  void add_to(CLI::App& command, const std::string& port_help);
+};
 
 }  // namespace sonar::clients

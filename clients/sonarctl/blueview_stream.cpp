@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "protocol/blueview/wish.hpp"
+#include "protocol/blueview/settings_override.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -12,8 +12,8 @@ using namespace std::chrono_literals;
 using blueview::FrameType;
 using blueview::Put;
 
-constexpr auto keep_alive_after = 2s;  // of our silence
-constexpr std::uint16_t abi = 4;       // which of the SDKs: both get the same
+constexpr auto keep_alive_after = 2s;  // after the last message sent
+constexpr std::uint16_t abi = 4;       // of the SDK; the answers do not depend on it
 
 bvt::Bytes sdk_bytes(wire::BytesView bytes) {
   bvt::Bytes out(bytes.size());
@@ -21,20 +21,20 @@ bvt::Bytes sdk_bytes(wire::BytesView bytes) {
   return out;
 }
 
-/// "there is no head 3 (code 2010)"
+/// "no head 3 (code 2010)"
 std::string text_of_error(wire::BytesView payload) {
   wire::Reader reader(payload);
   std::int32_t code = 0;
   reader("code", code);
-  return blueview::take_text(reader, "text") + " (code " + std::to_string(code) + ")";
+  return blueview::read_text(reader, "text") + " (code " + std::to_string(code) + ")";
 }
 
 }  // namespace
 
-Result<BlueViewStream> BlueViewStream::open(Socket socket, const HeadWish& wish, std::chrono::milliseconds patience) {
+Result<BlueViewStream> BlueViewStream::open(Socket socket, const HeadRequest& request, std::chrono::milliseconds patience) {
   BlueViewStream stream(std::move(socket));
   if (Result<void> greeted = stream.greet(patience); !greeted) return tl::unexpected(greeted.error());
-  if (Result<void> applied = stream.apply(wish, patience); !applied) return tl::unexpected(applied.error());
+  if (Result<void> applied = stream.apply(request, patience); !applied) return tl::unexpected(applied.error());
   return stream;
 }
 
@@ -52,24 +52,24 @@ Result<void> BlueViewStream::greet(std::chrono::milliseconds patience) {
   return {};
 }
 
-Result<void> BlueViewStream::apply(const HeadWish& wish, std::chrono::milliseconds patience) {
-  if (!wish.oculus_only.empty())
-    return failure(ErrorKind::usage, wish.oculus_only.front() + " is for Oculus sonars, and there is a " + sonar_.model +
-                                         ": it takes --mode (its heads, from 1), --range, --gain and --rate");
-  if (wish.head >= sonar_.heads.size())
+Result<void> BlueViewStream::apply(const HeadRequest& request, std::chrono::milliseconds patience) {
+  if (!request.oculus_only.empty())
+    return failure(ErrorKind::usage, request.oculus_only.front() + " applies to Oculus sonars; this is a " + sonar_.model +
+                                         ": it accepts --mode (its heads, from 1), --range, --gain and --rate");
+  if (request.head >= sonar_.heads.size())
     return failure(ErrorKind::usage, sonar_.model + " has " + std::to_string(sonar_.heads.size()) + " head(s), no mode " +
-                                         std::to_string(wish.head + 1));
-  head_ = wish.head;
+                                         std::to_string(request.head + 1));
+  head_ = request.head;
   const bvt::HeadDescription& head = sonar_.heads[head_];
-  if (wish.range_m &&
-      (*wish.range_m <= static_cast<double>(head.start_m) || *wish.range_m > static_cast<double>(head.max_range_m)))
-    return failure(ErrorKind::usage, sonar_.model + " sees from " + std::to_string(std::lround(head.start_m)) + " to " +
+  if (request.range_m &&
+      (*request.range_m <= static_cast<double>(head.start_m) || *request.range_m > static_cast<double>(head.max_range_m)))
+    return failure(ErrorKind::usage, sonar_.model + " has a range of " + std::to_string(std::lround(head.start_m)) + " to " +
                                          std::to_string(std::lround(head.max_range_m)) + " m: give --range between");
   Result<void> done;
-  if (wish.range_m) done = set(blueview::Key::stop_range, static_cast<float>(*wish.range_m), patience);
-  if (done && wish.gain_percent) done = set(blueview::Key::gain, blueview::gain_db_from(*wish.gain_percent), patience);
-  if (done && wish.rate_hz)
-    done = set(blueview::Key::ping_interval, static_cast<std::int32_t>(std::lround(1000 / *wish.rate_hz)), patience);
+  if (request.range_m) done = set(blueview::Key::stop_range, static_cast<float>(*request.range_m), patience);
+  if (done && request.gain_percent) done = set(blueview::Key::gain, blueview::gain_db_from(*request.gain_percent), patience);
+  if (done && request.rate_hz)
+    done = set(blueview::Key::ping_interval, static_cast<std::int32_t>(std::lround(1000 / *request.rate_hz)), patience);
   return done;
 }
 
@@ -100,7 +100,7 @@ Result<wire::Bytes> BlueViewStream::ask(FrameType type, wire::BytesView payload,
     if (read.what == Wait::closed)
       return failure(ErrorKind::io,
                      sonar_.heads.empty()
-                         ? "closed the connection before it answered: all its places are taken (clients.max)"
+                         ? "closed the connection before it answered: all its client slots are taken (clients.max)"
                          : "closed the connection before it answered: the daemon stopped, or closed it; see its log");
     if (read.what == Wait::timed_out) return failure(ErrorKind::unavailable, "does not answer on the BlueView link");
     if (read.what == Wait::interrupted) return failure(ErrorKind::io, "interrupted");
@@ -131,20 +131,20 @@ BlueViewStream::Item BlueViewStream::next(std::chrono::milliseconds patience) {
       wire::Bytes payload;
       const Put write(payload);
       write("head", sonar_.heads[head_].id);
-      write("timeout_ms", std::uint32_t{0});  // we wait as long as we like
+      write("timeout_ms", std::uint32_t{0});  // no limit at the sonar
       if (Result<void> sent = send(FrameType::ping, ++last_id_, payload); !sent) return {Wait::closed, {}, sent.error().text};
       asked_ = true;
     }
     while (const auto frame = framer_.next())
-      if (Item item = take(*frame); item.what != Wait::timed_out) return item;
+      if (Item item = handle(*frame); item.what != Wait::timed_out) return item;
     if (!framer_.broken().empty()) return {Wait::closed, {}, framer_.broken()};
     if (!asked_) continue;
     if (const Read read = receive(deadline); read.what != Wait::data) return {read.what, {}, read.error};
   }
 }
 
-/// Wait::timed_out: nothing for the user.
-BlueViewStream::Item BlueViewStream::take(const blueview::Frame& frame) {
+/// Wait::timed_out: a frame without data for the caller.
+BlueViewStream::Item BlueViewStream::handle(const blueview::Frame& frame) {
   if (frame.header.request_id != last_id_) return {};
   if (frame.header.type == FrameType::error)
     return {Wait::closed, {}, "the sonar refuses to ping: " + text_of_error(frame.payload)};

@@ -1,5 +1,4 @@
-// The commands of sonarctl as a user types them: each adds its options to the parser and returns what is to be done when it was
-// the one that was asked for. main.cpp lists them.
+// Command line of each command: adds its options to the parser and returns the function that executes it. main.cpp lists them.
 #pragma once
 
 #include <functional>

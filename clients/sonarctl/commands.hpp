@@ -1,5 +1,5 @@
-// What sonarctl can do, one function each; main.cpp fills the options from the command line. Results go to standard output,
-// complaints come back as one sentence with the exit code's class.
+// The commands of sonarctl, one function each; main.cpp fills the options from the command line. Results go to standard output,
+// errors are returned as one sentence with the class of the exit code.
 #pragma once
 
 #include <cstdint>
@@ -18,18 +18,18 @@
 
 namespace sonar::clients {
 
-/// Where pings come from: a device or a recording.
+/// Source of pings: a device or a recording.
 struct SourceOptions {
   Endpoint device{"127.0.0.2", 52100};
   SonarKind kind = SonarKind::oculus;
   bool discover = false;                     // take the device from its status broadcast
   std::filesystem::path recording;           // instead of a device
   std::optional<oculus::FireRequest> asked;  // settings to send
-  HeadWish head;                             // the same for a BlueView head
+  HeadRequest head;                          // the same for a BlueView head
   double connect_patience_s = 2;
-  double silence_limit_s = 10;  // no byte for so long is an error
-  bool observe = false;         // look on: take no client's place, ask for nothing
-  std::string control;          // HOST:PORT of sonard's control stream, which says where observers connect; empty = its default
+  double silence_limit_s = 10;  // longest time without a byte
+  bool observe = false;         // occupy no client slot, request nothing
+  std::string control;  // HOST:PORT of sonard's control stream, which reports the address for observers; empty = its default
   std::filesystem::path token_file;
 };
 
@@ -52,7 +52,7 @@ struct ViewOptions {
   bool terminal = false;                   // the picture as text
   bool live = false;                       // every ping until interrupted, or so many
   std::uint64_t pings = 0;                 // 0 = no limit
-  std::optional<TerminalColours> colours;  // nothing = what the terminal can show
+  std::optional<TerminalColours> colours;  // nullopt = what the terminal supports
   std::size_t ping = 0;                    // which of a recording's, from 0
   FanStyle style;
 };
@@ -61,7 +61,7 @@ Result<void> view(const ViewOptions& options);
 struct StatsOptions {
   SourceOptions source;
   std::size_t ping = 0;
-  std::string window;                // rows and beams of the speckle figures; empty = all
+  std::string window;                // rows and beams of the speckle statistics; empty = all
   std::string shadow, surroundings;  // two windows to compare
   bool json = false;
 };
@@ -69,13 +69,13 @@ Result<void> stats(const StatsOptions& options);
 
 struct PoseOptions {
   enum class Path { once, circle, line } path = Path::once;
-  std::string to;                                  // HOST:PORT; empty = 127.0.0.1 and the protocol's port
-  bool json = false;                               // JSON lines instead of protobuf
-  bool confirm = false;                            // over the TCP control stream, each pose answered by the daemon
-  std::filesystem::path token_file;                // for the control stream of a sonard that wants one
-  control::Frame frame = control::Frame::enu_flu;  // of the positions and angles below, and of what is sent
-  std::string vehicle, object;                     // at most one; empty = the only vehicle there is. Objects go over TCP
-  double rate_hz = 20, seconds = 0;                // 0 = one turn, or one line
+  std::string to;                                             // HOST:PORT; empty = 127.0.0.1 and the protocol's port
+  bool json = false;                                          // JSON lines instead of protobuf
+  bool confirm = false;                                       // over the TCP control stream, each pose answered by the daemon
+  std::filesystem::path token_file;                           // for a control stream that requires one
+  control::Frame frame = control::Frame::enu_flu;             // of the positions and angles below, and of what is sent
+  std::string vehicle, object;                                // at most one; empty = the only vehicle. Objects use TCP
+  double rate_hz = 20, seconds = 0;                           // 0 = one turn, or one line
   std::vector<double> position_m{0, 0, 0}, rpy_deg{0, 0, 0};  // once
   std::vector<double> centre_m{0, 0, 0};                      // circle
   double radius_m = 5, period_s = 60;
@@ -86,7 +86,7 @@ struct PoseOptions {
 };
 Result<void> send_poses(const PoseOptions& options);
 
-/// Interrupted by Ctrl-C: commands end as if their time were over.
+/// Set by Ctrl-C: commands end as at their time limit.
 extern volatile int interrupted;
 
 }  // namespace sonar::clients

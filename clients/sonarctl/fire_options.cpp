@@ -34,32 +34,32 @@ void FireArguments::add_to(CLI::App& app) {
       ->check(number(0.0, 100.0))
       ->excludes(metres);
   group(app.add_option("--gain", gain_percent, "per cent"))->check(number(0.0, 100.0));
-  group(app.add_option("--rate", rate, "pings a second at most"))->check(one_of({"2", "5", "10", "15", "40", "standby"}));
+  group(app.add_option("--rate", rate, "maximum ping rate [Hz]"))->check(one_of({"2", "5", "10", "15", "40", "standby"}));
   group(app.add_option("--beams", beams, ""))->check(one_of({"256", "512"}));
-  group(app.add_option("--bits", bits, "a sample; 32 needs --version 2"))->check(one_of({"8", "16", "32"}));
-  group(app.add_option("--gamma", gamma, "as the wire has it: gamma = value / 255"))->check(whole_number(0, 255));
+  group(app.add_option("--bits", bits, "bits per sample; 32 needs --version 2"))->check(one_of({"8", "16", "32"}));
+  group(app.add_option("--gamma", gamma, "wire value: gamma = value / 255"))->check(whole_number(0, 255));
   group(app.add_option("--speed-of-sound", sound_speed_mps, "m/s; 0 = the sonar computes it"))->check(number(0.0, 2000.0));
   group(app.add_option("--salinity", salinity_ppt, "ppt"))->check(number(0.0, 50.0));
-  group(app.add_option("--version", version, "of the messages"))->check(whole_number(0, 2));
-  app.add_flag("--gains", row_gains, "a gain in front of every row")->group(settings_group);
+  group(app.add_option("--version", version, "version of the messages"))->check(whole_number(0, 2));
+  app.add_flag("--gains", row_gains, "request a gain in front of every row")->group(settings_group);
   app.add_flag("--gain-assist", gain_assist, "flag bit 4")->group(settings_group);
   app.add_flag("--trigger", trigger, "one ping for each request (network trigger)")->group(settings_group);
 }
 
-HeadWish FireArguments::head_wish() const {
-  HeadWish wish;
-  if (command == nullptr) return wish;
+HeadRequest FireArguments::head_request() const {
+  HeadRequest request;
+  if (command == nullptr) return request;
   const auto typed = [this](const char* name) { return command->count(name) > 0; };
-  if (typed("--mode")) wish.head = static_cast<std::size_t>(mode - 1);
-  if (typed("--range")) wish.range_m = range_m;
-  if (typed("--gain")) wish.gain_percent = gain_percent;
-  if (typed("--rate") && rate != "standby") wish.rate_hz = std::stod(rate);
+  if (typed("--mode")) request.head = static_cast<std::size_t>(mode - 1);
+  if (typed("--range")) request.range_m = range_m;
+  if (typed("--gain")) request.gain_percent = gain_percent;
+  if (typed("--rate") && rate != "standby") request.rate_hz = std::stod(rate);
   for (const CLI::Option* option : command->get_options()) {
     const std::string name = option->get_name();
     const bool for_heads = name == "--mode" || name == "--range" || name == "--gain" || (name == "--rate" && rate != "standby");
-    if (option->get_group() == settings_group && option->count() > 0 && !for_heads) wish.oculus_only.push_back(name);
+    if (option->get_group() == settings_group && option->count() > 0 && !for_heads) request.oculus_only.push_back(name);
   }
-  return wish;
+  return request;
 }
 
 oculus::FireRequest FireArguments::request() const {

@@ -17,13 +17,13 @@ struct FireArguments {
   double range_m = 10, range_percent = 0, gain_percent = 50, sound_speed_mps = 0, salinity_ppt = 0;
   std::string rate = "10";
   bool row_gains = false, gain_assist = false, trigger = false;
-  const CLI::App* command = nullptr;  // knows what was typed
+  const CLI::App* command = nullptr;  // the parsed command
 
   /// The command must outlive this.
   void add_to(CLI::App& app);
   oculus::FireRequest request() const;
-  /// The same for a BlueView head: only what was typed.
-  HeadWish head_wish() const;
+  /// The same for a BlueView head: only the options that were typed.
+  HeadRequest head_request() const;
   bool triggered() const { return trigger; }
 };
 

@@ -16,7 +16,7 @@ std::vector<double> values_in(const PolarImage& image, const Window& w) {
   return values;
 }
 
-/// "a:b", "a:", ":b" or "" into [begin, end); false when it is none of them or does not fit.
+/// "a:b", "a:", ":b" or "" into [begin, end); false for other text or a window that does not fit.
 bool parse_interval(const std::string& text, std::size_t limit, std::size_t& begin, std::size_t& end) {
   begin = 0, end = limit;
   if (text.empty()) return true;
@@ -40,7 +40,7 @@ Result<Window> parse_window(const std::string& text, const PolarImage& image) {
   const std::string rows = text.substr(0, comma), beams = comma == std::string::npos ? "" : text.substr(comma + 1);
   if (parse_interval(rows, image.rows, w.row_begin, w.row_end) && parse_interval(beams, image.beams, w.beam_begin, w.beam_end))
     return w;
-  return failure(ErrorKind::usage, "\"" + text + "\" is no window of " + std::to_string(image.rows) + " rows by " +
+  return failure(ErrorKind::usage, "\"" + text + "\" is not a window of " + std::to_string(image.rows) + " rows by " +
                                        std::to_string(image.beams) + " beams; write ROW:ROW or ROW:ROW,BEAM:BEAM, ends excluded");
 }
 

@@ -1,5 +1,5 @@
-// Figures that say whether samples look like a sonar's: speckle correlations, shadow depth, the noise floor over range.
-// Computed on the codes as sent; `sonarctl stats` prints them, tests judge them.
+// Statistics of the samples of an image: speckle correlation, shadow depth, noise floor over range.
+// Computed on the codes as sent; `sonarctl stats` prints them, tests check them.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ struct Window {
   std::size_t row_begin = 0, row_end = 0, beam_begin = 0, beam_end = 0;
 };
 Window whole(const PolarImage& image);
-/// "400:650" or "400:650,100:200" (rows, beams); a missing end is the image's. Refused when empty or outside.
+/// "400:650" or "400:650,100:200" (rows, beams); a missing end is that of the image. usage: empty or outside.
 Result<Window> parse_window(const std::string& text, const PolarImage& image);
 
 double mean(const PolarImage& image, const Window& window);
@@ -29,7 +29,7 @@ std::vector<double> percentiles(const PolarImage& image, const Window& window, c
 /// Mean of each block of `rows` rows, all beams; the last block may be shorter.
 std::vector<double> block_means(const PolarImage& image, std::size_t rows);
 /// First row whose median over the beams rises above `factor` times the median of all rows before it and above `code`:
-/// where the near field ends. image.rows when it never does. The first eight rows (transmit leak) are passed over.
+/// where the near field ends; image.rows if none does. Skips the first eight rows (transmit leak).
 std::size_t first_echo_row(const PolarImage& image, double factor = 3, double code = 10);
 
 }  // namespace sonar::clients

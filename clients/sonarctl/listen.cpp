@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/picture.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/source.hpp"
@@ -12,9 +13,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-/// Time left before the run or the silence is over, whichever comes first; short enough to notice Ctrl-C.
+/// Time until the end of the run or of the permitted silence; short enough to react to Ctrl-C.
 std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_s, double silent_s) {
   double left_s = options.source.silence_limit_s - silent_s;
   if (options.seconds > 0) left_s = std::min(left_s, options.seconds - elapsed_s);
@@ -27,21 +26,21 @@ class Listener {
       : options_(options),
         stream_(std::move(opened.stream)),
         asked_(stream_.is_blueview() ? std::nullopt : options.source.asked),
-        heard_(stream_.is_blueview()),
+        received_(stream_.is_blueview()),
         log_(asked_),
         start_(opened.connected_at) {}
 
-  /// Until the wished time or number of pings is over; a sentence when the device stops before.
+  /// Until the requested time or number of pings; an error when the device stops earlier.
   Result<void> run() {
     while (!finished()) {
       const PingStream::Item item = stream_.next(patience(options_, seconds_since(start_), seconds_since(last_message_)));
       if (item.what == Wait::closed) return failure(ErrorKind::io, closed_text(item.error));
       if (item.what == Wait::data) {
         last_message_ = Clock::now();
-        heard_ = true;
-        if (Result<void> taken = item.ping ? take_ping(*item.ping) : take(*item.other); !taken) return taken;
+        received_ = true;
+        if (Result<void> handled = item.ping ? handle_ping(*item.ping) : handle(*item.other); !handled) return handled;
       } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
-        return tl::unexpected(silence(options_.source, stream_.device(), heard_, "nothing more",
+        return tl::unexpected(silence(options_.source, stream_.device(), received_, "nothing more",
                                       "drivers give up after 10 s; is the daemon stopped or stuck?"));
       }
     }
@@ -49,7 +48,7 @@ class Listener {
   }
 
   PingSummary summary() const { return log_.summary(stream_.junk_bytes()); }
-  /// Settings were sent that pings echo.
+  /// True when settings were sent that pings echo.
   bool asked() const { return asked_.has_value(); }
   const std::optional<AnyPing>& last_ping() const { return last_ping_; }
   std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }
@@ -67,24 +66,24 @@ class Listener {
            " pings: it stopped, or another client holds it (clients.max)";
   }
 
-  Result<void> take(const oculus::Received& message) {
+  Result<void> handle(const oculus::Received& message) {
     if (std::holds_alternative<oculus::DummyMessage>(message)) log_.add_dummy();
     if (const auto* other = std::get_if<oculus::OtherMessage>(&message); other != nullptr && !options_.json)
       std::printf("other message, type 0x%04x, %zu bytes: %s\n", static_cast<unsigned>(other->header.type), other->size,
                   other->why.c_str());
     if (const auto* text = std::get_if<oculus::LogText>(&message); text != nullptr && !options_.json)
-      std::printf("device says: %s\n", text->text.c_str());
+      std::printf("message of the device: %s\n", text->text.c_str());
     return {};
   }
 
-  Result<void> take_ping(const AnyPing& ping) {
+  Result<void> handle_ping(const AnyPing& ping) {
     const double at_s = seconds_since(start_);
     if (!last_ping_) first_ping_after_s_ = first_ping_time();
     const PingReport report = log_.add(ping, at_s);
     last_ping_ = ping;
     if (options_.json && !options_.quiet) std::puts(json_from(ping, report, at_s).c_str());
     if (!options_.json && (!options_.quiet || !report.errors.empty())) std::puts(line_from(ping, report).c_str());
-    // As strict drivers do: ask again until the echo says that the settings took.
+    // As strict drivers: repeat the request until the echo matches it.
     const bool unsatisfied = !report.echo_mismatches.empty() && !log_.counts().echo_satisfied_at;
     return unsatisfied || options_.triggered ? stream_.ask_again() : Result<void>{};
   }
@@ -98,7 +97,7 @@ class Listener {
   const ListenOptions& options_;
   PingStream stream_;
   std::optional<oculus::FireRequest> asked_;
-  bool heard_;
+  bool received_;
   PingLog log_;
   Clock::time_point start_, last_message_ = Clock::now();
   std::optional<AnyPing> last_ping_;

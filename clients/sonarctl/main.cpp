@@ -1,4 +1,4 @@
-// sonarctl: what a sonar's user has at hand when something is unclear. The list of its commands, and errors to exit codes.
+// sonarctl: the tool for users of a sonar. Lists the commands and maps errors to exit codes.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <csignal>
@@ -23,7 +23,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", std::string("sonarctl " SONARD_VERSION));
   app.footer(
       "examples:\n"
-      "  sonarctl doctor                       is everything as a driver needs it?\n"
+      "  sonarctl doctor                       check everything that a driver needs\n"
       "  sonarctl view --png ping.png          one picture\n"
       "  sonarctl COMMAND --help               explains a command, with examples");
   const std::vector<std::pair<std::string, Run>> commands{
@@ -33,13 +33,11 @@ int run(int argc, char** argv) {
       {"step", add_step(app)},           {"load", add_load(app)},     {"object", add_object(app)},
       {"recording", add_recording(app)}, {"scene", add_scene(app)}};
   const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
-  const std::string complaint = text::complaint_about_words(app, words);
-  if (!complaint.empty()) return complain(complaint, ErrorKind::usage);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
-    return complain(text::complaint_about(app, error, words), ErrorKind::usage);
+    const std::string complaint = text::complaint_about(app, error, words);
+    return complaint.empty() ? app.exit(error) : complain(complaint, ErrorKind::usage);
   }
   for (const auto& [name, command] : commands) {
     if (!app.got_subcommand(name)) continue;

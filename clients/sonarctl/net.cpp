@@ -37,7 +37,7 @@ Result<Socket> open_socket(int type) {
   return socket;
 }
 
-/// Where nobody listens on a port of the ephemeral range, the system may choose that very port for our end: TCP then connects the
+/// When no program listens on a port of the ephemeral range, the system may choose that port for our end: TCP then connects the
 /// socket to itself.
 bool is_connected_to_itself(const Socket& socket) {
   sockaddr_in ours{}, theirs{};
@@ -79,7 +79,7 @@ Result<Endpoint> parse_endpoint(const std::string& text, const Endpoint& fallbac
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data() + colon + 1, end, endpoint.port);
   if (error != std::errc{} || stop != end || endpoint.port == 0)
-    return failure(ErrorKind::usage, "\"" + text + "\" is no address: write HOST:PORT with a port from 1 to 65535");
+    return failure(ErrorKind::usage, "\"" + text + "\" is not an address: write HOST:PORT with a port from 1 to 65535");
   return endpoint;
 }
 
@@ -139,7 +139,7 @@ Result<Socket> listen_udp(const Endpoint& at) {
   if (::bind(socket->fd(), (*place)->ai_addr, (*place)->ai_addrlen) != 0)
     return failure(ErrorKind::unavailable,
                    "cannot listen on udp " + std::to_string(at.port) + ": " + std::strerror(errno) +
-                       ". A driver that shares no ports may hold it: stop it, or give the address instead");
+                       ". A driver without address reuse may hold it: stop it, or give the address instead");
   return socket;
 }
 

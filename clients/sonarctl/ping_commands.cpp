@@ -1,4 +1,4 @@
-// listen, view and stats on the command line: what looks at pings.
+// Command lines of listen, view and stats, which examine pings.
 #include <CLI/CLI.hpp>
 #include <memory>
 
@@ -16,56 +16,49 @@ using text::whole_number;
 
 /// Options that belong to a source of pings; finish() turns their texts into a SourceOptions once the line is parsed.
 struct SourceArguments {
-  std::string address;
-  std::uint16_t port = 0;  // 0 = the usual ones
-  bool discover = false, as_it_is = false, observe = false, is_blueview = false;
+  DeviceArguments device;
+  bool as_it_is = false, observe = false, is_blueview = false;
   std::string control;
   std::filesystem::path token_file;
   std::string recording;
-  double patience_s = 2;
   FireArguments fire;
 
   void add_to(CLI::App& app, bool recordings) {
-    app.add_option("ADDRESS", address, "address of the sonar, HOST or HOST:PORT (default 127.0.0.2)")->check(clients::address());
-    app.add_option("--port", port,
-                   "TCP port of the sonar (default: 52100 of an Oculus or 14750 of a BlueView head, whichever answers)")
-        ->check(whole_number(1, 65535));
-    app.add_flag("--blueview", is_blueview, "a BlueView head is there; needed on other ports than 14750");
-    app.add_flag("--discover", discover, "take the address from the status broadcast on udp 52102");
-    app.add_option("--wait", patience_s, "seconds to go on trying to connect")->check(number(0))->capture_default_str();
+    device.add_to(app, "TCP port of the sonar (default: 52100 of an Oculus or 14750 of a BlueView head, the first that answers)");
+    app.add_flag("--blueview", is_blueview, "the sonar is a BlueView head; needed on ports other than 14750");
     if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
-    app.add_flag("--as-it-is", as_it_is, "send no settings, only look (many sonars then send no pings)");
+    app.add_flag("--as-it-is", as_it_is, "send no settings (many sonars then send no pings)");
     app.add_flag("--observe", observe,
-                 "receive the pings that clients ask for, without taking a client's place or sending settings");
-    app.add_option("--control", control, "HOST:PORT of sonard's control stream, which says where observers connect")
+                 "receive the pings that clients request, without occupying a client slot or sending settings");
+    app.add_option("--control", control, "HOST:PORT of sonard's control stream, which reports the address for observers")
         ->check(clients::address());
-    app.add_option("--token-file", token_file, "the daemon's control.token_file, when it has one");
+    app.add_option("--token-file", token_file, "the daemon's control.token_file, if it has one");
     fire.add_to(app);
   }
 
   Result<SourceOptions> finish() const {
     SourceOptions source;
-    Result<Endpoint> device = parse_endpoint(address, {"127.0.0.2", port});
-    if (!device) return tl::unexpected(device.error());
-    if (discover && is_blueview)
+    Result<Endpoint> at = parse_endpoint(device.address, {"127.0.0.2", device.port});
+    if (!at) return tl::unexpected(at.error());
+    if (device.discover && is_blueview)
       return failure(ErrorKind::usage,
                      "--discover finds Oculus sonars only: leave it out, and give the address of the BlueView head");
-    const bool any_port = device->port == 0;
-    if (any_port) device->port = is_blueview ? blueview::tcp_port : oculus::tcp_port;
+    const bool any_port = at->port == 0;
+    if (any_port) at->port = is_blueview ? blueview::tcp_port : oculus::tcp_port;
     source.kind = SonarKind::oculus;
-    if (is_blueview || device->port == blueview::tcp_port)
+    if (is_blueview || at->port == blueview::tcp_port)
       source.kind = SonarKind::blueview;
-    else if (any_port && !discover)
+    else if (any_port && !device.discover)
       source.kind = SonarKind::either;
-    source.device = *device;
-    source.discover = discover;
+    source.device = *at;
+    source.discover = device.discover;
     source.recording = recording;
-    source.connect_patience_s = patience_s;
+    source.connect_patience_s = device.patience_s;
     source.observe = observe;
     source.control = control;
     source.token_file = token_file;
     if (!as_it_is && recording.empty()) source.asked = fire.request();
-    if (!as_it_is) source.head = fire.head_wish();
+    if (!as_it_is) source.head = fire.head_request();
     return source;
   }
 };
@@ -99,8 +92,8 @@ Run add_listen(CLI::App& app) {
       "  sonarctl listen --seconds 60\n"
       "  sonarctl listen 127.0.0.3 --mode 1 --range 30 --beams 512 --pings 100 --quiet\n"
       "  sonarctl listen --discover --json | head\n"
-      "  sonarctl listen 127.0.0.3 --range 20          a BlueView head there is found by itself\n"
-      "exit code 0 only when every ping was sound and the settings were echoed as asked");
+      "  sonarctl listen 127.0.0.3 --range 20          detects a BlueView head at that address\n"
+      "exit code 0 only when every ping was valid and the settings were echoed as requested");
   struct Arguments {
     ListenOptions options;
     SourceArguments source;
@@ -110,9 +103,9 @@ Run add_listen(CLI::App& app) {
   ListenOptions& options = arguments->options;
   arguments->source.add_to(command, false);
   command.add_option("--seconds", options.seconds, "stop after this time")->check(number(0));
-  command.add_option("--pings", options.pings, "stop after so many pings")->check(whole_number());
-  command.add_flag("--json", options.json, "one JSON object a line, the last one a summary");
-  command.add_flag("--quiet", options.quiet, "only broken pings and the summary");
+  command.add_option("--pings", options.pings, "stop after this number of pings")->check(whole_number());
+  command.add_flag("--json", options.json, "one JSON object per line, the last one a summary");
+  command.add_flag("--quiet", options.quiet, "print only invalid pings and the summary");
   command.add_option("--record", options.record, "write the raw TCP bytes to this file");
   command.add_option("--png", options.png, "draw the last ping into this file");
   command.add_option("--started-at", options.started_at_unix_s, "UNIX time from which to count the time to the first ping")
@@ -151,8 +144,8 @@ Run add_view(CLI::App& app) {
   command.add_option("--png", options.png, "file to write");
   command.add_flag("--term", options.terminal, "draw in the terminal: half blocks, in colour where it has colours");
   command.add_flag("--ascii", arguments->ascii, "with --term: letters, no colours (default for files, pipes and NO_COLOR)");
-  command.add_flag("--live", options.live, "every ping, until Ctrl-C");
-  command.add_option("--pings", options.pings, "with --live: stop after so many pings")->check(whole_number());
+  command.add_flag("--live", options.live, "draw every ping, until Ctrl-C");
+  command.add_option("--pings", options.pings, "with --live: stop after this number of pings")->check(whole_number());
   command.add_option("--ping", options.ping, "which ping of a recording, from 0")->check(whole_number())->capture_default_str();
   arguments->style.add_to(command);
   return [arguments]() -> Result<void> {
@@ -169,7 +162,7 @@ Run add_view(CLI::App& app) {
 }
 
 Run add_stats(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand("stats", "figures of one ping's samples: speckle correlation, noise, shadow");
+  CLI::App& command = *app.add_subcommand("stats", "statistics of one ping's samples: speckle correlation, noise, shadow");
   command.footer(
       "examples:\n"
       "  sonarctl stats --rows 400:650\n"
@@ -183,7 +176,7 @@ Run add_stats(CLI::App& app) {
   StatsOptions& options = arguments->options;
   arguments->source.add_to(command, true);
   command.add_option("--ping", options.ping, "which ping of a recording, from 0")->check(whole_number())->capture_default_str();
-  command.add_option("--rows", options.window, "window of the speckle figures, ROW:ROW or ROW:ROW,BEAM:BEAM");
+  command.add_option("--rows", options.window, "window of the speckle statistics, ROW:ROW or ROW:ROW,BEAM:BEAM");
   CLI::Option* shadow = command.add_option("--shadow", options.shadow, "window in a shadow");
   command.add_option("--surroundings", options.surroundings, "window beside it")->needs(shadow);
   command.add_flag("--json", options.json, "one JSON object");

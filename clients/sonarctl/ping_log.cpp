@@ -28,7 +28,7 @@ PingReport PingLog::add(const AnyPing& any, Seconds at) {
   summary_.bytes += facts_of(any).message_size;
   const auto* ping = std::get_if<oculus::DecodedPing>(&any);
   summary_.of_head = ping == nullptr;
-  if (summary_.of_head) return report;  // judged when it was decoded
+  if (summary_.of_head) return report;  // checked when it was decoded
   report.errors = ping->violations;
   for (std::string& error : sequence_.add(*ping)) report.errors.push_back(std::move(error));
   summary_.identity_errors += report.errors.size();
@@ -69,8 +69,7 @@ std::vector<std::string> complaints(const PingSummary& summary, bool asked) {
   if (summary.identity_errors > 0)
     found.push_back(std::to_string(summary.identity_errors) + " broken identities: drivers would drop these pings");
   if (summary.junk_bytes > 0) found.push_back(std::to_string(summary.junk_bytes) + " bytes between messages that belong to none");
-  if (asked && summary.pings > 0 && !summary.echo_satisfied_at)
-    found.push_back("the echoed settings never became what was asked for");
+  if (asked && summary.pings > 0 && !summary.echo_satisfied_at) found.push_back("the echoed settings never matched the request");
   if (summary.echo_lost > 0)
     found.push_back("the echo was lost again in " + std::to_string(summary.echo_lost) + " pings: is another client connected?");
   return found;

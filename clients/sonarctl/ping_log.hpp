@@ -1,5 +1,5 @@
-// What a driver's user wants to know of a stream of pings: how many, how steady, how sound, and whether the settings took.
-// Pure bookkeeping: listen feeds it, prints its lines and exits by its verdict.
+// Statistics of a stream of pings: number, regularity, faults, and whether the settings took effect. Without I/O: listen feeds
+// it, prints its lines and derives its exit code from it.
 #pragma once
 
 #include <chrono>
@@ -16,14 +16,14 @@ namespace sonar::clients {
 using Seconds = double;
 
 struct PingReport {
-  std::vector<std::string> errors;           // identities and sequence; a sentence each
-  std::vector<std::string> echo_mismatches;  // settings that are not yet what was asked for
+  std::vector<std::string> errors;           // of identities and sequence
+  std::vector<std::string> echo_mismatches;  // settings that do not have the requested value yet
 };
 
 struct PingSummary {
   std::uint64_t pings = 0, bytes = 0, missing_ids = 0, identity_errors = 0, dummies = 0, junk_bytes = 0;
-  std::optional<std::uint64_t> echo_satisfied_at;  // number of the ping, from 1; nothing = never, or nothing was asked
-  bool of_head = false;  // a BlueView head: its numbers may skip, since other hosts ask for pings too, and nothing is echoed
+  std::optional<std::uint64_t> echo_satisfied_at;  // number of the ping, from 1; nullopt = never, or nothing was requested
+  bool of_head = false;         // a BlueView head: numbers may skip, since other hosts request pings too, and nothing is echoed
   std::uint64_t echo_lost = 0;  // pings after that one whose echo differed
   double rate_hz = 0;
   double interval_p50_ms = 0, interval_p99_ms = 0, interval_max_ms = 0;
@@ -46,13 +46,13 @@ class PingLog {
   std::vector<Seconds> arrivals_;
 };
 
-/// Value below which `share` (0..1) of the values lie; 0 for none. Takes its own copy to sort.
+/// Value below which `share` (0..1) of the values lie; 0 for none. Sorts a copy.
 double percentile(std::vector<double> values, double share);
 
-/// Sentences that say why the stream is not what a driver needs; empty = all is well.
+/// Faults of the stream for a driver; empty = none.
 std::vector<std::string> complaints(const PingSummary& summary, bool asked);
 
-std::string line_from(const AnyPing& ping, const PingReport& report);  // one line a ping
+std::string line_from(const AnyPing& ping, const PingReport& report);  // one line per ping
 std::string text_from(const PingSummary& summary, bool asked);
 std::string json_from(const AnyPing& ping, const PingReport& report, Seconds at);
 std::string json_from(const PingSummary& summary, bool asked);

@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <iterator>
+
+#include "core/text/ipv4.hpp"
 
 namespace sonar::clients {
 
 namespace {
 
-constexpr std::chrono::milliseconds answer_patience(3000);  // of a head, at least: it may be busy computing
+constexpr std::chrono::milliseconds answer_patience(3000);  // minimum for a head, which may be computing
 
 }  // namespace
 
@@ -34,14 +35,14 @@ Result<PingStream> PingStream::open(const Endpoint& device, SonarKind kind, Sett
 
 Result<void> PingStream::ask_again() { return asked_ ? write_all(socket_, oculus::make_fire(*asked_)) : Result<void>{}; }
 
-bool PingStream::is_turned_away(std::chrono::milliseconds patience) const {
+bool PingStream::is_rejected(std::chrono::milliseconds patience) const {
   return !blueview_ && ends_without_a_byte(socket_, patience);
 }
 
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (blueview_)
-    return failure(ErrorKind::usage, "only the bytes of Oculus sonars are recorded, and there is a BlueView head at " +
-                                         text_from(device_) + "; hosts record it with BVTSonar_CreateFile");
+    return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is a BlueView head at " + text_from(device_) +
+                                         "; hosts record it with BVTSonar_CreateFile");
   record_.open(file, std::ios::binary | std::ios::trunc);
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
   return {};
@@ -103,13 +104,10 @@ Result<Discovered> discover(std::chrono::milliseconds patience) {
       return failure(ErrorKind::unavailable, "no status datagram on udp " + std::to_string(oculus::status_port) +
                                                  ": is a sonar running, and does its status_to reach this machine?");
     const auto status = oculus::decode_status(std::span<const std::byte>(datagram).first(read.size));
-    if (!status) continue;  // somebody else's datagram
-    const auto& ip = status->ip_address;
-    char host[16];
-    std::snprintf(host, sizeof host, "%u.%u.%u.%u", unsigned{ip[0]}, unsigned{ip[1]}, unsigned{ip[2]}, unsigned{ip[3]});
+    if (!status) continue;  // not a status message
     Discovered found;
     found.status = *status;
-    found.device.host = host;
+    found.device.host = text::format_ipv4(status->ip_address);
     found.device.port = oculus::tcp_port;
     found.complaints = oculus::status_violations(*status, read.size);
     return found;

@@ -1,5 +1,5 @@
-// Where decoded pings come from: a device's TCP stream with our settings sent to it, a recording of one, and the status
-// datagrams that lead to a device. Both kinds of sonars. Shared by listen, view, stats and doctor.
+// Sources of decoded pings: the TCP stream of a device (after sending settings), a recording of one, and the status datagrams
+// that announce a device. Both kinds of sonars. Shared by listen, view, stats and doctor.
 #pragma once
 
 #include <chrono>
@@ -18,13 +18,13 @@
 
 namespace sonar::clients {
 
-/// What speaks at an address; either: an Oculus there, or a BlueView head at its own port, whichever answers.
+/// Kind of sonar at an address; either: an Oculus there or a BlueView head at its own port, the first that answers.
 enum class SonarKind { oculus, blueview, either };
 
-/// Settings to send, by what is met.
+/// Settings to send, by kind of sonar.
 struct Settings {
   std::optional<oculus::FireRequest> oculus;
-  HeadWish head;
+  HeadRequest head;
 };
 
 class PingStream {
@@ -38,13 +38,13 @@ class PingStream {
     std::optional<oculus::Received> other;  // or this
     std::string error;
   };
-  /// The next message, or what happened instead within `patience`.
+  /// The next message, or the event that replaced it within `patience`.
   Item next(std::chrono::milliseconds patience);
-  /// Sends the settings once more. Nothing to do for heads: they answered.
+  /// Sends the settings once more. No effect on heads, which have confirmed them.
   Result<void> ask_again();
-  /// The connection is ended before the first byte; known when that byte comes, and no later than `patience`. Never that of a
+  /// True when the sonar closes the connection before the first byte; waits for that byte, at most `patience`. Never true of a
   /// head, which has greeted.
-  bool is_turned_away(std::chrono::milliseconds patience) const;
+  bool is_rejected(std::chrono::milliseconds patience) const;
   /// Also writes every received byte to this file. usage: of a BlueView head.
   Result<void> record_to(const std::filesystem::path& file);
   std::uint64_t junk_bytes() const { return decoder_.skipped_bytes(); }
@@ -70,7 +70,7 @@ class PingStream {
 /// Every ping of a raw dump: messages back to back, exactly the bytes of the TCP stream.
 Result<std::vector<oculus::DecodedPing>> read_recording(const std::filesystem::path& file);
 
-/// Waits for the status broadcast of a device on UDP 52102; reports what real drivers would object to in `complaints`.
+/// Waits for the status broadcast of a device on UDP 52102; reports deviations that real drivers reject in `complaints`.
 struct Discovered {
   oculus::StatusMessage status;
   Endpoint device;

@@ -93,11 +93,11 @@ std::vector<std::byte> bytes_of(const std::string& text) {
 
 /// On a connected UDP socket a missing listener shows as a refusal after the first datagram.
 Result<void> send_datagram(const Socket& socket, const Endpoint& to, const std::vector<std::byte>& datagram) {
-  const tl::unexpected<Error> nobody =
-      failure(ErrorKind::unavailable, "nobody listens on udp " + text_from(to) + ": is sonard running with poses there? (--to)");
-  if (!write_all(socket, datagram)) return nobody;
+  const tl::unexpected<Error> no_listener = failure(
+      ErrorKind::unavailable, "no program listens on udp " + text_from(to) + ": is sonard running with poses there? (--to)");
+  if (!write_all(socket, datagram)) return no_listener;
   std::array<std::byte, 16> nothing;
-  if (read_some(socket, nothing, std::chrono::milliseconds(5)).what == Wait::closed) return nobody;
+  if (read_some(socket, nothing, std::chrono::milliseconds(5)).what == Wait::closed) return no_listener;
   return {};
 }
 

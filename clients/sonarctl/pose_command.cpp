@@ -16,7 +16,7 @@ using text::number;
 void add_pose_options(CLI::App& command, PoseOptions& options) {
   command.add_option("--to", options.to, "HOST:PORT of sonard (default 127.0.0.1:14770, with --json :14771)")->check(address());
   command.add_flag("--json", options.json, "send JSON lines with ArduPilot's keys, not protobuf");
-  command.add_flag("--confirm", options.confirm, "use the TCP control stream and have each pose answered");
+  command.add_flag("--confirm", options.confirm, "use the TCP control stream; sonard confirms each pose");
   command.add_option("--token-file", options.token_file, "with --confirm or --object: the daemon's control.token_file");
   add_frame_option(command, options.frame, "of the arguments and of what is sent: enu (FLU body) or ned (FRD body)");
   command.add_option("--vehicle", options.vehicle, "name of the vehicle, if there are several");
@@ -32,7 +32,7 @@ void add_triple(CLI::App& command, const std::string& name, std::vector<double>&
 }  // namespace
 
 Run add_pose(CLI::App& app) {
-  CLI::App& pose = *app.add_subcommand("pose", "tell sonard where a vehicle or an object is");
+  CLI::App& pose = *app.add_subcommand("pose", "send poses of a vehicle or an object to sonard");
   pose.require_subcommand(1);
   pose.footer(
       "examples:\n"
@@ -42,15 +42,15 @@ Run add_pose(CLI::App& app) {
       "  sonarctl pose line --from 0,-8,-4 --to-point 0,8,-4 --speed 0.5 --object diver");
   const auto options = std::make_shared<PoseOptions>();
 
-  CLI::App& once = *pose.add_subcommand("once", "one place; repeated with --seconds");
+  CLI::App& once = *pose.add_subcommand("once", "one pose; repeated with --seconds");
   add_triple(once, "--xyz", options->position_m, "position, m");
   add_triple(once, "--rpy", options->rpy_deg, "roll, pitch, yaw in degrees, intrinsic Z-Y-X");
   once.callback([options] { options->path = PoseOptions::Path::once; });
 
-  CLI::App& circle = *pose.add_subcommand("circle", "round a centre, looking at it");
+  CLI::App& circle = *pose.add_subcommand("circle", "circle round a centre, looking at it");
   add_triple(circle, "--centre", options->centre_m, "m");
   circle.add_option("--radius", options->radius_m, "m")->check(number(0.0, 1e6))->capture_default_str();
-  circle.add_option("--period", options->period_s, "seconds a turn; negative = clockwise")
+  circle.add_option("--period", options->period_s, "seconds per turn; negative = clockwise")
       ->check(number())
       ->capture_default_str();
   circle.add_option("--pitch", options->pitch_deg, "degrees, bow up positive")->check(number(-90.0, 90.0));

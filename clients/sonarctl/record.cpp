@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/record_files.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "protocol/oculus/decode.hpp"
@@ -19,14 +20,12 @@ namespace {
 using namespace std::chrono_literals;
 using recording::Carrier;
 using recording::Origin;
-using recording::Piece;
+using recording::RecordedMessage;
 using Steady = std::chrono::steady_clock;
 
 constexpr int most_status_at_once = 32;
 
-double seconds_since(Steady::time_point start) { return std::chrono::duration<double>(Steady::now() - start).count(); }
-
-/// UNIX time that never goes back, whoever sets the clock.
+/// UNIX time that never decreases when the clock is set.
 class Stamps {
  public:
   Time now() const { return began_ + std::chrono::duration_cast<std::chrono::nanoseconds>(Steady::now() - started_); }
@@ -43,14 +42,14 @@ recording::PcapConversation conversation_of(const Socket& socket) {
   recording::PcapConversation conversation;
   sockaddr_in here{}, there{};
   socklen_t here_size = sizeof here, there_size = sizeof there;
-  // The casts are the sockets interface's own.
+  // The socket API requires these casts.
   if (::getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&here), &here_size) == 0) conversation.client = end_from(here);
   if (::getpeername(socket.fd(), reinterpret_cast<sockaddr*>(&there), &there_size) == 0) conversation.device = end_from(there);
   conversation.status_from.address = conversation.device.address;
   return conversation;
 }
 
-/// The sonard that serves the device: what it calls the sonar, and a subscription to its pings.
+/// The sonard that serves the device: name of the sonar and a subscription to its pings.
 struct Steering {
   ControlClient client;
   std::string sonar;
@@ -62,15 +61,15 @@ Result<Steering> ask_sonard(const ControlOptions& options, const Endpoint& devic
   if (!status) return tl::unexpected(status.error());
   for (const control::SonarStatus& sonar : status->sonars) {
     if (sonar.listens != text_from(device) && sonar.advertised != device.host) continue;
-    control::Subscribe wish;
-    wish.pings = true;
-    if (auto answer = client->request(wish); !answer) return tl::unexpected(answer.error());
+    control::Subscribe subscription;
+    subscription.pings = true;
+    if (auto answer = client->request(subscription); !answer) return tl::unexpected(answer.error());
     return Steering{std::move(*client), sonar.name};
   }
   return failure(ErrorKind::usage, "the sonard at " + text_from(client->at()) + " serves no sonar at " + text_from(device));
 }
 
-/// Records one device until it is enough.
+/// Records one device up to its limits.
 class Recorder {
  public:
   Recorder(const RecordOptions& options, Socket socket, std::optional<Socket> status, std::optional<Steering> steering,
@@ -95,7 +94,7 @@ class Recorder {
                                           : "the connection broke: " + read.error);
       if (read.what == Wait::data) {
         last_byte_ = Steady::now();
-        if (Result<void> taken = take(std::span<const std::byte>(chunk_).first(read.size)); !taken) return taken;
+        if (Result<void> stored = store(std::span<const std::byte>(chunk_).first(read.size)); !stored) return stored;
       } else if (seconds_since(last_byte_) >= options_.source.silence_limit_s) {
         return failure(ErrorKind::io, "not a byte from the device for " +
                                           std::to_string(std::lround(options_.source.silence_limit_s)) +
@@ -123,22 +122,22 @@ class Recorder {
     return files_.write({stamps_.now(), Origin::client, Carrier::stream, fire});
   }
 
-  Result<void> take(std::span<const std::byte> bytes) {
+  Result<void> store(std::span<const std::byte> bytes) {
     splitter_.append(stamps_.now(), bytes);
-    while (const auto piece = splitter_.next()) {
+    while (const auto message = splitter_.next()) {
       if (enough()) return {};
       const std::uint64_t pings = files_.pings();
-      if (Result<void> written = files_.write(*piece); !written) return written;
-      if (piece->bytes.size() >= oculus::header_size) device_id_ = oculus::header_of(piece->bytes).source;
+      if (Result<void> written = files_.write(*message); !written) return written;
+      if (message->bytes.size() >= oculus::header_size) device_id_ = oculus::header_of(message->bytes).source;
       if (options_.triggered && files_.pings() > pings)
         if (Result<void> asked = ask(); !asked) return asked;
     }
     return {};
   }
 
-  /// Broadcasts of this device; others pass by. A flood of them must not keep the sonar's bytes waiting.
+  /// Records the broadcasts of this device, a bounded number at a time so that a flood does not delay the sonar's bytes.
   Result<void> take_status() {
-    for (int taken = 0; status_ && taken < most_status_at_once; ++taken) {
+    for (int stored = 0; status_ && stored < most_status_at_once; ++stored) {
       std::array<std::byte, 2048> datagram;
       const Read read = read_some(*status_, datagram, 0ms);
       if (read.what != Wait::data) return {};
@@ -159,7 +158,7 @@ class Recorder {
     while (steering_) {
       const auto event = steering_->client.next_event(0ms);
       if (!event) {
-        std::fprintf(stderr, "sonarctl: no more poses: %s\n", event.error().text.c_str());
+        std::fprintf(stderr, "sonarctl: poses are no longer recorded: %s\n", event.error().text.c_str());
         steering_.reset();
         return {};
       }
@@ -230,20 +229,20 @@ Time made_up_time(std::uint64_t number) { return Time(number * 100ms); }
 Result<void> convert(const RecordOptions& options) {
   auto opened = recording::open_recording(options.source.recording, options.sonar);
   if (!opened) return tl::unexpected(opened.error());
-  recording::PieceReader& reader = *opened->reader;
+  recording::RecordingReader& reader = *opened->reader;
   auto files = RecordFiles::create(options, {}, options.sonar.empty() ? "sonar" : options.sonar);
   if (!files) return tl::unexpected(files.error());
   Result<void> written;
   std::optional<Time> first;
   Time last{};
   while (written && interrupted == 0 && (options.pings == 0 || files->pings() < options.pings)) {
-    auto piece = reader.next();
-    if (!piece) break;
-    if (!reader.knows_times()) piece->at = made_up_time(files->messages());
-    if (!first) first = last = piece->at;
-    last = piece->at = std::max(last, piece->at);
+    auto message = reader.next();
+    if (!message) break;
+    if (!reader.knows_times()) message->at = made_up_time(files->messages());
+    if (!first) first = last = message->at;
+    last = message->at = std::max(last, message->at);
     if (options.seconds > 0 && seconds(last - *first) > options.seconds) break;
-    written = files->write(*piece);
+    written = files->write(*message);
   }
   const Result<void> closed = files->close();
   report(*files, seconds(last - first.value_or(last)));

@@ -1,4 +1,4 @@
-// sonarctl record: the vendor's bytes of a sonar into files, as its client, or out of one recording into others.
+// sonarctl record: writes the vendor's bytes of a sonar into files, as its client, or converts a recording.
 #pragma once
 
 #include <filesystem>
@@ -16,12 +16,12 @@ struct RecordOptions {
   std::filesystem::path pcap, mcap, oculus, raw;  // at least one
   double seconds = 0;                             // 0 = no limit
   std::uint64_t pings = 0;                        // 0 = no limit
-  bool status = true;                             // listen for the device's status datagrams, too
+  bool status = true;                             // also record the status datagrams of the device
   Endpoint status_on{"0.0.0.0", 52102};           // where
-  std::string sonar;                              // which of a recording's
+  std::string sonar;                              // selects one of a recording
   std::optional<ControlOptions> control;          // ask this sonard for the sonar's name and poses, for the MCAP file
 };
-/// Ends well by the limits, by Ctrl-C, or at the end of a recording. However it ends, what was recorded is in the files.
+/// Succeeds at its limits, on Ctrl-C and at the end of a recording. In every case the files hold what was recorded.
 Result<void> record(const RecordOptions& options);
 
 }  // namespace sonar::clients

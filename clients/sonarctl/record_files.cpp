@@ -33,13 +33,13 @@ Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const reco
   return files;
 }
 
-Result<void> RecordFiles::write(const recording::Piece& piece) {
+Result<void> RecordFiles::write(const recording::RecordedMessage& message) {
   for (const auto& writer : writers_)
-    if (Result<void> written = writer->write(piece); !written) return written;
+    if (Result<void> written = writer->write(message); !written) return written;
   ++messages_;
-  bytes_ += piece.bytes.size();
-  const bool ping = piece.from == recording::Origin::device && piece.bytes.size() >= oculus::header_size &&
-                    oculus::header_of(piece.bytes).type == oculus::MessageType::ping_result;
+  bytes_ += message.bytes.size();
+  const bool ping = message.from == recording::Origin::device && message.bytes.size() >= oculus::header_size &&
+                    oculus::header_of(message.bytes).type == oculus::MessageType::ping_result;
   pings_ += ping ? 1 : 0;
   return {};
 }

@@ -12,15 +12,15 @@ namespace sonar::clients {
 
 class RecordFiles {
  public:
-  /// Makes all files that the options name. io.
+  /// Creates all files that the options name. io.
   static Result<RecordFiles> create(const RecordOptions& options, const recording::PcapConversation& conversation,
                                     const std::string& sonar);
 
-  /// To every file; the first that fails ends them all. io.
-  Result<void> write(const recording::Piece& piece);
-  /// To the MCAP file, where there is one.
+  /// Writes to every file; the first failure ends all. io.
+  Result<void> write(const recording::RecordedMessage& message);
+  /// Writes to the MCAP file, if any.
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
-  /// Finishes every file, also after a failure. io, the first.
+  /// Finishes every file, also after a failure; returns the first error. io.
   Result<void> close();
 
   std::uint64_t pings() const { return pings_; }
@@ -31,7 +31,7 @@ class RecordFiles {
   std::string sizes() const;
 
  private:
-  std::vector<std::unique_ptr<recording::PieceWriter>> writers_;
+  std::vector<std::unique_ptr<recording::RecordingWriter>> writers_;
   std::vector<std::filesystem::path> paths_;
   recording::McapSession* mcap_ = nullptr;  // one of the writers
   std::uint64_t pings_ = 0, messages_ = 0, bytes_ = 0;

@@ -1,4 +1,4 @@
-// `sonarctl scene check|info|import` on the command line; what they do is in clients/scene_tools.
+// `sonarctl scene check|info|import` on the command line; implemented in clients/scene_tools.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@ class App;
 
 namespace sonar::clients {
 
-/// Adds its options; the answer does what was asked for.
+/// Adds its options; returns the function that executes the command.
 std::function<Result<void>()> add_scene(CLI::App& app);
 
 }  // namespace sonar::clients

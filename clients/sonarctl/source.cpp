@@ -14,7 +14,7 @@ namespace {
 
 /// Pings that may still be under way with older settings when ours arrive.
 constexpr int stale_pings = 4;
-constexpr std::chrono::milliseconds first_byte_within{500};  // who has no place for us says so at once
+constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without a free slot closes at once
 
 Result<AnyPing> fetch_recorded(const SourceOptions& source, std::size_t number) {
   auto pings = read_recording(source.recording);
@@ -25,9 +25,9 @@ Result<AnyPing> fetch_recorded(const SourceOptions& source, std::size_t number) 
 }
 
 constexpr const char* heads_have_no_observers =
-    "only Oculus sonars have observers; a BlueView head has places for several hosts: leave out --observe";
+    "only Oculus sonars have observers; a BlueView head serves several hosts: leave out --observe";
 
-/// Where its sonard lets observers connect.
+/// The address for observers, as reported by the sonard that serves the device.
 Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& device) {
   auto control = ControlClient::open({source.control, source.token_file});
   if (!control) return tl::unexpected(control.error());
@@ -38,8 +38,7 @@ Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& devic
     if (s.listens != text_from(device) && s.advertised + port != text_from(device) &&
         s.listens != std::string("0.0.0.0").append(port))
       continue;
-    if (s.observers.empty())
-      return failure(ErrorKind::unavailable, "this sonar has no places for observers (observers.max is 0)");
+    if (s.observers.empty()) return failure(ErrorKind::unavailable, "this sonar accepts no observers (observers.max is 0)");
     auto at = parse_endpoint(s.observers, device);
     if (at) at->host = device.host;
     return at;
@@ -58,9 +57,9 @@ Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device
   auto stream = PingStream::open(*at, SonarKind::oculus, {}, milliseconds_from(source.connect_patience_s));
   if (!stream) return tl::unexpected(stream.error());
   const auto now = std::chrono::steady_clock::now();
-  if (stream->is_turned_away(first_byte_within))
+  if (stream->is_rejected(first_byte_within))
     return failure(ErrorKind::io,
-                   "tcp " + text_from(*at) + " closed the connection: all places for observers are taken (observers.max)");
+                   "tcp " + text_from(*at) + " closed the connection: all observer slots are taken (observers.max)");
   std::fprintf(stderr,
                "sonarctl: connected to %s as an observer: no settings are sent, pings have the settings of the sonar's clients\n",
                text_from(*at).c_str());
@@ -76,28 +75,29 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
   PingStream* const stream = &opened->stream;
   if (opened->observes) source.asked.reset();
   const auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
-  bool heard = stream->is_blueview();  // it greeted
+  bool received = stream->is_blueview();  // it greeted
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
     PingStream::Item item = stream->next(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(500)));
     if (item.what == Wait::closed)
-      return failure(ErrorKind::io, item.error.empty() || !stream->is_blueview()
-                                        ? "the device closed the connection before a ping came: another client may hold it "
-                                          "(clients.max)"
-                                        : "no ping came: " + item.error);
+      return failure(ErrorKind::io,
+                     item.error.empty() || !stream->is_blueview()
+                         ? "the device closed the connection before a ping arrived: another client may be connected "
+                           "(clients.max)"
+                         : "no ping arrived: " + item.error);
     if (item.what != Wait::data && left.count() <= 0) {
       const char* const hint = stream->is_blueview() ? "is the daemon's clock stopped (clock), or the daemon stuck?"
-                               : opened->observes    ? "the sonar has no client that asks for pings"
+                               : opened->observes    ? "the sonar has no client that requests pings"
                                                      : "is the sonar in standby?";
-      return tl::unexpected(silence(source, *device, heard, "no ping", hint));
+      return tl::unexpected(silence(source, *device, received, "no ping", hint));
     }
-    heard = heard || item.what == Wait::data;
+    received = received || item.what == Wait::data;
     if (!item.ping) continue;
     const auto* ping = std::get_if<oculus::DecodedPing>(&*item.ping);
     const bool as_asked = ping == nullptr || !source.asked || oculus::echo_violations(*source.asked, *ping).empty();
     if (as_asked || ++stale > stale_pings) return *std::move(item.ping);
   }
-  return failure(ErrorKind::io, "interrupted before a ping came");
+  return failure(ErrorKind::io, "interrupted before a ping arrived");
 }
 
 }  // namespace
@@ -107,24 +107,25 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
   auto stream = PingStream::open(device, source.kind, {source.asked, source.head}, milliseconds_from(source.connect_patience_s));
   if (!stream) return tl::unexpected(stream.error());
   const auto now = std::chrono::steady_clock::now();
-  if (!stream->is_turned_away(first_byte_within)) return OpenedStream{*std::move(stream), now};
+  if (!stream->is_rejected(first_byte_within)) return OpenedStream{*std::move(stream), now};
   auto observed = observe(source, device);
   if (observed) return observed;
   return failure(ErrorKind::io,
-                 "the device closed the connection before a ping came: another client may hold it (clients.max); "
+                 "the device closed the connection before a ping arrived: another client may be connected (clients.max); "
                  "connecting as an observer failed too: " +
                      observed.error().text);
 }
 
 std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::milliseconds(static_cast<std::int64_t>(s * 1000)); }
 
-Error silence(const SourceOptions& source, const Endpoint& device, bool heard, const std::string& what, const std::string& hint) {
+Error silence(const SourceOptions& source, const Endpoint& device, bool received, const std::string& what,
+              const std::string& hint) {
   const std::string limit = text::format("%g s", source.silence_limit_s);
-  if (heard) return {ErrorKind::io, what + " came within " + limit + ": " + hint};
-  return {ErrorKind::unavailable, "not one Oculus message came from tcp " + text_from(device) + " within " + limit +
-                                      ": is that an Oculus sonar?" +
-                                      (source.asked ? "" : " Some send nothing before settings come (--as-it-is sends none).") +
-                                      " sonard's banner names the address of each sonar"};
+  if (received) return {ErrorKind::io, what + " arrived within " + limit + ": " + hint};
+  return {ErrorKind::unavailable,
+          "no Oculus message arrived from tcp " + text_from(device) + " within " + limit + ": is it an Oculus sonar?" +
+              (source.asked ? "" : " Some sonars send nothing before they receive settings (--as-it-is sends none).") +
+              " sonard's banner names the address of each sonar"};
 }
 
 Result<Endpoint> find_device(const SourceOptions& source, bool say) {

@@ -13,7 +13,7 @@ namespace {
 /// Codes from which on a sample is saturated: an Oculus of 8 bits stops at 254.
 float saturation_of(const PingFacts& ping) { return ping.bits == 8 ? 254.0f : std::ldexp(1.0f, static_cast<int>(ping.bits)) - 1; }
 
-nlohmann::json speckle_figures(const PolarImage& image, const Window& w, float saturation) {
+nlohmann::json speckle_stats(const PolarImage& image, const Window& w, float saturation) {
   return {
       {"rows", {w.row_begin, w.row_end}},
       {"beams", {w.beam_begin, w.beam_end}},
@@ -25,7 +25,7 @@ nlohmann::json speckle_figures(const PolarImage& image, const Window& w, float s
 }
 
 /// The near field ends at the first echo; its first eight rows are the transmit leak.
-nlohmann::json range_figures(const PolarImage& image) {
+nlohmann::json range_stats(const PolarImage& image) {
   const std::size_t echo = first_echo_row(image), leak = std::min<std::size_t>(8, image.rows);
   const std::size_t tail = image.rows > 50 ? image.rows - 50 : 0;
   return {{"first_echo_row", echo},
@@ -34,8 +34,8 @@ nlohmann::json range_figures(const PolarImage& image) {
           {"mean_of_each_50_rows", block_means(image, 50)}};
 }
 
-void print_plain(const nlohmann::json& figures, const std::string& prefix) {
-  for (const auto& [name, value] : figures.items()) {
+void print_plain(const nlohmann::json& stats, const std::string& prefix) {
+  for (const auto& [name, value] : stats.items()) {
     if (value.is_object()) {
       print_plain(value, prefix + name + ".");
       continue;
@@ -56,19 +56,19 @@ Result<void> stats(const StatsOptions& options) {
   if (!image) return tl::unexpected(image.error());
   const Result<Window> window = parse_window(options.window, *image);
   if (!window) return tl::unexpected(window.error());
-  nlohmann::json figures{{"window", speckle_figures(*image, *window, saturation_of(facts_of(*ping)))},
-                         {"range", range_figures(*image)}};
+  nlohmann::json stats{{"window", speckle_stats(*image, *window, saturation_of(facts_of(*ping)))},
+                       {"range", range_stats(*image)}};
   if (!options.shadow.empty()) {
     const Result<Window> shadow = parse_window(options.shadow, *image), around = parse_window(options.surroundings, *image);
     if (!shadow) return tl::unexpected(shadow.error());
     if (!around) return tl::unexpected(around.error());
     const double dark = mean(*image, *shadow), bright = mean(*image, *around);
-    figures["shadow"] = {{"mean", dark}, {"surroundings_mean", bright}, {"ratio", bright > 0 ? dark / bright : 0.0}};
+    stats["shadow"] = {{"mean", dark}, {"surroundings_mean", bright}, {"ratio", bright > 0 ? dark / bright : 0.0}};
   }
   if (options.json) {
-    std::puts(figures.dump().c_str());
+    std::puts(stats.dump().c_str());
   } else {
-    print_plain(figures, "");
+    print_plain(stats, "");
   }
   return {};
 }

@@ -38,7 +38,7 @@ TerminalColours choose_colours(const TerminalFacts& facts) {
   const std::string term = facts.variable("TERM").value_or("");
   if (!facts.is_terminal || !facts.variable("NO_COLOR").value_or("").empty() || term.empty() || term == "dumb")
     return TerminalColours::none;
-  for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"}) {  // the first that is set counts
+  for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"}) {  // the first one set applies
     const std::string locale = facts.variable(name).value_or("");
     if (locale.empty()) continue;
     if (!says_utf8(locale)) return TerminalColours::none;
@@ -61,7 +61,7 @@ TerminalSize terminal_size() {
 
 LiveScreen::LiveScreen(bool is_terminal) : is_terminal_(is_terminal) {
   if (!is_terminal_) return;
-  std::fputs("\x1b[?1049h\x1b[?25l\x1b[2J", stdout);  // the other screen, no cursor, empty
+  std::fputs("\x1b[?1049h\x1b[?25l\x1b[2J", stdout);  // alternate screen, no cursor, cleared
   std::fflush(stdout);
 }
 
@@ -75,7 +75,7 @@ bool LiveScreen::show(const std::vector<std::string>& lines) const {
   std::string text = is_terminal_ ? "\x1b[H" : "";
   for (const std::string& line : lines) {
     if (is_terminal_ && &line != &lines.front()) text += "\r\n";
-    text += line + (is_terminal_ ? "\x1b[K" : "\n");  // to the end of the line nothing of the last picture stays
+    text += line + (is_terminal_ ? "\x1b[K" : "\n");  // erases the rest of the previous line
   }
   if (is_terminal_) text += "\x1b[J";
   std::fputs(text.c_str(), stdout);

@@ -1,4 +1,4 @@
-// Where a vehicle on a simple path is at a time: world ENU, body FLU. Sent by `sonarctl pose`.
+// Pose of a vehicle on a simple path over time: world ENU, body FLU. Sent by `sonarctl pose`.
 #pragma once
 
 #include "core/base/geometry.hpp"
@@ -12,7 +12,7 @@ struct Moment {
 
 struct Circle {
   Vec3d centre_m;
-  double radius_m = 5, period_s = 60, pitch_rad = 0;  // pitch: bow up positive; period below 0 turns the other way
+  double radius_m = 5, period_s = 60, pitch_rad = 0;  // pitch: bow up positive; negative period = clockwise
   bool look_inwards = true;                           // else along the path
 };
 /// Anticlockwise seen from above, starting east of the centre.

@@ -3,7 +3,7 @@
 #include "clients/sonarctl/picture.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/terminal.hpp"
-#include "clients/sonarctl/view_figures.hpp"
+#include "clients/sonarctl/view_caption.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -13,8 +13,7 @@ using Clock = std::chrono::steady_clock;
 double now_s() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
 
 Result<void> check(const ViewOptions& o) {
-  if (o.png.empty() && !o.terminal)
-    return failure(ErrorKind::usage, "say where the picture goes: --png FILE, or --term for the terminal");
+  if (o.png.empty() && !o.terminal) return failure(ErrorKind::usage, "choose an output: --png FILE, or --term for the terminal");
   if (o.live && !o.source.recording.empty())
     return failure(ErrorKind::usage, "--live is for devices; of a recording, choose a ping with --ping");
   if (o.pings > 0 && !o.live) return failure(ErrorKind::usage, "--pings goes with --live");
@@ -55,9 +54,9 @@ Result<void> view_one(const ViewOptions& options) {
   const auto lines = lines_of(options, *image, 2);
   if (!lines) return tl::unexpected(lines.error());
   for (const std::string& line : *lines) std::puts(line.c_str());
-  ViewFigures figures;
-  figures.add(*ping, 0);
-  std::puts(figures.text().c_str());
+  ViewCaption caption;
+  caption.add(*ping, 0);
+  std::puts(caption.text().c_str());
   return {};
 }
 
@@ -65,21 +64,21 @@ class LiveView {
  public:
   LiveView(const ViewOptions& options, PingStream stream) : options_(options), stream_(std::move(stream)) {}
 
-  /// Ends well when interrupted, when enough pings were seen, or when nobody reads the output any more.
+  /// Succeeds when interrupted, after the requested pings, or when the output was closed.
   Result<void> run() {
     const LiveScreen screen(options_.terminal && terminal_facts().is_terminal);
     double heard_s = now_s();
-    bool heard = stream_.is_blueview();  // it greeted
+    bool received = stream_.is_blueview();  // it greeted
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
       PingStream::Item item = stream_.next(std::chrono::milliseconds(500));
       if (item.what == Wait::closed)
         return failure(ErrorKind::io, "the device ended the connection" + (item.error.empty() ? "" : ": " + item.error) +
                                           "; it stopped, or another client holds it (clients.max)");
       if (item.what == Wait::data) heard_s = now_s();
-      heard = heard || item.what == Wait::data;
+      received = received || item.what == Wait::data;
       if (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s)
         return tl::unexpected(
-            silence(options_.source, stream_.device(), heard, "nothing more", "is the daemon stopped or stuck?"));
+            silence(options_.source, stream_.device(), received, "nothing more", "is the daemon stopped or stuck?"));
       if (!item.ping) continue;
       const Result<bool> read = show(*item.ping, screen);
       if (!read) return tl::unexpected(read.error());
@@ -89,7 +88,7 @@ class LiveView {
   }
 
  private:
-  /// False when nobody reads.
+  /// False when the output was closed.
   Result<bool> show(const AnyPing& ping, const LiveScreen& screen) {
     figures_.add(ping, now_s());
     const Result<PolarImage> image = picture_of(ping);
@@ -97,7 +96,7 @@ class LiveView {
     if (!options_.png.empty())
       if (const Result<Raster> fan = write_picture(options_, *image); !fan) return tl::unexpected(fan.error());
     if (!options_.terminal) {
-      const bool overwrites = terminal_facts().is_terminal;  // one line that changes, or one line a ping
+      const bool overwrites = terminal_facts().is_terminal;  // one line that changes, or one line per ping
       std::printf(overwrites ? "\r\x1b[K%s  %s" : "%s  %s\n", options_.png.c_str(), figures_.text().c_str());
       return std::fflush(stdout) == 0;
     }
@@ -109,7 +108,7 @@ class LiveView {
 
   const ViewOptions& options_;
   PingStream stream_;
-  ViewFigures figures_;
+  ViewCaption figures_;
 };
 
 Result<void> view_live(const ViewOptions& options) {

@@ -514,7 +514,7 @@ function oculus.dissector(tvb, pinfo, tree)
 end
 
 function oculus_status.dissector(tvb, pinfo, tree)
-  if tvb:len() < HEADER or tvb(0, 2):le_uint() ~= 0x4F53 then return 0 end  -- somebody else's datagram
+  if tvb:len() < HEADER or tvb(0, 2):le_uint() ~= 0x4F53 then return 0 end  -- not an Oculus datagram
   dissect_message(tvb, pinfo, tree, tvb:reported_len())
   return tvb:len()
 end

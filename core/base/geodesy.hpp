@@ -11,6 +11,7 @@ namespace sonar {
 struct Geodetic {
   double latitude_rad = 0, longitude_rad = 0;
   double altitude_m = 0;  // above the ellipsoid; any other level serves as long as all places are given above the same one
+  bool operator==(const Geodetic&) const = default;
 };
 
 inline constexpr double earth_semi_major_m = 6378137.0;        // WGS84 (NIMA TR8350.2, table 3.1)

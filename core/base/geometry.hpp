@@ -1,4 +1,4 @@
-// Vectors, quaternions and poses of the whole house: plain structs, shared with device code.
+// Vectors, quaternions and poses of all modules: plain structs, shared with device code.
 // World is ENU (z up), body and sonar are FLU (x ahead, y to port, z up); quaternions are Hamilton, body to world.
 // C++17-clean on purpose: nvcc reads it too.
 #pragma once
@@ -36,6 +36,14 @@ inline constexpr double pi = 3.14159265358979323846;
 SONAR_HD constexpr double rad_from_deg(double deg) { return deg * (pi / 180.0); }
 SONAR_HD constexpr double deg_from_rad(double rad) { return rad * (180.0 / pi); }
 
+// By hand: C++17 has no defaulted comparison.
+SONAR_HD constexpr bool operator==(Vec3 a, Vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+SONAR_HD constexpr bool operator==(Vec3d a, Vec3d b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+SONAR_HD constexpr bool operator==(Quatd a, Quatd b) { return a.w == b.w && a.x == b.x && a.y == b.y && a.z == b.z; }
+SONAR_HD constexpr bool operator==(const Pose& a, const Pose& b) {
+  return a.position_m == b.position_m && a.orientation == b.orientation;
+}
+
 SONAR_HD constexpr Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 SONAR_HD constexpr Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 SONAR_HD constexpr Vec3 operator*(float s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
@@ -49,6 +57,11 @@ SONAR_HD constexpr Vec3d operator*(double s, Vec3d a) { return {s * a.x, s * a.y
 SONAR_HD constexpr double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 SONAR_HD constexpr Vec3d cross(Vec3d a, Vec3d b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 SONAR_HD inline double length(Vec3d a) { return std::sqrt(dot(a, a)); }
+/// The zero vector stays zero.
+SONAR_HD inline Vec3d unit_vector(Vec3d a) {
+  const double l = length(a);
+  return l > 0 ? (1 / l) * a : a;
+}
 
 SONAR_HD constexpr Vec3d to_double(Vec3 a) { return {a.x, a.y, a.z}; }
 SONAR_HD constexpr Vec3 to_float(Vec3d a) { return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)}; }

@@ -1,4 +1,4 @@
-// Marks functions that run on the host and on a CUDA device alike. Floor 0: everything may include it.
+// Marks functions that run on the host and on a CUDA device alike. Every module may include it.
 #pragma once
 
 #if defined(__CUDACC__)

@@ -12,13 +12,13 @@
 namespace sonar {
 
 /// The least of /proc/meminfo (available and swap) and every control group above us, version 2 or 1, less what is used of it;
-/// file cache that can be given back counts as free. Nothing when none of them says.
+/// file cache that can be given back counts as free. Nothing when none of them is known.
 std::optional<std::uint64_t> memory_left_bytes();
 
 /// Refused, as unavailable, when `what` needs more than is left, a tenth of it kept back. `bytes` is an estimate of its peak.
 Result<void> check_memory_for(const std::string& what, std::uint64_t bytes);
 
-/// Where proc/ and sys/ lie: "/", and another folder in tests, which set it before any thread asks.
+/// Where proc/ and sys/ lie: "/", and another folder in tests, which set it before other threads start.
 std::filesystem::path& memory_root();
 
 }  // namespace sonar

@@ -28,7 +28,7 @@ struct Parallel::Pool {
   std::exception_ptr fault;  // the first of a round
 
   /// In a worker an exception would end the whole program: out of memory in one ping must cost that ping only.
-  void take_items(int worker) {
+  void run_items(int worker) {
     try {
       for (std::size_t i = next.fetch_add(1, std::memory_order_relaxed); i < count;
            i = next.fetch_add(1, std::memory_order_relaxed))
@@ -52,7 +52,7 @@ struct Parallel::Pool {
         if (stop) return;
         seen = round;
       }
-      take_items(worker);
+      run_items(worker);
       {
         std::lock_guard lock(mutex);
         if (--busy == 0) finished.notify_one();
@@ -94,7 +94,7 @@ void Parallel::run(std::size_t count, void* body, Call call) {
     ++p.round;
   }
   p.start.notify_all();
-  p.take_items(0);
+  p.run_items(0);
   std::unique_lock lock(p.mutex);
   p.finished.wait(lock, [&] { return p.busy == 0; });
   if (p.fault) std::rethrow_exception(std::exchange(p.fault, nullptr));

@@ -9,6 +9,8 @@
 
 namespace sonar {
 
+enum class Seed : std::uint64_t;  // core/base/units.hpp, which device code cannot read
+
 struct Random4 {
   std::uint32_t v[4];
 };
@@ -32,6 +34,34 @@ SONAR_HD constexpr Random4 philox(std::uint32_t c0, std::uint32_t c1, std::uint3
     k1 += 0xBB67AE85u;
   }
   return {{c0, c1, c2, c3}};
+}
+
+/// Every stream of draws of a ping and of its scene's cells. The values keep the streams apart: most are the last word of the
+/// counter, some are combined with the key or another word by exclusive or, as the comment says.
+enum class Domain : std::uint32_t {
+  cells = 0,                // speckle and places of surface cells; the counter's last word is the level
+  cell_blocks = 0x6e6574u,  // places within blocks of cells: in the key's low word
+  texture = 0x74657874u,    // combined with the object's index
+  noise_table = 0x6e6f6973u,
+  noise_place = 0x706c6163u,
+  leak = 0x6c65616bu,           // in the sonar's number, of noise_place
+  fixed_fan = 0x66616eu,        // a hit of the fixed fan
+  paper_speckle = 0x50323521u,  // a hit of the modes paper and raster
+  other_sonar = 0x6f746872u,   // phase and carrier offset of another sonar; with the key's words exchanged, of each of its pulses
+  relief_value = 0x76616c75u,  // seabed and rocks: the key's high word, combined with the stream
+  relief_gradient = 0x67726164u,  // the same, as it is
+};
+
+/// The key of one stream of draws.
+struct RandomKey {
+  std::uint32_t low = 0, high = 0, domain = 0;
+};
+SONAR_HD constexpr RandomKey key_of(Seed seed, Domain domain) {
+  const auto bits = static_cast<std::uint64_t>(seed);
+  return {static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32), static_cast<std::uint32_t>(domain)};
+}
+SONAR_HD constexpr Random4 philox(std::uint32_t c0, std::uint32_t c1, std::uint32_t c2, const RandomKey& key) {
+  return philox(c0, c1, c2, key.domain, key.low, key.high);
 }
 
 /// (0, 1): never 0, so that its logarithm is finite.

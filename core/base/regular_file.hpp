@@ -20,7 +20,7 @@ using OpenFile = std::unique_ptr<std::FILE, CloseFile>;
 /// For reading, bytes as they are. missing_file when there is none, or what it is instead: "x.png: is a FIFO, not a regular
 /// file".
 Result<OpenFile> open_regular(const std::filesystem::path& file);
-/// All of it, or the first `most_bytes` + 1: the caller says what is too long. io when reading fails,
+/// All of it, or the first `most_bytes` + 1: the caller rejects what is too long. io when reading fails,
 /// unavailable when memory does not suffice.
 Result<std::string> read_regular(const std::filesystem::path& file, std::size_t most_bytes);
 

@@ -56,7 +56,7 @@ std::string colour_map_names() {
 Result<ColourMap> find_colour_map(std::string_view name) {
   for (const ColourMap& map : colour_maps())
     if (map.name == name) return map;
-  return failure(ErrorKind::usage, "no colour map \"" + std::string(name) + "\"; there are " + colour_map_names());
+  return failure(ErrorKind::usage, "unknown colour map \"" + std::string(name) + "\"; choose one of " + colour_map_names());
 }
 
 }  // namespace sonar

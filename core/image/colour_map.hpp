@@ -14,6 +14,7 @@ namespace sonar {
 
 struct Rgb {
   std::uint8_t r = 0, g = 0, b = 0;
+  bool operator==(const Rgb&) const = default;
 };
 
 struct ColourMap {

@@ -64,7 +64,7 @@ Result<std::vector<std::byte>> encode_png(const Raster& raster) {
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);  // what it comes to at most
   std::vector<std::byte> bytes(size);
   if (png_image_write_to_memory(&image, bytes.data(), &size, 0, rgb.data(), 0, nullptr) == 0)
-    return failure(ErrorKind::bug, std::string("a picture could not be made: ") + image.message);
+    return failure(ErrorKind::bug, std::string("the picture could not be encoded: ") + image.message);
   bytes.resize(size);
   return bytes;
 }
@@ -95,7 +95,7 @@ Result<void> write_png(const Raster& raster, const std::filesystem::path& file) 
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
   const auto done = write_whole_file(file, {*bytes});
   if (done) return done;
-  return failure(ErrorKind::io, done.error().text + "; is there room, and is the folder writable?");
+  return failure(ErrorKind::io, done.error().text + "; check the free space and the folder's permissions");
 }
 
 }  // namespace sonar

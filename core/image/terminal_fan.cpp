@@ -28,8 +28,6 @@ struct Grid {
   }
 };
 
-bool same(Rgb a, Rgb b) { return a.r == b.r && a.g == b.g && a.b == b.b; }
-
 /// Mean over one half of a cell: a square of the drawn picture.
 Rgb mean_colour(const Raster& raster, int left, int top) {
   int r = 0, g = 0, b = 0, count = 0;
@@ -49,13 +47,13 @@ Grid grid_from(const Raster& raster, int columns) {
   grid.columns = columns;
   grid.lines = (raster.height + 2 * dots - 1) / (2 * dots);
   grid.cells.resize(static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.lines));
-  const Rgb background = raster.at(0, 0);
+  const Rgb outside = raster.at(0, 0);
   for (int line = 0; line < grid.lines; ++line) {
     for (int column = 0; column < grid.columns; ++column) {
       Cell& cell = grid.at(column, line);
       cell.upper = mean_colour(raster, dots * column, 2 * dots * line);
       cell.lower = mean_colour(raster, dots * column, 2 * dots * line + dots);
-      cell.outside = same(cell.upper, background) && same(cell.lower, background);
+      cell.outside = cell.upper == outside && cell.lower == outside;
     }
   }
   return grid;
@@ -104,8 +102,8 @@ class LineWriter {
     line_ += letter;
   }
   void block(const Cell& cell) {
-    if (!upper_ || !same(*upper_, cell.upper)) line_ += colour_code(colours_, cell.upper, true);
-    if (!lower_ || !same(*lower_, cell.lower)) line_ += colour_code(colours_, cell.lower, false);
+    if (!upper_ || *upper_ != cell.upper) line_ += colour_code(colours_, cell.upper, true);
+    if (!lower_ || *lower_ != cell.lower) line_ += colour_code(colours_, cell.lower, false);
     upper_ = cell.upper, lower_ = cell.lower;
     line_ += "\u2580";  // upper half block
   }
@@ -141,8 +139,8 @@ std::string text_of(Grid& grid, int line, TerminalColours colours) {
 
 Result<std::vector<std::string>> draw_terminal_fan(const PolarImage& image, const TerminalStyle& style) {
   if (style.columns < fewest_columns || style.lines < fewest_lines)
-    return failure(ErrorKind::usage, "no room for a picture in " + std::to_string(style.columns) + " columns and " +
-                                         std::to_string(style.lines) + " lines: it takes 24 and 8");
+    return failure(ErrorKind::usage, "the terminal is too small for a picture: " + std::to_string(style.columns) +
+                                         " columns and " + std::to_string(style.lines) + " lines, at least 24 and 8 are needed");
   FanStyle drawing;
   drawing.rings = false;
   drawing.colours = style.colours == TerminalColours::none ? *find_colour_map("gray") : style.map;

@@ -100,7 +100,7 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
     if (c == columns)
       return "unknown column " + in_quotes(header[i]) +
              text::suggestion(header[i].substr(0, longest_name), long_names, "columns");
-    if (out.place_[c] >= 0) return "column " + std::string(header[i]) + " stands twice";
+    if (out.place_[c] >= 0) return "column " + std::string(header[i]) + " appears twice";
     out.place_[c] = static_cast<int>(i);
   }
   return out.refuse_set();
@@ -178,7 +178,7 @@ Complaint Columns::refuse_matrix(const Words& words, Row& out) const {
   const Rotation turn{{{v[0], v[1], v[2]}, {v[4], v[5], v[6]}, {v[8], v[9], v[10]}}};
   out.pose.position_m = {v[3], v[7], v[11]};
   if (largest(out.pose.position_m) > farthest) return "the position is beyond 1e8";
-  if (!is_rotation(turn)) return "the first three columns of the matrix are no rotation";
+  if (!is_rotation(turn)) return "the first three columns of the matrix are not a rotation";
   out.pose.orientation = quat_from(turn);
   return std::nullopt;
 }
@@ -195,7 +195,8 @@ Complaint Columns::refuse(const Words& words, Row& out) const {
   if (!has(body)) return std::nullopt;
   out.body = word(words, body);
   const bool printable = std::none_of(out.body.begin(), out.body.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7f; });
-  if (out.body.empty() || out.body.size() > longest_name || !printable) return "a body's name has 1 to 64 printable characters";
+  if (out.body.empty() || out.body.size() > longest_name || !printable)
+    return "a body's name must have 1 to 64 printable characters";
   return std::nullopt;
 }
 

@@ -24,7 +24,7 @@ struct Row {
   std::string_view body;  // of a body column
 };
 
-/// A word of somebody else's file, fit for a sentence: printable and not long.
+/// A word of a file made printable and short enough for an error text.
 std::string in_quotes(std::string_view word);
 
 class Columns {

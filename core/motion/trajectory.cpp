@@ -7,31 +7,12 @@
 #include "core/motion/turning.hpp"
 
 namespace sonar::motion {
-namespace {
-
-bool same(Vec3d a, Vec3d b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
-bool same(const Pose& a, const Pose& b) {
-  const Quatd &p = a.orientation, &q = b.orientation;
-  return same(a.position_m, b.position_m) && p.w == q.w && p.x == q.x && p.y == q.y && p.z == q.z;
-}
-template <class T>
-bool all_same(const std::vector<T>& a, const std::vector<T>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const T& x, const T& y) { return same(x, y); });
-}
-
-}  // namespace
 
 Trajectory::Trajectory(Points points, Ns duration)
     : points_(std::move(points)), duration_(std::max(duration, points_.times.back())) {
   assert(points_.poses.size() == points_.times.size());
   assert(points_.velocities_mps.empty() || points_.velocities_mps.size() == points_.times.size());
   assert(points_.angular_velocities_radps.empty() || points_.angular_velocities_radps.size() == points_.times.size());
-}
-
-bool Trajectory::operator==(const Trajectory& other) const {
-  const Points &a = points_, &b = other.points_;
-  return duration_ == other.duration_ && a.times == b.times && all_same(a.poses, b.poses) &&
-         all_same(a.velocities_mps, b.velocities_mps) && all_same(a.angular_velocities_radps, b.angular_velocities_radps);
 }
 
 /// Of the way that ends at point `after`, u of it done.

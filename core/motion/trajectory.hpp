@@ -29,6 +29,8 @@ struct Points {
   std::vector<Pose> poses;                      // as many
   std::vector<Vec3d> velocities_mps;            // world axes; as many, or none
   std::vector<Vec3d> angular_velocities_radps;  // body axes; as many, or none
+
+  bool operator==(const Points&) const = default;
 };
 
 class Trajectory {
@@ -45,7 +47,7 @@ class Trajectory {
   std::size_t size() const { return points_.times.size(); }
   const Points& points() const { return points_; }
   /// The same points to the last bit.
-  bool operator==(const Trajectory& other) const;
+  bool operator==(const Trajectory&) const = default;
 
  private:
   Motion between(std::size_t after, double u) const;

@@ -185,11 +185,11 @@ class Reader {
 
   void look_at_the_whole() {
     if (tracks_.empty()) {
-      wrong_ = name_ + ": no poses; write one a line, see docs/trajectories.md";
+      wrong_ = name_ + ": no poses; write one a line, see docs/poses.md";
     } else if (!frame_ && !asked_.frame) {
       wrong_ = name_ +
                ": in which frame the poses are is not said; begin the file with a line \"# frame: ENU_FLU\" or \"# frame: "
-               "NED_FRD\", or give the frame with the file's name (docs/trajectories.md)";
+               "NED_FRD\", or give the frame with the file's name (docs/poses.md)";
     }
   }
 
@@ -262,9 +262,10 @@ Result<std::shared_ptr<const Trajectory>> trajectory_of(const TrajectoryFile& fi
     names.push_back(b.name);
   }
   if (names.front().empty())
-    return failure(ErrorKind::bad_data, name + ": there is one body in it and it has no name; leave out body");
+    return failure(ErrorKind::bad_data, name + ": the file has one body, without a name; leave out body");
   if (body.empty())
-    return failure(ErrorKind::bad_data, name + ": several bodies; say which: body" + text::suggestion("", names, "there are"));
+    return failure(ErrorKind::bad_data,
+                   name + ": the file has several bodies; choose one with body" + text::suggestion("", names, "there are"));
   return failure(ErrorKind::bad_data,
                  name + ": no body is called " + in_quotes(body) + text::suggestion(body, names, "there are"));
 }

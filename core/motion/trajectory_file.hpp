@@ -1,4 +1,4 @@
-// Files of trajectories: own CSV with a header, TUM, EuRoC CSV, KITTI matrices; what each looks like is in docs/trajectories.md.
+// Files of trajectories: own CSV with a header, TUM, EuRoC CSV, KITTI matrices; what each looks like is in docs/poses.md.
 // Read by `sonard run` for what it plays and by `sonard render`; the result is in our frames, its times from the file's start.
 #pragma once
 
@@ -20,8 +20,8 @@ std::string_view name_of(Format format);
 std::string_view name_of(Frame frame);
 
 struct ReadOptions {
-  Format format = Format::automatic;   // told by the first line with numbers or names
-  std::optional<Frame> frame = {};     // needed when the file does not say; a file that says otherwise is refused
+  Format format = Format::automatic;   // found from the first line with numbers or names
+  std::optional<Frame> frame = {};     // needed when the file does not name it; a file that names another is refused
   std::optional<double> rate_hz = {};  // lines a second; of KITTI files, which have no times, and of no others
   bool operator==(const ReadOptions&) const = default;
 };

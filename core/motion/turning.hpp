@@ -1,18 +1,10 @@
-// Turns from one orientation to another, and part of the way. Used where poses are interpolated: trajectories here, what senders
-// told in daemon/pose_history.
+// Turns from one orientation to another, and part of the way. Used where poses are interpolated: trajectories here, and in
+// daemon/emulator/world/pose_history.
 #pragma once
 
 #include "core/base/geometry.hpp"
 
 namespace sonar::motion {
-
-/// Rotation by a vector [rad].
-inline Quatd quat_from_rotation(Vec3d r) {
-  const double angle = length(r);
-  if (angle < 1e-12) return normalized(Quatd{1, r.x / 2, r.y / 2, r.z / 2});
-  const double s = std::sin(angle / 2) / angle;
-  return {std::cos(angle / 2), r.x * s, r.y * s, r.z * s};
-}
 
 /// The rotation vector [rad] that turns a into b, in a's own axes; shortest way.
 inline Vec3d rotation_between(Quatd a, Quatd b) {
@@ -25,6 +17,6 @@ inline Vec3d rotation_between(Quatd a, Quatd b) {
 }
 
 /// Shortest way from a (u = 0) to b (u = 1) at constant turn rate.
-inline Quatd slerp(Quatd a, Quatd b, double u) { return normalized(a * quat_from_rotation(u * rotation_between(a, b))); }
+inline Quatd slerp(Quatd a, Quatd b, double u) { return normalized(a * turned_by(u * rotation_between(a, b))); }
 
 }  // namespace sonar::motion

@@ -7,11 +7,6 @@
 #include "core/pipeline/arithmetic/scattering.hpp"
 
 namespace sonar::paper {
-namespace {
-
-constexpr std::uint32_t speckle_key = 0x50323521;  // keeps these draws apart from all others
-
-}  // namespace
 
 double elevation_pattern(const Prepared& p, double elevation_rad) {
   return p.elevation_per_sine > 0 ? sinc(p.elevation_per_sine * std::sin(elevation_rad)) : 1.0;
@@ -19,8 +14,10 @@ double elevation_pattern(const Prepared& p, double elevation_rad) {
 
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& p, const PingScalars& s,
               PaperEchoes& echoes) {
+  // Delay over the record's length.
   const double turns = range_m * s.samples_per_m / p.plan.samples;
   if (!(turns < 1)) return false;
+  // Choi 2025, eq. 1: sqrt(cross-section) D(phi) e^{-2 a r} / r^2 times the source.
   const double amplitude =
       s.source_upa * std::sqrt(cross_section_m2) * pattern * two_way_transmission(range_m, s.absorption_np_per_m);
   if (p.plan.expected_power)
@@ -33,30 +30,31 @@ bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNo
 
 void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene, const Prepared& p,
                const PingScalars& s, const PingRequest& request, const simd::Kernels& kernels, PaperEchoes& echoes) {
-  const auto bits = static_cast<std::uint64_t>(request.seed);
   const auto pattern_of = [&](const PaperHit& hit) {
     return p.pattern.empty() ? elevation_pattern(p, hit.elevation_rad) : p.pattern[static_cast<std::size_t>(hit.row)];
   };
   const auto mu_of = [&](const PaperHit& hit) { return mu[scene.objects[hit.object].mesh->material[hit.triangle]]; };
+  // The mean over speckle: |xi|^2 = 1, powers add.
   if (p.plan.expected_power) {
     for (const PaperHit& hit : hits)
       add_echo(hit.range_m, pattern_of(hit), printed_cross_section_m2(mu_of(hit), hit.cosine, hit.range_m, hit.solid_angle_sr),
                {}, p, s, echoes);
     return;
   }
-  constexpr std::size_t most = simd::HitsToSound::most;
+  constexpr std::size_t most = simd::HitsToScatter::most;
   std::uint32_t number[most], column[most], row[most];
   float range[most], weight[most], re[most], im[most];
+  // Speckle is drawn for each (ping, column, row).
   std::fill_n(number, most, static_cast<std::uint32_t>(request.number));
-  simd::HitsToSound sounding{
-      {{number, column, row}, speckle_key, {static_cast<std::uint32_t>(bits), static_cast<std::uint32_t>(bits >> 32)}},
-      range,
-      weight,
-      static_cast<float>(2 * s.absorption_np_per_m),
-      s.turns_per_m};
+  simd::HitsToScatter arguments{{{number, column, row}, key_of(request.seed, Domain::paper_speckle)},
+                                range,
+                                weight,
+                                static_cast<float>(2 * s.absorption_np_per_m),
+                                s.turns_per_m};
   int n = 0;
+  // A full batch goes to the kernel: carrier, absorption and draw.
   const auto send = [&] {
-    kernels.sound_hits(sounding, n, re, im);
+    kernels.scatter_hits(arguments, n, re, im);
     for (int i = 0; i < n; ++i)
       echoes.push_back({static_cast<double>(range[i]) * s.samples_per_m / p.plan.samples, {re[i], im[i]}});
     n = 0;
@@ -64,11 +62,12 @@ void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const
   for (const PaperHit& hit : hits) {
     if (!(hit.range_m * s.samples_per_m < p.plan.samples)) continue;
     // sqrt(printed_cross_section_m2) / r^2
-    const bool heard = hit.range_m >= nearest_scatterer_m;
+    const bool audible = hit.range_m >= nearest_scatterer_m;
     const double amplitude =
         s.source_upa * std::sqrt(mu_of(hit) * hit.solid_angle_sr) * hit.cosine * pattern_of(hit) / hit.range_m;
+    // Choi 2025, eq. 2 as printed: cos^2(incidence) times the footprint r^2 dOmega, without 1 / cos.
     range[n] = static_cast<float>(hit.range_m);
-    weight[n] = heard ? static_cast<float>(amplitude) : 0;
+    weight[n] = audible ? static_cast<float>(amplitude) : 0;
     column[n] = static_cast<std::uint32_t>(hit.column);
     row[n] = static_cast<std::uint32_t>(hit.row);
     if (++n == static_cast<int>(most)) send();

@@ -1,35 +1,70 @@
 #include "core/paper/paper_engine.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
+#include <functional>
 #include <stdexcept>
+#include <utility>
 
-#include "core/base/random.hpp"
 #include "core/paper/paper_ping.hpp"
+#include "core/pipeline/check_request.hpp"
 #include "core/pipeline/water_line.hpp"
 
 namespace sonar {
 namespace {
 
-class Engine final : public PingEngine {
+/// Pings in the modes paper and raster.
+class ComparisonEngine {
  public:
-  Engine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options, paper::FrequencySum sum)
-      : scene_(scene), pool_(pool), options_(options), sum_(sum), canonical_(make_cpu_engine(std::move(scene), pool, options)) {}
+  ComparisonEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options, paper::FrequencySum sum)
+      : rays_(scene, pool.threads()), scene_(std::move(scene)), pool_(pool), options_(options), sum_(sum) {}
+
+  Ping run(const PingRequest& asked) {
+    std::vector<PingRequest> room;
+    const PingRequest& request = in_water({&asked, 1}, *scene_, room).front();
+    if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
+    if (!scene_->bodies_in_world.empty())
+      rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
+    if (!prepared_ || !prepared_->serves(request)) prepared_ = std::make_unique<paper::Prepared>(request, sum_);
+    statistics_ = {};
+    Ping ping = paper::simulate(rays_, request, *prepared_, simd::kernels_for(options_.simd), pool_, options_.now_s, statistics_);
+    tell_as_asked({&asked, 1}, {&ping, 1});
+    return ping;
+  }
+  const PingStatistics& statistics() const { return statistics_; }
+
+ private:
+  RayScene rays_;
+  std::shared_ptr<const Scene> scene_;
+  Parallel& pool_;
+  EngineOptions options_;
+  paper::FrequencySum sum_;
+  std::unique_ptr<paper::Prepared> prepared_;
+  PingStatistics statistics_;
+};
+
+/// Sends each ping to the engine of its mode.
+class ModeRouter final : public PingEngine {
+ public:
+  ModeRouter(std::unique_ptr<PingEngine> canonical, std::shared_ptr<const Scene> scene, Parallel& pool,
+             const EngineOptions& options, paper::FrequencySum sum)
+      : canonical_(std::move(canonical)), make_comparison_([=, scene = std::move(scene), &pool] {
+          return std::make_unique<ComparisonEngine>(scene, pool, options, sum);
+        }) {}
 
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
     std::vector<Ping> pings;
     pings.reserve(requests.size());
-    std::vector<PingStatistics> each;  // a ping that is let in has its own
+    std::vector<PingStatistics> each;  // a ping run in between has its own
     while (!requests.empty()) {
-      if (requests.front().switches.mode != Mode::canonical) {
-        pings.push_back(compare(requests.front()));
-        each.push_back(statistics_);
+      if (!is_canonical(requests.front())) {
+        if (!comparison_) comparison_ = make_comparison_();
+        last_was_canonical_ = false;
+        pings.push_back(comparison_->run(requests.front()));
+        each.push_back(comparison_->statistics());
         requests = requests.subspan(1);
         continue;
       }
-      std::size_t n = 1;  // the longest run of canonical requests, so that an engine that likes batches gets them
-      while (n < requests.size() && requests[n].switches.mode == Mode::canonical) ++n;
+      std::size_t n = 1;  // the longest run of canonical requests, for engines that compute batches
+      while (n < requests.size() && is_canonical(requests[n])) ++n;
       for (Ping& ping : canonical_->run(requests.first(n))) pings.push_back(std::move(ping));
       for (const PingStatistics& s : canonical_->statistics_of_each()) each.push_back(s);
       requests = requests.subspan(n);
@@ -39,45 +74,34 @@ class Engine final : public PingEngine {
     return pings;
   }
 
-  void let_in(Interruption* who) override { canonical_->let_in(who); }
+  void set_interruption(Interruption* interruption) override { canonical_->set_interruption(interruption); }
   std::string description() const override { return canonical_->description(); }
-  PingStatistics statistics() const override { return last_was_canonical_ ? canonical_->statistics() : statistics_; }
+  PingStatistics statistics() const override {
+    return last_was_canonical_ ? canonical_->statistics() : comparison_->statistics();
+  }
   std::vector<PingStatistics> statistics_of_each() const override { return each_; }
 
  private:
-  Ping compare(const PingRequest& asked) {
-    std::vector<PingRequest> room;
-    const PingRequest& request = in_water({&asked, 1}, *scene_, room).front();
-    if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
-    if (!rays_) rays_ = std::make_unique<RayScene>(scene_, pool_.threads());
-    if (!scene_->bodies_in_world.empty())
-      rays_->place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
-    if (!prepared_ || !prepared_->serves(request)) prepared_ = std::make_unique<paper::Prepared>(request, sum_);
-    statistics_ = {};
-    last_was_canonical_ = false;
-    Ping ping =
-        paper::simulate(*rays_, request, *prepared_, simd::kernels_for(options_.simd), pool_, options_.now_s, statistics_);
-    tell_as_asked({&asked, 1}, {&ping, 1});
-    return ping;
-  }
+  static bool is_canonical(const PingRequest& request) { return request.switches.mode == Mode::canonical; }
 
-  std::shared_ptr<const Scene> scene_;
-  Parallel& pool_;
-  EngineOptions options_;
-  paper::FrequencySum sum_;
   std::unique_ptr<PingEngine> canonical_;
-  std::unique_ptr<RayScene> rays_;
-  std::unique_ptr<paper::Prepared> prepared_;
-  PingStatistics statistics_;
-  std::vector<PingStatistics> each_;  // of the last run
+  std::function<std::unique_ptr<ComparisonEngine>()> make_comparison_;
+  std::unique_ptr<ComparisonEngine> comparison_;  // made for its first ping: it needs a scene of rays of its own
+  std::vector<PingStatistics> each_;              // of the last run
   bool last_was_canonical_ = true;
 };
 
 }  // namespace
 
+std::unique_ptr<PingEngine> with_comparison_modes(std::unique_ptr<PingEngine> canonical, std::shared_ptr<const Scene> scene,
+                                                  Parallel& pool, const EngineOptions& options, paper::FrequencySum sum) {
+  return std::make_unique<ModeRouter>(std::move(canonical), std::move(scene), pool, options, sum);
+}
+
 std::unique_ptr<PingEngine> make_engine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options,
                                         paper::FrequencySum sum) {
-  return std::make_unique<Engine>(std::move(scene), pool, options, sum);
+  auto canonical = make_cpu_engine(scene, pool, options);
+  return with_comparison_modes(std::move(canonical), std::move(scene), pool, options, sum);
 }
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// The ping engine of the daemon and of the offline renderer: canonical pings go to the CPU engine, those in paper or raster mode
-// (Switches::mode) are made here. Stands beside core/pipeline, so that the pipeline need not know of it.
+// The one place where a ping's mode (Switches::mode) chooses its engine: canonical pings go to the engine given, those in the
+// modes paper and raster are computed here, on the CPU. Stands beside core/pipeline, which does not depend on it.
 #pragma once
 
 #include <memory>
@@ -9,9 +9,13 @@
 
 namespace sonar {
 
-/// Like make_cpu_engine, and knows every Mode. The comparison modes build their rays' scene when the first ping asks for them:
-/// until then they cost nothing. They hear surfaces and point targets only: no noise, no mirrors, no motion within the ping.
-/// Speckle is drawn anew for every ping, a draw a ray, from (seed, ping number, beam, ray).
+/// Adds the comparison modes to an engine of canonical pings over the same scene. They cost nothing until the first such ping.
+/// They contain echoes of surfaces and point targets only: no noise, no specular echoes, no motion within the ping. Speckle is
+/// drawn anew for every ping, a draw a ray, from (seed, ping number, beam, ray).
+std::unique_ptr<PingEngine> with_comparison_modes(std::unique_ptr<PingEngine> canonical, std::shared_ptr<const Scene> scene,
+                                                  Parallel& pool, const EngineOptions& options,
+                                                  paper::FrequencySum sum = paper::FrequencySum::fast);
+/// The CPU's engine for all modes.
 std::unique_ptr<PingEngine> make_engine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options = {},
                                         paper::FrequencySum sum = paper::FrequencySum::fast);
 

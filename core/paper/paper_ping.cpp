@@ -14,7 +14,7 @@ namespace {
 constexpr int sum_width = 8;              // of the fast sum: relative error 1e-7
 constexpr double width_constant = 0.884;  // P25's code, for sinc patterns: -3 dB width times aperture
 
-/// The comparison modes know no motion within the ping.
+/// The comparison modes have no motion within the ping.
 PingScalars still_scalars(const PingPlan& plan, PingRequest request, Vec3d origin) {
   request.switches.motion = false;
   return make_scalars(plan, request, origin);
@@ -45,10 +45,11 @@ std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p
     for (int k = 1; k < p.fan.columns(); ++k) {
       if (off(k) < off(nearest)) nearest = k;
     }
+    // The row whose ray passes nearest: beside the fan the point is not seen.
     const double row = ((p.fan.perspective ? at.z / at.x : elevation) - p.fan.first_row) / p.fan.row_step;
     if (at.x <= 0 || off(nearest) > p.fan.column_width[static_cast<std::size_t>(nearest)] || row < -0.5 || row > p.fan.rows - 0.5)
       continue;
-    if (!is_hidden(scene, s.seen_from.position_m, in_world))
+    if (!is_occluded(scene, s.seen_from.position_m, in_world))
       points.push_back({nearest, range, elevation, power_from_db(static_cast<double>(target.target_strength_db))});
   }
   return points;
@@ -84,7 +85,7 @@ class PaperPing {
     if (request.switches.keep_truth) truth_.resize(static_cast<std::size_t>(p_.fan.columns()));
   }
 
-  void sound_columns();
+  void simulate_columns();
   void correct_beams();
   Ping image();
 
@@ -98,7 +99,7 @@ class PaperPing {
     SumScratch sum;
     PingStatistics statistics;
   };
-  void sound_column(int column, Work& work);
+  void simulate_column(int column, Work& work);
 
   const RayScene& scene_;
   const PingRequest& request_;
@@ -116,11 +117,11 @@ class PaperPing {
   std::vector<BeamTruth> truth_;
 };
 
-void PaperPing::sound_columns() {
+void PaperPing::simulate_columns() {
   if (request_.blank) return;
   points_ = points_in_view(scene_, p_, s_, request_);
   pool_.for_each(static_cast<std::size_t>(p_.fan.columns()), [&](std::size_t column, int worker) {
-    sound_column(static_cast<int>(column), work_[static_cast<std::size_t>(worker)]);
+    simulate_column(static_cast<int>(column), work_[static_cast<std::size_t>(worker)]);
   });
   for (const Work& work : work_) {
     const PingStatistics& share = work.statistics;
@@ -130,11 +131,12 @@ void PaperPing::sound_columns() {
   }
 }
 
-void PaperPing::sound_column(int column, Work& work) {
+void PaperPing::simulate_column(int column, Work& work) {
   PingStatistics& mine = work.statistics;
   const double begin = now();
   std::vector<PaperHit>& hits = work.hits;
   hits.clear();
+  // Rays of one column, then eq. 2 for each hit.
   trace_column(scene_, p_.fan, s_, column, static_cast<float>(s_.max_range_m), hits);
   const double traced = now();
   if (!truth_.empty())
@@ -154,6 +156,7 @@ void PaperPing::sound_column(int column, Work& work) {
       p_.pulse_power->add(echoes[i], out.first(static_cast<std::size_t>(p_.plan.samples)));
   } else {
     // An array of complex numbers may be read as one of floats.
+    // Eq. 1 for this column, times |S(f)|.
     sum_frequencies(echoes, p_.spectrum, p_.fast.get(), kernels_, work.sum,
                     {reinterpret_cast<std::complex<float>*>(out.data()), static_cast<std::size_t>(p_.spectrum.count)});
   }
@@ -172,7 +175,7 @@ void PaperPing::correct_beams() {
   else
     correct(p_.correction, p_.plan.settings.beam_count, p_.fan.columns(), columns_, static_cast<int>(values_), kernels_, pool_,
             beams_);
-  statistics_.seconds[static_cast<std::size_t>(Stage::couple)] += now() - begin;
+  statistics_.seconds[static_cast<std::size_t>(Stage::form_beams)] += now() - begin;
 }
 
 Ping PaperPing::image() {
@@ -238,6 +241,7 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
   if (sum == FrequencySum::fast && spectral::have_transform)
     fast = std::make_unique<spectral::FrequencySums>(spectrum.count, sum_width);
   if (plan.expected_power) pulse_power = std::make_unique<PulsePower>(spectrum, inverse);
+  // Even azimuths make the correction a convolution, which a transform computes.
   const double spacing = static_cast<double>(plan.mode.horizontal_aperture_rad) / plan.settings.beam_count;
   if (!plan.expected_power) even = even_correction(fan.azimuth_rad, spacing);
   if (!even)
@@ -254,8 +258,8 @@ bool Prepared::serves(const PingRequest& request) const { return request.model =
 Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
               Parallel& pool, double (*now_s)(), PingStatistics& statistics) {
   PaperPing ping(scene, request, prepared, kernels, pool, now_s, statistics);
-  ping.sound_columns();  // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, a column a beam
-  ping.correct_beams();  // "as coded"
+  ping.simulate_columns();  // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, a column a beam
+  ping.correct_beams();     // "as coded"
   return ping.image();
 }
 

@@ -19,12 +19,14 @@ PaperSpectrum make_spectrum(const PingPlan& plan) {
   s.samples = plan.samples;
   s.sample_offset = plan.sample_offset;
   const double record_s = plan.samples * 2 * plan.sample_spacing_m / static_cast<double>(plan.settings.device_sound_speed_mps);
+  // Choi 2025, eq. 4: df = 1 / T, M = b T frequencies about the carrier.
   const double band = plan.envelope_hz * record_s;                  // b T, in units of df
   s.count = std::max(1, static_cast<int>(std::ceil(band - 1e-3)));  // b T meant whole may not come out whole
   s.first_frequency = 1 - 0.5 * band;                               // f_min = f_c - b / 2, m from 1
   double sum = 0;
   for (int m = 0; m < s.count; ++m) {
     const double x = pi * (s.first_frequency + m) / band;  // (f - f_c) pi / b
+    // Choi 2025, eq. 3: |S(f)| = e^{-(pi (f - f_c) / b)^2}, normalised to sum 1.
     s.weight.push_back(std::exp(-x * x));
     sum += s.weight.back();
   }
@@ -41,6 +43,7 @@ void PaperEchoes::push_back(const PaperEcho& e) {
 void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
                      const simd::Kernels& kernels, SumScratch& scratch, std::span<std::complex<float>> out) {
   std::vector<Complex>& sums = scratch.sums;
+  // Eq. 1's sum over scatterers at every frequency: by a non-uniform transform, or term by term.
   if (fast) {
     sums.resize(static_cast<std::size_t>(spectrum.count));
     scratch.grid.assign(static_cast<std::size_t>(fast->grid_points() + fast->padding), 0.0);
@@ -60,6 +63,7 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
   double energy = 0;
   for (const double to : azimuth_rad)
     for (const double from : azimuth_rad) {
+      // As coded by the authors: |sin y / y| of the angle between two beams, normalised by the energy of all weights.
       const double y = pi * 0.884 / spacing_rad * std::sin(to - from);
       v.push_back(std::abs(y) < 1e-12 ? 1.0 : std::abs(std::sin(y) / y));
       energy += v.back() * v.back();
@@ -116,7 +120,7 @@ void correct(std::span<const float> panels, int beams, int columns, std::span<co
     for (std::size_t k = 0; k < count; ++k) std::copy_n(in.data() + k * length + from, n, window.data() + k * block);
     for (int j = 0; j < beams; j += 4) {
       float sums[4 * block];
-      kernels.couple_panel(window.data(), block, panels.data() + static_cast<std::size_t>(j) * count, columns, sums, block);
+      kernels.form_beam_panel(window.data(), block, panels.data() + static_cast<std::size_t>(j) * count, columns, sums, block);
       for (int i = 0; i < 4 && j + i < beams; ++i)
         std::copy_n(sums + i * block, n, out.data() + static_cast<std::size_t>(j + i) * length + from);
     }

@@ -1,5 +1,5 @@
 // From hits to beams as Choi 2025 (Sensors 25(5):1516, "P25") prints it: eq. (1)-(4) per column, the reference code's beam
-// coupling, an inverse transform. Second stage of core/paper; what differs from the canonical model: docs/acoustics.md,
+// beamforming, an inverse transform. Second stage of core/paper; what differs from the canonical model: docs/acoustics.md,
 // section 8.
 #pragma once
 
@@ -11,7 +11,7 @@
 #include "core/base/parallel.hpp"
 #include "core/paper/paper_fan.hpp"
 #include "core/pipeline/beam_transform.hpp"
-#include "core/pipeline/couple.hpp"
+#include "core/pipeline/form_beams.hpp"
 #include "core/pipeline/pulses/spectral.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 
@@ -69,7 +69,7 @@ std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azi
 void correct(const BeamTransformTables& even, std::span<const float> in, int values, const simd::Kernels& kernels, Parallel& pool,
              std::span<float> out);
 
-/// The weights of four beams side by side, [(beams + 3) / 4][columns][4]: as the kernels want them.
+/// The weights of four beams side by side, [(beams + 3) / 4][columns][4]: in the kernels' layout.
 std::vector<float> panels_of(std::span<const float> weights, int beams, int columns);
 /// out[j] = sum_k weights[j][k] in[k], rows of `values` floats; `panels` of those weights.
 void correct(std::span<const float> panels, int beams, int columns, std::span<const float> in, int values,

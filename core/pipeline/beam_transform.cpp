@@ -8,6 +8,8 @@
 namespace sonar {
 namespace {
 
+// The convolution s_j = sum_k W(u_j - u_k) g_k over even columns is a product of discrete Fourier transforms, across a line
+// padded to twice its length so that it does not wrap around. The passes themselves are in simd/transform.inl.
 /// The smallest size of at least n whose only prime factors are 2 and 3.
 int smooth_size(int n) {
   for (int size = std::max(n, 4);; ++size) {
@@ -18,6 +20,7 @@ int smooth_size(int n) {
   }
 }
 
+/// e^{-i 2 pi i m / size} for m = 1 ... most: the twiddle factors of a pass.
 void append_turns(int size, int count, int most, std::vector<float>& turns) {
   for (int i = 0; i < count; ++i)
     for (int m = 1; m <= most; ++m) {
@@ -59,6 +62,7 @@ std::vector<double> weights_between(int taps, double place, double band) {
 
 BeamTransformTables::BeamTransformTables(const ReceivePattern& pattern, const Columns& columns,
                                          const std::vector<double>& beam_sines) {
+  // W at every distance of whole columns, du = d * spacing.
   lay_out(columns.count, static_cast<int>(beam_sines.size()));
   std::vector<double> of_distance;
   for (int d = 0; d < columns.count; ++d) of_distance.push_back(pattern(d * columns.spacing));
@@ -94,6 +98,7 @@ void BeamTransformTables::point_at_tables() {
 void BeamTransformTables::plan_passes() {
   append_turns(4 * tables_.quarter, tables_.quarter, 3, split_);
   for (int size = tables_.quarter; size > 1;) {
+    // Radix 4 where possible: the fewest operations a value.
     const int radix = size % 4 == 0 ? 4 : size % 3 == 0 ? 3 : 2;
     append_turns(size, size / radix, radix - 1, turns_.emplace_back());
     tables_.level[tables_.levels++] = {radix, size, nullptr};
@@ -102,14 +107,16 @@ void BeamTransformTables::plan_passes() {
   for (int l = 0; l < tables_.levels; ++l) tables_.level[l].turns = turns_[static_cast<std::size_t>(l)].data();
 }
 
-/// The transform of the weights, which are even: real. No beam wants those of columns as far apart as a line of columns is long.
+/// The transform of the weights, which are even: real. Distances as long as the line of columns are not needed.
 void BeamTransformTables::weigh(const std::vector<double>& of_distance) {
   const int size = 4 * tables_.quarter;
   std::vector<double> cosine, weight;
   for (int i = 0; i < size; ++i) cosine.push_back(std::cos(2 * pi * i / size));
+  // W is even: its transform is W_0 + 2 sum_d W_d cos(2 pi d f / size).
   for (std::size_t d = 0; d < of_distance.size(); ++d) weight.push_back(of_distance[d] * (d == 0 ? 1 : 2));
   for (int k = 0; k < 4; ++k)
     for (int place = 0; place < tables_.quarter; ++place) {
+      // The passes leave frequencies in mixed-radix digit-reversed order; the response is stored in that order.
       int frequency = 0, step = 1, rest = place;
       for (int l = 0; l < tables_.levels; ++l) {
         const int part = tables_.level[l].size / tables_.level[l].radix;
@@ -130,6 +137,7 @@ void BeamTransformTables::read_between(double aperture_in_spacings, const Column
   const auto place_of = [&](double sine) { return (columns.first_sine - sine) / columns.spacing; };
   const bool on_columns = std::all_of(beam_sines.begin(), beam_sines.end(),
                                       [&](double sine) { return std::abs(place_of(sine) - std::round(place_of(sine))) < 1e-6; });
+  // Beams between columns: interpolation by the fewest taps that reach the accuracy promised in the header.
   tables_.taps = on_columns ? 1 : aperture_in_spacings < 0.25 ? 8 : 10;
   for (const double sine : beam_sines) {
     const double place = place_of(sine);
@@ -146,6 +154,7 @@ void BeamTransformTables::read_between(double aperture_in_spacings, const Column
 }
 
 double BeamTransformTables::cost() const {
+  // Operations counted from simd/transform.inl: two transforms, the product, and reading the beams.
   const double q = tables_.quarter;
   double pass = 0;
   for (int l = 0; l < tables_.levels; ++l) pass += q * (tables_.level[l].radix == 4 ? 7 : tables_.level[l].radix == 3 ? 9 : 4);

@@ -1,8 +1,7 @@
-// Which requests can be simulated: the sentence that refuses the others (why_invalid, core/pipeline/ping_plan.hpp). Asked by
-// every engine before a ping.
+#include "core/pipeline/check_request.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "core/pipeline/ping_plan.hpp"
 

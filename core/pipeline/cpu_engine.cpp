@@ -2,6 +2,7 @@
 #include <array>
 #include <stdexcept>
 
+#include "core/pipeline/check_request.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simulate.hpp"
 #include "core/pipeline/water_line.hpp"
@@ -17,33 +18,32 @@ class CpuEngine final : public PingEngine, private Interruption {
         scene_(std::move(scene)),
         pool_(pool),
         options_(options),
-        kernels_(simd::kernels_for(options.simd)) {
-    for (Workspace& work : work_) work.now_s = options.now_s;
-  }
+        kernels_(simd::kernels_for(options.simd)),
+        work_{Workspace(options.now_s), Workspace(options.now_s)} {}
 
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
     std::vector<Ping> pings;
     pings.reserve(requests.size());
-    const bool let_in = under_way_.request != nullptr;
-    if (!let_in) each_.clear();
+    const bool is_nested = under_way_.request != nullptr;
+    if (!is_nested) each_.clear();
     std::vector<PingRequest> room;
     for (const PingRequest& request : in_water(requests, *scene_, room)) {
       if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
       pings.push_back(run(request));
-      if (!let_in) each_.push_back(work_[0].statistics);
+      if (!is_nested) each_.push_back(work_[0].statistics());
     }
     tell_as_asked(requests, pings);
     return pings;
   }
 
-  void let_in(Interruption* who) override { who_ = who; }
+  void set_interruption(Interruption* interruption) override { interruption_ = interruption; }
 
   std::string description() const override {
     return std::string("cpu, ") + kernels_.name + ", " + std::to_string(pool_.threads()) +
            (pool_.threads() == 1 ? " thread, " : " threads, ") + RayScene::version();
   }
 
-  PingStatistics statistics() const override { return work_[0].statistics; }
+  PingStatistics statistics() const override { return work_[0].statistics(); }
   std::vector<PingStatistics> statistics_of_each() const override { return each_; }
 
  private:
@@ -57,18 +57,18 @@ class CpuEngine final : public PingEngine, private Interruption {
       UnderWay& ping;
       ~Finish() { ping = {}; }
     } finish{under_way_};
-    work_[0].between = who_ ? this : nullptr;
+    work_[0].set_between(interruption_ ? this : nullptr);
     return simulate(rays_, *under_way_.cells, request, kernels_, work_[0], pool_);
   }
   void place_bodies(const PingRequest& request) {
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
   }
-  bool expected() const override { return who_->expected(); }
-  void take() override {
+  bool expected() const override { return interruption_->expected(); }
+  void run_other() override {
     if (under_way_.view == 0) under_way_.view = under_way_.cells->views();
     under_way_.cells->keep_since(under_way_.view);
-    who_->take();
+    interruption_->run_other();
     under_way_.cells->keep_since(0);
     place_bodies(*under_way_.request);  // where the ping under way has them
   }
@@ -81,7 +81,7 @@ class CpuEngine final : public PingEngine, private Interruption {
   std::shared_ptr<SurfaceCells> cells_;
   std::array<Workspace, 2> work_;     // of the ping under way, and of one let in
   std::vector<PingStatistics> each_;  // of the last run
-  Interruption* who_ = nullptr;
+  Interruption* interruption_ = nullptr;
   struct UnderWay {
     const PingRequest* request = nullptr;
     std::shared_ptr<SurfaceCells> cells;  // a ping let in may need others

@@ -1,5 +1,5 @@
 // How fans of rays are refined: a column's interval between two directions is halved until both ends see one surface that
-// interpolates, or an edge. One rule for what is seen directly (trace_fan) and by way of mirrors (multipath_trace).
+// interpolates, or an edge. One rule for what is seen directly (trace_fan) and via mirrors (multipath_trace).
 #pragma once
 
 #include <algorithm>
@@ -14,23 +14,23 @@
 
 namespace sonar {
 
-/// What a ray met at one stage of its way. Ranges run along the whole way, unfolded where mirrors bend it.
-struct SurfaceMet {
+/// What a ray met at one stage of its path. Ranges run along the whole path, unfolded where mirrors bend it.
+struct SurfaceHit {
   std::uint32_t object = RayPacket::miss;
   float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = nothing met
-  Vec3 normal;                       // of the facet, any length, world axes as seen along the last leg of the way
+  Vec3 normal;                       // of the facet, any length, world axes as seen along the last path of the path
   float offset = 0;                  // the facet's plane is normal . p = offset, p from the sonar's last image
 
-  /// Of a ray that has come `range_m` along the whole way; `forward`: x of the unit direction it left in.
-  static SurfaceMet by(const RayPacket& rays, std::size_t lane, float range_m, float forward) {
-    SurfaceMet met;
-    met.object = rays.object[lane];
-    const bool hit = met.object != RayPacket::miss;
-    met.range_m = hit ? range_m : 0;
-    met.inverse_x = hit ? 1.0f / std::max(met.range_m * forward, 1e-4f) : 0;
-    met.normal = {rays.normal_x[lane], rays.normal_y[lane], rays.normal_z[lane]};
-    met.offset = met.range_m * dot(met.normal, direction(rays, lane));
-    return met;
+  /// Of a ray that has come `range_m` along the whole path; `forward`: x of the unit direction it left in.
+  static SurfaceHit by(const RayPacket& rays, std::size_t lane, float range_m, float forward) {
+    SurfaceHit surface;
+    surface.object = rays.object[lane];
+    const bool hit = surface.object != RayPacket::miss;
+    surface.range_m = hit ? range_m : 0;
+    surface.inverse_x = hit ? 1.0f / std::max(surface.range_m * forward, 1e-4f) : 0;
+    surface.normal = {rays.normal_x[lane], rays.normal_y[lane], rays.normal_z[lane]};
+    surface.offset = surface.range_m * dot(surface.normal, direction(rays, lane));
+    return surface;
   }
   static Vec3 direction(const RayPacket& rays, std::size_t lane) {
     return {rays.direction_x[lane], rays.direction_y[lane], rays.direction_z[lane]};
@@ -51,12 +51,12 @@ struct FanInterval {
   int depth;
 };
 
-/// Sample: a FanSample with `int stages() const`, `const SurfaceMet& met_at(int stage) const` and `bool same_way(b) const`:
-/// whether both met the same number of surfaces by the same mirrors.
+/// Sample: a FanSample with `int stages() const`, `const SurfaceHit& surface_at(int stage) const` and `bool same_mirrors(b)
+/// const`: whether both met the same number of surfaces by the same mirrors.
 template <class Sample>
 class FanRefinement {
  public:
-  /// The buffers live with the caller, from ping to ping. `first_column`: the plan's column that the intervals count from, so
+  /// The caller keeps the buffers from ping to ping. `first_column`: the plan's column that the intervals count from, so
   /// that what a column sees does not depend on those it is traced with.
   FanRefinement(std::vector<Sample>& samples, std::vector<FanInterval>& open, std::vector<FanInterval>& halves,
                 float pulse_width_m, int first_column)
@@ -86,7 +86,7 @@ class FanRefinement {
   /// steps can fall in step with ripples, and then every column at once would take crests alone for a plain.
   float middle_rad(const FanInterval& v) {
     const float below = at(v.below).elevation_rad, above = at(v.above).elevation_rad;
-    if (!meet_the_same(at(v.below), at(v.above))) return 0.5f * (below + above);
+    if (!hit_the_same(at(v.below), at(v.above))) return 0.5f * (below + above);
     const float turns = golden_turn * static_cast<float>(first_column_ + v.column) + 0.5f * static_cast<float>(v.depth);
     const float part = 0.5f + widest_skew * (2 * (turns - std::floor(turns)) - 1);
     return below + part * (above - below);
@@ -103,24 +103,24 @@ class FanRefinement {
 
   Sample& at(std::int32_t i) { return samples_[static_cast<std::size_t>(i)]; }
 
-  static bool meet_the_same(const Sample& a, const Sample& b) {
-    if (!a.same_way(b)) return false;
+  static bool hit_the_same(const Sample& a, const Sample& b) {
+    if (!a.same_mirrors(b)) return false;
     for (int stage = 0; stage < a.stages(); ++stage)
-      if (a.met_at(stage).object != b.met_at(stage).object) return false;
+      if (a.surface_at(stage).object != b.surface_at(stage).object) return false;
     return true;
   }
 
   /// Whether an interval needs a look at its middle; what is left undecided becomes an edge.
   void consider(std::int32_t below, std::int32_t above, std::int32_t column, int depth, std::vector<FanInterval>& list) {
     Sample &a = at(below), &b = at(above);
-    const bool same = meet_the_same(a, b);
+    const bool same = hit_the_same(a, b);
     if (same && !far_apart(a, b)) return;
     if (depth < (same ? deepest : edge_depth)) list.push_back({below, above, column, depth});
     if (!same || depth >= deepest) a.edge_above = true;
   }
   bool far_apart(const Sample& a, const Sample& b) const {
     for (int stage = 0; stage < a.stages(); ++stage)
-      if (std::abs(a.met_at(stage).range_m - b.met_at(stage).range_m) > tolerance_m_) return true;
+      if (std::abs(a.surface_at(stage).range_m - b.surface_at(stage).range_m) > tolerance_m_) return true;
     return false;
   }
 
@@ -137,10 +137,10 @@ class FanRefinement {
 
   template <class Direction>
   bool interpolates(const Sample& a, const Sample& m, const Sample& b, const Direction& direction) const {
-    if (!meet_the_same(a, m) || !meet_the_same(a, b)) return false;
+    if (!hit_the_same(a, m) || !hit_the_same(a, b)) return false;
     const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
     for (int stage = 0; stage < m.stages(); ++stage) {
-      const SurfaceMet &below = a.met_at(stage), &middle = m.met_at(stage), &above = b.met_at(stage);
+      const SurfaceHit &below = a.surface_at(stage), &middle = m.surface_at(stage), &above = b.surface_at(stage);
       if (middle.object == RayPacket::miss) continue;
       const float expected_x = 1.0f / (below.inverse_x + part * (above.inverse_x - below.inverse_x));
       if (std::abs(expected_x / m.forward - middle.range_m) > tolerance_m_) return false;
@@ -150,7 +150,7 @@ class FanRefinement {
     return true;
   }
   /// Whether the plane through one end meets the middle's ray about where it hit.
-  bool plane_is_near(const SurfaceMet& end, Vec3 along, const SurfaceMet& middle) const {
+  bool plane_is_near(const SurfaceHit& end, Vec3 along, const SurfaceHit& middle) const {
     return std::abs(end.offset / dot(end.normal, along) - middle.range_m) <= slope_tolerance_in_pulses * tolerance_m_;
   }
 

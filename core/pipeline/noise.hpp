@@ -1,4 +1,4 @@
-// Receiver noise: white complex Gaussian per column, shaped in range like the pulse, injected before coupling so that
+// Receiver noise: white complex Gaussian per column, shaped in range like the pulse, injected before beamforming so that
 // neighbouring beams share it as in a real array (docs/acoustics.md, section 5). Drawn from a pre-filtered table at hashed
 // places.
 #pragma once
@@ -28,6 +28,12 @@ class NoiseTable {
   Seed seed_{};
   std::vector<float> filter_;
   std::vector<float> white_, shaped_;  // complex, interleaved
+};
+
+/// The draws of one ping of one sonar; `table` null = none.
+struct PingNoise {
+  const NoiseTable* table = nullptr;
+  std::uint32_t sonar = 0, ping = 0;
 };
 
 }  // namespace sonar

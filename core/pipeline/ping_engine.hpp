@@ -1,12 +1,14 @@
-// The seam between the daemon and whatever computes pings: CPU here, CUDA in cuda/.
+// The interface between the daemon and the engines that compute pings: CPU here, CUDA in cuda/.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/parallel.hpp"
@@ -17,6 +19,7 @@ namespace sonar {
 
 /// Instruction sets the hot loops are compiled for; chosen at run time.
 enum class SimdLevel { automatic, portable, avx2, avx512 };
+inline constexpr std::array<std::string_view, 4> simd_level_names = {"auto", "portable", "avx2", "avx512"};
 
 struct EngineOptions {
   SimdLevel simd = SimdLevel::automatic;
@@ -24,7 +27,7 @@ struct EngineOptions {
   double (*now_s)() = nullptr;  // a clock for PingStatistics; core/ has none of its own
 };
 
-enum class Stage { specular, multipath, cull, build_cells, trace, scatter, synthesize, noise, couple, receive, stages };
+enum class Stage { specular, multipath, cull, build_cells, trace, scatter, synthesize, noise, form_beams, receive, stages };
 inline constexpr std::array<const char*, static_cast<std::size_t>(Stage::stages)> stage_names{
     "specular", "multipath", "cull", "build cells", "trace", "scatter", "synthesize", "noise", "couple", "receive"};
 
@@ -34,17 +37,17 @@ struct PingStatistics {
   std::size_t rays = 0, tiles = 0, tiles_built = 0, cells = 0, echoes = 0, cell_bytes = 0;
 };
 
-/// Whoever may want another ping of an engine while one is under way.
+/// Runs short pings of other sonars between the parts of a long one.
 class Interruption {
  public:
   virtual ~Interruption() = default;
-  /// Whether that is likely: the ping is then made in smaller parts.
+  /// Whether such a ping is likely to come: this one is then made in smaller parts.
   virtual bool expected() const = 0;
   /// Between two parts, on the thread of run(); may call run() of the same engine, but not from within that again.
-  virtual void take() = 0;
+  virtual void run_other() = 0;
 };
 
-/// What an engine computes with is gone, a device that failed, and nothing may take its place.
+/// The device that an engine needs has failed, and the options allow no replacement.
 class EngineUnavailable : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -53,11 +56,11 @@ class EngineUnavailable : public std::runtime_error {
 class PingEngine {
  public:
   virtual ~PingEngine() = default;
-  /// A request that cannot be simulated (why_invalid in core/pipeline/ping_plan.hpp) throws std::invalid_argument with the
+  /// A request that cannot be simulated (why_invalid in core/pipeline/check_request.hpp) throws std::invalid_argument with the
   /// reason. One caller at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
-  /// Engines that let nobody in between ignore it. Null = nobody; no ping may be under way.
-  virtual void let_in(Interruption* who) { static_cast<void>(who); }
+  /// Engines that cannot be interrupted ignore it. Null = none; no ping may be under way.
+  virtual void set_interruption(Interruption* interruption) { static_cast<void>(interruption); }
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
   /// Of the last ping.
   virtual PingStatistics statistics() const { return {}; }

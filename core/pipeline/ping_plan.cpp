@@ -34,6 +34,7 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pul
                                    : static_cast<double>(mode.pattern.elevation_width_rad) * unit_fan_over_width / 2;
   fan.half_angle_rad = std::min(reach, widest_fan_rad);
   const double tangent = std::tan(fan.half_angle_rad);
+  // At full range a bin of the depth map spans at most 0.7 pulse widths.
   const double wanted = settings.range_m * 2 * tangent / (0.7 * pulse_width_m);
   fan.bins = 256;
   while (fan.bins < 2048 && fan.bins < wanted) fan.bins *= 2;
@@ -51,13 +52,14 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pul
 
 /// Least squares over the fan through Chebyshev points: the pattern is entire in w = sin^2, so few terms do.
 std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_rad) {
-  constexpr int n = simd::elevation_terms;
+  constexpr int n = elevation_terms;
   if (mode.pattern.elevation_taper == Taper::unit) {
     std::vector<float> one(n, 0.0f);
     one[0] = 1;
     return one;
   }
   const double aperture = elevation_aperture_in_wavelengths(mode.pattern);
+  // docs/acoustics.md, eq. 34: D_v(psi) = sinc^2((L_v / lambda) sin psi) as a polynomial in w = sin^2 psi.
   const double top = std::pow(std::sin(half_angle_rad), 2);
   // Newton's divided differences at Chebyshev nodes of [0, top], then expanded to plain powers.
   std::array<double, n> node{}, coefficient{};
@@ -84,6 +86,7 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
 /// The sample grid, and the pulse on it.
 void lay_out_samples(PingPlan& p) {
   const PingSettings& s = p.settings;
+  // Sample n lies at device range (n + sample_offset) spacing, at time 2 r / c_dev.
   const double c_dev = static_cast<double>(s.device_sound_speed_mps);
   p.samples = s.range_bin_count * s.samples_per_row;
   p.sample_spacing_m = s.range_bin_m / s.samples_per_row;
@@ -120,6 +123,7 @@ void fill_row_gains(PingPlan& plan) {
       gain_db = static_cast<double>(s.gain_db) + smallest;
       extra = plan.row_gain.back();
     }
+    // Eq. 36 and 37: (gain TVG / full scale)^2, since the receiver works on powers.
     const double factor = full_scale_factor(plan.mode.receiver, gain_db);
     plan.row_power_factor.push_back(static_cast<float>(factor * factor * extra));
   }
@@ -132,6 +136,7 @@ void lay_out_fixed_fan(PingPlan& p) {
   for (int ray = 0; ray < p.fixed_fan; ++ray) {
     const double angle = (ray + 0.5) * step_rad - p.fan.half_angle_rad, cosine = std::cos(angle);
     const double pattern = has_pattern ? elevation_two_way(aperture, angle) : 1.0;
+    // dOmega = du dpsi for cones; flat beams: cos(psi) dtheta dpsi, whose column factor follows in scatter_hits.
     const double solid_angle = p.columns.spacing * step_rad * (p.switches.conical ? 1.0 : cosine);
     p.fixed_fan_rays.push_back({static_cast<float>(angle), static_cast<float>(cosine), static_cast<float>(std::sin(angle)),
                                 static_cast<float>(pattern * std::sqrt(solid_angle))});
@@ -155,6 +160,7 @@ std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count) {
 Columns make_columns(const FrequencyMode& mode, int beam_count) {
   const double top = half_aperture_sine(mode), width = beam_width_sine(mode);
   // Beams lie on column centres where they are uniform in the sine, so that one row of weights serves them all.
+  // The column spacing divides the beam spacing, and is at most 0.35 of a beam width (docs/acoustics.md, section 2).
   const double beam_spacing = 2 * top / std::max(beam_count - 1, 1);
   const double per_beam = std::ceil(beam_spacing / (widest_column_in_beams * width) - 1e-9);
   Columns c;
@@ -165,17 +171,19 @@ Columns make_columns(const FrequencyMode& mode, int beam_count) {
   c.first_sine = top + margin * c.spacing;
   for (int k = 0; k < c.count; ++k) {
     const double beyond = (std::abs(c.sine(k)) - top) / width;
+    // T(u): cos^2 fall from 1.5 to 3 beam widths beyond the sector.
     const double fall = std::clamp((beyond - flat_margin_in_beams) / (margin_in_beams - flat_margin_in_beams), 0.0, 1.0);
     c.transmit.push_back(std::abs(c.sine(k)) < 1 ? static_cast<float>(std::pow(std::cos(pi / 2 * fall), 2)) : 0.0f);
   }
   return c;
 }
 
-Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared,
-                       const CouplingOptions& options) {
+BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines,
+                              bool squared, const BeamWeightOptions& options) {
   const ReceivePattern weight = receive_pattern(mode.pattern);
-  Coupling c;
+  BeamWeights c;
   // The smallest band whose dropped energy is below -40 dB.
+  // W at whole columns apart; its square is the energy that a column adds to a beam.
   std::vector<double> energy(static_cast<std::size_t>(columns.count));
   double total = 0;
   for (int h = 0; h < columns.count; ++h) {
@@ -228,10 +236,11 @@ Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const 
 
 std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m) {
   const int coarsest = static_cast<int>(std::ceil(-std::log2(pulse_width_m) - 1e-9));
-  constexpr double nearest_m = 0.2;  // nearer than this nobody images; one level serves what is left
+  constexpr double nearest_m = 0.2;  // no image begins nearer; one level serves the rest
   std::vector<CellLevel> levels;
   double coarser_begins = 2 * max_range_m;  // where the level above takes over
   for (int level = coarsest;; ++level) {
+    // A cell is at most a third of a beam wide from here on: 2^-level <= r theta / 3.
     const double begins = 3 * std::ldexp(1.0, -level) / beam_width_rad;
     const bool finest = begins < nearest_m || level - coarsest > 10;
     CellLevel l;
@@ -269,7 +278,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.columns = make_columns(mode, settings.beam_count);
   p.beam_sine = make_beam_sines(mode, settings.beam_count);
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
-  p.coupling = make_coupling(mode, p.columns, p.beam_sine, p.expected_power);
+  p.beam_weights = make_beam_weights(mode, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);
   p.fan = make_fan(mode, settings, p.pulse_width_m);
   lay_out_fixed_fan(p);
@@ -279,7 +288,8 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * static_cast<double>(mode.pattern.azimuth_width_rad),
                               settings.range_m * 1.1);
   p.noise_filter = make_noise_filter(p.pulse_shape, p.sample_time_s);
-  p.column_noise_upa = noise_rms_upa(mode, p.pulse_shape.noise_bandwidth_hz()) / std::sqrt(p.coupling.weight_energy);
+  // sum_k W_jk^2 column powers make a beam's: NL (eq. 30) at its output.
+  p.column_noise_upa = noise_rms_upa(mode, p.pulse_shape.noise_bandwidth_hz()) / std::sqrt(p.beam_weights.weight_energy);
   fill_row_gains(p);
   return p;
 }
@@ -291,14 +301,14 @@ void set_gain(PingPlan& plan, float gain_db) {
 }
 
 bool serves(const PingPlan& plan, const PingRequest& r) {
-  const PingSettings &a = plan.settings, &b = r.settings;
-  return plan.mode.name == r.model->modes[static_cast<std::size_t>(b.mode)].name && a.mode == b.mode &&
-         a.beam_count == b.beam_count && a.range_bin_count == b.range_bin_count && a.range_m == b.range_m &&
-         a.range_bin_m == b.range_bin_m && a.row_centre == b.row_centre && a.pulse_width_m == b.pulse_width_m &&
-         a.samples_per_row == b.samples_per_row && a.tvg == b.tvg && a.device_sound_speed_mps == b.device_sound_speed_mps &&
-         a.device_absorption_db_per_m == b.device_absorption_db_per_m && a.format.bits == b.format.bits &&
-         a.format.max_code == b.format.max_code && a.format.gamma == b.format.gamma && a.format.row_gains == b.format.row_gains &&
-         plan.switches == r.switches;
+  PingSettings asked = r.settings;  // as the plan's, but for what no table depends on
+  asked.rate_hz = plan.settings.rate_hz;
+  asked.gain_db = plan.settings.gain_db;
+  asked.gain_assist = plan.settings.gain_assist;
+  asked.triggered = plan.settings.triggered;
+  asked.transmit = plan.settings.transmit;
+  return asked == plan.settings && plan.switches == r.switches &&
+         plan.mode.name == r.model->modes[static_cast<std::size_t>(asked.mode)].name;
 }
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// Everything about a ping that follows from the model and the client's settings alone: columns, sample grid, pulse and coupling
-// tables, noise filter, gains. Made when settings change, used by every stage until they change again.
+// Everything about a ping that follows from the model and the client's settings alone: columns, sample grid, pulse and
+// beamforming tables, noise filter, gains. Made when settings change, used by every stage until they change again.
 #pragma once
 
 #include <cstdint>
@@ -8,22 +8,15 @@
 #include <vector>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/pulses/pulse.hpp"
+#include "core/pipeline/pulses/spectral_columns.hpp"
+#include "core/pipeline/signals.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/scene/cells/surface_cells.hpp"
 #include "core/sonar/ping.hpp"
 
 namespace sonar {
-
-/// Columns of constant direction sine u = y / r, cones about the array axis (flat beams: sine of azimuth), falling from port to
-/// starboard like the beams.
-struct Columns {
-  int count = 0;
-  double first_sine = 0;        // centre of column 0
-  double spacing = 0;           // in u
-  std::vector<float> transmit;  // amplitude of the transmitter per column: flat over the sector, soft beyond
-  double sine(int column) const { return first_sine - column * spacing; }
-};
 
 /// What the rays look at: angles about the array axis, and the tangent axis of the depth map.
 struct Fan {
@@ -41,27 +34,23 @@ struct FixedFanRay {
 };
 
 /// Weights of four neighbouring beams over the columns they share.
-struct CouplingPanel {
+struct BeamPanel {
   int first_beam = 0;  // the four beams first_beam .. +3; those past the last beam have zero weights
   int first_column = 0, count = 0;
-  std::size_t weights = 0;  // offset into Coupling::weights, count x 4 values
+  std::size_t weights = 0;  // offset into BeamWeights::weights, count x 4 values
 };
-class BeamTransformTables;
-
 /// How beams are made of columns.
-struct CouplingOptions {
+struct BeamWeightOptions {
   double dropped_energy = 1e-4;  // of the band: -40 dB
   bool transform = true;         // instead of a band that is wider than a transform is long, where beams allow it
 };
-struct Coupling {
+struct BeamWeights {
   int half_band = 0;  // columns on either side that a beam listens to
-  std::vector<CouplingPanel> panels;
+  std::vector<BeamPanel> panels;
   std::vector<float> weights;
   std::shared_ptr<const BeamTransformTables> transform;  // when set: the same as the panels, then of all columns, for less
   double weight_energy = 1;                              // sum_k W_jk^2 of the middle beam
 };
-
-class SpectralColumns;
 
 struct PingPlan {
   FrequencyMode mode;
@@ -73,7 +62,7 @@ struct PingPlan {
 
   Columns columns;
   Fan fan;
-  Coupling coupling;
+  BeamWeights beam_weights;
   std::vector<float> beam_azimuth_rad;
   std::vector<double> beam_sine;
 
@@ -96,7 +85,7 @@ struct PingPlan {
   std::vector<float> row_power_factor;  // per row: (gain * TVG / full scale)^2
   std::vector<std::uint32_t> row_gain;  // when settings.format.row_gains
 
-  /// How a place in the sonar's axes is heard: about the array's axis, or in flat beams.
+  /// Direction of a place in the sonar's axes: about the array's axis, or for flat beams.
   ConicalDirection direction_of(Vec3d from_sonar) const {
     return switches.conical ? conical_from_sonar(from_sonar) : flat_from_sonar(from_sonar);
   }
@@ -116,13 +105,10 @@ void set_gain(PingPlan& plan, float gain_db);
 /// Whether the plan still serves this request, but for its gain.
 bool serves(const PingPlan& plan, const PingRequest& request);
 
-/// The sentence that says why a request cannot be simulated; empty when it can.
-std::string why_invalid(const PingRequest& request);
-
 // The parts of a plan, callable alone.
 Columns make_columns(const FrequencyMode& mode, int beam_count);
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count);
-Coupling make_coupling(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines, bool squared,
-                       const CouplingOptions& options = {});
+BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines,
+                              bool squared, const BeamWeightOptions& options = {});
 std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m);
 }  // namespace sonar

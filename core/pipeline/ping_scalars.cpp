@@ -6,13 +6,14 @@
 
 namespace sonar {
 
-Pose carried_on(const Pose& pose, const Twist& twist, double seconds) {
+Pose propagate(const Pose& pose, const Twist& twist, double seconds) {
   return {pose.position_m + seconds * twist.velocity_mps,
           normalized(pose.orientation * turned_by(seconds * twist.angular_rate_radps))};
 }
 
-Meeting PingScalars::meet(Vec3d from_sonar_m) const {
+EchoGeometry PingScalars::echo_geometry(Vec3d from_sonar_m) const {
   if (!moves) return {from_sonar_m, {}, {}};
+  // Eq. 29: scattered at r / c, received at 2 r / c after firing; seen_at_s is the moment of `seen_from`.
   const double one_way_s = length(from_sonar_m) / sound_speed_mps;
   const Vec3d moved = (one_way_s - seen_at_s) * rotate(conjugate(seen_from.orientation), twist.velocity_mps);
   const Rotation turn = rotation_from(conjugate(turned_by((2 * one_way_s - seen_at_s) * twist.angular_rate_radps)));
@@ -21,6 +22,7 @@ Meeting PingScalars::meet(Vec3d from_sonar_m) const {
 
 double PingScalars::doppler_samples(Vec3d from_sonar_m) const {
   if (doppler_m_per_mps == 0) return 0;
+  // The component of the velocity toward the place shifts the pulse by (f / B) T v (docs/acoustics.md, eq. 27).
   const Vec3d velocity = rotate(conjugate(seen_from.orientation), twist.velocity_mps);
   return doppler_m_per_mps * dot(velocity, from_sonar_m) / length(from_sonar_m) * samples_per_m;
 }
@@ -55,7 +57,7 @@ PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d
   if (s.doppler_m_per_mps != 0) s.max_range_m += std::abs(s.doppler_m_per_mps) * length(s.twist.velocity_mps);
   s.moves = request.switches.motion && (length(s.twist.velocity_mps) > 0 || length(s.twist.angular_rate_radps) > 0);
   if (s.moves) s.seen_at_s = request.settings.range_m / static_cast<double>(request.settings.device_sound_speed_mps);
-  s.seen_from = s.moves ? carried_on(request.sonar_in_world, s.twist, s.seen_at_s) : request.sonar_in_world;
+  s.seen_from = s.moves ? propagate(request.sonar_in_world, s.twist, s.seen_at_s) : request.sonar_in_world;
   s.world_from_sonar = rotation_from(s.seen_from.orientation);
   s.position_in_scene = to_float(s.seen_from.position_m - scene_origin);
   return s;

@@ -7,9 +7,9 @@
 
 namespace sonar {
 
-/// Where something is at the moments that count for it: it scatters when the pulse passes, half way through its echo's flight,
-/// and is heard in the sonar's axes of the moment the echo comes home.
-struct Meeting {
+/// Geometry of one echo of a moving sonar: the place scatters when the pulse passes, at half the echo's time of flight, and its
+/// direction is measured in the sonar's axes at reception.
+struct EchoGeometry {
   Vec3d from_sonar_m;  // sonar axes at reception
   Vec3d moved_m;       // by how far the sonar had moved by then, in the axes of PingScalars::seen_from
   Rotation turn;       // from those axes to the ones at reception
@@ -35,14 +35,14 @@ struct PingScalars {
   double doppler_m_per_mps = 0;  // an echo that closes in by 1 m/s appears so much farther (docs/acoustics.md, section 4)
 
   /// Of a place in the axes of `seen_from`.
-  Meeting meet(Vec3d from_sonar_m) const;
+  EchoGeometry echo_geometry(Vec3d from_sonar_m) const;
   /// By how many samples the Doppler shift of a sweep delays the echo from a place in the sonar's axes.
   double doppler_samples(Vec3d from_sonar_m) const;
   double sample_of(double range_m) const { return range_m * samples_per_m - sample_offset; }
 };
 
 /// The sonar's pose `seconds` after `pose`.
-Pose carried_on(const Pose& pose, const Twist& twist, double seconds);
+Pose propagate(const Pose& pose, const Twist& twist, double seconds);
 
 PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d scene_origin);
 

@@ -12,6 +12,7 @@ void detect(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels&
             std::vector<float>& power) {
   const int per_row = plan.settings.samples_per_row;
   power.resize(static_cast<std::size_t>(rows) * static_cast<std::size_t>(width));
+  // |s|^2 per sample; a row of several samples is their mean power (docs/acoustics.md, section 7).
   if (per_row == 1 && !plan.expected_power) {
     kernels.detect(beams.data.data(), beams.stride, beams.beams, rows, power.data(), width);
     return;
@@ -61,6 +62,7 @@ void shape_ping(const PingPlan& plan, const Switches& switches, Ping& ping) {
 void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels& kernels, ReceiveScratch& scratch, Ping& ping) {
   const PingSettings& s = plan.settings;
   const int per_row = s.samples_per_row, first_row = beams.first_sample / per_row, rows = beams.samples / per_row;
+  // Kernels work on whole vectors of beams.
   const int width = (s.beam_count + 15) / 16 * 16;
   const int bytes = s.format.bits / 8;
   if (!ping.beam_signal_upa.empty()) keep_signal(beams, ping.beam_signal_upa);
@@ -73,6 +75,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
     const std::size_t at = static_cast<std::size_t>(first_row + row) * static_cast<std::size_t>(s.beam_count);
     if (!ping.pressure_upa.empty())
       for (int j = 0; j < s.beam_count; ++j) ping.pressure_upa[at + static_cast<std::size_t>(j)] = std::sqrt(power[j]);
+    // Eq. 37: code = max_code (|s| / full scale)^gamma: power times (gain TVG / full scale)^2, to the power gamma / 2.
     const float gain = plan.row_power_factor[static_cast<std::size_t>(first_row + row)], half_gamma = s.format.gamma / 2;
     std::byte* out = ping.samples.data() + at * static_cast<std::size_t>(bytes);
     if (bytes == 1) {

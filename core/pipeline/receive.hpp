@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "core/pipeline/couple.hpp"
 #include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/signals.hpp"
 #include "core/sonar/ping.hpp"
 
 namespace sonar {

@@ -15,7 +15,7 @@ float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 
 
 /// Which columns the box round a tile's cells can reach: u = y / r (y / h for flat beams) over it, to second order.
 void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotation& sonar_from_object, const PingPlan& plan,
-                  TileToSound& out) {
+                  PreparedTile& out) {
   out.first_column = 0, out.last_column = plan.columns.count;
   const Vec3d half = to_double(tile.box_half_m), c = centre_from_sonar_m + sonar_from_object * to_double(tile.box_middle_m);
   const double from_axis = plan.switches.conical ? length(c) : std::sqrt(c.x * c.x + c.y * c.y);
@@ -26,6 +26,7 @@ void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotatio
   const double along = -sine / from_axis;
   const Vec3d gradient = (1 / from_axis) * (transposed(sonar_from_object) *
                                             Vec3d{along * c.x, 1 + along * c.y, plan.switches.conical ? along * c.z : 0});
+  // First order: |du| <= sum |du/dx_i| half_i; second order: radius^2 / 2 times the bound 3 / r^2.
   const double spread = std::abs(gradient.x) * half.x + std::abs(gradient.y) * half.y + std::abs(gradient.z) * half.z +
                         1.5 * radius * radius / (nearest * nearest) + 1e-6;
   const double from = (plan.columns.first_sine - (sine + spread)) / plan.columns.spacing + 0.5;
@@ -34,13 +35,14 @@ void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotatio
   out.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(plan.columns.count)));
 }
 
-TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<const LawTable> laws, const BubbleLayer& bubbles,
-                    const PingPlan& plan, const PingScalars& s) {
-  TileToSound out;
+PreparedTile prepare(const PingContext& context, const TileInView& t, const BubbleLayer& bubbles) {
+  const PingScalars& s = context.scalars;
+  PreparedTile out;
   simd::TileSeen& seen = out.seen;
   const CellTile& tile = *t.tile;
-  const Meeting at = s.meet(t.from_sonar_m);
-  const Rotation& seen_from_object = cells.sonar_from_object(t.object);
+  // The tile's place at the moment it scatters, and the axes of reception; all its cells share them.
+  const EchoGeometry at = s.echo_geometry(t.from_sonar_m);
+  const Rotation& seen_from_object = context.cells.sonar_from_object(t.object);
   const Rotation sonar_from_object = s.moves ? at.turn * seen_from_object : seen_from_object;
   const Vec3d from_sonar_object_m =
       s.moves ? t.from_sonar_object_m - transposed(seen_from_object) * at.moved_m : t.from_sonar_object_m;
@@ -53,9 +55,12 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<co
   seen.range_m = static_cast<float>(range);
   seen.phase_turns = static_cast<float>(fraction_of_turn(range * s.turns_per_m));
   seen.sample_shift = static_cast<float>(s.doppler_samples(at.from_sonar_m));
-  const LawTable& law = laws[static_cast<std::size_t>(tile.material)];
+  const LawTable& law = context.laws[static_cast<std::size_t>(tile.material)];
   seen.law = law.table();
+  // The factors of eq. 6 (docs/acoustics.md, section 3) that are constant over a tile: 10^(SL/20) sqrt(mu) e^{-2 a r}. The
+  // cells' own range, incidence, pattern and phase follow in scatter_cells (simd/cells.inl).
   double constant = s.source_upa * std::sqrt(law.mu) * std::exp(-2 * s.absorption_np_per_m * range);
+  // Bubbles (eq. 16): e^{-2 b l}, l the part of the straight path inside the layer, once for the tile's middle.
   if (bubbles.present()) {
     const Vec3d seen_at = t.from_sonar_m + seen_from_object * tile.middle_cell_m();
     const double sonar_z_m = s.seen_from.position_m.z;
@@ -68,11 +73,11 @@ TileToSound prepare(const TileInView& t, const SurfaceCells& cells, std::span<co
   seen.fade_out_to_m = t.level->fade_out_to_m;
   seen.fade_out_per_m = per_metre(t.level->full_to_m, t.level->fade_out_to_m);
 
-  find_columns(tile, at.from_sonar_m, sonar_from_object, plan, out);
+  find_columns(tile, at.from_sonar_m, sonar_from_object, context.plan, out);
   return out;
 }
 
-/// Asks for a tile's cells ahead of their turn: they lie anywhere in memory, so that no processor guesses where.
+/// Prefetches a tile's cells: tiles lie anywhere in memory, which defeats the hardware prefetcher.
 void fetch_cells(const CellTile& tile) {
   constexpr std::size_t cache_line = 64;
   const auto* at = reinterpret_cast<const char*>(tile.data.get());
@@ -81,23 +86,7 @@ void fetch_cells(const CellTile& tile) {
 
 }  // namespace
 
-void Echoes::reserve(int capacity) {
-  const auto n = static_cast<std::size_t>(capacity) + 16;
-  sample.resize(n);
-  re.resize(n);
-  im.resize(n);
-  column.resize(n);
-}
-
-void Echoes::add(float at_sample, std::complex<float> amplitude, int in_column) {
-  if (count == capacity()) reserve(std::max(1024, 2 * count));
-  const auto i = static_cast<std::size_t>(count++);
-  sample[i] = at_sample;
-  re[i] = amplitude.real();
-  im[i] = amplitude.imag();
-  column[i] = in_column;
-}
-
+/// One table a material, at this ping's frequency and sound speed.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& s) {
   std::vector<LawTable> laws;
   for (const Material& m : scene.materials)
@@ -105,21 +94,20 @@ std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const Pi
   return laws;
 }
 
-void prepare_tiles(const std::vector<TileInView>& in_view, const SurfaceCells& cells, const Scene& scene,
-                   std::span<const LawTable> laws, const PingPlan& plan, const PingScalars& scalars, Parallel& pool,
-                   std::vector<TileToSound>& tiles) {
-  const BubbleLayer bubbles(scene.sea_surface);
+void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view, std::vector<PreparedTile>& tiles) {
+  const BubbleLayer bubbles(context.scene().sea_surface);
   tiles.resize(in_view.size());
   constexpr std::size_t batch = 256;
-  pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
+  context.pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);
-    for (std::size_t i = b * batch; i < end; ++i) tiles[i] = prepare(in_view[i], cells, laws, bubbles, plan, scalars);
+    for (std::size_t i = b * batch; i < end; ++i) tiles[i] = prepare(context, in_view[i], bubbles);
   });
 }
 
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, const DepthMap& seen) {
   simd::GroupView g{};
   g.conical = plan.switches.conical;
+  // Column k holds the directions u in [first_edge - (k + 1) du, first_edge - k du).
   g.first_edge_sine = static_cast<float>(plan.columns.first_sine + plan.columns.spacing / 2);
   g.columns_per_sine = static_cast<float>(1 / plan.columns.spacing);
   g.first_column = seen.first_column;
@@ -131,6 +119,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.depth_tolerance_m = plan.depth_tolerance_m();
   g.turns_per_m = static_cast<float>(s.turns_per_m);
   g.decay_per_m = static_cast<float>(2 * s.absorption_np_per_m);
+  // Echoes whose pulse reaches no sample of the record are dropped: half the taps beyond either end.
   g.samples_per_m = static_cast<float>(s.samples_per_m);
   g.sample_offset = static_cast<float>(s.sample_offset);
   g.first_sample = static_cast<float>(-plan.taps / 2);
@@ -140,7 +129,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   return g;
 }
 
-void sort_tiles(const std::vector<TileToSound>& tiles, int group_columns, int groups,
+void sort_tiles(const std::vector<PreparedTile>& tiles, int group_columns, int groups,
                 std::vector<std::vector<std::uint32_t>>& by_group) {
   by_group.resize(static_cast<std::size_t>(groups));
   for (auto& wanted : by_group) wanted.clear();
@@ -149,12 +138,13 @@ void sort_tiles(const std::vector<TileToSound>& tiles, int group_columns, int gr
       by_group[static_cast<std::size_t>(g)].push_back(static_cast<std::uint32_t>(i));
 }
 
-std::size_t scatter(const std::vector<TileToSound>& tiles, std::span<const std::uint32_t> wanted, std::size_t from,
+std::size_t scatter(const std::vector<PreparedTile>& tiles, std::span<const std::uint32_t> wanted, std::size_t from,
                     const simd::GroupView& group, const simd::Kernels& kernels, Echoes& echoes) {
   for (; from < wanted.size(); ++from) {
     if (from + 2 < wanted.size()) __builtin_prefetch(tiles[wanted[from + 2]].seen.tile);
     if (from + 1 < wanted.size()) fetch_cells(*tiles[wanted[from + 1]].seen.tile);
     const simd::TileSeen& seen = tiles[wanted[from]].seen;
+    // The kernels write a tile's echoes without bounds checks; a full buffer is summed first.
     if (echoes.count + seen.tile->count > echoes.capacity()) {
       if (echoes.count > 0) break;
       echoes.reserve(seen.tile->count);
@@ -164,25 +154,27 @@ std::size_t scatter(const std::vector<TileToSound>& tiles, std::span<const std::
   return from;
 }
 
-std::vector<PointEcho> scatter_points(const RayScene& scene, std::span<const Pose> bodies_in_world, const PingPlan& plan,
-                                      const PingScalars& s) {
+std::vector<PointEcho> scatter_points(const PingContext& context) {
+  const RayScene& scene = context.rays;
+  const PingScalars& s = context.scalars;
   std::vector<PointEcho> points;
   const Pose world_in_sonar = inverse(s.seen_from);
   for (const PointTarget& target : scene.scene().point_targets) {
-    const Vec3d in_world = scene.scene().in_world(target, bodies_in_world);
+    const Vec3d in_world = scene.scene().in_world(target, context.bodies_in_world);
     const Vec3d seen = transform(world_in_sonar, in_world);
     if (length(seen) < nearest_scatterer_m || seen.x <= 0) continue;
     const double strength = amplitude_from_db(static_cast<double>(target.target_strength_db));
-    const std::optional<PointEcho> echo = point_echo(seen, strength, plan, s);
+    const std::optional<PointEcho> echo = point_echo(seen, strength, context.plan, s);
     if (!echo) continue;
-    if (!is_hidden(scene, s.seen_from.position_m, in_world)) points.push_back(*echo);
+    if (!is_occluded(scene, s.seen_from.position_m, in_world)) points.push_back(*echo);
   }
   return points;
 }
 
 std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> strength_m, const PingPlan& plan,
                                     const PingScalars& s) {
-  const Vec3d p = s.meet(from_sonar_m).from_sonar_m;
+  // Eq. 6 for one scatterer: |strength| = sqrt(sigma_b A_c) of a point, 10^(TS/20).
+  const Vec3d p = s.echo_geometry(from_sonar_m).from_sonar_m;
   const double r = length(p);
   const double at_sample = s.sample_of(r) + s.doppler_samples(p);
   if (r < nearest_scatterer_m || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) return {};

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/random.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/scatter.hpp"
@@ -8,28 +9,31 @@
 namespace sonar {
 namespace {
 
-constexpr std::uint32_t fixed_fan_key = 0x66616eu;  // keeps these draws apart from the cells'
-
 /// Of a ray of the fixed fan, sonar axes.
 Vec3d direction_of_hit(const FanHit& hit, double sine, bool conical) {
   const ConicalDirection d{sine, static_cast<double>(hit.elevation_rad)};
   return conical ? sonar_from_conical(d) : sonar_from_flat(d);
 }
 
+// Eq. 6 with one scatterer a ray: sigma = sigma_b r^2 dOmega / cos(alpha), since a ray's footprint has the area
+// r^2 dOmega / cos(alpha). Hence sqrt(sigma) / r^2 = sqrt(sigma_b dOmega / cos(alpha)) / r.
 /// Hits on their way to echoes, as many at a time as the kernels take.
 class HitBatch {
  public:
-  HitBatch(const Scene& scene, std::span<const LawTable> laws, const PingPlan& plan, const PingScalars& s, Seed seed,
-           const simd::Kernels& kernels, Echoes& echoes)
-      : scene_(scene), laws_(laws), plan_(plan), s_(s), kernels_(kernels), echoes_(echoes) {
-    const auto bits = static_cast<std::uint64_t>(seed);
-    sounding_.draw.counter[0] = object_, sounding_.draw.counter[1] = column_, sounding_.draw.counter[2] = ray_;
-    sounding_.draw.last_counter = fixed_fan_key;
-    sounding_.draw.key[0] = static_cast<std::uint32_t>(bits), sounding_.draw.key[1] = static_cast<std::uint32_t>(bits >> 32);
-    sounding_.range_m = range_m_;
-    sounding_.weight = weight_;
-    sounding_.decay_per_m = static_cast<float>(2 * s.absorption_np_per_m);
-    sounding_.turns_per_m = s.turns_per_m;
+  HitBatch(const PingContext& context, Seed seed, Echoes& echoes)
+      : scene_(context.scene()),
+        laws_(context.laws),
+        plan_(context.plan),
+        s_(context.scalars),
+        kernels_(context.kernels),
+        echoes_(echoes) {
+    const RandomKey key = key_of(seed, Domain::fixed_fan);
+    arguments_.draw.counter[0] = object_, arguments_.draw.counter[1] = column_, arguments_.draw.counter[2] = ray_;
+    arguments_.draw.key = key;
+    arguments_.range_m = range_m_;
+    arguments_.weight = weight_;
+    arguments_.decay_per_m = static_cast<float>(2 * s_.absorption_np_per_m);
+    arguments_.turns_per_m = s_.turns_per_m;
   }
 
   void add(const FanHit& hit) {
@@ -53,7 +57,7 @@ class HitBatch {
     object_[count_] = hit.object;
     column_[count_] = static_cast<std::uint32_t>(hit.column);
     ray_[count_] = static_cast<std::uint32_t>(hit.ray);
-    if (++count_ == simd::HitsToSound::most) send();
+    if (++count_ == simd::HitsToScatter::most) send();
   }
 
   void send() {
@@ -63,18 +67,19 @@ class HitBatch {
     std::copy(column_, column_ + count_, out.column);
     if (plan_.expected_power)
       for (int i = 0; i < count_; ++i) {
-        const float amplitude = weight_[i] * std::exp(-sounding_.decay_per_m * range_m_[i]);
+        // Two-way absorption e^{-2 a r}; in expected power the square is the mean over the draw.
+        const float amplitude = weight_[i] * std::exp(-arguments_.decay_per_m * range_m_[i]);
         out.re[i] = amplitude * amplitude;
         out.im[i] = 0;
       }
     else
-      kernels_.sound_hits(sounding_, count_, out.re, out.im);
+      kernels_.scatter_hits(arguments_, count_, out.re, out.im);
     echoes_.count += count_;
     count_ = 0;
   }
 
  private:
-  /// What the solid angle of a ray owes to its column: flat beams only.
+  /// Solid-angle weight of a ray within its column (flat beams only): dOmega = cos(psi) dtheta dpsi, u = sin(theta).
   float column_weight(int column) {
     if (plan_.switches.conical) return 1;
     if (column != last_column_) {
@@ -91,19 +96,18 @@ class HitBatch {
   const PingScalars& s_;
   const simd::Kernels& kernels_;
   Echoes& echoes_;
-  simd::HitsToSound sounding_{};
+  simd::HitsToScatter arguments_{};
   int count_ = 0, last_column_ = -1;
   float last_weight_ = 1;
-  static constexpr int most = simd::HitsToSound::most;
+  static constexpr int most = simd::HitsToScatter::most;
   float sample_[most], range_m_[most], weight_[most];
   std::uint32_t object_[most], column_[most], ray_[most];
 };
 
 }  // namespace
 
-void scatter_hits(std::span<const FanHit> hits, const Scene& scene, std::span<const LawTable> laws, const PingPlan& plan,
-                  const PingScalars& s, Seed seed, const simd::Kernels& kernels, Echoes& echoes) {
-  HitBatch batch(scene, laws, plan, s, seed, kernels, echoes);
+void scatter_hits(const PingContext& context, std::span<const FanHit> hits, Seed seed, Echoes& echoes) {
+  HitBatch batch(context, seed, echoes);
   for (const FanHit& hit : hits) batch.add(hit);
   batch.send();
 }

@@ -9,10 +9,9 @@
 namespace sonar {
 namespace {
 
-constexpr double largest_strength = 1 / pi;  // of backscatter; a trend may not carry a surface beyond what comes in
-
 double from_db(float db) { return power_from_db(static_cast<double>(db)); }
 
+/// sigma_b = A e^{-a^2 / 2 B^2} + C cos^D a + E e^{-a^2 / 2 F^2} (docs/acoustics.md, eq. 13).
 double gsab(const GsabLaw& g, double cosine) {
   const double a = std::acos(std::clamp(cosine, 0.0, 1.0));
   const auto bell = [a](float db, float width_rad) {
@@ -27,12 +26,15 @@ double lambert_mu(const Material& m) { return lambert_coefficient(static_cast<do
 /// Straight on, where every law is strongest.
 double strongest(const Material& m) { return m.law == ScatteringLaw::gsab ? gsab(m.gsab, 1) : lambert_mu(m); }
 
+/// 10^(trend decades / 10), decades from the reference frequency.
 double trend(const Material& m, double centre_hz) {
   if (m.trend_db_per_decade == 0) return 1;
   const double decades = std::log10(centre_hz / static_cast<double>(m.trend_reference_hz));
-  return std::min(power_from_db(static_cast<double>(m.trend_db_per_decade) * decades), largest_strength / strongest(m));
+  // No surface backscatters more than the incident energy.
+  return std::min(power_from_db(static_cast<double>(m.trend_db_per_decade) * decades), largest_lambert / strongest(m));
 }
 
+/// k h, k = 2 pi f / c: the rms roughness in radians of phase.
 double phase_roughness(const Material& m, double centre_hz, double sound_speed_mps) {
   return 2 * pi * centre_hz / sound_speed_mps * static_cast<double>(m.roughness_m);
 }
@@ -43,25 +45,21 @@ double scattering_strength(const Material& m, double cosine, double centre_hz, d
   const double law = m.law == ScatteringLaw::gsab ? gsab(m.gsab, cosine) : lambert_per_area(lambert_mu(m), cosine);
   const double kh = phase_roughness(m, centre_hz, sound_speed_mps);
   const bool smooth = specular && kh < smooth_below_kh;
+  // The share that the specular echo has lost: 1 - e^{-4 k^2 h^2 cos^2 a} (eq. 14).
   const double scattered = smooth ? 1 - std::exp(-4 * kh * kh * cosine * cosine) : 1;
   return law * scattered * trend(m, centre_hz);
 }
 
-float LawTable::root_strength(float cosine) const {
-  const float root_mu = static_cast<float>(std::sqrt(mu));
-  if (root.empty()) return root_mu * cosine;
-  const float at = static_cast<float>(simd::law_steps) * std::sqrt(std::max(1.0f - cosine, 0.0f));
-  const auto step = static_cast<std::size_t>(at);
-  return root_mu * (root[step] + (at - static_cast<float>(step)) * (root[step + 1] - root[step]));
-}
+float LawTable::root_strength(float cosine) const { return static_cast<float>(std::sqrt(mu)) * relative_root(cosine); }
 
 LawTable make_law(const Material& m, double centre_hz, double sound_speed_mps, bool specular) {
   LawTable law;
   law.mu = lambert_mu(m) * trend(m, centre_hz);
   const bool smooth = specular && phase_roughness(m, centre_hz, sound_speed_mps) < smooth_below_kh;
   if (m.law == ScatteringLaw::lambert && !smooth) return law;
-  for (int i = 0; i < simd::law_steps + 2; ++i) {
-    const double x = std::min(1.0, static_cast<double>(i) / simd::law_steps);
+  // x = sqrt(1 - cosine): even steps in x follow a peak at normal incidence closely.
+  for (int i = 0; i < law_steps + 2; ++i) {
+    const double x = std::min(1.0, static_cast<double>(i) / law_steps);
     const double sigma = scattering_strength(m, 1 - x * x, centre_hz, sound_speed_mps, specular);
     law.root.push_back(static_cast<float>(std::sqrt(sigma / law.mu)));
   }

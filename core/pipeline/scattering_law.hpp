@@ -1,19 +1,22 @@
-// A material's scattering law as one ping hears it: how strongly a unit of surface sends back against the cosine of incidence.
+// A material's scattering law at the frequency of a ping: backscattering strength of a unit of surface against the cosine of
+// incidence.
 // Lambert's needs a number, the others a table for the kernels (docs/acoustics.md, section 3).
 #pragma once
 
 #include <vector>
 
-#include "core/pipeline/simd/kernels.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/scene/scene.hpp"
 
 namespace sonar {
 
 struct LawTable {
   double mu = 0;            // 1/sr; with an empty table sigma_b = mu cos^2
-  std::vector<float> root;  // sqrt(sigma_b / mu) over sqrt(1 - cosine), simd::law_steps + 2 values; or empty
+  std::vector<float> root;  // sqrt(sigma_b / mu) over sqrt(1 - cosine), law_steps + 2 values; or empty
 
   const float* table() const { return root.empty() ? nullptr : root.data(); }
+  /// sqrt(sigma_b / mu), cosine at least 0.
+  float relative_root(float cosine) const { return root.empty() ? cosine : law_root(root.data(), cosine); }
   /// sqrt(sigma_b), cosine at least 0.
   float root_strength(float cosine) const;
 };

@@ -1,19 +1,76 @@
 #include "core/pipeline/simulate.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "core/pipeline/form_beams.hpp"
+#include "core/pipeline/interference.hpp"
+#include "core/pipeline/multipath/multipath.hpp"
+#include "core/pipeline/ping_context.hpp"
+#include "core/pipeline/receive.hpp"
+#include "core/pipeline/scatter.hpp"
+#include "core/pipeline/specular/specular.hpp"
+#include "core/pipeline/synthesize.hpp"
+#include "core/pipeline/trace_fan.hpp"
+#include "core/pipeline/truth.hpp"
+#include "core/pipeline/volume.hpp"
 
 namespace sonar {
+
+/// What one model with one set of settings needs from ping to ping.
+struct PreparedSettings {
+  std::shared_ptr<const SonarModel> model;
+  PingPlan plan;
+  NoiseTable noise;
+  std::uint64_t last_used = 0;
+};
+
+/// Buffers reused from ping to ping.
+struct Workspace::Buffers {
+  std::vector<std::unique_ptr<PreparedSettings>> prepared;  // several sonars may take turns
+  std::uint64_t pings = 0;
+  SpecularEchoes specular_echoes;
+  std::vector<LawTable> laws;  // the tiles point into it
+  std::vector<PreparedTile> tiles;
+  std::vector<std::vector<std::uint32_t>> tiles_by_group;
+  MultipathWork multipath;
+  ColumnSignals columns;
+  std::vector<BeamTruth> first_hits;  // by column, when switches.keep_truth
+  struct PerWorker {
+    FanScratch fan;
+    DepthMap seen;
+    std::vector<FanHit> hits;
+    Echoes echoes;
+    VolumeScratch volume;
+    SpectralScratch spectral;
+    BeamScratch beam_scratch;
+    BeamSignals beams;
+    ReceiveScratch receive;
+    PingStatistics statistics;
+  };
+  std::vector<PerWorker> workers;
+  PingStatistics statistics;
+  double (*now_s)() = nullptr;
+  Interruption* between = nullptr;
+};
+
+Workspace::Workspace(double (*now_s)()) : buffers_(std::make_unique<Buffers>()) { buffers_->now_s = now_s; }
+Workspace::~Workspace() = default;
+void Workspace::set_between(Interruption* between) { buffers_->between = between; }
+const PingStatistics& Workspace::statistics() const { return buffers_->statistics; }
+
 namespace {
 
 constexpr int most_traced_columns = 48;  // columns whose rays are refined together
 constexpr std::size_t group_bytes =
     640 << 10;                            // signals and depth maps one worker carries from rays to sums: in the second cache
 constexpr int least_groups_a_worker = 3;  // so that all are done at about the same time
-constexpr int window_samples = 64;        // samples one worker carries from coupling to codes
+constexpr int window_samples = 64;        // samples one worker carries from beamforming to codes
 constexpr int echo_room = 16384;
 constexpr std::size_t most_prepared = 8;  // sets of settings kept ready
 
-/// Adds the time since it was made, or last told, to a stage.
+/// Adds the time since its construction, or the last lap, to a stage.
 class Stopwatch {
  public:
   Stopwatch(double (*now_s)(), PingStatistics& statistics)
@@ -31,7 +88,9 @@ class Stopwatch {
   double since_;
 };
 
-PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Workspace& w) {
+template <class Buffers>
+PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Buffers& w) {
+  // Tables of the settings are kept for several sonars; the least recently used are dropped.
   ++w.pings;
   auto it = std::find_if(w.prepared.begin(), w.prepared.end(),
                          [&](const auto& p) { return p->model == request.model && serves(p->plan, request); });
@@ -54,38 +113,41 @@ PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, W
   return p;
 }
 
+}  // namespace
+
 /// The stages of one ping and what they hand on.
-class PingUnderWay {
+class PingSimulation {
  public:
-  PingUnderWay(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
-               Workspace& work, Parallel& pool)
+  PingSimulation(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
+                 Workspace& work, Parallel& pool)
       : scene_(scene),
         cells_(cells),
         request_(request),
         kernels_(kernels),
-        w_(work),
+        w_(*work.buffers_),
         pool_(pool),
-        prepared_(prepared_for(request, scene.scene(), work)),
+        prepared_(prepared_for(request, scene.scene(), w_)),
         plan_(prepared_.plan),
         scalars_(make_scalars(plan_, request, scene.origin())),
         volume_(scene.scene().water_column, plan_, scalars_),
         leak_(plan_, request.switches),
         crosstalk_(plan_, request.switches),
-        bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world) {
+        bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world),
+        context_{scene, cells, bodies_, w_.laws, plan_, scalars_, kernels, pool} {
     w_.columns.shape(plan_.columns.count, plan_.samples, plan_.taps);
     group_columns_ = group_columns();
     w_.workers.resize(static_cast<std::size_t>(pool.threads()));
     w_.statistics = {};
     w_.first_hits.assign(request.switches.keep_truth ? static_cast<std::size_t>(plan_.columns.count) : 0, BeamTruth{});
-    for (Workspace::PerWorker& worker : w_.workers) {
+    for (Workspace::Buffers::PerWorker& worker : w_.workers) {
       worker.statistics = {};
       if (worker.echoes.column.empty()) worker.echoes.reserve(echo_room);
     }
   }
 
   void find_echo_sources();
-  void hear_by_mirrors();
-  void sound_columns();
+  void find_multipath_echoes();
+  void simulate_columns();
   Ping image();
 
  private:
@@ -97,17 +159,17 @@ class PingUnderWay {
   }
   int group_columns() const;
   int groups() const { return (plan_.columns.count + group_columns_ - 1) / group_columns_; }
-  void sound_group(int first, int last, Workspace::PerWorker& mine);
-  void scatter_hits_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch);
-  void scatter_cells_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch);
-  void sum_pulses(int first, Workspace::PerWorker& mine);
-  void image_rows(int first, int last, Workspace::PerWorker& mine, Ping& ping);
+  void simulate_group(int first, int last, Workspace::Buffers::PerWorker& mine);
+  void scatter_hits_of(int first, int last, Workspace::Buffers::PerWorker& mine, Stopwatch& watch);
+  void scatter_cells_of(int first, int last, Workspace::Buffers::PerWorker& mine, Stopwatch& watch);
+  void sum_pulses(int first, Workspace::Buffers::PerWorker& mine);
+  void image_rows(int first, int last, Workspace::Buffers::PerWorker& mine, Ping& ping);
 
   const RayScene& scene_;
   SurfaceCells& cells_;
   const PingRequest& request_;
   const simd::Kernels& kernels_;
-  Workspace& w_;
+  Workspace::Buffers& w_;
   Parallel& pool_;
   PreparedSettings& prepared_;
   const PingPlan& plan_;
@@ -116,17 +178,19 @@ class PingUnderWay {
   Leak leak_;
   Crosstalk crosstalk_;
   std::span<const Pose> bodies_;
+  const PingContext context_;
   int group_columns_ = 0;
   std::vector<PointEcho> points_;
-  std::vector<PulseHeard> other_sonars_;
+  std::vector<ReceivedPulse> other_sonars_;
 };
 
 /// How many columns a worker takes at once. Tiles that reach into several groups are looked at by each, so the more the better,
 /// as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
-int PingUnderWay::group_columns() const {
+int PingSimulation::group_columns() const {
   const int traced = traced_columns();
   if (w_.between && w_.between->expected()) return traced;
   const int bins = ray_is_scatterer() ? 0 : plan_.fan.bins;
+  // Signals and depth maps of a group should fit a worker's share of the second-level cache.
   const auto column_bytes = sizeof(float) * (static_cast<std::size_t>(w_.columns.stride) + static_cast<std::size_t>(bins));
   const int in_cache = static_cast<int>(group_bytes / column_bytes);
   const int least_groups = pool_.threads() > 1 ? least_groups_a_worker * pool_.threads() : 1;
@@ -136,17 +200,19 @@ int PingUnderWay::group_columns() const {
 }
 
 /// Surface cells that may be in view, sorted by the columns they reach; analytic points that are.
-void PingUnderWay::find_echo_sources() {
+void PingSimulation::find_echo_sources() {
   if (request_.blank) return;
-  points_ = scatter_points(scene_, bodies_, plan_, scalars_);
-  other_sonars_ = hear_other_sonars(scene_, plan_, scalars_, request_);
+  // Echoes without surface: point targets, other sonars, specular points (eq. 7).
+  points_ = scatter_points(context_);
+  other_sonars_ = receive_other_sonars(context_, request_);
   Stopwatch watch(w_.now_s, w_.statistics);
-  if (request_.switches.specular) w_.mirror_echoes.find(scene_, bodies_, plan_, scalars_, points_);
+  if (request_.switches.specular) w_.specular_echoes.find(context_, points_);
   watch.lap(Stage::specular);
   w_.laws = laws_of(scene_.scene(), plan_, scalars_);
   if (ray_is_scatterer()) return;
-  if (request_.switches.multipath) hear_by_mirrors();
+  if (request_.switches.multipath) find_multipath_echoes();
   watch.lap(Stage::multipath);
+  // Surface cells within range and fan; their level follows the distance.
   CellView view;
   view.sonar_in_world = scalars_.seen_from;
   view.bodies_in_world = bodies_;
@@ -156,7 +222,7 @@ void PingUnderWay::find_echo_sources() {
   view.levels = plan_.levels;
   const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
-  prepare_tiles(in_view, cells_, scene_.scene(), w_.laws, plan_, scalars_, pool_, w_.tiles);
+  prepare_tiles(context_, in_view, w_.tiles);
   sort_tiles(w_.tiles, group_columns_, groups(), w_.tiles_by_group);
   watch.lap(Stage::cull);
   w_.statistics.tiles = in_view.size();
@@ -166,30 +232,31 @@ void PingUnderWay::find_echo_sources() {
 }
 
 /// What comes by way of flat mirrors waits in columns of its own.
-void PingUnderWay::hear_by_mirrors() {
-  const MultipathCounts counts =
-      sound_ghosts(scene_, cells_, bodies_, w_.laws, plan_, scalars_, kernels_, pool_, w_.multipath, points_);
+void PingSimulation::find_multipath_echoes() {
+  const MultipathCounts counts = simulate_multipath(context_, w_.multipath, points_);
   w_.statistics.rays += counts.rays;
   w_.statistics.echoes += counts.echoes;
 }
 
 /// Rays, echoes, pulses and noise, a group of columns at a time.
-void PingUnderWay::sound_columns() {
+void PingSimulation::simulate_columns() {
+  // All groups at once, or when an interruption is likely, as many as there are threads between two yield points.
   const auto all = static_cast<std::size_t>(groups());
   const std::size_t at_once = w_.between && w_.between->expected() ? static_cast<std::size_t>(pool_.threads()) : all;
   for (std::size_t from = 0; from < all; from += at_once) {
-    if (from > 0) w_.between->take();
+    if (from > 0) w_.between->run_other();
     pool_.for_each(std::min(at_once, all - from), [&](std::size_t g, int worker) {
       const int first = static_cast<int>(from + g) * group_columns_;
-      sound_group(first, std::min(first + group_columns_, plan_.columns.count), w_.workers[static_cast<std::size_t>(worker)]);
+      simulate_group(first, std::min(first + group_columns_, plan_.columns.count), w_.workers[static_cast<std::size_t>(worker)]);
     });
   }
 }
 
-void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) {
+void PingSimulation::simulate_group(int first, int last, Workspace::Buffers::PerWorker& mine) {
   Stopwatch watch(w_.now_s, mine.statistics);
-  const ReceiverNoise noise{request_.switches.noise ? &prepared_.noise : nullptr, request_.sonar_id,
-                            static_cast<std::uint32_t>(request_.number)};
+  const PingNoise draws{&prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number)};
+  const PingNoise noise{request_.switches.noise ? draws.table : nullptr, draws.sonar, draws.ping};
+  // Order of a column's sums: noise, echoes, multipath, volume, T(u), leak; outside the sector the noise follows T(u).
   begin_columns(plan_, noise, first, last, w_.columns);
   watch.lap(Stage::noise);
   if (plan_.spectral) plan_.spectral->begin(last - first, mine.spectral);
@@ -200,32 +267,31 @@ void PingUnderWay::sound_group(int first, int last, Workspace::PerWorker& mine) 
       scatter_cells_of(first, last, mine, watch);
   }
   if (plan_.spectral) plan_.spectral->finish(first, last, mine.spectral, w_.columns);
-  if (request_.switches.multipath && !request_.blank && !ray_is_scatterer()) add_ghosts(w_.multipath, first, last, w_.columns);
-  if (volume_.is_heard() && !request_.blank)
-    volume_.add(ray_is_scatterer() ? nullptr : &mine.seen, prepared_.noise, request_.sonar_id,
-                static_cast<std::uint32_t>(request_.number), first, last, mine.volume, w_.columns);
+  if (request_.switches.multipath && !request_.blank && !ray_is_scatterer()) add_multipath(w_.multipath, first, last, w_.columns);
+  if (volume_.is_audible() && !request_.blank)
+    volume_.add(ray_is_scatterer() ? nullptr : &mine.seen, draws, first, last, mine.volume, w_.columns);
   finish_columns(plan_, noise, first, last, w_.columns);
-  if (leak_.is_heard() && !request_.blank)
-    leak_.add(plan_, prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number), first, last, w_.columns);
+  if (leak_.is_audible() && !request_.blank) leak_.add(plan_, draws, first, last, w_.columns);
   watch.lap(Stage::noise);
 }
 
-void PingUnderWay::scatter_hits_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch) {
+void PingSimulation::scatter_hits_of(int first, int last, Workspace::Buffers::PerWorker& mine, Stopwatch& watch) {
   mine.hits.clear();
   trace_fixed_fan(scene_, plan_, scalars_, first, last, mine.hits);
   if (!w_.first_hits.empty()) note_first_hits(mine.hits, plan_, w_.first_hits);
   mine.statistics.rays += static_cast<std::size_t>(last - first) * static_cast<std::size_t>(plan_.fixed_fan);
   watch.lap(Stage::trace);
-  scatter_hits(mine.hits, scene_.scene(), w_.laws, plan_, scalars_, request_.seed, kernels_, mine.echoes);
+  scatter_hits(context_, mine.hits, request_.seed, mine.echoes);
   mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
   watch.lap(Stage::scatter);
   sum_pulses(first, mine);
   watch.lap(Stage::synthesize);
 }
 
-void PingUnderWay::scatter_cells_of(int first, int last, Workspace::PerWorker& mine, Stopwatch& watch) {
+void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::PerWorker& mine, Stopwatch& watch) {
   mine.seen.shape(first, last, plan_.fan.bins);
   for (int from = first; from < last; from += traced_columns()) {
+    // Rays draw the depth map of these columns (section 2).
     const int to = std::min(from + traced_columns(), last);
     mine.statistics.rays += trace_fan(scene_, plan_, scalars_, from, to, mine.fan, mine.seen);
     if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, from, to, w_.first_hits);
@@ -243,7 +309,7 @@ void PingUnderWay::scatter_cells_of(int first, int last, Workspace::PerWorker& m
 }
 
 /// In time where the pulse is real and tabulated, else by way of the spectrum.
-void PingUnderWay::sum_pulses(int first, Workspace::PerWorker& mine) {
+void PingSimulation::sum_pulses(int first, Workspace::Buffers::PerWorker& mine) {
   if (plan_.spectral)
     plan_.spectral->add(mine.echoes, first, mine.spectral);
   else
@@ -251,7 +317,7 @@ void PingUnderWay::sum_pulses(int first, Workspace::PerWorker& mine) {
 }
 
 /// Beams, envelope, gain and codes, a window of rows at a time.
-Ping PingUnderWay::image() {
+Ping PingSimulation::image() {
   Ping ping;
   ping.request = request_;
   shape_ping(plan_, request_.switches, ping);
@@ -261,7 +327,7 @@ Ping PingUnderWay::image() {
     const int first = static_cast<int>(window) * rows_at_once;
     image_rows(first, std::min(first + rows_at_once, rows), w_.workers[static_cast<std::size_t>(worker)], ping);
   });
-  for (const Workspace::PerWorker& worker : w_.workers) {
+  for (const Workspace::Buffers::PerWorker& worker : w_.workers) {
     for (std::size_t s = 0; s < w_.statistics.seconds.size(); ++s) w_.statistics.seconds[s] += worker.statistics.seconds[s];
     w_.statistics.rays += worker.statistics.rays;
     w_.statistics.echoes += worker.statistics.echoes;
@@ -269,27 +335,26 @@ Ping PingUnderWay::image() {
   return ping;
 }
 
-void PingUnderWay::image_rows(int first, int last, Workspace::PerWorker& mine, Ping& ping) {
+void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWorker& mine, Ping& ping) {
   Stopwatch watch(w_.now_s, mine.statistics);
   const int per_row = plan_.settings.samples_per_row;
-  couple(w_.columns, plan_.coupling, kernels_, first * per_row, (last - first) * per_row, plan_.settings.beam_count, mine.couple,
-         mine.beams);
+  mine.beams.shape(plan_.settings.beam_count, first * per_row, (last - first) * per_row);
+  form_beams(w_.columns, plan_.beam_weights, kernels_, mine.beam_scratch, mine.beams);
+  // On top of the beams at exact directions: points and other sonars; then crosstalk between the beams.
   add_points(points_, plan_, mine.beams);
   add_pulses(other_sonars_, plan_, mine.beams);
-  if (crosstalk_.is_heard()) crosstalk_.add(plan_, mine.beams);
-  watch.lap(Stage::couple);
+  if (crosstalk_.is_audible()) crosstalk_.add(plan_, mine.beams);
+  watch.lap(Stage::form_beams);
   receive(mine.beams, plan_, kernels_, mine.receive, ping);
   watch.lap(Stage::receive);
 }
 
-}  // namespace
-
 Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
               Workspace& work, Parallel& pool) {
-  PingUnderWay ping(scene, cells, request, kernels, work, pool);
-  ping.find_echo_sources();  // scatterers live on the surfaces; speckle is theirs
-  ping.sound_columns();      // trace_fan: what is visible; scatter: echoes; synthesize: pulses; receiver noise
-  return ping.image();       // couple: columns to beams; receive: envelope, TVG, samples
+  PingSimulation ping(scene, cells, request, kernels, work, pool);
+  ping.find_echo_sources();  // surface cells in view and point echoes
+  ping.simulate_columns();   // per column: depth map, echoes (eq. 6), pulses (eq. 8), receiver noise
+  return ping.image();       // form_beams: columns to beams; receive: envelope, TVG, samples
 }
 
 }  // namespace sonar

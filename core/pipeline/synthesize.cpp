@@ -4,21 +4,11 @@
 
 namespace sonar {
 
-void ColumnSignals::shape(int column_count, int sample_count, int taps) {
-  columns = column_count;
-  samples = sample_count;
-  lead = taps;
-  // Room for late pulses, and for tiles that read whole vectors past the last sample.
-  stride = 2 * (lead + samples + taps + 64);
-  stride = (stride + 15) / 16 * 16;
-  if (stride % 1024 == 0) stride += 16;  // columns that share cache sets would evict each other
-  data.resize(static_cast<std::size_t>(stride * column_count));
-}
-
 void clear_columns(ColumnSignals& signals, int first, int last) {
   std::fill(signals.column(first), signals.column(first) + (last - first) * signals.stride, 0.0f);
 }
 
+/// Eq. 8 (docs/acoustics.md, section 4): g_k[n] += A_i p(t_n - tau_i), p from the table of rows.
 void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernels& kernels, ColumnSignals& signals) {
   kernels.accumulate(echoes.at(0), echoes.count, pulse, signals.data.data(), signals.stride, 0, signals.lead);
   echoes.count = 0;
@@ -26,13 +16,14 @@ void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernel
 
 namespace {
 
-bool begins_with_noise(const PingPlan& plan, const ReceiverNoise& noise, int column) {
+bool begins_with_noise(const PingPlan& plan, const PingNoise& noise, int column) {
   return noise.table && !plan.expected_power && plan.columns.transmit[static_cast<std::size_t>(column)] == 1.0f;
 }
 
 }  // namespace
 
-void begin_columns(const PingPlan& plan, const ReceiverNoise& noise, int first, int last, ColumnSignals& signals) {
+void begin_columns(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) {
+  // rms of one column: the level at a beam's output over sqrt(sum_k W_jk^2) (section 5).
   const auto rms = static_cast<float>(plan.column_noise_upa);
   for (int k = first; k < last; ++k) {
     float *at = signals.column(k), *end = at + signals.stride;
@@ -47,18 +38,20 @@ void begin_columns(const PingPlan& plan, const ReceiverNoise& noise, int first, 
   }
 }
 
-void finish_columns(const PingPlan& plan, const ReceiverNoise& noise, int first, int last, ColumnSignals& signals) {
+void finish_columns(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) {
   const auto rms = static_cast<float>(plan.column_noise_upa);
   for (int k = first; k < last; ++k) {
     if (begins_with_noise(plan, noise, k)) continue;
     float* at = signals.column(k);
     const float amplitude = plan.columns.transmit[static_cast<std::size_t>(k)];
+    // T(u) of eq. 6: 1 over the sector, soft beyond. Noise is added after it.
     if (amplitude != 1.0f) {
       const float factor = plan.expected_power ? amplitude * amplitude : amplitude;
       for (std::ptrdiff_t i = 0; i < signals.stride; ++i) at[i] *= factor;
     }
     float* samples = at + 2 * signals.lead;
     if (!noise.table) continue;
+    // Expected power: E|n|^2 = rms^2 in every sample.
     if (plan.expected_power)
       for (int n = 0; n < signals.samples; ++n) samples[2 * n] += rms * rms;
     else

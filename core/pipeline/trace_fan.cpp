@@ -29,7 +29,7 @@ std::vector<ColumnSine> column_sines(const Columns& columns, int first, int last
   return sines;
 }
 
-/// Sixteen rays on their way: fills a packet lane by lane. Rays decide shadows only, so float directions do.
+/// Sixteen rays on their path: fills a packet lane by lane. Rays decide shadows only, so float directions do.
 class PacketFiller {
  public:
   PacketFiller(const PingPlan& plan, const PingScalars& scalars, float far_m)
@@ -95,12 +95,12 @@ class FanTracer {
   int elevations() const { return static_cast<int>(base_.size()); }
 
   /// Turns a lane of the packet into the sample it was traced for.
-  void take(int lane, Elevation e, ColumnSine column, Sample& sample) const {
+  void store(int lane, Elevation e, ColumnSine column, Sample& sample) const {
     sample.elevation_rad = e.angle_rad;
     sample.forward = plan_.switches.conical ? column.across * e.cosine : e.cosine;
     sample.tangent = e.sine / e.cosine;
     const auto i = static_cast<std::size_t>(lane);
-    sample.met = SurfaceMet::by(filler_.packet, i, filler_.packet.far[i], sample.forward);
+    sample.surface = SurfaceHit::by(filler_.packet, i, filler_.packet.far[i], sample.forward);
   }
 
   /// Elevation by elevation, sixteen neighbouring columns a packet: neighbours in a packet lie a fraction of a degree apart.
@@ -116,7 +116,7 @@ class FanTracer {
         filler_.trace(scene_);
         for (int k = from; k < to; ++k) {
           const std::int32_t index = (k - first_) * n + e;
-          take(k - from, elevation, column(k - first_), at(index));
+          store(k - from, elevation, column(k - first_), at(index));
           at(index).next = e + 1 < n ? index + 1 : -1;
           at(index).edge_above = false;
         }
@@ -138,9 +138,9 @@ class FanTracer {
       }
       filler_.trace(scene_);
       for (std::size_t i = 0; i < intervals.size(); ++i)
-        take(static_cast<int>(i), middle[i], column(intervals[i].column), s_.samples.emplace_back());
+        store(static_cast<int>(i), middle[i], column(intervals[i].column), s_.samples.emplace_back());
     };
-    refinement.run(trace, [this](std::size_t lane, int) { return SurfaceMet::direction(filler_.packet, lane); });
+    refinement.run(trace, [this](std::size_t lane, int) { return SurfaceHit::direction(filler_.packet, lane); });
   }
 
   /// Linear between hits of one surface, the farther value across edges.
@@ -154,7 +154,7 @@ class FanTracer {
         const Sample &a = at(i), &b = at(at(i).next);
         const float top = (b.tangent - fan.first_tangent) * fan.bins_per_tangent;
         const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
-        const float inverse_a = a.met.inverse_x, inverse_b = b.met.inverse_x, farther = std::min(inverse_a, inverse_b);
+        const float inverse_a = a.surface.inverse_x, inverse_b = b.surface.inverse_x, farther = std::min(inverse_a, inverse_b);
         const float per_tangent = (inverse_b - inverse_a) / (b.tangent - a.tangent);
         if (bin > end) continue;
         if (a.edge_above) {

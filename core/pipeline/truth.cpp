@@ -28,7 +28,8 @@ void note_first_hits(const FanScratch& fan, const PingPlan& plan, int first, int
     BeamTruth& nearest = by_column[static_cast<std::size_t>(k)];
     for (std::int32_t i = (k - first) * elevations; i >= 0; i = fan.samples[static_cast<std::size_t>(i)].next) {
       const FanScratch::Sample& s = fan.samples[static_cast<std::size_t>(i)];
-      if (s.met.object != RayPacket::miss && std::abs(s.elevation_rad) <= widest) note(s.met.range_m, s.met.object, nearest);
+      if (s.surface.object != RayPacket::miss && std::abs(s.elevation_rad) <= widest)
+        note(s.surface.range_m, s.surface.object, nearest);
     }
   }
 }

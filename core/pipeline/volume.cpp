@@ -5,13 +5,13 @@
 
 #include "core/base/units.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/noise_place.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 
 namespace sonar {
 namespace {
 
 constexpr int most_slices = 256;
-constexpr int noise_columns = 1 << 24;  // the receiver's noise has the columns below, this is ours: draws apart
 
 }  // namespace
 
@@ -38,7 +38,7 @@ Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars
         {from + bins_a_slice / 2, 1 / std::cos(psi), amplitude * amplitude * solid * (angle(from + bins_a_slice) - angle(from))});
     open_fan_ += slices_.back().weight;
   }
-  // sigma = 10^(S_v / 10) Psi r^2 (c / 2) tau_eff, its echo falls as r^-4.
+  // docs/acoustics.md, eq. 17: sigma = 10^(S_v / 10) Psi r^2 (c / 2) tau_eff, its echo falls as r^-4.
   const double at_1_m = scalars.source_upa * scalars.source_upa * power_from_db(static_cast<double>(water.volume_db)) * 0.5 *
                         scalars.sound_speed_mps * plan.pulse_shape.energy_width_s();
   for (int n = 0; n < plan.samples; ++n) {
@@ -60,8 +60,8 @@ void Volume::find_blocked(const DepthMap& seen, int column, std::vector<double>&
   }
 }
 
-void Volume::add(const DepthMap* seen, const NoiseTable& noise, std::uint32_t sonar, std::uint32_t ping, int first, int last,
-                 VolumeScratch& scratch, ColumnSignals& signals) const {
+void Volume::add(const DepthMap* seen, const PingNoise& noise, int first, int last, VolumeScratch& scratch,
+                 ColumnSignals& signals) const {
   const std::size_t samples = open_power_.size();
   scratch.blocked.assign(samples, 0.0);
   scratch.rms.resize(samples);
@@ -80,7 +80,8 @@ void Volume::add(const DepthMap* seen, const NoiseTable& noise, std::uint32_t so
     }
     if (plan_.expected_power) continue;
     scratch.grains.assign(2 * samples, 0.0f);
-    noise.add(sonar, ping, noise_columns + k, 1, static_cast<int>(samples), scratch.grains.data());
+    noise.table->add(noise.sonar, noise.ping, static_cast<int>(first_volume_column) + k, 1, static_cast<int>(samples),
+                     scratch.grains.data());
     for (std::size_t i = 0; i < 2 * samples; ++i) at[i] += scratch.rms[i / 2] * scratch.grains[i];
   }
 }

@@ -1,5 +1,5 @@
 // Reverberation of the water itself: what floats in it scatters a little everywhere, as far as nothing solid stands in the way.
-// Added to the column signals between synthesis and coupling (docs/acoustics.md, section 3).
+// Added to the column signals between synthesis and beamforming (docs/acoustics.md, section 3).
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,11 @@
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/ping_scalars.hpp"
-#include "core/pipeline/synthesize.hpp"
-#include "core/pipeline/trace_fan.hpp"
+#include "core/pipeline/signals.hpp"
 
 namespace sonar {
 
-/// Buffers of Volume::add that live from ping to ping; one per worker.
+/// Buffers of Volume::add that are kept from ping to ping; one per worker.
 struct VolumeScratch {
   std::vector<double> blocked;     // by sample: how much of the fan ends there
   std::vector<float> rms, grains;  // by sample; grains are complex
@@ -33,14 +32,14 @@ class Volume {
     double range_per_x, weight;
   };
 
-  bool is_heard() const { return !open_power_.empty(); }
+  bool is_audible() const { return !open_power_.empty(); }
   /// Adds to columns [first, last), before the transmitter's pattern is applied. `seen`: what the rays saw of these columns; null
   /// = the fan is open as far as it reaches. Drawn anew for every (seed, sonar, ping); in expected power the mean is added, and
   /// `noise` is not used.
-  void add(const DepthMap* seen, const NoiseTable& noise, std::uint32_t sonar, std::uint32_t ping, int first, int last,
-           VolumeScratch& scratch, ColumnSignals& signals) const;
+  void add(const DepthMap* seen, const PingNoise& noise, int first, int last, VolumeScratch& scratch,
+           ColumnSignals& signals) const;
 
-  // What add() works with, for who does the same elsewhere.
+  // The data of add(), for engines that do the same on a device.
   const std::vector<Slice>& slices() const { return slices_; }
   double open_fan() const { return open_fan_; }
   const std::vector<double>& open_power_upa2() const { return open_power_; }

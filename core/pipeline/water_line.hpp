@@ -1,5 +1,5 @@
 // Which side of the sea surface a sonar is on. Engines ask before they compute, so that a sonar that floats sees what one just
-// below the surface sees, and one in the air hears noise.
+// below the surface sees, and one in the air receives noise only.
 #pragma once
 
 #include <span>
@@ -10,17 +10,17 @@
 
 namespace sonar {
 
-/// Nobody is nearer to the sea surface, z = 0, than this [m]: who is, or is up to as much above it, is taken so deep.
+/// Depth [m] at which a sonar is computed when it is nearer to the sea surface, z = 0, or up to as much above it.
 inline constexpr double least_depth_m = 1e-3;
 
-/// Whether a sonar there is above the sea surface and hears noise only; false in scenes without one.
+/// Whether a sonar there is above the sea surface and receives noise only; false in scenes without one.
 bool is_in_air(const Pose& sonar_in_world, const Scene& scene);
 
 /// The requests as they are to be computed; those given where nothing is to be changed, else copies in `room`. In scenes with a
-/// sea surface: a sonar above it hears nothing (blank), one at it is put just below, and none leaves the water during its ping.
+/// sea surface: the ping of a sonar above it is blank, one at it is put just below, and none leaves the water during its ping.
 std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room);
 
-/// Pings of such requests tell where their sonars really were; PingRequest::blank is left as it was computed.
+/// Puts the true poses of the sonars back into the pings of such requests; PingRequest::blank is left as it was computed.
 void tell_as_asked(std::span<const PingRequest> requests, std::span<Ping> pings);
 
 }  // namespace sonar

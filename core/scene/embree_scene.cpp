@@ -127,8 +127,6 @@ void add_object(const Device& device, Group& group, const Mesh& mesh, const Pose
 template <class Packet>
 constexpr int lanes_of = std::extent_v<decltype(Packet::ray.org_x)>;
 
-bool same(const Pose& a, const Pose& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
-
 }  // namespace
 
 struct RayScene::Impl {
@@ -208,7 +206,7 @@ struct RayScene::Impl {
     bool moved = placed.empty();
     placed.resize(groups.size() - 1, Pose{{HUGE_VAL, 0, 0}, {}});
     for (std::size_t b = 0; b < std::min(bodies.size(), placed.size()); ++b) {
-      if (same(bodies[b], placed[b])) continue;
+      if (bodies[b] == placed[b]) continue;
       moved = true;
       placed[b] = bodies[b];
       turned[b + 1] = rotation_from(bodies[b].orientation);
@@ -250,17 +248,17 @@ struct RayScene::Impl {
     }
     intersect(valid, traced, query, q);
 
-    const auto take = [&](auto* to, const auto* from) {
+    const auto copy_back = [&](auto* to, const auto* from) {
       for (int i = 0; i < lanes; ++i) to[first + i] = valid[i] != 0 ? from[i] : to[first + i];
     };
-    take(rays.far, q.ray.tfar), take(rays.triangle, q.hit.primID);
-    take(rays.normal_x, q.hit.Ng_x), take(rays.normal_y, q.hit.Ng_y), take(rays.normal_z, q.hit.Ng_z);
+    copy_back(rays.far, q.ray.tfar), copy_back(rays.triangle, q.hit.primID);
+    copy_back(rays.normal_x, q.hit.Ng_x), copy_back(rays.normal_y, q.hit.Ng_y), copy_back(rays.normal_z, q.hit.Ng_z);
     for (int i = 0; i < lanes; ++i)
       if (valid[i] != 0 && q.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID)
-        take_object(rays, first + i, q.hit.geomID[i], q.hit.instID[0][i]);
+        set_object(rays, first + i, q.hit.geomID[i], q.hit.instID[0][i]);
   }
 
-  void take_object(RayPacket& rays, int lane, unsigned geometry, unsigned instance) const {
+  void set_object(RayPacket& rays, int lane, unsigned geometry, unsigned instance) const {
     const std::size_t group = instance == RTC_INVALID_GEOMETRY_ID ? 0 : instance;
     rays.object[lane] = groups[group].objects[geometry];
     if (group == 0) return;

@@ -1,5 +1,5 @@
 // The box that things fill along some axes, and what its size may give away. Used to judge scenes and poses: `sonarctl scene`,
-// daemon/world/plausibility.
+// daemon/emulator/world/plausibility.
 #pragma once
 
 #include <algorithm>
@@ -34,6 +34,7 @@ struct Extent {
     const auto outside = [](double low, double at, double high) { return std::max({low - at, 0.0, at - high}); };
     return length(Vec3d{outside(low_m.x, p.x, high_m.x), outside(low_m.y, p.y, high_m.y), outside(low_m.z, p.z, high_m.z)});
   }
+  bool operator==(const Extent&) const = default;
 };
 
 /// Along the mesh's own axes.

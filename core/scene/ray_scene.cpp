@@ -1,9 +1,9 @@
-// What is asked of rays, whoever traces them.
+// Queries that are the same for every tracer of rays.
 #include "core/scene/ray_scene.hpp"
 
 namespace sonar {
 
-bool is_hidden(const RayScene& scene, Vec3d from, Vec3d place) {
+bool is_occluded(const RayScene& scene, Vec3d from, Vec3d place) {
   RayPacket ray{};
   const double distance = length(place - from);
   const Vec3 o = to_float(from - scene.origin()), d = to_float((1 / distance) * (place - from));

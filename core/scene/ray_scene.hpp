@@ -51,6 +51,6 @@ class RayScene {
 };
 
 /// Whether anything stands between two places of the world; what lies at the far one itself does not count.
-bool is_hidden(const RayScene& scene, Vec3d from, Vec3d place);
+bool is_occluded(const RayScene& scene, Vec3d from, Vec3d place);
 
 }  // namespace sonar

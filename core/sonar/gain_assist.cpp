@@ -27,7 +27,7 @@ double percentile_of_full_scale(const Ping& ping, double share) {
 }
 
 double next_gain_db(double gain_db, double level, double gamma, double passed_s) {
-  const double least_level = 1e-3;  // a black picture asks for more, but not for everything at once
+  const double least_level = 1e-3;  // a black picture raises the gain, but in steps
   double wanted_db = 20 / gamma * std::log10(assisted_level / std::max(level, least_level));
   if (level >= 0.999) wanted_db -= assumed_overload_db;
   const double part = 1 - std::exp(-std::max(passed_s, 0.0) / assist_time_s);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "core/base/geometry.hpp"
@@ -20,9 +21,12 @@ namespace sonar {
 /// What makes scatterers of the scene (docs/acoustics.md, section 8).
 enum class Mode {
   canonical,  // surface cells: the model of docs/acoustics.md
-  paper,      // Choi 2025 as printed: a fixed fan of rays, a frequency sum, its own beam coupling
+  paper,      // Choi 2025 as printed: a fixed fan of rays, a frequency sum, its own beamforming
   raster,     // the same with scatterers sampled on a perspective pixel grid, as the older method does
 };
+inline constexpr std::array<std::string_view, 3> mode_names = {"canonical", "paper", "raster"};
+
+inline constexpr std::string_view name_of(Mode mode) { return mode_names[static_cast<std::size_t>(mode)]; }
 
 /// Parts of the model that can be switched (docs/acoustics.md, section 8). The defaults are the canonical model.
 struct Switches {
@@ -58,7 +62,7 @@ struct NamedSwitch {
 };
 inline constexpr std::array<NamedSwitch, 11> named_switches{{
     {"noise", &Switches::noise, "receiver noise"},
-    {"specular", &Switches::specular, "mirror echoes of smooth surfaces"},
+    {"specular", &Switches::specular, "specular echoes of smooth surfaces"},
     {"texture", &Switches::texture, "patchiness of materials that have a texture"},
     {"volume", &Switches::volume, "reverberation of the water itself"},
     {"multipath", &Switches::multipath, "paths by way of flat mirrors: water surface, tank walls"},
@@ -76,6 +80,14 @@ struct Twist {
   Vec3d angular_rate_radps;  // sonar axes
 };
 
+/// Base of what a vendor's protocol keeps beside PingSettings, such as the client's own request; core only carries it, so that a
+/// ping is framed with the settings it was made with.
+struct VendorSettings {
+  virtual ~VendorSettings() = default;
+  /// Whether a client would see no difference; both are of the same vendor.
+  virtual bool equals(const VendorSettings& other) const = 0;
+};
+
 struct PingRequest {
   std::shared_ptr<const SonarModel> model;
   PingNumber number{};
@@ -86,8 +98,8 @@ struct PingRequest {
   std::vector<Pose> bodies_in_world;  // moving bodies, in the scene's order; empty = where the scene file put them
   Water water;
   PingSettings settings;
-  std::uint64_t settings_id = 0;  // which client request these settings came from: the echo belongs to the ping
-  std::uint32_t sonar_id = 0;     // keys the receiver noise
+  std::shared_ptr<const VendorSettings> vendor_settings;  // may be null
+  std::uint32_t sonar_id = 0;                             // keys the receiver noise
   Seed seed{};
   bool blank = false;  // no scene, noise only: on_stale: blank, or the sonar is out of the water
   Switches switches;

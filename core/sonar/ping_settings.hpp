@@ -11,6 +11,8 @@ struct SampleFormat {
   std::uint32_t max_code = 254;  // saturation value
   float gamma = 1;               // sample = max_code * (v / full scale)^gamma
   bool row_gains = false;        // a power gain per row, see Ping::row_gain
+
+  bool operator==(const SampleFormat&) const = default;
 };
 
 struct PingSettings {
@@ -29,8 +31,10 @@ struct PingSettings {
   float device_sound_speed_mps = 1500;   // what the device believes
   float device_absorption_db_per_m = 0;  // one way, what its TVG believes
   bool triggered = false;                // one ping per request of the client
-  bool transmit = true;                  // false: it only listens, and hears noise
+  bool transmit = true;                  // false: it receives noise only
   SampleFormat format;
+
+  bool operator==(const PingSettings&) const = default;
 };
 
 }  // namespace sonar

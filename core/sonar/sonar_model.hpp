@@ -27,14 +27,14 @@ struct BeamPattern {
 };
 
 /// How the receiver turns pressure into samples (docs/acoustics.md, section 7); constants of the product.
-struct ReceiverLaw {
+struct ReceiverModel {
   float tvg_slope_db = 30;  // X of X log10 r
   float tvg_minimum_range_m = 0.5f;
   float tvg_ceiling_db = 80;  // infinity switches it off
   float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
   float crosstalk_db = -200;  // amplitude that every channel leaks to every beam, re the channel; below -150 = none
-  float leak_upa = 0;         // rms pressure of the transmitter heard directly, at range 0; 0 = none
+  float leak_upa = 0;         // rms pressure of the transmitter's direct leakage, at range 0; 0 = none
   float leak_decay_db_per_m = 30;
 };
 
@@ -48,7 +48,7 @@ struct FrequencyMode {
   BeamSpacing beam_spacing = BeamSpacing::uniform_in_sine;
   BeamPattern pattern;
   Waveform waveform;
-  ReceiverLaw receiver;
+  ReceiverModel receiver;
 };
 
 struct SonarModel {

@@ -1,5 +1,5 @@
 // Absorption, sound speed, density and pressure of the water, as published formulae with their published digits.
-// Floor 0: the ping asks for them once per request, the vendors for what their device believes.
+// Used by the ping once per request, and by vendors for the values that their device assumes.
 #include "core/sonar/water.hpp"
 
 #include <algorithm>

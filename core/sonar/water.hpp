@@ -11,6 +11,10 @@ struct Water {
   double ph = 8.0;
   double sound_speed_mps = 0;  // 0 = computed from the rest (see true_sound_speed_mps)
 };
+constexpr bool operator==(const Water& a, const Water& b) {
+  return a.temperature_c == b.temperature_c && a.salinity_psu == b.salinity_psu && a.ph == b.ph &&
+         a.sound_speed_mps == b.sound_speed_mps;
+}
 
 /// Francois & Garrison 1982. Frequency [Hz], depth [m]; one-way, dB/m.
 double absorption_db_per_m(const Water& water, double depth_m, double frequency_hz);

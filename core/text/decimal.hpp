@@ -1,4 +1,4 @@
-// Numbers out of text, decimal only, the whole text or nothing. Used by the strict YAML cursors, command lines and grid files.
+// Parses decimal numbers; the whole text must be a number. Used by the strict YAML cursors, command lines and grid files.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The nearest valid name to a mistyped one, for "did you mean" sentences. Used by every reader of names: keys, choices,
+// Finds the nearest valid name to a mistyped one, for "did you mean" errors. Used by all readers of names: keys, choices,
 // materials.
 #pragma once
 
@@ -8,9 +8,10 @@
 
 namespace sonar::text {
 
-/// The candidate within a third of the name's length (at least one edit; swaps count one, case and - _ count nothing), or empty.
+/// The candidate within a third of the name's length (at least one edit; a swap counts as one; case and - _ are ignored), or
+/// empty.
 std::string_view nearest(std::string_view name, std::span<const std::string_view> candidates);
-/// `; did you mean "x"?` when something is near, `; <label>: a, b, c` otherwise (at most twelve), or empty without candidates.
+/// `; did you mean "x"?` for a near name, `; <label>: a, b, c` otherwise (at most twelve), or empty without candidates.
 std::string suggestion(std::string_view name, std::span<const std::string_view> candidates, std::string_view label);
 
 }  // namespace sonar::text

@@ -1,4 +1,4 @@
-// YAML read strictly: cursors over a parsed file that know where every value stands and refuse what nobody asked for.
+// Strict YAML: cursors over a parsed file that know the position of every value and reject unknown keys.
 // Floor 0: configuration and scenes read through it; yaml-cpp is included by strict_yaml.cpp and nowhere else.
 //
 //   auto document = text::parse_yaml_file(path, {.error_kind = ErrorKind::config});

@@ -267,7 +267,7 @@ std::optional<Error> Document::error() const { return tree_->first_error; }
 
 namespace {
 
-// A key nobody asked for that is near a missing one tells more than the missing one does.
+// An unknown key that is near a missing one explains more than the missing key does.
 std::optional<Error> check_keys(const YamlTree& tree, const YamlNode& map) {
   std::vector<std::string_view> valid(map.asked.begin(), map.asked.end());
   std::vector<std::string_view> missing(map.missing.begin(), map.missing.end());

@@ -116,10 +116,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     Map clients = node.map();
     sonar.max_clients =
         static_cast<int>(clients.optional("max").integer_or(profile ? profile->vendor->default_max_clients() : 1, 1, 16));
-    sonar.when_full = clients.optional("when_full")
-                          .choice_or(WhenClientsFull::close_new, {{"close_new", WhenClientsFull::close_new},
-                                                                  {"take_over", WhenClientsFull::take_over},
-                                                                  {"queue", WhenClientsFull::queue}});
+    sonar.when_full = read_enum(clients.optional("when_full"), sonar.when_full, when_clients_full_names);
   } else if (profile) {
     sonar.max_clients = profile->vendor->default_max_clients();
   }
@@ -134,10 +131,9 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
   if (Node node = map.optional("outbox")) {
     Map outbox = node.map();
     sonar.outbox.depth = static_cast<int>(outbox.optional("depth").integer_or(1, 1, OutboxRules::deepest));
-    sonar.outbox.when_full = outbox.optional("full").choice_or(
-        WhenFull::replace_oldest, {{"replace_oldest", WhenFull::replace_oldest}, {"drop_newest", WhenFull::drop_newest}});
+    sonar.outbox.when_full = read_enum(outbox.optional("full"), sonar.outbox.when_full, when_full_names);
   }
-  sonar.overload = map.optional("overload").choice_or(Overload::slow, {{"slow", Overload::slow}, {"count", Overload::count}});
+  sonar.overload = read_enum(map.optional("overload"), sonar.overload, overload_names);
   const Node options = map.optional("options");
   if (profile) {
     sonar.profile = *profile;
@@ -148,7 +144,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
   } else if (options.present()) {
     options.map().entries();
   }
-  for (const SonarConfig& other : config.sonars) {  // what is not there is the fault to be told, not that it is not there twice
+  for (const SonarConfig& other : config.sonars) {  // a missing key is reported once, not also as a duplicate
     if (name.present() && other.name == sonar.name) name.fail("\"" + sonar.name + "\" is used twice");
     if (map.has("bind_ip") && other.bind_ip == sonar.bind_ip)
       map.required("bind_ip").fail(text_of(sonar.bind_ip) + " is already used by sonar \"" + other.name +
@@ -178,22 +174,18 @@ void read_poses(const Node& node, const std::vector<VehicleConfig>& vehicles, Po
   poses.protobuf = read_listener(map.optional("protobuf"), 14770, !poses.allow_from.empty());
   poses.json = read_listener(map.optional("json"), 14771, !poses.allow_from.empty());
   poses.mavlink = read_mavlink(map.optional("mavlink"), !poses.allow_from.empty(), vehicles);
-  const bool same = poses.protobuf.enabled && poses.json.enabled && poses.json.at.port != 0 &&
-                    poses.protobuf.at.ip == poses.json.at.ip && poses.protobuf.at.port == poses.json.at.port;
-  if (same) map.optional("json").fail("the same address as poses.protobuf; give each its own port");
+  if (poses.protobuf.enabled && poses.protobuf == poses.json && poses.json.at.port != 0)
+    map.optional("json").fail("the same address as poses.protobuf; give each its own port");
   poses.extrapolate_max_s = map.optional("extrapolate_max_s").number_or(poses.extrapolate_max_s, Range::between(0, 10));
   poses.stale_after_s = map.optional("stale_after_s").number_or(poses.stale_after_s, Range::between(0.01, 3600));
   poses.max_jump_m = map.optional("max_jump_m").number_or(poses.max_jump_m, Range::between(0.001, 1e7));
-  poses.on_stale = map.optional("on_stale")
-                       .choice_or(OnStale::hold, {{"hold", OnStale::hold}, {"blank", OnStale::blank}, {"stop", OnStale::stop}});
+  poses.on_stale = read_enum(map.optional("on_stale"), poses.on_stale, on_stale_names);
 }
 
 void read_log(const Node& node, LogOptions& log) {
   if (!node.present()) return;
   Map map = node.map();
-  log.level = map.optional("level").choice_or(
-      LogLevel::info,
-      {{"debug", LogLevel::debug}, {"info", LogLevel::info}, {"warning", LogLevel::warning}, {"error", LogLevel::error}});
+  log.level = read_enum(map.optional("level"), log.level, log_levels);
   log.json = map.optional("format").choice_or<bool>(false, {{"text", false}, {"json", true}});
 }
 
@@ -204,7 +196,7 @@ RecordingConfig read_recording(const Node& node, const std::filesystem::path& di
   const std::filesystem::path path = (directory / folder.text()).lexically_normal();
   std::error_code ec;
   if (folder.present() && !std::filesystem::is_directory(path, ec))
-    folder.fail("is no folder: " + path.string() + "; make it first, writable for sonard");
+    folder.fail("is not a folder: " + path.string() + "; make it first, writable for sonard");
   return {path};
 }
 
@@ -231,10 +223,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   config.limits = read_limits(root.optional("limits"));
   config.recording = read_recording(root.optional("recording"), directory);
   const Node clock = root.optional("clock");
-  config.clock = clock.choice_or(ClockMode::realtime, {{name_of(ClockMode::realtime), ClockMode::realtime},
-                                                       {name_of(ClockMode::stepped), ClockMode::stepped},
-                                                       {name_of(ClockMode::lockstep), ClockMode::lockstep},
-                                                       {name_of(ClockMode::follow), ClockMode::follow}});
+  config.clock = read_enum(clock, config.clock, clock_modes);
   config.clock_place = clock.present() ? clock.location() + ": " + clock.path() : name + ": clock";
   read_log(root.optional("log"), config.log);
   if (auto error = document.finish()) return tl::make_unexpected(*error);
@@ -262,10 +251,10 @@ Result<void> check_time_can_pass(const Config& config) {
   const bool has_poses = config.poses.protobuf.enabled || config.poses.json.enabled || !config.poses.mavlink.empty();
   const char* why = nullptr;
   if (config.clock == ClockMode::lockstep && !has_control)
-    why = "lockstep lets time pass when control asks for it, and control.stream and control.http are off: leave one on";
+    why = "lockstep advances time by control requests, and control.stream and control.http are off: leave one on";
   if (config.clock == ClockMode::follow && !has_control && !has_poses)
     why =
-        "follow lets time pass by the stamps of poses, and poses.protobuf, poses.json, poses.mavlink and control are off: leave "
+        "follow advances time by the stamps of poses, and poses.protobuf, poses.json, poses.mavlink and control are off: leave "
         "one on";
   return why == nullptr ? Result<void>{} : failure(ErrorKind::config, config.clock_place + ": " + why);
 }

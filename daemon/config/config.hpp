@@ -2,6 +2,7 @@
 // Nothing else in the daemon reads settings from anywhere.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -16,18 +17,22 @@
 #include "core/motion/playback.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/sonar/water.hpp"
+#include "daemon/config/addresses.hpp"
 #include "daemon/config/clock_mode.hpp"
+#include "daemon/config/log_options.hpp"
 #include "daemon/config/outbox_rules.hpp"
 #include "daemon/config/scene_file.hpp"
-#include "daemon/system/addresses.hpp"
-#include "daemon/system/log.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar {
 
+// Enums, each with the names of its values in a configuration (config/enum_names.hpp).
 enum class WhenClientsFull { close_new, take_over, queue };
+inline constexpr std::array<std::string_view, 3> when_clients_full_names = {"close_new", "take_over", "queue"};
 enum class OnStale { hold, blank, stop };
-enum class Overload { slow, count };  // ticks without a ping: unseen by clients, or gaps in the ping numbers
+inline constexpr std::array<std::string_view, 3> on_stale_names = {"hold", "blank", "stop"};
+enum class Overload { slow, count };  // ticks without a ping: clients do not see them, or gaps in the ping numbers
+inline constexpr std::array<std::string_view, 2> overload_names = {"slow", "count"};
 
 struct VehicleConfig {
   std::string name;
@@ -40,7 +45,7 @@ struct VehicleConfig {
 struct ObjectConfig {
   std::string name;
   motion::Plan plan;
-  std::string place;  // file:line:col: key.path, for what only the scene can tell
+  std::string place;  // file:line:col: key.path, for errors found with the scene
 };
 struct SonarConfig {
   std::string name;
@@ -53,8 +58,8 @@ struct SonarConfig {
   std::uint16_t device_id = 0;
   int max_clients = 1;
   WhenClientsFull when_full = WhenClientsFull::close_new;
-  int max_observers = 4;            // who only look on; 0 = nobody
-  std::uint16_t observer_port = 0;  // 0 = any that is free
+  int max_observers = 4;            // connections that only receive; 0 = none
+  std::uint16_t observer_port = 0;  // 0 = any free port
   OutboxRules outbox;
   Overload overload = Overload::slow;
   protocol::OptionValues options;  // complete
@@ -62,52 +67,57 @@ struct SonarConfig {
 struct PoseListener {
   bool enabled = true;
   Endpoint at;
+  bool operator==(const PoseListener&) const = default;
 };
-/// A MAVLink link that poses come by (docs/autopilots.md).
+/// A MAVLink link that poses come by (docs/poses.md, "MAVLink").
 struct MavlinkConfig {
-  bool dials = false;  // udpout: we speak first, and hear that address only
+  bool dials = false;  // udpout: we send first, and accept that address only
   Endpoint at;
   std::string vehicle;
-  std::uint8_t system_id = 0, component_id = 0;  // 0 = the first that speaks
+  std::uint8_t system_id = 0, component_id = 0;  // 0 = that of the first message
   bool request_rates = false;                    // ask the autopilot for its messages, rate_hz each
   double rate_hz = 50;
+  bool operator==(const MavlinkConfig&) const = default;
 };
 struct PoseConfig {
   PoseListener protobuf, json;
   std::vector<MavlinkConfig> mavlink;
-  std::vector<AddressRange> allow_from;  // empty = anybody who reaches the listener (loopback only)
+  std::vector<AddressRange> allow_from;  // empty = any sender (loopback only)
   double extrapolate_max_s = 0.2;
   double stale_after_s = 1.0;
   OnStale on_stale = OnStale::hold;
   double max_jump_m = 50;
 };
-/// Who may steer the daemon, and where they ask (docs/control.md).
+/// The control interfaces (docs/control.md).
 struct ControlConfig {
   PoseListener stream{true, {{127, 0, 0, 1}, 14770}};  // TCP: the control stream
   PoseListener http{true, {{127, 0, 0, 1}, 8088}};
-  bool stream_given = false, http_given = false;  // by the file: then it must be free; the default gives way with a warning
-  std::filesystem::path token_file;               // empty = none; needed when a listener is not on loopback
-  std::vector<std::string> hosts;                 // names that HTTP's Host and Origin may have, beside addresses and localhost
+  bool stream_given = false,
+       http_given = false;           // by the file: then an address in use is an error; for a default it is a warning
+  std::filesystem::path token_file;  // empty = none; needed when a listener is not on loopback
+  std::vector<std::string> hosts;    // allowed names in HTTP's Host and Origin, beside addresses and localhost
+  bool operator==(const ControlConfig&) const = default;
 };
-/// What strangers may cost us.
+/// Resource limits for clients.
 struct LimitConfig {
   int clients = 256;                             // of all sonars together; 16 of one: SonarConfig::max_clients
   int control_clients = 32;                      // of the stream, and of HTTP
-  std::size_t input_bytes_per_s = 1u << 20;      // of one client; more is read more slowly
+  std::size_t input_bytes_per_s = 1u << 20;      // of one client; reading slows down above it
   std::size_t pose_bytes_per_s = 2u << 20;       // of all pose connections together
   std::size_t control_message_bytes = 1u << 20;  // of one message of the stream, one body of HTTP
-  std::chrono::milliseconds stall{10000};        // a client that takes no byte for so long is reset
-  std::chrono::milliseconds dead_peer{15000};    // one whose computer answers nothing
-  int spare_descriptors = 32;                    // never given to clients
-  std::chrono::milliseconds load{120000};        // a scene that takes longer to load is trouble
+  std::chrono::milliseconds stall{10000};        // a client that reads no byte for so long is reset
+  std::chrono::milliseconds dead_peer{15000};    // a client whose computer does not answer is reset
+  int spare_descriptors = 32;                    // file descriptors reserved for the daemon
+  std::chrono::milliseconds load{120000};        // a scene that takes longer to load makes the daemon unhealthy
 };
-/// Recordings that control may ask for (docs/recording.md).
+/// Recordings by control requests (docs/recording.md).
 struct RecordingConfig {
-  std::filesystem::path folder;  // an existing one; empty = nothing may be recorded
+  std::filesystem::path folder;  // an existing one; empty = recording is off
 };
 inline constexpr int most_fixed_rays = 100000;  // a column
 /// What computes the pings (docs/cuda.md).
 enum class EngineDevice { cpu, cuda, automatic };
+inline constexpr std::array<std::string_view, 3> engine_device_names = {"cpu", "cuda", "auto"};
 
 struct EngineConfig {
   int threads = 0;      // 0 = all cores
@@ -118,12 +128,12 @@ struct EngineConfig {
 };
 
 struct Config {
-  std::string source;  // the file, or what stands in for it
+  std::string source;  // the file, or "demo"
   SceneFile scene;     // as found
   std::uint64_t seed = 1;
-  std::optional<Geodetic> origin;  // where latitudes and longitudes are counted from
+  std::optional<Geodetic> origin;  // of latitudes and longitudes
   Water water;
-  bool allow_hot = false;  // water of 30 C or more is meant
+  bool allow_hot = false;  // accepts water of 30 C or more
   std::vector<VehicleConfig> vehicles;
   std::vector<ObjectConfig> objects;
   std::vector<SonarConfig> sonars;
@@ -133,7 +143,7 @@ struct Config {
   RecordingConfig recording;
   EngineConfig engine;
   ClockMode clock = ClockMode::realtime;
-  std::string clock_place;  // file:line:col: clock, for what only shows with the command line
+  std::string clock_place;  // file:line:col: clock, for errors found with the command line
   LogOptions log;
 };
 
@@ -141,7 +151,7 @@ struct Config {
 Result<Config> load_config(const std::filesystem::path& file);
 /// `directory` is where relative scene paths start; `name` stands in errors for the file.
 Result<Config> parse_config(std::string_view yaml, const std::string& name, const std::filesystem::path& directory);
-/// What time waits for must be able to come; asked when the command line has had its say. config.
+/// Checks that a lockstep or follow clock has a source that can advance it. Call after applying command-line options. config.
 Result<void> check_time_can_pass(const Config& config);
 /// What runs when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. Needs no files.
 Result<Config> demo_config();

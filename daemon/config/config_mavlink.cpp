@@ -1,4 +1,4 @@
-// Where poses come from by MAVLink, from the configuration: poses.mavlink and world.origin (docs/autopilots.md).
+// Where poses come from by MAVLink, from the configuration: poses.mavlink and world.origin (docs/poses.md).
 #include <algorithm>
 
 #include "core/text/decimal.hpp"
@@ -29,7 +29,7 @@ void read_link(const Node& node, bool has_ranges, MavlinkConfig& link) {
 }
 
 std::string read_vehicle(Map& map, const std::vector<VehicleConfig>& vehicles) {
-  if (vehicles.empty()) return {};  // an error told elsewhere
+  if (vehicles.empty()) return {};  // reported elsewhere
   const Node node = vehicles.size() > 1 ? map.required("vehicle") : map.optional("vehicle");
   if (!node.present()) return vehicles.front().name;
   std::vector<std::string_view> names;

@@ -121,16 +121,10 @@ EngineConfig read_engine(const Node& node) {
   Map map = node.map();
   engine.threads = static_cast<int>(map.optional("threads").integer_or(0, 0, 256));
   engine.io_priority = static_cast<int>(map.optional("io_priority").integer_or(0, 0, 99));
-  map.optional("quality").choice_or<int>(0, {{"default", 0}});
-  engine.device = map.optional("device").choice_or(
-      EngineDevice::cpu, {{"auto", EngineDevice::automatic}, {"cpu", EngineDevice::cpu}, {"cuda", EngineDevice::cuda}});
-  engine.simd = map.optional("simd").choice_or(SimdLevel::automatic, {{"auto", SimdLevel::automatic},
-                                                                      {"portable", SimdLevel::portable},
-                                                                      {"avx2", SimdLevel::avx2},
-                                                                      {"avx512", SimdLevel::avx512}});
+  engine.device = read_enum(map.optional("device"), engine.device, engine_device_names);
+  engine.simd = read_enum(map.optional("simd"), engine.simd, simd_level_names);
   engine.switches.expected_power = map.optional("expected_power").boolean_or(false);
-  engine.switches.mode = map.optional("mode").choice_or(
-      Mode::canonical, {{"canonical", Mode::canonical}, {"paper", Mode::paper}, {"raster", Mode::raster}});
+  engine.switches.mode = read_enum(map.optional("mode"), engine.switches.mode, mode_names);
   engine.switches.fixed_fan = static_cast<int>(map.optional("fixed_fan").integer_or(0, 0, most_fixed_rays));
   for (const NamedSwitch& part : named_switches) {
     bool& is_on = engine.switches.*part.is_on;

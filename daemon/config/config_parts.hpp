@@ -1,5 +1,5 @@
 // Parts that the configuration and the render files have in common: poses, water, options of a sonar, switches of the engine.
-// Readers over strict_yaml cursors; what is wrong is told by the document's finish().
+// Readers over strict_yaml cursors; errors are returned by the document's finish().
 #pragma once
 
 #include <filesystem>
@@ -9,6 +9,11 @@
 
 namespace sonar {
 
+/// One of an enum's names, which are in the order of its values.
+template <class Enum, std::size_t n>
+Enum read_enum(const text::Node& node, Enum fallback, const std::array<std::string_view, n>& names) {
+  return node.present() ? static_cast<Enum>(node.choice_index({names.begin(), names.end()})) : fallback;
+}
 /// `{frame: ENU_FLU | NED_FRD, xyz_m, rpy_deg}`; absent = the origin.
 Pose read_world_pose(const text::Node& node);
 /// `{frame: FLU | FRD, xyz_m, rpy_deg}` of a sonar on its vehicle.
@@ -17,15 +22,15 @@ Pose read_mount(const text::Node& node);
 Endpoint read_endpoint(const text::Node& node, bool port_needed);
 /// `{lat, lon, alt}` of the world's origin; absent = nowhere.
 std::optional<Geodetic> read_origin(const text::Node& node);
-/// One endpoint, or a list of links. `has_ranges`: poses.allow_from says who is heard.
+/// One endpoint, or a list of links. `has_ranges`: poses.allow_from is given.
 std::vector<MavlinkConfig> read_mavlink(const text::Node& node, bool has_ranges, const std::vector<VehicleConfig>& vehicles);
 /// Relative files start in `directory`.
 ControlConfig read_control(const text::Node& node, const std::filesystem::path& directory);
 /// The name of a scene file, found as find_scene() does.
 SceneFile read_scene_file(const text::Node& node, const std::filesystem::path& directory);
-/// Whether water of 30 C or more is meant is told beside it.
+/// `allow_hot` receives whether water of 30 C or more is accepted.
 Water read_water(const text::Node& node, bool* allow_hot = nullptr);
-/// The same rules for water that came otherwise: empty, or one sentence.
+/// The same rules for water from elsewhere: empty, or one sentence.
 std::string why_no_water(const Water& water, bool allow_hot);
 /// Complete: defaults filled in. `others_too`: options that only other vendors have are checked and kept (products.hpp tells
 /// them).

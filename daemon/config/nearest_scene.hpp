@@ -1,5 +1,4 @@
-// What somebody may have meant who named a scene that is nowhere: the nearest name among those that find_scene() would find.
-// Used by the readers of configurations and render files, for their refusal.
+// Suggests the closest scene name that find_scene() would find, for errors of configurations and render files.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// What follows from the choice of a product: which vendor's options count, and the demo with another sonar than its own.
+// What depends on the product of a sonar: the options that have an effect, and `sonard --profile`.
 #pragma once
 
 #include <string>
@@ -10,10 +10,10 @@
 
 namespace sonar {
 
-/// "Oculus", "BlueView": as the names of the vendor's products begin.
+/// "Oculus", "BlueView": the first word of the vendor's product names.
 std::string title_of(const protocol::Vendor& vendor);
 
-/// Places for those who only look on: none of a product that has places for several clients.
+/// Default number of observers: 0 for a product that accepts several clients.
 int default_max_observers(const protocol::Vendor& vendor);
 
 /// A sentence for each option that the configuration gives to a sonar of another vendor. Such options have no effect: a

@@ -40,7 +40,7 @@ TrajectoryKeys::TrajectoryKeys(text::Map& map)
 
 TrajectoryFiles::Named TrajectoryFiles::read(const Node& file, const motion::ReadOptions& options) {
   const std::string name = file.text(1024);
-  if (name.empty()) return {};  // it said so
+  if (name.empty()) return {};  // reported
   const std::filesystem::path path = folder_ / name;
   for (const Known& k : known_)
     if (k.path == path && k.options == options) return k.named;

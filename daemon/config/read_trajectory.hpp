@@ -1,5 +1,5 @@
 // The keys by which configurations and render files name trajectory files, and the files themselves.
-// Readers over strict_yaml cursors; what is wrong, in the files too, is told by the document's finish().
+// Readers over strict_yaml cursors; errors, also of the files, are returned by the document's finish().
 #pragma once
 
 #include <filesystem>
@@ -26,8 +26,8 @@ class TrajectoryFiles {
   explicit TrajectoryFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   struct Named {
-    std::string name;                                    // as the errors have it
-    std::shared_ptr<const motion::TrajectoryFile> file;  // null when it could not be read: that has been said
+    std::string name;                                    // for errors
+    std::shared_ptr<const motion::TrajectoryFile> file;  // null after an error, which is reported
   };
   Named read(const text::Node& file, const motion::ReadOptions& options);
   Named read(const TrajectoryKeys& keys);

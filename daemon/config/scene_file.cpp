@@ -30,7 +30,7 @@ const std::vector<std::filesystem::path>& shipped_folders() {
   return folders;
 }
 
-/// Links followed. The root holds everything: it is nobody's folder of scenes.
+/// Links are resolved. The root directory contains everything, so it never counts as a folder of scenes.
 bool is_below(const std::filesystem::path& file, const std::filesystem::path& folder) {
   std::error_code ec;
   const auto real = std::filesystem::canonical(file, ec);
@@ -40,7 +40,7 @@ bool is_below(const std::filesystem::path& file, const std::filesystem::path& fo
   return std::mismatch(top.begin(), top.end(), real.begin(), real.end()).first == top.end();
 }
 
-constexpr int most_looked_at = 256;  // files of a folder: somebody's home is one too
+constexpr int most_looked_at = 256;  // files of a folder, which can be a home directory
 
 /// By its first column: configurations and libraries of materials lie beside scenes.
 bool is_like_a_scene(const std::filesystem::path& file) {
@@ -63,7 +63,7 @@ std::vector<std::string> scenes_in(const std::filesystem::path& folder) {
     if (has_scene_name(it->path()) && it->is_regular_file(ec) && is_like_a_scene(it->path()))
       names.push_back(it->path().filename().string());
   }
-  std::sort(names.begin(), names.end());  // the folder's own order is anybody's
+  std::sort(names.begin(), names.end());  // the order of a folder is unspecified
   return names;
 }
 

@@ -1,5 +1,4 @@
-// Which scene a name stands for: a file on disk if there is one, else a scene that is part of the program.
-// Used by the configuration, `sonard run`, `sonard check` and `sonard bench`, so that all of them find the same.
+// Resolves the name of a scene: a file on disk, else a scene built into the program. The one place that does so.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +12,7 @@ namespace sonar {
 
 struct SceneFile {
   std::filesystem::path path;
-  bool built_in = false;  // then `path` is one of built_in_scenes, and nothing is read from disk
+  bool built_in = false;  // `path` is one of built_in_scenes; no file is read
 
   std::string name() const { return (built_in ? "built-in " : "") + path.string(); }
 };
@@ -23,10 +22,10 @@ std::optional<SceneFile> find_scene(const std::filesystem::path& given, const st
 /// The folders that find_scene() looks in, for its caller's error: "., A and B".
 std::string scene_folders(const std::filesystem::path& directory);
 
-/// For those who ask from outside: true of names that end in .yaml or .yml.
+/// For names from control clients: true when it ends in .yaml or .yml.
 bool has_scene_name(const std::filesystem::path& given);
-/// Whether errors with words of the file may go to those who ask from outside: it is in `directory`, the configuration's, or
-/// among the shipped scenes. Links count as what they lead to.
+/// Whether errors that quote the file may be sent to control clients: only for files in `directory` (the configuration's) and for
+/// the shipped scenes, after resolving links.
 bool may_be_quoted(const SceneFile& file, const std::filesystem::path& directory);
 
 /// Inline, so that the configuration alone does not need the scene loader and its libraries.

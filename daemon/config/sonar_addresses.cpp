@@ -1,4 +1,4 @@
-// What follows from a sonar's own address, and moving it, or all that a daemon listens on, elsewhere.
+// Addresses derived from a sonar's address, and moving one sonar or all listeners to other addresses.
 #include "daemon/config/config.hpp"
 #include "daemon/config/move_addresses.hpp"
 

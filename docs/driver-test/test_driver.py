@@ -1,8 +1,8 @@
 """A driver's tests against sonard: copy this file into your driver's repository and change DRIVER and read_ping.
 
-    DRIVER    the command that starts your driver on ADDRESS and prints one line a ping; here the sixty lines of tiny_driver.py
+    DRIVER    the command that starts your driver on ADDRESS and prints one line per ping; here tiny_driver.py
     SONARD    the daemon's program (default: the one in the PATH)
-    ADDRESS   of the emulated sonar (default 127.0.0.2); poses and control listen on it too, so that runs do not meet
+    ADDRESS   of the emulated sonar (default 127.0.0.2); poses and control use it too, so that parallel runs are separate
 
 Run it with: python3 -m unittest test_driver.py
 """
@@ -23,7 +23,7 @@ SONARD = os.environ.get("SONARD", "sonard")
 ADDRESS = os.environ.get("ADDRESS", "127.0.0.2")
 DRIVER = os.environ.get("DRIVER", f"{sys.executable} {HERE / 'tiny_driver.py'} {ADDRESS}")
 
-# Three spheres of which no two swap under any mirror image: an image that is mirrored or turned cannot pass.
+# Three spheres in an arrangement without symmetry: a mirrored or rotated image fails.
 CONFIG = f"""
 world: {{scene: l-targets.yaml, seed: 1}}
 vehicles: [{{name: rov, initial_pose: {{frame: ENU_FLU, xyz_m: [0, 0, 0]}}}}]
@@ -35,7 +35,7 @@ NEAR_TO_PORT, NEAR_TO_STARBOARD, FAR_TO_PORT = (3.9, -20), (3.9, 10), (6.9, -8) 
 
 
 def read_ping(line):
-    """A line that your driver prints for a ping: number, and the range and bearing of bright places."""
+    """Parses a line of your driver: number of the ping, and range and bearing of its bright spots."""
     return json.loads(line)
 
 
@@ -51,7 +51,7 @@ class Sonar:
     def power_on(self):
         self.process = subprocess.Popen([SONARD, "run", str(self.config)], stdin=subprocess.DEVNULL)
         deadline = time.monotonic() + 30
-        while time.monotonic() < deadline:  # it answers as soon as drivers can connect
+        while time.monotonic() < deadline:  # /healthz answers as soon as drivers can connect
             try:
                 with urllib.request.urlopen(f"http://{ADDRESS}:8088/healthz", timeout=1):
                     return
@@ -62,16 +62,16 @@ class Sonar:
         raise AssertionError("sonard is not ready after 30 s")
 
     def power_off(self):
-        """As by a switch: no goodbye."""
+        """Like a power cut: connections are not closed in order."""
         self.process.kill()
         self.process.wait()
 
-    def tell(self, operation, **message):
-        """One request of docs/control.md: tell("sonar", transmit=False)."""
-        request = urllib.request.Request(f"http://{ADDRESS}:8088/api/v1/{operation}", json.dumps(message).encode(),
-                                         {"Content-Type": "application/json"})
-        with urllib.request.urlopen(request, timeout=10) as answer:
-            return json.load(answer)
+    def request(self, operation, **message):
+        """A request of docs/control.md: request("sonar", transmit=False)."""
+        post = urllib.request.Request(f"http://{ADDRESS}:8088/api/v1/{operation}", json.dumps(message).encode(),
+                                      {"Content-Type": "application/json"})
+        with urllib.request.urlopen(post, timeout=10) as reply:
+            return json.load(reply)
 
 
 class Driver:
@@ -80,7 +80,7 @@ class Driver:
     def __init__(self):
         self.pings = []  # (time of arrival, ping)
         self.other_lines = []
-        self.errors = tempfile.NamedTemporaryFile("w")  # what it says on stderr, for the report of a failure
+        self.errors = tempfile.NamedTemporaryFile("w")  # stderr, shown when a test fails
         self.process = subprocess.Popen(shlex.split(DRIVER), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self.errors,
                                         text=True)
         self.reader = threading.Thread(target=self._read, daemon=True)
@@ -90,27 +90,27 @@ class Driver:
         for line in self.process.stdout:
             try:
                 self.pings.append((time.monotonic(), read_ping(line)))
-            except (ValueError, KeyError, TypeError):  # no line about a ping
+            except (ValueError, KeyError, TypeError):  # not a line of a ping
                 self.other_lines.append(line)
 
     def output(self):
-        """What it said beside pings: the last lines of it."""
+        """The last lines other than pings."""
         errors = pathlib.Path(self.errors.name).read_text(encoding="utf-8", errors="replace")
-        return "".join((self.other_lines + errors.splitlines(keepends=True))[-20:]) or "(nothing)"
+        return "".join((self.other_lines + errors.splitlines(keepends=True))[-20:]) or "(none)"
 
-    def wait_for_pings(self, count, patience_s):
-        """The next `count` pings from now on."""
-        begin, deadline = len(self.pings), time.monotonic() + patience_s
+    def wait_for_pings(self, count, timeout_s):
+        """Returns the next `count` pings."""
+        begin, deadline = len(self.pings), time.monotonic() + timeout_s
         while len(self.pings) < begin + count:
             if self.process.poll() is not None:
-                self.reader.join(10)  # it may have printed pings until its end
+                self.reader.join(10)  # pings printed just before the end
                 if len(self.pings) >= begin + count:
                     break
                 raise AssertionError(f"the driver ended with code {self.process.returncode} after {len(self.pings) - begin} of "
-                                     f"{count} pings; it said:\n{self.output()}")
+                                     f"{count} pings; its output:\n{self.output()}")
             if time.monotonic() > deadline:
-                raise AssertionError(f"{len(self.pings) - begin} of {count} pings within {patience_s} s; "
-                                     f"the driver said:\n{self.output()}")
+                raise AssertionError(f"{len(self.pings) - begin} of {count} pings within {timeout_s} s; "
+                                     f"output of the driver:\n{self.output()}")
             time.sleep(0.02)
         return [ping for _, ping in self.pings[begin:begin + count]]
 
@@ -133,9 +133,9 @@ class DriverTest(unittest.TestCase):
 
     def expect_echo(self, ping, place):
         near = [e for e in ping["bright"] if abs(e[0] - place[0]) < 0.2 and abs(e[1] - place[1]) < 2]
-        self.assertTrue(near, f"nothing at {place[0]} m, {place[1]} deg; bright were {ping['bright']}")
+        self.assertTrue(near, f"no echo at {place[0]} m, {place[1]} deg; bright spots: {ping['bright']}")
 
-    def test_left_is_left_and_near_is_near(self):
+    def test_targets_are_at_their_ranges_and_bearings(self):
         ping = self.driver.wait_for_pings(3, 30)[-1]
         for place in (NEAR_TO_PORT, NEAR_TO_STARBOARD, FAR_TO_PORT):
             self.expect_echo(ping, place)
@@ -144,16 +144,16 @@ class DriverTest(unittest.TestCase):
         numbers = [ping["number"] for ping in self.driver.wait_for_pings(20, 30)]
         self.assertEqual(numbers, list(range(numbers[0], numbers[0] + 20)))
 
-    def test_it_is_back_after_a_power_cut(self):
+    def test_driver_recovers_after_a_power_cut(self):
         self.driver.wait_for_pings(3, 30)
         self.sonar.power_off()
         time.sleep(4)
         self.sonar.power_on()
         self.driver.wait_for_pings(3, 15)
 
-    def test_a_transmitter_that_fails_shows_no_echo(self):
+    def test_no_echo_when_the_transmitter_fails(self):
         self.driver.wait_for_pings(3, 30)
-        self.sonar.tell("sonar", sonar="front", transmit=False)
+        self.sonar.request("sonar", sonar="front", transmit=False)
         time.sleep(1)
         ping = self.driver.wait_for_pings(3, 10)[-1]
         self.assertFalse([e for e in ping["bright"] if abs(e[0] - 3.9) < 0.2 and abs(e[1] + 20) < 2])

@@ -1,4 +1,4 @@
-"""The smallest driver that works: connects, asks for pings, prints one JSON line each. It stands for yours in test_driver.py.
+"""A minimal driver: connects, requests pings, prints one JSON line for each. Replace it by yours in test_driver.py.
 
 usage: tiny_driver.py ADDRESS
 """
@@ -10,7 +10,7 @@ import sys
 import time
 
 HEADER, FIRE = struct.Struct("<HHHHHIH"), struct.Struct("<BBBBBdddd")
-RESULT = struct.Struct("<IIddddIBdHHIII")  # of version 1, from byte 53
+RESULT = struct.Struct("<IIddddIBdHHIII")  # version 1, from byte 53
 
 
 def fire_message():
@@ -19,18 +19,18 @@ def fire_message():
     return HEADER.pack(0x4F53, 0, 0, 0x15, 0, len(body), 0) + body
 
 
-def exactly(sonar, size):
+def receive_exactly(sonar, size):
     data = b""
     while len(data) < size:
         chunk = sonar.recv(size - len(data))
         if not chunk:
-            raise ConnectionError("closed by the sonar")
+            raise ConnectionError("connection closed by the sonar")
         data += chunk
     return data
 
 
-def bright_places(message):
-    """Number of the ping; range [m] and bearing [deg] of the strongest sample in each square of 0.5 m x 5 deg that has one."""
+def bright_spots(message):
+    """Number of the ping, and range [m] and bearing [deg] of the strongest bright sample in each cell of 0.5 m x 5 deg."""
     number, *_, resolution, rows, beams, offset, _, _ = RESULT.unpack_from(message, 53)
     bearings = struct.unpack_from(f"<{beams}h", message, 122)
     image, best = message[offset:], {}
@@ -47,11 +47,11 @@ def listen(address):
     with socket.create_connection((address, 52100), timeout=3) as sonar:
         sonar.sendall(fire_message())
         while True:
-            header = exactly(sonar, HEADER.size)
+            header = receive_exactly(sonar, HEADER.size)
             _, _, _, kind, _, size, _ = HEADER.unpack(header)
-            message = header + exactly(sonar, size)
+            message = header + receive_exactly(sonar, size)
             if kind == 0x23:
-                number, bright = bright_places(message)
+                number, bright = bright_spots(message)
                 print(json.dumps({"number": number, "bright": bright}), flush=True)
 
 
@@ -59,5 +59,5 @@ while True:
     try:
         listen(sys.argv[1])
     except OSError as problem:
-        print(f"{problem}; trying again", file=sys.stderr)
+        print(f"{problem}; reconnecting", file=sys.stderr)
         time.sleep(0.5)

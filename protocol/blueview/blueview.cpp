@@ -6,7 +6,7 @@
 #include "protocol/blueview/head_settings.hpp"
 #include "protocol/blueview/models.hpp"
 #include "protocol/blueview/options.hpp"
-#include "protocol/blueview/wish.hpp"
+#include "protocol/blueview/settings_override.hpp"
 
 namespace sonar::blueview {
 namespace {
@@ -30,10 +30,12 @@ class BlueViewVendor final : public protocol::Vendor {
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     const SonarSettings settings = initial_sonar_settings(device);
-    return {ping_settings(settings, device), bytes_of_settings(settings), "as it comes: " + describe(settings, device)};
+    return {ping_settings(settings, device), std::make_shared<SonarSettings>(settings),
+            "as it comes: " + describe(settings, device)};
   }
-  Result<protocol::ChangeSettings> wished(const protocol::Wish& wish, const protocol::DeviceState& device) const override {
-    return blueview::wished(wish, device);
+  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
+                                                  const protocol::DeviceState& device) const override {
+    return blueview::apply_override(wanted, device);
   }
   bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
   protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
@@ -43,9 +45,9 @@ class BlueViewVendor final : public protocol::Vendor {
   std::unique_ptr<protocol::Dialogue> converse(const protocol::DeviceState& device, Time now) const override {
     return make_dialogue(device, now);
   }
-  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device,
-                                               protocol::BytesView request) const override {
-    return std::make_shared<const protocol::Bytes>(encode_ping(ping, device, request));
+  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
+    const SonarSettings settings = settings_from(ping.request.vendor_settings.get(), device);
+    return std::make_shared<const protocol::Bytes>(encode_ping(ping, device, settings));
   }
 };
 

@@ -1,4 +1,4 @@
-// Teledyne BlueView behind the Vendor interface: what the daemon needs to serve the drop-in SDK libraries of clients/bvtsdk.
+// Teledyne BlueView as a Vendor: serves the drop-in SDK libraries of clients/bvtsdk.
 #pragma once
 
 #include "protocol/vendor.hpp"

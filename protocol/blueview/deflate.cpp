@@ -7,7 +7,7 @@
 namespace sonar::blueview {
 
 wire::Bytes deflated(wire::BytesView plain) {
-  // zlib wants its own byte type: copied in and out, so that no cast of a buffer is needed.
+  // zlib uses its own byte type: copying in and out avoids casts of buffers.
   std::vector<Bytef> in(plain.size()), out(compressBound(static_cast<uLong>(plain.size())));
   if (!plain.empty()) std::memcpy(in.data(), plain.data(), plain.size());
   auto size = static_cast<uLongf>(out.size());

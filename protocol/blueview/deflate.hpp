@@ -1,4 +1,4 @@
-// zlib's deflate behind one function: the only file of the protocols that knows it.
+// Compression of samples by zlib's deflate.
 #pragma once
 
 #include "protocol/wire/wire.hpp"

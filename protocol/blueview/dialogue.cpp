@@ -19,11 +19,11 @@ using protocol::Notice;
 using protocol::Reaction;
 using protocol::RequestPing;
 
-constexpr auto keep_alive_after = 2s;  // of our silence
+constexpr auto keep_alive_after = 2s;  // since the last message sent
 constexpr auto longest_host_silence = 10s;
 constexpr std::size_t most_waiting = 8;  // triggers of one host that may wait for their ping
 constexpr std::uint32_t longest_wait_ms = 600000;
-constexpr float housing_above_water_c = 2;  // unknown: what the thermometer of a real head reads
+constexpr float housing_above_water_c = 2;  // unknown: reading of a real head's thermometer
 
 class BlueViewDialogue final : public protocol::Dialogue {
  public:
@@ -31,7 +31,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
 
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
-    settings_ = settings_from(device_.request, device_);
+    settings_ = settings_from(device_.settings.get(), device_);
     framer_.append(received);
     while (const auto frame = framer_.next()) {
       on_frame(*frame, now, reaction);
@@ -42,16 +42,17 @@ class BlueViewDialogue final : public protocol::Dialogue {
     return reaction;
   }
 
-  Reaction on_tick(Time now) override {
+  Reaction on_tick(Time now, bool ping_pending) override {
     Reaction reaction;
-    settings_ = settings_from(device_.request, device_);
+    settings_ = settings_from(device_.settings.get(), device_);
     while (!waiting_.empty() && waiting_.front().until <= now) {  // every wait is as long: the oldest ends first
       reaction.replies.push_back(make_error(waiting_.front().request_id, Code::timeout, "no ping in the time given"));
       waiting_.pop_front();
     }
     if (subscription_ && subscription_->next <= now) {
       subscription_->wanted = true;
-      if (subscribed_head_is_free()) ask_for_ping(subscription_->head, reaction);
+      // A single ping that a host requested of another head comes first; else a quick subscription would always be served.
+      if (!ping_pending || settings_.active_head == subscription_->head) ask_for_ping(subscription_->head, reaction);
       subscription_->next += ((now - subscription_->next) / subscription_->interval + 1) * subscription_->interval;
     }
     if (now >= spoke_at_ + keep_alive_after) reaction.replies.push_back(make_frame(FrameType::keep_alive, 0, {}));
@@ -66,19 +67,21 @@ class BlueViewDialogue final : public protocol::Dialogue {
     return next;
   }
 
-  std::optional<Time> next_wish() const override { return subscription_ ? std::optional(subscription_->next) : std::nullopt; }
+  std::optional<Time> next_ping_request() const override {
+    return subscription_ ? std::optional(subscription_->next) : std::nullopt;
+  }
   std::optional<std::chrono::milliseconds> longest_silence() const override { return longest_host_silence; }
 
   void on_ping_queued(Time now) override { spoke_at_ = now; }
 
-  protocol::Delivery on_ping(protocol::BytesView made_with, std::size_t shared_bytes, Time now) override {
+  protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t shared_bytes, Time now) override {
     protocol::Delivery delivery;
     const SonarSettings fired_with = settings_from(made_with, device_);
     const int head = fired_with.active_head;
     const HeadSettings& fired = fired_with.heads[static_cast<std::size_t>(head)];
-    const HeadSettings now_set = settings_from(device_.request, device_).heads[static_cast<std::size_t>(head)];
+    const HeadSettings now_set = settings_from(device_.settings.get(), device_).heads[static_cast<std::size_t>(head)];
     for (auto it = waiting_.begin(); it != waiting_.end();) {
-      // A ping fired before the host set what it then asked a ping of is not the one it means.
+      // A ping fired before the host's latest SET does not answer its later request.
       if (it->head != head || (fired != it->asked_with && fired != now_set)) {
         ++it;
         continue;
@@ -93,7 +96,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const bool subscriber_waits = subscription_ && subscription_->wanted;
     if (!waiting_.empty() || subscriber_waits) {  // for another head, or with other settings: that one is next
       Reaction reaction;
-      settings_ = settings_from(device_.request, device_);
+      settings_ = settings_from(device_.settings.get(), device_);
       ask_for_ping(waiting_.empty() ? subscription_->head : waiting_.front().head, reaction);
       delivery.events = std::move(reaction.events);
     }
@@ -146,7 +149,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     std::int32_t id = 0;
     reader("head", id);
     const auto head = head_of(id);
-    if (reader.ok() && !head) return refuse(frame, Code::no_head, "there is no head " + std::to_string(id), reaction);
+    if (reader.ok() && !head) return refuse(frame, Code::no_head, "no head " + std::to_string(id), reaction);
     if (head) on_head_frame(frame, *head, reader, now, reaction);
     if (!reader.ok()) refuse(frame, Code::bad_parameter, reader.failure_text(), reaction);
   }
@@ -173,7 +176,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     std::uint16_t version = 0, abi = 0;
     reader("proto", version);
     reader("abi", abi);
-    take_text(reader, "client");
+    read_text(reader, "client");
     if (!reader.ok()) return refuse(frame, Code::bad_parameter, reader.failure_text(), reaction);
     if (version != protocol_version) {
       refuse(frame, Code::bad_packet_version, "speaks version " + std::to_string(version) + " of the link, this is version 1",
@@ -227,7 +230,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
   void on_set(const Frame& frame, int head, wire::Reader& reader, Reaction& reaction) {
     Key key{};
     reader("key", key);
-    const auto value = take_value(reader, key);
+    const auto value = read_value(reader, key);
     if (!value) return reader.ok() ? refuse(frame, Code::bad_parameter, "unknown kind of value", reaction) : void();
     const Applied applied = apply(settings_, head, key, *value, device_);
     if (!applied.value) return refuse(frame, applied.refusal.code, applied.refusal.text, reaction);
@@ -273,9 +276,6 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reaction.replies.push_back(make_frame(reply_to(FrameType::subscribe), frame.header.request_id, {}));
   }
 
-  /// Who asked for one ping of another head gets that first: a quick subscription would else take the sonar away every time.
-  bool subscribed_head_is_free() const { return !device_.ping_is_owed || settings_.active_head == subscription_->head; }
-
   void ask_for_ping(int head, Reaction& reaction) {
     settings_.active_head = head;
     reaction.events.emplace_back(change());
@@ -283,7 +283,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
   }
 
   ChangeSettings change() const {
-    return {ping_settings(settings_, device_), bytes_of_settings(settings_), describe(settings_, device_)};
+    return {ping_settings(settings_, device_), std::make_shared<SonarSettings>(settings_), describe(settings_, device_)};
   }
 
   const DeviceState& device_;
@@ -307,10 +307,10 @@ protocol::Bytes answer_discovery(protocol::BytesView datagram, const DeviceState
   wire::Reader reader(datagram);
   reader("letters", letters);
   reader("version", version);
-  if (!reader.ok() || letters != std::array<std::uint8_t, 4>{'B', 'V', 'E', '?'} || version != protocol_version) return {};
+  if (!reader.ok() || letters != discovery_question || version != protocol_version) return {};
   protocol::Bytes answer;
   const Put write(answer);
-  write("letters", std::array<std::uint8_t, 4>{'B', 'V', 'E', '!'});
+  write("letters", discovery_answer);
   write("version", protocol_version);
   write("tcp_port", tcp_port);
   put_text(answer, device.model->name);

@@ -9,7 +9,7 @@ namespace sonar::blueview {
 
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now);
 
-/// The answer to a discovery datagram; empty when it is none.
+/// The answer to a discovery datagram; empty for other datagrams.
 protocol::Bytes answer_discovery(protocol::BytesView datagram, const protocol::DeviceState& device);
 
 }  // namespace sonar::blueview

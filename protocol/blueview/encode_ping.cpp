@@ -50,8 +50,7 @@ wire::Bytes beam_major(const Ping& ping, const HeadGrid& grid) {
 
 }  // namespace
 
-wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, wire::BytesView request) {
-  const SonarSettings settings = settings_from(request, device);
+wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const SonarSettings& settings) {
   const int index = ping.request.settings.mode;
   const HeadSettings& head = settings.heads[static_cast<std::size_t>(index)];
   const HeadGrid grid = grid_of(head, head_presets(device.model->profile)[static_cast<std::size_t>(index)].bin_m);

@@ -1,7 +1,7 @@
 // A Ping as the payload of PING_DATA: beam-major 16-bit samples, near to far, left to right, and where the vehicle was.
 #pragma once
 
-#include "protocol/blueview/frames.hpp"
+#include "protocol/blueview/head_settings.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::blueview {
@@ -21,7 +21,7 @@ enum NavField : std::uint16_t {
   nav_text = 1 << 10,             // text
 };
 
-/// `request`: ChangeSettings::request of the settings the ping was made with.
-wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, wire::BytesView request);
+/// `settings`: those the ping was made with.
+wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const SonarSettings& settings);
 
 }  // namespace sonar::blueview

@@ -3,11 +3,6 @@
 #include <algorithm>
 
 namespace sonar::blueview {
-namespace {
-
-enum class Kind : std::uint8_t { integer = 0, number = 1, text = 2 };
-
-}  // namespace
 
 void put_text(wire::Bytes& out, std::string_view text) {
   const auto length = static_cast<std::uint16_t>(std::min<std::size_t>(text.size(), 65535));
@@ -16,7 +11,7 @@ void put_text(wire::Bytes& out, std::string_view text) {
   for (const char c : text.substr(0, length)) out.push_back(static_cast<std::byte>(c));
 }
 
-std::string take_text(wire::Reader& reader, std::string_view name) {
+std::string read_text(wire::Reader& reader, std::string_view name) {
   std::uint16_t length = 0;
   reader(name, length);
   std::string text;
@@ -43,7 +38,7 @@ void put_value(wire::Bytes& out, const Value& value) {
   }
 }
 
-std::optional<Value> take_value(wire::Reader& reader, Key key) {
+std::optional<Value> read_value(wire::Reader& reader, Key key) {
   auto kind = static_cast<Kind>(0xFF);
   reader("kind", kind);
   std::int32_t integer = 0;
@@ -60,7 +55,7 @@ std::optional<Value> take_value(wire::Reader& reader, Key key) {
       }
       return reader.ok() ? std::optional<Value>(number) : std::nullopt;
     case Kind::text: {
-      std::string text = take_text(reader, "value");
+      std::string text = read_text(reader, "value");
       return reader.ok() ? std::optional<Value>(std::move(text)) : std::nullopt;
     }
   }
@@ -100,12 +95,12 @@ std::optional<Frame> Framer::next() {
   wire::Reader reader(left.first(header_size));
   fields(reader, frame.header);
   if (frame.header.magic != magic) {
-    broken_ = "does not speak BVE1: a frame starts with other letters";
+    broken_ = "is not a BVE1 link: a frame has another magic number";
     return std::nullopt;
   }
   if (frame.header.payload_length > longest_) {
-    broken_ = "announces a message of " + std::to_string(frame.header.payload_length) + " bytes, at most " +
-              std::to_string(longest_) + " are taken";
+    broken_ = "has a payload of " + std::to_string(frame.header.payload_length) + " bytes, at most " + std::to_string(longest_) +
+              " are accepted";
     return std::nullopt;
   }
   if (left.size() < header_size + frame.header.payload_length) return std::nullopt;

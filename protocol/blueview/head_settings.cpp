@@ -11,7 +11,7 @@ namespace sonar::blueview {
 namespace {
 
 constexpr int most_bins = 2400;     // of a ping: coarser bins beyond
-constexpr float base_gain_db = 48;  // unknown: what a gain adjustment of 0 dB stands for
+constexpr float base_gain_db = 48;  // unknown: gain at an adjustment of 0 dB
 constexpr float longest_interval_ms = 3600e3f;
 
 const FrequencyMode& mode_of(const protocol::DeviceState& device, int head) {
@@ -27,7 +27,7 @@ std::optional<double> number_in(const Value& value) {
 
 Applied refused(Code code, std::string text) { return {std::nullopt, {code, std::move(text)}}; }
 
-/// Start and stop together: a start beyond the stop would be no range.
+/// Start and stop together: the start must lie before the stop.
 Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, float stop, bool strict, Key key) {
   if (!std::isfinite(start) || !std::isfinite(stop)) return refused(Code::bad_parameter, "a range must be a finite number");
   const bool fine = start >= mode.min_range_m && stop <= mode.max_range_m && start < stop;
@@ -90,31 +90,20 @@ SonarSettings initial_sonar_settings(const protocol::DeviceState& device) {
   return all;
 }
 
-wire::Bytes bytes_of_settings(const SonarSettings& settings) {
-  wire::Bytes out;
-  wire::Writer write(out);
-  write("active_head", settings.active_head);
-  write("local_clock", settings.local_clock);
-  put_text(out, settings.name);
-  for (const HeadSettings& head : settings.heads) fields(write, head);
-  return out;
+bool SonarSettings::equals(const VendorSettings& other) const {
+  const auto* of = dynamic_cast<const SonarSettings*>(&other);
+  return of != nullptr && active_head == of->active_head && local_clock == of->local_clock && name == of->name &&
+         heads == of->heads;
 }
 
-SonarSettings settings_from(wire::BytesView request, const protocol::DeviceState& device) {
-  SonarSettings initial = initial_sonar_settings(device), read = initial;
-  wire::Reader reader(request);
-  reader("active_head", read.active_head);
-  reader("local_clock", read.local_clock);
-  read.name = take_text(reader, "name");
-  for (HeadSettings& head : read.heads) fields(reader, head);
-  const bool whole = reader.ok() && reader.remaining() == 0 && read.active_head >= 0 &&
-                     read.active_head < static_cast<std::int32_t>(read.heads.size());
-  return whole ? read : initial;
+SonarSettings settings_from(const VendorSettings* settings, const protocol::DeviceState& device) {
+  const auto* of = dynamic_cast<const SonarSettings*>(settings);
+  return of != nullptr ? *of : initial_sonar_settings(device);
 }
 
 Applied apply(SonarSettings& settings, int head_index, Key key, const Value& value, const protocol::DeviceState& device) {
   if (head_index < 0 || head_index >= static_cast<int>(settings.heads.size()))
-    return refused(Code::no_head, "there is no head " + std::to_string(head_index));
+    return refused(Code::no_head, "no head " + std::to_string(head_index));
   HeadSettings& head = settings.heads[static_cast<std::size_t>(head_index)];
   if (key == Key::name) {
     const auto* text = std::get_if<std::string>(&value);
@@ -205,7 +194,7 @@ PingSettings ping_settings(const SonarSettings& all, const protocol::DeviceState
   Water believed = device.water;
   if (head.fluid == 0) believed.salinity_psu = std::max(believed.salinity_psu, 30.0);
   if (head.fluid == 1) believed.salinity_psu = 0;
-  // The slope knob comes on top of what absorption takes; TVG counts both ways.
+  // The TVG slope is added to absorption; both apply to the two-way path.
   s.device_absorption_db_per_m =
       static_cast<float>(absorption_db_per_m(believed, device.depth_m, static_cast<double>(mode.centre_hz)) +
                          0.5 * static_cast<double>(head.tvg_db_per_m));

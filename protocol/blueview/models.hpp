@@ -1,5 +1,5 @@
-// The Teledyne BlueView products as SonarModel rows, one frequency mode a head, and what a head is set to when nobody asked for
-// anything. Which figures are verified and which are recalled is said beside each (docs/protocols/blueview-link.md, "Products").
+// The Teledyne BlueView products as SonarModel rows, one frequency mode per head, and the default settings of a head.
+// Each number is marked as verified or recalled (docs/protocols/blueview-link.md, "Products").
 #pragma once
 
 #include <memory>
@@ -16,7 +16,7 @@ struct HeadPreset {
   int beams = 512;
   double bin_m = 0.0254;  // range resolution
   double start_m = 2, stop_m = 10;
-  bool verified = false;  // figures with a source one can read; otherwise recalled from data sheets
+  bool verified = false;  // numbers from an accessible source; otherwise recalled from data sheets
 };
 
 std::span<const std::shared_ptr<const SonarModel>> models();

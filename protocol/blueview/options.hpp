@@ -1,4 +1,4 @@
-// What one may choose about an emulated BlueView sonar, by name, under `options:` of a sonar in the configuration.
+// Options of an emulated BlueView sonar, by name, under `options:` of a sonar in the configuration.
 #pragma once
 
 #include <span>

@@ -1,5 +1,5 @@
-// The control protocol's messages as plain structs, and their translation from and to protobuf. Nothing else in the house sees
-// protobuf. Both directions are here: the daemon decodes requests, tools and tests encode them.
+// The control protocol's messages as plain structs, and their conversion from and to protobuf. No other layer sees protobuf. The
+// daemon decodes requests; tools and tests encode them.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ inline constexpr std::size_t largest_json = std::size_t{1} << 20;
 struct Hello {
   std::uint32_t protocol_version = control::protocol_version;
   std::string name;
-  std::string token = {};  // what the client knows of control.token_file
+  std::string token = {};  // the content of control.token_file
 };
 struct Unsupported {  // a request this version does not know
 };
@@ -36,7 +36,7 @@ struct Request {
                SetTrajectory, Step, StartRecording, StopRecording, Subscribe>
       op;
 };
-enum class StatusCode { ok, refused, unsupported, failed };
+enum class StatusCode { ok, refused, unsupported, failed, unauthenticated };
 struct Response {
   std::uint64_t id = 0;
   StatusCode code = StatusCode::ok;
@@ -47,17 +47,17 @@ struct Response {
 
 /// One datagram: a PoseUpdate. Refused with one sentence when malformed (see checked()).
 Result<PoseSample> decode_pose_datagram(BytesView datagram);
-struct RefusedRequest {  // a Response can still name it
+struct RefusedRequest {  // its id is known, for the Response
   std::uint64_t id = 0;
   std::string why;
-  bool pose = false;        // it should have been a pose
+  bool pose = false;        // of a malformed pose
   bool is_protobuf = true;  // a Request, if a wrong one
 };
 /// One message of the stream, without its length. A message that is not protobuf has id 0.
 tl::expected<Request, RefusedRequest> decode_request(BytesView message);
 Bytes encode_response(const Response& response);
 
-/// For senders. The sample's pose is sent as ENU_FLU, or turned into NED_FRD when `sent_in` says so.
+/// For senders. The sample's pose is sent as ENU_FLU, or turned into NED_FRD depending on `sent_in`.
 Bytes encode_pose_datagram(const PoseSample& sample);
 Bytes encode_request(const Request& request);
 Result<Response> decode_response(BytesView message);
@@ -66,7 +66,7 @@ Result<Response> decode_response(BytesView message);
 
 /// `op` is the name of a member of Request.op ("sonar", "set_object"), `json` its message. Refused with one sentence: not JSON,
 /// an unknown key, a wrong type, and whatever decode_request refuses. `name`: of the sonar or object that the message is about,
-/// when it was said elsewhere.
+/// when it is given elsewhere, as in a path.
 Result<Request> request_from_json(std::string_view op, std::string_view json, std::string_view name = {});
 /// One line, no newline; names as in control.proto, numbers that are 0 and empty lists too. 64-bit numbers are strings, as
 /// protobuf's mapping has it.

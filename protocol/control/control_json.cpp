@@ -1,5 +1,5 @@
 // The control protocol's messages as JSON text. Text from outside is read twice: by our own strict reader, which bounds depth and
-// refuses what is no JSON or said twice, and then by protobuf's, which knows the messages.
+// refuses invalid JSON and duplicate keys, and then by protobuf's, which checks the messages.
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/util/json_util.h>
 
@@ -7,14 +7,13 @@
 #include <set>
 
 #include "protocol/control/messages.hpp"
+#include "protocol/control/refused.hpp"
 
 namespace sonar::control {
 namespace {
 
 using google::protobuf::Message;
-constexpr std::size_t deepest_nesting = 16;
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
+constexpr std::size_t deepest_request = 16;
 
 std::string in_quotes(const std::string& name) { return '"' + name.substr(0, 64) + '"'; }
 
@@ -33,7 +32,7 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
   bool start_object(std::size_t) override { return enter(); }
   bool key(string_t& name) override {
     if (keys_.back().insert(name).second) return true;
-    why = in_quotes(name) + " is said twice";
+    why = in_quotes(name) + " is given twice";
     return false;
   }
   bool end_object() override { return leave(); }
@@ -47,8 +46,8 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
  private:
   bool enter() {
     keys_.emplace_back();
-    if (keys_.size() <= deepest_nesting) return true;
-    why = "nested deeper than " + std::to_string(deepest_nesting) + " levels";
+    if (keys_.size() <= deepest_request) return true;
+    why = "nested deeper than " + std::to_string(deepest_request) + " levels";
     return false;
   }
   bool leave() {
@@ -58,7 +57,7 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
   std::vector<std::set<std::string>> keys_;  // of each open object
 };
 
-/// What to write for a protobuf type; empty where the words before it say enough.
+/// The expected value for a protobuf type; empty where protobuf's own text is enough.
 std::string kind_of(const std::string& type) {
   if (type == "DOUBLE" || type == "FLOAT") return "a number";
   if (type == "BOOL") return "true or false";
@@ -92,9 +91,9 @@ bool set_name(Message& message, const std::string& name) {
   const auto& of = *message.GetDescriptor();
   const auto* field = of.FindFieldByName("sonar") != nullptr ? of.FindFieldByName("sonar") : of.FindFieldByName("object");
   if (field == nullptr) return false;
-  const std::string said = message.GetReflection()->GetString(message, field);
-  if (said.empty()) message.GetReflection()->SetString(&message, field, name);
-  return said.empty() || said == name;
+  const std::string given = message.GetReflection()->GetString(message, field);
+  if (given.empty()) message.GetReflection()->SetString(&message, field, name);
+  return given.empty() || given == name;
 }
 
 std::string json_from(Message& message) {
@@ -113,7 +112,7 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
   keep_protobuf_quiet();
   v1::Request message;
   const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
-  if (field == nullptr || field->containing_oneof() == nullptr) return refused("no such request");
+  if (field == nullptr || field->containing_oneof() == nullptr) return refused("unknown request");
   if (json.size() > largest_json) return refused("longer than 1 MiB");
   if (const auto zero = json.find('\0'); zero != std::string_view::npos)  // to the reader the end, to protobuf more to read
     return refused("not JSON: a zero byte at character " + std::to_string(zero + 1));
@@ -125,7 +124,7 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
                                                                   message.GetReflection()->MutableMessage(&message, field));
   if (!status.ok()) return refused(sentence_from(std::string(status.message())));
   if (!name.empty() && !set_name(*message.GetReflection()->MutableMessage(&message, field), std::string(name)))
-    return refused("this is about " + in_quotes(std::string(name)) + ", but the message names another");
+    return refused("the path names " + in_quotes(std::string(name)) + ", but the message names another");
   auto request = from(message);
   if (!request) return refused(request.error().why);
   return *std::move(request);

@@ -4,7 +4,7 @@
 namespace sonar::control {
 namespace {
 
-struct Fill {
+struct FillEvent {
   v1::Event& out;
   void operator()(const PingEvent& e) const {
     v1::PingEvent& m = *out.mutable_ping();
@@ -61,11 +61,13 @@ v1::Status::Code code_of(StatusCode code) {
       return v1::Status::REFUSED;
     case StatusCode::unsupported:
       return v1::Status::UNSUPPORTED;
+    case StatusCode::unauthenticated:
+      return v1::Status::UNAUTHENTICATED;
     default:
       return v1::Status::FAILED;
   }
 }
-/// A code of a later version is none that we could act on.
+/// Codes of later versions are unsupported.
 StatusCode code_from(v1::Status::Code code) {
   switch (code) {
     case v1::Status::OK:
@@ -74,6 +76,8 @@ StatusCode code_from(v1::Status::Code code) {
       return StatusCode::refused;
     case v1::Status::FAILED:
       return StatusCode::failed;
+    case v1::Status::UNAUTHENTICATED:
+      return StatusCode::unauthenticated;
     default:
       return StatusCode::unsupported;
   }
@@ -82,7 +86,7 @@ StatusCode code_from(v1::Status::Code code) {
 }  // namespace
 
 void fill(v1::Event& out, const Event& event) {
-  std::visit(Fill{out}, event.what);
+  std::visit(FillEvent{out}, event.what);
   out.set_unsent(event.unsent);
 }
 
@@ -132,7 +136,7 @@ void fill(v1::Response& out, const Response& response) {
 Result<Response> from(const v1::Response& message) {
   if (const auto where = first_unreal_number(message)) return failure(ErrorKind::bad_data, *where + " is NaN or infinite");
   if (const auto where = first_bad_orientation(message))
-    return failure(ErrorKind::bad_data, *where + " is no quaternion of norm 1");
+    return failure(ErrorKind::bad_data, *where + " is not a quaternion of norm 1");
   Response response;
   response.id = message.id();
   response.code = code_from(message.status().code());

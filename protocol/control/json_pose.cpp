@@ -3,15 +3,15 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "protocol/control/refused.hpp"
+
 namespace sonar::control {
 namespace {
 
 using nlohmann::json;
-constexpr int deepest_nesting = 8;
+constexpr int deepest_pose = 8;
 constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";  // .NET writes one
 constexpr double latest_timestamp_s = 1e-9 * static_cast<double>(largest_stamp_ns);
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
 
 /// Looks at nesting only: brackets outside strings. The parser recurses, so depth is bounded before it runs.
 bool too_deep(std::string_view text) {
@@ -28,7 +28,7 @@ bool too_deep(std::string_view text) {
       continue;
     }
     if (c == '"') in_string = true;
-    if ((c == '{' || c == '[') && ++depth > deepest_nesting) return true;
+    if ((c == '{' || c == '[') && ++depth > deepest_pose) return true;
     if (c == '}' || c == ']') --depth;
   }
   return false;

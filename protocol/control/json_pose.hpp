@@ -22,7 +22,7 @@ inline constexpr std::size_t longest_line = 4096;
 ///   frame       "NED_FRD" (default, as ArduPilot) or "ENU_FLU": then position, velocity and attitude are ENU and FLU
 ///   vehicle     name, may be absent when there is one vehicle
 Result<PoseSample> parse_json_pose(std::string_view line);
-/// Whether the line is a JSON object at all, whatever its keys: what is not speaks another protocol.
+/// Whether the line is a JSON object, with any keys; other lines belong to another protocol.
 bool is_json_object(std::string_view line);
 
 /// Cuts a byte stream into lines. A line beyond the limit is swallowed to its end and reported once. A byte order mark at the

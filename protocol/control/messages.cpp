@@ -15,17 +15,15 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
 
-constexpr double largest_norm_error = 1e-3;  // as of poses
-
-/// Wrappers such as DoubleValue are the value to whoever reads the name.
+/// Wrappers such as DoubleValue are named like their value.
 std::string joined(const std::string& path, const FieldDescriptor& field) {
   if (field.containing_type()->full_name().starts_with("google.protobuf.")) return path;
   return path.empty() ? field.name() : path + "." + field.name();
 }
 
-using Judge = std::function<bool(const Message&, const FieldDescriptor*)>;  // null: of the message as a whole
-/// Path of the first part that `bad` says so of.
-std::optional<std::string> find_first(const Message& message, const std::string& path, const Judge& bad) {
+using Predicate = std::function<bool(const Message&, const FieldDescriptor*)>;  // null: of the message as a whole
+/// Path of the first part for which `bad` is true.
+std::optional<std::string> find_first(const Message& message, const std::string& path, const Predicate& bad) {
   if (bad(message, nullptr)) return path;
   std::vector<const FieldDescriptor*> given;
   const Reflection& fields = *message.GetReflection();

@@ -1,5 +1,5 @@
-// Between the classes that protoc makes of control.proto and the house's plain structs. Only files of this folder include it:
-// control.cpp and control_json.cpp put bytes and text round it.
+// Converts between protoc's classes of control.proto and plain structs. Included by files of this folder only; control.cpp and
+// control_json.cpp add bytes and text.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -14,7 +14,7 @@ namespace sonar::control {
 
 bool parse(google::protobuf::Message& message, BytesView bytes);
 Bytes serialized(const google::protobuf::Message& message);
-/// The library would write lines of its own about ill-formed strings, as fast as a stranger can send them.
+/// Turns off the library's own log lines about ill-formed strings, which untrusted clients could flood.
 void keep_protobuf_quiet();
 
 /// Path of the first number that is NaN or infinite: "sonar.range_m".

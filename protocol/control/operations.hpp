@@ -1,5 +1,6 @@
-// What can be asked of a running daemon beside poses, as plain structs: the requests of control.proto, checked and in the house's
-// frames (world ENU, body FLU, SI). protocol/control makes them from protobuf and JSON; daemon/operations.hpp carries them out.
+// Requests to a running daemon, its status and events, as plain structs: the messages of control.proto, checked and in sonard's
+// frames (world ENU, body FLU, SI). protocol/control converts from protobuf and JSON; daemon/server/operations.hpp executes
+// requests.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,7 @@ namespace sonar::control {
 
 struct GetStatus {};
 
-/// What is not given stays as it is. Finite numbers only; whether the product can do it, the daemon says.
+/// Fields that are not given keep their values. Finite numbers only; the daemon checks them against the product.
 struct SetSonar {
   std::string sonar;  // empty = the only one there is
   std::optional<double> range_m, rate_hz, gain_percent;
@@ -42,18 +43,18 @@ struct SetObject {
   std::optional<bool> visible;
   std::optional<Pose> in_world;
 };
-/// Of a trajectory that a vehicle or a moving object plays. What is not given stays as it is.
+/// Playback of the trajectory of a vehicle or a moving object. Fields that are not given keep their values.
 struct SetTrajectory {
   PoseSample::Of of = PoseSample::Of::vehicle;
   std::string name;  // empty = the only vehicle there is
   std::optional<bool> paused;
   std::optional<double> position_s, speed;
 };
-/// Of time that passes on request: clock: lockstep.
+/// Advances a lockstep clock.
 struct Step {
   double dt_s = 0;
 };
-/// Of what a sonar sends, into a new file of the configuration's recording.folder.
+/// Records the messages of a sonar into a new file in the configuration's recording.folder.
 struct StartRecording {
   std::string file;
   std::string sonar = {};  // empty = the only one there is
@@ -65,7 +66,7 @@ struct Subscribe {
   bool pings = false, clients = false, poses = false, scene = false;
 };
 
-/// What the daemon does for whoever may ask; Hello and Subscribe are the connection's own business.
+/// Requests that the daemon executes; Hello and Subscribe are handled by the connection.
 using Operation = std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
                                SetTrajectory, Step, StartRecording, StopRecording>;
 
@@ -82,8 +83,8 @@ struct SonarFigures {
 };
 struct SonarStatus {
   std::string name, profile, listens, advertised;
-  std::string observers;        // where they connect who only look on, as `listens`; empty = nowhere
-  std::uint32_t observing = 0;  // of them, now
+  std::string observers;        // address for connections that only receive, as `listens`; empty = none
+  std::uint32_t observing = 0;  // such connections, now
   std::vector<std::string> status_to;
   bool pinging = false, transmits = true;
   double range_m = 0, rate_hz = 0, gain_db = 0, frequency_hz = 0;
@@ -117,11 +118,11 @@ struct RecordingStatus {
   std::string sonar, file;
   bool running = false;
   std::uint64_t pings = 0, messages = 0, bytes = 0;  // messages of the sonar, bytes of the file
-  std::string why;                                   // it ended
+  std::string why;                                   // reason of its end
 };
-/// What the daemon allows and its user probably did not mean, or still has to do: a sentence, and what to change.
+/// A probable mistake of the configuration that is accepted, or a step that is still missing: a sentence, and what to change.
 struct Note {
-  std::string vehicle;  // that it is about; empty = the scene, a sonar
+  std::string vehicle;  // the note's subject; empty = the scene or a sonar
   std::string text, cure;
 };
 struct DaemonStatus {
@@ -138,7 +139,7 @@ struct DaemonStatus {
   std::vector<RecordingStatus> recordings;
   std::vector<Note> notes;
 };
-/// A step is done.
+/// Result of a Step.
 struct Stepped {
   std::int64_t now_ns = 0;
   std::uint64_t pings = 0;  // made meanwhile, by all sonars

@@ -3,14 +3,13 @@
 
 #include "core/base/units.hpp"
 #include "protocol/control/messages.hpp"
+#include "protocol/control/refused.hpp"
 
 namespace sonar::control {
 namespace {
 
 constexpr double furthest_mount_m = 1000;
 constexpr double most_degrees = 360;
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
 
 std::array<double, 3> array_from(const v1::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 std::array<double, 4> array_from(const v1::Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
@@ -20,7 +19,7 @@ Result<Stamp> stamp_from(const v1::Time& time) {
     return refused("time.ns is beyond 4.5e18 ns (142 years): send nanoseconds, or ARRIVAL time");
   switch (time.domain()) {
     case v1::CLOCK_UNSPECIFIED:
-      if (time.ns() != 0) return refused("time.domain is missing: say WALL, SIM or ARRIVAL");
+      if (time.ns() != 0) return refused("time.domain is missing: give WALL, SIM or ARRIVAL");
       return Stamp{};
     case v1::ARRIVAL:
       return Stamp{};
@@ -117,7 +116,7 @@ Result<Pose> from(const v1::Placement& message) {
 }
 
 Result<Pose> from(const v1::Mount& message) {
-  if (message.frame() == v1::Mount::FRAME_UNSPECIFIED) return refused("mount.frame is missing: say FRD or FLU");
+  if (message.frame() == v1::Mount::FRAME_UNSPECIFIED) return refused("mount.frame is missing: give FRD or FLU");
   if (message.frame() != v1::Mount::FRD && message.frame() != v1::Mount::FLU) return refused("mount.frame has an unknown value");
   if (!all_within(message.position(), furthest_mount_m)) return refused("mount.position is beyond 1000 m");
   if (!all_within(message.rpy_deg(), most_degrees)) return refused("mount.rpy_deg is beyond 360 degrees");

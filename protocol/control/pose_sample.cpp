@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "protocol/control/refused.hpp"
+
 namespace sonar::control {
 namespace {
 
 constexpr double largest_position_m = 1e8;  // beyond any local world; keeps later sums exact to micrometres
 constexpr double largest_speed_mps = 1e4;   // nothing that carries a sonar
 constexpr double largest_turn_radps = 1e3;
-constexpr double largest_norm_error = 1e-3;
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
 
 template <std::size_t N>
 bool all_within(const std::array<double, N>& values, double limit) {
@@ -39,7 +38,7 @@ double angle_beyond_radians(const std::array<double, 3>& rpy_rad) {
 }
 
 Result<PoseSample> checked(PoseSample sample, const RawPose& raw) {
-  if (!raw.frame) return refused("frame is missing: say NED_FRD or ENU_FLU, there is no default");
+  if (!raw.frame) return refused("frame is missing: give NED_FRD or ENU_FLU; there is no default");
   if (!all_finite(raw.position_m)) return refused("position has a NaN or infinite component");
   if (!all_within(raw.position_m, largest_position_m)) return refused("position is more than 1e8 m from the origin");
   if (!all_finite(raw.orientation_wxyz)) return refused("orientation has a NaN or infinite component");

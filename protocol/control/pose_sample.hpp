@@ -1,5 +1,5 @@
 // A pose as a sender gave it, checked and turned into the house's frames: world ENU, body FLU, SI units, int64 nanoseconds.
-// protocol/control makes these from protobuf and JSON; daemon/world/world.hpp keeps them.
+// protocol/control makes these from protobuf and JSON; daemon/emulator/world/world.hpp keeps them.
 #pragma once
 
 #include <array>
@@ -13,7 +13,10 @@
 
 namespace sonar::control {
 
-/// Whose clock a stamp was read from (docs/configuration.md, "Sending poses").
+/// How far the length of an orientation quaternion may be from 1.
+inline constexpr double largest_norm_error = 1e-3;
+
+/// Whose clock a stamp was read from (docs/poses.md, "Time and order").
 enum class ClockDomain {
   wall,     // UNIX time of a computer whose clock agrees with ours
   sim,      // the sender's own, any origin

@@ -2,13 +2,12 @@
 #include <algorithm>
 
 #include "protocol/control/messages.hpp"
+#include "protocol/control/refused.hpp"
 
 namespace sonar::control {
 namespace {
 
 constexpr std::size_t longest_name = 256, longest_path = 4096;
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
 
 /// Names end up in log lines and answers.
 Result<std::string> checked_text(const std::string& text, const char* key, bool needed, std::size_t longest = longest_name) {
@@ -20,7 +19,7 @@ Result<std::string> checked_text(const std::string& text, const char* key, bool 
 }
 
 Result<Pose> placed(const v1::Placement& message) {
-  auto pose = from(message);
+  auto pose = control::from(message);
   if (!pose) pose.error().text.insert(0, "at: ");
   return pose;
 }
@@ -186,7 +185,7 @@ Result<Request> with_op(const v1::Request& message) {
   return request;
 }
 
-struct Fill {
+struct FillRequest {
   v1::Request& out;
   void operator()(const Unsupported&) const {}
   void operator()(const Hello& op) const {
@@ -265,7 +264,7 @@ tl::expected<Request, RefusedRequest> from(const v1::Request& message) {
 
 void fill(v1::Request& out, const Request& request) {
   out.set_id(request.id);
-  std::visit(Fill{out}, request.op);
+  std::visit(FillRequest{out}, request.op);
   repair_texts(out);
 }
 

@@ -1,4 +1,4 @@
-// What the daemon says of itself, between plain structs and protobuf.
+// Converts the daemon's status between plain structs and protobuf.
 #include "protocol/control/messages.hpp"
 
 namespace sonar::control {

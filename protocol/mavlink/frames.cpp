@@ -8,7 +8,7 @@ namespace {
 constexpr std::byte magic_1{0xFE}, magic_2{0xFD};
 constexpr std::size_t header_1 = 6, header_2 = 10;  // magic included
 constexpr std::size_t checksum_size = 2, signature_size = 13;
-constexpr std::uint8_t is_signed = 0x01;  // the only incompatible flag we know how to skip
+constexpr std::uint8_t is_signed = 0x01;  // the only supported incompatible flag
 
 constexpr std::array<std::uint16_t, 256> checksum_steps = [] {
   std::array<std::uint16_t, 256> steps{};
@@ -62,10 +62,10 @@ static_assert(wire::wire_size<Header2>() == header_2);
 struct FrameReader::Header {
   Frame frame;                      // but for the payload
   std::size_t before = 0, end = 0;  // of the payload; of the frame with checksum and signature
-  bool readable = true;             // no flags that change what follows
+  bool readable = true;             // no flags that change the payload
 };
 
-/// What the first bytes say, if the frame they promise fits into the datagram.
+/// The header at the front, if its frame fits into the datagram.
 std::optional<FrameReader::Header> FrameReader::header() const {
   const auto byte = [this](std::size_t i) { return std::to_integer<std::uint8_t>(rest_[i]); };
   Header h;
@@ -92,9 +92,9 @@ bool FrameReader::begins_a_frame(std::size_t at) const {
   return at == rest_.size() || rest_[at] == magic_1 || rest_[at] == magic_2;
 }
 
-/// The whole frame when it is sound. What is not, is counted and skipped: whole where that leads to another frame and no checksum
-/// could say otherwise, else by one byte, so that a false start hides nothing.
-std::optional<Frame> FrameReader::judged(const Header& h) {
+/// The whole frame when it is valid. Otherwise counts and skips it: whole if another frame follows and the message is unknown,
+/// else one byte, so that a false start hides no frame.
+std::optional<Frame> FrameReader::checked(const Header& h) {
   const MessageInfo* const message = find_message(h.frame.id);
   if (message == nullptr || !h.readable) {
     const bool whole = begins_a_frame(h.end);
@@ -104,8 +104,8 @@ std::optional<Frame> FrameReader::judged(const Header& h) {
   }
   const std::size_t behind = h.before + h.frame.payload_size;
   const std::uint16_t is = checksum(std::array{std::byte{message->crc_extra}}, checksum(rest_.subspan(1, behind - 1)));
-  const auto said = std::to_integer<unsigned>(rest_[behind]) | std::to_integer<unsigned>(rest_[behind + 1]) << 8;
-  if (is != said) {
+  const auto stated = std::to_integer<unsigned>(rest_[behind]) | std::to_integer<unsigned>(rest_[behind + 1]) << 8;
+  if (is != stated) {
     ++counts_.bad_checksum;
     skip(1);
     return std::nullopt;
@@ -128,20 +128,19 @@ std::optional<Frame> FrameReader::next() {
     if (!h) {
       ++counts_.junk_bytes;
       skip(1);
-    } else if (auto frame = judged(*h)) {
+    } else if (auto frame = checked(*h)) {
       return frame;
     }
   }
   return std::nullopt;
 }
 
-Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Speaker& speaker) {
+Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Identity& sender) {
   payload = payload.first(std::min(payload.size(), largest_payload));
   while (payload.size() > 1 && payload.back() == std::byte{0}) payload = payload.first(payload.size() - 1);
   Bytes out;
   out.reserve(header_2 + largest_payload + checksum_size);
-  Header2 header{magic_2, static_cast<std::uint8_t>(payload.size()), {}, speaker.sequence++, speaker.system, speaker.component,
-                 {}};
+  Header2 header{magic_2, static_cast<std::uint8_t>(payload.size()), {}, sender.sequence++, sender.system, sender.component, {}};
   header.id = {static_cast<std::uint8_t>(id), static_cast<std::uint8_t>(id >> 8), static_cast<std::uint8_t>(id >> 16)};
   wire::append(out, header);
   out.insert(out.end(), payload.begin(), payload.end());

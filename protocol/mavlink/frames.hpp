@@ -1,5 +1,5 @@
-// MAVLink frames, versions 1 and 2: found in a datagram and checked, or written. Nothing of a datagram is believed before its
-// checksum was computed; protocol/mavlink/mavlink_poses.hpp makes poses of what is inside.
+// MAVLink frames, versions 1 and 2: found in a datagram and checked, or written. No field is used before the checksum was
+// verified; protocol/mavlink/mavlink_poses.hpp converts messages to poses.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace sonar::mavlink {
 
 inline constexpr std::size_t largest_payload = 255;
 
-/// A frame whose checksum is right, of a message in known_messages().
+/// A frame with a valid checksum, of a message in known_messages().
 struct Frame {
   int version = 2;
   std::uint8_t sequence = 0, system = 0, component = 0;
@@ -32,7 +32,7 @@ M message_in(const Frame& frame) {
 
 struct FrameCounts {
   std::uint64_t frames = 0;        // good ones
-  std::uint64_t unknown = 0;       // of messages we do not read; skipped whole
+  std::uint64_t unknown = 0;       // of unsupported messages; skipped whole
   std::uint64_t bad_checksum = 0;  // damaged, or of a dialect that gave the number to another message
   std::uint64_t wrong_size = 0;    // version 1 payload of another length than the message has
   std::uint64_t junk_bytes = 0;    // belong to no frame
@@ -48,7 +48,7 @@ class FrameReader {
  private:
   struct Header;
   std::optional<Header> header() const;
-  std::optional<Frame> judged(const Header& header);
+  std::optional<Frame> checked(const Header& header);
   bool begins_a_frame(std::size_t at) const;
   void skip(std::size_t count) { rest_ = rest_.subspan(count); }
 
@@ -59,19 +59,19 @@ class FrameReader {
 /// CRC-16/MCRF4XX, which MAVLink calls X.25; `crc` carries on an earlier one.
 std::uint16_t checksum(BytesView bytes, std::uint16_t crc = 0xFFFF);
 
-/// Who speaks.
-struct Speaker {
+/// System, component and sequence number of a sender.
+struct Identity {
   std::uint8_t system = 1, component = 0;
   std::uint8_t sequence = 0;  // of the next frame
 };
-/// A frame of version 2 around a payload; counts the speaker's sequence up.
-Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Speaker& speaker);
+/// A frame of version 2 around a payload; counts the sender's sequence up.
+Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Identity& sender);
 template <class M>
-Bytes framed(const M& message, Speaker& speaker) {
+Bytes framed(const M& message, Identity& sender) {
   Bytes payload;
   wire::Writer writer(payload);
   all_fields(writer, message);
-  return framed(M::id, M::crc_extra, payload, speaker);
+  return framed(M::id, M::crc_extra, payload, sender);
 }
 
 }  // namespace sonar::mavlink

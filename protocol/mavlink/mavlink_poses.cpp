@@ -13,13 +13,13 @@ using control::Stamp;
 
 constexpr std::int64_t late_ms = 1000;  // a clock that goes back further than this has been restarted
 constexpr std::int64_t late_ns = late_ms * 1'000'000;
-constexpr double farthest_m = 100e3;  // from the origin; beyond, the tangent plane means nothing
+constexpr double farthest_m = 100e3;  // from the origin; beyond, the tangent plane is not valid
 constexpr double moved_origin_m = 0.01;
 
 std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
-/// Those whose sender can be nothing but a vehicle, or its simulator.
-bool bears_a_pose(std::uint32_t id) { return id != Heartbeat::id && id != SystemTime::id && id != GpsGlobalOrigin::id; }
+/// Messages that only vehicles or their simulators send.
+bool contains_pose(std::uint32_t id) { return id != Heartbeat::id && id != SystemTime::id && id != GpsGlobalOrigin::id; }
 
 Stamp boot_stamp(std::int64_t at_ms) { return {ClockDomain::sim, at_ms * 1'000'000}; }
 
@@ -40,30 +40,30 @@ std::string_view name_of(Source source) {
 }
 
 MavlinkPoses::MavlinkPoses(Settings settings) : settings_(std::move(settings)) {
-  us_.component = own_component;
-  if (settings_.system_id != 0) us_.system = settings_.system_id;
+  self_.component = own_component;
+  if (settings_.system_id != 0) self_.system = settings_.system_id;
 }
 
-// ---- who is meant
+// ---- selection of the vehicle
 
-void MavlinkPoses::begin(std::uint8_t system, Time now) {
-  system_ = us_.system = system;
+void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
+  system_ = self_.system = system;
   found_at_ = now;
   next_request_ = now;
   has_autopilot_ = sim_state_is_coarse_ = global_has_fix_ = sim_state_has_fix_ = false;
-  told_.reset();
+  reported_.reset();
   autopilot_component_ = 1;
-  heard_.clear();
+  received_.clear();
   local_in_world_.reset();
   newest_ns_ = {};
-  yielded_ = {};
+  last_pose_ = {};
   timeless_ = {};
   reset_counter_ = {};
-  begin_histories();
+  clear_histories();
 }
 
-/// Nothing from before may be joined with what comes now.
-void MavlinkPoses::begin_histories() {
+/// Later messages must not be paired with earlier ones.
+void MavlinkPoses::clear_histories() {
   attitudes_.clear();
   local_.clear();
   global_.clear();
@@ -71,37 +71,38 @@ void MavlinkPoses::begin_histories() {
   ++resets_;
 }
 
-bool MavlinkPoses::is_meant(const Frame& frame, Time now) {
-  if (frame.system == us_.system && frame.component == own_component) return false;  // our own, sent back by a router
+bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
+  if (frame.system == self_.system && frame.component == own_component)
+    return false;  // sent by this component, returned by a router
   if (settings_.component_id != 0 && frame.component != settings_.component_id) return false;
   if (settings_.system_id != 0) {
     if (frame.system != settings_.system_id) return false;
-    if (!system_) begin(frame.system, now);
+    if (!system_) select_vehicle(frame.system, now);
     return true;
   }
   if (system_ && frame.system == *system_) return true;
-  if (system_ && now - last_heard_ <= system_silence) return false;
-  const bool shows_itself =
-      frame.id == Heartbeat::id ? message_in<Heartbeat>(frame).autopilot != Heartbeat::no_autopilot : bears_a_pose(frame.id);
-  if (shows_itself) begin(frame.system, now);
-  return shows_itself;
+  if (system_ && now - last_received_ <= system_silence) return false;
+  const bool identifies_vehicle =
+      frame.id == Heartbeat::id ? message_in<Heartbeat>(frame).autopilot != Heartbeat::no_autopilot : contains_pose(frame.id);
+  if (identifies_vehicle) select_vehicle(frame.system, now);
+  return identifies_vehicle;
 }
 
-/// Of several components that send the same message one is listened to; heartbeats come from all.
-bool MavlinkPoses::is_heard(const Frame& frame, Time now) {
-  const auto known = heard_.find(frame.id);
-  const bool other = known != heard_.end() && known->second.component != frame.component;
+/// Accepts each message from one component only; heartbeats from all.
+bool MavlinkPoses::is_selected_component(const Frame& frame, Time now) {
+  const auto known = received_.find(frame.id);
+  const bool other = known != received_.end() && known->second.component != frame.component;
   if (other && frame.id != Heartbeat::id && now - known->second.at <= system_silence) return false;
-  heard_[frame.id] = {frame.component, now};
+  received_[frame.id] = {frame.component, now};
   return true;
 }
 
-bool MavlinkPoses::has_come(std::uint32_t message, Time now, std::chrono::nanoseconds within) const {
-  const auto known = heard_.find(message);
-  return known != heard_.end() && now - known->second.at <= within;
+bool MavlinkPoses::received_within(std::uint32_t message, Time now, std::chrono::nanoseconds within) const {
+  const auto known = received_.find(message);
+  return known != received_.end() && now - known->second.at <= within;
 }
 
-// ---- what arrives
+// ---- messages
 
 Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   Reaction out;
@@ -111,19 +112,19 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   }
   FrameReader frames(datagram);
   while (const auto frame = frames.next()) {
-    if (!is_meant(*frame, now)) {
-      pass_over(*frame);
+    if (!is_from_vehicle(*frame, now)) {
+      note_ignored(*frame);
       continue;
     }
-    last_heard_ = now;
-    out.heard = true;
-    if (is_heard(*frame, now)) on_frame(*frame, {now, out});
+    last_received_ = now;
+    out.from_vehicle = true;
+    if (is_selected_component(*frame, now)) on_frame(*frame, {now, out});
   }
-  judge(frames.counts(), out);
+  add_counts(frames.counts(), out);
   return out;
 }
 
-void MavlinkPoses::judge(const FrameCounts& now, Reaction& out) {
+void MavlinkPoses::add_counts(const FrameCounts& now, Reaction& out) {
   counts_.frames += now.frames;
   counts_.unknown += now.unknown;
   counts_.bad_checksum += now.bad_checksum;
@@ -131,61 +132,61 @@ void MavlinkPoses::judge(const FrameCounts& now, Reaction& out) {
   counts_.junk_bytes += now.junk_bytes;
   if (now.bad_checksum > 0)
     out.refusals.emplace_back(
-        "a MAVLink frame has a wrong checksum: damaged, or of a dialect with another message of that number");
+        "a MAVLink frame has a wrong checksum: damaged, or of a dialect that uses its number for another message");
   else if (now.wrong_size > 0)
     out.refusals.emplace_back("a MAVLink 1 message has the wrong length");
   else if (now.junk_bytes > 0)
-    out.refusals.push_back(std::to_string(now.junk_bytes) + " bytes are no MAVLink");
+    out.refusals.push_back(std::to_string(now.junk_bytes) + " bytes are not MAVLink");
 }
 
 void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
   switch (frame.id) {
     case Heartbeat::id:
-      return take(message_in<Heartbeat>(frame), frame);
+      return handle(message_in<Heartbeat>(frame), frame);
     case Attitude::id:
-      if (!has_come(AttitudeQuaternion::id, at.now, source_silence)) take(attitude_of(message_in<Attitude>(frame)), at);
+      if (!received_within(AttitudeQuaternion::id, at.now, source_silence)) handle(attitude_of(message_in<Attitude>(frame)), at);
       return;
     case AttitudeQuaternion::id:
-      return take(attitude_of(message_in<AttitudeQuaternion>(frame)), at);
+      return handle(attitude_of(message_in<AttitudeQuaternion>(frame)), at);
     case LocalPositionNed::id:
-      return take(message_in<LocalPositionNed>(frame), at);
+      return handle(message_in<LocalPositionNed>(frame), at);
     case GlobalPositionInt::id:
-      return take(message_in<GlobalPositionInt>(frame), at);
+      return handle(message_in<GlobalPositionInt>(frame), at);
     case GpsGlobalOrigin::id:
-      return take(message_in<GpsGlobalOrigin>(frame), at);
+      return handle(message_in<GpsGlobalOrigin>(frame), at);
     case VisionPositionEstimate::id:
-      return take(message_in<VisionPositionEstimate>(frame), at);
+      return handle(message_in<VisionPositionEstimate>(frame), at);
     case SimState::id:
-      return take(message_in<SimState>(frame), at);
+      return handle(message_in<SimState>(frame), at);
     case AttPosMocap::id:
-      return take(message_in<AttPosMocap>(frame), at);
+      return handle(message_in<AttPosMocap>(frame), at);
     case Odometry::id:
-      return take(message_in<Odometry>(frame), at);
+      return handle(message_in<Odometry>(frame), at);
     default:
-      return;  // SYSTEM_TIME: poses are stamped with the boot clock, which the World maps to ours
+      return;  // SYSTEM_TIME: poses are stamped with the boot clock, which the World maps to the daemon's
   }
 }
 
-void MavlinkPoses::take(const Heartbeat& m, const Frame& frame) {
+void MavlinkPoses::handle(const Heartbeat& m, const Frame& frame) {
   if (m.autopilot == Heartbeat::no_autopilot) return;
   has_autopilot_ = true;
   autopilot_ = m.autopilot;
   autopilot_component_ = frame.component;
 }
 
-void MavlinkPoses::take(const AttitudeReading& reading, Moment at) {
+void MavlinkPoses::handle(const AttitudeReading& reading, Moment at) {
   note_boot_time(reading.at_ms);
   attitudes_.put(reading);
   join_pairs(at);
 }
 
-void MavlinkPoses::take(const LocalPositionNed& m, Moment at) {
+void MavlinkPoses::handle(const LocalPositionNed& m, Moment at) {
   note_boot_time(m.boot_ms);
   local_.put(place_of(m));
   join_pairs(at);
 }
 
-void MavlinkPoses::take(const GlobalPositionInt& m, Moment at) {
+void MavlinkPoses::handle(const GlobalPositionInt& m, Moment at) {
   note_boot_time(m.boot_ms);
   const auto place = placed(GlobalPositionInt::name, geodetic_of(m), at);
   global_has_fix_ = place.has_value();
@@ -194,7 +195,7 @@ void MavlinkPoses::take(const GlobalPositionInt& m, Moment at) {
   join_pairs(at);
 }
 
-void MavlinkPoses::take(const GpsGlobalOrigin& m, Moment at) {
+void MavlinkPoses::handle(const GpsGlobalOrigin& m, Moment at) {
   const auto place = placed(GpsGlobalOrigin::name, geodetic_of(m), at);
   if (!place) return;
   const Vec3d before = local_in_world_.value_or(Pose{}).position_m;
@@ -202,41 +203,41 @@ void MavlinkPoses::take(const GpsGlobalOrigin& m, Moment at) {
   local_in_world_ = *place;
 }
 
-void MavlinkPoses::take(const SimState& m, Moment at) {
+void MavlinkPoses::handle(const SimState& m, Moment at) {
   const auto place = placed(SimState::name, geodetic_of(m), at);
   sim_state_is_coarse_ = !has_exact_position(m);
   sim_state_has_fix_ = place.has_value();
-  if (place) offer(Source::sim_state, raw_pose(m), Stamp{}, *place, at);
+  if (place) add_pose(Source::sim_state, raw_pose(m), Stamp{}, *place, at);
 }
 
-void MavlinkPoses::take(const VisionPositionEstimate& m, Moment at) {
+void MavlinkPoses::handle(const VisionPositionEstimate& m, Moment at) {
   on_reset_counter(Source::vision, m.reset_counter);
-  offer(Source::vision, raw_pose(m), stamp_of(Source::vision, m.time_us), Pose{}, at);
+  add_pose(Source::vision, raw_pose(m), stamp_of(Source::vision, m.time_us), Pose{}, at);
 }
 
-void MavlinkPoses::take(const AttPosMocap& m, Moment at) {
-  offer(Source::mocap, raw_pose(m), stamp_of(Source::mocap, m.time_us), Pose{}, at);
+void MavlinkPoses::handle(const AttPosMocap& m, Moment at) {
+  add_pose(Source::mocap, raw_pose(m), stamp_of(Source::mocap, m.time_us), Pose{}, at);
 }
 
-void MavlinkPoses::take(const Odometry& m, Moment at) {
+void MavlinkPoses::handle(const Odometry& m, Moment at) {
   const auto raw = raw_pose(m);
   if (!raw) return refuse(Odometry::name, raw.error().text, at);
   on_reset_counter(Source::odometry, m.reset_counter);
-  offer(Source::odometry, *raw, stamp_of(Source::odometry, m.time_us), local_in_world_.value_or(Pose{}), at);
+  add_pose(Source::odometry, *raw, stamp_of(Source::odometry, m.time_us), local_in_world_.value_or(Pose{}), at);
 }
 
-// ---- what becomes of it
+// ---- poses
 
 void MavlinkPoses::join_pairs(Moment at) {
   while (const auto pair = local_.next(attitudes_))
-    offer(Source::local, raw_pose(pair->attitude, pair->place), boot_stamp(pair->place.at_ms), local_in_world_.value_or(Pose{}),
-          at);
+    add_pose(Source::local, raw_pose(pair->attitude, pair->place), boot_stamp(pair->place.at_ms),
+             local_in_world_.value_or(Pose{}), at);
   while (const auto pair = global_.next(attitudes_))
-    offer(Source::global, raw_pose(pair->attitude, {pair->place.at_ms, {}, pair->place.ned_mps}), boot_stamp(pair->place.at_ms),
-          pair->place.enu_in_world, at);
+    add_pose(Source::global, raw_pose(pair->attitude, {pair->place.at_ms, {}, pair->place.ned_mps}),
+             boot_stamp(pair->place.at_ms), pair->place.enu_in_world, at);
 }
 
-/// East, north, up at a place, in the world; nothing without an origin or a fix, or when it makes no sense.
+/// The local ENU frame in the world; nullopt without an origin or a fix, or for an implausible position.
 std::optional<Pose> MavlinkPoses::placed(std::string_view message, const Result<std::optional<Geodetic>>& place, Moment at) {
   if (!place) {
     refuse(message, place.error().text, at);
@@ -250,12 +251,12 @@ std::optional<Pose> MavlinkPoses::placed(std::string_view message, const Result<
   return std::nullopt;
 }
 
-void MavlinkPoses::offer(Source source, const RawPose& raw, Stamp stamp, const Pose& enu_in_world, Moment at) {
+void MavlinkPoses::add_pose(Source source, const RawPose& raw, Stamp stamp, const Pose& enu_in_world, Moment at) {
   for (std::size_t better = 0; better < index_of(source); ++better)
-    if (yielded_[better] && at.now - *yielded_[better] <= source_silence) return;
+    if (last_pose_[better] && at.now - *last_pose_[better] <= source_silence) return;
   if (settings_.needs_time && stamp.domain == ClockDomain::arrival) {
     if (!std::exchange(timeless_[index_of(source)], true))
-      at.out.notices.push_back(std::string(name_of(source)) + " bears no time and is not used: time is what poses say");
+      at.out.notices.push_back(std::string(name_of(source)) + " has no time stamp and is not used: clock: follow needs one");
     return;
   }
   control::PoseSample sample;
@@ -266,7 +267,7 @@ void MavlinkPoses::offer(Source source, const RawPose& raw, Stamp stamp, const P
   auto pose = checked(std::move(sample), raw);
   if (!pose) return refuse(name_of(source), pose.error().text, at);
   pose->pose = compose(enu_in_world, pose->pose);
-  yielded_[index_of(source)] = at.now;
+  last_pose_[index_of(source)] = at.now;
   at.out.poses.push_back({*std::move(pose), "system " + std::to_string(*system_) + " " + std::string(name_of(source))});
 }
 
@@ -281,7 +282,7 @@ Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
 }
 
 void MavlinkPoses::note_boot_time(std::int64_t ms) {
-  if (ms < newest_boot_ms_ - late_ms) begin_histories();
+  if (ms < newest_boot_ms_ - late_ms) clear_histories();
   newest_boot_ms_ = std::max(newest_boot_ms_, ms);
 }
 

@@ -1,4 +1,4 @@
-// The MAVLink messages that poses come from, in the wire's order: base fields sorted by size, extensions as they were added.
+// The MAVLink messages that carry poses, in wire order: base fields sorted by size, extensions as they were added.
 // Each row's number, CRC_EXTRA and lengths are those of minimal.xml, standard.xml and common.xml of the MAVLink project; a test
 // computes CRC_EXTRA and lengths from the fields below. protocol/mavlink/frames.hpp reads and writes them.
 #pragma once
@@ -125,7 +125,7 @@ constexpr void extensions(V& visit, M& m) {
   visit("time_usec", m.time_us);
 }
 
-/// Written by us only.
+/// Only written, never read.
 struct CommandLong {
   static constexpr std::uint32_t id = 76;
   static constexpr std::uint8_t crc_extra = 152;
@@ -162,7 +162,7 @@ constexpr void extensions(V& visit, M& m) {
   visit("covariance", m.covariance), visit("reset_counter", m.reset_counter);
 }
 
-/// What a simulator knows to be true. Bears no time.
+/// Ground truth of a simulator. Has no time stamp.
 struct SimState {
   static constexpr std::uint32_t id = 108;
   static constexpr std::uint8_t crc_extra = 32;
@@ -251,16 +251,16 @@ constexpr std::size_t full_size() {
   return counter.bytes;
 }
 
-/// What a reader must know of a message before it looks inside.
+/// Properties of a message that a reader needs before decoding.
 struct MessageInfo {
   std::uint32_t id = 0;
   std::string_view name;
   std::uint8_t crc_extra = 0;
   std::size_t size = 0, full_size = 0;  // of the payload without and with extensions
 };
-/// Those we read, by rising id.
+/// The supported messages, by rising id.
 std::span<const MessageInfo> known_messages();
-/// Null when we do not read it.
+/// Null for unsupported messages.
 const MessageInfo* find_message(std::uint32_t id);
 
 }  // namespace sonar::mavlink

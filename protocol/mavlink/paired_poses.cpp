@@ -16,7 +16,7 @@ Quatd between(Quatd a, Quatd b, double u) {
 }  // namespace
 
 void Attitudes::put(const AttitudeReading& reading) {
-  if (!readings_.empty() && reading.at_ms < readings_.back().at_ms) return;  // came late
+  if (!readings_.empty() && reading.at_ms < readings_.back().at_ms) return;  // arrived late
   if (!readings_.empty() && reading.at_ms == readings_.back().at_ms) readings_.pop_back();
   readings_.push_back(reading);
   if (readings_.size() > most) readings_.pop_front();

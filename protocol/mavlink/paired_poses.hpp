@@ -15,14 +15,14 @@ class Attitudes {
  public:
   /// Longest step across which two are interpolated, and from which on an attitude is too old for a place.
   static constexpr std::int64_t longest_gap_ms = 1000;
-  /// A newest attitude is carried on by its rates so far, instead of waiting for the next.
+  /// Limit of extrapolation of the newest attitude by its rates.
   static constexpr std::int64_t longest_carry_ms = 20;
 
   enum class Answer { known, later, never };
   void put(const AttitudeReading& reading);
   void clear() { readings_.clear(); }
   bool empty() const { return readings_.empty(); }
-  /// The attitude at a moment: interpolated, or carried on a little. `later`: the next one will tell.
+  /// The attitude at a moment: interpolated, or extrapolated for a short time. `later`: needs the next reading.
   Answer at(std::int64_t at_ms, AttitudeReading& out) const;
 
  private:
@@ -30,7 +30,7 @@ class Attitudes {
   std::deque<AttitudeReading> readings_;
 };
 
-/// Places in waiting for their attitude.
+/// Positions that wait for their attitude.
 template <class Place>
 class PairedPlaces {
  public:
@@ -43,7 +43,7 @@ class PairedPlaces {
     if (waiting_.size() > most) waiting_.pop_front();
   }
   void clear() { waiting_.clear(); }
-  /// The next place whose attitude is known, in the order they came.
+  /// The next position with a known attitude, in order of arrival.
   std::optional<Paired> next(const Attitudes& attitudes) {
     while (!waiting_.empty()) {
       Paired paired;

@@ -21,7 +21,7 @@ enum MavFrame : std::uint8_t {
   local_flu = 21,
 };
 
-constexpr double highest_m = 1e5;         // nothing that carries a sonar; keeps what follows finite
+constexpr double highest_m = 1e5;         // above any vehicle with a sonar; keeps the results finite
 const Quatd half_turn_ahead{0, 1, 0, 0};  // FRD and FLU into each other
 const Quatd enu_and_ned{0, std::sqrt(0.5), std::sqrt(0.5), 0};
 

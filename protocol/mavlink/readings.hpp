@@ -1,5 +1,5 @@
-// What single messages say of a vehicle, in the terms of control::RawPose: north-east-down world, forward-right-down body.
-// protocol/mavlink/mavlink_poses.hpp decides which of them count.
+// Contents of single messages as control::RawPose: north-east-down world, forward-right-down body.
+// protocol/mavlink/mavlink_poses.hpp selects the messages to use.
 #pragma once
 
 #include <optional>
@@ -28,7 +28,7 @@ struct PlaceReading {
 };
 PlaceReading place_of(const LocalPositionNed& m);
 
-/// Degrees times 1e7; no value at all at 0, 0: that is how autopilots say that they do not know.
+/// Degrees times 1e7; nullopt at 0, 0, which autopilots send without a fix.
 /// Errors: a latitude or longitude beyond the globe's.
 Result<std::optional<Geodetic>> geodetic_of(const GlobalPositionInt& m);
 Result<std::optional<Geodetic>> geodetic_of(const GpsGlobalOrigin& m);
@@ -40,7 +40,7 @@ control::RawPose raw_pose(const AttitudeReading& attitude, const PlaceReading& p
 control::RawPose raw_pose(const SimState& m);
 control::RawPose raw_pose(const AttPosMocap& m);
 control::RawPose raw_pose(const VisionPositionEstimate& m);
-/// Errors: a frame_id or child_frame_id that says nothing about axes we know.
+/// Errors: an unsupported frame_id or child_frame_id.
 Result<control::RawPose> raw_pose(const Odometry& m);
 
 /// Whether its position uses the integer extensions, which version 1 cannot carry.

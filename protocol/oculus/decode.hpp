@@ -1,5 +1,5 @@
-// The driver side: an incremental decoder for what a device sends, and the checks real drivers make.
-// Used by clients/sonarctl and the tests; the fire messages it answers to are made by make_fire (fire.hpp).
+// The driver side: an incremental decoder for the messages of a device, and the checks of real drivers.
+// Used by clients/sonarctl and the tests; make_fire (fire.hpp) makes the fire messages.
 #pragma once
 
 #include <optional>
@@ -20,7 +20,7 @@ struct DecodedPing {
   std::vector<std::int16_t> bearings_cdeg;  // [beams], positive to starboard
   std::vector<std::uint32_t> row_gains;     // [rows] when the echoed flag bit 2 is set, else empty
   wire::Bytes message;                      // the whole message
-  std::vector<std::string> violations;      // broken identities, a sentence each; empty for a sound ping
+  std::vector<std::string> violations;      // broken identities; empty for a valid ping
   bool has_image = false;                   // rows x beams samples lie inside the message
 
   std::size_t rows() const { return has_image ? head.fixed.row_count : 0; }
@@ -30,7 +30,7 @@ struct DecodedPing {
   std::uint32_t sample(std::size_t row, std::size_t beam) const;
   /// The row's samples as they lie in the message.
   wire::BytesView row_samples(std::size_t row) const;
-  /// Positive to port, our convention.
+  /// Positive to port, sonard's convention.
   double azimuth_rad(std::size_t beam) const;
   /// Range of a row's centre [m], in the device's metres.
   double row_range_m(std::size_t row) const;
@@ -40,7 +40,7 @@ struct LogText {
   MessageHeader header;
   std::string text;
 };
-struct OtherMessage {  // a type a driver has no use for, or a known type too short to read
+struct OtherMessage {  // a type that drivers ignore, or a known type too short to read
   MessageHeader header;
   std::size_t size = 0;
   std::string why;
@@ -49,12 +49,12 @@ using Received = std::variant<DecodedPing, DummyMessage, UserConfigMessage, LogT
 
 /// Any message of at least 16 bytes, as framed.
 Received decode_message(wire::BytesView message);
-/// Nothing when the fixed part does not fit (then there is no ping to speak of).
+/// nullopt when the fixed part does not fit.
 std::optional<DecodedPing> decode_ping(wire::BytesView message);
-/// A status datagram: at least 142 bytes with the right magic, or a sentence.
+/// A status datagram: at least 142 bytes with the right magic. bad_data otherwise.
 Result<StatusMessage> decode_status(wire::BytesView datagram);
 
-/// The device's TCP stream, in whatever pieces it arrives. Lengths above reply_limit are junk and never sized for.
+/// The TCP stream of a device in chunks of any size. Lengths above reply_limit are junk; nothing is allocated for them.
 class Decoder {
  public:
   void append(wire::BytesView received) { framer_.append(received); }
@@ -67,14 +67,14 @@ class Decoder {
   Framer framer_{Sender::device};
 };
 
-/// Identities of one ping result that some driver enforces; a sentence for each that is broken (identities.cpp).
+/// The broken ones of the identities of a ping result that drivers enforce (identities.cpp).
 std::vector<std::string> identity_violations(const DecodedPing& ping);
-/// What drivers compare between their request and the echo; a sentence for each difference. `gain_echo` as the option.
+/// The differences between a request and its echo that drivers check. `gain_echo` as the option.
 std::vector<std::string> echo_violations(const FireRequest& sent, const DecodedPing& ping, std::string_view gain_echo = "auto");
 /// The same for a status datagram: length, type, device id, addresses, status bits, temperature.
 std::vector<std::string> status_violations(const StatusMessage& status, std::size_t datagram_size);
 
-/// What must hold from ping to ping: one device id, ids that only rise. Skipped ids are counted, not complained about.
+/// Checks between pings: one device id, rising ping ids. Skipped ids are counted, not reported as violations.
 class PingSequence {
  public:
   std::vector<std::string> add(const DecodedPing& ping);

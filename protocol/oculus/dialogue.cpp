@@ -19,8 +19,8 @@ using protocol::Reaction;
 using protocol::RequestPing;
 using protocol::StoreAddress;
 
-constexpr std::size_t notices_per_call = 8;               // a hostile client must not turn its bytes into more of ours
-constexpr auto greeting_after = std::chrono::seconds(2);  // of a client's silence: whoever fires by itself does so at once
+constexpr std::size_t notices_per_call = 8;               // bounds the log output that a hostile client can cause
+constexpr auto greeting_after = std::chrono::seconds(2);  // without a fire message: drivers that fire by themselves do so at once
 
 class OculusDialogue final : public protocol::Dialogue {
  public:
@@ -44,7 +44,7 @@ class OculusDialogue final : public protocol::Dialogue {
     return reaction;
   }
 
-  Reaction on_tick(Time now) override {
+  Reaction on_tick(Time now, bool) override {
     Reaction reaction;
     if (now < next_tick()) return reaction;
     if (greeting_at_ && now >= *greeting_at_) {
@@ -88,26 +88,26 @@ class OculusDialogue final : public protocol::Dialogue {
     if (!fire) return notice(reaction, "ignored a fire message of " + std::to_string(message.size()) + " bytes, 53 are needed");
     if (has_non_finite(fire->settings))
       return notice(reaction, "ignored a fire message whose range, gain, sound speed or salinity is not a finite number");
-    Settled settled = settle(*fire, device_);
-    if (!settled.clamped.empty() && text_option(device_.options, option_name::out_of_range) == "ignore")
-      return notice(reaction, "ignored a fire message: " + settled.clamped.front() + " (option out_of_range: ignore)");
+    ResolvedSettings resolved = resolve(*fire, device_);
+    if (!resolved.clamped.empty() && text_option(device_.options, option_name::out_of_range) == "ignore")
+      return notice(reaction, "ignored a fire message: " + resolved.clamped.front() + " (option out_of_range: ignore)");
 
-    protocol::Bytes request = make_fire(*fire, 0);
-    const bool standby = settled.settings.rate_hz <= 0;
+    const protocol::Bytes request = make_fire(*fire);
+    const bool standby = resolved.settings.rate_hz <= 0;
     const bool repeated = request == last_request_;
     last_request_ = request;
-    const bool one_ping = settled.settings.triggered && !standby;
-    reaction.events.emplace_back(ChangeSettings{settled.settings, std::move(request), summary(*fire, settled)});
+    const bool one_ping = resolved.settings.triggered && !standby;
+    reaction.events.emplace_back(ChangeSettings{resolved.settings, std::make_shared<HeldFire>(*fire), summary(*fire, resolved)});
     if (one_ping) reaction.events.emplace_back(RequestPing{});
-    if (standby && !repeated) {  // drivers take a dummy as the acknowledgement of standby
+    if (standby && !repeated) {  // drivers expect a dummy as the acknowledgement of standby
       reaction.replies.push_back(make_dummy(device_.id));
       postpone_dummy(now);
     }
   }
 
-  static std::string summary(const FireRequest& fire, const Settled& settled) {
+  static std::string summary(const FireRequest& fire, const ResolvedSettings& resolved) {
     std::string text = describe(fire);
-    for (const std::string& clamped : settled.clamped) text += "; " + clamped;
+    for (const std::string& clamped : resolved.clamped) text += "; " + clamped;
     return text;
   }
 
@@ -123,7 +123,7 @@ class OculusDialogue final : public protocol::Dialogue {
     }
     if (write && text_option(device_.options, option_name::user_config_write) != "reply") return;
     reaction.replies.push_back(make_user_config(device_.id, stored_, device_));
-    postpone_dummy(now);  // the one client that asks takes whatever 28 bytes come first: leave it quiet
+    postpone_dummy(now);  // the only client that reads it accepts the first 28 bytes as its answer
   }
 
   void notice(Reaction& reaction, std::string text) {

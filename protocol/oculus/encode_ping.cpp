@@ -11,7 +11,8 @@
 namespace sonar::oculus {
 namespace {
 
-/// Floats near 65 deg err by 4e-4 of a hundredth; the capture's own law comes no closer than this to a whole number but on it.
+/// Rounding tolerance: floats near 65 deg have an error of 4e-4 of 0.01 deg; non-integers of the capture's formula differ by
+/// more.
 constexpr double truncation_guard_cdeg = 1e-3;
 
 PingResultV1 version_1(const PingHead& head) {
@@ -61,13 +62,13 @@ std::uint16_t reply_version(const FireRequest& fire, std::string_view option) {
   if (option == "0") return 0;
   if (option == "1") return 1;
   if (option == "2") return 2;
-  return std::min<std::uint16_t>(fire.version, 2);  // mirror; there is no version above 2
+  return std::min<std::uint16_t>(fire.version, 2);  // echoes the version; the highest is 2
 }
 
 void set_attitude(PingResultV2& fixed, const Quatd& vehicle_in_world) {
   const RollPitchYaw angles = rpy_from_quat(vehicle_in_world);
   fixed.heading_deg = deg_from_rad(heading_rad(vehicle_in_world));
-  fixed.pitch_deg = -deg_from_rad(angles.pitch_rad);  // about y to port, positive is bow down; the packet wants bow up
+  fixed.pitch_deg = -deg_from_rad(angles.pitch_rad);  // about y to port, positive is bow down; the packet uses bow up
   fixed.roll_deg = deg_from_rad(angles.roll_rad);
 }
 
@@ -84,7 +85,7 @@ void set_start_time(PingHead& head, std::chrono::nanoseconds since_power_up, std
   head.ping_start_counter = static_cast<std::uint32_t>(unit == "microseconds" ? microseconds : since_power_up.count());
 }
 
-/// The double the client sent, when that is what was used; settings keep it as a float.
+/// The client's double when it was applied; settings store a float.
 double sound_speed_used(const FireSettings& asked, const PingSettings& settings) {
   const bool as_asked = static_cast<float>(asked.sound_speed_mps) == settings.device_sound_speed_mps;
   return as_asked ? asked.sound_speed_mps : static_cast<double>(settings.device_sound_speed_mps);
@@ -129,8 +130,7 @@ FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, doub
   return echo;
 }
 
-wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, wire::BytesView request) {
-  const FireRequest fire = parse_fire(request).value_or(stored_fire());
+wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const FireRequest& fire) {
   const PingSettings& settings = ping.request.settings;
   PingHead head;
   PingResultV2& fixed = head.fixed;

@@ -11,7 +11,7 @@
 
 namespace sonar::oculus {
 
-/// Fixed part of either version. header.version decides what travels: below 2 the extension, the attitude and
+/// Fixed part of either version. header.version selects the fields: below 2 the extension, the attitude and
 /// ping_start_time_s stay behind and ping_start_counter goes instead.
 struct PingHead {
   PingResultV2 fixed;
@@ -32,7 +32,7 @@ std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad);
 /// The fire settings as the ping repeats them (docs/protocols/oculus.md, 5.5). `sound_speed_used` replaces a requested 0.
 FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, double sound_speed_used_mps);
 
-/// Everything: request parsed, echo, environment, image.
-wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, wire::BytesView request);
+/// Everything: echo, environment, image. `fire`: the request the ping was made with.
+wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const FireRequest& fire);
 
 }  // namespace sonar::oculus

@@ -37,12 +37,22 @@ wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination, bool p
 }
 
 FireRequest stored_fire() {
-  FireRequest fire;  // unknown: what the real device stores; a plain picture of the nearest 10 m
+  FireRequest fire;  // unknown: settings stored in the real device; chosen: range 10 m
   fire.settings.mode = 2;
   fire.settings.flags = flag::range_in_metres | flag::simple_result | flag::beams_512;
   fire.settings.range = 10;
   fire.settings.gain_percent = 50;
   return fire;
+}
+
+bool HeldFire::equals(const VendorSettings& other) const {
+  const auto* held = dynamic_cast<const HeldFire*>(&other);
+  return held != nullptr && make_fire(fire) == make_fire(held->fire);
+}
+
+FireRequest fire_of(const VendorSettings* settings) {
+  const auto* held = dynamic_cast<const HeldFire*>(settings);
+  return held != nullptr ? held->fire : stored_fire();
 }
 
 std::string describe(const FireRequest& fire) {

@@ -1,10 +1,12 @@
-// The fire message as both sides use it: parsed from a client's bytes, or made by our own client.
-// The device keeps its normalised bytes (53 or 89) beside the settings, so that a ping echoes what it was made with.
+// The fire message for both ends: parsed from a client's bytes, or made by sonarctl.
+// The device keeps it beside the settings (HeldFire), so that a ping echoes the request it was made with.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "core/sonar/ping.hpp"
 #include "protocol/oculus/messages.hpp"
 
 namespace sonar::oculus {
@@ -24,6 +26,15 @@ wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination = 0, bo
 
 /// The device's stored configuration before any client spoke. Version 0 fits all clients (docs/protocols/oculus.md, 5.1).
 FireRequest stored_fire();
+
+/// The request that a device's settings come from; equal when its bytes are.
+struct HeldFire final : VendorSettings {
+  explicit HeldFire(const FireRequest& from) : fire(from) {}
+  bool equals(const VendorSettings& other) const override;
+  FireRequest fire;
+};
+/// stored_fire() for null.
+FireRequest fire_of(const VendorSettings* settings);
 
 /// "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, own sound speed, 512 beams, 8 bits, ...": for the log.
 std::string describe(const FireRequest& fire);

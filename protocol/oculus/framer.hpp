@@ -12,14 +12,14 @@ namespace sonar::oculus {
 /// Who sends the stream: clients put 0 into payload_size as they like (docs/protocols/oculus.md, 2), devices are exact.
 enum class Sender { client, device };
 
-/// Total length of the message this header opens, or nothing when the header is junk for that sender.
+/// Total length of the message with this header; nullopt for a header that this sender never sends.
 std::optional<std::size_t> message_length(const MessageHeader& header, Sender sender);
 
 class Framer {
  public:
   explicit Framer(Sender sender) : sender_(sender) {}
 
-  /// Adds received bytes. Drain with next() before the following append: what then stays is less than one message.
+  /// Adds received bytes. Drain with next() before the next append: less than one message then remains.
   void append(wire::BytesView received);
   /// The next whole message, header included; valid until the next call of append or next.
   std::optional<wire::BytesView> next();

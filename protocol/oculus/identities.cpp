@@ -23,24 +23,24 @@ class Check {
   template <class A, class B>
   void equal(const char* what, A value, const char* with, B expected) {
     if (static_cast<std::uint64_t>(value) != static_cast<std::uint64_t>(expected))
-      say(std::string(what) + " is " + number(static_cast<std::uint64_t>(value)) + " but " + with + " is " +
+      add(std::string(what) + " is " + number(static_cast<std::uint64_t>(value)) + " but " + with + " is " +
           number(static_cast<std::uint64_t>(expected)));
   }
   void exact(const char* what, double value, double expected) {
-    if (!(value == expected)) say("echoed " + std::string(what) + " is " + number(value) + ", requested " + number(expected));
+    if (!(value == expected)) add("echoed " + std::string(what) + " is " + number(value) + ", requested " + number(expected));
   }
   void close(const char* what, double value, double expected) {
     if (!(std::abs(value - expected) <= tolerated_difference))
-      say("echoed " + std::string(what) + " is " + number(value) + ", expected " + number(expected));
+      add("echoed " + std::string(what) + " is " + number(value) + ", expected " + number(expected));
   }
   void holds(bool statement, std::string otherwise) {
-    if (!statement) say(std::move(otherwise));
+    if (!statement) add(std::move(otherwise));
   }
-  std::vector<std::string> take() { return std::move(said_); }
+  std::vector<std::string> violations() { return std::move(violations_); }
 
  private:
-  void say(std::string sentence) { said_.push_back(std::move(sentence)); }
-  std::vector<std::string> said_;
+  void add(std::string sentence) { violations_.push_back(std::move(sentence)); }
+  std::vector<std::string> violations_;
 };
 
 void check_sizes(Check& check, const DecodedPing& ping) {
@@ -96,7 +96,7 @@ std::vector<std::string> identity_violations(const DecodedPing& ping) {
   check.holds(std::isfinite(fixed.frequency_hz) && fixed.frequency_hz > 0,
               "frequency " + number(fixed.frequency_hz) + " is not above 0");
   check.holds(std::isfinite(fixed.temperature_c) && std::isfinite(fixed.pressure_bar), "temperature or pressure is not finite");
-  return check.take();
+  return check.violations();
 }
 
 std::vector<std::string> echo_violations(const FireRequest& sent, const DecodedPing& ping, std::string_view gain_echo) {
@@ -114,7 +114,7 @@ std::vector<std::string> echo_violations(const FireRequest& sent, const DecodedP
               asked.sound_speed_mps != 0 ? asked.sound_speed_mps : ping.head.fixed.sound_speed_mps);
   check.close("salinity", echo.salinity_ppt, asked.salinity_ppt);
   check.exact("ext_flags", ping.head.fixed.extension.flags, sent.extension.flags);
-  return check.take();
+  return check.violations();
 }
 
 std::vector<std::string> status_violations(const StatusMessage& status, std::size_t datagram_size) {
@@ -130,7 +130,7 @@ std::vector<std::string> status_violations(const StatusMessage& status, std::siz
   check.equal("part_number in the header", status.header.part_number, "that in the body", status.part_number);
   check.holds((status.status & 7u) == 2 || (status.status & 7u) == 3, "status bits 0-2 say that the main firmware does not run");
   check.holds(status.ip_address != std::array<std::uint8_t, 4>{}, "ip_addr is 0.0.0.0");
-  return check.take();
+  return check.violations();
 }
 
 std::vector<std::string> PingSequence::add(const DecodedPing& ping) {
@@ -144,7 +144,7 @@ std::vector<std::string> PingSequence::add(const DecodedPing& ping) {
   if (source_) check.equal("src_device_id", ping.head.fixed.header.source, "that of the ping before", *source_);
   last_id_ = id;
   source_ = ping.head.fixed.header.source;
-  return check.take();
+  return check.violations();
 }
 
 }  // namespace sonar::oculus

@@ -238,7 +238,7 @@ constexpr void fields(V& visit, M& m) {
   visit("dhcpEnable", m.dhcp_enable);
 }
 
-/// Keep-alive: a header and nothing else.
+/// Keep-alive: a header only.
 struct DummyMessage {
   MessageHeader header;
 };

@@ -14,11 +14,11 @@ namespace {
 // oculus_driver. BAS: bastianschildknecht sonar_driver. TID: tidewise drivers-sonar_oculus_m750d. CAT: the payload catalogue of
 // the open simulator OceanSim, which quotes the vendor's data sheet DA-148-P01443-10 (2026) for the M series and integrators'
 // pages for the C550d; the data sheet itself was not read. CAP: the captured M1200d pings. unknown: no public source; the value
-// is our choice.
+// is chosen.
 
 /// unknown: fitted. The pressure that reaches full scale at TVG 0 dB and gain 0 dB, so that the demo scene at gain 50, gamma 127
 /// has an 8-bit median of 30 to 60; of the others by the same brightness at half their range. Not by the captured M1200d pings:
-/// at their gain of 50 % a scene like theirs comes out 47 dB too weak (docs/acoustics.md, section 9). The one place to tune it.
+/// at their gain of 50 % a scene like theirs comes out 47 dB too weak (docs/acoustics.md, section 9). Tuned here only.
 namespace fitted_full_scale_upa {
 constexpr float m370s = 2.2e10f, c550d_low = 1.9e10f, c550d_high = 1.4e10f, m750d_low = 2e10f, m750d_high = 1.5e10f;
 constexpr float m1200d_low = 1.5e10f, m1200d_high = 3.5e10f, m3000d_low = 1.4e10f, m3000d_high = 3.3e10f;
@@ -28,7 +28,7 @@ constexpr float source_level_db = 200;  // unknown: chosen; Choi et al. 2025 fit
 constexpr float tvg_ceiling_db = 80;    // unknown: chosen
 
 // unknown: fitted to the captured M1200d ping (docs/acoustics.md, section 9), and taken for all products, which share their
-// electronics as far as anybody knows. The law: from the part of the picture that changes from ping to ping, noise, which rises
+// electronics, as far as is known. The law: from the part of the picture that changes from ping to ping, noise, which rises
 // by 35 dB from 0.1 to 1.9 m and hardly below 0.25 m. The leak: rows 0 to 6; in the range of one pulse it is over.
 constexpr float tvg_slope_db = 35, tvg_minimum_range_m = 0.25f;
 constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;

@@ -6,8 +6,8 @@
 #include "protocol/oculus/options.hpp"
 #include "protocol/oculus/replies.hpp"
 #include "protocol/oculus/settings.hpp"
+#include "protocol/oculus/settings_override.hpp"
 #include "protocol/oculus/tune_model.hpp"
-#include "protocol/oculus/wish.hpp"
 
 namespace sonar::oculus {
 namespace {
@@ -32,10 +32,11 @@ class OculusVendor final : public protocol::Vendor {
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     const FireRequest fire = stored_fire();
-    return {settle(fire, device).settings, make_fire(fire), "stored configuration: " + describe(fire)};
+    return {resolve(fire, device).settings, std::make_shared<HeldFire>(fire), "stored configuration: " + describe(fire)};
   }
-  Result<protocol::ChangeSettings> wished(const protocol::Wish& wish, const protocol::DeviceState& device) const override {
-    return oculus::wished(wish, device);
+  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
+                                                  const protocol::DeviceState& device) const override {
+    return oculus::apply_override(wanted, device);
   }
   bool pings_before_first_request(const protocol::DeviceState& device) const override {
     return text_option(device.options, option_name::before_first_fire) == "pings";
@@ -44,9 +45,8 @@ class OculusVendor final : public protocol::Vendor {
   std::unique_ptr<protocol::Dialogue> converse(const protocol::DeviceState& device, Time now) const override {
     return make_dialogue(device, now);
   }
-  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device,
-                                               protocol::BytesView request) const override {
-    return std::make_shared<const protocol::Bytes>(encode_ping(ping, device, request));
+  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
+    return std::make_shared<const protocol::Bytes>(encode_ping(ping, device, fire_of(ping.request.vendor_settings.get())));
   }
 };
 

@@ -30,7 +30,7 @@ std::span<const protocol::Option> options();
 std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
 /// For free numbers; the default when the text is not a finite number above 0.
 double number_option(const protocol::OptionValues& values, std::string_view name);
-/// For numbers that replace a product's own: nothing when that stands.
+/// For numbers that replace the product's value: nullopt keeps that value.
 std::optional<double> given_number(const protocol::OptionValues& values, std::string_view name);
 
 /// Rows of the table in docs/protocols/oculus.md, section 7: name, values, default, meaning.

@@ -3,15 +3,17 @@
 #include <algorithm>
 
 #include "core/sonar/water.hpp"
+#include "core/text/ipv4.hpp"
 #include "protocol/oculus/options.hpp"
 
 namespace sonar::oculus {
 namespace {
 
 constexpr std::uint32_t main_firmware_runs = 3, main_connection = 1u << 7;
-// unknown: versions of the real firmware; major 8 bits, minor 8, build 16. Ours says 1.0 build 0.
+// unknown: versions of the real firmware; major 8 bits, minor 8, build 16. Chosen: 1.0 build 0.
 constexpr std::uint32_t firmware_version = 0x01000000, firmware_date = 0;
-// unknown: dstDeviceId of the status, 0xFFFF in the notes of ALD on a real M750d; ours is 0, as in CAP's pings. No driver looks.
+// unknown: dstDeviceId of the status, 0xFFFF in the notes of ALD on a real M750d; chosen: 0, as in CAP's pings. No driver reads
+// it.
 
 MessageHeader header_for(MessageType type, std::uint16_t device_id, std::size_t message_size) {
   MessageHeader header;
@@ -19,11 +21,6 @@ MessageHeader header_for(MessageType type, std::uint16_t device_id, std::size_t 
   header.type = type;
   header.payload_size = static_cast<std::uint32_t>(message_size - header_size);
   return header;
-}
-
-/// The user configuration's order: first octet in the most significant byte, the reverse of the status message.
-std::uint32_t integer_from(const protocol::Ipv4& ip) {
-  return std::uint32_t{ip[0]} << 24 | std::uint32_t{ip[1]} << 16 | std::uint32_t{ip[2]} << 8 | ip[3];
 }
 
 }  // namespace
@@ -54,8 +51,9 @@ wire::Bytes make_user_config(std::uint16_t device_id, const protocol::DeviceStat
                              const protocol::DeviceState& device) {
   UserConfigMessage config;
   config.header = header_for(MessageType::user_config, device_id, user_config_size);
-  config.ip_address = stored.ip != 0 ? stored.ip : integer_from(device.advertise_ip);
-  config.ip_mask = stored.ip != 0 ? stored.netmask : integer_from(device.netmask);
+  // The first octet is the most significant byte here, the reverse of the status message.
+  config.ip_address = stored.ip != 0 ? stored.ip : text::number_from_ipv4(device.advertise_ip);
+  config.ip_mask = stored.ip != 0 ? stored.netmask : text::number_from_ipv4(device.netmask);
   config.dhcp_enable = stored.dhcp ? 1 : 0;
   return wire::bytes_of(config);
 }

@@ -13,7 +13,7 @@ namespace sonar::oculus {
 wire::Bytes make_status(const protocol::DeviceState& device);
 /// A bare header: keep-alive, and the acknowledgement of standby.
 wire::Bytes make_dummy(std::uint16_t device_id);
-/// What is stored, or the advertised address while nothing was stored yet.
+/// The stored configuration, or the advertised address before one was stored.
 wire::Bytes make_user_config(std::uint16_t device_id, const protocol::DeviceState::StoredAddress& stored,
                              const protocol::DeviceState& device);
 /// ASCII text, as the real device prints while it boots.

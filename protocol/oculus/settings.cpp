@@ -16,19 +16,19 @@ constexpr double surface_pressure_bar = 1.013;
 
 constexpr int most_samples_per_row = 32;
 
-/// Clamps, and says so: "range 20 m is outside 0.1..10 m, 10 m is used".
-double clamped(double value, double low, double high, const char* what, const char* unit, std::vector<std::string>& said) {
+/// Clamps, with a message: "range 20 m is outside 0.1..10 m, 10 m is used".
+double clamped(double value, double low, double high, const char* what, const char* unit, std::vector<std::string>& messages) {
   const double used = std::clamp(value, low, high);
   if (used != value) {
     char text[160];
     std::snprintf(text, sizeof text, "%s %g %s is outside %g..%g %s, %g %s is used", what, value, unit, low, high, unit, used,
                   unit);
-    said.emplace_back(text);
+    messages.emplace_back(text);
   }
   return used;
 }
 
-/// Option `row_origin`; unknown: what the device does.
+/// Option `row_origin`; unknown: behaviour of the device.
 double row_centre(const protocol::OptionValues& options) {
   const std::string_view origin = text_option(options, option_name::row_origin);
   return origin == "near_edge" ? 0 : origin == "far_edge" ? 1 : 0.5;
@@ -58,8 +58,8 @@ double highest_rate_hz(const FireSettings& fire, const PingSettings& settings, c
 
 }  // namespace
 
-RowLaw row_law(double range_m, double sound_speed_mps, double rate_hz) {
-  RowLaw law{sound_speed_mps / (2 * rate_hz), 1};
+RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz) {
+  RowGrid law{sound_speed_mps / (2 * rate_hz), 1};
   while (range_m / law.spacing_m > row_limit) law.spacing_m *= 2;
   law.count = std::max(1, static_cast<int>(std::floor(range_m / law.spacing_m)));
   return law;
@@ -125,8 +125,8 @@ double device_sound_speed_mps(const protocol::DeviceState& device, double salini
                                 std::clamp(gauge_bar, 0.0, 1000.0));
 }
 
-Settled settle(const FireRequest& fire, const protocol::DeviceState& device) {
-  Settled out;
+ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& device) {
+  ResolvedSettings out;
   PingSettings& settings = out.settings;
   const FireSettings& asked = fire.settings;
   settings.mode = mode_index(*device.model, asked.mode);
@@ -148,7 +148,7 @@ Settled settle(const FireRequest& fire, const protocol::DeviceState& device) {
   const double range = metres ? asked.range : asked.range / 100 * static_cast<double>(mode.max_range_m);
   const double used_range = clamped(range, mode.min_range_m, mode.max_range_m, "range", "m", out.clamped);
   settings.range_m = used_range;
-  const RowLaw rows = row_law(used_range, speed, std::clamp(number_option(device.options, option_name::row_rate_hz), 1e4, 1e7));
+  const RowGrid rows = row_grid(used_range, speed, std::clamp(number_option(device.options, option_name::row_rate_hz), 1e4, 1e7));
   settings.range_bin_count = rows.count;
   settings.range_bin_m = rows.spacing_m;
   settings.row_centre = row_centre(device.options);

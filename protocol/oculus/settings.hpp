@@ -18,11 +18,11 @@ inline constexpr int row_limit = 720;             // liboculus node README, meas
 inline constexpr double native_pulse_m = 0.0025;  // the finest range resolution the data sheets quote
 
 /// Rows of a ping (docs/protocols/oculus.md, 5.4): c / (2 fs) doubled until at most 720 rows cover the range.
-struct RowLaw {
+struct RowGrid {
   double spacing_m = 0;
   int count = 1;
 };
-RowLaw row_law(double range_m, double sound_speed_mps, double rate_hz = row_rate_hz);
+RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz = row_rate_hz);
 
 /// 0 = standby; unknown values count as 10 Hz (chosen).
 double table_rate_hz(PingRate rate);
@@ -45,13 +45,13 @@ int mode_index(const SonarModel& model, std::uint8_t wire_mode);
 /// What the device computes for itself when 0 is requested [m/s].
 double device_sound_speed_mps(const protocol::DeviceState& device, double salinity_ppt);
 
-/// Settings in our terms, and a sentence for each value that had to be clamped.
-struct Settled {
+/// The resulting settings, and a message for each clamped value.
+struct ResolvedSettings {
   PingSettings settings;
   std::vector<std::string> clamped;
 };
 /// The fire message must be finite.
-Settled settle(const FireRequest& fire, const protocol::DeviceState& device);
+ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& device);
 
 /// Bytes of a ping result made with these settings.
 std::size_t ping_size(const PingSettings& settings);

@@ -1,4 +1,4 @@
-// A product with the figures that no public source tells replaced by those of the configuration: apertures and beam widths.
+// Replaces apertures and beam widths of a product, which no public source states, by those of the configuration.
 // Made once per sonar when its configuration is read; everything after it sees the tuned model only.
 #pragma once
 

@@ -36,7 +36,7 @@ void MessageSplitter::append(Time at, wire::BytesView bytes) {
   finished_ = false;
 }
 
-Piece MessageSplitter::take(std::size_t count) {
+RecordedMessage MessageSplitter::cut(std::size_t count) {
   const auto bytes = wire::BytesView(buffer_).subspan(begin_, count);
   begin_ += count;
   return {at_, from_, Carrier::stream, {bytes.begin(), bytes.end()}};
@@ -53,7 +53,7 @@ void MessageSplitter::break_off() {
   lost_ = strict_ = true;
 }
 
-/// Of the message that begins here; 0 = not yet known; nothing = no message begins here. In the middle of nowhere only headers
+/// Length of the message that begins here; 0 = not yet known; nullopt = no message begins here. After lost bytes only headers
 /// of known types count: two bytes of an image soon look like the magic number.
 std::optional<std::size_t> MessageSplitter::length_at_front(wire::BytesView waiting) const {
   if (!starts_like_header(waiting)) return std::nullopt;
@@ -63,13 +63,13 @@ std::optional<std::size_t> MessageSplitter::length_at_front(wire::BytesView wait
   return oculus::message_length(header, from_ == Origin::device ? oculus::Sender::device : oculus::Sender::client);
 }
 
-std::optional<Piece> MessageSplitter::next() {
+std::optional<RecordedMessage> MessageSplitter::next() {
   while (waiting_bytes() > 0) {
     const auto waiting = wire::BytesView(buffer_).subspan(begin_);
     if (const auto length = length_at_front(waiting)) {
       if (*length > 0 && waiting.size() >= *length) {
         lost_ = strict_ = false;
-        return take(*length);
+        return cut(*length);
       }
       if (!finished_) return std::nullopt;
       if (!lost_) ++losses_;  // a message begins and never ends
@@ -80,7 +80,7 @@ std::optional<Piece> MessageSplitter::next() {
     strict_ = true;
     std::size_t none = 1;
     while (none < waiting.size() && !starts_like_header(waiting.subspan(none))) ++none;
-    if (!lost_) return take(none);
+    if (!lost_) return cut(none);
     lose(none);
   }
   return std::nullopt;

@@ -1,11 +1,11 @@
-// Cuts the bytes of one direction of an Oculus connection into pieces: whole messages, and what lies between them, byte for byte.
-// Stands between streams (raw dumps, captures, live sockets) and everything that keeps or replays messages.
+// Splits the bytes of one direction of an Oculus connection into whole messages and the bytes between them; no byte is lost.
+// Used on raw dumps, captures and live sockets.
 #pragma once
 
 #include <optional>
 
 #include "protocol/oculus/framer.hpp"
-#include "protocol/recording/piece.hpp"
+#include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording {
 
@@ -13,15 +13,15 @@ class MessageSplitter {
  public:
   explicit MessageSplitter(Origin from) : from_(from) {}
 
-  /// Drain with next() before the following append: what then stays is less than one message.
+  /// Drain with next() before the next append: less than one message then remains.
   void append(Time at, wire::BytesView bytes);
-  /// Bytes are missing before what comes next: a message that was begun is lost, and so is all up to the next header.
+  /// Reports missing bytes: the incomplete message and all bytes up to the next header are lost.
   void break_off();
-  std::optional<Piece> next();
-  /// The stream is over. What is no beginning of a message is given by next(), the rest is lost.
+  std::optional<RecordedMessage> next();
+  /// Ends the stream. next() returns remaining bytes that do not begin a message; an incomplete message is lost.
   void finish();
 
-  /// Bytes of messages whose other parts are missing, and how many such places there were.
+  /// Bytes of incomplete messages, and the number of such places.
   std::uint64_t lost_bytes() const { return lost_bytes_; }
   std::uint64_t losses() const { return losses_; }
   /// Of the unfinished message: bytes that are there.
@@ -29,7 +29,7 @@ class MessageSplitter {
 
  private:
   std::optional<std::size_t> length_at_front(wire::BytesView waiting) const;
-  Piece take(std::size_t count);
+  RecordedMessage cut(std::size_t count);
   void lose(std::size_t count);
 
   Origin from_;

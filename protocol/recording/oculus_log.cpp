@@ -2,14 +2,14 @@
 
 #include <cmath>
 
-#include "protocol/recording/inflate.hpp"
 #include "protocol/recording/message_splitter.hpp"
+#include "protocol/recording/zlib.hpp"
 
 namespace sonar::recording {
 namespace {
 
 constexpr std::size_t file_header_bytes = wire::wire_size<OculusLogHeader>(), item_bytes = wire::wire_size<OculusLogItem>();
-constexpr std::size_t most_payload = oculus::reply_limit + 1024;  // of an item we want; others are skipped unread
+constexpr std::size_t most_payload = oculus::reply_limit + 1024;  // of a message item; others are skipped
 
 template <class M>
 M read_as(BytesView bytes) {
@@ -19,7 +19,7 @@ M read_as(BytesView bytes) {
   return message;
 }
 
-/// Seconds as a double are exact to a quarter of a microsecond in our days; what is no time at all becomes 1970.
+/// Today's UNIX seconds as a double are exact to 0.25 us; an invalid time becomes 1970.
 Time time_of(double unix_s) {
   if (!std::isfinite(unix_s) || std::abs(unix_s) > 4e9) return {};
   return Time(nanoseconds_from(unix_s));
@@ -31,14 +31,14 @@ Time time_of(const OculusLogTime& t) {
 
 bool is_item(const OculusLogItem& item) { return item.magic == OculusLogItem{}.magic && item.size == item_bytes; }
 
-class LogReader final : public PieceReader {
+class LogReader final : public RecordingReader {
  public:
   explicit LogReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_, file_header_bytes) {}
 
-  std::optional<Piece> next() override {
+  std::optional<RecordedMessage> next() override {
     while (scan_.left() > 0) {
       const std::uint64_t at = scan_.position();
-      const BytesView front = scan_.take(item_bytes);
+      const BytesView front = scan_.read(item_bytes);
       if (front.size() < item_bytes) return cut(at, "the header of an item");
       const auto item = read_as<OculusLogItem>(front);
       if (!is_item(item)) {
@@ -56,7 +56,7 @@ class LogReader final : public PieceReader {
         scan_.skip(item.payload_size);
         continue;
       }
-      if (auto piece = message(item, at)) return piece;
+      if (auto message = read_message(item, at)) return message;
     }
     return std::nullopt;
   }
@@ -67,13 +67,13 @@ class LogReader final : public PieceReader {
   }
 
  private:
-  std::optional<Piece> cut(std::uint64_t at, const std::string& what) {
+  std::optional<RecordedMessage> cut(std::uint64_t at, const std::string& what) {
     damages_.add(what + " at byte " + std::to_string(at) + " is cut short by the end of the file");
     scan_.seek(source_->size());
     return std::nullopt;
   }
 
-  /// Somebody else's bytes, or damaged ones: on to the next item, or to the end.
+  /// Foreign or damaged bytes: continues with the next item, or at the end.
   bool find_item(std::uint64_t at) {
     for (std::uint64_t from = at + 1; from + item_bytes <= source_->size(); ++from) {
       scan_.seek(from);
@@ -85,7 +85,7 @@ class LogReader final : public PieceReader {
     return false;
   }
 
-  std::optional<Piece> message(const OculusLogItem& item, std::uint64_t at) {
+  std::optional<RecordedMessage> read_message(const OculusLogItem& item, std::uint64_t at) {
     const auto refuse = [&](const std::string& why) {
       damages_.add("the message at byte " + std::to_string(at) + " " + why);
       return std::nullopt;
@@ -94,24 +94,24 @@ class LogReader final : public PieceReader {
       find_item(at);
       return refuse("has " + std::to_string(item.payload_size) + " bytes, more than any message");
     }
-    const BytesView payload = scan_.take(item.payload_size);
-    Piece piece;
-    piece.bytes.assign(payload.begin(), payload.end());
+    const BytesView payload = scan_.read(item.payload_size);
+    RecordedMessage message;
+    message.bytes.assign(payload.begin(), payload.end());
     if (item.compression == 1) {
-      auto plain = piece.bytes.size() < 4 ? std::nullopt : inflate(BytesView(piece.bytes).subspan(4), oculus::reply_limit);
+      auto plain = message.bytes.size() < 4 ? std::nullopt : inflate(BytesView(message.bytes).subspan(4), oculus::reply_limit);
       if (!plain) return refuse("does not decompress");
-      piece.bytes = std::move(*plain);
+      message.bytes = std::move(*plain);
     } else if (item.compression != 0) {
       return refuse("is compressed in a way that is not known: " + std::to_string(item.compression));
     }
-    if (piece.bytes.size() < oculus::header_size) return refuse("is shorter than a header");
-    const oculus::MessageHeader header = oculus::header_of(piece.bytes);
-    if (oculus::message_length(header, oculus::Sender::device) != piece.bytes.size())
-      return refuse("is not as long as its header says");
-    if (header.type == oculus::MessageType::status) piece.by = Carrier::datagram;
-    if (header.type == oculus::MessageType::fire) piece.from = Origin::client;
-    piece.at = exact_time().value_or(time_of(item.at_unix_s));
-    return piece;
+    if (message.bytes.size() < oculus::header_size) return refuse("is shorter than a header");
+    const oculus::MessageHeader header = oculus::header_of(message.bytes);
+    if (oculus::message_length(header, oculus::Sender::device) != message.bytes.size())
+      return refuse("does not have the length in its header");
+    if (header.type == oculus::MessageType::status) message.by = Carrier::datagram;
+    if (header.type == oculus::MessageType::fire) message.from = Origin::client;
+    message.at = exact_time().value_or(time_of(item.at_unix_s));
+    return message;
   }
 
   std::optional<Time> exact_time() {
@@ -130,27 +130,27 @@ class LogReader final : public PieceReader {
   Damages damages_;
 };
 
-class LogWriter final : public PieceWriter {
+class LogWriter final : public RecordingWriter {
  public:
   explicit LogWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
 
-  Result<void> write(const Piece& piece) override {
-    if (piece.from != Origin::device || piece.by != Carrier::stream || piece.bytes.size() < oculus::header_size) return {};
-    const auto length = oculus::message_length(oculus::header_of(piece.bytes), oculus::Sender::device);
-    if (length != piece.bytes.size()) return {};
+  Result<void> write(const RecordedMessage& message) override {
+    if (message.from != Origin::device || message.by != Carrier::stream || message.bytes.size() < oculus::header_size) return {};
+    const auto length = oculus::message_length(oculus::header_of(message.bytes), oculus::Sender::device);
+    if (length != message.bytes.size()) return {};
     Bytes record;
-    if (!begun_) append_header(record, piece.at);
-    append_item(record, oculus_message_item, piece.at, piece.bytes);
-    const auto since = piece.at.time_since_epoch();
+    if (!begun_) append_header(record, message.at);
+    append_item(record, oculus_message_item, message.at, message.bytes);
+    const auto since = message.at.time_since_epoch();
     const auto whole = std::chrono::floor<std::chrono::seconds>(since);
     const OculusLogTime exact{static_cast<std::uint64_t>(whole.count()), static_cast<std::uint64_t>((since - whole).count())};
-    append_item(record, oculus_time_item, piece.at, wire::bytes_of(exact));
+    append_item(record, oculus_time_item, message.at, wire::bytes_of(exact));
     Result<void> written = sink_->append(record);
     begun_ = begun_ || written;
     return written;
   }
   Result<void> close() override {
-    if (!begun_) {  // nothing came: still a file of its kind
+    if (!begun_) {  // no message: still a valid file
       Bytes header;
       append_header(header, {});
       if (Result<void> written = sink_->append(header); !written) return written;
@@ -179,19 +179,21 @@ class LogWriter final : public PieceWriter {
 
 }  // namespace
 
-Result<std::unique_ptr<PieceReader>> read_oculus_log(std::unique_ptr<Source> source) {
+Result<std::unique_ptr<RecordingReader>> read_oculus_log(std::unique_ptr<Source> source) {
   Scan scan(*source);
-  const BytesView front = scan.take(file_header_bytes);
+  const BytesView front = scan.read(file_header_bytes);
   const auto refuse = [&](const std::string& why) { return failure(ErrorKind::bad_data, source->name() + why); };
   if (front.size() < file_header_bytes) return refuse(" ends within its file header: it holds no message");
   const auto header = read_as<OculusLogHeader>(front);
-  if (header.magic != OculusLogHeader{}.magic || header.size != file_header_bytes) return refuse(" is no .oculus log file");
+  if (header.magic != OculusLogHeader{}.magic || header.size != file_header_bytes) return refuse(" is not an .oculus log file");
   if (header.version != 1)
     return refuse(": .oculus log files of version " + std::to_string(header.version) + " are not read, only version 1");
   if (header.encryption != 0) return refuse(" is encrypted: export it without encryption");
   return std::make_unique<LogReader>(std::move(source));
 }
 
-std::unique_ptr<PieceWriter> write_oculus_log(std::unique_ptr<Sink> sink) { return std::make_unique<LogWriter>(std::move(sink)); }
+std::unique_ptr<RecordingWriter> write_oculus_log(std::unique_ptr<Sink> sink) {
+  return std::make_unique<LogWriter>(std::move(sink));
+}
 
 }  // namespace sonar::recording

@@ -5,8 +5,8 @@
 
 #include <memory>
 
-#include "protocol/recording/piece.hpp"
-#include "protocol/recording/store.hpp"
+#include "protocol/recording/byte_source.hpp"
+#include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording {
 
@@ -33,7 +33,7 @@ constexpr void fields(V& visit, M& m) {
 struct OculusLogItem {
   std::uint32_t magic = 0xAABBCCDD, size = 40;
   std::uint16_t type = 0;
-  std::uint16_t version = 0;  // unknown: what the vendor writes here; readers do not look
+  std::uint16_t version = 0;  // unknown: value of the vendor; readers ignore it
   std::uint32_t pad0 = 0;
   double at_unix_s = 0;
   std::uint16_t compression = 0, pad1 = 0;  // 1 = zlib behind a 4-byte big-endian length
@@ -69,9 +69,9 @@ inline constexpr std::uint16_t oculus_message_item = 10, oculus_time_item = 1010
 static_assert(wire::wire_size<OculusLogHeader>() == 48);
 static_assert(wire::wire_size<OculusLogItem>() == 40);
 
-/// bad_data when it is no such file, or one of version 2 or encrypted.
-Result<std::unique_ptr<PieceReader>> read_oculus_log(std::unique_ptr<Source> source);
-/// Keeps the messages of the device's TCP stream; what lies between messages has no place in this format and is left out.
-std::unique_ptr<PieceWriter> write_oculus_log(std::unique_ptr<Sink> sink);
+/// bad_data: another kind of file, version 2, or encrypted.
+Result<std::unique_ptr<RecordingReader>> read_oculus_log(std::unique_ptr<Source> source);
+/// Keeps the messages of the device's TCP stream; the format cannot hold the bytes between messages.
+std::unique_ptr<RecordingWriter> write_oculus_log(std::unique_ptr<Sink> sink);
 
 }  // namespace sonar::recording

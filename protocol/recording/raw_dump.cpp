@@ -3,17 +3,17 @@
 namespace sonar::recording {
 namespace {
 
-constexpr std::size_t block_bytes = 256 << 10;
+constexpr std::size_t dump_block_bytes = 256 << 10;
 
-class RawReader final : public PieceReader {
+class RawReader final : public RecordingReader {
  public:
   explicit RawReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
 
-  std::optional<Piece> next() override {
+  std::optional<RecordedMessage> next() override {
     while (true) {
-      if (auto piece = splitter_.next()) return piece;
+      if (auto message = splitter_.next()) return message;
       if (scan_.left() == 0) return end();
-      const BytesView block = scan_.take(block_bytes);
+      const BytesView block = scan_.read(dump_block_bytes);
       if (block.empty()) return unreadable();
       splitter_.append({}, block);
     }
@@ -28,7 +28,7 @@ class RawReader final : public PieceReader {
   bool knows_times() const override { return false; }
 
  private:
-  std::optional<Piece> end() {
+  std::optional<RecordedMessage> end() {
     if (std::exchange(ended_, true)) return std::nullopt;
     const std::size_t unfinished = splitter_.waiting_bytes();
     splitter_.finish();
@@ -38,7 +38,7 @@ class RawReader final : public PieceReader {
                    std::to_string(unfinished) + " bytes are there");
     return last;
   }
-  std::optional<Piece> unreadable() {
+  std::optional<RecordedMessage> unreadable() {
     if (!std::exchange(ended_, true)) damages_.add("cannot be read from byte " + std::to_string(scan_.position()) + " on");
     return std::nullopt;
   }
@@ -50,12 +50,12 @@ class RawReader final : public PieceReader {
   bool ended_ = false;
 };
 
-class RawWriter final : public PieceWriter {
+class RawWriter final : public RecordingWriter {
  public:
   explicit RawWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
-  Result<void> write(const Piece& piece) override {
-    if (piece.from != Origin::device || piece.by != Carrier::stream) return {};
-    return sink_->append(piece.bytes);
+  Result<void> write(const RecordedMessage& message) override {
+    if (message.from != Origin::device || message.by != Carrier::stream) return {};
+    return sink_->append(message.bytes);
   }
   Result<void> close() override { return sink_->close(); }
 
@@ -65,15 +65,17 @@ class RawWriter final : public PieceWriter {
 
 }  // namespace
 
-Result<std::unique_ptr<PieceReader>> read_raw_dump(std::unique_ptr<Source> source) {
+Result<std::unique_ptr<RecordingReader>> read_raw_dump(std::unique_ptr<Source> source) {
   Scan scan(*source);
-  const BytesView front = scan.take(oculus::header_size);
+  const BytesView front = scan.read(oculus::header_size);
   const bool header = front.size() == oculus::header_size && is_known(oculus::header_of(front)) &&
                       oculus::message_length(oculus::header_of(front), oculus::Sender::device);
   if (!header) return failure(ErrorKind::bad_data, source->name() + " does not begin with an Oculus message");
   return std::make_unique<RawReader>(std::move(source));
 }
 
-std::unique_ptr<PieceWriter> write_raw_dump(std::unique_ptr<Sink> sink) { return std::make_unique<RawWriter>(std::move(sink)); }
+std::unique_ptr<RecordingWriter> write_raw_dump(std::unique_ptr<Sink> sink) {
+  return std::make_unique<RawWriter>(std::move(sink));
+}
 
 }  // namespace sonar::recording

@@ -3,14 +3,14 @@
 
 #include <memory>
 
+#include "protocol/recording/byte_source.hpp"
 #include "protocol/recording/message_splitter.hpp"
-#include "protocol/recording/store.hpp"
 
 namespace sonar::recording {
 
 /// bad_data when the source does not begin with an Oculus message.
-Result<std::unique_ptr<PieceReader>> read_raw_dump(std::unique_ptr<Source> source);
-/// Keeps what the device sent by TCP, and nothing else.
-std::unique_ptr<PieceWriter> write_raw_dump(std::unique_ptr<Sink> sink);
+Result<std::unique_ptr<RecordingReader>> read_raw_dump(std::unique_ptr<Source> source);
+/// Keeps only the bytes that the device sent by TCP.
+std::unique_ptr<RecordingWriter> write_raw_dump(std::unique_ptr<Sink> sink);
 
 }  // namespace sonar::recording

@@ -1,8 +1,8 @@
 #include "protocol/recording/recording.hpp"
 
 #include <algorithm>
-#include <charconv>
 
+#include "core/text/ipv4.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/oculus_log.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
@@ -28,20 +28,12 @@ std::optional<Format> format_of(BytesView front) {
   return std::nullopt;
 }
 
+/// The address that selects a sonar of a capture; nullopt selects the only one.
 Result<std::optional<std::uint32_t>> address_from(const std::string& text) {
   if (text.empty()) return std::nullopt;
-  std::uint32_t address = 0;
-  const char *at = text.data(), *end = at + text.size();
-  for (int octet = 0; octet < 4; ++octet) {
-    unsigned value = 256;
-    const auto told = std::from_chars(at, end, value);
-    const bool last = octet == 3;
-    if (told.ec != std::errc{} || value > 255 || (last ? told.ptr != end : told.ptr == end || *told.ptr != '.'))
-      return failure(ErrorKind::usage, "\"" + text + "\" is no IPv4 address; sonars in a capture are named by theirs");
-    address = address << 8 | value;
-    at = last ? told.ptr : told.ptr + 1;
-  }
-  return address;
+  const auto ip = text::parse_ipv4(text);
+  if (!ip) return failure(ErrorKind::usage, "\"" + text + "\" is not an IPv4 address; a capture names its sonars by address");
+  return text::number_from_ipv4(*ip);
 }
 
 }  // namespace
@@ -69,13 +61,13 @@ Result<Recording> open_recording(std::unique_ptr<Source> source, const std::stri
     const bool sqlite = begins_with(view, {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f'});
     const std::string why = there == 0 ? " is empty"
                             : sqlite   ? " is an SQLite database: .oculus files of version 2 are not read, only version 1"
-                                       : " is no recording: expected an .oculus log, a raw dump, pcap, pcapng or MCAP";
+                                       : " is not a recording: expected an .oculus log, a raw dump, pcap, pcapng or MCAP";
     return failure(ErrorKind::bad_data, source->name() + why);
   }
   if (!sonar.empty() && (*format == Format::oculus_log || *format == Format::raw_dump))
     return failure(ErrorKind::usage, source->name() + " is a" + (*format == Format::raw_dump ? " " : "n ") + name_of(*format) +
                                          ", which holds one sonar without a name: leave out the choice of one");
-  Result<std::unique_ptr<PieceReader>> reader;
+  Result<std::unique_ptr<RecordingReader>> reader;
   if (*format == Format::pcap) {
     const auto device = address_from(sonar);
     if (!device) return tl::unexpected(device.error());

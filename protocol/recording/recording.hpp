@@ -1,12 +1,12 @@
-// A recording of any kind, told by its first bytes: .oculus log, raw dump, capture (pcap, pcapng), MCAP. What `sonard replay` and
-// `sonarctl record --from` open.
+// A recording of any kind, identified by its first bytes: .oculus log, raw dump, capture (pcap, pcapng), MCAP. What `sonard
+// replay` and `sonarctl record --from` open.
 #pragma once
 
 #include <filesystem>
 #include <memory>
 
-#include "protocol/recording/piece.hpp"
-#include "protocol/recording/store.hpp"
+#include "protocol/recording/byte_source.hpp"
+#include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording {
 
@@ -15,9 +15,9 @@ const char* name_of(Format format);
 
 struct Recording {
   Format format{};
-  std::unique_ptr<PieceReader> reader;
+  std::unique_ptr<RecordingReader> reader;
 };
-/// `sonar`: which of several in the file, an IPv4 address in captures, a name in MCAP; empty = the one that says most, or first.
+/// `sonar`: selects one of several, by IPv4 address in captures, by name in MCAP; empty = the one with most bytes, or the first.
 /// missing_file, io, bad_data; usage for a sonar that no such file can name.
 Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});

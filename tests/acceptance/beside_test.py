@@ -68,7 +68,7 @@ class Beside(unittest.TestCase):
         with Demo(free[0]) as first, Demo(free[1]) as second:
             for demo in (first, second):
                 self.assertIn(f"Connect your driver to {demo.address}.", demo.text())
-                self.assertNotIn("going on without", demo.text())
+                self.assertNotIn("continuing without", demo.text())
                 status = demo.status()
                 self.assertEqual(status["sonars"][0]["listens"], f"{demo.address}:52100")
                 self.assertEqual(status["http"], f"127.0.0.1:{8088 + 10 * demo.offset}")
@@ -78,7 +78,7 @@ class Beside(unittest.TestCase):
                 self.assertEqual(found["errors"], 0, found)
                 texts = " ".join(f["text"] for f in found["findings"])
                 self.assertIn(f"tcp {demo.address}:52100 accepts", texts)
-                self.assertIn(f"http://127.0.0.1:{8088 + 10 * demo.offset}/healthz says ok", texts)
+                self.assertIn(f"http://127.0.0.1:{8088 + 10 * demo.offset}/healthz returns ok", texts)
                 self.assertNotIn("same device id", texts)  # of the other's, whose broadcast it hears too
             moved = run(SONARCTL, "pose", "once", "--xyz", "1,2,-3", "--to", f"127.0.0.1:{14770 + 10 * second.offset}")
             self.assertEqual(moved.returncode, 0, moved.stderr)

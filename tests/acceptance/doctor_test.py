@@ -62,7 +62,7 @@ class Doctor(unittest.TestCase):
     def test_http_is_asked_where_the_daemon_serves_it(self):
         with Sonard() as daemon:
             code, findings, _ = told_of_control(daemon)
-            self.expect(findings, "http", "ok", f"http://{daemon.address}:8088/healthz says ok")
+            self.expect(findings, "http", "ok", f"http://{daemon.address}:8088/healthz returns ok")
             self.assertEqual(code, 0)
         with Sonard(http="off") as daemon:
             self.expect(told_of_control(daemon)[1], "http", "ok", "HTTP is not served")
@@ -74,7 +74,7 @@ class Doctor(unittest.TestCase):
             token.chmod(0o600)
             with Sonard(control=f', token_file: "{token}"') as daemon:
                 code, findings, _ = told_of_control(daemon)
-                self.expect(findings, "control", "warn", "wants a token", "--token-file FILE")
+                self.expect(findings, "control", "warn", "requires a token", "--token-file FILE")
                 self.assertEqual(code, 0)
                 code, findings, _ = told_of_control(daemon, "--token-file", token)
                 self.expect(findings, "control", "ok", "1 sonar")
@@ -86,7 +86,7 @@ class Doctor(unittest.TestCase):
     def test_nothing_running_says_what_to_do(self):
         start = time.monotonic()
         code, findings, _ = doctor(free_address())
-        self.expect(findings, "ping", "fail", "refuses the connection: nobody listens there")
+        self.expect(findings, "ping", "fail", "refuses the connection: no program listens there")
         self.expect(findings, "control", "fail", "no sonard answers on the control stream")
         self.assertEqual(str(findings["control"]).count("--control HOST:PORT"), 1)
         self.assertEqual(code, 69)
@@ -105,7 +105,7 @@ class Doctor(unittest.TestCase):
             output = command.communicate(timeout=60)[0]
             client.close()
         findings = {f["check"]: [f] for f in json.loads(output)["findings"]}
-        self.expect(findings, "ping", "fail", "no Oculus messages", f"pid {os.getpid()}")
+        self.expect(findings, "ping", "fail", "not Oculus messages", f"pid {os.getpid()}")
         self.expect(findings, "status", "warn", "cannot listen on udp 52102, held without address reuse by", f"pid {os.getpid()}")
         self.assertEqual(command.returncode, 69)
 
@@ -114,11 +114,11 @@ class Doctor(unittest.TestCase):
             driver.settimeout(10)
             self.assertTrue(driver.recv(16))  # served: dummies come
             code, findings, _ = doctor(daemon.address, *PATIENT)
-            self.expect(findings, "ping", "ok", "is busy", f":{driver.getsockname()[1]}", "was left alone")
+            self.expect(findings, "ping", "ok", "is busy", f":{driver.getsockname()[1]}", "not connecting")
             self.assertEqual(code, 0)
             # The same without the control stream: the kernel and the status message know.
             _, findings, _ = doctor(daemon.address, *PATIENT, control_port=1)
-            self.expect(findings, "ping", "ok", "is busy", "was left alone")
+            self.expect(findings, "ping", "ok", "is busy", "not connecting")
             self.assertNotIn("turned away", daemon.log())
             # Connected all the same: this sonar has one place, and the driver keeps it.
             _, findings, _ = doctor(daemon.address, "--take", *PATIENT)

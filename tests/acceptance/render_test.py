@@ -165,7 +165,7 @@ class Render(unittest.TestCase):
         self.assertAlmostEqual(side["twist"]["velocity_mps"][0], 0.5, places=6)
         self.assertAlmostEqual(side["twist"]["angular_rate_radps"][2], math.radians(10), places=6)
         other = self.path / "other"
-        self.expect(self.render("--poses", poses, "--format", "raw", "--pings", "4", out=other), 64, "enough for 3")
+        self.expect(self.render("--poses", poses, "--format", "raw", "--pings", "4", out=other), 64, "the poses cover only 3")
         self.expect(self.render("--poses", poses, "--format", "raw", "--rate", "2", out=other), 0, "5 of 5 pings")
         poses.write_text("t,x,y,z\n0,0,0\n", encoding="utf-8")
         self.expect(self.render("--poses", poses, out=self.path / "third"), 65, "poses.csv:2: 3 values")
@@ -235,8 +235,8 @@ class Render(unittest.TestCase):
         third = self.path / "third"
         self.expect(self.render("--poses", poses, "--first", "2", "--format", "raw", out=third), 0, "2 of 2 pings")
         self.assertEqual(json.loads((third / "000002.json").read_text(encoding="utf-8"))["time_s"], 1)
-        self.expect(self.render("--poses", poses, "--first", "4", out=third), 64, "--first 4", "enough for 3")
-        self.expect(self.render("--poses", poses, "--first", "3", "--pings", "2", out=third), 64, "--first 3 --pings 2", "enough for 3")
+        self.expect(self.render("--poses", poses, "--first", "4", out=third), 64, "--first 4", "the poses cover only 3")
+        self.expect(self.render("--poses", poses, "--first", "3", "--pings", "2", out=third), 64, "--first 3 --pings 2", "the poses cover only 3")
         self.expect(self.render("--first", "999999", "--pings", "2", out=third), 64, "999999")
         sweep = self.path / "sweep.yaml"
         sweep.write_text("scene: l-targets.yaml\nsweep: {r: [5, 6]}\nsonar: {ping: {range_m: $r}}\n", encoding="utf-8")

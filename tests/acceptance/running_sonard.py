@@ -1,16 +1,19 @@
-"""Starts the shipped sonard on an address of its own and stops it; runs the shipped sonarctl. Used by the acceptance tests.
+"""Runs sonard on a separate address, and sonarctl, for the acceptance tests.
 
 SONARD_BUILD names the build folder, build/release by default; ctest sets it.
 """
 import os
 import pathlib
-import random
-import signal
 import subprocess
+import sys
 import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "clients/python"))
+
+from sonard_client.daemon import Daemon, free_address  # noqa: E402,F401  pylint: disable=wrong-import-position,unused-import
+
 BUILD = pathlib.Path(os.environ.get("SONARD_BUILD", ROOT / "build/release"))
 SONARD, SONARCTL = BUILD / "daemon/sonard", BUILD / "clients/sonarctl"
 
@@ -22,16 +25,12 @@ sonars:
   - name: front
     profile: {profile}
     mount: {mount}
-    bind_ip: {address}
-    status_to: [{address}]
-poses: {{protobuf: "{address}:14770", json: "{address}:14771"{poses}}}
-control: {{stream: "{address}:14770", http: "{http}"{control}}}
+    bind_ip: ADDRESS
+    status_to: [ADDRESS]
+poses: {{protobuf: "ADDRESS:14770", json: "ADDRESS:14771"{poses}}}
+control: {{stream: "ADDRESS:14770", http: "{http}"{control}}}
 {more}
 """
-
-
-def free_address():
-    return f"127.{random.randint(64, 126)}.{random.randint(0, 255)}.{random.randint(1, 254)}"
 
 
 def run(*command, patience_s=120):
@@ -39,63 +38,32 @@ def run(*command, patience_s=120):
                           check=False)
 
 
-class Sonard:
+class Sonard(Daemon):
     """with Sonard(scene="demo.yaml") as daemon: ... daemon.address"""
 
     def __init__(self, scene="demo.yaml", profile="oculus-m1200d", pose="{frame: ENU_FLU, xyz_m: [-7, 0, -3]}",
                  mount="{frame: FLU, xyz_m: [0, 0, 0]}", trajectory="", more="", control="", http="", poses="",
                  arguments=()):
-        self.folder = tempfile.TemporaryDirectory()
+        super().__init__(CONFIG, str(SONARD), arguments)
+        self.folder = self._folder = tempfile.TemporaryDirectory()
         self.scene, self.profile, self.pose, self.mount = ROOT / "scenes" / scene, profile, pose, mount
         self.trajectory = f", trajectory: {trajectory}" if trajectory else ""
         self.control = control  # more of that section: ", token_file: token"
         self.http = http  # empty: port 8088 of the address
-        self.poses = poses  # as control; ADDRESS in it becomes the daemon's
-        self.more, self.arguments = more, [str(a) for a in arguments]
-
-    def __enter__(self):
-        for _ in range(5):
-            self._start()
-            if self._ready():
-                return self
-            code = self.process.wait()
-            if code != 69:  # 69: the address is taken, another one may be free
-                break
-        text = self.log()
-        self.folder.cleanup()
-        raise AssertionError(f"sonard ended with code {code}:\n{text}")
-
-    def _start(self):
-        self.address = free_address()
-        config = self.write_config()
-        self.log_path = pathlib.Path(self.folder.name) / "log"
-        with open(self.log_path, "wb") as log:
-            self.process = subprocess.Popen([str(SONARD), "run", str(config), *self.arguments], stdin=subprocess.DEVNULL,
-                                            stdout=log, stderr=subprocess.STDOUT)
+        self.poses = poses  # as control
+        self.more = more
 
     def write_config(self):
-        """For self.address; returns where it is."""
-        config = pathlib.Path(self.folder.name) / "sonard.yaml"
-        config.write_text(CONFIG.format(address=self.address, scene=self.scene, profile=self.profile, pose=self.pose,
-                                        mount=self.mount, trajectory=self.trajectory, more=self.more, control=self.control,
-                                        http=self.http or f"{self.address}:8088",
-                                        poses=self.poses.replace("ADDRESS", self.address)),
-                          encoding="utf-8")
-        return config
+        self._text = CONFIG.format(scene=self.scene, profile=self.profile, pose=self.pose, mount=self.mount,
+                                   trajectory=self.trajectory, more=self.more, control=self.control,
+                                   http=self.http or "ADDRESS:8088", poses=self.poses)
+        return super().write_config()
 
-    def _ready(self, patience_s=60):
-        deadline = time.monotonic() + patience_s
-        while time.monotonic() < deadline:
-            if "ready in" in self.log():
-                return True
-            if self.process.poll() is not None:
-                return False
-            time.sleep(0.01)
-        self.process.kill()
-        return False
-
-    def log(self):
-        return self.log_path.read_text(encoding="utf-8", errors="replace")
+    def restart(self):
+        """Starts sonard again with the same configuration, after its process has ended."""
+        self._launch(self.process.args)
+        if not self._ready():
+            raise AssertionError(self.log())
 
     def ctl(self, command, *arguments, **options):
         """sonarctl COMMAND ADDRESS ..."""
@@ -105,17 +73,17 @@ class Sonard:
         """sonarctl COMMAND ... --to ENDPOINT, for poses."""
         return run(SONARCTL, command, *arguments, "--to", endpoint, **options)
 
-    def stop(self, patience_s=20):
+    def stop(self, timeout_s=20):
         """Exit code after SIGTERM, and the seconds it took."""
         start = time.monotonic()
-        self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(patience_s), time.monotonic() - start
+        return super().stop(timeout_s), time.monotonic() - start
 
     def wait(self, patience_s=300):
         return self.process.wait(patience_s)
 
     def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.wait()
+        """Kills the process: a test may have suspended it."""
+        if self._process is not None and self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
         self.folder.cleanup()

@@ -64,8 +64,8 @@ class Steering(unittest.TestCase):
         status = self.status()
         self.assertAlmostEqual(status["sonars"][0]["range_m"], 5, delta=0.5)
         self.assertEqual(status["environment"]["temperature_c"], 8)
-        self.refuses(64, ("set", "sonar"), "say what to set")
-        self.refuses(64, ("set", "water"), "say what to set")
+        self.refuses(64, ("set", "sonar"), "nothing to set")
+        self.refuses(64, ("set", "water"), "nothing to set")
         self.refuses(65, ("set", "sonar", "stern", "--range", "5"), "stern")
 
     def test_objects_come_go_and_move(self):
@@ -132,7 +132,7 @@ class Secrets(unittest.TestCase):
                 control = ("--control", f"{daemon.address}:14770")
                 refused = run(SONARCTL, "status", *control)
                 self.assertNotEqual(refused.returncode, 0)
-                self.assertIn(f"{daemon.address}:14770 wants a token: give --token-file FILE", refused.stderr)
+                self.assertIn(f"{daemon.address}:14770 requires a token: give --token-file FILE", refused.stderr)
                 opened = run(SONARCTL, "status", *control, "--token-file", token)
                 self.assertEqual(opened.returncode, 0, opened.stderr)
                 self.assertEqual(run(SONARCTL, "status", *control, "--token-file", "none").returncode, 66)

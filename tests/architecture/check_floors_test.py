@@ -38,7 +38,7 @@ class Planted(unittest.TestCase):
                 ("core/scene/a.cpp", "core/pipeline/simulate.hpp"), ("core/pipeline/a.cpp", "protocol/vendor.hpp"),
                 ("core/pipeline/a.cpp", "core/text/strict_yaml.hpp"), ("core/pipeline/arithmetic/a.hpp", "core/scene/scene.hpp"),
                 ("protocol/oculus/a.cpp", "core/scene/scene.hpp"), ("protocol/oculus/a.cpp", "core/pipeline/ping_engine.hpp"),
-                ("protocol/oculus/a.cpp", "protocol/blueview/models.hpp"), ("protocol/control/a.cpp", "daemon/world/world.hpp"),
+                ("protocol/oculus/a.cpp", "protocol/blueview/models.hpp"), ("protocol/control/a.cpp", "daemon/emulator/world/world.hpp"),
                 ("clients/sonarctl/a.cpp", "daemon/config/config.hpp"), ("clients/sonarctl/a.cpp", "core/pipeline/simulate.hpp"),
                 ("cuda/a.cu", "core/image/raster.hpp"), ("daemon/a.cpp", "clients/sonarctl/net.hpp")]:
             with self.subTest(name=name, header=header):
@@ -52,7 +52,7 @@ class Planted(unittest.TestCase):
                 ("core/scene/scene.cpp", "embree3/rtcore.h"), ("core/pipeline/a.cpp", "embree4/rtcore.h"),
                 ("core/pipeline/a.cpp", "fftw3.h"), ("daemon/config/config.cpp", "yaml-cpp/yaml.h"),
                 ("core/scene/scene.cpp", "assimp/scene.h"), ("protocol/oculus/a.cpp", "spdlog/spdlog.h"),
-                ("daemon/a.cpp", "google/protobuf/message.h"), ("daemon/sonars/session.cpp", "boost/asio.hpp"),
+                ("daemon/a.cpp", "google/protobuf/message.h"), ("daemon/server/sonars/session.cpp", "boost/asio.hpp"),
                 ("core/base/a.cpp", "boost/container/small_vector.hpp"), ("core/base/parallel.cpp", "tbb/parallel_for.h"),
                 ("core/pipeline/a.cpp", "cuda_runtime.h"), ("core/base/a.hpp", "Eigen/Dense")]:
             with self.subTest(name=name, header=header):
@@ -120,12 +120,12 @@ class Innocent(unittest.TestCase):
             "protocol/control/control.cpp": '#include "control.pb.h"\n',
             "protocol/oculus/a.cpp": "// reinterpret_cast is not for us\nchar t[9]; int n = std::snprintf(t, 9, \"%d\", 1);\n",
             "protocol/vendors.cpp": '#include "protocol/oculus/oculus.hpp"\n',
-            "daemon/system/asio.hpp": "#pragma once\n#include <utility>\n#include <boost/asio.hpp>\n",
-            "daemon/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
+            "daemon/server/system/asio.hpp": "#pragma once\n#include <utility>\n#include <boost/asio.hpp>\n",
+            "daemon/commands/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
             "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/oculus/decode.hpp"\n',
             "clients/bvtsdk/abi4/include/bvt_sdk.h": '#pragma once\n#include "bvt_sdk_classes.h"\n',
             "clients/bvtsdk/core/link.cpp": "#include <thread>\nstd::thread reader(f);\n",
-            "tests/core/a.cpp": '#include <Eigen/Dense>\n#include "daemon/world/world.hpp"\nstd::thread t; // steady_clock\n',
+            "tests/core/a.cpp": '#include <Eigen/Dense>\n#include "daemon/emulator/world/world.hpp"\nstd::thread t; // steady_clock\n',
             PAGE: "see https://example.org/wo" "rk/ho" "me and scenes/demo.yaml, /etc/sonard/sonard.yaml\n",
         }), [])
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Follows the links of all Markdown pages of a tree: files, pictures and headings; and, in a checkout, the files that pages name in
-backticks (`daemon/main.cpp`).
+backticks (`daemon/commands/main.cpp`).
 
 usage: check_links.py ROOT              a checkout: its tracked files
        check_links.py --installed ROOT  what an installation made below ROOT: a page may link to what is there, nowhere else

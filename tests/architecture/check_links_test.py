@@ -14,7 +14,7 @@ DOT = "."  # keep this file free of pages that do not exist
 PAGE, OTHER = "docs/a" + DOT + "md", "docs/deep/b" + DOT + "md"
 FILES = {
     OTHER: "# Big title\n\n## Twice\n\n## Twice\n\n## `code`, and [a link](https://example.org): 1.2 `--x`\n\n<a name=\"own\"></a>\n",
-    "docs/picture.png": "", "core/base/units.hpp": "", "core/base/units.cpp": "", "daemon/main.cpp": "", "LICENSE": "",
+    "docs/picture.png": "", "core/base/units.hpp": "", "core/base/units.cpp": "", "daemon/commands/main.cpp": "", "LICENSE": "",
 }
 
 
@@ -85,7 +85,7 @@ class Innocent(unittest.TestCase):
                      f"[it]({name}#big-title) [it]({name}#twice) [it]({name}#twice-1) [it]({name}#own)",
                      f"[it]({name}#code-and-a-link-12---x)", "[it](https://example.org/nowhere) [it](mailto:a@example.org)",
                      "```\n[it](nowhere.txt) `core/nowhere.cpp`\n```", "    [it](nowhere.txt)", "`[it](nowhere.txt)`, ``a ` [it](nowhere)``",
-                     "`core/base/units.hpp`, `core/base/units.{hpp,cpp}`, `core/base/units`, `core/base/*`, `core/base/`, `daemon/main.cpp:12`",
+                     "`core/base/units.hpp`, `core/base/units.{hpp,cpp}`, `core/base/units`, `core/base/*`, `core/base/`, `daemon/commands/main.cpp:12`",
                      "`build/release/x.cpp`, `and/or`, `m/s`, `core/<vendor>/x.cpp`, `/etc/core/x`, `deep/b" + DOT + "md`"):
             with self.subTest(line=line):
                 self.assertEqual(found_in({**FILES, PAGE: "# Here\n\n" + line + "\n"}), [])

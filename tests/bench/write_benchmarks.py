@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Writes docs/benchmarks.md, and its two pictures, from what `sonard bench --json` found.
+"""Writes docs/benchmarks.md with its two pictures, and docs/benchmarks/tables.md, from results of `sonard_bench --json`.
 
 usage: write_benchmarks.py [--instruction-sets] BENCH.json [SET.json...] DOCS_FOLDER
   BENCH.json  the whole run
   SET.json    rates with one instruction set, the best first: the chapter "Instruction sets"
-  --instruction-sets  all files are SET.json: writes that chapter anew and keeps the rest of the page
-Standard library only. tests/tools/benchmarks.sh makes the JSON and calls this; nothing in the page is written by hand.
+  --instruction-sets  all files are SET.json: replaces that chapter of the tables and keeps everything else
+Standard library only. tests/tools/benchmarks.sh makes the JSON and calls this; the pages are not edited by hand.
 """
 
 import json
@@ -14,7 +14,7 @@ import re
 import sys
 from pathlib import Path
 
-# name: what must hold, the goal (pings a second, but where the unit says otherwise).
+# name: required, goal [pings/s].
 GOALS = {
     "P1": (75, 250),
     "P2": (60, 150),
@@ -25,9 +25,9 @@ GOALS = {
     "P4a": (40, 120),
     "P4b": (25, 60),
 }
-# Thread ms of the prototype's stages for P1 (2 processors with AVX-512): what the goal was made of.
+# Thread ms of the prototype's stages for P1 (2 processors with AVX-512), from which the goal was derived.
 FLOOR = {"trace": 2.9 + 0.44, "cull": 0.09, "scatter": 1.9, "synthesize": 1.4, "noise": 0.17, "couple": 0.42, "receive": 0.2}
-NAME = "benchmarks"
+NAME, TABLES = "benchmarks", "benchmarks/tables"  # pages, below docs/
 PAPER = [  # Choi 2025, Table 3: 512 beams, 10 m, RTX 2080 Ti and i9-9900K
     ("paper, 300 rays a beam, GPU", 0.3),
     ("paper, raster, 11 rays, GPU", 2.0),
@@ -59,7 +59,7 @@ def rates(report, scene):
         one = f"{found[1]['pings_per_second']:.0f}" if 1 in found else ""
         rows.append([case, most["description"], one, f"{most['pings_per_second']:.0f}", f"{1e3 / most['min_ms']:.0f}",
                      f"{most['processor_ms']:.2f}", must, goal, verdict(most["pings_per_second"], must, goal)])
-    return table(["case", "what", "1 thread", "all threads", "best ping", "processor ms", "must hold", "goal", ""], rows)
+    return table(["case", "what", "1 thread", "all threads", "best ping", "processor ms", "required", "goal", ""], rows)
 
 
 def stages(report, scene):
@@ -73,48 +73,45 @@ def stages(report, scene):
         cells = [[stage, f"{ms:.2f}", f"{p1['thread_ms'].get(stage, 0):.2f}",
                   f"{100 * ms / p1['thread_ms'][stage]:.0f} %" if p1["thread_ms"].get(stage) else ""]
                  for stage, ms in FLOOR.items()]
-        lines += ["Against the prototype that the goals were taken from (P1, thread ms; it left out mirrors, motion and framing):", ""]
-        lines += table(["stage", "prototype", "here", "of the floor"], cells)
+        lines += ["Beside the prototype that the goals were derived from (P1, thread ms; without specular echoes, motion and framing):", ""]
+        lines += table(["stage", "prototype", "here", "prototype over here"], cells)
     return lines
 
 
 def service(report):
-    lines = []
+    rows = []
     if "latency" in report:
         t = report["latency"]
         p99 = t["latency"]["p99_ms"]
-        lines += [f"**P5, latency.** From a pose and a network trigger to the last byte of the ping at a client on loopback "
-                  f"({t['rows']} rows, {t['threads']} threads, {t['triggers']} triggers): median {t['latency']['median_ms']:.2f} ms, "
-                  f"p99 {p99:.2f} ms, worst {t['latency']['max_ms']:.2f} ms. Must hold 25, goal 10: {verdict(p99, 25, 10, True)}.", ""]
-    for c in report.get("clients", []):
-        share = 100 * c["sender_share"]
-        lines += [f"**P8, {c['clients']} clients.** {c['pings_per_second']:.1f} pings/s each, {c['dropped']} dropped, the sending "
-                  f"thread takes {share:.1f} % of a processor. Must hold 40 %, goal 15 %, no drop: "
-                  f"{verdict(share, 40, 15, True) if c['dropped'] == 0 else '**missed**'}.", ""]
-    return lines
-
-
-def findings(report):
-    lines = []
+        rows.append(["P5", f"latency from a pose and a network trigger to the ping's last byte at a client on loopback: {t['rows']} rows, "
+                     f"{t['threads']} threads, {t['triggers']} triggers", f"median {t['latency']['median_ms']:.2f} ms, p99 {p99:.2f} ms, "
+                     f"worst {t['latency']['max_ms']:.2f} ms", "25 ms", "10 ms", verdict(p99, 25, 10, True)])
     for c in report.get("cold", []):
         ms = c["cold"]["median_ms"]
-        lines += [f"- **P3e, cold, {c['case']}, {c['threads']} thread{'s' if c['threads'] > 1 else ''}**: {ms:.0f} ms (worst "
-                  f"{c['cold']['max_ms']:.0f}), the next ping {c['warm']['median_ms']:.1f} ms; {100 * c['new_tiles']:.0f} % of the "
-                  f"tiles were new. Must hold 500, goal 60: {verdict(c['cold']['max_ms'], 500, 60, True)}."]
+        rows.append(["P3e", f"jump to a new place, {c['case']}, {c['threads']} thread{'s' if c['threads'] > 1 else ''}, "
+                     f"{100 * c['new_tiles']:.0f} % of the tiles new",
+                     f"{ms:.0f} ms (worst {c['cold']['max_ms']:.0f}), the next ping {c['warm']['median_ms']:.1f} ms", "500 ms", "60 ms",
+                     verdict(c["cold"]["max_ms"], 500, 60, True)])
     if "objects" in report:
         o = report["objects"]
-        lines += [f"- **P7, {o['objects']} moving objects**: placed in {o['place']['median_ms']:.3f} ms; over the same objects at rest "
-                  f"a ping takes {o['added']['median_ms']:+.2f} processor ms. Must hold 0.5, goal 0.1: "
-                  f"{verdict(o['place']['median_ms'], 0.5, 0.1, True)} (placing)."]
+        rows.append(["P7", f"placing {o['objects']} moving objects; and the ping's extra processor time over the same objects at rest",
+                     f"{o['place']['median_ms']:.3f} ms; {o['added']['median_ms']:+.2f} ms", "0.5 ms", "0.1 ms",
+                     verdict(o["place"]["median_ms"], 0.5, 0.1, True)])
+    for c in report.get("clients", []):
+        share = 100 * c["sender_share"]
+        rows.append(["P8", f"{c['clients']} client{'s' if c['clients'] > 1 else ''} at {c['pings_per_second']:.1f} pings/s: the sending thread's share of a processor",
+                     f"{share:.1f} %, {c['dropped']} dropped", "40 %, no drop", "15 %",
+                     verdict(share, 40, 15, True) if c["dropped"] == 0 else "**missed**"])
     for h in report.get("hashes", []):
-        lines += [f"- **P9, {h['case']}**: 1, 2, 4 and again 1 threads give {'the same bytes' if h['same'] else '**different bytes**'}"
-                  f" (SHA-256 {h['sha256'][:16]}...)."]
-    if "empty_bins" in report:
-        rows = [[e["case"], e["rows"], "one scatterer a ray, 300 rays" if e["rays"] else "surface cells", e["bins"],
-                 f"{100 * e['empty_share']:.3f} %"] for e in report["empty_bins"]]
-        lines += ["", "**P12, range bins without energy** on a level bed (10 dB or more below the closed form, expected power):", ""]
-        lines += table(["case", "rows", "scatterers", "bins on the bed", "empty"], rows)
-    return lines + [""]
+        rows.append(["P9", f"{h['case']} with 1, 2, 4 and again 1 threads", "the same bytes" if h["same"] else "**different bytes**",
+                     "the same", "", f"SHA-256 {h['sha256'][:16]}..."])
+    return table(["case", "what", "measured", "required", "goal", ""], rows)
+
+
+def empty_bins(report):
+    rows = [[e["case"], e["rows"], "one scatterer a ray, 300 rays" if e["rays"] else "surface cells", e["bins"],
+             f"{100 * e['empty_share']:.3f} %"] for e in report["empty_bins"]]
+    return table(["case", "rows", "scatterers", "bins on the bed", "empty"], rows)
 
 
 def ratios(report):
@@ -183,8 +180,8 @@ def instruction_sets(reports, scene="local-search"):
     names = [engine.split(", ")[1] for engine in engines]
     lines = [SETS, "",
              f"Processor: {reports[0]['processor']}; {engines[0].split(', ')[2]}. The hot loops (`--simd`) and the ray tracer "
-             "(`SONARD_EMBREE_ISA`) are held down together: `avx2` stands for most desktops and laptops, `portable` (Embree with SSE "
-             "4.2) for what is older. Pings/s; in brackets, how many times faster the first column is.", ""]
+             "(`SONARD_EMBREE_ISA`) are limited together: `avx2` stands for most desktops and laptops, `portable` (Embree with SSE "
+             "4.2) for older ones. Pings/s; in brackets, how many times faster the first column is.", ""]
     rows = []
     for case in GOALS:
         rates = [results[case]["pings_per_second"] for results in found if case in results]
@@ -202,53 +199,74 @@ def instruction_sets(reports, scene="local-search"):
 
 
 def with_chapter(text, chapter):
-    """The page with its chapter on instruction sets made anew; behind the rates where there was none."""
-    anchor = "## Beside the published figures"
+    """The page of tables with its chapter on instruction sets replaced; before the stages where there was none."""
+    anchor = "## Stages"
     if f"\n{anchor}\n" not in text:
         sys.exit(f'the page has no chapter "{anchor}" to put "{SETS}" before; make the whole page first')
     kept = re.sub(rf"^{SETS}\n.*?(?=^## |\Z)", "", text, flags=re.M | re.S)
     return re.sub(rf"^(?={anchor})", lambda _: chapter + "\n", kept, count=1, flags=re.M)
 
 
+def by_case_and_threads(report, scene):
+    """(case and threads, result) of the cases that the paper's figures are compared with."""
+    for case in ("P1", "P2"):
+        for threads, r in sorted(by_threads(report["results"], case, scene).items()):
+            yield f"{case}, {threads} thread{'s' if threads > 1 else ''}", r
+
+
 def page(report, scene="local-search"):
     results = report["results"]
-    ours = {case: by_threads(results, case, scene) for case in ("P1", "P2")}
+    times = [f"{name}: {r['pings_per_second'] / PAPER[0][1]:.0f} times the paper's" for name, r in by_case_and_threads(report, scene)]
     lines = ["# Benchmarks", "",
-             "Written by `tests/tools/benchmarks.sh` from what `sonard bench` found; not to be edited by hand.", "",
+             "Written by `tests/tools/benchmarks.sh` from results of `sonard_bench`. Stages, instruction sets, ratios of the hot loops and "
+             f"the values of the curves are in the [tables]({TABLES}.MD).".replace(".MD", ".md"), "",
              f"Processor: {report['processor']}; engine: {results[0]['engine'] if results else 'none'}. A ping is timed from pose to "
-             "framed bytes, median of many, warm cells, default quality (noise, mirrors, motion on), the sonar moving at 0.9 m/s and "
-             f"up to 20 deg/s over rough sand of {results[0]['triangles'] if results else 0:,} triangles (scene `{scene}`). Processor "
-             "ms are those of all threads together; other programs on the machine lengthen wall times, not ratios."
+             "framed bytes: median of many, warm cells, default quality (noise, specular echoes, motion on). The sonar moves at 0.9 m/s "
+             f"and up to 20 deg/s over rough sand of {results[0]['triangles'] if results else 0:,} triangles (scene `{scene}`). Processor "
+             "ms are those of all threads together. Other programs on the machine lengthen wall times, not ratios."
              + (f" Load average of the machine before the run: {report['load_average']:.1f}." if "load_average" in report else ""), "",
-             "## Rates", ""] + rates(report, scene)
-    lines += ["## Beside the published figures", "",
+             "## Rates", "", "Pings/s.", ""] + rates(report, scene)
+    lines += ["## Beside the published times", "",
               "Choi 2025, Table 3 (512 beams, 10 m; NVIDIA RTX 2080 Ti, Intel i9-9900K): 0.9 s for the rays and 2.31 s for the sum, "
-              "0.3 Hz with 300 rays a beam. Its public successor reports about 36 ms a frame. Ours without a GPU:", "",
-              "![rates](benchmarks-rates.svg)", ""]
-    rows = [[name, f"{rate:.1f}", ""] for name, rate in PAPER]
-    for case, found in ours.items():
-        for threads, r in sorted(found.items()):
-            rows.append([f"{case}, {threads} thread{'s' if threads > 1 else ''}: {r['description']}", f"{r['pings_per_second']:.1f}",
-                         f"{r['pings_per_second'] / PAPER[0][1]:.0f} times the paper's"])
-    lines += table(["", "pings/s", ""], rows)
-    lines += ["## Stages", "", "Thread ms a ping, by the engine's own clock.", ""] + stages(report, scene)
+              "0.3 Hz with 300 rays a beam. Its public successor reports about 36 ms a frame. Ours without a GPU: "
+              + ("; ".join(times) or "not measured") + ".", "", "![rates](benchmarks-rates.svg)", ""]
     lines += ["## As a service", ""] + service(report)
-    lines += ["## Jumps, objects, bytes, coverage", ""] + findings(report)
-    if report.get("ratios"):
-        lines += ["## Ratios (P6)", "",
-                  "The hot loops against the plain ways of doing the same: one process, one thread, in turns, best of several. "
-                  "They hold on a busy machine, and a test gates on them. \"differ by\": relative, in the least squares.", ""]
-        lines += ratios(report)
     if report.get("curves"):
         lines += ["## How times grow", "", "![curves](benchmarks-curves.svg)", ""]
+    return "\n".join(lines)
+
+
+def tables(report, scene="local-search"):
+    lines = ["# Benchmark tables", "",
+             "Written by `tests/tools/benchmarks.sh`, as is the [overview](../benchmarks.MD), which names the machine.".replace(".MD", ".md"),
+             "", "## Published and measured rates", ""]
+    rows = [[name, f"{rate:.1f}", ""] for name, rate in PAPER]
+    rows += [[f"{name}: {r['description']}", f"{r['pings_per_second']:.1f}", f"{r['pings_per_second'] / PAPER[0][1]:.0f} times the paper's"]
+             for name, r in by_case_and_threads(report, scene)]
+    lines += table(["", "pings/s", ""], rows)
+    lines += ["## Stages", "", "Thread ms a ping, by the engine's own clock.", ""] + stages(report, scene)
+    if report.get("empty_bins"):
+        lines += ["## Range bins without energy (P12)", "",
+                  "On a level bed: 10 dB or more below the closed form, in expected power.", ""] + empty_bins(report)
+    if report.get("ratios"):
+        lines += ["## Ratios (P6)", "",
+                  "The hot loops against plain implementations of the same: one process, one thread, in turns, best of several. They hold "
+                  "on a busy machine, and a test requires them. \"differ by\": relative, in the least squares.", ""]
+        lines += ratios(report)
+    if report.get("curves"):
+        lines += ["## How times grow", ""]
         for c in report["curves"]:
             lines += [f"- {c['name']} ({c['case']}): " + ", ".join(f"{p['x']:g}: {p['median_ms']:.2f} ms" for p in c["points"])]
         lines.append("")
     return "\n".join(lines)
 
 
+def file_of(folder, name):
+    return (folder / name).with_suffix(".md")
+
+
 def write(report, folder, sets=()):
-    folder.mkdir(parents=True, exist_ok=True)
+    file_of(folder, TABLES).parent.mkdir(parents=True, exist_ok=True)
     scene = "local-search"
     entries = [(name, rate, False) for name, rate in PAPER]
     for case in GOALS:
@@ -256,8 +274,9 @@ def write(report, folder, sets=()):
         if found:
             r = found[max(found)]
             entries.append((f"{case}: {r['description']}", r["pings_per_second"], True))
-    text = page(report, scene)
-    (folder / (NAME + ".md")).write_text(with_chapter(text, instruction_sets(sets, scene)) if sets else text, encoding="utf-8")
+    file_of(folder, NAME).write_text(page(report, scene), encoding="utf-8")
+    text = tables(report, scene)
+    file_of(folder, TABLES).write_text(with_chapter(text, instruction_sets(sets, scene)) if sets else text, encoding="utf-8")
     (folder / "benchmarks-rates.svg").write_text(bars(entries), encoding="utf-8")
     if report.get("curves"):
         (folder / "benchmarks-curves.svg").write_text(lines_of(report["curves"]), encoding="utf-8")
@@ -272,7 +291,7 @@ def main():
         sys.exit(__doc__.strip())
     reports, folder = [json.loads(Path(name).read_text(encoding="utf-8")) for name in words[:-1]], Path(words[-1])
     if sets_only:
-        file = folder / (NAME + ".md")
+        file = file_of(folder, TABLES)
         file.write_text(with_chapter(file.read_text(encoding="utf-8"), instruction_sets(reports)), encoding="utf-8")
     else:
         write(reports[0], folder, reports[1:])

@@ -1,4 +1,4 @@
-"""The page of benchmarks says what the figures say: verdicts, missing parts, and pictures that are XML."""
+"""The pages of benchmarks agree with the results: verdicts, missing parts, and pictures that are XML."""
 
 import unittest
 import xml.etree.ElementTree as ElementTree
@@ -25,8 +25,10 @@ class Page(unittest.TestCase):
         self.assertIn("| 260 |", row["| P1"])
         self.assertTrue(row["| P1"].endswith("goal |"))
         self.assertTrue(row["| P3a"].endswith("**missed** |"))
-        self.assertIn("50 %", page, "1.9 ms of the prototype against 3.8")
-        self.assertIn("333 times the paper's", page)
+        self.assertIn("P1, 2 threads: 867 times the paper's", page)
+        tables = write_benchmarks.tables(report)
+        self.assertIn("50 %", tables, "1.9 ms of the prototype against 3.8")
+        self.assertIn("| P1, 1 thread: P1 described | 100.0 | 333 times the paper's |", tables)
 
     def test_everything_found_is_told(self):
         report = {"processor": "test", "load_average": 5.5, "results": [result("P1", 2, 80)],
@@ -41,12 +43,15 @@ class Page(unittest.TestCase):
                   "curves": [{"name": "rows", "case": "P3a", "points": [{"x": 200, "median_ms": 3.0}, {"x": 400, "median_ms": 5.0}]}]}
         with TemporaryDirectory() as folder:
             write_benchmarks.write(report, Path(folder))
-            page = (Path(folder) / (write_benchmarks.NAME + ".md")).read_text(encoding="utf-8")
+            page, tables = (write_benchmarks.file_of(Path(folder), name).read_text(encoding="utf-8")
+                            for name in (write_benchmarks.NAME, write_benchmarks.TABLES))
             for svg in ("benchmarks-rates.svg", "benchmarks-curves.svg"):
                 self.assertTrue(ElementTree.parse(Path(folder) / svg).getroot().tag.endswith("svg"))
-        for words in ("p99 4.00 ms", "no drop: **missed**", "**different bytes**", "31.000 %", "| 500 |", "400: 5.00 ms",
-                      "Must hold 500, goal 60: goal", "before the run: 5.5"):
+        for words in ("p99 4.00 ms", "1 dropped | 40 %, no drop | 15 % | **missed** |", "**different bytes**",
+                      "the next ping 2.0 ms | 500 ms | 60 ms | goal |", "before the run: 5.5"):
             self.assertIn(words, page)
+        for words in ("31.000 %", "| 500 |", "400: 5.00 ms"):
+            self.assertIn(words, tables)
 
     def test_instruction_sets_stand_beside_each_other(self):
         sets = [{"processor": "test", "results": [dict(result("P1", 2, rate), engine=f"cpu, {name}, 2 threads, Embree")]}
@@ -55,7 +60,7 @@ class Page(unittest.TestCase):
         self.assertIn("| case | what | avx2 | portable |", chapter)
         self.assertIn("| P1 | P1 described | 100 | 40 (2.50) |", chapter)
         self.assertIn("| P1 | portable | 3.80 | 3.34 |", chapter)
-        page = write_benchmarks.page({"processor": "test", "results": [result("P1", 2, 260)]})
+        page = write_benchmarks.tables({"processor": "test", "results": [result("P1", 2, 260)]})
         once = write_benchmarks.with_chapter(page, chapter)
         self.assertEqual(once.replace(chapter + "\n", ""), page)
         again = write_benchmarks.with_chapter(once, chapter.replace("| 100 |", "| 120 |"))

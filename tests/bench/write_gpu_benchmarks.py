@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the page of the CUDA engine's benchmarks from what `sonard bench --engine cuda --json` found and from facts of the machine.
+"""Writes the page of the CUDA engine's benchmarks from what `sonard_bench --engine cuda --json` found and from facts of the machine.
 
 usage: write_gpu_benchmarks.py REPORT.json FACTS.json PAGE
 FACTS: {"facts": {"driver": "...", ...}, "distances": "lines of the comparison with Embree's rays"}; tests/tools/gpu_check.sh
@@ -9,7 +9,7 @@ import json
 import pathlib
 import sys
 
-# case: (must hold, goal) [pings/s], as for the CPU; P10 is that of batches.
+# case: (required, goal) [pings/s], as for the CPU; P10 is that of batches.
 FLOORS = {"P1": (75, 250), "P3a": (40, 200), "P3b": (40, 160), "P3c": (40, 170), "P3d": (40, 100)}
 BATCH_FLOOR, BATCH_GOAL = 1000, 5000
 RATIO_FLOOR, RATIO_GOAL = 100, 1000
@@ -41,7 +41,7 @@ def alone(results):
         rows.append([r["case"], r["description"], r["scene"], f'{r["pings_per_second"]:.0f}', f'{r["median_ms"]:.3f}',
                      f'{r["p90_ms"]:.3f}', f'{r["cold_ms"]:.1f}', floor, goal, verdict(r["pings_per_second"], floor, goal)]
                     + [f'{r["thread_ms"][s]:.3f}' for s in stages])
-    yield from table(["case", "what", "scene", "pings/s", "median ms", "p90", "cold", "must hold", "goal", ""] + stages, rows)
+    yield from table(["case", "what", "scene", "pings/s", "median ms", "p90", "cold", "required", "goal", ""] + stages, rows)
     by_cpu = sorted({r["case"] for r in results if not r["engine"].startswith("cuda")})
     if by_cpu:
         yield ""
@@ -51,7 +51,7 @@ def alone(results):
 def batches(device):
     yield "## In batches"
     yield ""
-    yield ("Four batches to a call, two of them under way at a time, framed; must hold 1,000 pings/s, goal 5,000 (P10). The processor "
+    yield ("Four batches to a call, two of them under way at a time, framed; required 1,000 pings/s, goal 5,000 (P10). The processor "
            "finds tiles and points of the next batch while the device is at work: the longer of the two sets the rate.")
     yield ""
     yield from table(["case", "pings a launch", "pings/s", "", "ms a ping: processor", "device"],
@@ -61,7 +61,7 @@ def batches(device):
     yield ""
     if reference["on_this_device"]:
         yield (f'P11: {reference["ratio"]:.0f} times the public reference code on this device ({reference["ms"]:.1f} ms a frame): '
-               f'{verdict(reference["ratio"], RATIO_FLOOR, RATIO_GOAL)} (must hold {RATIO_FLOOR}, goal {RATIO_GOAL}).')
+               f'{verdict(reference["ratio"], RATIO_FLOOR, RATIO_GOAL)} (required {RATIO_FLOOR}, goal {RATIO_GOAL}).')
     else:
         yield (f'P11 is not measured: the public reference code has not run on this device. Against its published {reference["ms"]:.0f} ms '
                f'a frame, on another device, P1 is {reference["ratio"]:.0f} times as fast. `GPU_CHECK_REFERENCE_MS=...` gives a measured one.')
@@ -75,12 +75,12 @@ def page(report, facts):
     if "latency" in report:
         t = report["latency"]["latency"]
         lines += ["", "## From trigger to last byte", "",
-                  f'P5, a daemon on loopback: median {t["median_ms"]:.2f} ms, p99 {t["p99_ms"]:.2f} ms (must hold 25, goal 10).']
+                  f'P5, a daemon on loopback: median {t["median_ms"]:.2f} ms, p99 {t["p99_ms"]:.2f} ms (required 25, goal 10).']
     for found in report.get("hashes", []):
         same = "the same bytes" if found["same"] else "**different bytes**"
         lines += ["", f'P9, {found["case"]}: {same} by 1, 2 and 4 threads and again.']
     if facts.get("distances"):
-        lines += ["", 'Beside the CPU engine with Embree (docs/cuda.md, "How equal it is"), eight pings of P1:', "", "```",
+        lines += ["", 'Beside the CPU engine with Embree (docs/cuda.md, "Equality with the CPU"), eight pings of P1:', "", "```",
                   facts["distances"].strip(), "```"]
     return "\n".join(lines) + "\n"
 

@@ -46,11 +46,11 @@ class Page(unittest.TestCase):
         self.assertIn("P11 is not measured", page)
         self.assertNotIn("P11: ", page)
 
-    @unittest.skipUnless("SONARD" in os.environ, "SONARD names the program")
+    @unittest.skipUnless("SONARD_BENCH" in os.environ, "SONARD_BENCH names the program")
     def test_the_whole_way_with_host_loops(self):
         with tempfile.TemporaryDirectory() as folder:
             found, facts, page = (pathlib.Path(folder) / name for name in ("found.json", "facts.json", "page"))
-            subprocess.run([os.environ["SONARD"], "bench", "--engine", "cuda", "--scene", "demo", "--case", "P3c", "--case", "P10",
+            subprocess.run([os.environ["SONARD_BENCH"], "--engine", "cuda", "--scene", "demo", "--case", "P3c", "--case", "P10",
                             "--pings", "2", "--threads", "1", "--reference-ms", "30", "--json", found], check=True, timeout=250,
                            stdout=subprocess.DEVNULL)
             facts.write_text(json.dumps({"facts": {"driver": "none"}}), encoding="utf-8")

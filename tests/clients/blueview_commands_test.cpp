@@ -119,7 +119,7 @@ class FakeHead {
     if (frame.header.type == FrameType::set) {
       blueview::Key key{};
       reader("key", key);
-      const auto value = blueview::take_value(reader, key);
+      const auto value = blueview::read_value(reader, key);
       ASSERT_TRUE(value);
       ++settings;
       if (key == blueview::Key::stop_range) stop_m = std::get<float>(*value);
@@ -212,7 +212,7 @@ TEST(BlueViewCommands, WhatIsWishedIsSet) {
   EXPECT_EQ(head.stop_m, 20);
   EXPECT_EQ(head.gain_db, 24);
   source.head.range_m = 101;
-  EXPECT_THAT(fetch_ping(source, 0).error().text, HasSubstr("BlueView P900-90 sees from 2 to 100 m"));
+  EXPECT_THAT(fetch_ping(source, 0).error().text, HasSubstr("BlueView P900-90 has a range of 2 to 100 m"));
   source.head = {};
   source.head.head = 1;
   EXPECT_THAT(fetch_ping(source, 0).error().text, HasSubstr("has 1 head(s), no mode 2"));
@@ -220,7 +220,7 @@ TEST(BlueViewCommands, WhatIsWishedIsSet) {
   source.head.oculus_only = {"--beams"};
   const Error refused = fetch_ping(source, 0).error();
   EXPECT_EQ(refused.kind, ErrorKind::usage);
-  EXPECT_THAT(refused.text, HasSubstr("--beams is for Oculus sonars, and there is a BlueView P900-90"));
+  EXPECT_THAT(refused.text, HasSubstr("--beams applies to Oculus sonars; this is a BlueView P900-90"));
 }
 
 TEST(BlueViewCommands, WhatIsNoHeadIsSaidToBeNone) {
@@ -232,7 +232,7 @@ TEST(BlueViewCommands, WhatIsNoHeadIsSaidToBeNone) {
     FakeHead full(true);
     const Error closed = fetch_ping(source, 0).error();
     EXPECT_EQ(closed.kind, ErrorKind::io);
-    EXPECT_THAT(closed.text, HasSubstr("all its places are taken (clients.max)"));
+    EXPECT_THAT(closed.text, HasSubstr("all its client slots are taken (clients.max)"));
   }
   const Socket listener = listening(blueview::tcp_port);
   std::thread other([&listener] {
@@ -245,7 +245,7 @@ TEST(BlueViewCommands, WhatIsNoHeadIsSaidToBeNone) {
   const Error other_service = fetch_ping(source, 0).error();
   other.join();
   EXPECT_EQ(other_service.kind, ErrorKind::bad_data);
-  EXPECT_THAT(other_service.text, HasSubstr("tcp " + address + ":14750 does not speak BVE1"));
+  EXPECT_THAT(other_service.text, HasSubstr("tcp " + address + ":14750 is not a BVE1 link"));
 }
 
 TEST(BlueViewCommands, RawBytesAreOfOculusSonarsOnly) {
@@ -255,7 +255,7 @@ TEST(BlueViewCommands, RawBytesAreOfOculusSonarsOnly) {
   options.record = std::filesystem::path(testing::TempDir()) / "blueview_commands.raw";
   const Result<void> done = listen(options);
   EXPECT_EQ(done.error().kind, ErrorKind::usage);
-  EXPECT_THAT(done.error().text, HasSubstr("only the bytes of Oculus sonars are recorded"));
+  EXPECT_THAT(done.error().text, HasSubstr("only Oculus sonars are recorded"));
   EXPECT_FALSE(std::filesystem::exists(options.record));
 }
 

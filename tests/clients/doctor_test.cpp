@@ -1,8 +1,8 @@
-// What doctor says of every state it can find, without a network: facts in, lines out.
+// The findings of doctor for every state, without a network: facts in, lines out.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "clients/sonarctl/doctor/judge.hpp"
+#include "clients/sonarctl/doctor/checks.hpp"
 #include "clients/sonarctl/doctor/proc_net.hpp"
 
 namespace sonar::clients::doctor {
@@ -14,8 +14,8 @@ using testing::IsEmpty;
 using testing::Not;
 using Outcome = StreamFacts::Outcome;
 
-HeardStatus heard(const std::string& from) {
-  HeardStatus status;
+ReceivedStatus received(const std::string& from) {
+  ReceivedStatus status;
   status.from = status.advertised = from;
   status.device_id = 7001;
   status.size = 142;
@@ -50,7 +50,7 @@ control::DaemonStatus daemon_of(const std::string& host) {
 Facts healthy() {
   Facts facts;
   facts.sonars.push_back(healthy_sonar("127.0.0.2"));
-  facts.status.heard.push_back(heard("127.0.0.2"));
+  facts.status.received.push_back(received("127.0.0.2"));
   facts.status.waited_s = 2.5;
   facts.control.at = {"127.0.0.1", 14770};
   facts.control.status = daemon_of("127.0.0.2");
@@ -69,7 +69,7 @@ Finding line(const std::vector<Finding>& findings, const std::string& check) {
   EXPECT_EQ(found.size(), 1u) << check << " in\n" << text_from(findings);
   return found.size() == 1 ? found.front() : Finding{};
 }
-Finding line(const Facts& facts, const std::string& check) { return line(judge(facts), check); }
+Finding line(const Facts& facts, const std::string& check) { return line(run_checks(facts), check); }
 
 void expect(const Finding& finding, Level level, const std::string& text, const std::string& cure) {
   EXPECT_EQ(finding.level, level) << finding.text;
@@ -82,23 +82,23 @@ void expect(const Finding& finding, Level level, const std::string& text, const 
 
 TEST(Doctor, PraisesWhatIsWell) {
   EXPECT_EQ(
-      text_from(judge(healthy())),
+      text_from(run_checks(healthy())),
       "ok    status broadcast received back on udp 52102 from 127.0.0.2\n"
       "ok    tcp 127.0.0.2:52100 accepts, first ping decoded after 96 ms: 512 beams x 437 ranges, 8 bit, size fields consistent\n"
       "ok    rate 10.0 Hz (asked 10), image latency 18 ms p50, 21 ms p99\n"
       "ok    control tcp 127.0.0.1:14770 answers: sonard 0.1.0, 1 sonar, realtime clock\n"
       "ok    trace backend: embree, avx2\n"
       "ok    poses of rov: demo orbit\n"
-      "ok    http://127.0.0.1:8088/healthz says ok\n"
+      "ok    http://127.0.0.1:8088/healthz returns ok\n"
       "ok    ports 52100,52102 are reserved\n"
       "8 checks, 0 errors, 0 warnings\n");
-  EXPECT_FALSE(any_failed(judge(healthy())));
+  EXPECT_FALSE(any_failed(run_checks(healthy())));
 }
 
 TEST(Doctor, WarnsOfPortsThatOthersMayTake) {
   Facts facts = healthy();
   facts.kernel_ports.reserved = "";
-  EXPECT_THAT(text_from(judge(facts)),
+  EXPECT_THAT(text_from(run_checks(facts)),
               HasSubstr("warn  ports 52100,52102 lie in the ephemeral range 32768-60999: an outgoing "
                         "connection may take one first; reserve: sysctl "
                         "net.ipv4.ip_local_reserved_ports=52100,52102\n8 checks, 0 errors, 1 warning\n"));
@@ -107,15 +107,15 @@ TEST(Doctor, WarnsOfPortsThatOthersMayTake) {
   facts.kernel_ports = {true, 10000, 50000, ""};
   expect(line(facts, "ports"), Level::ok, "outside the ephemeral range 10000-50000", "");
   facts.kernel_ports.known = false;
-  EXPECT_THAT(text_from(judge(facts)), Not(HasSubstr("ephemeral")));
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("ephemeral")));
 }
 
 TEST(Doctor, KnowsWhyNoStatusComes) {
   Facts facts = healthy();
-  facts.status.heard.clear();
+  facts.status.received.clear();
   expect(line(facts, "status"), Level::fail, "no status from 127.0.0.2 on udp 52102 within 2.5 s",
          "a firewall may drop udp 52102");
-  facts.sonars[0].says = facts.control.status->sonars[0];
+  facts.sonars[0].reported = facts.control.status->sonars[0];
   expect(line(facts, "status"), Level::fail, "no status", "it is sent to 192.0.2.255:52102");
   facts.status.error = "Address already in use";
   facts.status.holders = {{"0.0.0.0:52102", 4711, "oculus_node"}};
@@ -128,29 +128,29 @@ TEST(Doctor, KnowsWhyNoStatusComes) {
 
 TEST(Doctor, SaysWhatDriversWouldObjectToInTheStatus) {
   Facts facts = healthy();
-  facts.status.heard[0].complaints = {"datagram length 140 is not a status message's 142"};
+  facts.status.received[0].complaints = {"datagram length 140 is not a status message's 142"};
   expect(line(facts, "status"), Level::fail, "datagram length 140", "142 bytes");
 }
 
 TEST(Doctor, FollowsTheAdvertisedAddress) {
   Facts facts = healthy();
-  facts.status.heard[0].from = "127.0.0.1";
+  facts.status.received[0].from = "127.0.0.1";
   expect(line(facts, "status"), Level::ok, "from 127.0.0.1, which tells drivers to connect to 127.0.0.2", "");
-  facts.status.heard[0] = heard("127.0.0.2");
-  facts.status.heard[0].advertised = "10.1.1.1";
-  expect(line(facts, "status"), Level::fail, "connect to 10.1.1.1, where nobody answers", "advertise_ip");
+  facts.status.received[0] = received("127.0.0.2");
+  facts.status.received[0].advertised = "10.1.1.1";
+  expect(line(facts, "status"), Level::fail, "connect to 10.1.1.1, where no sonar answers", "advertise_ip");
 }
 
 TEST(Doctor, LeavesABusySonarAlone) {
   Facts facts = healthy();
   facts.sonars[0].stream = {};
   facts.sonars[0].clients = {"127.0.0.1:41022"};
-  expect(line(facts, "ping"), Level::ok, "127.0.0.2 is busy: 127.0.0.1:41022 is connected and was left alone (--take", "");
-  facts.sonars[0].says = facts.control.status->sonars[0];
-  facts.sonars[0].says->figures.served = 120;
-  facts.sonars[0].says->figures.latency_ms_p99 = 33;
-  expect(line(facts, "ping"), Level::ok, "it says 120 pings served, 0 dropped, latency 0 ms p50, 33 ms p99", "");
-  EXPECT_FALSE(any_failed(judge(facts)));
+  expect(line(facts, "ping"), Level::ok, "127.0.0.2 is busy: 127.0.0.1:41022 is connected; not connecting (--take", "");
+  facts.sonars[0].reported = facts.control.status->sonars[0];
+  facts.sonars[0].reported->figures.served = 120;
+  facts.sonars[0].reported->figures.latency_ms_p99 = 33;
+  expect(line(facts, "ping"), Level::ok, "it reports 120 pings served, 0 dropped, latency 0 ms p50, 33 ms p99", "");
+  EXPECT_FALSE(any_failed(run_checks(facts)));
 }
 
 TEST(Doctor, SaysWhereSomethingDoesListen) {
@@ -159,9 +159,9 @@ TEST(Doctor, SaysWhereSomethingDoesListen) {
   facts.sonars[0].at = {"127.0.0.2", 52100};
   facts.sonars[0].on_this_host = true;
   facts.sonars[0].stream.outcome = Outcome::refused;
-  expect(line(facts, "ping"), Level::fail, "tcp 127.0.0.2:52100 refuses the connection: nobody listens there",
+  expect(line(facts, "ping"), Level::fail, "tcp 127.0.0.2:52100 refuses the connection: no program listens there",
          "start it: sonard");
-  facts.status.heard.push_back(heard("127.0.0.9"));
+  facts.status.received.push_back(received("127.0.0.9"));
   expect(line(facts, "ping"), Level::fail, "refuses", "names a sonar at 127.0.0.9: sonarctl doctor 127.0.0.9");
   facts.daemons = {{"127.0.0.5:52100", 12, "sonard"}};
   expect(line(facts, "ping"), Level::fail, "refuses", "sonard (pid 12) listens on 127.0.0.5:52100: sonarctl doctor 127.0.0.5");
@@ -184,8 +184,8 @@ TEST(Doctor, NamesWhoElseHasThePort) {
   sonar.listeners = {{"0.0.0.0:52100", 99, "nginx"}};
   expect(line(facts, "ping"), Level::fail, "no ping came within 4.0 s: nginx (pid 99) has the port, not sonard", "stop it");
   sonar.stream.junk_bytes = 300;
-  expect(line(facts, "ping"), Level::fail, "sends 300 bytes that are no Oculus messages: nginx (pid 99) listens on 0.0.0.0:52100",
-         "another program has the port");
+  expect(line(facts, "ping"), Level::fail,
+         "sends 300 bytes that are not Oculus messages: nginx (pid 99) listens on 0.0.0.0:52100", "another program has the port");
 }
 
 TEST(Doctor, KnowsWhyNoPingComes) {
@@ -197,11 +197,11 @@ TEST(Doctor, KnowsWhyNoPingComes) {
   sonar.stream.asked = true;
   expect(line(facts, "ping"), Level::fail, "no ping came", "overloaded");
   facts.control.status->clock = "lockstep";
-  expect(line(facts, "ping"), Level::warn, "with clock: lockstep time stands until it is asked to pass", "sonarctl step");
+  expect(line(facts, "ping"), Level::warn, "with clock: lockstep time stops until a client requests a step", "sonarctl step");
   facts.control.status->clock = "follow";
-  expect(line(facts, "ping"), Level::warn, "with clock: follow time stands until the next pose comes", "sender of poses");
-  sonar.says = facts.control.status->sonars[0];
-  sonar.says->figures.refused = 7;
+  expect(line(facts, "ping"), Level::warn, "with clock: follow time stops until the next pose comes", "sender of poses");
+  sonar.reported = facts.control.status->sonars[0];
+  sonar.reported->figures.refused = 7;
   expect(line(facts, "ping"), Level::fail, "the engine refused 7 of them", "log");
   sonar.stream.outcome = Outcome::closed_without_a_byte;
   expect(line(facts, "ping"), Level::warn, "closed the connection without a byte", "clients.max");
@@ -225,9 +225,9 @@ TEST(Doctor, MeasuresTheRate) {
   s.rate_hz = 10, s.missing = 4;
   expect(line(facts, "rate"), Level::warn, "4 pings missing", "outbox");
   s.missing = 0, s.latency_p50_ms.reset(), s.spread_p99_ms = 7.0;
-  expect(line(facts, "rate"), Level::ok, "images come 7 ms later than the promptest, p99", "");
-  facts.sonars[0].says = facts.control.status->sonars[0];
-  facts.sonars[0].says->figures.latency_ms_p50 = 25, facts.sonars[0].says->figures.latency_ms_p99 = 31;
+  expect(line(facts, "rate"), Level::ok, "images come 7 ms later than the earliest, p99", "");
+  facts.sonars[0].reported = facts.control.status->sonars[0];
+  facts.sonars[0].reported->figures.latency_ms_p50 = 25, facts.sonars[0].reported->figures.latency_ms_p99 = 31;
   expect(line(facts, "rate"), Level::ok, "image latency 25 ms p50, 31 ms p99", "");
   s.asked = false, s.rate_hz = 3;
   expect(line(facts, "rate"), Level::warn, "rate 3.0 Hz (asked 10)", "fewer beams");
@@ -242,39 +242,39 @@ TEST(Doctor, SaysWhatComputingAllows) {
   EXPECT_THAT(line(facts, "rate").text, Not(HasSubstr("computing"))) << "as fast as an Oculus can be asked for";
   sonar.stream.computing_ms = 52;
   expect(line(facts, "rate"), Level::ok, "rate 10.0 Hz (asked 10)", "");
-  expect(line(facts, "rate"), Level::ok, ", computing takes 52 ms a ping: 19 Hz at most here", "");
+  expect(line(facts, "rate"), Level::ok, ", computing takes 52 ms per ping: 19 Hz at most here", "");
   sonar.stream.computing_ms = 193, sonar.stream.rate_hz = 5.2;
-  expect(line(facts, "rate"), Level::warn, "computing takes 193 ms a ping: 5.2 Hz at most here: the simulation is slower",
+  expect(line(facts, "rate"), Level::warn, "computing takes 193 ms per ping: 5.2 Hz at most here: the simulation is slower",
          "engine.threads");
 
-  // Somebody else's sonar, by the figures that the daemon has.
+  // A sonar with another client, by the statistics of the daemon.
   sonar.stream = {};
   sonar.clients = {"127.0.0.1:41022"};
-  sonar.says = facts.control.status->sonars[0];
-  sonar.says->pinging = true, sonar.says->rate_hz = 40;
-  sonar.says->figures.simulation_ms = 24;
-  EXPECT_THAT(text_from(judge(facts)), Not(HasSubstr("computing")));
-  sonar.says->figures.simulation_ms = 52, sonar.says->figures.skipped_ticks = 77;
+  sonar.reported = facts.control.status->sonars[0];
+  sonar.reported->pinging = true, sonar.reported->rate_hz = 40;
+  sonar.reported->figures.simulation_ms = 24;
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("computing")));
+  sonar.reported->figures.simulation_ms = 52, sonar.reported->figures.skipped_ticks = 77;
   expect(line(facts, "rate"), Level::warn,
-         "rate 40 Hz asked for by 127.0.0.1:41022, computing takes 52 ms a ping: 19 Hz at most here, 77 ticks skipped",
+         "rate 40 Hz requested by 127.0.0.1:41022, computing takes 52 ms per ping: 19 Hz at most here, 77 ticks skipped",
          "fewer beams");
 }
 
 TEST(Doctor, ExpectsControlWhereADaemonIs) {
   Facts facts = healthy();
   facts.control.status.reset();
-  facts.control.error = "nobody there";
-  expect(line(facts, "control"), Level::warn, "nobody there", "nothing is said of poses");
+  facts.control.error = "no answer";
+  expect(line(facts, "control"), Level::warn, "no answer", "poses, clients and engine were not checked");
   facts.control.given = true;
-  expect(line(facts, "control"), Level::fail, "nobody there", "nothing is said of poses");
-  facts.control.wants_token = true;
-  expect(line(facts, "control"), Level::warn, "127.0.0.1:14770 wants a token, and none was given", "--token-file FILE");
-  facts.control.wants_token = false;
+  expect(line(facts, "control"), Level::fail, "no answer", "poses, clients and engine were not checked");
+  facts.control.token_required = true;
+  expect(line(facts, "control"), Level::warn, "127.0.0.1:14770 requires a token, and none was given", "--token-file FILE");
+  facts.control.token_required = false;
   facts.control.given = false;
   facts.sonars[0].on_this_host = false;
-  EXPECT_THAT(text_from(judge(facts)), Not(HasSubstr("control"))) << "a device of another computer";
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("control"))) << "a device of another computer";
   facts.control.status = daemon_of("127.0.0.77");
-  EXPECT_THAT(text_from(judge(facts)), HasSubstr("warn  the sonard there does not serve 127.0.0.2"));
+  EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("warn  that sonard does not serve 127.0.0.2"));
 }
 
 TEST(Doctor, SaysWhatTheDaemonNotedAndNotThatAllIsWellWithThoseVehicles) {
@@ -282,12 +282,12 @@ TEST(Doctor, SaysWhatTheDaemonNotedAndNotThatAllIsWellWithThoseVehicles) {
   facts.control.status->vehicles.push_back({"boat", "initial pose", false, {}});
   facts.control.status->notes = {{"boat", "mavlink udpin:127.0.0.1:14551: no poses yet", "see the streams"},
                                  {"", "wreck is long", "scale"}};
-  const std::string text = text_from(judge(facts));
+  const std::string text = text_from(run_checks(facts));
   EXPECT_THAT(text, HasSubstr("warn  mavlink udpin:127.0.0.1:14551: no poses yet; see the streams\n"));
   EXPECT_THAT(text, HasSubstr("warn  wreck is long; scale\n"));
   EXPECT_THAT(text, Not(HasSubstr("poses of boat")));
   EXPECT_THAT(text, HasSubstr("ok    poses of rov: demo orbit\n"));
-  EXPECT_FALSE(any_failed(judge(facts)));
+  EXPECT_FALSE(any_failed(run_checks(facts)));
 }
 
 TEST(Doctor, LooksAtPosesHttpAndClocks) {
@@ -296,7 +296,7 @@ TEST(Doctor, LooksAtPosesHttpAndClocks) {
   expect(line(facts, "poses"), Level::warn, "poses of rov have stopped, the last came from json 127.0.0.1", "on_stale");
   facts.control.status->vehicles[0].stale = false;
   facts.control.status->poses.refused = 3;
-  EXPECT_THAT(text_from(judge(facts)), HasSubstr("warn  3 messages were refused as poses, 0 accepted"));
+  EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("warn  3 messages were refused as poses, 0 accepted"));
   facts.http.code = 0;
   expect(line(facts, "http"), Level::warn, "does not answer", "--http");
   facts.http.code = 503, facts.http.text = "no ping for 5 s";
@@ -306,25 +306,25 @@ TEST(Doctor, LooksAtPosesHttpAndClocks) {
   facts.http.place = HttpFacts::Place::not_served;
   expect(line(facts, "http"), Level::ok, "HTTP is not served", "");
   facts.http.place = HttpFacts::Place::only_over_there;
-  expect(line(facts, "http"), Level::ok, "http://127.0.0.1:8088/healthz is for that computer alone", "");
+  expect(line(facts, "http"), Level::ok, "http://127.0.0.1:8088/healthz accepts only clients on that computer", "");
   facts.control.clock_ahead_s = -3.5;
-  expect(line(facts, "clock"), Level::warn, "3.50 s behind ours", "NTP");
+  expect(line(facts, "clock"), Level::warn, "3.50 s behind this one", "NTP");
   facts.control.clock_ahead_s = 0.01;
-  expect(line(facts, "clock"), Level::ok, "0.01 s ahead of ours", "");
+  expect(line(facts, "clock"), Level::ok, "0.01 s ahead of this one", "");
 }
 
 TEST(Doctor, ChecksEverySonarAndTellsThemApart) {
   Facts facts = healthy();
   facts.sonars.push_back(healthy_sonar("127.0.0.3"));
   facts.sonars[0].name = "front";
-  facts.status.heard.push_back(heard("127.0.0.3"));
-  const std::string text = text_from(judge(facts));
+  facts.status.received.push_back(received("127.0.0.3"));
+  const std::string text = text_from(run_checks(facts));
   EXPECT_THAT(text, HasSubstr("ok    front: tcp 127.0.0.2:52100 accepts"));
   EXPECT_THAT(text, HasSubstr("ok    127.0.0.3: tcp 127.0.0.3:52100 accepts"));
   expect(line(facts, "identity"), Level::warn, "127.0.0.2 and 127.0.0.3 have the same device id, 7001", "device_id");
-  facts.sonars[1].time_was_over = true;
-  EXPECT_THAT(text_from(judge(facts)),
-              HasSubstr("warn  127.0.0.3: 127.0.0.3 was not looked at: the time was over; give more with --within"));
+  facts.sonars[1].out_of_time = true;
+  EXPECT_THAT(text_from(run_checks(facts)),
+              HasSubstr("warn  127.0.0.3: 127.0.0.3 was not examined: the time limit was reached; raise it with --within"));
 }
 
 TEST(Doctor, FindsBlueViewHeads) {
@@ -334,7 +334,7 @@ TEST(Doctor, FindsBlueViewHeads) {
   facts.control.status->sonars.push_back(head);
   expect(line(facts, "blueview"), Level::warn, "BlueView sonar bow at 127.0.0.4:14750 does not answer discovery", "udp 14751");
   facts.address_given = true;  // 127.0.0.2: the other one was not asked
-  EXPECT_THAT(text_from(judge(facts)), Not(HasSubstr("does not answer discovery")));
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("does not answer discovery")));
   facts.heads = {{"127.0.0.4:14750", "P900-90", "123"}};
   expect(line(facts, "blueview"), Level::ok, "BlueView head P900-90 (123) answers discovery at tcp 127.0.0.4:14750", "");
 }
@@ -342,13 +342,13 @@ TEST(Doctor, FindsBlueViewHeads) {
 /// A BlueView head that pings, and the daemon that says so.
 Facts healthy_head() {
   Facts facts = healthy();
-  facts.status.heard.clear();  // heads send no status
+  facts.status.received.clear();  // heads send no status
   SonarFacts& sonar = facts.sonars[0];
   sonar.at.port = 14750, sonar.blueview = true;
   sonar.stream.rows = 315, sonar.stream.bits = 16, sonar.stream.asked_hz = 0;
-  control::SonarStatus& said = facts.control.status->sonars[0];
-  said.profile = "blueview-p900-90", said.listens = "127.0.0.2:14750", said.rate_hz = 15;
-  sonar.says = said;
+  control::SonarStatus& reported = facts.control.status->sonars[0];
+  reported.profile = "blueview-p900-90", reported.listens = "127.0.0.2:14750", reported.rate_hz = 15;
+  sonar.reported = reported;
   facts.heads = {{"127.0.0.2:14750", "BlueView P900-90", "7001"}};
   facts.kernel_ports.reserved = "";
   return facts;
@@ -357,14 +357,14 @@ Facts healthy_head() {
 TEST(Doctor, LooksAtAHeadAsItsHostsDo) {
   Facts facts = healthy_head();
   facts.sonars[0].stream.rate_hz = 14.9;
-  EXPECT_EQ(text_from(judge(facts)),
+  EXPECT_EQ(text_from(run_checks(facts)),
             "ok    tcp 127.0.0.2:14750 accepts, first ping decoded after 96 ms: 512 beams x 315 ranges, 16 bit, size fields "
             "consistent\n"
             "ok    rate 14.9 Hz (at most 15), image latency 18 ms p50, 21 ms p99\n"
             "ok    control tcp 127.0.0.1:14770 answers: sonard 0.1.0, 1 sonar, realtime clock\n"
             "ok    trace backend: embree, avx2\n"
             "ok    poses of rov: demo orbit\n"
-            "ok    http://127.0.0.1:8088/healthz says ok\n"
+            "ok    http://127.0.0.1:8088/healthz returns ok\n"
             "ok    BlueView head BlueView P900-90 (7001) answers discovery at tcp 127.0.0.2:14750\n"
             "7 checks, 0 errors, 0 warnings\n");
   facts.sonars[0].stream.rate_hz = 6;
@@ -376,11 +376,11 @@ TEST(Doctor, SaysWhatIsWrongWithAHead) {
   StreamFacts& s = facts.sonars[0].stream;
   s = {};
   s.outcome = Outcome::no_ping;
-  s.error = "tcp 127.0.0.2:14750 does not speak BVE1: a frame starts with other letters";
+  s.error = "tcp 127.0.0.2:14750 is not a BVE1 link: a frame has another magic number";
   expect(line(facts, "ping"), Level::fail, s.error, "another program has the port");
   s.error.clear();
   s.outcome = Outcome::closed_without_a_byte;
-  expect(line(facts, "ping"), Level::warn, "all its places are taken", "clients.max");
+  expect(line(facts, "ping"), Level::warn, "all its client slots are taken", "clients.max");
   s.outcome = Outcome::refused;
   expect(line(facts, "ping"), Level::fail, "refuses the connection", "sonard --demo blueview");
 }
@@ -388,7 +388,7 @@ TEST(Doctor, SaysWhatIsWrongWithAHead) {
 TEST(Doctor, SpeaksJson) {
   Facts facts = healthy();
   facts.kernel_ports.reserved = "";
-  const std::string json = json_from(judge(facts));
+  const std::string json = json_from(run_checks(facts));
   EXPECT_THAT(json, AllOf(HasSubstr("\"checks\":8"), HasSubstr("\"errors\":0"), HasSubstr("\"warnings\":1"),
                           HasSubstr("\"check\":\"ports\""), HasSubstr("\"level\":\"warn\"")));
 }

@@ -96,7 +96,7 @@ TEST(GazeboBridge, LeavesOutWhatSonardWouldRefuse) {
   EXPECT_FALSE(json_line({{nan, 0, 0}, {}}, 0, ""));
   EXPECT_FALSE(json_line({{0, 0, 0}, {nan, 0, 0, 0}}, 0, ""));
   EXPECT_FALSE(json_line({{0, 0, 0}, {0, 0, 0, 0}}, 0, ""));
-  std::vector<FollowedModel> followed{parse_followed("nobody").value()};
+  std::vector<FollowedModel> followed{parse_followed("absent").value()};
   EXPECT_THAT(lines_from(message_at(1), followed), IsEmpty());
 }
 

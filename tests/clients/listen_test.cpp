@@ -148,7 +148,7 @@ TEST(Listen, RefusesBrokenSizesJunkAndWrongEchoes) {
   });
   const Result<void> done = listen(quiet(deaf.endpoint(), 3));
   EXPECT_EQ(done.error().kind, ErrorKind::bad_data);
-  EXPECT_THAT(done.error().text, HasSubstr("never became"));
+  EXPECT_THAT(done.error().text, HasSubstr("never matched the request"));
 }
 
 /// `--seconds` and the time of the first ping do not include the wait for a device that starts late.
@@ -174,8 +174,8 @@ TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
   options.source.silence_limit_s = 0.3;
   const Result<void> nothing = listen(options);
   EXPECT_EQ(nothing.error().kind, ErrorKind::unavailable);
-  EXPECT_THAT(nothing.error().text, HasSubstr("not one Oculus message came from tcp " + text_from(silent.endpoint()) +
-                                              " within 0.3 s: is that an Oculus sonar?"));
+  EXPECT_THAT(nothing.error().text, HasSubstr("no Oculus message arrived from tcp " + text_from(silent.endpoint()) +
+                                              " within 0.3 s: is it an Oculus sonar?"));
 
   std::uint16_t free_port = 0;
   { const Socket briefly = bound(SOCK_STREAM, free_port); }
@@ -192,7 +192,7 @@ TEST(Listen, SaysWhenTheDeviceFallsSilent) {
   options.source.silence_limit_s = 0.3;
   const Result<void> done = listen(options);
   EXPECT_EQ(done.error().kind, ErrorKind::io);
-  EXPECT_THAT(done.error().text, HasSubstr("nothing more came within 0.3 s"));
+  EXPECT_THAT(done.error().text, HasSubstr("nothing more arrived within 0.3 s"));
 }
 
 TEST(View, TellsAnotherServiceFromASonarInStandby) {
@@ -207,14 +207,14 @@ TEST(View, TellsAnotherServiceFromASonarInStandby) {
     options.live = live;
     const Result<void> done = view(options);
     EXPECT_EQ(done.error().kind, ErrorKind::unavailable);
-    EXPECT_THAT(done.error().text, HasSubstr("is that an Oculus sonar?"));
+    EXPECT_THAT(done.error().text, HasSubstr("is it an Oculus sonar?"));
   }
   FakeDevice standby(1, [](std::uint32_t, const oculus::FireSettings&) { return oculus::make_dummy(7001); });
   options.source.device = standby.endpoint();
   options.live = false;
   const Result<void> done = view(options);
   EXPECT_EQ(done.error().kind, ErrorKind::io);
-  EXPECT_THAT(done.error().text, HasSubstr("no ping came within 0.3 s: is the sonar in standby?"));
+  EXPECT_THAT(done.error().text, HasSubstr("no ping arrived within 0.3 s: is the sonar in standby?"));
 }
 
 TEST(Endpoints, TakeWhatIsMissingFromTheDefault) {
@@ -284,12 +284,12 @@ TEST(Pose, ArrivesAsAJsonLineInEitherFrame) {
   }
 }
 
-TEST(Pose, SaysWhenNobodyListensOrTheWishIsContradictory) {
+TEST(Pose, FailsWithoutAListenerOrWithContradictoryOptions) {
   std::uint16_t free_port = 0;
   { const Socket briefly = bound(SOCK_DGRAM, free_port); }
   PoseOptions options;
   options.to = "127.83.1.9:" + std::to_string(free_port);
-  EXPECT_THAT(send_poses(options).error().text, HasSubstr("nobody listens"));
+  EXPECT_THAT(send_poses(options).error().text, HasSubstr("no program listens"));
   options.vehicle = "rov";
   options.object = "diver";
   EXPECT_EQ(send_poses(options).error().kind, ErrorKind::usage);

@@ -68,7 +68,7 @@ TEST(PingLog, TellsWhenTheSettingsTookAndWhetherTheyStayed) {
   other.settings.range = 5;
   PingLog log(asked());
   EXPECT_THAT(log.add(ping(1, other), 0).echo_mismatches, ElementsAre(HasSubstr("range")));
-  EXPECT_THAT(complaints(log.summary(0), true), ElementsAre(HasSubstr("never became")));
+  EXPECT_THAT(complaints(log.summary(0), true), ElementsAre(HasSubstr("never matched the request")));
   log.add(ping(2, asked()), 0.1);
   EXPECT_EQ(log.summary(0).echo_satisfied_at, 2u);
   EXPECT_THAT(complaints(log.summary(0), true), ElementsAre());

@@ -7,7 +7,7 @@
 #include "clients/sonarctl/control/control_commands.hpp"
 #include "clients/sonarctl/control/status_text.hpp"
 #include "clients/sonarctl/terminal.hpp"
-#include "clients/sonarctl/view_figures.hpp"
+#include "clients/sonarctl/view_caption.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -45,8 +45,8 @@ oculus::DecodedPing ping(std::uint32_t id) {
   return decoded;
 }
 
-TEST(ViewFigures, TellRateAndGaps) {
-  ViewFigures figures;
+TEST(ViewCaption, TellRateAndGaps) {
+  ViewCaption figures;
   figures.add(ping(7), 100.0);
   EXPECT_EQ(figures.text(), "ping 7  10.00 m  2.1 MHz  512 beams x 400 rows");
   figures.add(ping(8), 100.1);

@@ -144,7 +144,7 @@ TEST(DeviceEngine, IsTheSameBytesHoweverItIsLaunched) {
           ASSERT_EQ(ping.samples, samples) << again;
         }
       const PingStatistics took = engine->statistics();
-      for (const Stage s : {Stage::trace, Stage::scatter, Stage::synthesize, Stage::noise, Stage::couple, Stage::receive})
+      for (const Stage s : {Stage::trace, Stage::scatter, Stage::synthesize, Stage::noise, Stage::form_beams, Stage::receive})
         EXPECT_EQ(took.seconds[static_cast<std::size_t>(s)] > 0, clock != nullptr) << stage_names[static_cast<std::size_t>(s)];
     }
 }

@@ -160,7 +160,7 @@ TEST(AnalyticDaemon, TellsOnceThatASonarIsAboveTheSeaSurface) {
   };
   EXPECT_THAT(raise_to(0.4), HasSubstr("\"OK\""));
   EXPECT_TRUE(
-      eventually([&] { return daemon.log_text().find("above the sea surface and hears noise only") != std::string::npos; }));
+      eventually([&] { return daemon.log_text().find("above the sea surface and receives noise only") != std::string::npos; }));
   EXPECT_TRUE(client.next_ping()) << "pings go on";
   EXPECT_THAT(raise_to(-3), HasSubstr("\"OK\""));
   EXPECT_TRUE(sees_wall(client, 1.7));

@@ -4,7 +4,7 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "core/scene/files/load_scene.hpp"
-#include "daemon/world/edit_scene.hpp"
+#include "daemon/emulator/world/edit_scene.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar {
@@ -20,14 +20,14 @@ class ChangedScene : public ::testing::Test {
     protocol::DeviceState device;
     device.model = profile->model;
     device.options = *protocol::check_options(*profile->vendor, {});
-    protocol::Wish wish;
-    wish.range_m = 8;
-    wish.beams = 256;
-    device.request = profile->vendor->initial_settings(device).request;
+    protocol::SettingsOverride wanted;
+    wanted.range_m = 8;
+    wanted.beams = 256;
+    device.settings = profile->vendor->initial_settings(device).vendor_settings;
     PingRequest request;
     request.model = profile->model;
     request.number = PingNumber(1);
-    request.settings = profile->vendor->wished(wish, device)->settings;
+    request.settings = profile->vendor->apply_override(wanted, device)->settings;
     request.sonar_in_world = {{-7, 0, -3}, quat_from_rpy({0, rad_from_deg(15), 0})};
     request.vehicle_in_world = request.sonar_in_world;
     request.bodies_in_world = scene->bodies_in_world;

@@ -1,12 +1,12 @@
 // Who computes: the CPU unless something else is wished for; a wish that cannot be had is a sentence or a log line, as asked.
-#include "daemon/engine/choose_engine.hpp"
+#include "daemon/server/engine/choose_engine.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 
-#include "daemon/engine/start_engine.hpp"
+#include "daemon/server/engine/start_engine.hpp"
 
 namespace sonar {
 namespace {

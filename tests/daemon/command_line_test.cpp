@@ -1,5 +1,5 @@
 // What the user types reaches the configuration, and wins over the file; what is not typed changes nothing.
-#include "daemon/command_line.hpp"
+#include "daemon/commands/command_line.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -48,9 +48,9 @@ int usage_error(const std::vector<std::string>& words) {
 TEST(CommandLine, ItsClockIsJudgedInPlaceOfTheFiles) {
   EXPECT_TRUE(deaf_with("realtime", {"run", "x.yaml"}));
   EXPECT_THAT(deaf_with("realtime", {"run", "x.yaml", "--clock", "lockstep"}).error().text,
-              ::testing::StartsWith("--clock: lockstep lets time pass"));
+              ::testing::StartsWith("--clock: lockstep advances time"));
   EXPECT_THAT(deaf_with("lockstep", {"run", "x.yaml"}).error().text,
-              ::testing::StartsWith("test.yaml:5:8: clock: lockstep lets"));
+              ::testing::StartsWith("test.yaml:5:8: clock: lockstep advances"));
   EXPECT_TRUE(deaf_with("lockstep", {"run", "x.yaml", "--clock", "realtime"}));
 }
 

@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "daemon/config/config.hpp"
-#include "daemon/reload.hpp"
+#include "daemon/config/restart_keys.hpp"
 
 namespace sonar {
 namespace {
@@ -27,7 +27,7 @@ std::string why(const std::string& poses, const std::string& vehicles = "[{name:
   return config ? "accepted" : config.error().text;
 }
 
-TEST(ConfigMavlink, NobodyIsHeardUnlessNamed) {
+TEST(ConfigMavlink, ByDefaultThereIsNoLink) {
   EXPECT_TRUE(parse("{}")->poses.mavlink.empty());
   EXPECT_TRUE(parse("{mavlink: off}")->poses.mavlink.empty());
 }
@@ -92,9 +92,9 @@ TEST(ConfigMavlink, TheOriginIsRead) {
 TEST(ConfigMavlink, LinksAndOriginNeedARestart) {
   const Config now = *parse("{mavlink: 'udpin:127.0.0.1:14551'}");
   Config same = now;
-  EXPECT_TRUE(keep_what_needs_a_restart(now, same).empty());
+  EXPECT_TRUE(keep_restart_keys(now, same).empty());
   Config next = *parse("{mavlink: 'udpin:127.0.0.1:14552'}", "[{name: rov}]", ", origin: {lat: 1, lon: 2}");
-  EXPECT_THAT(keep_what_needs_a_restart(now, next), ::testing::ElementsAre("poses.mavlink", "world.origin"));
+  EXPECT_THAT(keep_restart_keys(now, next), ::testing::ElementsAre("poses.mavlink", "world.origin"));
   EXPECT_EQ(next.poses.mavlink.at(0).at.port, 14551);
   EXPECT_FALSE(next.origin);
 }

@@ -95,7 +95,7 @@ TEST(ConfigMistakes, OptionsOfAnotherVendorAreTold) {
               ::testing::ElementsAre("sonar front: options.heads_base is for BlueView sonars: without effect on Oculus M1200d"));
 }
 
-TEST(ConfigMistakes, OptionsOfNobodyAreRefusedWithTheKnownOnes) {
+TEST(ConfigMistakes, UnknownOptionsAreRefusedWithTheKnownOnes) {
   const auto with = [](const std::string& options) {
     return why(world + vehicles + "sonars:\n  - {name: a, profile: blueview-p900-90, bind_ip: 127.0.0.2, options: {" + options +
                "}}\n");

@@ -121,7 +121,7 @@ poses:
   stale_after_s: 2
   on_stale: stop
   max_jump_m: 5
-engine: {threads: 3, quality: default, device: auto, simd: portable, expected_power: true, noise: off, fixed_fan: 16}
+engine: {threads: 3, device: auto, simd: portable, expected_power: true, noise: off, fixed_fan: 16}
 clock: stepped
 log: {level: debug, format: json}
 )");
@@ -256,7 +256,7 @@ TEST(Config, EveryRefusalSaysWhatAndWhere) {
   EXPECT_THAT(with("poses: {allow_from: [10.0.0.0/33]}\n"), HasSubstr("poses.allow_from[0]: is not an address range"));
   EXPECT_THAT(with("poses: {json: 127.0.0.1:14770}\n"), HasSubstr("poses.json: the same address as poses.protobuf"));
   EXPECT_THAT(with("poses: {stale_after_s: 0}\n"), HasSubstr("poses.stale_after_s"));
-  EXPECT_THAT(with("engine: {quality: best}\n"), HasSubstr("engine.quality"));
+  EXPECT_THAT(with("engine: {quality: default}\n"), HasSubstr("engine.quality: unknown key"));
   EXPECT_THAT(with("clock: folow\n"), HasSubstr("did you mean \"follow\""));
   EXPECT_THAT(with("log: {level: loud}\n"), HasSubstr("log.level"));
   const std::string hot = "world: {scene: scene.yaml, water: {temperature_c: 30}}\n";
@@ -275,11 +275,11 @@ TEST(Config, ATimeThatWouldStandForEverIsRefused) {
     return passes ? std::string("accepted") : passes.error().text;
   };
   EXPECT_THAT(with("control: {stream: off, http: off}\nclock: lockstep\n"),
-              HasSubstr("sonard.yaml:8:8: clock: lockstep lets time pass when control asks for it, and control.stream and "
+              HasSubstr("sonard.yaml:8:8: clock: lockstep advances time by control requests, and control.stream and "
                         "control.http are off"));
   EXPECT_EQ(with("clock: lockstep\ncontrol: {stream: off}\n"), "accepted");
   const std::string deaf = "control: {stream: off, http: off}\nposes: {protobuf: off, json: off";
-  EXPECT_THAT(with("clock: follow\n" + deaf + "}\n"), HasSubstr("clock: follow lets time pass by the stamps of poses"));
+  EXPECT_THAT(with("clock: follow\n" + deaf + "}\n"), HasSubstr("clock: follow advances time by the stamps of poses"));
   EXPECT_EQ(with("clock: follow\n" + deaf + ", mavlink: 'udpin:127.0.0.1:0'}\n"), "accepted");
   EXPECT_EQ(with("clock: stepped\n" + deaf + "}\n"), "accepted");
 }

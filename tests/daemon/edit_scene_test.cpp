@@ -1,5 +1,5 @@
 // Scenes made from scenes: what is not changed keeps its place, and what cannot be is refused with what the scene has.
-#include "daemon/world/edit_scene.hpp"
+#include "daemon/emulator/world/edit_scene.hpp"
 
 #include <gmock/gmock.h>
 

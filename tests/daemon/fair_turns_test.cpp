@@ -1,5 +1,5 @@
 // Several sonars on one engine: a quick one is let in between, a greedy one waits, and nobody saves up turns by being silent.
-#include "daemon/engine/fair_turns.hpp"
+#include "daemon/server/engine/fair_turns.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/engine/simulator.hpp"
+#include "daemon/server/engine/simulator.hpp"
 
 namespace sonar {
 namespace {
@@ -55,17 +55,17 @@ class Parts final : public PingEngine {
     if (requests.front().sonar_id == quick) wait(1);
     for (int part = 0; requests.front().sonar_id == slow && part < 20; ++part) {
       wait(5);
-      if (who_) who_->take();
+      if (interruption_) interruption_->run_other();
     }
     Ping ping;
     ping.request = requests.front();
     return {ping};
   }
-  void let_in(Interruption* who) override { who_ = who; }
+  void set_interruption(Interruption* interruption) override { interruption_ = interruption; }
   std::string description() const override { return "parts"; }
 
  private:
-  Interruption* who_ = nullptr;
+  Interruption* interruption_ = nullptr;
 };
 
 TEST(Simulator, AQuickSonarKeepsItsRateBesideASlowOne) {

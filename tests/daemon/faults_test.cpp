@@ -1,8 +1,8 @@
 // An exception in one conversation, a mistake of ours: it is said, and costs that conversation only.
 #include <gmock/gmock.h>
 
-#include "daemon/poses/pose_server.hpp"
-#include "daemon/sonars/session.hpp"
+#include "daemon/server/poses/pose_server.hpp"
+#include "daemon/server/sonars/session.hpp"
 #include "tests/daemon/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -10,20 +10,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
-class AskingDialogue final : public protocol::Dialogue {
-  protocol::Reaction on_bytes(protocol::BytesView, Time) override {
-    protocol::Reaction reaction;
-    reaction.events.emplace_back(protocol::RequestPing{});
-    return reaction;
-  }
-  protocol::Reaction on_tick(Time) override { return {}; }
-  Time next_tick() const override { return Time::max(); }
-  void on_ping_queued(Time) override {}
-};
-
 struct ThrowingParent final : SessionParent {
   std::string fault, why;
-  void on_event(Session&, const protocol::Event&) override { throw std::runtime_error("no such luck"); }
+  void on_bytes(Session&, protocol::BytesView) override { throw std::runtime_error("no such luck"); }
+  Outbox::Message next_message(Session&) override { return {}; }
+  void on_sent(Session&, std::size_t) override {}
+  std::optional<milliseconds> longest_silence(const Session&) const override { return std::nullopt; }
+  void on_finish(Session&) override {}
   void on_written(Session&, const Outbox::Message&) override {}
   void on_fault(Session&, const std::string& what) override { fault = what; }
   void on_over(Session&, const std::string& reason) override { why = reason; }
@@ -34,9 +27,7 @@ TEST(Faults, EndTheSessionTheyHappenIn) {
   tcp::acceptor acceptor(io, {asio::ip::make_address(own_address()), 0});
   Client client(acceptor.local_endpoint().address().to_string(), acceptor.local_endpoint().port());
   ThrowingParent parent;
-  const Clock clock(true);
-  auto session =
-      std::make_shared<Session>(parent, clock, acceptor.accept(), std::make_unique<AskingDialogue>(), Session::Setup{});
+  auto session = std::make_shared<Session>(parent, acceptor.accept(), Session::Setup{});
   session->start();
   client.send(std::string("ping, please"));
   io.run_for(patience);

@@ -5,8 +5,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "daemon/sonars/admission.hpp"
-#include "daemon/system/real_time.hpp"
+#include "daemon/server/sonars/admission.hpp"
+#include "daemon/server/system/real_time.hpp"
 #include "tests/daemon/loopback.hpp"
 
 namespace sonar::testing_daemon {

@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/app.hpp"
+#include "daemon/server/app.hpp"
 #include "protocol/oculus/decode.hpp"
 
 namespace sonar::testing_daemon {

@@ -55,7 +55,7 @@ class Vehicle {
   }
   std::uint16_t port = 0, from_port = 0;
   int commands = 0;
-  mavlink::Speaker who{1, 1, 0};
+  mavlink::Identity who{1, 1, 0};
 
  private:
   static sockaddr_in place(const std::string& address, std::uint16_t port) {
@@ -147,7 +147,7 @@ TEST_F(Mavlink, NonsenseIsCountedAndChangesNothing) {
   vehicle.send(daemon.address(), port, damaged);
   EXPECT_TRUE(eventually([&] { return daemon.status().poses.refused == 2; }));
   EXPECT_EQ(daemon.status().poses.accepted, 0u);
-  EXPECT_THAT(daemon.log_text(), HasSubstr("pose refused: 64 bytes are no MAVLink"));
+  EXPECT_THAT(daemon.log_text(), HasSubstr("pose refused: 64 bytes are not MAVLink"));
   EXPECT_THAT(daemon.log_text(), HasSubstr("wrong checksum"));
 }
 

@@ -1,5 +1,7 @@
 // Histograms and the Prometheus text: bounds, quantiles, escaping, and that every line is one that a scraper takes.
-#include "daemon/sonars/metrics.hpp"
+#include "daemon/emulator/sonar/metrics.hpp"
+
+#include "daemon/server/system/process_figures.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -10,7 +12,7 @@
 #include <set>
 #include <sstream>
 
-#include "daemon/control/prometheus.hpp"
+#include "daemon/server/control/prometheus.hpp"
 
 namespace sonar {
 namespace {

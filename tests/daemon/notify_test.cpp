@@ -1,6 +1,6 @@
 // What a service manager hears, by a socket of our own: when we are ready, reload and stop, and signs of life only while the
 // simulation thread gets on.
-#include "daemon/system/notify.hpp"
+#include "daemon/server/system/notify.hpp"
 
 #include <gmock/gmock.h>
 #include <sys/socket.h>

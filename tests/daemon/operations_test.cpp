@@ -157,7 +157,7 @@ TEST(SetSonar, WhatCannotBeIsRefusedWithWhatCanAndNothingChanges) {
   wrong.transmit = false;
   const OperationResult far = daemon.ask(wrong);
   EXPECT_EQ(far.code, Code::refused);
-  EXPECT_THAT(far.text, HasSubstr("sees from 0.1 to 10 m"));
+  EXPECT_THAT(far.text, HasSubstr("is 0.1 to 10 m"));
   control::SetSonar stranger = set_range(3);
   stranger.sonar = "rear";
   const OperationResult unknown = daemon.ask(stranger);

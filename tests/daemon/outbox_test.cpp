@@ -1,5 +1,5 @@
 // The outbox rule of docs/architecture.md: message being written + depth waiting pings, whole messages, drops counted.
-#include "daemon/sonars/outbox.hpp"
+#include "daemon/emulator/sonar/outbox.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Ticks lie on a grid computed from its start; late ones are skipped and counted; travel time bounds the rate.
-#include "daemon/sonars/pacer.hpp"
+#include "daemon/emulator/sonar/pacer.hpp"
 
 #include <gtest/gtest.h>
 

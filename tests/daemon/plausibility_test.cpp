@@ -1,6 +1,6 @@
 // What was probably not meant: each mistake that newcomers make has its note, what is right has none, and a running daemon tells
 // each kind once and keeps it in its status as long as it holds.
-#include "daemon/world/plausibility.hpp"
+#include "daemon/emulator/world/plausibility.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -325,9 +325,9 @@ TEST(MavlinkNotes, ALinkWithoutUsablePosesIsInTheStatusUntilTheyCome) {
     return notes.empty() ? control::Note{} : notes.front();
   };
   EXPECT_EQ(note().vehicle, "rov");
-  EXPECT_THAT(note().text, HasSubstr("no poses yet: nothing has come"));
+  EXPECT_THAT(note().text, HasSubstr("no poses yet: no message received"));
   const std::uint16_t port = daemon.app().mavlink().listens_at(0).port;
-  mavlink::Speaker autopilot{1, 1, 0};
+  mavlink::Identity autopilot{1, 1, 0};
   mavlink::Attitude attitude;
   attitude.boot_ms = 1000;
   send_udp(daemon.address(), port, framed(attitude, autopilot));

@@ -1,5 +1,5 @@
 // Interpolation, extrapolation and holding against closed forms.
-#include "daemon/world/pose_history.hpp"
+#include "daemon/emulator/world/pose_history.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <list>
 
-#include "daemon/system/listen.hpp"
+#include "daemon/server/system/listen.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 #include "tests/daemon/loopback.hpp"

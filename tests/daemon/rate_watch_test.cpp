@@ -1,5 +1,5 @@
 // Only a sonar that computing keeps from its rate is told of, once, with the figures that say what is possible.
-#include "daemon/sonars/rate_watch.hpp"
+#include "daemon/emulator/sonar/rate_watch.hpp"
 
 #include <gmock/gmock.h>
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "daemon/recording/recordings.hpp"
+#include "daemon/server/recording/recordings.hpp"
 #include "protocol/recording/recording.hpp"
 #include "tests/daemon/loopback.hpp"
 #include "tests/small_disk.hpp"
@@ -40,7 +40,7 @@ std::uint64_t messages_in(const std::filesystem::path& file) {
     return 0;
   }
   std::uint64_t count = 0;
-  while (const auto piece = opened->reader->next()) count += piece->by == recording::Carrier::stream ? 1 : 0;
+  while (const auto message = opened->reader->next()) count += message->by == recording::Carrier::stream ? 1 : 0;
   return count;
 }
 
@@ -98,7 +98,7 @@ TEST(RecordingFile, KeepsAStatusASecondAndTheTruthOfEveryPing) {
   EXPECT_THAT(found, ElementsAre(std::pair("/front/device", 5), std::pair("/front/pose", 5), std::pair("/front/status", 2),
                                  std::pair("/front/truth", 5)));
   EXPECT_THAT(truth,
-              HasSubstr(R"("range_m":[2.5,0],"object":[1,-1],"objects":[{"index":1,"name":"box"}],"bodies":[{"name":"crate")"));
+              HasSubstr(R"("range_m":[2.5,0.0],"object":[1,-1],"objects":[{"index":1,"name":"box"}],"bodies":[{"name":"crate")"));
 }
 
 TEST(RecordingFile, AnExistingFileIsNotTouched) {
@@ -128,8 +128,8 @@ TEST(RecordingConfig, NamesAFolderThatIsThere) {
   EXPECT_TRUE(none->recording.folder.empty());
   EXPECT_EQ(here->recording.folder, std::filesystem::path(folder.path) / "here");
   EXPECT_EQ(absolute->recording.folder, folder.path);
-  EXPECT_THAT(read("recording: {folder: there}\n").error().text, HasSubstr("c.yaml:4:21: recording.folder: is no folder: "));
-  EXPECT_THAT(read("recording: {folder: scene.yaml}\n").error().text, HasSubstr("is no folder"));
+  EXPECT_THAT(read("recording: {folder: there}\n").error().text, HasSubstr("c.yaml:4:21: recording.folder: is not a folder: "));
+  EXPECT_THAT(read("recording: {folder: scene.yaml}\n").error().text, HasSubstr("is not a folder"));
   EXPECT_THAT(read("recording: {folder: here, format: mcap}\n").error().text, HasSubstr("recording.format: unknown key"));
 }
 
@@ -274,7 +274,7 @@ TEST(RecordedDaemon, ClientsGetTheSameBytesAndTheFileHasThemToo) {
     Sha256 kept;
     const auto opened = recording::open_recording(std::filesystem::path(folder.path + "/run.oculus"));
     ASSERT_TRUE(opened);
-    while (const auto piece = opened->reader->next()) kept.add(piece->bytes);
+    while (const auto message = opened->reader->next()) kept.add(message->bytes);
     EXPECT_EQ(kept.hex(), digests.back()) << "the client was sent nothing but pings";
     EXPECT_EQ(messages_in(folder.path + "/run.mcap"), 30u);
   }
@@ -389,7 +389,7 @@ TEST(RecordedDaemon, AStopOfTheDaemonFinishesTheFile) {
   const auto opened = recording::open_recording(std::filesystem::path(folder.path + "/run.mcap"));
   ASSERT_TRUE(opened);
   std::uint64_t pings = 0;
-  while (const auto piece = opened->reader->next()) pings += piece->by == recording::Carrier::stream ? 1 : 0;
+  while (const auto message = opened->reader->next()) pings += message->by == recording::Carrier::stream ? 1 : 0;
   EXPECT_GE(pings, 2u);
   EXPECT_FALSE(opened->reader->damage());
 }

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "core/base/memory_left.hpp"
-#include "daemon/reload.hpp"
+#include "daemon/config/restart_keys.hpp"
 #include "tests/daemon/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -363,12 +363,12 @@ TEST(Reload, ManyInARowLeaveNothingBehind) {
 TEST(KeepWhatNeedsARestart, NamesKeysThatDifferAndPutsThemBack) {
   const Config now = *demo_config();
   Config next = *demo_config();
-  EXPECT_THAT(keep_what_needs_a_restart(now, next), IsEmpty());
+  EXPECT_THAT(keep_restart_keys(now, next), IsEmpty());
   next.poses.json.enabled = false;
   next.control.hosts = {"sonar.example"};
   next.engine.simd = SimdLevel::portable;
   next.poses.max_jump_m = 7;
-  EXPECT_THAT(keep_what_needs_a_restart(now, next), ElementsAre("poses.json", "control", "engine.simd"));
+  EXPECT_THAT(keep_restart_keys(now, next), ElementsAre("poses.json", "control", "engine.simd"));
   EXPECT_TRUE(next.poses.json.enabled);
   EXPECT_EQ(next.poses.max_jump_m, 7) << "what can be taken over stays";
 }

@@ -8,7 +8,7 @@
 #include <future>
 #include <thread>
 
-#include "daemon/replay/replay_server.hpp"
+#include "daemon/commands/replay/replay_server.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "protocol/oculus/encode_ping.hpp"
 #include "protocol/recording/oculus_log.hpp"
@@ -21,7 +21,7 @@ namespace {
 using recording::Bytes;
 using recording::Carrier;
 using recording::Origin;
-using recording::Piece;
+using recording::RecordedMessage;
 using std::chrono::milliseconds;
 using Steady = std::chrono::steady_clock;
 constexpr milliseconds patience{20000};
@@ -49,24 +49,24 @@ Bytes ping_message(std::uint32_t id) {
   return oculus::encode_ping(head, {bearings, {}, samples});
 }
 
-std::vector<Piece> pieces_of(std::uint32_t pings, milliseconds period) {
-  std::vector<Piece> pieces;
+std::vector<RecordedMessage> messages_of(std::uint32_t pings, milliseconds period) {
+  std::vector<RecordedMessage> messages;
   for (std::uint32_t i = 0; i < pings; ++i)
-    pieces.push_back({Time(std::chrono::seconds(1000)) + i * period, Origin::device, Carrier::stream, ping_message(i + 1)});
-  return pieces;
+    messages.push_back({Time(std::chrono::seconds(1000)) + i * period, Origin::device, Carrier::stream, ping_message(i + 1)});
+  return messages;
 }
 
-Bytes stream_of(const std::vector<Piece>& pieces) {
+Bytes stream_of(const std::vector<RecordedMessage>& messages) {
   Bytes stream;
-  for (const Piece& piece : pieces) stream.insert(stream.end(), piece.bytes.begin(), piece.bytes.end());
+  for (const RecordedMessage& message : messages) stream.insert(stream.end(), message.bytes.begin(), message.bytes.end());
   return stream;
 }
 
-using MakeWriter = std::unique_ptr<recording::PieceWriter> (*)(std::unique_ptr<recording::Sink>);
-Bytes file_of(MakeWriter make, const std::vector<Piece>& pieces) {
+using MakeWriter = std::unique_ptr<recording::RecordingWriter> (*)(std::unique_ptr<recording::Sink>);
+Bytes file_of(MakeWriter make, const std::vector<RecordedMessage>& messages) {
   Bytes file;
   const auto writer = make(recording::sink_into(file));
-  for (const Piece& piece : pieces) EXPECT_TRUE(writer->write(piece));
+  for (const RecordedMessage& message : messages) EXPECT_TRUE(writer->write(message));
   EXPECT_TRUE(writer->close());
   return file;
 }
@@ -154,12 +154,12 @@ ReplayOptions as_fast_as_read() {
 }
 
 TEST(Replay, EveryByteOfEveryFormat) {
-  const std::vector<Piece> pieces = pieces_of(40, milliseconds(5));
+  const std::vector<RecordedMessage> messages = messages_of(40, milliseconds(5));
   const MakeWriter pcap = [](std::unique_ptr<recording::Sink> sink) { return recording::write_pcap(std::move(sink), {}); };
   for (const MakeWriter make : {&recording::write_oculus_log, &recording::write_raw_dump, pcap}) {
-    Replay replay(file_of(make, pieces), as_fast_as_read());
+    Replay replay(file_of(make, messages), as_fast_as_read());
     Driver driver(replay);
-    EXPECT_EQ(driver.read(everything), stream_of(pieces));
+    EXPECT_EQ(driver.read(everything), stream_of(messages));
     EXPECT_TRUE(replay.ends());
     EXPECT_EQ(replay.figures().messages, 40u);
     EXPECT_EQ(replay.figures().times_through, 1u);
@@ -167,33 +167,33 @@ TEST(Replay, EveryByteOfEveryFormat) {
 }
 
 TEST(Replay, WhatAClientSaysChangesNothing) {
-  const std::vector<Piece> pieces = pieces_of(20, milliseconds(10));
-  Replay replay(file_of(&recording::write_oculus_log, pieces), {});
+  const std::vector<RecordedMessage> messages = messages_of(20, milliseconds(10));
+  Replay replay(file_of(&recording::write_oculus_log, messages), {});
   Driver driver(replay);
   driver.send(oculus::make_fire({}));
   driver.send(Bytes(5000, std::byte{0x53}));
-  EXPECT_EQ(driver.read(everything), stream_of(pieces));
+  EXPECT_EQ(driver.read(everything), stream_of(messages));
   EXPECT_TRUE(replay.ends());
 }
 
 TEST(Replay, KeepsTheRecordedPaceScaled) {
-  const std::vector<Piece> pieces = pieces_of(11, milliseconds(100));
+  const std::vector<RecordedMessage> messages = messages_of(11, milliseconds(100));
   ReplayOptions options;
   options.speed = 2;
-  Replay replay(file_of(&recording::write_oculus_log, pieces), options);
+  Replay replay(file_of(&recording::write_oculus_log, messages), options);
   const auto begin = Steady::now();
   Driver driver(replay);
-  EXPECT_EQ(driver.read(everything), stream_of(pieces));
+  EXPECT_EQ(driver.read(everything), stream_of(messages));
   EXPECT_GE(Steady::now() - begin, milliseconds(490));  // a second, twice as fast; how late it may be the machine decides
 }
 
 TEST(Replay, LoopsUntilStopped) {
-  const std::vector<Piece> pieces = pieces_of(3, milliseconds(1));
+  const std::vector<RecordedMessage> messages = messages_of(3, milliseconds(1));
   ReplayOptions options = as_fast_as_read();
   options.loop = true;
-  Replay replay(file_of(&recording::write_raw_dump, pieces), options);
+  Replay replay(file_of(&recording::write_raw_dump, messages), options);
   Driver driver(replay);
-  const Bytes once = stream_of(pieces), twice_and_more = driver.read(2 * once.size() + 100);
+  const Bytes once = stream_of(messages), twice_and_more = driver.read(2 * once.size() + 100);
   EXPECT_EQ(Bytes(twice_and_more.begin(), twice_and_more.begin() + static_cast<std::ptrdiff_t>(once.size())), once);
   EXPECT_TRUE(std::equal(once.begin(), once.end(), twice_and_more.begin() + static_cast<std::ptrdiff_t>(once.size())));
   replay.stop();
@@ -203,8 +203,8 @@ TEST(Replay, LoopsUntilStopped) {
 }
 
 TEST(Replay, TheNextClientGetsItFromTheFront) {
-  const std::vector<Piece> pieces = pieces_of(50, milliseconds(20));
-  Replay replay(file_of(&recording::write_oculus_log, pieces), {});
+  const std::vector<RecordedMessage> messages = messages_of(50, milliseconds(20));
+  Replay replay(file_of(&recording::write_oculus_log, messages), {});
   {
     Driver first(replay);
     EXPECT_EQ(first.read(1000).size(), 1000u);
@@ -217,7 +217,7 @@ TEST(Replay, TheNextClientGetsItFromTheFront) {
     Driver next(replay);
     const Bytes begin = next.read(2000);
     if (begin.empty()) continue;  // the first is not yet gone
-    const Bytes expected = stream_of(pieces);
+    const Bytes expected = stream_of(messages);
     EXPECT_TRUE(std::equal(begin.begin(), begin.end(), expected.begin()));
     return;
   }
@@ -225,8 +225,8 @@ TEST(Replay, TheNextClientGetsItFromTheFront) {
 }
 
 TEST(Replay, StopsWithAClientThatDoesNotRead) {
-  const std::vector<Piece> pieces = pieces_of(400, milliseconds(0));  // 32 MB: more than the kernel holds
-  Replay replay(file_of(&recording::write_raw_dump, pieces), as_fast_as_read());
+  const std::vector<RecordedMessage> messages = messages_of(400, milliseconds(0));  // 32 MB: more than the kernel holds
+  Replay replay(file_of(&recording::write_raw_dump, messages), as_fast_as_read());
   Driver driver(replay);
   EXPECT_EQ(driver.read(10).size(), 10u);
   std::this_thread::sleep_for(milliseconds(100));
@@ -240,7 +240,7 @@ TEST(Replay, StatusLeadsDriversHere) {
   asio::io_context io;
   const Ipv4 ip = own_address();
   udp::socket listener(io, udp::endpoint(asio::ip::address_v4(ip), 0));
-  std::vector<Piece> pieces = pieces_of(2, milliseconds(1));
+  std::vector<RecordedMessage> messages = messages_of(2, milliseconds(1));
   oculus::StatusMessage recorded;
   recorded.header.part_number = recorded.part_number = 1032;
   recorded.header.type = oculus::MessageType::status;
@@ -250,10 +250,10 @@ TEST(Replay, StatusLeadsDriversHere) {
   recorded.arm0_version = 0x01020003;
   const MakeWriter pcap = [](std::unique_ptr<recording::Sink> sink) { return recording::write_pcap(std::move(sink), {}); };
   for (const bool with_status : {false, true}) {
-    if (with_status) pieces.push_back({pieces.back().at, Origin::device, Carrier::datagram, wire::bytes_of(recorded)});
+    if (with_status) messages.push_back({messages.back().at, Origin::device, Carrier::datagram, wire::bytes_of(recorded)});
     ReplayOptions options;
     options.status_to = {{ip, listener.local_endpoint().port()}};
-    Replay replay(file_of(pcap, pieces), options);
+    Replay replay(file_of(pcap, messages), options);
     ASSERT_TRUE(readable(listener)) << "no status datagram for " << patience.count() << " ms; one a second is sent";
     Bytes datagram(2000);
     datagram.resize(listener.receive(asio::buffer(datagram)));
@@ -268,9 +268,9 @@ TEST(Replay, StatusLeadsDriversHere) {
 }
 
 /// As if one of the server's parts had a bug.
-class BrokenReader final : public recording::PieceReader {
+class BrokenReader final : public recording::RecordingReader {
  public:
-  std::optional<Piece> next() override { throw std::runtime_error("out of order"); }
+  std::optional<RecordedMessage> next() override { throw std::runtime_error("out of order"); }
   std::optional<Error> damage() const override { return {}; }
   void rewind() override {}
 };

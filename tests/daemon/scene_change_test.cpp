@@ -205,7 +205,7 @@ TEST(SceneChange, WordsOfFilesElsewhereStayHere) {
   }
   const OperationResult answer = daemon.ask(control::LoadScene{file});
   EXPECT_EQ(answer.code, Code::failed);
-  EXPECT_THAT(answer.text, HasSubstr(file + " is no scene without mistakes; sonard's log"));
+  EXPECT_THAT(answer.text, HasSubstr(file + " could not be loaded: the scene file has errors, see sonard's log"));
   EXPECT_THAT(answer.text, Not(HasSubstr("password")));
   EXPECT_THAT(daemon.log_text(), HasSubstr("password"));
   std::filesystem::remove(file);

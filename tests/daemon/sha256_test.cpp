@@ -1,5 +1,5 @@
 // FIPS 180-4 examples (NIST "SHA-256 example values") and splitting.
-#include "daemon/system/sha256.hpp"
+#include "daemon/server/system/sha256.hpp"
 
 #include <gtest/gtest.h>
 

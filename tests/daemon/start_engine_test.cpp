@@ -1,5 +1,5 @@
 // An engine that this machine cannot start is a sentence and exit code 69; only our own mistakes are bugs.
-#include "daemon/engine/start_engine.hpp"
+#include "daemon/server/engine/start_engine.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -84,9 +84,9 @@ TEST(TrajectoryConfig, BodiesOfOneFile) {
 /// The page's example, with files as it names them.
 TEST(TrajectoryConfig, TheManualsExampleIsAConfiguration) {
   std::ofstream(directory() + "/missions/fleet.csv") << "body,t,x,y,z\nauv,0,1,2,3\nboat,0,4,5,6\nauv,99,1,2,3\n";
-  std::ifstream page(std::string(SONARD_SOURCE_DIR) + "/docs/trajectories.md");
+  std::ifstream page(std::string(SONARD_SOURCE_DIR) + "/docs/poses.md");
   std::string text((std::istreambuf_iterator<char>(page)), std::istreambuf_iterator<char>());
-  const std::size_t begin = text.find("```yaml\n") + 8;
+  const std::size_t begin = text.find("```yaml\nvehicles:") + 8;
   const std::string example = text.substr(begin, text.find("```", begin) - begin);
   const auto config = parse_config(
       "world: {scene: scene.yaml}\nsonars: [{name: a, profile: oculus-m1200d, vehicle: rov, bind_ip: 127.0.0.2}]\n" + example,

@@ -1,5 +1,5 @@
 // A client that reconnects for ever: its comings and goings stay in the log, in few lines, and none goes unsaid.
-#include "daemon/sonars/visit_log.hpp"
+#include "daemon/server/sonars/visit_log.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,7 +1,7 @@
 // How stamps become time with clock: follow: one clock, several, restarts, jumps, and stamps that mean harm.
 #include <gtest/gtest.h>
 
-#include "daemon/world/world.hpp"
+#include "daemon/emulator/world/world.hpp"
 
 namespace sonar {
 namespace {

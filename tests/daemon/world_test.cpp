@@ -1,5 +1,5 @@
-// Who is believed, when, and what the daemon answers for a moment: the rules of docs/configuration.md, "Sending poses".
-#include "daemon/world/world.hpp"
+// Who is believed, when, and what the daemon answers for a moment: the rules of docs/poses.md, "Time and order".
+#include "daemon/emulator/world/world.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

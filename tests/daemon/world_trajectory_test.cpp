@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/world/world.hpp"
+#include "daemon/emulator/world/world.hpp"
 
 namespace sonar {
 namespace {

@@ -15,7 +15,7 @@ protocol::DeviceState make_device() {
   d.id = 7001;
   d.model = protocol::find_profile("blueview-m900-2250-130")->model;
   d.options = *protocol::check_options(blueview::vendor(), {});
-  d.request = blueview::vendor().initial_settings(d).request;
+  d.settings = blueview::vendor().initial_settings(d).vendor_settings;
   return d;
 }
 }  // namespace
@@ -33,11 +33,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (reaction.replies.size() > size + 1) std::abort();
     for (const auto& event : reaction.events)
       if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
-        device.request = change->request;
+        device.settings = change->vendor_settings;
         if (!(change->settings.range_bin_m > 0) || change->settings.range_bin_count < 1) std::abort();
       }
-    host->on_tick(Time{} + std::chrono::seconds(3));
-    host->on_ping(device.request, 100, Time{});
+    host->on_tick(Time{} + std::chrono::seconds(3), size % 2 == 0);
+    host->on_ping(device.settings.get(), 100, Time{});
   }
   return 0;
 }

@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   BytesView payload(data + 1, size - 1);
   FrameHeader header;
   if (data[0] % 2 == 1) {
-    if (!take_header(payload, header)) return 0;
+    if (!read_header(payload, header)) return 0;
     require(header.payload_size <= longest_payload);
     Bytes again;
     put_header(again, header);

@@ -49,7 +49,7 @@ void use(const PolarPing& ping, std::uint8_t wishes) {
 
 void put_checksums_right(Bytes& bytes) {
   FrameHeader header;
-  for (std::size_t at = 8; at + 20 <= bytes.size() && take_header({bytes.data() + at, bytes.size() - at}, header);) {
+  for (std::size_t at = 8; at + 20 <= bytes.size() && read_header({bytes.data() + at, bytes.size() - at}, header);) {
     const std::size_t size = frame_header_size + header.payload_size;
     if (bytes.size() - at < size + 4) return;
     Bytes crc;

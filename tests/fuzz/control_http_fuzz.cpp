@@ -1,11 +1,11 @@
-// What may come to the HTTP port: requests out of a stream, and what they are judged to want. First byte: length of the pieces,
+// Input of the HTTP port: requests out of a stream, and their routing. First byte: length of the pieces,
 // second: the policy; the rest is the stream. Whatever the pieces, the requests are the same; nothing passes without its Host,
 // and nothing but /healthz without the token.
 #include <algorithm>
 #include <string>
 #include <vector>
 
-#include "daemon/control/http_judge.hpp"
+#include "daemon/server/control/http_router.hpp"
 #include "tests/fuzz/byte_script.hpp"
 
 namespace {
@@ -36,15 +36,15 @@ Taken take(std::span<const std::byte> stream, std::size_t piece) {
 
 void check(const HttpRequest& request, const HttpPolicy& policy) {
   require(request.body.size() <= HttpReader::longest_body);
-  const Judgement judgement = judge(request, policy);
-  if (const auto* answer = std::get_if<HttpAnswer>(&judgement.wanted)) {
+  const RoutedRequest routed = route_request(request, policy);
+  if (const auto* answer = std::get_if<HttpAnswer>(&routed.action)) {
     require(answer->status >= 400 && answer->status < 500 && answer->body.starts_with('{'));
     return;
   }
   require(request.has_host && host_allowed(request.host, policy.reached, policy.hosts));
   require(!request.has_origin || origin_allowed(request.origin, policy.reached, policy.hosts));
   if (!policy.token.matches(bearer_token(request.authorization))) {
-    const auto* health = std::get_if<WantsHealth>(&judgement.wanted);
+    const auto* health = std::get_if<HealthAction>(&routed.action);
     require(health != nullptr && !health->with_text);
   }
 }

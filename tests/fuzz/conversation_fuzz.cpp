@@ -1,15 +1,16 @@
 // Whole conversations in virtual time, both vendors: clients come, ask, read slowly and go, in the order that a script of bytes
-// says. First byte: vendor, product and options; second: the outbox; then commands, a letter and its arguments.
+// says. First byte: vendor, product and options; second: the outbox and the rules for clients; then commands, a letter and its
+// arguments.
 #include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/fire.hpp"
 #include "tests/fuzz/byte_script.hpp"
-#include "tests/fuzz/conversation.hpp"
+#include "tests/fuzz/sonar_clients.hpp"
 
 namespace {
 
 using namespace sonar;
-using fuzz::Conversation;
 using fuzz::Script;
+using fuzz::SonarClients;
 
 struct Choice {
   const char* profile;
@@ -73,22 +74,24 @@ protocol::Bytes blueview_message(Script& script, char letter) {
 }
 
 /// In two pieces, now and then.
-void send(Conversation& talk, std::size_t place, protocol::BytesView bytes, bool split) {
+void send(SonarClients& talk, std::size_t place, protocol::BytesView bytes, bool split) {
   const std::size_t cut = split ? bytes.size() / 3 : 0;
   talk.receive(place, bytes.first(cut));
   talk.receive(place, bytes.subspan(cut));
 }
 
-void obey(Conversation& talk, Script& script) {
+void obey(SonarClients& talk, Script& script) {
   const char letter = static_cast<char>(script.byte());
   if (letter == 'P') return talk.fire();
   const std::uint8_t first = script.byte();
   if (letter == 'w') return talk.wait(std::chrono::milliseconds(first < 200 ? first : (first - 199) * 250));
-  const std::size_t place = first % Conversation::places;
+  const std::size_t place = first % SonarClients::places;
   const bool split = first >= 128;
   switch (letter) {
     case 'c':
       return talk.connect(place);
+    case 'o':
+      return talk.connect(place, Role::observer);
     case 'f':
       return send(talk, place, fire_message(script), split);
     case 'h':
@@ -121,8 +124,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Script script(data, size);
   const Choice& choice = chosen(script.byte());
   const std::uint8_t rules = script.byte();
-  Conversation talk(protocol::find_profile(choice.profile).value(), choice.options,
-                    {.depth = 1 + rules % 3, .when_full = rules >= 128 ? WhenFull::drop_newest : WhenFull::replace_oldest});
+  const auto profile = protocol::find_profile(choice.profile).value();
+  SonarConfig sonar;
+  sonar.name = "front";
+  sonar.profile = profile;
+  sonar.mount = {};
+  sonar.device_id = 7001;
+  sonar.options = protocol::check_options(*profile.vendor, choice.options).value();
+  sonar.outbox = {.depth = 1 + rules % 3, .when_full = rules >= 128 ? WhenFull::drop_newest : WhenFull::replace_oldest};
+  sonar.max_clients = 3 - rules / 3 % 3;
+  sonar.when_full = static_cast<WhenClientsFull>(rules / 9 % 3);
+  SonarClients talk(std::move(sonar));
   while (!script.ended()) obey(talk, script);
   talk.end();
   return 0;

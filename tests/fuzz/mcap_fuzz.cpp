@@ -1,5 +1,5 @@
 // MCAP files of anybody: every message, and the sonar's among them, which replay paces by their times.
-#include "daemon/replay/replay_pace.hpp"
+#include "daemon/commands/replay/replay_pace.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 
@@ -13,9 +13,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!reader) return 0;
   const auto pace = std::make_unique<ReplayPace>(1, std::nullopt);  // on the stack GCC 12 takes it for uninitialized
   ReplayPace::Steady::time_point now{}, last{};
-  while (const auto piece = (*reader)->next()) {
-    if (piece->bytes.size() > size) std::abort();
-    now = pace->due(piece->at, now);
+  while (const auto message = (*reader)->next()) {
+    if (message->bytes.size() > size) std::abort();
+    now = pace->due(message->at, now);
     if (now < last || now - last > ReplayPace::longest_gap) std::abort();
     last = now;
   }

@@ -1,4 +1,4 @@
-// What every reader of recordings must keep, whatever the file: it ends, its pieces are no larger than messages may be, and a
+// Properties of every reader of recordings, for any file: it ends, no message is longer than messages may be, and a
 // second reading gives the same.
 #pragma once
 
@@ -15,24 +15,24 @@ inline recording::Bytes bytes_from(const std::uint8_t* data, std::size_t size) {
 }
 
 struct ReadThrough {
-  std::uint64_t pieces = 0, bytes = 0;
+  std::uint64_t messages = 0, bytes = 0;
   bool damaged = false;
   bool operator==(const ReadThrough&) const = default;
 };
 /// `most_bytes` may come out of the file.
-inline ReadThrough read_through(recording::PieceReader& reader, std::uint64_t most_bytes) {
+inline ReadThrough read_through(recording::RecordingReader& reader, std::uint64_t most_bytes) {
   ReadThrough read;
-  while (const auto piece = reader.next()) {
-    ++read.pieces;
-    read.bytes += piece->bytes.size();
-    if (piece->bytes.empty() || read.bytes > most_bytes) std::abort();
+  while (const auto message = reader.next()) {
+    ++read.messages;
+    read.bytes += message->bytes.size();
+    if (message->bytes.empty() || read.bytes > most_bytes) std::abort();
   }
   read.damaged = reader.damage().has_value();
   if (reader.next()) std::abort();
   return read;
 }
 
-inline void check_reader(Result<std::unique_ptr<recording::PieceReader>> reader, std::uint64_t most_bytes) {
+inline void check_reader(Result<std::unique_ptr<recording::RecordingReader>> reader, std::uint64_t most_bytes) {
   if (!reader) {
     if (reader.error().text.empty()) std::abort();
     return;

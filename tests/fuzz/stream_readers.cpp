@@ -5,7 +5,7 @@
 #include "clients/bvtsdk/core/frame.hpp"
 #include "clients/bvtsdk/core/polar_ping.hpp"
 #include "tests/fuzz/byte_script.hpp"
-#include "tests/fuzz/conversation.hpp"
+#include "tests/fuzz/sonar_clients.hpp"
 
 namespace sonar::fuzz {
 namespace {
@@ -39,7 +39,7 @@ class BlueViewReader final : public StreamReader {
     std::size_t at = 0;
     bvt::FrameHeader header;
     while (buffer_.size() - at >= bvt::frame_header_size) {
-      require(bvt::take_header({buffer_.data() + at, buffer_.size() - at}, header));
+      require(bvt::read_header({buffer_.data() + at, buffer_.size() - at}, header));
       const std::size_t whole = bvt::frame_header_size + header.payload_size;
       if (buffer_.size() - at < whole) break;
       take(header, {buffer_.data() + at + bvt::frame_header_size, header.payload_size});

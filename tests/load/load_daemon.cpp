@@ -8,7 +8,7 @@
 #include <mutex>
 #include <thread>
 
-#include "daemon/app.hpp"
+#include "daemon/server/app.hpp"
 #include "tests/load/premade_engine.hpp"
 
 namespace sonar::load {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/sonars/metrics.hpp"
+#include "daemon/emulator/sonar/metrics.hpp"
 
 namespace sonar::load {
 

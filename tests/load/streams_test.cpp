@@ -7,6 +7,7 @@
 #include <array>
 #include <thread>
 
+#include "daemon/server/system/process_figures.hpp"
 #include "tests/load/load_case.hpp"
 #include "tests/load/load_daemon.hpp"
 

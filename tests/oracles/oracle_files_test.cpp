@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "daemon/render/expectation.hpp"
-#include "daemon/render/render_job.hpp"
+#include "daemon/commands/render/expectation.hpp"
+#include "daemon/commands/render/render_job.hpp"
 #include "tests/oracles/record.hpp"
 
 namespace sonar::render {

@@ -3,7 +3,7 @@
 
 usage: oracle_table.py FOLDER [--markdown] [--partial]
   FOLDER      what the environment variable SONARD_ORACLES named, build/<preset>/oracles after ctest
-  --markdown  a table for docs/validation.md instead of one for the terminal
+  --markdown  a table for docs/validation/tables.md instead of one for the terminal
   --partial   an oracle without figures is no fault: the run was asked for some tests only
 Exit status 1: an oracle is out of tolerance, or has no figures and no reason for that. 2: the folder cannot be read.
 """
@@ -24,16 +24,16 @@ ORACLES = {
     7: "slope of a seabed cell over range",
     8: "absolute level of a seabed",
     9: "Lambert sphere",
-    10: "mirror echo of a sphere",
-    11: "mirror echo of a cylinder",
-    12: "mirror echo of a plate",
+    10: "specular echo of a sphere",
+    11: "specular echo of a cylinder",
+    12: "specular echo of a plate",
     13: "trihedral corner",
     14: "receive width of a point target",
     15: "highest side lobe",
     16: "two-way elevation product",
     17: "pulse width in range",
     18: "column synthesis against the direct sum",
-    19: "coupling against the dense sum",
+    19: "beamforming against the dense sum",
     20: "CPU against GPU",
     21: "energy against the number of rays",
     22: "energy against the number of beams",
@@ -52,8 +52,8 @@ ORACLES = {
     35: "decorrelation by a lateral shift",
     36: "speckle rides with the bottom ahead",
     37: "speckle stays with the bottom in a turn",
-    38: "surface ghosts: ranges",
-    39: "surface ghosts: amplitude",
+    38: "surface ghosts, ranges",
+    39: "surface ghosts, amplitudes",
     40: "yaw during the ping",
     41: "quantisation round trip",
     42: "TVG flattens a point target",
@@ -65,8 +65,8 @@ ORACLES = {
 NO_NUMBER = 0  # truths beyond the table
 
 NOT_BUILT = {
-    13: "only if a corner module is built, and none is: corners echo by multipath or not at all",
-    20: "needs a CUDA device, and there was none; by loops on the host: docs/cuda.md",
+    13: "no corner reflector is built: corners echo by multipath or not at all",
+    20: "needs a CUDA device; by loops on the host: docs/cuda.md",
 }
 
 

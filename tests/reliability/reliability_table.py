@@ -14,47 +14,46 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 BY_HAND = pathlib.Path(__file__).resolve().parent / "by_hand"
 FUZZ_BOUNDS = {"mesh_file": "5,000: the importer takes a hundred times as long"}  # as tests/tools/fuzz.sh
 
-# Section -> items: key, what it is, what is promised.
+# Section -> items: key, what is measured, the bound.
 ITEMS = {
-    "Load and neighbours": [
-        ("load-accounted", "8 sonars x 4 clients x 40 Hz x 128 KiB for 45 s: pings made, and sent or dropped", "exactly equal"),
-        ("load-garbled", "the same: pings whose content is not what was made", "0"),
+    "Load": [
+        ("load-accounted", "8 sonars x 4 clients x 40 Hz x 128 KiB, 45 s: pings simulated = sent + dropped", "exactly equal"),
+        ("load-garbled", "the same: pings with wrong content", "0"),
         ("load-dropped", "the same: pings dropped", "at most 0.5 %"),
         ("load-memory", "the same: growth of resident memory", "at most 1 MiB"),
-        ("stall-neighbours", "a client that never reads beside three that do: pings the three lose", "0"),
-        ("stall-reset", "the same: when the fourth is reset", "10 s without progress"),
-        ("stall-accounted", "the same: pings made for the fourth, and sent or dropped", "exactly equal"),
-        ("dead-peer", "a client whose computer died: when its place is free", "within 15 s"),
-        ("cycles", "10,000 times connect, command, disconnect: descriptors, threads, memory", "back to baseline"),
-        ("reconnects", "1,000 reconnects of a driver-shaped client that leaves in rude ways", "every one served"),
-        ("real-pings", "60 s of 40 Hz x 512 simulated beams: ticks, pings and drops", "every one accounted for"),
-        ("junk-rate", "junk at full speed into one sonar and the pose ports: pings the neighbour loses", "0"),
-        ("junk-gap", "the same: longest gap of the neighbour's stream", "at most 250 ms at 40 Hz"),
-        ("descriptors", "every file descriptor used up by visitors: pings a running stream loses", "0"),
+        ("stall-neighbours", "one client never reads: pings lost by three others", "0"),
+        ("stall-reset", "the same: time until its reset", "10 s without progress"),
+        ("stall-accounted", "the same: its pings = sent + dropped", "exactly equal"),
+        ("dead-peer", "a client's computer fails: time until its slot is free", "within 15 s"),
+        ("cycles", "10,000 x connect, command, disconnect: descriptors, threads, memory", "back to baseline"),
+        ("reconnects", "1,000 reconnects without orderly disconnects: served", "every one served"),
+        ("real-pings", "40 Hz x 512 simulated beams, 60 s: ticks, pings, drops", "every one accounted for"),
+        ("junk-rate", "junk at full speed into one sonar and the pose ports: pings lost by another sonar", "0"),
+        ("junk-gap", "the same: its longest gap", "at most 250 ms at 40 Hz"),
+        ("descriptors", "all file descriptors used up: pings lost by a running stream", "0"),
     ],
     "Life cycle": [
-        ("stop-reading", "SIGTERM: clients that read get their message whole and a FIN", "all"),
+        ("stop-reading", "SIGTERM: reading clients get their message whole, then a FIN", "all"),
         ("stop-time", "SIGTERM with a client that does not read: exit 0", "within 2 s"),
-        ("reload-untouched", "SIGHUP: pings that an untouched sonar loses", "0"),
-        ("reload-error", "SIGHUP with a wrong file", "the old configuration stays"),
+        ("reload-untouched", "SIGHUP: pings lost by an unchanged sonar", "0"),
+        ("reload-error", "SIGHUP with an invalid file", "the old configuration stays"),
         ("kill-restart", "kill -9 and restart: first ping", "within 2.5 s"),
         ("disk-full", "log on a full disk", "no ping lost"),
-        ("closed-output", "closed standard output and error", "no ping lost"),
-        ("stop-continue", "SIGSTOP, SIGCONT: burst and corruption", "none"),
-        ("unit-exposure", "exposure of the systemd unit, systemd-analyze security", "at most 1.5"),
-        ("driver-restart", "restart after 4 s under oculus_driver of ENSTA: it publishes again", "within 15 s"),
+        ("closed-output", "standard output and error closed", "no ping lost"),
+        ("stop-continue", "SIGSTOP, SIGCONT: pings in the first second", "at most 12, whole"),
+        ("unit-exposure", "systemd-analyze security of the unit", "at most 1.5"),
+        ("driver-restart", "restart after 4 s: ENSTA's oculus_driver publishes again", "within 15 s"),
     ],
-    "Whole missions": [
-        ("mission-digest", "10 minutes of a trajectory in stepped time: digests of two runs, one of them recorded", "equal"),
-        ("mission-pace", "the same: pace", "faster than real time"),
-        ("mission-replay", "its .oculus recording, served by sonard replay, received by our client", "byte for byte the same"),
-        ("trajectory-load", "a trajectory of an hour at 100 Hz, 360,000 lines: read", "less than 1 s"),
+    "Missions": [
+        ("mission-digest", "10 min of a trajectory in stepped time: digests of two runs, one recorded", "equal"),
+        ("mission-pace", "the same: speed", "faster than real time"),
+        ("mission-replay", "its .oculus recording served by sonard replay", "byte for byte the same"),
+        ("trajectory-load", "reading a trajectory of 360,000 lines (an hour at 100 Hz)", "less than 1 s"),
     ],
-    "Bytes from outside": [
-        ("dissector", "a recorded run read by tshark with our dissector and by our decoder", "equal, field by field"),
-        ("asan", "functional suite but for what computes for long, under the address and undefined-behaviour sanitizers",
-         "no report"),
-        ("tsan", "protocol, control and daemon under the thread sanitizer", "no report"),
+    "Input": [
+        ("dissector", "a recorded run: fields of the Wireshark dissector = sonard's decoder", "equal, field by field"),
+        ("asan", "functional tests, without long computations: address and undefined-behaviour sanitizers", "no report"),
+        ("tsan", "protocol, control and daemon tests: thread sanitizer", "no report"),
     ],
 }
 
@@ -64,8 +63,7 @@ def items():
     listed = {section: list(rows) for section, rows in ITEMS.items()}
     for source in sorted((ROOT / "tests/fuzz").glob("*_fuzz.cpp")):
         name = source.stem.removesuffix("_fuzz")
-        listed["Bytes from outside"].append((f"fuzz-{name}", f"fuzz target {name}: inputs tried without a fault",
-                                            FUZZ_BOUNDS.get(name, "500,000")))
+        listed["Input"].append((f"fuzz-{name}", f"fuzz target {name}: inputs without a fault", FUZZ_BOUNDS.get(name, "500,000")))
     return listed
 
 
@@ -84,36 +82,71 @@ def cell(text):
     return str(text).replace("|", "\\|").replace("\n", " ")
 
 
-def row_of(key, what, bound, record, machines):
-    if record is None:
-        return [what, bound, "not run", "", "", "", ""]
-    at = machines.setdefault(record["machine"], len(machines) + 1)
-    return [what, record["bound"], record["figure"], "yes" if record["passed"] else "**NO**", f"`{record['command']}`", str(at),
-            record.get("date", "")]
+def range_of(values):
+    """The common value of several records, or the first and the last."""
+    values = sorted(set(values))
+    return values[0] if len(values) == 1 else f"{values[0]} to {values[-1]}"
+
+
+class Page:
+    """Rows of the tables; commands, machines and dates are listed once, by number."""
+
+    def __init__(self):
+        self.machines, self.commands, self.faults = {}, {}, []
+
+    def number(self, command, records):
+        at = sorted({self.machines.setdefault(r["machine"], len(self.machines) + 1) for r in records})
+        where = f"machine{'s' if len(at) > 1 else ''} {' and '.join(map(str, at))}"
+        text = f"`{command}`, {where}, {range_of(r.get('date', '') for r in records)}"
+        return self.commands.setdefault(text, len(self.commands) + 1)
+
+    def row(self, key, what, bound, record):
+        if record is None:
+            return what, bound, "not run", "", ""
+        if not record["passed"]:
+            self.faults.append(f"{key}: {record['figure']}, bound {record['bound']}")
+        holds = "yes" if record["passed"] else "**NO**"
+        return what, record["bound"], record["figure"], holds, self.number(record["command"], [record])
+
+    def fuzz_row(self, bound, records):
+        """One row for all targets that passed with the same bound."""
+        names = ", ".join(f"`{name}`" for name in sorted(records))
+        count = f"{len(records)} fuzz targets: inputs without a fault each"
+        what = count if len(records) > 1 else "fuzz target: inputs without a fault"
+        figures = range_of(r["figure"] for r in records.values())
+        return f"{what}: {names}", bound, figures, "yes", self.number("tests/tools/fuzz.sh TARGET", list(records.values()))
+
+    def section(self, title, rows, records):
+        lines = [f"## {title}", "", "| measured | bound | result | holds | command |", "|" + "---|" * 5]
+        passed = {}  # bound -> fuzz target -> record
+        for key, what, bound in rows:
+            record = records.get(key)
+            if key.startswith("fuzz-") and record is not None and record["passed"]:
+                same = record["bound"].replace(",", "") == bound.replace(",", "")
+                passed.setdefault(bound if same else record["bound"], {})[key.removeprefix("fuzz-")] = record
+                continue
+            lines.append("| " + " | ".join(cell(c) for c in self.row(key, what, bound, record)) + " |")
+        for bound, targets in passed.items():
+            lines.append("| " + " | ".join(cell(c) for c in self.fuzz_row(bound, targets)) + " |")
+        return lines + [""]
 
 
 def page_of(records):
     """The page, and the faults it shows."""
-    machines, faults = {}, []
+    page = Page()
     lines = ["# Reliability", "",
-             "What is promised of a daemon that is left running, and what was measured. Generated by "
-             "`tests/reliability/reliability_table.py` from what the tests record; `./test.sh --long` measures everything again, "
-             "but for what `tests/reliability/by_hand` keeps: that needs programs which are built elsewhere.", "",
-             "\"Holds\" judges the bound that is written here. The tests themselves fail only at five times a promised time, so "
-             "that a busy machine does not fail them; a row with **NO** fails `./test.sh --long` all the same.", ""]
-    known = set()
-    for section, rows in items().items():
-        lines += [f"## {section}", "", "| what | bound | measured | holds | command | machine | date |", "|" + "---|" * 7]
-        for key, what, bound in rows:
-            known.add(key)
-            record = records.get(key)
-            lines.append("| " + " | ".join(cell(c) for c in row_of(key, what, bound, record, machines)) + " |")
-            if record is not None and not record["passed"]:
-                faults.append(f"{key}: {record['figure']}, bound {record['bound']}")
-        lines.append("")
-    faults += [f"unknown item {key}: add it to ITEMS" for key in sorted(set(records) - known)]
-    if machines:
-        lines += ["Machines: " + "; ".join(f"{at}: {name}" for name, at in machines.items()) + ".", ""]
+             "Measured bounds of a daemon that runs for long. Generated by `tests/reliability/reliability_table.py` from the",
+             "records of `./test.sh --long`; `tests/reliability/by_hand` has results that need programs built elsewhere.", "",
+             "\"Holds\" compares with the bound given here; a **NO** fails `./test.sh --long`. The tests themselves fail only at",
+             "five times a time bound, so that a busy machine does not fail them.", ""]
+    sections = items()
+    for title, rows in sections.items():
+        lines += page.section(title, rows, records)
+    known = {key for rows in sections.values() for key, _, _ in rows}
+    faults = page.faults + [f"unknown item {key}: add it to ITEMS" for key in sorted(set(records) - known)]
+    if page.commands:
+        lines += ["## Commands", ""] + [f"{at}. {text}" for text, at in page.commands.items()] + [""]
+        lines += ["Machines: " + "; ".join(f"{at}: {name}" for name, at in page.machines.items()) + ".", ""]
     return "\n".join(lines), faults, sorted(known - set(records))
 
 

@@ -53,8 +53,21 @@ class Table(unittest.TestCase):
         row = next(line for line in page.splitlines() if "0.02 %" in line)
         self.assertIn("| yes |", row)
         self.assertIn("57,600 \\| 3", row)
-        self.assertIn("`build/x --only load`", row)
+        self.assertTrue(row.endswith("| 1 |"), row)
+        self.assertIn("1. `build/x --only load`, machine ", page)
         self.assertIn("Machines: 1: ", page)
+
+    def test_fuzz_targets_that_passed_share_a_row(self):
+        for name, bound in (("mavlink", "500000"), ("mcap", "500,000"), ("mesh", "1,000")):
+            record(f"fuzz-{name}", "500000", bound, True, f"tests/tools/fuzz.sh {name}")
+        record("fuzz-pcap", "17", "500,000", False, "tests/tools/fuzz.sh pcap")
+        code, page, said = table(self.folder.name)
+        self.assertEqual(code, 1)
+        self.assertIn("fuzz-pcap: 17", said)
+        self.assertIn("| 2 fuzz targets: inputs without a fault each: `mavlink`, `mcap` | 500,000 | 500000 | yes |", page)
+        self.assertIn("| fuzz target: inputs without a fault: `mesh` | 1,000 | 500000 | yes |", page)
+        self.assertIn("| fuzz target pcap: inputs without a fault | 500,000 | 17 | **NO** |", page)
+        self.assertIn("| fuzz target scene: inputs without a fault | 500,000 | not run |", page)
 
     def test_a_missed_bound_is_a_fault(self):
         record("load-dropped", "1.2 %", "at most 0.5 %", False, "x")

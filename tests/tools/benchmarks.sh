@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Measures everything that docs/benchmarks.md says and writes it, with its pictures.
+# Runs the benchmarks and writes docs/benchmarks.md with its pictures, and docs/benchmarks/tables.md.
 # usage: tests/tools/benchmarks.sh [--instruction-sets] [BUILD_FOLDER]
-#   --instruction-sets  only that chapter: the rates with this processor's instruction sets and with lesser ones
-# Wants a quiet machine; takes five to ten minutes. BUILD_FOLDER (default build/release) must hold a built sonard.
+#   --instruction-sets  only that chapter of the tables: the rates with this processor's instruction sets and with lesser ones
+# Needs an otherwise idle machine and five to ten minutes. BUILD_FOLDER (default build/release) must hold a built sonard.
 set -eu -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 case "${1:-}" in
@@ -14,8 +14,8 @@ if [ "${1:-}" = --instruction-sets ]; then
   shift
 fi
 build=${1:-build/release}
-sonard=$build/daemon/sonard
-[ -x "$sonard" ] || { echo "no $sonard; build it first, or name another build folder" >&2; exit 66; }
+bench=$build/tests/bench/sonard_bench
+[ -x "$bench" ] || { echo "no $bench; build it first, or name another build folder" >&2; exit 66; }
 threads=$(nproc)
 each=(--threads "$threads")
 [ "$threads" = 1 ] || each=(--threads 1 --threads "$threads")
@@ -26,7 +26,7 @@ levels=(avx2:avx2 portable:sse4.2)
 sets=()
 for level in "${levels[@]}"; do
   sets+=("$build/benchmarks-${level%%:*}.json")
-  SONARD_EMBREE_ISA=${level#*:} "$sonard" bench --simd "${level%%:*}" --scene local-search --threads "$threads" --pings 200 \
+  SONARD_EMBREE_ISA=${level#*:} "$bench" --simd "${level%%:*}" --scene local-search --threads "$threads" --pings 200 \
     --case P1 --case P2 --case P3a --case P3b --case P3c --case P3d --case P4a --case P4b --json "${sets[-1]}"
 done
 if [ -n "$sets_only" ]; then
@@ -34,7 +34,7 @@ if [ -n "$sets_only" ]; then
 else
   json=$build/benchmarks.json
   # A ratio that is missed (exit code 1) is in the page; anything else ends here.
-  "$sonard" bench --scene local-search "${each[@]}" --pings 200 --curves --json "$json" || [ $? -eq 1 ]
+  "$bench" --scene local-search "${each[@]}" --pings 200 --curves --json "$json" || [ $? -eq 1 ]
   python3 tests/bench/write_benchmarks.py "$json" "${sets[@]}" docs
 fi
-echo "docs/benchmarks.md is written; figures are in $build/benchmarks*.json"
+echo "docs/benchmarks.md and docs/benchmarks/tables.md are written; results are in $build/benchmarks*.json"

@@ -22,7 +22,7 @@ cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSONAR_CUDA=REQUIRED
   ${GPU_CHECK_ARCHITECTURES:+-DCMAKE_CUDA_ARCHITECTURES="$GPU_CHECK_ARCHITECTURES"} >"$build.log" 2>&1 ||
   { tail -20 "$build.log" >&2; exit 1; }
 tests="cuda_device_same_rays_test cuda_device_embree_rays_test"
-ninja -C "$build" $tests cuda_seam_test sonard sonard_cuda
+ninja -C "$build" $tests cuda_seam_test sonard sonard_bench sonard_cuda
 
 for test in $tests cuda_seam_test; do
   # A test that is skipped here has checked nothing: with a device there is no reason for it.
@@ -42,7 +42,7 @@ if [ -n "$sanitizer" ]; then
 fi
 
 # The benchmark of docs/cuda.md, as any user can run it.
-SONARD_CUDA_MODULE="$build/daemon/libsonard_cuda.so" "$build/daemon/sonard" bench --engine cuda --scene local-search \
+SONARD_CUDA_MODULE="$build/daemon/libsonard_cuda.so" "$build/tests/bench/sonard_bench" --engine cuda --scene local-search \
   --scenes-dir scenes --case P1 --case P3a --case P3b --case P3c --case P3d --case P5 --case P9 --case P10 --pings 256 \
   ${GPU_CHECK_REFERENCE_MS:+--reference-ms "$GPU_CHECK_REFERENCE_MS"} --json "$build/bench-gpu.json"
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Truth against a real device: three captured pings of an M1200d beside the same scene rendered, in one table and one picture.
+"""Comparison with a real device: three captured pings of an M1200d beside the same scene rendered, in one table and one picture.
 
 Statistics are made with the standard library alone, matplotlib draws. Writes capture.png into --out-dir and prints the chapter.
 The captures stay where they are: tests and this script read them from the folder that SONARD_CAPTURES names.
@@ -28,8 +28,8 @@ NEEDS_NO_REASON = 0.12  # a figure at the edge of the tolerance keeps its reason
 REASONS = {
     "percentile 1": ("one code of 254", 0.26),
     "rows 200-249, mean": ("the near edge of the bed: its true relief is not known", 0.40),
-    "near-field floor (rows 20-60), sd": ("the real floor is 11 at the edges of the fan and 7 amid it; ours is even", 0.35),
-    "difference of pings, rows 20-119, sd": ("as the floor's: louder at the edges of the fan", 0.20),
+    "near-field floor (rows 20-60), sd": ("the real floor is 11 at the edges of the fan and 7 in the middle; ours is even", 0.35),
+    "difference of pings, rows 20-119, sd": ("as the floor: louder at the edges of the fan", 0.20),
     "difference of pings, rows 400-599, sd": ("the real far field is steadier: echoes where ours is noise", 0.40),
 }
 
@@ -190,12 +190,12 @@ INTRODUCTION = """## Beside a real device
 
 Three pings of a real Oculus M1200d (high mode, 2 m, 256 beams), recorded by the University of Washington's Applied Physics
 Laboratory ([liboculus](https://github.com/apl-ocean-engineering/liboculus), BSD 3-clause, notice in
-`docs/validation/LICENSE.liboculus`), and the same statistics of `tests/validation/scenes/like-the-capture.yaml`: patchy, very soft
-mud (-40 dB) 0.6 m below a sonar that looks down by 42 degrees. What was under the device is not known: place, slope and patches of
-the bed are chosen to look alike. TVG law, noise figure and leak of our profile are fitted to this very recording; beam patterns,
-pulse and speckle are not. What cannot be told apart: the bed's strength and the noise figure (only their distance is seen), the
-gain and the full scale. The gain here is {gain} dB where 50 %, as requested, would be 48: our full scale is set by the demo's
-brightness, and the recording has flag bit 4 set, which is gain assist to some.
+`docs/validation/LICENSE.liboculus`), and the same statistics of `tests/validation/scenes/like-the-capture.yaml`: patchy, very
+soft mud (-40 dB) 0.6 m below a sonar that looks down by 42 degrees. The real bed is unknown: its place, slope and patches are
+chosen for a similar picture. TVG curve, noise figure and leak of our profile are fitted to this recording; beam patterns, pulse
+and speckle are not. The bed's strength and the noise figure cannot be separated (only their distance is visible), nor can gain
+and full scale. The gain here is {gain} dB; the requested 50 % would be 48: our full scale is set by the demo's brightness, and
+the recording has flag bit 4 set, possibly gain assist.
 
 """
 
@@ -207,7 +207,7 @@ def chapter(program, captures, folder):
     draw(real[0], ours[0], folder / "capture.png")
     gain = next(line.split()[1] for line in SCENE.read_text(encoding="utf-8").splitlines() if line.strip().startswith("gain_db:"))
     return (INTRODUCTION.format(gain=gain) + text + f"\n{within} of {len(figures[0])} within {100 * TOLERANCE:.0f} %.\n"
-            "\n![A captured ping and ours](validation/capture.png)\n")
+            "\n![A captured ping and ours](capture.png)\n")
 
 
 def main():

@@ -32,11 +32,10 @@ def chapter(sonard, folder):
 
 INTRODUCTION = """## Cost of a ping
 
-Beside Table 3 of the paper (P900, 10 m, 512 beams; NVIDIA RTX 2080 Ti and Intel i9-9900K).
-Ours, no GPU: {machine}.
-By `sonard bench --case P1 --scene local-search --pings {pings}`: median rate over rough sand of {triangles} triangles, the sonar
-moving; stages are thread time over threads. Load average of the machine in the last minute: {load:.1f}; what exceeds the number of
-processors made these times longer. The paper's columns are ray signal, summation, correction and FFT; our default has other
-stages, put where they do that work.
+Beside Table 3 of the paper (P900, 10 m, 512 beams; NVIDIA RTX 2080 Ti and Intel i9-9900K). Ours, no GPU: {machine}. By `sonard_bench
+--case P1 --scene local-search --pings {pings}`: median rate over rough sand of {triangles} triangles, the sonar moving;
+stages are thread time over threads. Load average of the machine in the last minute: {load:.1f}; above the number of processors it
+lengthens these times. The paper's columns are ray signal, summation, correction and FFT. Our default has other stages, in the
+columns of the same work.
 
 """

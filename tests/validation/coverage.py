@@ -25,15 +25,15 @@ def rows_of(report):
 def chapter(sonard, folder):
     rows = rows_of(sonard.call("render", "--report", "coverage"))
     whole = sum(float(row[5].split()[0]) == 100 for row in rows)
-    return (INTRODUCTION + table(["sonar", "beams", "range", "rows", "bins of the bed", "within 1 dB", "farthest off", "mean"], rows) +
+    return (INTRODUCTION + table(["sonar", "beams", "range", "rows", "bins of the bed", "within 1 dB", "largest deviation", "mean"], rows) +
             f"\n{whole} of {len(rows)} wholly within 1 dB.\n")
 
 
 INTRODUCTION = """## Coverage
 
-Every mode of every sonar, at the range it starts with, over a level bed: how many bins of the bed lie within 1 dB of the closed
-form of its level. By `sonard render --report coverage` (how it is measured: docs/render.md). This is expected power, the mean over
-speckle, whose surface cells are smaller than a picture's, 0.4 of them each way. It shows that rays, patterns, pulse and gain leave
-no holes and no error; what a picture's own, larger cells leave is told in docs/acoustics.md, section 3.
+Every mode of every sonar, at its first range, over a level bed: how many bins of the bed lie within 1 dB of the closed form of
+their level. By `sonard render --report coverage` (method: docs/render.md). This is expected power, the mean over speckle, with
+surface cells 0.4 of a picture's each way. It shows that rays, patterns, pulse and gain leave no holes and no error; the effect of
+a picture's larger cells is in docs/acoustics.md, section 3.
 
 """

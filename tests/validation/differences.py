@@ -106,21 +106,21 @@ def chapter(sonard, folder):
     return "\n".join([INTRODUCTION.replace("PAGE", PAGE) + LAW, grazing(sonard), BEAMS, points(sonard), "", walls(sonard), RAYS, rays(sonard)])
 
 
-PAGE = "acoustics" + ".md"
-INTRODUCTION = """## What the comparison modes do otherwise
+PAGE = "../acoustics" + ".md"
+INTRODUCTION = """## Differences of the comparison modes
 
-`mode: paper` is Choi 2025 as printed, with the beam coupling of its code; `mode: raster` takes its rays on an image plane. What is
-left out and what is different is listed in section 8 of [the model's page](PAGE); what it comes to, by measurement:
+`mode: paper` is Choi 2025 as printed, with the beamforming of its code; `mode: raster` takes its rays on an image plane. Section
+8 of [the model's page](PAGE) lists what is left out and what is different. Measured effects:
 
 """
-LAW = """The printed footprint gives Lambert's law another cosine of the angle of incidence: on a bed, low grazing angles are too dark.
+LAW = """The printed footprint multiplies Lambert's law by another cosine of the incidence: on a bed, low grazing angles are too dark.
 """
 BEAMS = """
-The published coupling is |sinc| as wide as the beams' *spacing*, and divides by the root of the sum of its squares over all beams.
-Neighbours share almost nothing, side lobes add up, and where the beams double, points lose 3 dB and surfaces 6. The spectrum, cut
-to b, has side lobes in range that fall slowly: a strong near bed covers the far one.
+The published beam pattern is |sinc| as wide as the beams' *spacing*, divided by the root of the sum of its squares over all
+beams. Neighbours share almost nothing and side lobes add up. Where the beams double, points lose 3 dB and surfaces 6. The
+spectrum, cut to b, has side lobes in range that fall slowly: a strong near bed covers the far one.
 """
 RAYS = """
-Mean energy of the local search's level sand against rays a column. The mean is right with few rays already: it does not show the
-holes between them, which the previous chapter counts.
+Mean energy of the local search's level sand against rays a column. The mean is correct with few rays; it does not show the holes
+between them, which the previous chapter counts.
 """

@@ -42,7 +42,7 @@ def chapter(sonard, folder):
         ("default", "closed form", sonard.coverage("flat-sand")),
     ]
     rows = [[name, against, f"{c['bins']:,}", f"{c['within_1_db']:.2f} %", f"{c['worst_db']:+.1f} dB"] for name, against, c in runs]
-    text = table(["scatterers", "compared with", "bins of the bottom", "within 1 dB", "farthest off"], rows)
+    text = table(["scatterers", "compared with", "bins of the bottom", "within 1 dB", "largest deviation"], rows)
 
     figure, axes = page.plt.subplots(1, 3, figsize=(12, 3.6))
     pictures = [("11 raster rows", ["--mode", "raster"]), ("300 rays, paper mode", ["--mode", "paper"]), ("default", [])]
@@ -52,17 +52,17 @@ def chapter(sonard, folder):
         top = np.percentile(level, 99.8)
         page.draw_fan(axis, ping, level, top - 40, top, title)
     page.save(figure, folder / "local-search.png")
-    return INTRODUCTION + text + "\n![Local search, 40 dB below the brightest, 30 log r](validation/local-search.png)\n"
+    return INTRODUCTION + text + "\n![Local search, 40 dB below the brightest, 30 log r](local-search.png)\n"
 
 
 INTRODUCTION = """## Local search
 
-What the paper reports: over a bottom with objects 5 to 7 m ahead, the older raster method (11 effective rows) drew arcs, 300 rays
-filled them. It gives pictures and no figures.
+The paper: over a bottom with objects at 5 to 7 m, the older raster method (11 effective rows) drew arcs, and 300 rays filled
+them. It has pictures and no values.
 
-What we measure: the same sonar (P900, 10 m, 512 beams, rows of one inch, b = 29.5 kHz) over level sand, 2 m below and 0.25 rad
-nose down, in expected power: how many bins of the bottom have the level they should have. Our own kinds of scatterers are compared
-with the closed form (oracle 8, where the two-way pattern is above -20 dB). The comparison modes have another law and other beams,
-so their measure is what they would show with 20 000 rays a column.
+Measured: the share of bottom bins with the correct level in expected power, for the same sonar (P900, 10 m, 512 beams, rows of
+one inch, b = 29.5 kHz) 2 m above level sand, 0.25 rad nose down. Our scatterers are compared with the closed form (oracle 8,
+where the two-way pattern is above -20 dB). The comparison modes have another law and other beams, so they are compared with
+themselves at 20 000 rays a column.
 
 """

@@ -1,4 +1,4 @@
-"""The table of the oracles of a test run, for the validation page: the whole run, or it says what is missing."""
+"""The oracles' table of a test run, for docs/validation/tables.md: a complete run, or the chapter states what is missing."""
 
 import pathlib
 import subprocess
@@ -24,7 +24,7 @@ def chapter(folder, partial=False):
 
 INTRODUCTION = """## Oracles
 
-Closed forms that the engine is held to by its tests (`./test.sh`); of many measurements of one kind the worst is shown. This table
-is of the last test run before the page was made.
+Closed forms that the tests hold the engine to (`./test.sh`). Of several measurements of one kind the worst is shown. The table is
+that of the last test run before this page was made.
 
 """

@@ -8,7 +8,7 @@ SCENES = ["local-search", "demo"]
 CASE, LOW = "P3b", "P3d"
 PARTS = ["specular", "texture", "volume", "multipath", "crosstalk", "leak"]
 OPT_IN = {"multipath"}  # off by default
-GIVEN = {"texture", "volume", "crosstalk", "leak"}  # sonard bench --give: where scene or sonar have nothing of it
+GIVEN = {"texture", "volume", "crosstalk", "leak"}  # sonard_bench --give: where scene or sonar have nothing of it
 PINGS = 40
 
 
@@ -58,9 +58,9 @@ def chapter(sonard, folder):
 
 INTRODUCTION = """## Cost of the parts
 
-M1200d, high mode, 10 m, 512 beams x 720 rows, from pose to framed bytes, the sonar moving; {machine}. By `sonard bench --case
-{case} --scene SCENE --pings {pings}` with `--PART on` and `off` in turn, each run by itself: rates are those of the median ping.
-Parts of which scene or sonar have nothing are given it (`--give PART`) for their rows. Load average of the machine in the last
-minute: {load:.1f}; what exceeds its number of processors made these times longer, and differences of a few thread ms are chance.
+M1200d, high mode, 10 m, 512 beams x 720 rows, from pose to framed bytes, the sonar moving; {machine}. By `sonard_bench --case
+{case} --scene SCENE --pings {pings}` with `--PART on` and `off` in separate runs; rates are those of the median ping. A part that
+scene and sonar lack is added for its row (`--give PART`). Load average of the machine in the last minute: {load:.1f}; above its
+number of processors it lengthens these times. Differences of a few thread ms are chance.
 
 """

@@ -1,4 +1,4 @@
-"""Runs the program for the validation page: pings by `sonard render`, times by `sonard bench`. Nothing here knows acoustics."""
+"""Runs the program for the validation page: pings by `sonard render`, times by `sonard_bench`. Nothing here knows acoustics."""
 
 import json
 import pathlib
@@ -44,13 +44,15 @@ class Ping:
 class Sonard:
     def __init__(self, program, threads=0):
         self.program = str(program)
+        self.bench_program = pathlib.Path(program).parents[1] / "tests/bench/sonard_bench"
         self.threads = threads
         self.pings = 0
 
-    def call(self, *arguments):
-        done = subprocess.run([self.program, *map(str, arguments)], capture_output=True, text=True, check=False)
+    def call(self, *arguments, program=None):
+        words = [str(program or self.program), *map(str, arguments)]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
         if done.returncode != 0:
-            raise RuntimeError(f"{self.program} {' '.join(map(str, arguments))}\nfailed with {done.returncode}: {done.stderr.strip()}")
+            raise RuntimeError(f"{' '.join(words)}\nfailed with {done.returncode}: {done.stderr.strip()}")
         return done.stdout
 
     def pings_of(self, scene, *arguments, text=None):
@@ -82,7 +84,7 @@ class Sonard:
     def bench(self, *arguments):
         with tempfile.TemporaryDirectory(prefix="validation-") as folder:
             file = pathlib.Path(folder) / "bench.json"
-            self.call("bench", "--json", file, *arguments)
+            self.call("--json", file, *arguments, program=self.bench_program)
             return json.loads(file.read_text(encoding="utf-8"))
 
 

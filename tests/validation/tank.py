@@ -9,7 +9,7 @@ from texts import table, with_seeds, with_step
 PINGS = 100
 READINGS = ["HF, rod lying square (calibration)", "HF, rod upright", "LF, rod lying, yawed 15 degrees", "LF, rod upright, tilted across",
             "LF, rod upright, tilted away"]
-# An integration of the model's eq. (5) and (6) made outside this program, before it existed: peak of LF less peak of HF in 2.5 mm
+# An integration of the model's eq. (5) and (6) made independently of this program: peak of LF less peak of HF in 2.5 mm
 # bins, absorption apart, and the HF reading each belongs to.
 PREDICTED_PEAK_DB = {2: (0, 0.5), 3: (1, 1.2), 4: (1, -6.1)}
 PREDICTED_TOTAL_DB = [-24.06, -21.86, -22.11, -18.98, -19.13]
@@ -47,40 +47,40 @@ def speckled_mean(sonard, reading, *arguments):
 
 def totals_table(lambert):
     """Rows of the table, and the totals with absorption in them."""
-    rows, heard = [], []
+    rows, levels = [], []
     for i, name in enumerate(READINGS):
         ping, power = along_centre([lambert[i]])
-        heard.append(total_db(ping, power, ROD_M))
+        levels.append(total_db(ping, power, ROD_M))
         gone = 2 * FRONT_M * ping.absorption_db_per_m
-        rows.append([name, f"{heard[-1] - ping.about['sonar']['source_level_db'] - MU_DB + gone:.2f}", f"{PREDICTED_TOTAL_DB[i]:.2f}"])
-    return rows, heard
+        rows.append([name, f"{levels[-1] - ping.about['sonar']['source_level_db'] - MU_DB + gone:.2f}", f"{PREDICTED_TOTAL_DB[i]:.2f}"])
+    return rows, levels
 
 
 def differences(lambert, paper):
-    heard = totals_table(lambert)[1]
+    levels = totals_table(lambert)[1]
     rows = []
     for i, (of, predicted_peak) in PREDICTED_PEAK_DB.items():
         absorbed = 2 * FRONT_M * (lambert[of].absorption_db_per_m - lambert[i].absorption_db_per_m)
         ours, theirs = ([peak(*along_centre([pings[k]]), ROD_M)[0] for k in (i, of)] for pings in (lambert, paper))
         predicted_total = PREDICTED_TOTAL_DB[i] - PREDICTED_TOTAL_DB[of]
-        rows.append([READINGS[i], READINGS[of], f"{heard[i] - heard[of]:+.2f} dB", f"{predicted_total + absorbed:+.2f} dB",
+        rows.append([READINGS[i], READINGS[of], f"{levels[i] - levels[of]:+.2f} dB", f"{predicted_total + absorbed:+.2f} dB",
                      f"{ours[0] - ours[1]:+.1f} dB", f"{predicted_peak + absorbed:+.1f} dB", f"{theirs[0] - theirs[1]:+.1f} dB"])
     return rows
 
 
 def chapter(sonard, folder):
     lambert = sonard.expected("tank-rod", "--specular", "off")
-    mirror = sonard.expected("tank-rod")
+    specular = sonard.expected("tank-rod")
     paper = sonard.expected("tank-rod", "--mode", "paper")
     rows = []
     for i, name in enumerate(READINGS):
         cells = [name]
-        for pings in (lambert, mirror, paper):
+        for pings in (lambert, specular, paper):
             ping, power = along_centre([pings[i]])
             rod, wall = peak(ping, power, ROD_M), peak(ping, power, WALL_M)
             cells.append(f"{rod[0]:.1f} at {rod[1]:.3f} m, {wall[0]:.1f} at {wall[1]:.3f} m")
         rows.append(cells)
-    text = table(["expected power, dB re 1 uPa: rod, wall", "canonical, Lambert part", "canonical with mirror echoes", "paper mode"],
+    text = table(["expected power, dB re 1 uPa: rod, wall", "canonical, Lambert part", "canonical with specular echoes", "paper mode"],
                       rows)
 
     text += TOTALS + table(["", "measured", "predicted outside"], totals_table(lambert)[0])
@@ -105,33 +105,33 @@ def chapter(sonard, folder):
     page.save(figure, folder / "tank.png")
     text += f"\nMean of {PINGS} pings, canonical with everything on, peaks along the centre line:\n\n"
     text += table(["", "rod [dB re 1 uPa]", "wall [dB re 1 uPa]"], means)
-    return INTRODUCTION + text + "\n![Echo level along the centre line](validation/tank.png)\n"
+    return INTRODUCTION + text + "\n![Echo level along the centre line](tank.png)\n"
 
 
 TOTALS = """
-The rod's whole echo, sum of `sigma D^2 / (mu r^4)` in dB re 1/m^2, absorption taken out. The prediction is an integration of the
-model's equations for an array without taper, made outside this program before it existed; a test in `tests/core/paper` holds the
-engine to it within 0.15 dB. The shipped model's tapered array, measured here, collects a little less:
+Total echo of the rod, sum of `sigma D^2 / (mu r^4)` in dB re 1/m^2, without absorption. The prediction is an independent
+integration of the model's equations for an array without taper; `tests/core/paper` holds the engine to it within 0.15 dB. The
+shipped model's tapered array, measured here, collects a little less:
 
 """
 DIFFERENCES = """
-Validation less calibration, Lambert part: the whole echo, and its peak. 0.65 dB of each are the lower absorption at 1.2 MHz. The
-peaks predicted are those of sums over bins of 2.5 mm, which depend on where in its bin the front lies; ours are of a pulse as
-long. Only the totals can be expected to agree:
+Validation less calibration, Lambert part: total echo and peak. Each includes 0.65 dB from the lower absorption at 1.2 MHz. The
+predicted peaks are sums over bins of 2.5 mm and depend on where in its bin the front lies; ours are those of a pulse as long.
+Only the totals can be expected to agree:
 
 """
 INTRODUCTION = """## Tank: calibration and validation
 
-What the paper reports: an M1200d at 2.1 MHz, 0.5 m from an aluminium rod in a round tank, gave the source level (170 dB) and the
-strengths (rod 0.1, tank 0.2) by fit; with the same three numbers the picture at 1.2 MHz of the rod turned by 15 degrees matched
-"well". The measured and simulated curves are its Figures 7 and 9. **No public text gives the numbers of those figures**: that they
-match is all that is claimed, and all that could be compared. Nor does it say which way the 15 degrees were, where the sonar
-stood, or whether 0.5 m is to the rod's front; so all three readings are here, sonar on a diameter at mid depth, the front at 0.5 m.
+The paper: an M1200d at 2.1 MHz, 0.5 m from an aluminium rod in a round tank, gave by fit the source level (170 dB) and the
+strengths (rod 0.1, tank 0.2). With these numbers the picture at 1.2 MHz of the rod turned by 15 degrees matched "well" (Figures 7
+and 9). **The values of those figures are not published**; only the statement that they match can be compared. The paper does not
+state the direction of the 15 degrees, the sonar's place, or whether 0.5 m is to the rod's front. All three readings are here,
+with the sonar on a diameter at mid depth and the front at 0.5 m.
 
-What we measure: the level of the echo along the centre line, absolute, with the paper's source level and strengths. A mean of 100
-pings is what the paper's experiment took; here a still scene repeats its speckle, so the 100 pings have a tank drawn anew each.
-Paper-mode levels lie lower for its beam correction, which divides by the root of the sum over all beams.
-A polished rod mirrors: square, its glint outshines its speckle by tens of dB; turned, the glint misses the sonar, and the speckle
-is what little the smooth metal does not mirror. The two canonical columns differ by that; the published model has no mirror echoes.
+Measured: the absolute echo level along the centre line, with the paper's source level and strengths. The paper averaged 100
+pings. A still scene repeats its speckle here, so each of the 100 pings has a newly drawn tank. Paper-mode levels are lower
+because of its beam correction, which divides by the root of the sum over all beams. A polished rod gives a specular echo: square,
+it exceeds the speckle by tens of dB; turned, it misses the sonar, and only the weak diffuse part remains. The two canonical
+columns differ by it; the published model has no specular echoes.
 
 """

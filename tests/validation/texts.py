@@ -1,4 +1,4 @@
-"""Text of the validation page and of the files it renders: tables, chapters with their marks, steps of a sweep. Nothing but text."""
+"""Texts of the validation pages and of the files they render: tables, chapters with their marks, steps of a sweep. Text only."""
 
 import re
 
@@ -7,6 +7,15 @@ def table(header, rows):
     lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
     lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
     return "\n".join(lines) + "\n"
+
+
+def tables_of(text):
+    """(header, rows) of every table in a text, cells without their blanks."""
+    found = []
+    for block in re.findall(r"(?:^\|.*\|$\n?)+", text, re.M):
+        lines = [[cell.strip().replace("\\|", "|") for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in block.splitlines()]
+        found.append((lines[0], lines[2:]))
+    return found
 
 
 def mark(name):

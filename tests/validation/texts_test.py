@@ -1,19 +1,26 @@
 #!/usr/bin/env python3
-"""The texts behind docs/validation.md, and that its render files can be rendered. Needs neither matplotlib nor numpy."""
+"""The texts behind docs/validation.md and its tables, and that their render files can be rendered. Needs no matplotlib and no numpy."""
 
 import json
 import os
 import pathlib
 import subprocess
+import sys
 import tempfile
 import unittest
 
 import coverage
 import oracles
 import parts
-from texts import chapters_of, mark, table, with_seeds, with_step
+import summary
+import validate
+from texts import chapters_of, mark, table, tables_of, with_seeds, with_step
 
-SONARD = pathlib.Path(os.environ.get("SONARD_BUILD", "build/release")) / "daemon" / "sonard"
+sys.path.insert(0, str(oracles.SCRIPT.parent))
+import oracle_table  # noqa: E402
+
+BUILD = pathlib.Path(os.environ.get("SONARD_BUILD", "build/release"))
+SONARD, SONARD_BENCH = BUILD / "daemon/sonard", BUILD / "tests/bench/sonard_bench"
 SCENES = pathlib.Path(__file__).resolve().parent / "scenes"
 SWEPT = "name: a\nsweep:   # two\n  mode: [2, 1]  # one, two\n  yaw: [0, 15]\n\nscene: x\n"
 
@@ -36,7 +43,10 @@ class Texts(unittest.TestCase):
         self.assertEqual(chapters_of(""), {})
 
     def test_tables(self):
-        self.assertEqual(table(["a", "b"], [[1, "2 dB"]]), "| a | b |\n|---|---|\n| 1 | 2 dB |\n")
+        text = table(["a", "b"], [[1, "2 dB"]])
+        self.assertEqual(text, "| a | b |\n|---|---|\n| 1 | 2 dB |\n")
+        self.assertEqual(tables_of(f"x\n\n{text}\nbetween\n\n| c | |\n|---|---|\n| \\|d\\| |  |\n"),
+                         [(["a", "b"], [["1", "2 dB"]]), (["c", ""], [["|d|", ""]])])
 
 
 class Oracles(unittest.TestCase):
@@ -92,6 +102,57 @@ class Chapters(unittest.TestCase):
         self.assertEqual(rows[3], ["demo", "volume", "on, nothing of it here", "24.0", "25.0", "+3.0"])
 
 
+class Summary(unittest.TestCase):
+    def chapters(self):
+        return chapters_of(validate.tables_beside(validate.PAGE).read_text(encoding="utf-8"))
+
+    def oracles_of(self, *rows):
+        return {"oracles": table(oracle_table.HEAD, rows)}
+
+    def test_the_page_is_the_summary_of_the_tables(self):
+        self.assertEqual(validate.PAGE.read_text(encoding="utf-8"), summary.page_of(self.chapters()))
+        self.assertLess(len(validate.PAGE.read_text(encoding="utf-8").split()), 800, "it is one page")
+
+    def test_writing_pages_keeps_every_chapter(self):
+        with tempfile.TemporaryDirectory() as folder:
+            page = pathlib.Path(folder, validate.PAGE.name)
+            validate.tables_beside(page).parent.mkdir()
+            validate.write_pages(page, self.chapters())
+            self.assertEqual(validate.tables_beside(page).read_bytes(), validate.tables_beside(validate.PAGE).read_bytes())
+            self.assertEqual(page.read_bytes(), validate.PAGE.read_bytes())
+
+    def test_every_oracle_that_is_built_is_in_one_group(self):
+        grouped = [n for _, numbers in summary.GROUPS if numbers != "+" for n in numbers]
+        self.assertEqual(len(grouped), len(set(grouped)))
+        self.assertEqual(set(grouped) | set(oracle_table.NOT_BUILT), set(oracle_table.ORACLES))
+
+    def test_shares_of_tolerances(self):
+        for expected, measured, tolerance, share in (
+                ("141.6 dB", "141.9", "±0.3", 1), ("-50 dB/decade", "-50.15", "±0.3", 0.5), ("0", "0", "exact", 0), ("0", "1", "exact", 1e9),
+                ("below 1.000e-04", "5.000e-05", "", 0.5), ("below -30 dB", "-60", "", 0.5), ("below -100 dB", "-inf", "", 0),
+                ("at least 0.9", "0.95", "", 0.5), ("at least 100 %", "100", "", 0), ("at least 100 %", "99", "", 1e9),
+                ("0 dB", "nan", "±0.2", 1e9)):
+            with self.subTest(expected, measured=measured):
+                found = summary.share_of_tolerance(expected, measured, tolerance)
+                self.assertAlmostEqual(min(found, 1e9), share)
+
+    def test_the_worst_of_a_group_is_shown_and_a_miss_is_stated(self):
+        near = ["3", "level: far (worst of 9)", "0 dB", "0.1", "±0.3", "yes"]
+        far = ["4", "slope: near", "-40 dB/decade", "-40.3", "±0.2", "NO"]
+        page = summary.page_of(self.oracles_of(near))
+        self.assertIn("9 measurements. All are within tolerance.", page)
+        self.assertIn("| 3-9 | levels and their slopes | far | 0.1 | 0 dB ±0.3 |", page)
+        page = summary.page_of(self.oracles_of(near, far, ["13", "corner", "", "", "", "not built"]))
+        self.assertIn("10 measurements. **Out of tolerance: 1 rows.**", page)
+        self.assertIn("| near | -40.3 | -40 dB/decade ±0.2 |", page)
+
+    def test_chapters_that_are_missing_are_left_out(self):
+        page = summary.page_of({name: text for name, text in self.chapters().items() if name == "coverage"})
+        self.assertIn("| flat bed, ", page)
+        for words in ("tank", "## Oracles", "## Cost", "capture.png"):
+            self.assertNotIn(words, page)
+
+
 class RenderFiles(unittest.TestCase):
     def test_every_scene_of_the_page_renders(self):
         for name in ("tank-rod", "two-cylinders", "flat-sand", "rough-sand", "grazing", "point", "wall"):
@@ -109,7 +170,7 @@ class RenderFiles(unittest.TestCase):
     def test_the_benchmark_times_the_comparison_modes(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder, "bench.json")
-            done = subprocess.run([SONARD, "bench", "--case", "P1", "--scene", "local-search", "--pings", "1", "--mode", "paper",
+            done = subprocess.run([SONARD_BENCH, "--case", "P1", "--scene", "local-search", "--pings", "1", "--mode", "paper",
                                    "--fixed-fan", "8", "--frequency-sum", "direct", "--json", file],
                                   capture_output=True, text=True, check=False)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -121,7 +182,7 @@ class RenderFiles(unittest.TestCase):
     def test_the_benchmark_takes_the_switches_and_gives_what_is_missing(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder, "bench.json")
-            done = subprocess.run([SONARD, "bench", "--case", "P3c", "--scene", "demo", "--pings", "1", "--specular", "off", "--give",
+            done = subprocess.run([SONARD_BENCH, "--case", "P3c", "--scene", "demo", "--pings", "1", "--specular", "off", "--give",
                                    "volume", "--give", "texture", "--give", "crosstalk", "--multipath", "on", "--json", file],
                                   capture_output=True, text=True, check=False)
             self.assertEqual(done.returncode, 0, done.stderr)

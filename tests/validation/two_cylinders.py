@@ -47,17 +47,17 @@ def chapter(sonard, folder):
         top = np.percentile(level, 99.8)
         page.draw_fan(axis, ping, level, top - 50, top, title)
     page.save(figure, folder / "two-cylinders.png")
-    return INTRODUCTION + text + "\n![Two cylinders, 50 dB below the brightest, 30 log r](validation/two-cylinders.png)\n"
+    return INTRODUCTION + text + "\n![Two cylinders, 50 dB below the brightest, 30 log r](two-cylinders.png)\n"
 
 
 INTRODUCTION = """## Two cylinders in a square tank
 
-The paper's section 4.1, whose world its code ships: an upright and a lying cylinder under a P900; no figures are published for it
-but a rate of 3 Hz. Expected are returns from both cylinders, shadows behind them, and walls bright over all beams. Sizes of tank and
-cylinders are ours where the world's file does not give them.
+The world of the paper's section 4.1: an upright and a lying cylinder under a P900. Only a rate of 3 Hz is published for it.
+Expected are returns from both cylinders, shadows behind them, and walls bright over all beams. Sizes missing in the published
+world are ours.
 
-What we measure: where the cylinders' peaks stand in the beam straight ahead (expected power, Lambert part, rows of one inch), and
-how much of the tank's floor beside them stays dark for want of rays. A cylinder's echo is as long as its surface is deep in the
-beam, so that peaks stand a little behind the nearest point.
+Measured: the range of the cylinders' peaks in the beam straight ahead (expected power, Lambert part, rows of one inch), and the
+share of the tank's floor that stays dark for lack of rays. A cylinder's echo is as long as its surface is deep in the beam, so
+peaks lie a little behind the nearest point.
 
 """

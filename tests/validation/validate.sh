@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Makes docs/validation.md and its pictures anew: builds sonard, renders the experiments, under fifteen minutes on two cores.
-# usage: tests/validation/validate.sh [--partial] [--only CHAPTER ...]
-# Chapters: tank two-cylinders local-search differences coverage cost parts capture oracles. Costs want a machine that does nothing else.
-# The table of oracles is that of the last ./test.sh, whole, or --partial says that part of it will do; the captured ping needs
-# SONARD_CAPTURES. What has no data keeps its chapter.
+# Writes docs/validation/tables.md with its pictures, and its summary docs/validation.md: builds sonard, renders the experiments.
+# usage: tests/validation/validate.sh [--partial] [--only CHAPTER ...] | --summary
+# Chapters: tank two-cylinders local-search differences coverage cost parts capture oracles. Costs need an otherwise idle machine.
+# Takes under fifteen minutes on two cores; --summary rewrites the summary from the tables in a moment. The table of oracles is that
+# of the last ./test.sh, complete unless --partial is given; the recorded ping needs SONARD_CAPTURES. Chapters without data are kept.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -11,9 +11,10 @@ cd "$(dirname "$0")/../.." || exit 70
 
 case "${1:-}" in
   -h | --help) sed -n '2,6s/^# //p' "$0"; exit 0 ;;
+  --summary) exec python3 tests/validation/validate.py --summary ;;
 esac
 
-# A Python that lies in front of the system's does not see the system's packages.
+# A Python before the system's in PATH may not find the system's packages.
 python_with_matplotlib() {
   local candidate
   for candidate in python3 /usr/bin/python3; do
@@ -26,7 +27,7 @@ if ! python=$(python_with_matplotlib); then
   python=$(python_with_matplotlib) || { echo "no python3 that finds matplotlib, numpy and PIL" >&2; exit 69; }
 fi
 if [ -z "${SONARD_PROGRAM:-}" ]; then
-  setup_and_build sonard || exit
+  setup_and_build sonard sonard_bench || exit
   SONARD_PROGRAM=build/release/daemon/sonard
 fi
 say "validation"

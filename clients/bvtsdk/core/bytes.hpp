@@ -1,4 +1,4 @@
-// Little-endian fields in and out of byte buffers: what frames, pings and recordings are made of.
+// Reads and writes little-endian fields of byte buffers, for frames, pings and recordings.
 // Bytes from outside are never trusted: a Reader remembers the first failure and yields zeros from then on.
 #pragma once
 
@@ -64,20 +64,20 @@ class Reader {
   explicit Reader(BytesView bytes) : bytes_(bytes) {}
 
   template <class T>
-  T take() {
+  T read() {
     static_assert(std::is_arithmetic_v<T>);
     using Bits = typename detail::UnsignedOf<sizeof(T)>::type;
     Bits bits = 0;
-    const BytesView piece = block(sizeof(T));
-    for (std::size_t i = 0; i < piece.size; ++i)
-      bits = static_cast<Bits>(bits | static_cast<Bits>(Bits{piece.data[i]} << (8 * i)));
+    const BytesView field = block(sizeof(T));
+    for (std::size_t i = 0; i < field.size; ++i)
+      bits = static_cast<Bits>(bits | static_cast<Bits>(Bits{field.data[i]} << (8 * i)));
     T value;
     std::memcpy(&value, &bits, sizeof value);
     return value;
   }
   std::string text() {
-    const BytesView piece = block(take<std::uint16_t>());
-    return std::string(piece.data, piece.data + piece.size);
+    const BytesView field = block(read<std::uint16_t>());
+    return std::string(field.data, field.data + field.size);
   }
   /// So many bytes as they are; empty when there are fewer left.
   BytesView block(std::size_t size) {

@@ -1,6 +1,8 @@
-// The SDK's return codes that we produce: public constants of its interface, the same in 3.x and 4.x.
-// Inside the core a function that can fail returns one of them; the facades pass them on as they are.
+// The return codes of the SDK that these libraries produce: public constants of its interface, the same in 3.x and 4.x.
+// A function of the core that can fail returns one of them; the facades pass it on unchanged.
 #pragma once
+
+#include "protocol/blueview/link.hpp"
 
 namespace sonar::bvt {
 
@@ -11,12 +13,12 @@ enum Code : int {
   file_open = 3,
   file_read = 4,
   file_write = 5,
-  bad_parameter = 6,
+  bad_parameter = static_cast<int>(blueview::Code::bad_parameter),
   invalid_ptr = 7,
   file_create = 8,
   file_not_open = 10,
   not_implemented = 13,
-  timeout = 18,
+  timeout = static_cast<int>(blueview::Code::timeout),
   buffer_too_small = 19,
   file_header_bad = 1003,
   file_too_new = 1004,
@@ -30,10 +32,10 @@ enum Code : int {
   index_out_of_bounds = 1064,
   socket_not_connected = 1065,
   no_temp = 2008,
-  no_head = 2010,
+  no_head = static_cast<int>(blueview::Code::no_head),
   ping_number_too_large = 4002,
   ping_number_too_small = 4003,
-  bad_range = 4009,
+  bad_range = static_cast<int>(blueview::Code::bad_range),
   no_ping_signal = 4011,
   read_only_file = 4012,
   no_video_frame = 4014,
@@ -44,9 +46,9 @@ enum Code : int {
   invalid_image_size = 5008,
   invalid_resolution = 5010,
   load_color_map = 9001,
-  bad_packet_type = 14001,
+  bad_packet_type = static_cast<int>(blueview::Code::bad_packet_type),
   net_not_connected = 14003,
-  bad_packet_version = 14004,
+  bad_packet_version = static_cast<int>(blueview::Code::bad_packet_version),
   nav_no_data = 16000,
   trigger_not_present = 18000,
 };

@@ -43,8 +43,8 @@ std::uint32_t pixel_of(const Colour& c, PixelOrder order) {
 int high_percentile(const MagImage& image) {
   std::vector<std::uint32_t> histogram(65536, 0);
   for (const std::uint16_t v : image.pixels) ++histogram[v];
-  const std::size_t heard = image.pixels.size() - histogram[0];
-  const auto wanted = static_cast<std::size_t>(std::ceil(0.995 * static_cast<double>(heard)));
+  const std::size_t nonzero = image.pixels.size() - histogram[0];
+  const auto wanted = static_cast<std::size_t>(std::ceil(0.995 * static_cast<double>(nonzero)));
   std::size_t below = 0;
   for (std::size_t v = 1; v < histogram.size(); ++v)
     if ((below += histogram[v]) >= wanted) return static_cast<int>(v);
@@ -64,8 +64,8 @@ ColourMap make_colour_map(std::string_view name) {
 }
 
 PixelOrder pixel_order_from_environment() {
-  const char* const wish = std::getenv("BVE_PIXEL");
-  return wish && std::strcmp(wish, "rgba") == 0 ? PixelOrder::rgba : PixelOrder::bgra;
+  const char* const order = std::getenv("BVE_PIXEL");
+  return order && std::strcmp(order, "rgba") == 0 ? PixelOrder::rgba : PixelOrder::bgra;
 }
 
 Code ColourMapper::load(const std::string& path) {

@@ -27,7 +27,7 @@ Code save_colour_map(const std::string& path, const ColourMap& map);
 
 /// Order of the bytes of a colour pixel in memory. Clients hand them to OpenCV as BGRA (inferred).
 enum class PixelOrder { bgra, rgba };
-/// BVE_PIXEL=bgra or rgba; bgra when it says neither.
+/// BVE_PIXEL=bgra or rgba; default bgra.
 PixelOrder pixel_order_from_environment();
 
 struct ColourImage : ImageGeometry {

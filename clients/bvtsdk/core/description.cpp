@@ -2,7 +2,7 @@
 
 namespace sonar::bvt {
 
-void take_settings(HeadDescription& to, const HeadDescription& from) {
+void copy_settings(HeadDescription& to, const HeadDescription& from) {
   to.start_m = from.start_m;
   to.stop_m = from.stop_m;
   to.sound_speed_mps = from.sound_speed_mps;
@@ -21,27 +21,27 @@ const HeadDescription* SonarDescription::head(int number) const {
 std::optional<SonarDescription> decode_description(BytesView payload) {
   Reader reader(payload);
   SonarDescription sonar;
-  sonar.version = reader.take<std::uint16_t>();
+  sonar.version = reader.read<std::uint16_t>();
   sonar.model = reader.text();
   sonar.name = reader.text();
   sonar.serial = reader.text();
   sonar.firmware = reader.text();
-  sonar.temperature_c = reader.take<float>();
-  sonar.capabilities = reader.take<std::uint32_t>();
-  const int heads = reader.take<std::uint8_t>();
+  sonar.temperature_c = reader.read<float>();
+  sonar.capabilities = reader.read<std::uint32_t>();
+  const int heads = reader.read<std::uint8_t>();
   for (int i = 0; i < heads && reader.ok(); ++i) {
     HeadDescription h;
-    h.id = reader.take<std::int32_t>();
+    h.id = reader.read<std::int32_t>();
     h.name = reader.text();
-    for (float* value : {&h.min_range_m, &h.max_range_m, &h.start_m, &h.stop_m}) *value = reader.take<float>();
-    h.centre_hz = reader.take<std::int32_t>();
-    h.fov_min_deg = reader.take<float>();
-    h.fov_max_deg = reader.take<float>();
-    h.beams = reader.take<std::uint16_t>();
-    h.sound_speed_mps = reader.take<std::int32_t>();
-    h.gain_db = reader.take<float>();
-    h.tvg_db_per_m = reader.take<float>();
-    h.fluid = reader.take<std::int32_t>();
+    for (float* value : {&h.min_range_m, &h.max_range_m, &h.start_m, &h.stop_m}) *value = reader.read<float>();
+    h.centre_hz = reader.read<std::int32_t>();
+    h.fov_min_deg = reader.read<float>();
+    h.fov_max_deg = reader.read<float>();
+    h.beams = reader.read<std::uint16_t>();
+    h.sound_speed_mps = reader.read<std::int32_t>();
+    h.gain_db = reader.read<float>();
+    h.tvg_db_per_m = reader.read<float>();
+    h.fluid = reader.read<std::int32_t>();
     sonar.heads.push_back(std::move(h));
   }
   if (!reader.ok()) return std::nullopt;

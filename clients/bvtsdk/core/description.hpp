@@ -1,4 +1,4 @@
-// What a sonar says of itself when it is greeted: HELLO_OK of the link, and the first frame of every recording.
+// Description of a sonar: payload of HELLO_OK on the link, and first frame of every recording.
 // docs/protocols/blueview-link.md describes it.
 #pragma once
 
@@ -24,8 +24,8 @@ struct HeadDescription {
   std::int32_t fluid = 0;  // 0 salt, 1 fresh, 2 other
 };
 
-/// What a host may set of a head, from one description into another; the rest says what the head is.
-void take_settings(HeadDescription& to, const HeadDescription& from);
+/// Copies the settings that a host can change from one description to another; the other fields are fixed properties.
+void copy_settings(HeadDescription& to, const HeadDescription& from);
 
 struct SonarDescription {
   std::uint16_t version = 1;
@@ -35,13 +35,13 @@ struct SonarDescription {
   std::vector<HeadDescription> heads;
 
   bool strict_heads() const { return (capabilities & 1) != 0; }
-  /// Of a simulator: that it says nothing for long means nothing.
+  /// True of a simulator whose time may stop: silence is then not a fault.
   bool may_be_silent() const { return (capabilities & 2) != 0; }
-  /// The head a host means by a number: its own, or 0 and 1 alike where there is one head and numbers are not strict.
+  /// The head with this number; a sonar with one head and non-strict numbers accepts 0 and 1.
   const HeadDescription* head(int number) const;
 };
 
-/// The payload of HELLO_OK; nothing when it is none.
+/// Decodes the payload of HELLO_OK; nullopt when it is invalid.
 std::optional<SonarDescription> decode_description(BytesView payload);
 Bytes encode_description(const SonarDescription& sonar);
 

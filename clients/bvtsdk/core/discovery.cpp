@@ -11,11 +11,12 @@
 #include <cstring>
 #include <memory>
 
+#include "protocol/blueview/link.hpp"
+
 namespace sonar::bvt {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr std::uint16_t discovery_port = 14751;
 constexpr in_addr_t loopback_broadcast = 0x7FFFFFFF;  // 127.255.255.255: sonars of this machine, whatever their 127.x.y.z
 
 in_addr_t ipv4_of(const sockaddr* address) {
@@ -62,13 +63,13 @@ Code DiscoveryAgent::start() {
 
 void DiscoveryAgent::stop() {
   if (!socket_) return;
-  take_answers();
+  receive_answers();
   socket_ = Descriptor();
 }
 
 const std::vector<std::string>& DiscoveryAgent::sonars() {
   if (socket_) {
-    take_answers();
+    receive_answers();
     if (Clock::now() - last_asked_ > std::chrono::seconds(1)) ask();
   }
   return found_;
@@ -76,27 +77,27 @@ const std::vector<std::string>& DiscoveryAgent::sonars() {
 
 void DiscoveryAgent::ask() {
   last_asked_ = Clock::now();
-  Bytes question{'B', 'V', 'E', '?'};
-  put(question, std::uint16_t{1});
+  Bytes question(blueview::discovery_question.begin(), blueview::discovery_question.end());
+  put(question, blueview::protocol_version);
   for (const in_addr_t address : addresses_to_ask()) {
     sockaddr_in to{};
     to.sin_family = AF_INET;
-    to.sin_port = htons(discovery_port);
+    to.sin_port = htons(blueview::discovery_port);
     to.sin_addr.s_addr = address;
     sockaddr generic;
     std::memcpy(&generic, &to, sizeof to);
-    sendto(socket_.fd(), question.data(), question.size(), MSG_NOSIGNAL, &generic, sizeof to);  // nobody there is no error
+    sendto(socket_.fd(), question.data(), question.size(), MSG_NOSIGNAL, &generic, sizeof to);  // no receiver is not an error
   }
 }
 
-void DiscoveryAgent::take_answers() {
+void DiscoveryAgent::receive_answers() {
   for (int i = 0; i < 1000; ++i) {
     std::uint8_t answer[1024];
     sockaddr from{};
     socklen_t from_size = sizeof from;
     const ssize_t n = recvfrom(socket_.fd(), answer, sizeof answer, 0, &from, &from_size);
     if (n < 0) return;
-    if (n < 6 || std::memcmp(answer, "BVE!", 4) != 0 || from.sa_family != AF_INET) continue;
+    if (n < 6 || std::memcmp(answer, blueview::discovery_answer.data(), 4) != 0 || from.sa_family != AF_INET) continue;
     const in_addr_t address = ipv4_of(&from);
     char text[INET_ADDRSTRLEN] = "";
     inet_ntop(AF_INET, &address, text, sizeof text);

@@ -1,5 +1,5 @@
 // Finding sonars: "BVE?" datagrams out, "BVE!" datagrams back (docs/protocols/blueview-link.md, "Discovery").
-// Needs no thread: answers wait in the socket until somebody counts them.
+// Needs no thread: answers wait in the socket until they are read.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ namespace sonar::bvt {
 
 class DiscoveryAgent {
  public:
-  /// Forgets what was found and asks again: by broadcast on every network, this machine's own among them, and every address in
+  /// Clears the results and asks again: by broadcast on every network, this machine's own among them, and every address in
   /// the environment variable BVE_DISCOVERY (separated by commas or spaces). failed without a socket.
   Code start();
   /// Takes the last answers.
@@ -22,7 +22,7 @@ class DiscoveryAgent {
 
  private:
   void ask();
-  void take_answers();
+  void receive_answers();
 
   Descriptor socket_;
   Deadline last_asked_{};

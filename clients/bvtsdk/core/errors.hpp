@@ -1,12 +1,12 @@
 // Names and texts of the return codes (BVTError_GetName, BVTError_GetString), for any number.
-// The names are those of the constants; the texts are ours.
+// The names are those of the constants; the texts are sonard's.
 #pragma once
 
 namespace sonar::bvt {
 
-/// "BVT_SUCCESS" and so on; "BVT_UNKNOWN_ERROR" for a number that is none of ours. Never null, valid for ever.
+/// "BVT_SUCCESS" and so on; "BVT_UNKNOWN_ERROR" for an unknown number. Never null, always valid.
 const char* error_name(int code);
-/// One sentence that says what happened and what to do.
+/// One sentence with the cause and the remedy.
 const char* error_text(int code);
 
 }  // namespace sonar::bvt

@@ -1,5 +1,5 @@
-// Handles: what a host holds instead of pointers. A handle is a small number cast to the pointer's type, so that a host that
-// cuts it to 32 bits (Python's ctypes by default) loses nothing, and a stale or foreign one is told from a live one.
+// Handles that a host holds instead of pointers. A handle is a small number cast to the pointer type, so that truncation to 32
+// bits (Python's ctypes by default) loses nothing, and stale or foreign handles are detected.
 #pragma once
 
 #include <cstdint>
@@ -16,17 +16,17 @@ struct Object {
   std::mutex mutex;
 };
 
-/// 20 bits of place and 11 of generation: up to 1 048 575 objects live at once, all numbers below 2^31.
+/// 20 bits of index and 11 of generation: up to 1 048 575 objects at once, all numbers below 2^31.
 class Handles {
  public:
-  /// Null when there is no place left.
+  /// Null when the table is full.
   void* add(std::shared_ptr<Object> object);
   /// Null when the handle is null, stale, foreign, or stands for something else.
   template <class T>
   std::shared_ptr<T> find(const void* handle) {
     return std::dynamic_pointer_cast<T>(find_any(handle));
   }
-  /// Makes the handle stale and gives what it stood for; null as above.
+  /// Invalidates the handle and returns its object; null as above.
   template <class T>
   std::shared_ptr<T> remove(const void* handle) {
     return find<T>(handle) ? std::dynamic_pointer_cast<T>(remove_any(handle)) : nullptr;

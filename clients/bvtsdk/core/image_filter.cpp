@@ -25,14 +25,14 @@ void mean_over(const Window& window, MagImage& image) {
     const std::uint16_t* const in = row_at(row);
     for (std::size_t c = 0; c < width; ++c) inner[c] += in[c];
   };
-  const auto take_away = [&](int row) {
+  const auto subtract = [&](int row) {
     const std::uint16_t* const in = row_at(row);
     for (std::size_t c = 0; c < width; ++c) inner[c] -= in[c];
   };
   for (int row = 0; row < std::min(window.below, image.height); ++row) add(row);
   for (int row = 0; row < image.height; ++row) {
     if (row + window.below < image.height) add(row + window.below);
-    if (row - window.above - 1 >= 0) take_away(row - window.above - 1);
+    if (row - window.above - 1 >= 0) subtract(row - window.above - 1);
     const int rows = std::min(row, window.above) + 1 + std::min(image.height - 1 - row, window.below);
     std::uint16_t* const to = out.data() + static_cast<std::size_t>(row) * width;
     for (std::size_t c = 0; c < width; ++c) {

@@ -7,16 +7,15 @@
 #include <limits>
 #include <new>
 
+#include "clients/bvtsdk/core/degrees.hpp"
 #include "clients/bvtsdk/core/image_filter.hpp"
 #include "clients/bvtsdk/core/sample_grid.hpp"
 
 namespace sonar::bvt {
 namespace {
 
-constexpr double degrees = 57.29577951308232;
-constexpr double most_pixels = 32e6;  // of any image
-constexpr double polite_pixels =
-    1e6;  // of one nobody asked the size of: clients keep 4 bytes a pixel on an 8 MB stack (verified)
+constexpr double most_pixels = 32e6;   // of any image
+constexpr double polite_pixels = 1e6;  // default size limit: clients keep 4 bytes per pixel on an 8 MB stack (verified)
 
 int to_int(double x) {
   constexpr double limit = std::numeric_limits<int>::max();
@@ -131,8 +130,8 @@ void fill_r_theta(const PolarGrid& grid, const Extent& extent, MagImage& image) 
 }  // namespace
 
 XyBottom xy_bottom_from_environment() {
-  const char* const wish = std::getenv("BVE_XY");
-  return wish && std::strcmp(wish, "sonar") == 0 ? XyBottom::sonar : XyBottom::sector;
+  const char* const bottom = std::getenv("BVE_XY");
+  return bottom && std::strcmp(bottom, "sonar") == 0 ? XyBottom::sonar : XyBottom::sector;
 }
 
 double ImageGeometry::pixel_range_m(int row, int col) const {

@@ -23,7 +23,7 @@ enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 
 /// How near an XY image begins: with the nearest corners of the sector, or with the sonar itself.
 enum class XyBottom { sector, sonar };
-/// BVE_XY=sector or sonar; sector when it says neither.
+/// BVE_XY=sector or sonar; default sector.
 XyBottom xy_bottom_from_environment();
 
 /// The lowest set flag wins (verified values; chosen: applied to the finished image).
@@ -32,7 +32,7 @@ enum FilterFlags : int { no_filter = 0, mean_3x3 = 2, mean_9x2 = 16 };
 struct ImageSettings {
   ImageRes resolution = ImageRes::automatic;
   XyBottom xy_bottom = xy_bottom_from_environment();
-  /// Wishes; 0 = none. A size wins over a range resolution, that over `resolution` (chosen).
+  /// Requested by the user; 0 = not. A size wins over a range resolution, that over `resolution` (chosen).
   float range_resolution_m = 0;                   // metres per row; at most a million pixels are made for it
   int requested_height = 0, requested_width = 0;  // XY keeps the height and adjusts the width (verified); a width alone sets both
   int r_theta_width = 0;                          // columns; wins over requested_width
@@ -42,7 +42,7 @@ struct ImageSettings {
   int sound_speed_override_mps = 0;  // 0 = the ping's; ranges are scaled by override / ping's
 };
 
-/// What an image says about its pixels. Row-major (verified), angles clockwise from ahead in degrees (verified).
+/// Geometry of the pixels of an image. Row-major (verified), angles clockwise from ahead in degrees (verified).
 struct ImageGeometry {
   ImageType type = ImageType::xy;
   int height = 0, width = 0;
@@ -50,7 +50,7 @@ struct ImageGeometry {
   double bearing_resolution_deg = 0;   // per column; 0 in XY
   int origin_row = 0, origin_col = 0;  // the sonar, usually outside the image
   float fov_min_deg = 0, fov_max_deg = 0;
-  double start_m = 0, stop_m = 0;  // of what is shown, sound speed override applied
+  double start_m = 0, stop_m = 0;  // of the shown area, with the sound speed override
 
   /// Any row and column, also outside the image: clients ask one past the end (verified). R-Theta labels a column by its
   /// left edge (verified). XY counts whole pixels from the origin (verified): x = (col - origin_col) * range_resolution_m to
@@ -65,7 +65,7 @@ struct MagImage : ImageGeometry {
 };
 
 /// Size and scale of the image a ping would give. no_ping_signal for a ping without samples, bad_parameter for negative
-/// wishes, invalid_image_size for more than 32 million pixels.
+/// sizes or resolutions, invalid_image_size for more than 32 million pixels.
 Code plan_image(const PolarPing& ping, ImageType type, const ImageSettings& settings, ImageGeometry& geometry);
 
 /// Makes images; remembers the lookup tables of the last few XY geometries. One Imager may serve several threads.

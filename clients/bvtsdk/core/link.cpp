@@ -15,18 +15,17 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::uint16_t protocol_version = 1;
-constexpr std::size_t piece_bytes = 256u << 10;
+constexpr std::size_t chunk_bytes = 256u << 10;
 
 std::string default_port() {
   const char* port = std::getenv("BVE_PORT");
-  return port && *port ? port : "14750";
+  return port && *port ? port : std::to_string(blueview::tcp_port);
 }
 
 /// A refusal's code; the sonar's sentence goes to the log.
 int refusal(const Bytes& payload) {
   Reader reader(payload);
-  const auto code = reader.take<std::int32_t>();
+  const auto code = reader.read<std::int32_t>();
   const std::string text = reader.text();
   if (!reader.ok() || code == success) return failed;
   log(LogLevel::status, "the sonar refused: " + text);
@@ -69,7 +68,7 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
                   "into BVE_PORT");
   std::unique_ptr<Link> fresh(new Link(std::move(socket), patience));
   Bytes hello, answer;
-  put(hello, protocol_version);
+  put(hello, blueview::protocol_version);
   put(hello, static_cast<std::uint16_t>(abi));
   put_text(hello, "libbvtsdk");
   const int greeted = fresh->ask(FrameType::hello, hello, answer, patience.connect);
@@ -83,17 +82,18 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
                                             (greeted == socket_read_timeout ? " accepts the connection but sends no greeting"
                                                                             : " accepts the connection and closes it at once") +
                                             "; sonard is starting, ending or stopped: see its log, and open again");
-  std::optional<SonarDescription> told = decode_description(answer);
-  if (!told)
-    return refuse(bad_packet_type, "what answers at " + there + " describes no sonar; use library and sonard of one release");
-  fresh->may_be_silent_ = told->may_be_silent();
-  sonar = std::move(*told);
+  std::optional<SonarDescription> description = decode_description(answer);
+  if (!description)
+    return refuse(bad_packet_type,
+                  "what answers at " + there + " does not describe a sonar; use library and sonard of one release");
+  fresh->may_be_silent_ = description->may_be_silent();
+  sonar = std::move(*description);
   link = std::move(fresh);
   return success;
 }
 
 Link::Link(Descriptor socket, const Patience& patience)
-    : patience_(patience), socket_(std::move(socket)), last_sent_(Clock::now()), last_heard_(Clock::now()) {
+    : patience_(patience), socket_(std::move(socket)), last_sent_(Clock::now()), last_received_(Clock::now()) {
   const SignalsBlocked blocked;
   reader_ = std::thread([this] { read_until_lost(); });
 }
@@ -142,7 +142,7 @@ void Link::read_until_lost() {
     const auto glance = std::min(patience_.silence, patience_.lifeless) / 4;
     while (connected()) {
       if (wait_for(socket_.fd(), POLLIN, Clock::now() + glance) == success) receive();
-      if (!may_be_silent_ && Clock::now() - last_heard_ > patience_.lifeless) lose(socket_read_timeout);
+      if (!may_be_silent_ && Clock::now() - last_received_ > patience_.lifeless) lose(socket_read_timeout);
       keep_alive();
     }
   } catch (const std::exception& e) {  // out of memory
@@ -151,27 +151,27 @@ void Link::read_until_lost() {
   }
 }
 
-// One piece of whatever has arrived; a frame that is whole is delivered.
+// Receives one chunk; delivers the frame when it is complete.
 void Link::receive() {
   FrameHeader header;
   std::size_t wanted = frame_header_size;
   if (received_.size() >= frame_header_size) {
-    take_header(received_, header);
+    read_header(received_, header);
     wanted += header.payload_size;
   }
   const std::size_t before = received_.size();
-  const Code code = receive_some(socket_.fd(), received_, std::min(wanted - before, piece_bytes));
+  const Code code = receive_some(socket_.fd(), received_, std::min(wanted - before, chunk_bytes));
   if (code != success) return lose(code);
-  if (received_.size() > before) last_heard_ = Clock::now();
+  if (received_.size() > before) last_received_ = Clock::now();
   if (received_.size() == frame_header_size && before < frame_header_size) {
-    if (!take_header(received_, header)) {
-      log(LogLevel::critical, "what answers is no sonar: not a BVE1 frame");
+    if (!read_header(received_, header)) {
+      log(LogLevel::critical, "the peer is not a sonar: not a BVE1 frame");
       return lose(bad_packet_type);
     }
     wanted += header.payload_size;
   }
   if (received_.size() < frame_header_size || received_.size() < wanted) return;
-  take_header(received_, header);
+  read_header(received_, header);
   received_.erase(received_.begin(), received_.begin() + frame_header_size);
   deliver(header, std::move(received_));
   received_ = {};
@@ -201,7 +201,7 @@ Code Link::send(FrameType type, std::uint32_t id, const Bytes& payload) {
 void Link::keep_alive() {
   {
     const std::unique_lock lock(send_mutex_, std::try_to_lock);
-    if (!lock || Clock::now() - last_sent_ < patience_.silence) return;  // who holds the lock is sending
+    if (!lock || Clock::now() - last_sent_ < patience_.silence) return;  // the owner of the lock is sending
   }
   const Code code = send(FrameType::keep_alive, 0, {});
   if (code != success) lose(code);
@@ -211,7 +211,7 @@ void Link::lose(Code why) {
   const std::lock_guard lock(waiting_mutex_);
   if (lost_ != success) return;
   lost_ = why;
-  shutdown(socket_.fd(), SHUT_RDWR);  // wakes the reader; the descriptor stays ours until the link is destroyed
+  shutdown(socket_.fd(), SHUT_RDWR);  // wakes the reader; the descriptor stays valid until the link is destroyed
   answered_.notify_all();
 }
 

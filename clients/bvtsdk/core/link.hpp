@@ -1,5 +1,5 @@
 // The host's end of BVE1: one TCP connection to a sonar, requests and their replies, keep-alive.
-// docs/protocols/blueview-link.md describes it. Any number of threads may ask at once; replies find who asked.
+// docs/protocols/blueview-link.md describes it. Any number of threads may send requests at once; each receives its own reply.
 #pragma once
 
 #include <atomic>
@@ -18,11 +18,11 @@
 
 namespace sonar::bvt {
 
-/// How long things may take. Tests shorten them.
+/// Time limits. Tests shorten them.
 struct Patience {
   std::chrono::milliseconds connect{5000};    // name, connection and greeting, each
   std::chrono::milliseconds request{5000};    // a reply that needs no ping
-  std::chrono::milliseconds silence{2000};    // of ours, then we send a keep-alive
+  std::chrono::milliseconds silence{2000};    // without own messages, then a keep-alive is sent
   std::chrono::milliseconds lifeless{10000};  // nothing at all from the sonar: it is gone
 };
 
@@ -38,13 +38,13 @@ class Link {
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  /// Sends a request and waits for its reply; the sonar's own code when it refuses, socket_read_timeout when none comes in
-  /// time, and what ended the link (socket_closed, socket_read_timeout, ...) when it is lost, now and ever after.
+  /// Sends a request and waits for its reply. The sonar's code when it refuses, socket_read_timeout without a reply in time;
+  /// once the link is lost, always the cause (socket_closed, socket_read_timeout, ...).
   int ask(FrameType request, const Bytes& payload, Bytes& answer, std::chrono::milliseconds patience);
   int ask(FrameType request, const Bytes& payload, Bytes& answer) { return ask(request, payload, answer, patience_.request); }
 
   bool connected() const { return lost_ == success; }
-  /// Whoever waits is told socket_closed. From any thread.
+  /// Waiting calls return socket_closed. From any thread.
   void close() { lose(socket_closed); }
 
  private:
@@ -77,7 +77,7 @@ class Link {
   Deadline last_sent_;
 
   // Of the reader alone.
-  Deadline last_heard_;
+  Deadline last_received_;
   Bytes received_;
   std::thread reader_;  // last: it uses all of the above
 };

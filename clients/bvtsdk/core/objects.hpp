@@ -35,7 +35,7 @@ struct DiscoveryObject : Object {
   DiscoveryAgent agent;
 };
 
-/// What a head was told about images when it pinged; BVTPing_GetImage and its like go by that.
+/// Image settings of a head at the time of its ping; used by BVTPing_GetImage and related functions.
 struct HeadImaging {
   ImageType type = ImageType::xy;
   ImageSettings image;

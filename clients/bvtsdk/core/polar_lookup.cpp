@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/bvtsdk/core/degrees.hpp"
+
 namespace sonar::bvt {
 namespace {
 
-constexpr double degrees = 57.29577951308232;
 constexpr std::uint32_t one = 32768;  // a weight of 1: products with 16 bits still fit 32
 
 struct Place {

@@ -62,7 +62,7 @@ Bytes bytes_of(const std::vector<std::uint16_t>& samples, Packing packing) {
   return out;
 }
 
-/// Exactly `size` bytes or nothing: a stream that wants to give more is cut off there and refused.
+/// Exactly `size` bytes or nothing: a longer stream is refused.
 Bytes inflated(BytesView body, std::size_t size) {
   if (size > deflate_at_best * body.size + 64) return {};
   Bytes out(size);
@@ -79,7 +79,7 @@ Bytes inflated(BytesView body, std::size_t size) {
   return out;
 }
 
-/// Runs only: what else repeats in noise is not worth the search. Empty when it cannot be had.
+/// Runs only: searching noise for other repetitions gains too little. Empty on failure.
 Bytes deflated(BytesView body) {
   z_stream stream{};
   if (deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) return {};
@@ -105,14 +105,14 @@ void put_nav(Bytes& out, const NavData& nav) {
   if (present & nav_text) put_text(out, nav.text);
 }
 
-NavData take_nav(Reader& reader) {
+NavData decode_nav(Reader& reader) {
   NavData nav;
-  const auto sent = reader.take<std::uint16_t>();
+  const auto sent = reader.read<std::uint16_t>();
   if (sent & ~known_fields) reader.fail();
   nav.present = sent;
   numbers_of(nav, [&](NavField bit, auto& value) {
     if ((sent & bit) == 0) return;
-    value = reader.take<std::decay_t<decltype(value)>>();
+    value = reader.read<std::decay_t<decltype(value)>>();
     if (std::isfinite(value)) return;
     value = 0;
     nav.present = static_cast<std::uint16_t>(nav.present & ~bit);
@@ -129,22 +129,22 @@ std::optional<PolarPing> decode_ping(BytesView payload, std::string* why) {
   };
   Reader reader(payload);
   PolarPing p;
-  p.head = reader.take<std::int32_t>();
-  p.number = reader.take<std::uint32_t>();
-  p.time_s = reader.take<double>();
-  p.time_zone_s = reader.take<std::int32_t>();
-  p.start_m = reader.take<float>();
-  p.stop_m = reader.take<float>();
-  p.sound_speed_mps = reader.take<std::int32_t>();
-  p.fov_min_deg = reader.take<float>();
-  p.fov_max_deg = reader.take<float>();
-  p.bin_m = reader.take<float>();
-  p.beams = reader.take<std::uint16_t>();
-  p.bins = reader.take<std::uint16_t>();
-  const auto format = reader.take<std::uint8_t>();
-  const auto packing = static_cast<Packing>(reader.take<std::uint8_t>());
-  p.nav = take_nav(reader);
-  const std::size_t size = reader.take<std::uint32_t>();
+  p.head = reader.read<std::int32_t>();
+  p.number = reader.read<std::uint32_t>();
+  p.time_s = reader.read<double>();
+  p.time_zone_s = reader.read<std::int32_t>();
+  p.start_m = reader.read<float>();
+  p.stop_m = reader.read<float>();
+  p.sound_speed_mps = reader.read<std::int32_t>();
+  p.fov_min_deg = reader.read<float>();
+  p.fov_max_deg = reader.read<float>();
+  p.bin_m = reader.read<float>();
+  p.beams = reader.read<std::uint16_t>();
+  p.bins = reader.read<std::uint16_t>();
+  const auto format = reader.read<std::uint8_t>();
+  const auto packing = static_cast<Packing>(reader.read<std::uint8_t>());
+  p.nav = decode_nav(reader);
+  const std::size_t size = reader.read<std::uint32_t>();
   if (!reader.ok()) return refuse("it ends early or has unknown navigation fields");
   const BytesView body = reader.rest();
   if (const std::string what = complaint(p); !what.empty()) return refuse(what);

@@ -1,4 +1,4 @@
-// One ping as the link delivers it: polar samples, what they mean, and where the vehicle was. Images, range lists and
+// One ping as delivered by the link: polar samples, their geometry, and navigation data. Images, range lists and
 // recordings are all made from this.
 #pragma once
 
@@ -26,7 +26,7 @@ enum NavField : std::uint16_t {
   nav_text = 1 << 10,
 };
 
-/// A field means nothing unless its bit of `present` is set.
+/// A field is valid only when its bit of `present` is set.
 struct NavData {
   std::uint16_t present = 0;
   double time_s = 0;  // since 1970 UTC
@@ -66,7 +66,7 @@ struct PolarPing {
   double range_m(double bin) const { return static_cast<double>(start_m) + (bin + 0.5) * static_cast<double>(bin_m); }
 };
 
-/// The payload of PING_DATA. Nothing when it is none, and `why` then says in one sentence what is wrong. Allocates no more
+/// Decodes the payload of PING_DATA; nullopt when it is invalid, with the reason in `why`. Allocates no more
 /// than the payload can hold, and never more than 64 MiB.
 std::optional<PolarPing> decode_ping(BytesView payload, std::string* why = nullptr);
 
@@ -77,9 +77,9 @@ enum class Packing : std::uint8_t { plain = 0, deflate = 1, planes = 2 };
 /// The opposite.
 Bytes encode_ping(const PolarPing& ping, Packing packing = Packing::plain);
 
-/// The bitmap and the values, as in PING_DATA and NAV_DATA; bits the link does not know are left out.
+/// The bitmap and the values, as in PING_DATA and NAV_DATA; unknown bits are omitted.
 void put_nav(Bytes& out, const NavData& nav);
 /// The opposite; `reader.ok()` tells whether it was whole and held known fields only. Values that are no numbers count as absent.
-NavData take_nav(Reader& reader);
+NavData decode_nav(Reader& reader);
 
 }  // namespace sonar::bvt

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <new>
 
+#include "clients/bvtsdk/core/degrees.hpp"
 #include "clients/bvtsdk/core/sample_grid.hpp"
 
 namespace sonar::bvt {
 namespace {
 
-constexpr double degrees = 57.29577951308232;
-
-/// Index of the sample that counts, or n for none. At equal strength the nearer one.
+/// Index of the selected sample, or n for none. At equal strength the nearer one.
 std::size_t chosen_bin(const std::uint16_t* samples, std::size_t first, std::size_t n, std::uint16_t lowest,
                        RangeListSettings::Policy policy) {
   if (first >= n) return n;
@@ -52,7 +51,7 @@ Code make_range_list(const PolarPing& ping, const RangeListSettings& settings, R
   const double scale = range_scale(ping, settings.sound_speed_override_mps);
   const auto beams = static_cast<std::size_t>(ping.beams), bins = static_cast<std::size_t>(ping.bins);
   // Above the threshold, and not silenced by the noise threshold.
-  const int lowest = std::max(settings.threshold + 1, static_cast<int>(lowest_heard(settings.noise_threshold)));
+  const int lowest = std::max(settings.threshold + 1, static_cast<int>(lowest_significant(settings.noise_threshold)));
   const double skipped = (static_cast<double>(settings.start_range_m) / scale - static_cast<double>(ping.start_m)) /
                              static_cast<double>(ping.bin_m) -
                          0.5;  // a bin counts when its centre does

@@ -9,7 +9,7 @@
 
 namespace sonar::bvt {
 
-/// What a bearing without an echo above the threshold holds. Clients take anything above 999 as none (verified).
+/// Value of a bearing without an echo above the threshold. Clients treat values above 999 as no echo (verified).
 inline constexpr float no_range_m = 1000;
 
 /// Until a host sets another. Unknown: the vendor's. Chosen above the noise measured with the P900, P450, M450, M900 and MB

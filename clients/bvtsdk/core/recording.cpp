@@ -14,7 +14,7 @@ constexpr std::uint16_t newest_version = 2;
 constexpr std::size_t file_header_size = 8;
 constexpr std::size_t crc_size = 4;
 constexpr std::size_t index_entry_size = 2 + 4 + 8 + 8;
-constexpr std::size_t most_lanes = 256;                // what a damaged index may make us search
+constexpr std::size_t most_lanes = 256;                // bounds the search in a damaged index
 constexpr std::size_t index_tail_size = 8 + crc_size;  // the index frame's own offset, and its checksum
 
 std::uint32_t checksum(BytesView header, BytesView payload) {
@@ -34,14 +34,14 @@ bool place_of(FrameType type, BytesView payload, FramePlace& place) {
   Reader reader(payload);
   place.type = type;
   if (type == FrameType::ping_data) {
-    place.head = reader.take<std::int32_t>();
-    reader.take<std::uint32_t>();
-    place.time_s = reader.take<double>();
+    place.head = reader.read<std::int32_t>();
+    reader.read<std::uint32_t>();
+    place.time_s = reader.read<double>();
   } else if (type == FrameType::nav_data) {
-    take_nav(reader);
-    place.time_s = reader.take<double>();
+    decode_nav(reader);
+    place.time_s = reader.read<double>();
   } else if (type == FrameType::event_mark) {
-    place.time_s = reader.take<double>();
+    place.time_s = reader.read<double>();
   } else if (type != FrameType::hello_ok) {
     return false;
   }
@@ -75,7 +75,7 @@ Code RecordingWriter::put_frame(FrameType type, BytesView payload, std::int32_t 
                        std::fwrite(payload.data, 1, payload.size, file_.get()) == payload.size && write_all(file_.get(), crc) &&
                        std::fflush(file_.get()) == 0;
   if (!written) {
-    file_.reset();  // what follows half a frame would never be read; whole frames before it will
+    file_.reset();  // bytes after a partial frame would never be read; the frames before it will
     return file_write;
   }
   if (size_ > file_header_size && type != FrameType::index) places_.push_back({type, head, time_s, size_});
@@ -166,13 +166,14 @@ Code RecordingReader::open(File file, std::string* why) {
   const off_t end = ftello(file_.get());
   size_ = end > 0 ? static_cast<std::uint64_t>(end) : 0;
   if (!seek(file_.get(), 0) || !read_all(file_.get(), start, sizeof start) || std::memcmp(start, "BVER", 4) != 0)
-    return refuse(file_header_bad, "is no recording of ours; the vendor's .son files are proprietary and cannot be read");
+    return refuse(file_header_bad,
+                  "is not a recording of this library; the vendor's .son files are proprietary and cannot be read");
   const int version = start[4] | start[5] << 8;
   if (version > newest_version)
     return refuse(file_too_new, "is a recording of version " + std::to_string(version) + "; this library reads versions 1 and 2");
   FrameHeader header;
   if (version < 1 || !read_frame(file_header_size, header, hello_) || header.type != FrameType::hello_ok)
-    return refuse(file_header_bad, "does not say which sonar it came from; was it cut off at once?");
+    return refuse(file_header_bad, "does not name its sonar; was it cut off at the start?");
   const std::uint64_t first = file_header_size + frame_header_size + hello_.size() + crc_size;
   has_index_ = read_index();
   if (!has_index_) scan(first);
@@ -184,12 +185,12 @@ Code RecordingReader::open(File file, std::string* why) {
 bool RecordingReader::read_frame(std::uint64_t offset, FrameHeader& header, Bytes& payload) {
   Bytes head(frame_header_size);
   if (!file_ || offset > size_ || size_ - offset < frame_header_size + crc_size) return false;
-  if (!seek(file_.get(), offset) || !read_all(file_.get(), head.data(), head.size()) || !take_header(head, header)) return false;
+  if (!seek(file_.get(), offset) || !read_all(file_.get(), head.data(), head.size()) || !read_header(head, header)) return false;
   if (size_ - offset - frame_header_size - crc_size < header.payload_size) return false;  // checked before anything is allocated
   payload.resize(header.payload_size);
   std::uint8_t crc[crc_size];
   if (!read_all(file_.get(), payload.data(), payload.size()) || !read_all(file_.get(), crc, sizeof crc)) return false;
-  return Reader({crc, sizeof crc}).take<std::uint32_t>() == checksum(head, payload);
+  return Reader({crc, sizeof crc}).read<std::uint32_t>() == checksum(head, payload);
 }
 
 bool RecordingReader::read_index() {
@@ -197,20 +198,20 @@ bool RecordingReader::read_index() {
   if (size_ < file_header_size + index_tail_size || !seek(file_.get(), size_ - index_tail_size) ||
       !read_all(file_.get(), tail, sizeof tail))
     return false;
-  const auto offset = Reader({tail, sizeof tail}).take<std::uint64_t>();
+  const auto offset = Reader({tail, sizeof tail}).read<std::uint64_t>();
   FrameHeader header;
   Bytes payload;
   if (!read_frame(offset, header, payload) || header.type != FrameType::index) return false;
   if (offset + frame_header_size + payload.size() + crc_size != size_) return false;
   Reader reader(payload);
-  const std::size_t count = reader.take<std::uint32_t>();
+  const std::size_t count = reader.read<std::uint32_t>();
   if (!reader.ok() || reader.left() != count * index_entry_size + 8) return false;
   for (std::size_t i = 0; i < count; ++i) {
     FramePlace place;
-    place.type = static_cast<FrameType>(reader.take<std::uint16_t>());
-    place.head = reader.take<std::int32_t>();
-    place.time_s = reader.take<double>();
-    place.offset = reader.take<std::uint64_t>();
+    place.type = static_cast<FrameType>(reader.read<std::uint16_t>());
+    place.head = reader.read<std::int32_t>();
+    place.time_s = reader.read<double>();
+    place.offset = reader.read<std::uint64_t>();
     add(place);
   }
   return true;
@@ -285,8 +286,8 @@ Code RecordingReader::read_nav(int n, NavData& nav, double& time_s) {
   Bytes payload;
   if (!read_frame(offsets[static_cast<std::size_t>(n)], header, payload) || header.type != FrameType::nav_data) return file_read;
   Reader reader(payload);
-  nav = take_nav(reader);
-  time_s = reader.take<double>();
+  nav = decode_nav(reader);
+  time_s = reader.read<double>();
   return reader.ok() && std::isfinite(time_s) ? success : file_read;
 }
 
@@ -300,7 +301,7 @@ Code RecordingReader::read_event(int n, EventMark& mark) {
     return file_read;
   Reader reader(payload);
   EventMark read;
-  read.time_s = reader.take<double>();
+  read.time_s = reader.read<double>();
   read.key = reader.text();
   read.text = reader.text();
   if (!reader.ok() || !std::isfinite(read.time_s)) return file_read;

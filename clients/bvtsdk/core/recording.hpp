@@ -1,9 +1,9 @@
-// Recordings in our own format, BVER: pings, navigation and event marks as frames of the link, so that FILE mode plays back
-// what NET mode saw. The vendor's .son files are proprietary and are refused.
+// Recordings in sonard's own format, BVER: pings, navigation and event marks as frames of the link, so that FILE mode plays back
+// the data of NET mode. The vendor's .son files are proprietary and are refused.
 //
 // File: "BVER", u16 version = 2 (1: samples are not packed), u16 0; then frames (frame.hpp), each followed by the CRC-32 of its
 // header and payload: HELLO_OK first, and again before a ping that was made with other settings, then PING_DATA, NAV_DATA (u16
-// bitmap, values, f64 time) and EVENT_MARK (f64 time, text key, text) in the order they came. A closed file ends with an index
+// bitmap, values, f64 time) and EVENT_MARK (f64 time, text key, text) in order of arrival. A closed file ends with an index
 // frame: u32 entries, per entry u16 type, i32 head, f64 time, u64 offset of the frame, and at last the u64 offset of the index
 // frame itself. Without it the file is scanned up to the last whole frame.
 #pragma once
@@ -66,19 +66,19 @@ class RecordingWriter {
 /// Not for several threads at once.
 class RecordingReader {
  public:
-  /// file_open; file_header_bad for anything but a recording of ours, a vendor's .son among them; file_too_new. `why` is
+  /// file_open; file_header_bad for any other file, including the vendor's .son; file_too_new. `why` is
   /// a line for the log.
   Code open(const std::string& path, std::string* why = nullptr);
   Code open(File file, std::string* why = nullptr);
 
   const Bytes& hello() const { return hello_; }  // payload of the first HELLO_OK
-  /// Payload of the one that holds for ping n of a head; the first one's when there is no other.
+  /// Payload of the description valid at ping n of a head; by default the first one.
   Bytes hello_of_ping(std::int32_t head, int n);
   std::uint64_t size_bytes() const { return size_; }
   /// False when the last writer never closed the file, or its end is damaged.
   bool has_index() const { return has_index_; }
 
-  /// Frames in the order they came.
+  /// Frames in order of arrival.
   int ping_count(std::int32_t head) const { return static_cast<int>(places(FrameType::ping_data, head).size()); }
   int nav_count() const { return static_cast<int>(places(FrameType::nav_data).size()); }
   int event_count() const { return static_cast<int>(places(FrameType::event_mark).size()); }

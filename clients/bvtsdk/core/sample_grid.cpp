@@ -31,7 +31,7 @@ double range_scale(const PolarPing& ping, int sound_speed_override_mps) {
   return sound_speed_override_mps > 0 ? static_cast<double>(sound_speed_override_mps) / ping.sound_speed_mps : 1.0;
 }
 
-std::uint16_t lowest_heard(float noise_threshold) {
+std::uint16_t lowest_significant(float noise_threshold) {
   if (!(noise_threshold > 0)) return 0;
   return static_cast<std::uint16_t>(std::ceil(std::min(noise_threshold, 1.0f) * full_scale));
 }
@@ -47,7 +47,7 @@ SampleGrid::SampleGrid(const PolarPing& ping, float noise_threshold, float clipp
     samples = made_.data();
     pooled_ = static_cast<double>(together);
   }
-  const std::uint16_t lowest = lowest_heard(noise_threshold);
+  const std::uint16_t lowest = lowest_significant(noise_threshold);
   const bool clips = clipping_threshold > 0 && clipping_threshold < 1;
   const auto highest = static_cast<std::uint16_t>(clips ? std::lround(clipping_threshold * full_scale) : 65535);
   if (lowest > 0 || clips) {

@@ -13,7 +13,7 @@ namespace sonar::bvt {
 /// Ranges are multiplied by it: override / the ping's sound speed, 1 without an override (0).
 double range_scale(const PolarPing& ping, int sound_speed_override_mps);
 /// The least sample that is not set to 0 by a noise threshold in fractions of full scale.
-std::uint16_t lowest_heard(float noise_threshold);
+std::uint16_t lowest_significant(float noise_threshold);
 
 class SampleGrid {
  public:

@@ -25,14 +25,14 @@ class Descriptor {
   int fd_;
 };
 
-/// "host" or "host:port" cut in two. False when the host is empty or the port is no number from 1 to 65535.
+/// Splits "host" or "host:port". False when the host is empty or the port is not a number from 1 to 65535.
 bool split_endpoint(const std::string& endpoint, std::string& host, std::string& port);
 
 /// Connects to the first address of the host that takes it. lookup_host when the name is unknown, connection_timed_out when
-/// nobody takes it by the deadline or it is refused; `why` is then what the system says. The socket does not block.
+/// the connection is refused, or not accepted by the deadline; `why` is then the system's error text. The socket is non-blocking.
 Code connect_to(const std::string& host, const std::string& port, Deadline deadline, Descriptor& out, std::string& why);
 
-/// success, timeout (nothing came or went by the deadline), or failed. `events` as for poll().
+/// success, timeout (no event by the deadline), or failed. `events` as for poll().
 Code wait_for(int fd, short events, Deadline deadline);
 
 /// success, socket_write_timeout, socket_closed (the peer is gone) or socket_write.

@@ -33,14 +33,14 @@ int Head::set_range(float start_m, float stop_m) {
 }
 
 int Head::set_start(float start_m) {
-  const int code = set(Key::start, start_m, now.start_m);
+  const int code = set(Key::start_range, start_m, now.start_m);
   RangeLimits limits{now.start_m, now.stop_m};
   if (code == success && source_->get(now.id, limits) == success) now.stop_m = limits.stop_m;  // it may have been moved too
   return code;
 }
 
 int Head::set_stop(float stop_m) {
-  const int code = set(Key::stop, stop_m, now.stop_m);
+  const int code = set(Key::stop_range, stop_m, now.stop_m);
   RangeLimits limits{now.start_m, now.stop_m};
   if (code == success && source_->get(now.id, limits) == success) now.start_m = limits.start_m;
   return code;
@@ -69,7 +69,7 @@ int Head::get_ping(int n, std::shared_ptr<PingObject>& ping) {
   fresh->settings = now;
   const int code = source_->get_ping(now.id, n, patience, fresh->polar, fresh->settings);
   if (code != success) return code;
-  take_settings(now, fresh->settings);
+  copy_settings(now, fresh->settings);
   fresh->imaging = imaging;
   fresh->imager = imager_;
   ping = std::move(fresh);
@@ -126,7 +126,7 @@ SonarDescription Sonar::description() const {
   SonarDescription out = source_->sonar();
   for (std::size_t i = 0; i < out.heads.size(); ++i) {  // heads_ are in the same order
     const std::lock_guard lock(heads_[i]->mutex);
-    take_settings(out.heads[i], heads_[i]->now);
+    copy_settings(out.heads[i], heads_[i]->now);
   }
   return out;
 }

@@ -1,4 +1,4 @@
-// A sonar as the SDK shows it, and its heads: what BVTSonar_* and BVTHead_* of both interfaces do.
+// A sonar of the SDK and its heads: implements BVTSonar_* and BVTHead_* of both interfaces.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ class Head : public Object {
   HeadImaging imaging;
   int transmit = 1, ping_interval_ms = 0, dynamic_power = 0, mount = 0;  // mount is kept and read back only
 
-  /// bad_parameter for what is no number; else the sonar's word (bad_range). `now` holds what the sonar made of it.
+  /// bad_parameter for a non-finite number; else the code of the sonar (bad_range). `now` receives the applied value.
   int set_range(float start_m, float stop_m);
   int set_start(float start_m);
   int set_stop(float stop_m);
@@ -47,13 +47,13 @@ class Sonar : public Object {
   int open(const std::string& type, const std::string& parameter, int abi);
   /// Becomes a new recording of that sonar.
   int create_file(const std::string& path, const SonarDescription& of);
-  /// Closes link or file; heads that are still held say so from then on, and 3.x handles of heads are gone.
+  /// Closes link or file; remaining heads then return errors, and 3.x handles of heads are invalid.
   void reset();
   /// no_head for a number it does not have, net_not_connected before it is open.
   int head(int number, std::shared_ptr<Head>& head) const;
 
   const Source* source() const { return source_.get(); }  // null: not open
-  /// What it said of itself, with the settings that hold now. Waits for calls on its heads. Only while it is open.
+  /// Its description, with the current settings. Waits for calls on its heads. Only while it is open.
   SonarDescription description() const;
   int put_event(const std::string& key, const std::string& text);
   int set_local_clock(int on);

@@ -5,6 +5,8 @@
 namespace sonar::bvt {
 namespace {
 
+using blueview::Kind;
+
 int kilobytes_of(std::uint64_t bytes) { return static_cast<int>((bytes + 1023) / 1024); }
 
 class LiveSource : public Source {
@@ -15,11 +17,11 @@ class LiveSource : public Source {
   bool connected() const override { return link_->connected(); }
   void close() override { link_->close(); }
 
-  int set(int head, Key key, std::int32_t& value) override { return set_value(head, key, 0, value); }
-  int set(int head, Key key, float& value) override { return set_value(head, key, 1, value); }
+  int set(int head, Key key, std::int32_t& value) override { return set_value(head, key, Kind::integer, value); }
+  int set(int head, Key key, float& value) override { return set_value(head, key, Kind::number, value); }
   int set(int head, RangeLimits& limits) override {
     Bytes request = address(head, Key::range);
-    put(request, std::uint8_t{1});
+    put(request, static_cast<std::uint8_t>(Kind::number));
     put(request, limits.start_m);
     put(request, limits.stop_m);
     return ask_limits(FrameType::set, request, limits);
@@ -30,13 +32,13 @@ class LiveSource : public Source {
     Bytes request, answer;
     put(request, static_cast<std::int32_t>(head));
     put(request, static_cast<std::uint32_t>(patience.count()));
-    // The sonar gives up by itself; only a sonar that hangs is given up by us.
+    // The sonar ends its own wait; this longer limit applies only to a sonar that hangs.
     const int code = link_->ask(FrameType::ping, request, answer, patience + std::chrono::seconds(5));
     if (code != success) return code;
     std::string why;
     std::optional<PolarPing> decoded = decode_ping(answer, &why);
     if (!decoded) {
-      log(LogLevel::warning, "a ping that cannot be used: " + why);
+      log(LogLevel::warning, "invalid ping: " + why);
       return bad_ping;
     }
     ping = std::move(*decoded);
@@ -52,15 +54,15 @@ class LiveSource : public Source {
   }
 
   template <class T>
-  int set_value(int head, Key key, std::uint8_t kind, T& value) {
+  int set_value(int head, Key key, Kind kind, T& value) {
     Bytes request = address(head, key), answer;
-    put(request, kind);
+    put(request, static_cast<std::uint8_t>(kind));
     put(request, value);
     const int code = link_->ask(FrameType::set, request, answer);
     if (code != success) return code;
     Reader reader(answer);
-    const bool same_kind = reader.take<std::uint8_t>() == kind;
-    const T applied = reader.take<T>();
+    const bool same_kind = static_cast<Kind>(reader.read<std::uint8_t>()) == kind;
+    const T applied = reader.read<T>();
     if (!reader.ok() || !same_kind) return bad_packet_type;
     value = applied;
     return success;
@@ -71,8 +73,8 @@ class LiveSource : public Source {
     const int code = link_->ask(type, request, answer);
     if (code != success) return code;
     Reader reader(answer);
-    const bool floats = reader.take<std::uint8_t>() == 1;
-    const RangeLimits applied{reader.take<float>(), reader.take<float>()};
+    const bool floats = static_cast<Kind>(reader.read<std::uint8_t>()) == Kind::number;
+    const RangeLimits applied{reader.read<float>(), reader.read<float>()};
     if (!reader.ok() || !floats) return bad_packet_type;
     limits = applied;
     return success;
@@ -81,11 +83,11 @@ class LiveSource : public Source {
   const std::unique_ptr<Link> link_;
 };
 
-void take_recorded_settings(RecordingReader& reader, int n, HeadDescription& head) {
+void copy_recorded_settings(RecordingReader& reader, int n, HeadDescription& head) {
   const std::optional<SonarDescription> then = decode_description(reader.hello_of_ping(head.id, n));
   if (!then) return;
   for (const HeadDescription& h : then->heads)
-    if (h.id == head.id) take_settings(head, h);
+    if (h.id == head.id) copy_settings(head, h);
 }
 
 class PlayedSource : public Source {
@@ -102,7 +104,7 @@ class PlayedSource : public Source {
     if (!why.empty()) log(LogLevel::warning, path_ + ": " + why);
     if (code != success) return code;
     next = wanted + 1;
-    take_recorded_settings(*reader_, wanted, settings);
+    copy_recorded_settings(*reader_, wanted, settings);
     return code;
   }
   int ping_count(int head) const override { return reader_->ping_count(head); }
@@ -129,7 +131,7 @@ class WrittenSource : public Source {
   int put_ping(int head, const PolarPing& ping, const HeadDescription& settings) override {
     const std::lock_guard lock(mutex_);
     for (HeadDescription& h : now_.heads)
-      if (h.id == head) take_settings(h, settings);
+      if (h.id == head) copy_settings(h, settings);
     return writer_->put_ping(head, ping, encode_description(now_));
   }
   int put_event(const EventMark& mark) override {
@@ -181,10 +183,10 @@ Code open_recording(const std::string& path, std::shared_ptr<Source>& source) {
   }
   std::optional<SonarDescription> sonar = decode_description(reader->hello());
   if (!sonar) {
-    log(LogLevel::warning, path + " does not say which sonar it is from; its head is damaged");
+    log(LogLevel::warning, path + " does not name its sonar; its header is damaged");
     return file_header_bad;
   }
-  for (HeadDescription& head : sonar->heads) take_recorded_settings(*reader, 0, head);
+  for (HeadDescription& head : sonar->heads) copy_recorded_settings(*reader, 0, head);
   source = std::make_shared<PlayedSource>(std::move(*sonar), path, std::move(reader));
   return success;
 }
@@ -195,7 +197,7 @@ Code create_recording(const std::string& path, const SonarDescription& sonar, st
   if (code == success)
     source = std::make_shared<WrittenSource>(sonar, std::move(writer));
   else
-    log(LogLevel::warning, path + " cannot be created; check that its folder exists, may be written and has room");
+    log(LogLevel::warning, path + " cannot be created; check that its folder exists, is writable and has space");
   return code;
 }
 

@@ -1,5 +1,5 @@
-// Where a sonar's pings come from or go to: a live link, a recording that is played, or one that is being written.
-// Sonar and Head stand on this; any thread may call.
+// The source or target of a sonar's pings: a live link, a recording being played, or a recording being written.
+// Used by Sonar and Head; any thread may call.
 #pragma once
 
 #include <atomic>
@@ -13,23 +13,11 @@
 #include "clients/bvtsdk/core/link.hpp"
 #include "clients/bvtsdk/core/polar_ping.hpp"
 #include "clients/bvtsdk/core/recording.hpp"
+#include "protocol/blueview/link.hpp"
 
 namespace sonar::bvt {
 
-/// What SET and GET name; docs/protocols/blueview-link.md lists units.
-enum class Key : std::uint16_t {
-  start = 1,
-  stop = 2,
-  range = 3,
-  sound_speed = 4,
-  gain = 5,
-  tvg = 6,
-  fluid = 7,
-  transmit = 8,
-  ping_interval = 9,
-  dynamic_power = 10,
-  local_clock = 13,
-};
+using blueview::Key;
 
 struct RangeLimits {
   float start_m = 0, stop_m = 0;
@@ -43,13 +31,13 @@ class Source {
 
   virtual bool is_file() const { return true; }
   virtual bool connected() const { return false; }
-  /// `value` becomes what holds afterwards, which may be a nearer one. Recordings take any.
+  /// `value` receives the applied value, which may be the nearest valid one. Recordings accept any.
   virtual int set(int /*head*/, Key, std::int32_t& /*value*/) { return success; }
   virtual int set(int /*head*/, Key, float& /*value*/) { return success; }
   virtual int set(int /*head*/, RangeLimits&) { return success; }
   virtual int get(int /*head*/, RangeLimits&) { return success; }
 
-  /// n < 0: the next one. Live: always a new one, whatever n says; `patience` on top of the sonar's own time.
+  /// n < 0: the next one. Live: always a new one, regardless of n; `patience` on top of the sonar's own time.
   /// `settings`: the head's, which become those the ping was recorded with.
   virtual int get_ping(int /*head*/, int /*n*/, std::chrono::milliseconds /*patience*/, PolarPing&,
                        HeadDescription& /*settings*/) {

@@ -22,7 +22,7 @@ int guarded(F work) noexcept {
   }
 }
 
-/// The code of `work(object)`, done under the object's lock; invalid_ptr when the handle is none of a T.
+/// The code of `work(object)`, done under the object's lock; invalid_ptr when the handle is not of a T.
 template <class T, class F>
 int on(const void* handle, F work) noexcept {
   return guarded([&]() -> int {

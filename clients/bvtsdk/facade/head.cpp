@@ -1,4 +1,4 @@
-// BVTHead_*: both interfaces. What each does is said in docs/bvtsdk.md.
+// BVTHead_*: both interfaces. See docs/bvtsdk.md for each function.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"
@@ -63,7 +63,7 @@ RetVal BVTHead_PutPing(BVTHead self, BVTPing ping) {
   return on<Head>(self, [&](Head& o) -> int { return on<PingObject>(ping, [&](PingObject& p) { return o.put_ping(p); }); });
 }
 
-// How later pings of this head turn into images; the sonar does not know of it.
+// Image settings for later pings of this head; not sent to the sonar.
 RetVal BVTHead_SetImageRes(BVTHead self, int resolution) {
   return on<Head>(self, [&](Head& o) -> int {
     if (resolution < 0 || resolution > 4) return invalid_resolution;

@@ -1,4 +1,4 @@
-// BVTMagImage_*, BVTColorImage_* and BVTColorMapper_*. What each does is said in docs/bvtsdk.md.
+// BVTMagImage_*, BVTColorImage_* and BVTColorMapper_*. See docs/bvtsdk.md for each function.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;
@@ -44,7 +44,7 @@ auto* row_of(Image& image, int row) {
 BVT_IMAGE(MagImage, MagImageObject, MagPixel)
 BVT_IMAGE(ColorImage, ColourImageObject, ColourPixel)
 
-// A row or pixel outside the image: null or 0, and index_out_of_bounds where there is a code to say so.
+// A row or pixel outside the image: null or 0, and index_out_of_bounds where the function returns a code.
 #if BVT_ABI == 3
 #define BVT_PIXELS(Class, Kind, Pixel)                                                                                           \
   Pixel* BVT##Class##_GetRow(BVT##Class self, int row) {                                                                         \

@@ -1,4 +1,4 @@
-// BVTImageGenerator_*, 4.x only: how pings become images and range profiles. What each does is said in docs/bvtsdk.md.
+// BVTImageGenerator_*, 4.x only: how pings become images and range profiles. See docs/bvtsdk.md for each function.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

@@ -1,4 +1,4 @@
-// Discovery, error texts, version and log. What each does is said in docs/bvtsdk.md.
+// Discovery, error texts, version and log. See docs/bvtsdk.md for each function.
 #include "clients/bvtsdk/core/errors.hpp"
 #include "clients/bvtsdk/facade/getter.hpp"
 

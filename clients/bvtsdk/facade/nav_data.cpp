@@ -1,4 +1,4 @@
-// BVTNavData_*: where the vehicle is; both interfaces, 3.x without the time. What each does is said in docs/bvtsdk.md.
+// BVTNavData_*: where the vehicle is; both interfaces, 3.x without the time. See docs/bvtsdk.md for each function.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

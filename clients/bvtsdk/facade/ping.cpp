@@ -1,4 +1,4 @@
-// BVTPing_*, BVTImageGenerator_*, range data and range profiles. What each does is said in docs/bvtsdk.md.
+// BVTPing_*, BVTImageGenerator_*, range data and range profiles. See docs/bvtsdk.md for each function.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

@@ -1,4 +1,4 @@
-// BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x): one range a bearing. What each does is said in docs/bvtsdk.md.
+// BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x): one range a bearing. See docs/bvtsdk.md for each function.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;

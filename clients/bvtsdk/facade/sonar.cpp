@@ -1,4 +1,4 @@
-// BVTSonar_*: both interfaces. What each does is said in docs/bvtsdk.md.
+// BVTSonar_*: both interfaces. See docs/bvtsdk.md for each function.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;

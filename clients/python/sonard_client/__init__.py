@@ -1,4 +1,4 @@
-"""Poses to sonard, pings from it, and control of a running daemon; the standard library only, numpy where it is installed.
+"""Sends poses to sonard, receives pings and controls a running daemon. Standard library only; uses numpy if installed.
 
     from sonard_client import OculusClient, PoseSender, Control, Daemon, discover
 """

@@ -1,4 +1,4 @@
-"""python3 -m sonard_client listen|discover|pose|status: a look at a sonar, and a pose by hand."""
+"""python3 -m sonard_client listen|discover|pose|status: inspect a sonar or the daemon, send one pose."""
 from __future__ import annotations
 
 import argparse
@@ -14,28 +14,28 @@ from . import Control, ControlError, OculusClient, PoseSender, discover
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python3 -m sonard_client", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    listen = commands.add_parser("listen", help="a line for each ping of a sonar")
+    listen = commands.add_parser("listen", help="print a line for each ping of a sonar")
     listen.add_argument("address", nargs="?", default="127.0.0.2")
     listen.add_argument("--range", type=float, default=10, help="m")
-    listen.add_argument("--rate", type=int, default=10, help="2, 5, 10, 15 or 40 a second")
+    listen.add_argument("--rate", type=int, default=10, help="pings per second: 2, 5, 10, 15 or 40")
     listen.add_argument("--gain", type=float, default=50, help="per cent")
-    listen.add_argument("--count", type=int, help="pings; without it until Ctrl-C")
-    listen.add_argument("--timeout", type=float, default=10, help="s without a ping")
-    found = commands.add_parser("discover", help="the sonars whose status is heard")
+    listen.add_argument("--count", type=int, help="number of pings (default: until Ctrl-C)")
+    listen.add_argument("--timeout", type=float, default=10, help="s without a ping before it fails")
+    found = commands.add_parser("discover", help="list the sonars whose status datagrams arrive")
     found.add_argument("--seconds", type=float, default=2.5)
-    found.add_argument("--listen", default="0.0.0.0", help="address of this computer")
-    found.add_argument("--enough", type=int, help="ends when so many are known")
-    pose = commands.add_parser("pose", help="sends one pose")
+    found.add_argument("--listen", default="0.0.0.0", help="local address")
+    found.add_argument("--enough", type=int, help="stop after this number of sonars")
+    pose = commands.add_parser("pose", help="send one pose")
     pose.add_argument("xyz", nargs=3, type=float, help="m")
     pose.add_argument("--rpy", nargs=3, type=float, default=(0, 0, 0), metavar="DEG", help="roll pitch yaw")
     pose.add_argument("--frame", default="ENU_FLU", choices=("ENU_FLU", "NED_FRD"))
     pose.add_argument("--to", default="127.0.0.1", help="host or host:port")
     pose.add_argument("--encoding", default="json", choices=("json", "protobuf"))
     pose.add_argument("--vehicle", default="")
-    status = commands.add_parser("status", help="what the daemon says, as JSON")
+    status = commands.add_parser("status", help="print the daemon's status as JSON")
     status.add_argument("--host", default="127.0.0.1")
     status.add_argument("--port", type=int, default=8088)
-    status.add_argument("--token-file", help="its control.token_file")
+    status.add_argument("--token-file", help="the daemon's control.token_file")
     return parser
 
 
@@ -55,7 +55,7 @@ def _run(options: argparse.Namespace) -> None:
     elif options.command == "discover":
         for sonar in discover(options.seconds, options.listen, enough=options.enough):
             print(f"{sonar.address}  id {sonar.device_id}  part {sonar.part_number}  " +
-                  (f"taken by {sonar.connected}" if sonar.connected else "free"))
+                  (f"connected to {sonar.connected}" if sonar.connected else "free"))
     elif options.command == "pose":
         with PoseSender(options.to, options.encoding, vehicle=options.vehicle) as poses:
             poses.send(options.xyz, rpy=[math.radians(a) for a in options.rpy], frame=options.frame)

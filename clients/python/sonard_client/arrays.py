@@ -1,4 +1,4 @@
-"""Grids and vectors: numpy arrays where numpy is installed, memoryviews and tuples where it is not.
+"""Grids and vectors: numpy arrays if numpy is installed, else memoryviews and tuples.
 
 Both kinds of grid are indexed as grid[row, beam] and have shape and tolist().
 """
@@ -29,10 +29,10 @@ def grid(little_endian: bytes, rows: int, columns: int, width: int) -> Grid:
     if numpy is not None:
         return numpy.frombuffer(little_endian, dtype=f"<u{width}").reshape(rows, columns)
     if sys.byteorder == "big" and width > 1:
-        turned = bytearray(len(little_endian))
+        swapped = bytearray(len(little_endian))
         for place in range(width):
-            turned[place::width] = little_endian[width - 1 - place::width]
-        little_endian = bytes(turned)
+            swapped[place::width] = little_endian[width - 1 - place::width]
+        little_endian = bytes(swapped)
     return memoryview(little_endian).cast(_CODES[width], shape=[rows, columns])
 
 

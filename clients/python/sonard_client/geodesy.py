@@ -1,4 +1,4 @@
-"""Latitude and longitude on WGS 84 as metres north, east and down of a place: the plane that touches the ellipsoid there."""
+"""Latitude and longitude (WGS 84) as metres north, east and down in the tangent plane of an origin."""
 from __future__ import annotations
 
 import math
@@ -7,18 +7,18 @@ from typing import NamedTuple, Tuple
 from .rotations import Vector3
 
 EQUATOR_M, FLATTENING = 6378137.0, 1 / 298.257223563
-_SQUASH = FLATTENING * (2 - FLATTENING)  # first eccentricity, squared
+_E2 = FLATTENING * (2 - FLATTENING)  # first eccentricity, squared
 
 
 class Geodetic(NamedTuple):
-    """Heights above the ellipsoid or above the sea: the same ones for the origin and for what is placed by it."""
+    """Altitudes refer to the ellipsoid or to mean sea level, the same for the origin and for positions relative to it."""
     latitude_deg: float
     longitude_deg: float
     altitude_m: float = 0.0
 
     @property
     def is_fix(self) -> bool:
-        """Receivers without a fix say 0, 0."""
+        """Receivers without a fix report 0, 0."""
         return all(map(math.isfinite, self)) and abs(self.latitude_deg) <= 90 and abs(self.longitude_deg) <= 360 and \
             (self.latitude_deg, self.longitude_deg) != (0, 0)
 
@@ -34,21 +34,21 @@ def parse_origin(text: str) -> Geodetic:
     except (ValueError, TypeError):
         raise ValueError(f"origin {text!r} is not LAT,LON,ALT in degrees and metres") from None
     if not (all(map(math.isfinite, place)) and abs(place.latitude_deg) <= 90 and abs(place.longitude_deg) <= 360):
-        raise ValueError(f"origin {text!r} is no place on Earth: latitude within 90 degrees, longitude within 360")
+        raise ValueError(f"origin {text!r} is out of range: latitude within 90 degrees, longitude within 360")
     return place
 
 
 def ecef(place: Geodetic) -> Vector3:
-    """Metres from the centre of the Earth: toward 0 N 0 E, 0 N 90 E, and the north pole."""
+    """Earth-centred, Earth-fixed coordinates [m]: axes to 0 N 0 E, 0 N 90 E and the north pole."""
     latitude, longitude = math.radians(place.latitude_deg), math.radians(place.longitude_deg)
-    across = EQUATOR_M / math.sqrt(1 - _SQUASH * math.sin(latitude) ** 2)
-    out = (across + place.altitude_m) * math.cos(latitude)
-    return (out * math.cos(longitude), out * math.sin(longitude),
-            (across * (1 - _SQUASH) + place.altitude_m) * math.sin(latitude))
+    normal_m = EQUATOR_M / math.sqrt(1 - _E2 * math.sin(latitude) ** 2)
+    radius_m = (normal_m + place.altitude_m) * math.cos(latitude)
+    return (radius_m * math.cos(longitude), radius_m * math.sin(longitude),
+            (normal_m * (1 - _E2) + place.altitude_m) * math.sin(latitude))
 
 
 class LocalPlane:
-    """north, east, down of an origin."""
+    """Tangent plane at an origin: coordinates north, east, down [m]."""
 
     def __init__(self, origin: Geodetic) -> None:
         self.origin = origin
@@ -61,7 +61,7 @@ class LocalPlane:
         return self._from_ecef(ecef(place))
 
     def ned_from(self, other: "LocalPlane", ned: Vector3) -> Vector3:
-        """What is `ned` of another origin, in metres of this one."""
+        """Converts coordinates `ned` of another plane to this one."""
         x, y, z = (c + sum(ned[i] * other._axes[i][k] for i in range(3)) for k, c in enumerate(other._centre))
         return self._from_ecef((x, y, z))
 

@@ -1,6 +1,6 @@
-"""The bytes of Oculus messages, after the tables of docs/protocols/oculus.md; nothing here is shared with sonard's own code.
+"""Byte layout of Oculus messages, written from the tables of docs/protocols/oculus.md; shares no code with sonard.
 
-All numbers are little-endian and packed. Lengths found in messages are checked here before anything relies on them.
+All numbers are little-endian and packed. Lengths in messages are checked here before use.
 """
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ MAGIC = b"\x53\x4f"
 STATUS, FIRE, PING, USER_CONFIGURATION, LOG, DUMMY = 0x01, 0x15, 0x23, 0x55, 0x80, 0xFF
 HEADER_BYTES = 16
 LONGEST_MESSAGE = 4 << 20
-LONGEST_SMALL_MESSAGE = 64 << 10  # of those whose length no table gives
+LONGEST_SMALL_MESSAGE = 64 << 10  # limit for messages whose length no table gives
 STANDBY = 5
 RATE_CODES = {10: 0, 15: 1, 40: 2, 5: 3, 2: 4, 0: STANDBY}
 
 METRES, WIDE_SAMPLES, ROW_GAINS, SIMPLE_PING, GAIN_ASSIST, MANY_BEAMS, TRIGGERED = 0x01, 0x02, 0x04, 0x08, 0x10, 0x40, 0x80
-SAMPLES_32_BIT = 0x200  # of the extended flags
+SAMPLES_32_BIT = 0x200  # extended flag
 
 _HEADER = struct.Struct("<HHHHHIH")
 _FIRE = struct.Struct("<5B4d")
 _FIRE_TAIL = struct.Struct("<I2II5I")
-_SHORT_PING = struct.Struct("<II4dIBdHHIII")         # behind the fire message: versions 0 and 1
+_SHORT_PING = struct.Struct("<II4dIBdHHIII")         # after the fire message: versions 0 and 1
 _LONG_PING = struct.Struct("<II3d3dddBdHH4IIII")     # version 2
 
 
@@ -38,7 +38,7 @@ class Header(NamedTuple):
 
 
 def read_header(data: bytes) -> Header:
-    """Of 16 bytes that begin with the magic."""
+    """Parses 16 bytes that begin with the magic."""
     return Header(*_HEADER.unpack(data)[1:])
 
 
@@ -48,7 +48,7 @@ def header_bytes(kind: int, version: int, payload_bytes: int, destination: int =
 
 @dataclass(frozen=True)
 class FireSettings:
-    """A fire message: what a client asks of the sonar, and the echo of it in each ping."""
+    """A fire message: the settings a client requests, and their echo in each ping."""
     mode: int = 2                    # 1 low frequency, 2 high
     rate_code: int = 0               # RATE_CODES
     network_speed: int = 0xFF
@@ -58,7 +58,7 @@ class FireSettings:
     gain_percent: float = 50.0
     sound_speed_mps: float = 0.0     # 0: the sonar computes it
     salinity_ppt: float = 0.0
-    extended: Tuple[int, ...] = (0,) * 9  # version 2: extFlags and the words behind them
+    extended: Tuple[int, ...] = (0,) * 9  # version 2: extFlags and the following words
 
     @property
     def row_gains(self) -> bool:
@@ -77,13 +77,13 @@ def fire_bytes(settings: FireSettings, version: int, destination: int = 0) -> by
 
 
 def read_fire(data: bytes, version: int) -> FireSettings:
-    """Of the bytes behind a header."""
+    """Parses the bytes after a header."""
     tail = _FIRE_TAIL.unpack_from(data, _FIRE.size) if version == 2 else (0,) * 9
     return FireSettings(*(_FIRE.unpack_from(data) + (tail,)))
 
 
 class PingFields(NamedTuple):
-    """The fixed part of a ping result behind the echoed fire message."""
+    """The fixed part of a ping result after the echoed fire message."""
     number: int
     status: int
     frequency_hz: float
@@ -103,14 +103,14 @@ class PingFields(NamedTuple):
 
 
 def ping_head_bytes(version: int) -> int:
-    """From the start of the message to the bearings."""
+    """Bytes from the start of the message to the bearings."""
     if version == 2:
         return HEADER_BYTES + _FIRE.size + _FIRE_TAIL.size + _LONG_PING.size
     return HEADER_BYTES + _FIRE.size + _SHORT_PING.size
 
 
 def read_ping_fields(data: bytes, version: int) -> PingFields:
-    """Of a message of which at least ping_head_bytes() are there."""
+    """Parses a message of at least ping_head_bytes()."""
     if version == 2:
         f = _LONG_PING.unpack_from(data, HEADER_BYTES + _FIRE.size + _FIRE_TAIL.size)
         return PingFields._make(f[:5] + (f[5:8], f[8], None, f[9], f[10] + 1) + f[11:14] + f[18:])
@@ -119,7 +119,7 @@ def read_ping_fields(data: bytes, version: int) -> PingFields:
 
 
 def ping_fault(data: bytes, header: Header) -> str:
-    """Why these first bytes cannot be those of a ping; empty when every length in them agrees with every other."""
+    """The reason why these bytes are not the start of a ping; empty if all lengths are consistent."""
     if header.version > 2:
         return f"ping of version {header.version}"
     head = ping_head_bytes(header.version)

@@ -1,6 +1,7 @@
-"""NMEA 0183 sentences, and what a vehicle's instruments say in them: no socket, no clock.
+"""Parses NMEA 0183 sentences and derives poses from them, without sockets or clocks.
 
-HDT heading; PRDID pitch, roll, heading; PHTRO pitch and roll; GGA, RMC, GLL position; DPT, DBT depth of water below a transducer.
+HDT: heading. PRDID: pitch, roll, heading. PHTRO: pitch and roll. GGA, RMC, GLL: position. DPT, DBT: depth of water below a
+transducer.
 """
 from __future__ import annotations
 
@@ -11,22 +12,22 @@ from .geodesy import Geodetic, LocalPlane
 from .rotations import Vector3
 
 DAY_S = 86400.0
-FIX_KINDS = ("GGA", "RMC", "GLL")  # the first one heard of counts: the others repeat it
+FIX_KINDS = ("GGA", "RMC", "GLL")  # in order of preference; the others repeat the fix
 ATTITUDE_KINDS = ("HDT", "PRDID", "PHTRO")
 DEPTH_KINDS = ("DPT", "DBT")
 
 
 class NmeaError(ValueError):
-    """Why a line is no sentence."""
+    """The reason why a line is not a sentence."""
 
 
 class Sentence(NamedTuple):
-    kind: str  # "GGA" of "$GPGGA"; proprietary ones whole: "PRDID"
+    kind: str  # "GGA" for "$GPGGA"; in full for proprietary sentences: "PRDID"
     fields: Tuple[str, ...]
 
 
 def checksum(body: str) -> int:
-    """Of what stands between $ and *."""
+    """Checksum of the text between $ and *."""
     value = 0
     for byte in body.encode("latin-1", "replace"):
         value ^= byte
@@ -34,23 +35,23 @@ def checksum(body: str) -> int:
 
 
 def parse_sentence(line: str, without_checksum: bool = False) -> Sentence:
-    """What stands before the $, a time for instance, is passed over. A sentence without a checksum is refused unless told."""
+    """Text before the $, such as a time, is skipped. A missing checksum is an error unless `without_checksum`."""
     start = line.find("$")
     if start < 0:
-        raise NmeaError("no sentence: there is no $")
-    body, star, told = line[start + 1:].strip().partition("*")
+        raise NmeaError("not a sentence: $ is missing")
+    body, star, given = line[start + 1:].strip().partition("*")
     if star:
         try:
-            right = int(told[:2], 16) == checksum(body) and len(told.strip()) == 2
+            right = int(given[:2], 16) == checksum(body) and len(given.strip()) == 2
         except ValueError:
             right = False
         if not right:
-            raise NmeaError(f"checksum {told!r} where {checksum(body):02X} is right")
+            raise NmeaError(f"checksum is {given!r}, expected {checksum(body):02X}")
     elif not without_checksum:
-        raise NmeaError("no checksum")
+        raise NmeaError("checksum is missing")
     address, *fields = body.split(",")
     if len(address) < 3 or not address.isalnum():
-        raise NmeaError(f"{address[:12]!r} is no kind of sentence")
+        raise NmeaError(f"{address[:12]!r} is not a sentence type")
     return Sentence(address if address.startswith("P") else address[-3:], tuple(fields))
 
 
@@ -63,7 +64,7 @@ def _number(text: str) -> Optional[float]:
 
 
 def _angle(text: str, half: str, degrees: int) -> Optional[float]:
-    """ddmm.mmm and dddmm.mmm with N, S, E, W."""
+    """Parses ddmm.mmm or dddmm.mmm with N, S, E or W."""
     minutes = _number(text[degrees:])
     if not text[:degrees].isdigit() or minutes is None or not 0 <= minutes < 60 or half not in ("N", "S", "E", "W"):
         return None
@@ -80,20 +81,20 @@ def time_of_day_s(text: str) -> Optional[float]:
 
 
 class Instruments:
-    """What was last said; None is unknown. Heading is true, clockwise from north; pitch bow up, roll starboard down positive."""
+    """The latest values; None = unknown. Heading is true, clockwise from north; pitch is positive bow up, roll starboard down."""
 
     def __init__(self) -> None:
         self.heading_deg: Optional[float] = None
         self.pitch_deg: Optional[float] = None
         self.roll_deg: Optional[float] = None
-        self.place: Optional[Geodetic] = None  # without altitude: an antenna's height says nothing of a vehicle's depth
-        self.fix_time_s: Optional[float] = None  # of the day; beyond 86400 after midnight
+        self.place: Optional[Geodetic] = None  # without altitude: the antenna's height is not the vehicle's depth
+        self.fix_time_s: Optional[float] = None  # time of day; exceeds 86400 after midnight
         self.water_below_m: Optional[float] = None
-        self.heard: Set[str] = set()
+        self.received: Set[str] = set()
         self._fixes_by: Optional[str] = None
 
     def feed(self, sentence: Sentence) -> str:
-        """ "place", "attitude" or "depth" where the sentence told something of it, else empty."""
+        """Returns what the sentence changed: "place", "attitude", "depth", or empty."""
         kind, fields = sentence
         if kind in FIX_KINDS:
             return self._fix(kind, fields)
@@ -118,13 +119,13 @@ class Instruments:
             return ""
         self._fixes_by = kind
         self.place = Geodetic(latitude, longitude)
-        now = time_of_day_s(fields[clock]) if len(fields) > clock else None  # GLL of old instruments has neither time nor status
+        now = time_of_day_s(fields[clock]) if len(fields) > clock else None  # old GLL sentences have neither time nor status
         if now is not None:
             before = self.fix_time_s
             while before is not None and now < before - DAY_S / 2:
                 now += DAY_S
             self.fix_time_s = now
-        self.heard.add(kind)
+        self.received.add(kind)
         return "place"
 
     def _attitude(self, kind: str, fields: Tuple[str, ...]) -> str:
@@ -133,7 +134,7 @@ class Instruments:
             self.heading_deg = numbers[0]
         elif kind == "PRDID" and len(numbers) >= 3 and None not in numbers[:3]:
             self.pitch_deg, self.roll_deg = numbers[0], numbers[1]
-            if "HDT" not in self.heard:
+            if "HDT" not in self.received:
                 self.heading_deg = numbers[2]
         elif kind == "PHTRO" and len(numbers) >= 4 and numbers[0] is not None and numbers[2] is not None and \
                 fields[1] in ("M", "P") and fields[3] in ("B", "T"):
@@ -141,7 +142,7 @@ class Instruments:
             self.roll_deg = numbers[2] if fields[3] == "T" else -numbers[2]   # T: port up
         else:
             return ""
-        self.heard.add(kind)
+        self.received.add(kind)
         return "attitude"
 
     def _depth(self, kind: str, fields: Tuple[str, ...]) -> str:
@@ -149,22 +150,22 @@ class Instruments:
         if depth is None or depth < 0:
             return ""
         self.water_below_m = depth
-        self.heard.add(kind)
+        self.received.add(kind)
         return "depth"
 
 
 class Assumptions(NamedTuple):
-    """What no sentence tells, told by the user."""
-    origin: Optional[Geodetic] = None       # the first fix
-    north_east_m: Optional[Tuple[float, float]] = None  # where there is no fix at all
-    heading_deg: Optional[float] = None     # until one is heard
+    """Values that sentences do not contain, given by the user."""
+    origin: Optional[Geodetic] = None       # default: the first fix
+    north_east_m: Optional[Tuple[float, float]] = None  # used without a fix
+    heading_deg: Optional[float] = None     # used until a heading is received
     depth_m: float = 0.0
-    depth_is_vehicle: bool = False          # DPT and DBT are the vehicle's own depth
+    depth_is_vehicle: bool = False          # DPT and DBT give the vehicle's own depth
     bottom_m: Optional[float] = None        # depth of the bottom: the vehicle is DPT or DBT above it
 
 
 class NmeaPoses:
-    """Poses in NED_FRD from sentences and assumptions."""
+    """Derives NED_FRD poses from sentences and assumptions."""
 
     def __init__(self, assumed: Assumptions = Assumptions()) -> None:
         self.assumed, self.instruments = assumed, Instruments()
@@ -181,38 +182,38 @@ class NmeaPoses:
         return changed
 
     def pose(self) -> "Optional[Tuple[Vector3, Vector3]]":
-        """Position north, east, down [m] and roll, pitch, yaw [rad]; None as long as place or heading are unknown."""
-        said, assumed = self.instruments, self.assumed
-        heading = said.heading_deg if said.heading_deg is not None else assumed.heading_deg
+        """Position north, east, down [m] and roll, pitch, yaw [rad]; None while position or heading is unknown."""
+        now, assumed = self.instruments, self.assumed
+        heading = now.heading_deg if now.heading_deg is not None else assumed.heading_deg
         if heading is None:
             return None
-        if said.place is not None and self._plane is not None:
-            north, east, _ = self._plane.ned(said.place)  # its third is the curve of the Earth
+        if now.place is not None and self._plane is not None:
+            north, east, _ = self._plane.ned(now.place)  # ignore down: it contains the Earth's curvature
         elif assumed.north_east_m is not None:
             north, east = assumed.north_east_m
         else:
             return None
         down = assumed.depth_m
-        if said.water_below_m is not None and assumed.depth_is_vehicle:
-            down = said.water_below_m
-        elif said.water_below_m is not None and assumed.bottom_m is not None:
-            down = assumed.bottom_m - said.water_below_m
-        angles = (math.radians(said.roll_deg or 0.0), math.radians(said.pitch_deg or 0.0), math.radians(heading))
+        if now.water_below_m is not None and assumed.depth_is_vehicle:
+            down = now.water_below_m
+        elif now.water_below_m is not None and assumed.bottom_m is not None:
+            down = assumed.bottom_m - now.water_below_m
+        angles = (math.radians(now.roll_deg or 0.0), math.radians(now.pitch_deg or 0.0), math.radians(heading))
         return (north, east, down), angles
 
     def unknown(self) -> List[str]:
-        """What the poses hold that nobody said; one phrase each."""
-        said, assumed = self.instruments, self.assumed
+        """Describes each value of the poses that was assumed."""
+        now, assumed = self.instruments, self.assumed
         out = []
-        if said.place is None:
-            out.append("no position (a fix of GGA, RMC or GLL)" + (": it stays where --at says" if assumed.north_east_m else ""))
-        if said.heading_deg is None:
-            out.append("no heading (HDT or PRDID)" + (": --heading is taken" if assumed.heading_deg is not None else ""))
-        if said.pitch_deg is None:
-            out.append("no pitch and roll (PRDID or PHTRO): 0 is taken")
-        if said.water_below_m is None:
-            out.append(f"no depth (DPT or DBT): {assumed.depth_m:g} m is taken")
+        if now.place is None:
+            out.append("no position (a fix of GGA, RMC or GLL)" + (": --at is used" if assumed.north_east_m else ""))
+        if now.heading_deg is None:
+            out.append("no heading (HDT or PRDID)" + (": --heading is used" if assumed.heading_deg is not None else ""))
+        if now.pitch_deg is None:
+            out.append("no pitch and roll (PRDID or PHTRO): 0 is used")
+        if now.water_below_m is None:
+            out.append(f"no depth (DPT or DBT): {assumed.depth_m:g} m is used")
         elif not assumed.depth_is_vehicle and assumed.bottom_m is None:
-            out.append(f"the vehicle's depth: DPT and DBT are the water below it ({assumed.depth_m:g} m is taken; --bottom or "
-                       "--depth-is-vehicle say more)")
+            out.append(f"no vehicle depth: DPT and DBT give the water below it ({assumed.depth_m:g} m is used; set --bottom or "
+                       "--depth-is-vehicle)")
         return out

@@ -1,4 +1,4 @@
-"""A driver for Oculus sonars, emulated or real: connect, fire, take the pings."""
+"""Client for Oculus sonars, emulated or real: connects, sends fire messages, receives pings."""
 from __future__ import annotations
 
 import errno
@@ -15,7 +15,7 @@ from .stream import Message, MessageReader
 
 
 def endpoint(address: str, port: int, lowest: int = 1) -> Tuple[str, int]:
-    """("host", port) of "host" or "host:port". lowest: 0 where one listens, and 0 means any free port."""
+    """Splits "host" or "host:port" into ("host", port). lowest: 0 for listeners, where port 0 means any free port."""
     host, colon, number = address.rpartition(":")
     if not colon:
         return address, port
@@ -25,14 +25,14 @@ def endpoint(address: str, port: int, lowest: int = 1) -> Tuple[str, int]:
 
 
 def _checked(name: str, value: float, low: float, high: float) -> float:
-    if not low <= value <= high:  # true for NaN, too
-        raise ValueError(f"{name} is {value}: it must lie between {low:g} and {high:g}")
+    if not low <= value <= high:  # also rejects NaN
+        raise ValueError(f"{name} is {value}: it must be between {low:g} and {high:g}")
     return value
 
 
 def settings_of(range_m: float, rate_hz: int, gain_percent: float, mode: int, beams: int, bits: int, gains: bool, salinity: float,
                 sound_speed: float, gamma: int, gain_assist: bool, triggered: bool) -> FireSettings:
-    """Trade units to the fields of a fire message; ValueError says which one the sonar does not know."""
+    """Converts settings to the fields of a fire message. Raises ValueError for a value that the sonar does not support."""
     for name, value, choice in (("mode", mode, (1, 2)), ("rate_hz", rate_hz, tuple(layouts.RATE_CODES)),
                                 ("beams", beams, (256, 512)), ("bits", bits, (8, 16, 32))):
         if value not in choice:
@@ -51,19 +51,21 @@ def settings_of(range_m: float, rate_hz: int, gain_percent: float, mode: int, be
 class OculusClient:
     """with OculusClient("127.0.0.2") as sonar: sonar.fire(range_m=5); ping = sonar.ping()
 
-    Keep reading: a sonar resets a client that takes nothing for long, and pings are not kept for it."""
+    Keep reading: the sonar resets a client that stops reading, and does not store pings for it."""
 
     def __init__(self, address: str, port: int = layouts.DATA_PORT, timeout: float = 5.0) -> None:
         self.address, self._timeout = endpoint(address, port), timeout
         self.reader = MessageReader()
-        self.settings: Optional[FireSettings] = None  # asked for last
+        self.settings: Optional[FireSettings] = None  # of the last request
         self._last_fire = b""
         self._ready: Deque[Message] = deque()
-        self._heard = False
+        self._has_received = False
         try:
             self._socket = socket.create_connection(self.address, timeout=timeout)
         except ConnectionRefusedError:
-            raise ConnectionRefusedError(errno.ECONNREFUSED, f"no sonar listens at {self.address[0]}:{self.address[1]}") from None
+            raise ConnectionRefusedError(
+                errno.ECONNREFUSED,
+                f"{self.address[0]}:{self.address[1]} refuses the connection: is a sonar running there?") from None
         except socket.timeout:
             raise TimeoutError(errno.ETIMEDOUT, f"{self.address[0]}:{self.address[1]} did not answer within {timeout:g} s") from None
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -71,11 +73,11 @@ class OculusClient:
     def fire(self, range_m: float = 10, rate_hz: int = 10, gain_percent: float = 50, mode: int = 2, beams: int = 512,
              bits: int = 8, gains: bool = False, salinity: float = 0, sound_speed: float = 0, gamma: int = 127,
              gain_assist: bool = False, triggered: bool = False, version: int = 2) -> FireSettings:
-        """Asks for pings with these settings until others are asked for.
+        """Requests pings with these settings, which apply until the next request.
 
-        rate_hz: 2, 5, 10, 15 or 40, at most; 0 = standby. mode: 1 low frequency, 2 high. gains: each row with a gain in front.
+        rate_hz: maximum, 2, 5, 10, 15 or 40; 0 = standby. mode: 1 low frequency, 2 high. gains: a gain before each row.
         sound_speed: m/s, 0 = the sonar computes it. gamma: exponent of the samples = gamma / 255, 255 = linear.
-        triggered: one ping for each again(). version: of the messages; 2 brings heading, pitch and roll, old drivers use 0."""
+        triggered: one ping for each again(). version: message version; 2 adds heading, pitch and roll, old drivers use 0."""
         if version not in (0, 1, 2):
             raise ValueError(f"version is {version}: it must be 0, 1 or 2")
         if bits == 32 and version != 2:
@@ -87,25 +89,25 @@ class OculusClient:
         return self.settings
 
     def again(self) -> None:
-        """The same fire message once more: the next ping, when the sonar is triggered."""
+        """Sends the last fire message again, which triggers one ping with triggered=True."""
         if not self._last_fire:
-            raise ValueError("nothing was fired yet: call fire() first")
+            raise ValueError("no settings were sent: call fire() first")
         self._send(self._last_fire)
 
     def standby(self) -> None:
-        """No more pings until the next fire()."""
+        """Stops the pings until the next fire()."""
         self.fire(rate_hz=0)
 
     def pings(self, timeout: float = 10.0, count: Optional[int] = None) -> Iterator[Ping]:
-        """Ping after ping, for ever or `count` of them; TimeoutError when none comes for `timeout` seconds, ConnectionError when
-        the sonar closes the connection."""
+        """Yields pings, `count` of them or without limit. Raises TimeoutError after `timeout` seconds without a ping, and
+        ConnectionError when the sonar closes the connection."""
         while count is None or count > 0:
             yield self.ping(timeout)
             if count is not None:
                 count -= 1
 
     def ping(self, timeout: float = 10.0) -> Ping:
-        """The next ping; errors as with pings()."""
+        """Returns the next ping; errors as with pings()."""
         deadline = time.monotonic() + timeout
         while True:
             message = self.message(deadline - time.monotonic())
@@ -116,23 +118,23 @@ class OculusClient:
                 return ping_from(message)
 
     def pings_during(self, act: Callable[[], Any], settle: float = 0.1) -> List[Ping]:
-        """The pings that come while act() runs beside, and until none has come for `settle` seconds after it. What act() raises is
-        raised here. With clock: lockstep or follow time waits for readers, so one thread alone would wait for itself:
-        sonar.pings_during(lambda: control.step(0.5))"""
+        """Runs act() in another thread. Returns the pings received until none arrives for `settle` seconds after act().
+        Exceptions of act() are raised here. Use it with clock: lockstep or follow, where time waits for readers and one thread
+        alone would deadlock: sonar.pings_during(lambda: control.step(0.5))"""
         pings: List[Ping] = []
-        with ThreadPoolExecutor(1) as beside:
-            done = beside.submit(act)
+        with ThreadPoolExecutor(1) as executor:
+            future = executor.submit(act)
             while True:
-                was_done = done.done()
+                was_done = future.done()
                 message = self.message(settle)
                 if message is not None and message.type == layouts.PING:
                     pings.append(ping_from(message))
                 elif message is None and was_done:
-                    done.result()
+                    future.result()
                     return pings
 
     def message(self, timeout: float = 10.0) -> Optional[Message]:
-        """The next message of any kind, dummies among them; None when none is whole within `timeout` seconds."""
+        """Returns the next message of any type, including dummies; None if none is complete within `timeout` seconds."""
         deadline = time.monotonic() + timeout
         while not self._ready:
             left = deadline - time.monotonic()
@@ -143,11 +145,11 @@ class OculusClient:
                 received = self._socket.recv(1 << 18)
             except socket.timeout:
                 return None
-            except ConnectionError:  # closed with our request unread
+            except ConnectionError:  # closed before our request was read
                 received = b""
             if not received:
                 raise self._closed()
-            self._heard = True
+            self._has_received = True
             self.reader.feed(received)
             self._ready.extend(self.reader)
         return self._ready.popleft()
@@ -161,7 +163,7 @@ class OculusClient:
 
     def _closed(self) -> ConnectionError:
         return ConnectionError(f"{self.address[0]} closed the connection" +
-                               ("" if self._heard else " without a word: it may have a client already"))
+                               ("" if self._has_received else " without sending data: it may already have a client"))
 
     def close(self) -> None:
         self._socket.close()

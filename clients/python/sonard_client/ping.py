@@ -1,6 +1,6 @@
-"""A ping as a driver sees it: samples by row and beam, with the ranges and directions they belong to.
+"""A decoded ping: samples by row and beam, with their ranges and directions.
 
-Beam 0 is most to port. Azimuths are positive to port, x is ahead and y to port; only `bearings_rad` is as on the wire.
+Beam 0 is the outermost to port. Azimuths are positive to port, x is ahead and y to port; only `bearings_rad` is as on the wire.
 """
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .stream import Message
 
 
 class Peak(NamedTuple):
-    """One place in the picture. `value` is the sample, divided by the root of its row's gain where there are gains."""
+    """A sample and its position. `value` is the sample, divided by the root of its row's gain if there are gains."""
     value: float
     row: int
     beam: int
@@ -27,11 +27,11 @@ class Peak(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Ping:
-    """One ping result, checked. Grids and vectors are numpy's where it is installed."""
+    """A checked ping result. Grids and vectors are numpy arrays if numpy is installed."""
     number: int
     device_id: int
-    version: int                    # of the message: 0, 1 or 2
-    settings: layouts.FireSettings  # the fire message it was made with, as the sonar echoes it
+    version: int                    # message version: 0, 1 or 2
+    settings: layouts.FireSettings  # the sonar's echo of the fire message
     frequency_hz: float
     sound_speed_mps: float
     temperature_c: float
@@ -40,9 +40,9 @@ class Ping:
     pitch_deg: Optional[float]      # bow up
     roll_deg: Optional[float]       # starboard down
     start_time_s: Optional[float]   # since power-up
-    start_counter: Optional[int]    # versions 0 and 1: 32 bits, free running
+    start_counter: Optional[int]    # versions 0 and 1: 32 bits, free-running
     row_m: float
-    ranges_m: Vector                # of the rows' middles
+    ranges_m: Vector                # centres of the rows
     azimuths_rad: Vector            # of the beams, positive to port
     sample_bits: int                # 8, 16, 24 or 32
     samples: Grid                   # samples[row, beam], as sent
@@ -59,7 +59,7 @@ class Ping:
 
     @property
     def bearings_rad(self) -> Vector:
-        """As on the wire: positive to starboard."""
+        """Bearings as on the wire: positive to starboard."""
         return arrays.vector(-a for a in self.azimuths_rad)
 
     def row(self, row: int) -> Tuple[int, ...]:
@@ -67,20 +67,20 @@ class Ping:
         return tuple(int(self.samples[row, beam]) for beam in range(self.beams))
 
     def amplitudes(self) -> Any:
-        """Samples that can be compared between rows: divided by the root of the row's gain. Floats, rows x beams; without numpy a
-        list of lists."""
+        """Samples divided by the root of their row's gain, so that rows are comparable. Floats, rows x beams (without numpy a
+        list of lists)."""
         gains = self.row_gains or (1,) * self.rows
         if arrays.numpy is not None:
             return self.samples / arrays.numpy.sqrt(arrays.numpy.array(gains, dtype=float))[:, None]
         return [[value / math.sqrt(gain) for value in row] for row, gain in zip(self.samples.tolist(), gains)]
 
     def xy(self, row: int, beam: int) -> Tuple[float, float]:
-        """Metres ahead of the sonar and to port, in the plane of the picture."""
+        """Metres ahead of the sonar and to port, in the plane of the image."""
         r, a = float(self.ranges_m[row]), float(self.azimuths_rad[beam])
         return r * math.cos(a), r * math.sin(a)
 
     def fan_xy(self) -> Tuple[Any, Any]:
-        """Metres ahead and to port of every sample, two grids of rows x beams: ready for a colour mesh."""
+        """Metres ahead and to port of every sample, two grids of rows x beams, as a colour mesh needs."""
         if arrays.numpy is not None:
             outer, a = arrays.numpy.outer, self.azimuths_rad
             return outer(self.ranges_m, arrays.numpy.cos(a)), outer(self.ranges_m, arrays.numpy.sin(a))
@@ -88,19 +88,19 @@ class Ping:
         return [[r * c for c in ahead] for r in self.ranges_m], [[r * s for s in port] for r in self.ranges_m]
 
     def strongest(self, beyond_m: float = 0.0) -> Peak:
-        """The strongest sample, the nearest and most to port of equals; `beyond_m` leaves out the first rows, where the
-        transmitter is heard."""
+        """The strongest sample; of equal ones the nearest, then the outermost to port. `beyond_m` excludes the first rows, which
+        contain the transmitter's leak."""
         first = min(max(math.ceil(beyond_m / self.row_m - 0.5), 0), self.rows - 1)
         if arrays.numpy is not None:
             place = int(self.amplitudes()[first:].argmax())
             row, beam = first + place // self.beams, place % self.beams
         else:
-            row, beam = self._strongest_by_hand(first)
+            row, beam = self._strongest_without_numpy(first)
         gain = self.row_gains[row] if self.row_gains else 1
         value = int(self.samples[row, beam]) / math.sqrt(gain)
         return Peak(value, row, beam, float(self.ranges_m[row]), float(self.azimuths_rad[beam]), *self.xy(row, beam))
 
-    def _strongest_by_hand(self, first: int) -> Tuple[int, int]:
+    def _strongest_without_numpy(self, first: int) -> Tuple[int, int]:
         gains = self.row_gains or (1,) * self.rows
         best, found, where = -1.0, [0], first
         for row, samples in enumerate(self.samples.tolist()[first:], first):
@@ -111,7 +111,7 @@ class Ping:
 
 
 def ping_from(message: Message) -> Ping:
-    """The message of a MessageReader, which has checked its lengths."""
+    """Decodes a ping message of a MessageReader, which has checked its lengths."""
     data, version = message.data, message.header.version
     f = layouts.read_ping_fields(data, version)
     settings = layouts.read_fire(data[layouts.HEADER_BYTES:], version)

@@ -1,4 +1,4 @@
-"""A pose as sonard takes it: a JSON line, or a PoseUpdate of protocol/control/control.proto, encoded here by hand."""
+"""Encodes poses as JSON lines or as PoseUpdate of protocol/control/control.proto, without a protobuf library."""
 from __future__ import annotations
 
 import json
@@ -14,7 +14,7 @@ CLOCKS = {"wall": 1, "sim": 2, "arrival": 3}
 
 @dataclass(frozen=True)
 class PoseMessage:
-    """Everything in the world and body axes of `frame`; checked by whoever makes it."""
+    """All vectors are in the world or body axes of `frame`. The caller checks the values."""
     position_m: Vector3
     orientation: Quaternion
     frame: str
@@ -28,7 +28,7 @@ class PoseMessage:
 
 
 def json_line(pose: PoseMessage) -> bytes:
-    """The keys of ArduPilot's JSON simulator interface, which know neither seq nor angular velocity."""
+    """The keys of ArduPilot's JSON simulator interface, without seq and angular velocity."""
     line: Dict[str, Any] = {"frame": pose.frame, "position": pose.position_m, "quaternion": pose.orientation}
     if pose.timestamp_s is not None:
         line["timestamp"] = pose.timestamp_s
@@ -40,18 +40,18 @@ def json_line(pose: PoseMessage) -> bytes:
 
 
 def pose_update(pose: PoseMessage) -> bytes:
-    """One datagram. Velocities are in body axes there."""
+    """One datagram. Its velocities are in body axes."""
     stamped = pose.timestamp_s is not None
     time = _number(1, CLOCKS[pose.clock if stamped else "arrival"])
     if pose.timestamp_s is not None:
         time += _key(2, 1) + struct.pack("<q", round(pose.timestamp_s * 1e9))
     twist = b""
     if pose.velocity_mps is not None:
-        twist += _part(1, _doubles(to_body(pose.orientation, pose.velocity_mps)))
+        twist += _field(1, _doubles(to_body(pose.orientation, pose.velocity_mps)))
     if pose.angular_velocity_radps is not None:
-        twist += _part(2, _doubles(pose.angular_velocity_radps))
-    return (_part(1, pose.vehicle.encode()) + _number(2, pose.seq) + _part(3, time) + _number(4, FRAMES[pose.frame]) +
-            _part(5, _doubles(pose.position_m)) + _part(6, _doubles(pose.orientation)) + (_part(7, twist) if twist else b"") +
+        twist += _field(2, _doubles(pose.angular_velocity_radps))
+    return (_field(1, pose.vehicle.encode()) + _number(2, pose.seq) + _field(3, time) + _number(4, FRAMES[pose.frame]) +
+            _field(5, _doubles(pose.position_m)) + _field(6, _doubles(pose.orientation)) + (_field(7, twist) if twist else b"") +
             _number(8, pose.reset_counter))
 
 
@@ -73,7 +73,7 @@ def _number(field: int, value: int) -> bytes:
     return _key(field, 0) + _varint(value)
 
 
-def _part(field: int, content: bytes) -> bytes:
+def _field(field: int, content: bytes) -> bytes:
     return _key(field, 2) + _varint(len(content)) + content
 
 

@@ -1,4 +1,4 @@
-"""The few rotations that poses need: quaternions (w, x, y, z), body to world, Hamilton."""
+"""Rotations for poses: Hamilton quaternions (w, x, y, z), body to world."""
 from __future__ import annotations
 
 import math
@@ -17,7 +17,7 @@ def quaternion_from_rpy(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Qu
 
 
 def three(name: str, values: Sequence[float]) -> Vector3:
-    """Three finite numbers, or ValueError."""
+    """Checks that the values are three finite numbers; else raises ValueError."""
     numbers = tuple(float(v) for v in values)
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
         raise ValueError(f"{name} must be three finite numbers, not {values!r}")
@@ -25,7 +25,7 @@ def three(name: str, values: Sequence[float]) -> Vector3:
 
 
 def unit(values: Sequence[float]) -> Quaternion:
-    """Of length 1, from one that nearly is; ValueError where it is not, as sonard would refuse it."""
+    """Normalises a quaternion of nearly unit length; raises ValueError for others, which sonard would refuse."""
     numbers = [float(v) for v in values]
     if len(numbers) != 4 or not all(map(math.isfinite, numbers)):
         raise ValueError(f"a quaternion is four finite numbers w, x, y, z, not {values!r}")
@@ -36,7 +36,7 @@ def unit(values: Sequence[float]) -> Quaternion:
 
 
 def orientation(quaternion: "Sequence[float] | None", rpy: "Sequence[float] | None") -> Quaternion:
-    """Whichever is given; level and ahead when neither is."""
+    """The given quaternion or the one of rpy; no rotation if neither is given."""
     if quaternion is not None and rpy is not None:
         raise ValueError("give quaternion or rpy, not both")
     if quaternion is not None:
@@ -45,14 +45,14 @@ def orientation(quaternion: "Sequence[float] | None", rpy: "Sequence[float] | No
 
 
 def to_body(q: Quaternion, v: Vector3) -> Vector3:
-    """A vector in world axes, in body axes."""
+    """Rotates a vector from world axes to body axes."""
     w, x, y, z = q[0], -q[1], -q[2], -q[3]
     tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
     return v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx
 
 
 def between(a: Quaternion, b: Quaternion, u: float) -> Quaternion:
-    """The way from a (u = 0) to b (u = 1), evenly and the shorter way round."""
+    """Spherical linear interpolation from a (u = 0) to b (u = 1) along the shorter arc."""
     cosine = sum(p * q for p, q in zip(a, b))
     sign = -1.0 if cosine < 0 else 1.0
     angle = math.acos(min(1.0, abs(cosine)))

@@ -1,6 +1,6 @@
-"""The stream of an Oculus sonar cut into messages: bytes go in in any pieces, whole messages come out.
+"""Splits the byte stream of an Oculus sonar into messages, without sockets.
 
-It has no socket. What cannot be a message is skipped byte by byte to the next `53 4F`, and counted.
+Bytes that cannot be a message are skipped one by one up to the next `53 4F`, and counted.
 """
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _EXACT = {layouts.DUMMY: 0, layouts.USER_CONFIGURATION: 12, layouts.STATUS: 126}
 
 @dataclass(frozen=True)
 class Message:
-    """One whole message; `data` is all of it, header included."""
+    """A complete message; `data` includes the header."""
     header: Header
     data: bytes
 
@@ -32,9 +32,9 @@ class MessageReader:
     """reader.feed(received); for message in reader: ..."""
 
     def __init__(self) -> None:
-        self._waiting, self._at = bytearray(), 0  # what is before _at was read or skipped
+        self._waiting, self._at = bytearray(), 0  # bytes before _at are read or skipped
         self.skipped_bytes = 0
-        self.last_fault = ""  # of what was skipped
+        self.last_fault = ""  # reason of the last skip
 
     def feed(self, received: bytes) -> None:
         del self._waiting[:self._at]
@@ -42,7 +42,7 @@ class MessageReader:
         self._waiting += received
 
     def __iter__(self) -> Iterator[Message]:
-        """The whole messages that are there; the rest waits for the next feed()."""
+        """Yields the complete messages; an incomplete one remains for the next feed()."""
         while True:
             message = self._next()
             if message is None:
@@ -52,40 +52,40 @@ class MessageReader:
     def _next(self) -> Optional[Message]:
         while True:
             self._go_to_magic()
-            if self._there() < HEADER_BYTES:
+            if self._available() < HEADER_BYTES:
                 return None
             header = layouts.read_header(self._peek(HEADER_BYTES))
             fault = _header_fault(header)
             if not fault and header.type == layouts.PING:
                 head = layouts.ping_head_bytes(header.version)
-                if self._there() < head:
+                if self._available() < head:
                     return None
                 fault = layouts.ping_fault(self._peek(head), header)
             if fault:
                 self._skip(1, fault)
                 continue
             size = HEADER_BYTES + header.payload_bytes
-            if self._there() < size:
+            if self._available() < size:
                 return None
             data = self._peek(size)
             self._at += size
             return Message(header, data)
 
-    def _there(self) -> int:
+    def _available(self) -> int:
         return len(self._waiting) - self._at
 
     def _peek(self, count: int) -> bytes:
         return bytes(self._waiting[self._at:self._at + count])
 
     def _go_to_magic(self) -> None:
-        """To where the next header may begin: the magic, or a last byte that may be half of one."""
+        """Skips to the next possible header: the magic, or a last byte that may be its first half."""
         found = self._waiting.find(layouts.MAGIC, self._at)
         if found < 0:
             found = len(self._waiting)
             if found > self._at and self._waiting[-1] == layouts.MAGIC[0]:
                 found -= 1
         if found > self._at:
-            self._skip(found - self._at, "bytes that are no message")
+            self._skip(found - self._at, "bytes outside messages")
 
     def _skip(self, count: int, why: str) -> None:
         self._at += count
@@ -94,7 +94,7 @@ class MessageReader:
 
 
 def _header_fault(header: Header) -> str:
-    """Why no message has this header. Lengths are limited before anything waits for so many bytes."""
+    """The reason why a header is invalid, or empty. Limits the length before the reader waits for the payload."""
     if header.type == layouts.PING:
         if header.version > 2:
             return f"ping of version {header.version}"

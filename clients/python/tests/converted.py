@@ -1,10 +1,10 @@
-"""What the tests of converters share: a folder for the log, what was warned, and a track against the way it was made from."""
+"""Shared by the tests of converters: a folder for the log, the warnings, and a comparison of tracks with their source."""
 import math
 import pathlib
 import tempfile
 import unittest
 
-import common  # noqa: F401  puts the package on the path
+import common  # noqa: F401  adds the package to the path
 import made_logs as made
 
 from sonard_client.convert import convert
@@ -26,8 +26,8 @@ class WithFolder(unittest.TestCase):
         self.warned = []
         return convert(self.file(data), warn=self.warned.append, **how)
 
-    def assert_way(self, track, steps, every=1, t0=0.0, metres=0.01, radians=2e-4, origin_down=0.0):
-        """track is the way of made_logs.moment(), in NED_FRD or ENU_FLU; angles to a rounded hundredth of a degree."""
+    def assert_track(self, track, steps, every=1, t0=0.0, metres=0.01, radians=2e-4, origin_down=0.0):
+        """Compares track with made_logs.moment(), in NED_FRD or ENU_FLU; angles to a hundredth of a degree."""
         self.assertEqual(len(track.rows), len(steps), track.rows[:2])
         for row, step in zip(track.rows, steps):
             t, north, east, down, roll, pitch, yaw = made.moment(step)

@@ -1,4 +1,4 @@
-"""Logs of autopilots, robots and instruments, made by hand for the tests: a vehicle that goes north and east and turns."""
+"""Synthetic logs of autopilots, robots and instruments for the tests: a vehicle that moves north-east and turns."""
 import functools
 import math
 import struct
@@ -20,14 +20,14 @@ def times(a, b):
 
 
 def quaternion(roll, pitch, yaw):
-    """w, x, y, z, by rotations about one axis after the other."""
+    """w, x, y, z, as a product of rotations about single axes."""
     about = [(math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)), (math.cos(pitch / 2), 0, math.sin(pitch / 2), 0),
              (math.cos(roll / 2), math.sin(roll / 2), 0, 0)]
     return functools.reduce(times, about)
 
 
 def degrees_at(north, east, down):
-    """Near ORIGIN, by the two radii of curvature: good to a millimetre within 100 m."""
+    """Position near ORIGIN, by the two radii of curvature; accurate to a millimetre within 100 m."""
     latitude, a, e2 = math.radians(ORIGIN[0]), 6378137.0, 6.69437999014e-3
     w = 1 - e2 * math.sin(latitude) ** 2
     meridian, across = a * (1 - e2) / w ** 1.5, a / math.sqrt(w)
@@ -62,7 +62,7 @@ def _centidegrees(angle):
 
 
 def dataflash_log(kinds=("ATT", "POS"), steps=50):
-    """The kinds named, POS at every second step."""
+    """A log with the given messages; POS at every second step."""
     out = b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", 128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
     out += b"".join(map(dataflash_format, DATAFLASH))
     out += dataflash_message("ORGN", 0, 0, round(1e7 * ORIGIN[0]), round(1e7 * ORIGIN[1]), round(100 * ORIGIN[2]))
@@ -85,7 +85,7 @@ def dataflash_log(kinds=("ATT", "POS"), steps=50):
 
 # --- telemetry ---
 
-# Number, seed of the CRC, fields, extensions: written down a second time, from the definitions of the messages.
+# Number, seed of the CRC, fields, extensions: written independently of the package, from the message definitions.
 MAVLINK = {
     "HEARTBEAT": (0, 50, "IBBBBB", ""), "ATTITUDE": (30, 39, "Iffffff", ""), "ATTITUDE_QUATERNION": (31, 246, "Ifffffff", "ffff"),
     "LOCAL_POSITION_NED": (32, 185, "Iffffff", ""), "GLOBAL_POSITION_INT": (33, 104, "IiiiihhhH", ""),
@@ -96,7 +96,7 @@ MAVLINK = {
 
 
 def crc16(data):
-    """CRC-16/MCRF4XX, in the form without bits that small machines use."""
+    """CRC-16/MCRF4XX, in its bytewise form without tables."""
     value = 0xFFFF
     for byte in data:
         part = byte ^ (value & 0xFF)
@@ -118,12 +118,12 @@ def mavlink_frame(name, values, version=2, system=1, sequence=0, signed=False, c
 
 def telemetry_log(kinds=("ATTITUDE", "LOCAL_POSITION_NED"), steps=50, version=2, began_s=1_700_000_000, boot_s=25, frames=(1, 8),
                   turned=(1, 0, 0, 0)):
-    """frames: of ODOMETRY; turned: the axes of its body, in FRD."""
+    """frames: frame_id and child_frame_id of ODOMETRY; turned: rotation of its body axes from FRD."""
     out = b""
 
     def put(step, name, *values, system=1):
         nonlocal out
-        late_us = 1000 * (step * 7 % 5)  # what the radio adds
+        late_us = 1000 * (step * 7 % 5)  # delay of the radio link
         stamp = round(1e6 * (began_s + STEP_S * step)) + late_us
         out += stamp.to_bytes(8, "big") + mavlink_frame(name, values, version, system, step & 0xFF)
 
@@ -153,7 +153,7 @@ def telemetry_log(kinds=("ATTITUDE", "LOCAL_POSITION_NED"), steps=50, version=2,
 # --- ROS messages ---
 
 class Cdr:
-    """Little-endian, or as ROS 1 has it: unpadded."""
+    """CDR, or the unpadded encoding of ROS 1."""
 
     def __init__(self, ros1=False, big=False):
         self.out, self.ros1, self.order = b"", ros1, ">" if big else "<"
@@ -180,7 +180,7 @@ class Cdr:
 
 
 def enu_moment(step):
-    """The same vehicle as ROS tells it: time, east, north, up; x, y, z, w."""
+    """The same moment as in ROS: time, east, north, up; x, y, z, w."""
     t, north, east, down, roll, pitch, yaw = moment(step)
     w, x, y, z = quaternion(roll, -pitch, math.pi / 2 - yaw)
     return t, (east, north, -down), (x, y, z, w)
@@ -230,7 +230,7 @@ def mcap(channels, chunk_messages=10, closed=True, chunked=True, compress=("", l
         head += mcap_record(0x03, struct.pack("<H", number) + _text(schema) + _text("text") + struct.pack("<I", 0))
         head += mcap_record(0x04, struct.pack("<HH", number, number) + _text(topic) + _text(encoding) + struct.pack("<I", 0))
     messages = [mcap_record(0x05, struct.pack("<HIQQ", n, i, round(1e9 * t), 0) + data)
-                for n, (_, _, _, told) in enumerate(channels, 1) for i, (t, data) in enumerate(told)]
+                for n, (_, _, _, logged) in enumerate(channels, 1) for i, (t, data) in enumerate(logged)]
     for first in range(0, len(messages), chunk_messages):
         records = (head if first == 0 else b"") + b"".join(messages[first:first + chunk_messages])
         out += mcap_chunk(records, compress[0], compress[1](records)) if chunked else records
@@ -249,11 +249,11 @@ def bag_record(fields, data):
 def bag(connections, compression="none", pack=lambda data: data):
     """connections: [(topic, type, [(time in s, bytes)])]"""
     inner = b""
-    for number, (topic, kind, told) in enumerate(connections):
+    for number, (topic, kind, logged) in enumerate(connections):
         conn = ("conn", struct.pack("<I", number))
         described = struct.pack("<I", len(kind) + 5) + b"type=" + kind.encode()
         inner += bag_record([("op", b"\x07"), conn, ("topic", topic.encode())], described)
-        for t, data in told:
+        for t, data in logged:
             stamp = struct.pack("<II", int(t), round((t - int(t)) * 1e9))
             inner += bag_record([("op", b"\x02"), conn, ("time", stamp)], data)
     size = ("size", struct.pack("<I", len(inner)))

@@ -1,4 +1,4 @@
-"""What Control says over HTTP, and what it makes of answers; a server of this test's own stands in for sonard."""
+"""Requests of Control over HTTP and its handling of replies, against a fake server."""
 import http.server
 import json
 import socket
@@ -24,7 +24,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def answer(self):
         length = int(self.headers.get("Content-Length", 0))
         body = json.loads(self.rfile.read(length)) if length else None
-        self.server.heard.append((self.command, self.path, dict(self.headers), body))
+        self.server.requests.append((self.command, self.path, dict(self.headers), body))
         if self.path.startswith("/api/v1/events"):
             return self.events()
         status, text = ANSWERS.get(self.path, (200, '{"code":"OK","text":""}'))
@@ -41,49 +41,49 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.wfile.write(b"%x\r\n%s\r\n" % (len(line), line))
         if "clients" in self.path:
             self.server.release.wait(20)  # silence
-        elif "poses" not in self.path:    # there it is cut off without an end
+        elif "poses" not in self.path:    # for poses the stream ends without a last chunk
             self.wfile.write(b"0\r\n\r\n")
         self.close_connection = True
 
     do_GET = do_POST = answer
 
     def log_message(self, *_):
-        """Not into the test's output."""
+        """No output."""
 
 
-class Nobody(unittest.TestCase):
-    def test_says_who_does_not_listen(self):
-        with socket.socket() as taken:  # and does not listen
+class Refused(unittest.TestCase):
+    def test_error_names_the_closed_port(self):
+        with socket.socket() as taken:  # without listen()
             taken.bind(("127.0.0.1", 0))
             port = taken.getsockname()[1]
-            with self.assertRaisesRegex(ConnectionRefusedError, f"nobody listens at 127.0.0.1:{port}: is sonard running"):
+            with self.assertRaisesRegex(ConnectionRefusedError, f"127.0.0.1:{port} refuses the connection: is sonard running"):
                 Control(port=port).status()
-            with self.assertRaisesRegex(ConnectionRefusedError, f"no sonar listens at 127.0.0.1:{port}"):
+            with self.assertRaisesRegex(ConnectionRefusedError, f"127.0.0.1:{port} refuses the connection: is a sonar running"):
                 OculusClient("127.0.0.1", port)
 
 
-class SomethingElse(unittest.TestCase):
-    """A wrong port is said to be one within about two seconds, however long requests may take."""
+class WrongPort(unittest.TestCase):
+    """A wrong port is reported within about two seconds, whatever the timeout of the request."""
 
     def expect(self, port, error, words):
         for ask in (lambda c: c.status(), lambda c: c.load_scene("demo.yaml"), lambda c: c.events()):
             begin = time.monotonic()
-            with self.assertRaisesRegex(error, f"127.0.0.1:{port} {words}.*something else listens there.*8088"):
+            with self.assertRaisesRegex(error, f"127.0.0.1:{port} {words}.*another program listens there.*8088"):
                 ask(Control(port=port))
-            self.assertLess(time.monotonic() - begin, 6)  # 2 s on a quiet machine; requests alone: 30 s, 330 s, for ever
+            self.assertLess(time.monotonic() - begin, 6)  # 2 s on a quiet machine; requests alone: 30 s, 330 s, no limit
 
-    def test_that_is_silent(self):
+    def test_silent_server(self):
         with socket.create_server(("127.0.0.1", 0)) as silent:
             self.expect(silent.getsockname()[1], TimeoutError, "does not answer HTTP within 2 s")
 
-    def test_that_speaks_otherwise(self):
-        for said in (b"SSH-2.0-Other\r\n", b""):
+    def test_other_protocol(self):
+        for greeting in (b"SSH-2.0-Other\r\n", b""):
             with socket.create_server(("127.0.0.1", 0)) as other:
                 def serve():
                     for _ in range(3):
                         connection = other.accept()[0]
                         with connection:
-                            connection.sendall(said)
+                            connection.sendall(greeting)
                             connection.recv(4096)
 
                 thread = threading.Thread(target=serve)
@@ -92,10 +92,10 @@ class SomethingElse(unittest.TestCase):
                 thread.join()
 
 
-class Asked(unittest.TestCase):
+class Requests(unittest.TestCase):
     def setUp(self):
         self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.server.heard, self.server.release = [], threading.Event()
+        self.server.requests, self.server.release = [], threading.Event()
         thread = threading.Thread(target=self.server.serve_forever, args=(0.02,))
         thread.start()
         self.addCleanup(thread.join)
@@ -105,7 +105,7 @@ class Asked(unittest.TestCase):
         self.control = Control("127.0.0.1", self.server.server_address[1], token="secret")
 
     def last(self):
-        method, path, headers, body = self.server.heard[-1]
+        method, path, headers, body = self.server.requests[-1]
         self.assertEqual(headers["Authorization"], "Bearer secret")
         if method == "POST":
             self.assertEqual(headers["Content-Type"], "application/json")
@@ -129,7 +129,7 @@ class Asked(unittest.TestCase):
         self.control.stop_recording()
         self.assertEqual(self.last(), ("POST", "/api/v1/stop_recording", {}))
 
-    def test_refusals_carry_the_sentence(self):
+    def test_refusals_carry_the_message(self):
         with self.assertRaisesRegex(ControlError, "no sonar is called") as caught:
             self.control.set_sonar("rear", range_m=5)
         self.assertEqual((caught.exception.status, caught.exception.code), (400, "REFUSED"))
@@ -160,7 +160,7 @@ class Asked(unittest.TestCase):
         with self.assertRaises(ValueError):
             self.control.set_sonar(range_m=float("nan"))
 
-    def test_events_until_the_end_a_cut_and_silence(self):
+    def test_events_until_end_disconnection_and_timeout(self):
         for kinds in ({"pings": True}, {"poses": True}):
             events = list(self.control.events(**kinds))
             self.assertEqual(events[0]["ping"]["fired_at_ns"], 123)
@@ -171,10 +171,10 @@ class Asked(unittest.TestCase):
             with self.assertRaisesRegex(TimeoutError, "no event"):
                 next(events)
 
-    def test_it_is_the_package_of_this_checkout(self):
+    def test_package_is_of_this_checkout(self):
         self.assertIn(str(PACKAGE), sys.modules[Control.__module__].__file__)
 
-    def test_nobody_there(self):
+    def test_closed_port(self):
         with socket.socket() as unused:
             unused.bind(("127.0.0.1", 0))
             port = unused.getsockname()[1]

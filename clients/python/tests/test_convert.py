@@ -1,5 +1,4 @@
-"""Logs made by hand, converted: poses against the way they were made from; whatever is cut off or changed ends in poses or in one
-sentence."""
+"""Conversion of synthetic logs: poses are compared with their source; truncated or corrupted logs give poses or one error."""
 import contextlib
 import io
 import math
@@ -33,12 +32,12 @@ class Geodesy(unittest.TestCase):
             for got, value in zip(plane.ned(Geodetic(*made.degrees_at(*wanted))), wanted):
                 self.assertAlmostEqual(got, value, delta=2e-3)
 
-    def test_metres_of_one_origin_in_those_of_another(self):
+    def test_conversion_between_origins(self):
         other = LocalPlane(Geodetic(*made.degrees_at(100, 50, -20)))
         for got, value in zip(LocalPlane(HERE).ned_from(other, (1, 2, 3)), (101, 52, -17)):
             self.assertAlmostEqual(got, value, delta=5e-3)
 
-    def test_origins_in_words(self):
+    def test_parsing_of_origins(self):
         self.assertEqual(parse_origin("47.6,-122.33"), Geodetic(47.6, -122.33, 0))
         for bad in ("47.6", "a,b", "91,0,0", "1,2,3,4", "nan,0,0", ""):
             with self.subTest(bad), self.assertRaises(ValueError):
@@ -56,49 +55,49 @@ class Dataflash(WithFolder):
     def test_attitude_and_position_are_paired(self):
         track = self.convert(made.dataflash_log(), origin=HERE)
         self.assertEqual((track.frame, track.source, self.warned), ("NED_FRD", "ATT+POS", []))
-        self.assert_way(track, range(49))  # the last attitude has no position behind it
+        self.assert_track(track, range(49))  # no position follows the last attitude
 
-    def test_the_simulators_truth_goes_first_and_any_source_can_be_asked_for(self):
+    def test_simulators_truth_is_preferred_and_any_source_selectable(self):
         log = made.dataflash_log(("ATT", "POS", "XKF1", "SIM"))
         self.assertEqual(self.convert(log).source, "SIM")
-        self.assert_way(self.convert(log, source="SIM", origin=HERE), range(50))
+        self.assert_track(self.convert(log, source="SIM", origin=HERE), range(50))
         core = self.convert(log, source="XKF1")
-        self.assert_way(core, range(50))
+        self.assert_track(core, range(50))
         self.assertIn("origin: 47.60000000,-122.33000000,10.000", core.comments)
         self.assertAlmostEqual(self.convert(log, source="XKF1:1").rows[0].position_m[2], 102)
-        with self.assertRaisesRegex(ConvertError, r"no poses of 'AHR2'; there is SIM \(50 poses\), XKF1 "):
+        with self.assertRaisesRegex(ConvertError, r"no poses of 'AHR2'; sources: SIM \(50 poses\), XKF1 "):
             self.convert(log, source="AHR2")
 
-    def test_an_origin_that_is_not_the_logs_moves_local_metres(self):
+    def test_another_origin_shifts_local_positions(self):
         other = Geodetic(*made.degrees_at(-30, 20, 0))
         row = self.convert(made.dataflash_log(("XKF1",)), origin=other).rows[0]
         for got, wanted in zip(row.position_m, (30, -20, 2)):
             self.assertAlmostEqual(got, wanted, delta=0.01)
 
-    def test_without_an_origin_the_first_fix_is_it(self):
+    def test_default_origin_is_the_first_fix(self):
         track = self.convert(made.dataflash_log())
         self.assertEqual(track.comments, ["origin: 47.60000000,-122.33000000,8.000 (the first fix)"])
-        self.assert_way(track, range(49), origin_down=2)
+        self.assert_track(track, range(49), origin_down=2)
 
-    def test_a_log_cut_off_is_read_to_its_end(self):
+    def test_truncated_log(self):
         log = made.dataflash_log(("SIM",))
         track = self.convert(log[:-20])
         self.assertEqual(len(track.rows), 49)
         self.assertRegex(self.warned[0], rf"ends within a message, at byte {len(log) - 45}")
 
-    def test_garbage_within_is_passed_over(self):
+    def test_garbage_is_skipped(self):
         log, begin = made.dataflash_log(("SIM",)), len(made.dataflash_log(("SIM",), 10))
         track = self.convert(log[:begin] + b"\xa3\x95\xee" + bytes(500) + log[begin:])
         self.assertEqual(len(track.rows), 50)
-        self.assertRegex(self.warned[0], f"503 bytes are no message, the first at byte {begin}")
+        self.assertRegex(self.warned[0], f"503 bytes outside messages were skipped, the first at byte {begin}")
 
-    def test_a_description_that_contradicts_itself_is_left_out(self):
+    def test_inconsistent_description_is_omitted(self):
         log = made.dataflash_log(("SIM",)).replace(made.dataflash_format("SIM"), made.dataflash_format("SIM", 48))
         with self.assertRaisesRegex(ConvertError, "no poses"):
             self.convert(log)
-        self.assertIn("SIM contradicts itself", self.warned[0])
+        self.assertIn("SIM is inconsistent", self.warned[0])
 
-    def test_old_logs_count_milliseconds(self):
+    def test_old_logs_in_milliseconds(self):
         old = {"SIM": (13, "IccCfLL", "TimeMS,Roll,Pitch,Yaw,Alt,Lat,Lng", "IhhHfii")}
         with mock.patch.dict(made.DATAFLASH, old):
             log = made.dataflash_format("SIM") + b"".join(
@@ -110,32 +109,32 @@ class Dataflash(WithFolder):
 
 
 class Telemetry(WithFolder):
-    def test_attitudes_meet_positions_by_the_vehicles_clock(self):
+    def test_attitudes_and_positions_are_paired_by_the_vehicles_clock(self):
         for version in (1, 2):
             for attitude in ("ATTITUDE", "ATTITUDE_QUATERNION"):
                 with self.subTest(attitude, version=version):
                     track = self.convert(made.telemetry_log((attitude, "LOCAL_POSITION_NED"), version=version))
                     self.assertEqual((track.source, self.warned), (f"{attitude}+LOCAL_POSITION_NED", []))
-                    self.assert_way(track, range(49), t0=25, metres=1e-5, radians=1e-5)
+                    self.assert_track(track, range(49), t0=25, metres=1e-5, radians=1e-5)
                     self.assertEqual(track.comments[0], "origin: 47.60000000,-122.33000000,10.000")
 
-    def test_a_vehicle_that_starts_again_goes_on_in_time(self):
+    def test_time_continues_after_a_restart(self):
         again = made.telemetry_log(began_s=1_700_000_060, boot_s=3)
         rows = self.convert(made.telemetry_log() + again).rows
-        self.assertEqual(len(rows), 99)  # one between the two: a position on either side of it
+        self.assertEqual(len(rows), 99)  # one is interpolated between the two parts
         self.assertAlmostEqual(rows[-1].t_s - rows[0].t_s, 64.8, delta=0.02)
-        self.assertIn("started again (1 x)", self.warned[0])
+        self.assertIn("restarted (1 x)", self.warned[0])
 
-    def test_what_is_better_goes_first(self):
+    def test_order_of_preference(self):
         all_of_it = ("ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "SIM_STATE", "ODOMETRY")
         log = made.telemetry_log(all_of_it)
         self.assertEqual(self.convert(log).source, "ODOMETRY")
-        self.assert_way(self.convert(log), range(50), t0=25, metres=1e-5, radians=1e-5)
+        self.assert_track(self.convert(log), range(50), t0=25, metres=1e-5, radians=1e-5)
         truth = self.convert(log, source="SIM_STATE", origin=HERE)
-        self.assert_way(truth, range(50), t0=1_700_000_000, radians=1e-5)  # it has no time: that of arrival
-        self.assert_way(self.convert(log, source="ATTITUDE+GLOBAL_POSITION_INT", origin=HERE), range(49), t0=25)
+        self.assert_track(truth, range(50), t0=1_700_000_000, radians=1e-5)  # without a timestamp: time of receipt
+        self.assert_track(self.convert(log, source="ATTITUDE+GLOBAL_POSITION_INT", origin=HERE), range(49), t0=25)
 
-    def test_of_several_systems_one_is_taken_and_the_choice_is_told(self):
+    def test_one_of_several_systems_is_used_and_reported(self):
         other = bytearray()
         for step in range(10):
             t, north, east, down, *angles = made.moment(step)
@@ -144,80 +143,80 @@ class Telemetry(WithFolder):
             other += stamp + made.mavlink_frame("LOCAL_POSITION_NED", (step, north, east, down, 0, 0, 0), system=2)
         both = made.telemetry_log() + bytes(other)
         self.assertEqual(len(self.convert(both).rows), 49)
-        self.assertIn("taking 1, which has most", self.warned[0])
+        self.assertIn("using 1, which has most", self.warned[0])
         self.assertEqual(len(self.convert(both, system=2).rows), 10)
-        with self.assertRaisesRegex(ConvertError, "system 9 does not occur; there are 1, 2, 255"):
+        with self.assertRaisesRegex(ConvertError, "system 9 is not in the log; systems: 1, 2, 255"):
             self.convert(both, system=9)
 
     @staticmethod
-    def told_by(component, first, steps, away_m):
-        """[(time of arrival, record)] of ODOMETRY and ATTITUDE with LOCAL_POSITION_NED; places are away_m too deep."""
+    def sent_by(component, first, steps, away_m):
+        """[(time of receipt, record)] of ODOMETRY and ATTITUDE with LOCAL_POSITION_NED; positions are away_m too deep."""
         out = []
         for step in range(first, first + steps):
             t, north, east, down, *angles = made.moment(step)
             place = north, east, down + away_m
-            stamp_us = round(1e6 * (1_700_000_000 + t)) + component  # the others' behind component 1's
+            stamp_us = round(1e6 * (1_700_000_000 + t)) + component  # after those of component 1
             for name, values in (("ODOMETRY", (stamp_us, *place, *made.quaternion(*angles), *[0] * 6, 1, 8, 0, 0, 0)),
                                  ("ATTITUDE", (round(1e3 * t), *angles, 0, 0, 0)),
                                  ("LOCAL_POSITION_NED", (round(1e3 * t), *place, 0, 0, 0))):
                 out.append((stamp_us, stamp_us.to_bytes(8, "big") + made.mavlink_frame(name, values, component=component)))
         return out
 
-    def test_of_several_components_one_is_listened_to_and_the_choice_is_told(self):
-        both = sorted(self.told_by(1, 0, 20, 0) + self.told_by(197, 0, 20, 50), key=lambda record: record[0])
+    def test_one_of_several_components_is_used_and_reported(self):
+        both = sorted(self.sent_by(1, 0, 20, 0) + self.sent_by(197, 0, 20, 50), key=lambda record: record[0])
         for source in ("ODOMETRY", "ATTITUDE+LOCAL_POSITION_NED"):
             with self.subTest(source):
                 track = self.convert(b"".join(record for _, record in both), source=source)
-                self.assert_way(track, range(20), t0=1_700_000_000 if source == "ODOMETRY" else 0, metres=1e-5, radians=1e-5)
+                self.assert_track(track, range(20), t0=1_700_000_000 if source == "ODOMETRY" else 0, metres=1e-5, radians=1e-5)
                 self.assertEqual(len(self.warned), 1)
                 for name in ("ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY"):
-                    self.assertIn(f"{name}: component 1 (left out: 20 messages of 197)", self.warned[0])
+                    self.assertIn(f"{name}: component 1 (omitted: 20 messages of 197)", self.warned[0])
 
-    def test_one_component_can_be_asked_for(self):
+    def test_selected_component(self):
         both = b"".join(record for _, record in
-                        sorted(self.told_by(1, 0, 20, 0) + self.told_by(197, 0, 20, 50), key=lambda record: record[0]))
+                        sorted(self.sent_by(1, 0, 20, 0) + self.sent_by(197, 0, 20, 50), key=lambda record: record[0]))
         for source in ("ODOMETRY", "ATTITUDE+LOCAL_POSITION_NED"):
             for component, away_m in ((1, 0), (197, 50)):
                 track = self.convert(both, source=source, component=component)
                 self.assertEqual((len(track.rows), self.warned), (20, []))
                 for step, row in enumerate(track.rows):
                     self.assertAlmostEqual(row.position_m[2], made.moment(step)[3] + away_m, places=4)
-        with self.assertRaisesRegex(ConvertError, "component 7 tells no pose; such messages come from 1, 197"):
+        with self.assertRaisesRegex(ConvertError, "component 7 sends no poses; components: 1, 197"):
             self.convert(both, component=7)
 
-    def test_after_silence_another_component_is_listened_to(self):
-        for gap_steps, taken, left_out in ((40, "1", "10 messages of 197"), (52, "1, later 197", "none")):
+    def test_another_component_is_used_after_silence(self):
+        for gap_steps, used, omitted in ((40, "1", "10 messages of 197"), (52, "1, later 197", "none")):
             with self.subTest(gap_steps):
-                records = self.told_by(1, 0, 10, 0) + self.told_by(197, 9 + gap_steps, 10, 50)
+                records = self.sent_by(1, 0, 10, 0) + self.sent_by(197, 9 + gap_steps, 10, 50)
                 track = self.convert(b"".join(record for _, record in records))
-                self.assertEqual(len(track.rows), 10 if left_out != "none" else 20)
-                self.assertIn(f"ODOMETRY: component {taken} (left out: {left_out})", self.warned[0])
+                self.assertEqual(len(track.rows), 10 if omitted != "none" else 20)
+                self.assertIn(f"ODOMETRY: component {used} (omitted: {omitted})", self.warned[0])
 
-    def test_components_that_send_different_messages_are_no_choice(self):
-        mixed = [record for _, record in self.told_by(1, 0, 10, 0)]
-        mixed[2::3] = [record for _, record in self.told_by(197, 0, 10, 0)][2::3]  # positions
+    def test_components_with_different_messages_are_combined(self):
+        mixed = [record for _, record in self.sent_by(1, 0, 10, 0)]
+        mixed[2::3] = [record for _, record in self.sent_by(197, 0, 10, 0)][2::3]  # positions
         track = self.convert(b"".join(mixed), source="ATTITUDE+LOCAL_POSITION_NED")
         self.assertEqual((len(track.rows), self.warned), (10, []))
 
-    def test_the_known_value_of_the_checksum(self):
-        self.assertEqual(crc(b"12345678", ord("9")), 0x6F91)  # of CRC-16/MCRF4XX
+    def test_check_value_of_the_crc(self):
+        self.assertEqual(crc(b"12345678", ord("9")), 0x6F91)  # check value of CRC-16/MCRF4XX
 
-    def test_frames_of_tank_cameras_and_signed_ones(self):
+    def test_motion_capture_and_signed_frames(self):
         t, north, east, down, *angles = made.moment(0)
         for name, values in (("ATT_POS_MOCAP", (0, *made.quaternion(*angles), north, east, down, *[0] * 21)),
                              ("VISION_POSITION_ESTIMATE", (0, north, east, down, *angles, *[0] * 21, 5))):
             with self.subTest(name):
                 frame = made.mavlink_frame(name, values, signed=True)
                 track = self.convert(round(1e6 * 77).to_bytes(8, "big") + frame, kind="tlog")
-                self.assert_way(track, range(1), t0=77, metres=1e-6, radians=1e-6)
+                self.assert_track(track, range(1), t0=77, metres=1e-6, radians=1e-6)
 
-    def test_broken_frames_cost_only_themselves(self):
+    def test_broken_frames_do_not_affect_others(self):
         log = bytearray(made.telemetry_log(("ODOMETRY",)))
         middle = log.index(b"\xfd", len(log) // 2) + 30
         log[middle] ^= 0x10
         track = self.convert(bytes(log))
         self.assertEqual(len(track.rows), 49)
-        self.assertRegex(self.warned[0], "bytes are no intact frame, the first at byte [0-9]+")
+        self.assertRegex(self.warned[0], "bytes outside intact frames were skipped, the first at byte [0-9]+")
         track = self.convert(bytes(log[:-5]))
         self.assertEqual(len(track.rows), 48)
         self.assertIn("ends within a frame", self.warned[0])
@@ -227,52 +226,52 @@ class Telemetry(WithFolder):
             with self.subTest(frames):
                 turned = (0, 1, 0, 0) if frames[1] == 13 else (1, 0, 0, 0)
                 track = self.convert(made.telemetry_log(("ODOMETRY",), frames=frames, turned=turned))
-                self.assert_way(track, range(50), t0=25, metres=1e-5, radians=1e-5)
-                self.assertEqual(["x is taken as north" in text for text in self.warned], [True] * (frames[0] == 20))
+                self.assert_track(track, range(50), t0=25, metres=1e-5, radians=1e-5)
+                self.assertEqual(["x is used as north" in text for text in self.warned], [True] * (frames[0] == 20))
 
     def test_a_level_body_in_flu_is_level(self):
-        values = 1000, 1, 2, 3, 0, 1, 0, 0, *[0] * 6, 1, 13, 0, 0, 0  # to NED: half a turn about the axis ahead
+        values = 1000, 1, 2, 3, 0, 1, 0, 0, *[0] * 6, 1, 13, 0, 0, 0  # to NED: half a turn about the forward axis
         row, = self.convert(bytes(8) + made.mavlink_frame("ODOMETRY", values)).rows
         self.assertEqual([abs(part) for part in row.orientation], [1, 0, 0, 0])
 
-    def test_odometry_in_other_frames_is_left_out_and_told(self):
+    def test_odometry_in_unsupported_frames_is_omitted(self):
         for frames in ((21, 8), (1, 20), (20, 1), (1, 0), (12, 12)):
             with self.subTest(frames):
-                told = "frame_id %d and child_frame_id %d" % frames
+                frame_ids = "frame_id %d and child_frame_id %d" % frames
                 self.convert(made.telemetry_log(("ODOMETRY",), 3) + made.telemetry_log(("ODOMETRY",), 2, frames=frames))
-                self.assertIn(f"ODOMETRY with {told} (2 messages) was left out", self.warned[0])
+                self.assertIn(f"ODOMETRY with {frame_ids} (2 messages) was omitted", self.warned[0])
                 with self.assertRaises(ConvertError):
                     self.convert(made.telemetry_log(("ODOMETRY",), 2, frames=frames))
-                self.assertIn(told, self.warned[0])
+                self.assertIn(frame_ids, self.warned[0])
 
 
 class Nmea(WithFolder):
     def test_a_pose_at_every_fix(self):
         track = self.convert(made.nmea_log(), origin=HERE, assumed=self.assumed(bottom_m=20))
         self.assertEqual(self.warned, [])
-        self.assert_way(track, range(20), t0=43200, radians=1e-6)
+        self.assert_track(track, range(20), t0=43200, radians=1e-6)
         self.assertEqual(self.convert(made.nmea_log()).comments, ["origin: 47.60000000,-122.33000000,0.000 (the first fix)"])
-        self.assertIn("DPT and DBT are the water below it", self.warned[0])
+        self.assertIn("DPT and DBT give the water below it", self.warned[0])
 
     @staticmethod
     def assumed(**what):
         return Assumptions(**what)
 
-    def test_times_go_on_past_midnight(self):
+    def test_times_continue_past_midnight(self):
         rows = self.convert(made.nmea_log(began_s=86399)).rows
         self.assertAlmostEqual(rows[-1].t_s - rows[0].t_s, 1.9)
 
-    def test_lines_that_are_none_are_told_with_their_place(self):
+    def test_invalid_lines_are_reported_with_their_offset(self):
         log = made.nmea_log().replace("HEHDT,28.6", "HEHDT,29.6", 1)
         log = log[:400] + "noise\r\n" + log[400:]
         self.convert(log, kind="nmea")
-        self.assertRegex(self.warned[0], r"at byte 0: checksum '..' where .. is right; [2-4] lines were left out")
+        self.assertRegex(self.warned[0], r"at byte 0: checksum is '..', expected ..; lines omitted: [2-4]")
         with self.assertRaisesRegex(ConvertError, "no heading"):
             self.convert(made.nmea_log(kinds=("GGA",)))
 
 
-class Anything(WithFolder):
-    """Whatever happens to a log, the answer is poses or one sentence that names the file."""
+class Corrupted(WithFolder):
+    """Any corrupted log gives poses or one error that names the file."""
 
     LOGS = {"dataflash": made.dataflash_log(("ATT", "POS", "SIM"), 4), "tlog": made.telemetry_log(("ATTITUDE", "ODOMETRY"), 3),
             "mcap": made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", [(i, made.odometry(i)) for i in range(4)]),
@@ -286,14 +285,14 @@ class Anything(WithFolder):
         except ConvertError as error:
             self.assertIn(str(self.folder / "log"), str(error))
 
-    def test_cut_off_anywhere(self):
+    def test_truncated_anywhere(self):
         for kind, log in self.LOGS.items():
             self.assertEqual(format_of(self.file(log)), kind)
             for length in range(0, len(log), 1 + len(log) // 150):
                 with self.subTest(kind, length=length):
                     self.outcome(kind, log[:length])
 
-    def test_bytes_changed_anywhere(self):
+    def test_changed_bytes(self):
         draw = random.Random(1)
         for kind, log in self.LOGS.items():
             for number in range(150):
@@ -303,22 +302,22 @@ class Anything(WithFolder):
                 with self.subTest(kind, number=number):
                     self.outcome(kind, bytes(data))
 
-    def test_what_is_no_log(self):
+    def test_other_files(self):
         for data in (b"", b"\x7fELF" + bytes(100), b"time,x,y\n1,2,3\n"):
             with self.subTest(data[:8]), self.assertRaises(ConvertError):
                 format_of(self.file(data))
 
 
 class Command(WithFolder):
-    def said(self, *words):
+    def run_main(self, *words):
         out, error = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
             code = main([str(w) for w in words])
         return code, out.getvalue(), error.getvalue()
 
-    def test_the_file_that_comes_out(self):
+    def test_output_file(self):
         log, target = self.file(made.dataflash_log(("SIM",), 3), "flight.bin"), self.folder / "way.csv"
-        code, _, text = self.said(log, "-o", target, "--origin", "47.6,-122.33,10", "--body", "rov")
+        code, _, text = self.run_main(log, "-o", target, "--origin", "47.6,-122.33,10", "--body", "rov")
         self.assertEqual(code, 0, text)
         self.assertIn("flight.bin: 3 poses of SIM over 0.2 s, NED_FRD", text)
         lines = target.read_text(encoding="utf-8").splitlines()
@@ -328,30 +327,30 @@ class Command(WithFolder):
         self.assertTrue(all(line.endswith(",rov") for line in lines[5:]))
         self.assertEqual(list(self.folder.glob("*.part")), [])
 
-    def test_the_logs_own_times(self):
+    def test_keep_time(self):
         log = self.file(made.telemetry_log(("SIM_STATE",), 3), "flight.tlog")
-        code, text, _ = self.said(log, "-o", "-", "--keep-time")
+        code, text, _ = self.run_main(log, "-o", "-", "--keep-time")
         self.assertEqual(code, 0)
         self.assertEqual(text.splitlines()[-3].split(",")[0], "1700000000.000000000")
 
-    def test_another_frame_for_a_recording(self):
+    def test_frame_option(self):
         log = self.file(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", [(i, made.odometry(i)) for i in range(3)])]))
-        self.assertTrue(self.said(log, "-o", "-", "--frame", "NED_FRD")[1].startswith("# frame: NED_FRD"))
-        self.assertEqual(self.said(self.file(made.dataflash_log()), "-o", "-", "--frame", "ENU_FLU")[0], 64)
+        self.assertTrue(self.run_main(log, "-o", "-", "--frame", "NED_FRD")[1].startswith("# frame: NED_FRD"))
+        self.assertEqual(self.run_main(self.file(made.dataflash_log()), "-o", "-", "--frame", "ENU_FLU")[0], 64)
 
-    def test_gaps_are_told(self):
+    def test_gaps_are_reported(self):
         late = made.dataflash_message("SIM", 9000000, 0, 0, 0, 0, 476000000, -1223300000, 1, 0, 0, 0)
         log = made.dataflash_log(("SIM",), 3) + late
-        self.assertIn("no pose for 8.8 s after second 0.2", self.said(self.file(log), "-o", "-")[2])
+        self.assertIn("no pose for 8.8 s after second 0.2", self.run_main(self.file(log), "-o", "-")[2])
 
-    def test_what_goes_wrong_has_its_code(self):
+    def test_exit_codes(self):
         log = self.file(made.dataflash_log(("SIM",), 3))
-        self.assertEqual(self.said(self.folder / "none.bin", "-o", "-")[0], 66)
-        self.assertEqual(self.said(log, "-o", self.folder / "no" / "folder.csv")[0], 66)
-        self.assertEqual(self.said(log, "-o", "-", "--origin", "x")[0], 64)
-        self.assertEqual(self.said(log, "-o", "-", "--component", "256")[0], 64)
-        self.assertEqual(self.said(log, "-o", "-", "--body", "a b")[0], 64)
-        self.assertEqual(self.said(self.file(b"\x7fELF"), "-o", "-")[0], 65)
+        self.assertEqual(self.run_main(self.folder / "none.bin", "-o", "-")[0], 66)
+        self.assertEqual(self.run_main(log, "-o", self.folder / "no" / "folder.csv")[0], 66)
+        self.assertEqual(self.run_main(log, "-o", "-", "--origin", "x")[0], 64)
+        self.assertEqual(self.run_main(log, "-o", "-", "--component", "256")[0], 64)
+        self.assertEqual(self.run_main(log, "-o", "-", "--body", "a b")[0], 64)
+        self.assertEqual(self.run_main(self.file(b"\x7fELF"), "-o", "-")[0], 65)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A converted log, taken by `sonard render`: sonard's vehicle is where the log's was."""
+"""`sonard render` with a converted log: the vehicle follows the log."""
 import json
 import pathlib
 import subprocess
@@ -14,7 +14,7 @@ ORIGIN = ",".join(map(str, made.ORIGIN))
 
 
 class Rendered(unittest.TestCase):
-    def test_the_vehicle_goes_the_way_of_the_log(self):
+    def test_vehicle_follows_the_log(self):
         odometry = [(i, made.odometry(i)) for i in range(3)]
         logs = {"flight.bin": (made.dataflash_log(("SIM",), 3), ["--origin", ORIGIN]),
                 "flight.tlog": (made.telemetry_log(("ODOMETRY",), 3), []),

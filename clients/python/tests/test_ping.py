@@ -1,4 +1,4 @@
-"""Pings: every version and width, golden messages, gains, places in the picture; with numpy and without it."""
+"""Pings: all versions and sample widths, golden messages, gains, positions in the image; with and without numpy."""
 import json
 import math
 import os
@@ -20,7 +20,7 @@ def decoded(data):
 
 
 def listed(values):
-    """Rows of a grid as lists, from either kind."""
+    """Rows of either kind of grid as lists."""
     return values if isinstance(values, list) else values.tolist()
 
 
@@ -29,8 +29,8 @@ class Decoding(unittest.TestCase):
         for version in (0, 1, 2):
             with self.subTest(version=version):
                 ping = decoded((GOLDEN / f"ping_v{version}.bin").read_bytes())
-                said = json.loads((GOLDEN / f"ping_v{version}.json").read_text(encoding="utf-8"))
-                fields, blocks = said["fields"], said["blocks"]
+                expected = json.loads((GOLDEN / f"ping_v{version}.json").read_text(encoding="utf-8"))
+                fields, blocks = expected["fields"], expected["blocks"]
                 self.assertEqual((ping.number, ping.version, ping.device_id), (fields["pingId"], version, 7001))
                 self.assertEqual((ping.frequency_hz, ping.temperature_c, ping.pressure_bar), (2098880.5970149254, 12.5, 1.5))
                 self.assertEqual((ping.sound_speed_mps, ping.row_m), (fields["speedOfSoundUsed"], fields["rangeResolution"]))
@@ -58,15 +58,15 @@ class Decoding(unittest.TestCase):
                         self.assertEqual(ping.row(1), tuple(samples[1]))
                         self.assertEqual(ping.row_gains, tuple(gains) if gains else None)
 
-    def test_numpy_is_used_where_it_is_and_not_missed_where_it_is_not(self):
+    def test_numpy_is_optional(self):
         kind = memoryview if arrays.numpy is None else arrays.numpy.ndarray
         self.assertIsInstance(decoded(made_ping(0)).samples, kind)
         if arrays.numpy is None and os.environ.get("SONARD_CLIENT_NUMPY") != "hidden":
-            self.skipTest("numpy is not installed: only what replaces it was tested")
+            self.skipTest("numpy is not installed: only its replacement was tested")
 
 
-class Picture(unittest.TestCase):
-    def test_rows_are_their_middles_and_port_is_positive(self):
+class Image(unittest.TestCase):
+    def test_ranges_are_centres_and_port_is_positive(self):
         ping = decoded(made_ping(0, bearings=[-3000, -1000, 1000, 3000]))
         self.assertEqual([float(r) for r in ping.ranges_m], [0.25, 0.75, 1.25])
         self.assertAlmostEqual(float(ping.azimuths_rad[0]), math.radians(30))
@@ -84,7 +84,7 @@ class Picture(unittest.TestCase):
         self.assertEqual(ping.strongest()[:3], (5, 1, 1))
         self.assertEqual(ping.strongest(beyond_m=1)[:3], (2, 2, 3))
 
-    def test_the_strongest_is_the_nearest_of_equals(self):
+    def test_strongest_is_the_nearest_of_equals(self):
         ping = decoded(made_ping(0, samples=[[0, 0, 0, 0], [0, 9, 9, 0], [9, 0, 0, 0]]))
         self.assertEqual(ping.strongest()[:4], (9, 1, 1, 0.75))
         self.assertEqual(ping.strongest(beyond_m=1e9).row, 2)
@@ -97,7 +97,7 @@ class Requests(unittest.TestCase):
             settings = layouts.read_fire(golden[16:], version)
             self.assertEqual(layouts.fire_bytes(settings, version, layouts.read_header(golden[:16]).destination), golden)
 
-    def test_units_become_fields(self):
+    def test_settings_become_fields(self):
         good = dict(range_m=5, rate_hz=15, gain_percent=70, mode=1, beams=512, bits=16, gains=True, salinity=35, sound_speed=1490,
                     gamma=255, gain_assist=False, triggered=True)
         settings = settings_of(**good)

@@ -1,4 +1,4 @@
-"""Poses as they are sent: rotations against closed forms, protobuf read back by protoc, refusals."""
+"""Encoding of poses: rotations against closed forms, protobuf decoded by protoc, rejected values."""
 import json
 import math
 import re
@@ -16,11 +16,11 @@ from sonard_client.rotations import quaternion_from_rpy, to_body
 PROTOC = shutil.which("protoc")
 
 
-def protoc_says(data):
-    """{"position.x": 1.0, ...} of a PoseUpdate, by protobuf's own compiler."""
+def decoded_by_protoc(data):
+    """{"position.x": 1.0, ...} of a PoseUpdate, decoded by protoc."""
     command = [PROTOC, f"--proto_path={ROOT}/protocol/control", "--decode=sonar.v1.PoseUpdate", "control.proto"]
     text = subprocess.run(command, input=data, capture_output=True, timeout=60, check=True).stdout.decode()
-    said, path = {}, []
+    fields, path = {}, []
     for line in text.splitlines():
         line = line.strip()
         if line.endswith("{"):
@@ -29,12 +29,12 @@ def protoc_says(data):
             path.pop()
         else:
             name, value = line.split(": ", 1)
-            said[".".join(path + [name])] = value
-    return said
+            fields[".".join(path + [name])] = value
+    return fields
 
 
 class Receiver:
-    """A socket that stands in for sonard."""
+    """A socket in place of sonard."""
 
     def __enter__(self):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -68,38 +68,38 @@ class Messages(unittest.TestCase):
                        2.5, "wall", 300, 7)
 
     @unittest.skipUnless(PROTOC, "protoc is not installed")
-    def test_protobuf_reads_what_was_meant(self):
-        said = protoc_says(pose_update(self.pose))
-        self.assertEqual((said["frame"], said["seq"], said["reset_counter"]), ("NED_FRD", "300", "7"))
-        self.assertEqual((said["time.domain"], said["time.ns"]), ("WALL", "2500000000"))
-        self.assertEqual(said["vehicle"], '"rov \\303\\251"')
+    def test_protobuf_fields(self):
+        fields = decoded_by_protoc(pose_update(self.pose))
+        self.assertEqual((fields["frame"], fields["seq"], fields["reset_counter"]), ("NED_FRD", "300", "7"))
+        self.assertEqual((fields["time.domain"], fields["time.ns"]), ("WALL", "2500000000"))
+        self.assertEqual(fields["vehicle"], '"rov \\303\\251"')
         for name, value in (("position.x", 1.5), ("position.y", -2), ("position.z", 300), ("orientation.z", math.sqrt(0.5)),
                             ("twist.linear.x", 2), ("twist.linear.y", -1), ("twist.angular.z", 0.3)):
-            self.assertAlmostEqual(float(said[name]), value)
-        self.assertFalse([name for name in said if re.search(r"(^|\.)\d", name)], "unknown fields")
+            self.assertAlmostEqual(float(fields[name]), value)
+        self.assertFalse([name for name in fields if re.search(r"(^|\.)\d", name)], "unknown fields")
 
     @unittest.skipUnless(PROTOC, "protoc is not installed")
-    def test_without_a_stamp_the_moment_of_receipt_counts(self):
-        said = protoc_says(pose_update(PoseMessage((0, 0, 0), (1, 0, 0, 0), "ENU_FLU")))
-        self.assertEqual((said["time.domain"], said["frame"]), ("ARRIVAL", "ENU_FLU"))
-        self.assertNotIn("time.ns", said)
-        self.assertNotIn("twist.linear.x", said)
+    def test_default_time_is_arrival(self):
+        fields = decoded_by_protoc(pose_update(PoseMessage((0, 0, 0), (1, 0, 0, 0), "ENU_FLU")))
+        self.assertEqual((fields["time.domain"], fields["frame"]), ("ARRIVAL", "ENU_FLU"))
+        self.assertNotIn("time.ns", fields)
+        self.assertNotIn("twist.linear.x", fields)
 
     def test_json(self):
         line = json_line(self.pose)
         self.assertTrue(line.endswith(b"\n"))
-        said = json.loads(line)
-        self.assertEqual((said["frame"], said["vehicle"], said["timestamp"]), ("NED_FRD", "rov é", 2.5))
-        self.assertEqual((said["position"], said["velocity"]), ([1.5, -2, 300], [1, 2, 3]))
+        fields = json.loads(line)
+        self.assertEqual((fields["frame"], fields["vehicle"], fields["timestamp"]), ("NED_FRD", "rov é", 2.5))
+        self.assertEqual((fields["position"], fields["velocity"]), ([1.5, -2, 300], [1, 2, 3]))
 
-    def test_one_datagram_a_pose_and_the_numbers_count_up(self):
+    def test_one_datagram_per_pose_with_increasing_numbers(self):
         with Receiver() as there, PoseSender(there.address, vehicle="rov") as poses:
             poses.send((1, 2, 3), rpy=(0, 0, 0.5))
             poses.send([4, 5, 6], quaternion=[0, 0, 0, 1.0005], vehicle="other")
             first, second = (json.loads(there.socket.recv(4096)) for _ in range(2))
         self.assertEqual((first["vehicle"], second["vehicle"]), ("rov", "other"))
         self.assertAlmostEqual(first["quaternion"][3], math.sin(0.25))
-        self.assertEqual(second["quaternion"], [0, 0, 0, 1])  # repaired
+        self.assertEqual(second["quaternion"], [0, 0, 0, 1])  # normalised
         with Receiver() as there, PoseSender(there.address, "protobuf") as poses:
             for number in (1, 2, 3):
                 poses.send((0, 0, 0))
@@ -107,7 +107,7 @@ class Messages(unittest.TestCase):
 
 
 class Refusals(unittest.TestCase):
-    def test_what_sonard_would_refuse(self):
+    def test_values_that_sonard_refuses(self):
         with Receiver() as there, PoseSender(there.address) as poses:
             for bad in (dict(position=(1, 2)), dict(position=(1, 2, float("nan"))), dict(quaternion=(2, 0, 0, 0)),
                         dict(quaternion=(1, 0, 0)), dict(frame="NED"), dict(quaternion=(1, 0, 0, 0), rpy=(0, 0, 0)),
@@ -115,21 +115,21 @@ class Refusals(unittest.TestCase):
                 with self.subTest(**bad), self.assertRaises(ValueError):
                     poses.send(**dict(dict(position=(0, 0, 0)), **bad))
             poses.send((0, 0, 7))
-            self.assertEqual(json.loads(there.socket.recv(4096))["position"], [0, 0, 7])  # nothing of the rest was sent
+            self.assertEqual(json.loads(there.socket.recv(4096))["position"], [0, 0, 7])  # the others were not sent
 
-    def test_what_no_sender_can_be(self):
+    def test_invalid_senders(self):
         for bad in (dict(encoding="xml"), dict(transport="sctp"), dict(encoding="protobuf", transport="tcp"), dict(clock="wall"),
                     dict(clock="arrival")):
             with self.subTest(**bad), self.assertRaises(ValueError):
                 PoseSender("127.0.0.1:9", **bad)
 
-    def test_nobody_there_is_counted_and_no_error(self):
+    def test_closed_port_is_counted_without_an_error(self):
         with Receiver() as there:
             address = there.address
         with PoseSender(address) as poses:
             for _ in range(20):
                 poses.send((0, 0, 0))
-            self.assertGreater(poses.unheard, 0)
+            self.assertGreater(poses.undelivered, 0)
 
 
 if __name__ == "__main__":

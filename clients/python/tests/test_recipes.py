@@ -1,5 +1,4 @@
-"""docs/poses-from-elsewhere.md: every recipe in it is typed, with logs made by hand and a running sonard; its table of axes is
-computed."""
+"""docs/poses.md: runs every recipe with synthetic logs and a running sonard, and checks the table of axes."""
 import functools
 import math
 import os
@@ -16,19 +15,19 @@ from common import PACKAGE, ROOT, SONARD, config
 from sonard_client import Daemon
 from sonard_client.rotations import quaternion_from_rpy
 
-PAGE = (ROOT / "docs/poses-from-elsewhere.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/poses.md").read_text(encoding="utf-8")
 HALF = math.sqrt(0.5)
 
 
 def logs():
     odometry = [(100 + i, made.odometry(i)) for i in range(4)]
-    told = [(100 + i, made.odometry(i, ros1=True)) for i in range(4)]
+    ros1 = [(100 + i, made.odometry(i, ros1=True)) for i in range(4)]
     return {"flight.bin": made.dataflash_log(("SIM", "ATT", "POS"), 4),
             "flight.tlog": made.telemetry_log(("ODOMETRY", "SIM_STATE"), 4),
             "second.tlog": made.telemetry_log(("ODOMETRY",), 5),
             "dive.mcap": made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", odometry),
                                     ("/tf", "cdr", "tf2_msgs/msg/TFMessage", [(100 + i, made.transforms(i)) for i in range(4)])]),
-            "dive.bag": made.bag([("/odom", "nav_msgs/Odometry", told)]), "nmea.log": made.nmea_log(4).encode(),
+            "dive.bag": made.bag([("/odom", "nav_msgs/Odometry", ros1)]), "nmea.log": made.nmea_log(4).encode(),
             "dive.yaml": config().replace("ADDRESS", "127.0.0.1").encode()}
 
 
@@ -51,11 +50,11 @@ class Recipes(unittest.TestCase):
                 self.assertIn("# frame: ", (folder / f"{csv}.csv").read_text(encoding="utf-8"))
             both = (folder / "both.csv").read_text(encoding="utf-8").splitlines()
             self.assertEqual([sum(line.endswith(b) for line in both) for b in (",rov", ",buoy")], [4, 5])
-            self.assert_file_of_two_is_read(folder, environment)
+            self.assert_file_with_two_bodies(folder, environment)
             self.assertIn("json", daemon.log())
 
-    def assert_file_of_two_is_read(self, folder, environment):
-        """`both.csv` by the reader of sonard: each body has its own lines, and another one is answered with their names."""
+    def assert_file_with_two_bodies(self, folder, environment):
+        """sonard reads `both.csv`: each body has its own lines; the error for another name lists them."""
         dive = (folder / "dive.yaml").read_text(encoding="utf-8")
         text, changed = re.subn(r"initial_pose: \{.*?\}", "trajectory: {file: both.csv, body: BODY}", dive)
         self.assertEqual(changed, 1)
@@ -71,7 +70,7 @@ class Recipes(unittest.TestCase):
 
 
 class Axes(unittest.TestCase):
-    """What of a body looks ahead, to port and up, in the axes of others, and by the table in ours."""
+    """Forward, port and up axes of a body in other conventions, converted by the table."""
 
     @staticmethod
     def product(a, b):

@@ -1,4 +1,4 @@
-"""Recordings of robots, converted: MCAP and ROS 1 bags, every message with a pose, what is compressed, broken off or changed."""
+"""Conversion of MCAP and ROS 1 bags: all messages with poses; compressed, truncated and corrupted files."""
 import bz2
 import json
 import struct
@@ -13,7 +13,7 @@ from sonard_client.convert import ConvertError, compression
 
 
 class ModuleStandIn:
-    """For lz4.frame and compression.zstd, which may not be here: unpacks by turning round."""
+    """Replaces lz4.frame and compression.zstd, which may not be installed: decompresses by reversing."""
     class LZ4FrameDecompressor:
         eof = True
 
@@ -24,45 +24,45 @@ class ModuleStandIn:
     ZstdDecompressor = LZ4FrameDecompressor
 
 
-class Unpacking(unittest.TestCase):
+class Decompression(unittest.TestCase):
     BOMB = bytes(64 << 20)
 
     def refused(self, kind, packed):
-        """Told of far fewer bytes than there are, it takes memory for these few, and for the unpacker itself."""
+        """If the declared size is too small, memory stays limited to that size and the decompressor's own need."""
         tracemalloc.start()
         try:
-            with self.assertRaisesRegex(compression.Unreadable, "unpacks to more than the 1000 bytes that were promised"):
+            with self.assertRaisesRegex(compression.Unreadable, "decompresses to more than the declared 1000 bytes"):
                 compression.unpack(kind, packed, 1000)
             self.assertLess(tracemalloc.get_traced_memory()[1], 16 << 20)
         finally:
             tracemalloc.stop()
 
-    def whole_broken_off_or_too_short(self, kind, pack):
+    def complete_truncated_or_too_short(self, kind, pack):
         data = bytes(range(250)) * 4
         self.assertEqual(compression.unpack(kind, pack(data), 1000), data)
-        for packed in (pack(data)[:-5], pack(data[:-1]), b"", b"nothing that was ever packed"):
+        for packed in (pack(data)[:-5], pack(data[:-1]), b"", b"not compressed data"):
             with self.subTest(kind, packed=packed[-10:]), self.assertRaises(compression.Unreadable):
                 compression.unpack(kind, packed, 1000)
 
     def test_bz2(self):
-        self.whole_broken_off_or_too_short("bz2", bz2.compress)
+        self.complete_truncated_or_too_short("bz2", bz2.compress)
         self.refused("bz2", bz2.compress(self.BOMB))
 
     def test_lz4(self):
         lz4 = compression._module("lz4.frame")
         if lz4 is None:
-            self.skipTest("python3-lz4 is not here")
-        self.whole_broken_off_or_too_short("lz4", lz4.compress)
+            self.skipTest("python3-lz4 is not installed")
+        self.complete_truncated_or_too_short("lz4", lz4.compress)
         self.refused("lz4", lz4.compress(self.BOMB))
 
     def test_zstd(self):
         zstd = compression._module("compression.zstd", "zstandard")
         if zstd is None:
-            self.skipTest("python3-zstandard is not here")
-        self.whole_broken_off_or_too_short("zstd", zstd.compress)
+            self.skipTest("python3-zstandard is not installed")
+        self.complete_truncated_or_too_short("zstd", zstd.compress)
         self.refused("zstd", zstd.compress(self.BOMB))
 
-    def test_modules_are_asked_for_no_more_than_was_promised(self):
+    def test_modules_are_limited_to_the_declared_size(self):
         for kind, module in (("lz4", "lz4.frame"), ("zstd", "compression.zstd")):
             with self.subTest(kind), \
                     mock.patch.object(compression, "_module", lambda *names, m=module: ModuleStandIn if m in names else None):
@@ -83,23 +83,23 @@ class Recordings(WithFolder):
                     encoding = "ros1" if how.get("ros1") else "cdr"
                     track = self.convert(made.mcap([self.channel(maker, schema, encoding=encoding, **how)]), topic=topic)
                     self.assertEqual((track.frame, track.source, self.warned), ("ENU_FLU", topic, []))
-                    self.assert_way(track, range(30), t0=100, metres=1e-9, radians=1e-6)
+                    self.assert_track(track, range(30), t0=100, metres=1e-9, radians=1e-6)
 
-    def test_without_a_stamp_the_time_of_recording_counts(self):
+    def test_default_time_is_that_of_recording(self):
         data = made.mcap([self.channel(made.pose_stamped, "geometry_msgs/msg/PoseStamped", t0=0)], chunked=False)
-        self.assert_way(self.convert(data), range(30), t0=5000, radians=1e-6)
+        self.assert_track(self.convert(data), range(30), t0=5000, radians=1e-6)
 
-    def test_odometry_goes_before_poses_and_doubt_is_an_error(self):
+    def test_odometry_is_preferred_and_ambiguity_is_an_error(self):
         odometry = self.channel(made.odometry, "nav_msgs/msg/Odometry")
         pose = self.channel(made.pose_stamped, "geometry_msgs/msg/PoseStamped", "/pose")
         self.assertEqual(self.convert(made.mcap([pose, odometry])).source, "/odom")
         self.assertEqual(self.convert(made.mcap([pose, odometry]), topic="/pose").source, "/pose")
         second = self.channel(made.odometry, "nav_msgs/msg/Odometry", "/other")
-        with self.assertRaisesRegex(ConvertError, r"'/odom' \(30 poses\), '/other' \(30 poses\); say which"):
+        with self.assertRaisesRegex(ConvertError, r"'/odom' \(30 poses\), '/other' \(30 poses\); select one"):
             self.convert(made.mcap([odometry, second]))
         with self.assertRaisesRegex(ConvertError, "no poses on topic '/nowhere'"):
             self.convert(made.mcap([odometry]), topic="/nowhere")
-        with self.assertRaisesRegex(ConvertError, "no poses: no message"):
+        with self.assertRaisesRegex(ConvertError, "no poses found: expected"):
             self.convert(made.mcap([self.channel(made.odometry, "sensor_msgs/msg/Imu")]))
 
     def test_json_poses(self):
@@ -114,13 +114,13 @@ class Recordings(WithFolder):
 
         track = self.convert(made.mcap([self.channel(line, "", encoding="json")]))
         self.assertEqual(track.frame, "NED_FRD")
-        self.assert_way(track, range(30), radians=1e-6)
+        self.assert_track(track, range(30), radians=1e-6)
         track = self.convert(made.mcap([self.channel(nested, "Pose", encoding="json")]))
         self.assertEqual(track.frame, "ENU_FLU")
-        self.assert_way(track, range(30), t0=100, radians=1e-6)
+        self.assert_track(track, range(30), t0=100, radians=1e-6)
 
     def test_a_recording_of_sonard_itself(self):
-        """The texts are those of docs/recording.md: pictures beside poses."""
+        """Images and poses as in docs/recording.md."""
         def pose(step):
             t, (x, y, z), (a, b, c, d) = made.enu_moment(step)
             return (f'{{"timestamp":{{"sec":100,"nsec":{round(1e9 * t)}}},"frame_id":"world","pose":'
@@ -130,7 +130,7 @@ class Recordings(WithFolder):
         log = made.mcap([image, self.channel(pose, "foxglove.PoseInFrame", "/front/pose", "json", 10)])
         track = self.convert(log)
         self.assertEqual((track.source, track.frame, self.warned), ("/front/pose", "ENU_FLU", []))
-        self.assert_way(track, range(10), t0=100, radians=1e-6)
+        self.assert_track(track, range(10), t0=100, radians=1e-6)
 
     def test_poses_of_the_foxglove_schemas(self):
         def part(field, content):
@@ -148,25 +148,25 @@ class Recordings(WithFolder):
             return part(2, b"map") + part(3, b"rov") + part(4, doubles(position)) + part(5, doubles(xyzw))
 
         track = self.convert(made.mcap([self.channel(in_frame, "foxglove.PoseInFrame", encoding="protobuf", steps=1)]))
-        self.assert_way(track, range(1), t0=100, radians=1e-6)
+        self.assert_track(track, range(1), t0=100, radians=1e-6)
         track = self.convert(made.mcap([self.channel(transform, "foxglove.FrameTransform", encoding="protobuf")]))
         self.assertEqual(track.source, "/odom map->rov")
-        self.assert_way(track, range(30), t0=5000, radians=1e-6)
+        self.assert_track(track, range(30), t0=5000, radians=1e-6)
 
-    def test_a_recording_that_was_not_closed_or_breaks_off(self):
+    def test_unclosed_and_truncated_recordings(self):
         data = made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], closed=False)
         self.assertEqual(len(self.convert(data).rows), 30)
         self.assertIn("was not closed", self.warned[0])
         self.assertEqual(len(self.convert(data[:-1]).rows), 20)
         self.assertRegex(self.warned[0], "ends within a record, at byte [0-9]+")
 
-    def test_a_chunk_whose_checksum_is_wrong_is_left_out(self):
+    def test_chunk_with_wrong_checksum_is_omitted(self):
         data = bytearray(made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")]))
         data[len(data) // 2] ^= 1
         self.assertEqual(len(self.convert(bytes(data)).rows), 20)
-        self.assertRegex(self.warned[0], "at byte [0-9]+: a chunk cannot be read: the checksum .* 1 chunks were left out")
+        self.assertRegex(self.warned[0], "at byte [0-9]+: a chunk cannot be read: its checksum is wrong; chunks omitted: 1")
 
-    def test_a_message_that_is_too_short_is_named(self):
+    def test_short_message_is_reported(self):
         channel = self.channel(made.odometry, "nav_msgs/msg/Odometry")
         channel[3][4] = (channel[3][4][0], channel[3][4][1][:60])
         self.assertEqual(len(self.convert(made.mcap([channel])).rows), 29)
@@ -181,17 +181,17 @@ class Recordings(WithFolder):
             with mock.patch.object(compression, "_module", lambda *names: None), \
                     self.assertRaisesRegex(ConvertError, f"at byte [0-9]+: a chunk is compressed by {kind}: install {package}"):
                 self.convert(data)
-        with self.assertRaisesRegex(ConvertError, "compressed by 'rar', which is not known"):
+        with self.assertRaisesRegex(ConvertError, "compressed by 'rar', which is not supported"):
             self.convert(made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], compress=("rar", lambda d: d)))
 
     def test_bags(self):
-        told = [(5000 + made.STEP_S * i, made.odometry(i, ros1=True)) for i in range(30)]
+        logged = [(5000 + made.STEP_S * i, made.odometry(i, ros1=True)) for i in range(30)]
         for kind, pack in (("none", lambda d: d), ("bz2", bz2.compress)):
             with self.subTest(kind):
-                data = made.bag([("/odom", "nav_msgs/Odometry", told), ("/imu", "sensor_msgs/Imu", [(1, b"")])], kind, pack)
+                data = made.bag([("/odom", "nav_msgs/Odometry", logged), ("/imu", "sensor_msgs/Imu", [(1, b"")])], kind, pack)
                 track = self.convert(data)
                 self.assertEqual((track.frame, track.source, self.warned), ("ENU_FLU", "/odom", []))
-                self.assert_way(track, range(30), t0=100, metres=1e-9, radians=1e-6)
+                self.assert_track(track, range(30), t0=100, metres=1e-9, radians=1e-6)
         with self.assertRaisesRegex(ConvertError, "no poses"):
             self.convert(data[:-10])
         self.assertIn("ends within a record", self.warned[0])

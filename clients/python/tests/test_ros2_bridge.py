@@ -1,4 +1,4 @@
-"""What the ROS 2 bridge computes, without ROS: frames, the line it sends, the status it reads; and that its files are whole."""
+"""The ROS 2 bridge without ROS: frames, the line it sends, the status it reads, and its package files."""
 import ast
 import importlib
 import json
@@ -75,7 +75,7 @@ class Lines(unittest.TestCase):
         self.assertEqual(set(json.loads(c.json_line((0, 0, 0), (1, 0, 0, 0)))), {"frame", "position", "quaternion"})
         self.assertNotIn("velocity", json.loads(c.json_line((0, 0, 0), (1, 0, 0, 0), velocity_in_body=(math.nan, 0, 0))))
 
-    def test_what_is_not_sent(self):
+    def test_invalid_poses_are_not_sent(self):
         for position, stamp in (((math.nan, 0, 0), None), ((1, 2), None), ((0, 0, 0), -1.0), ((0, 0, 0), 5e9)):
             with self.subTest(position, stamp=stamp), self.assertRaises(c.Unusable):
                 c.json_line(position, (1, 0, 0, 0), stamp)
@@ -99,7 +99,7 @@ class Lines(unittest.TestCase):
 
 
 def stubs(parameters):
-    """Modules with just the names the node takes from ROS; they say nothing of whether ROS has them so."""
+    """Stub modules with the names that the node imports from ROS; they do not check ROS itself."""
     class Node:
         def __init__(self, name):
             self.logged, self.subscribed = [], []
@@ -158,7 +158,7 @@ class TheNode(unittest.TestCase):
 
 
 class Package(unittest.TestCase):
-    def test_its_files_are_whole(self):
+    def test_files_are_complete(self):
         package = xml.etree.ElementTree.parse(BRIDGE / "package.xml").getroot()
         self.assertEqual(package.findtext("name"), "sonard_bridge")
         self.assertTrue((BRIDGE / "resource" / package.findtext("name")).exists())
@@ -166,7 +166,7 @@ class Package(unittest.TestCase):
             ast.parse((BRIDGE / name).read_text(encoding="utf-8"), name)
         self.assertIn(f'version="{package.findtext("version")}"', (BRIDGE / "setup.py").read_text(encoding="utf-8"))
 
-    def test_the_node_takes_from_conversions_what_there_is(self):
+    def test_imports_of_the_node_exist(self):
         tree = ast.parse((BRIDGE / "sonard_bridge/node.py").read_text(encoding="utf-8"))
         (taken,) = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module == "conversions"]
         self.assertEqual([a.name for a in taken.names if not hasattr(c, a.name)], [])

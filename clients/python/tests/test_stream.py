@@ -1,4 +1,4 @@
-"""The stream reader: golden messages at every split, junk, broken lengths, recorded pings of a real device."""
+"""The stream reader: golden messages at every split, junk, wrong lengths, recorded pings of a real device."""
 import os
 import pathlib
 import random
@@ -24,7 +24,7 @@ def read(*pieces):
 
 
 class Splits(unittest.TestCase):
-    def test_every_split_in_two_gives_the_same_messages(self):
+    def test_every_split_gives_the_same_messages(self):
         stream = DUMMY_BYTES + (GOLDEN / "ping_v2.bin").read_bytes() + (GOLDEN / "user_config.bin").read_bytes() + DUMMY_BYTES
         whole = [m.data for m in read(stream)[1]]
         self.assertEqual([len(data) for data in whole], [16, 2072, 28, 16])
@@ -38,12 +38,12 @@ class Splits(unittest.TestCase):
         _, messages = read(*(stream[i:i + 1] for i in range(len(stream))))
         self.assertEqual([m.type for m in messages], [PING, DUMMY])
 
-    def test_a_truncated_message_is_never_given_out(self):
+    def test_truncated_message_is_not_returned(self):
         stream = made_ping(1)
         for length in range(len(stream)):
             self.assertEqual(read(stream[:length])[1], [])
 
-    def test_leaving_the_loop_or_feeding_within_it_loses_nothing(self):
+    def test_interrupted_iteration_loses_nothing(self):
         reader = MessageReader()
         reader.feed(made_ping(0, number=1) + made_ping(0, number=2))
         suspended = iter(reader)
@@ -61,14 +61,14 @@ class Junk(unittest.TestCase):
         self.assertEqual(reader.skipped_bytes, len(junk) + 3)
         self.assertTrue(reader.last_fault)
 
-    def test_junk_alone_does_not_pile_up(self):
+    def test_junk_is_not_accumulated(self):
         reader = MessageReader()
         for _ in range(100):
             reader.feed(bytes(1000))
             self.assertEqual(list(reader), [])
         self.assertEqual(reader.skipped_bytes, 100_000)
 
-    def test_a_length_that_lies_costs_only_its_own_message(self):
+    def test_wrong_length_affects_only_its_own_message(self):
         places = {"header size": (10, "<I", 0x00FFFFF0), "endless": (10, "<I", 0xFFFFFFFF), "a little": (10, "<I", 3000),
                   "message size": (118, "<I", 9), "image size": (114, "<I", 1 << 30), "image offset": (110, "<I", 60),
                   "rows": (106, "<H", 4000), "no beams": (108, "<H", 0), "width": (97, "<B", 200),
@@ -81,10 +81,10 @@ class Junk(unittest.TestCase):
                 self.assertEqual([ping_from(m).number for m in messages], [2])
                 self.assertEqual(reader.skipped_bytes, len(broken))
 
-    def test_a_dummy_with_a_length_is_none(self):
+    def test_dummy_with_a_payload_is_skipped(self):
         self.assertEqual([m.type for m in read(struct.pack("<5HIH", 0x4F53, 1, 0, DUMMY, 0, 400, 0) + made_ping(0))[1]], [PING])
 
-    def test_flipped_bits_never_raise_and_whatever_comes_out_is_whole(self):
+    def test_flipped_bits_give_only_complete_messages(self):
         draw = random.Random(4)
         good = [made_ping(0), made_ping(2, 2, gains=[1, 2, 3]), DUMMY_BYTES, (GOLDEN / "status.bin").read_bytes()]
         for _ in range(1500):

@@ -1,5 +1,4 @@
-"""The client with a running sonard: pings of every kind, poses that move the picture, discovery, control, and every example
-of the manuals."""
+"""The client with a running sonard: pings of all kinds, poses, discovery, control, and every example of the manuals."""
 import contextlib
 import io
 import math
@@ -22,13 +21,13 @@ WITH_EXAMPLES = ("README.md", "docs/python.md", "clients/python/README.md")
 A, B = (3.76, 1.37), (3.94, -0.69)  # m ahead and to port: the near spheres of scenes/l-targets.yaml
 
 
-def next_made_with(sonar, settings, patience=50):
-    """The first ping that echoes these settings; the gain may be echoed as the device uses it."""
-    for ping in sonar.pings(timeout=30, count=patience):
+def next_with_settings(sonar, settings, attempts=50):
+    """The first ping that echoes these settings. The echoed gain may differ."""
+    for ping in sonar.pings(timeout=30, count=attempts):
         echo = ping.settings
         if all(getattr(echo, name) == getattr(settings, name) for name in ("flags", "extended", "range", "mode")):
             return ping
-    raise AssertionError("the settings did not arrive")
+    raise AssertionError("no ping with these settings")
 
 
 class Running(unittest.TestCase):
@@ -41,8 +40,8 @@ class Running(unittest.TestCase):
     def tearDownClass(cls):
         cls.daemon.__exit__()
 
-    def eventually(self, condition, patience_s=20):
-        deadline = time.monotonic() + patience_s
+    def eventually(self, condition, timeout_s=20):
+        deadline = time.monotonic() + timeout_s
         while not condition():
             self.assertLess(time.monotonic(), deadline, self.daemon.log()[-2000:])
             time.sleep(0.02)
@@ -52,27 +51,27 @@ class Running(unittest.TestCase):
 
     def test_every_version_and_width(self):
         with OculusClient(self.address) as sonar:
-            for wish in (dict(version=0, beams=256), dict(version=1, bits=16, gains=True), dict(version=2, bits=32),
+            for chosen in (dict(version=0, beams=256), dict(version=1, bits=16, gains=True), dict(version=2, bits=32),
                          dict(mode=1, gains=True)):
-                with self.subTest(**wish):
-                    ping = next_made_with(sonar, sonar.fire(range_m=5, rate_hz=40, **wish))
-                    self.assertEqual(ping.sample_bits, wish.get("bits", 8))
-                    self.assertEqual(ping.beams, wish.get("beams", 512))
-                    self.assertEqual(ping.version, wish.get("version", 2))
-                    self.assertEqual(ping.row_gains is not None, wish.get("gains", False))
+                with self.subTest(**chosen):
+                    ping = next_with_settings(sonar, sonar.fire(range_m=5, rate_hz=40, **chosen))
+                    self.assertEqual(ping.sample_bits, chosen.get("bits", 8))
+                    self.assertEqual(ping.beams, chosen.get("beams", 512))
+                    self.assertEqual(ping.version, chosen.get("version", 2))
+                    self.assertEqual(ping.row_gains is not None, chosen.get("gains", False))
                     self.assertAlmostEqual(float(ping.ranges_m[-1]), 5, delta=0.1)
                     self.assertGreater(float(ping.azimuths_rad[0]), 0.5)
             self.assertEqual(sonar.reader.skipped_bytes, 0)
 
-    def test_left_is_left_and_a_turn_of_the_bow_moves_the_picture(self):
+    def test_image_follows_the_heading(self):
         for encoding in ("json", "protobuf"):
             for yaw in (0.5, 0.0):
                 with self.subTest(encoding, yaw=yaw), OculusClient(self.address) as sonar, \
-                        PoseSender(self.address, encoding) as poses:  # a sender's first pose: there is nothing to carry on from
+                        PoseSender(self.address, encoding) as poses:  # a new sender: without extrapolation
                     settings = sonar.fire(range_m=5, rate_hz=40, gain_percent=20, salinity=30, gain_assist=True)
                     poses.send((0, 0, 0), rpy=(0, 0, yaw), timestamp=time.monotonic())
                     self.eventually(lambda: abs(self.vehicle()["orientation"]["z"] - math.sin(yaw / 2)) < 1e-6)
-                    next_made_with(sonar, settings)
+                    next_with_settings(sonar, settings)
                     list(sonar.pings(timeout=30, count=2))  # may have been made before the pose
                     ping = sonar.ping(timeout=30)
                     self.assertAlmostEqual(ping.heading_deg, 90 - math.degrees(yaw), delta=0.01)
@@ -81,7 +80,7 @@ class Running(unittest.TestCase):
                     nearest = min(math.hypot(there[0] - x, there[1] - y) for x, y in turned)
                     self.assertLess(nearest, 0.25, f"{there} is none of {turned}")
 
-    def test_poses_arrive_as_they_were_meant(self):
+    def test_poses_by_every_transport(self):
         sent = dict(position=(1, -2, -3), rpy=(0.1, -0.2, 0.3))
         expected = {"w": 0.98186, "x": 0.06407, "y": -0.09116, "z": 0.15344}
         for number, (encoding, transport) in enumerate((("json", "udp"), ("protobuf", "udp"), ("json", "tcp"))):
@@ -90,7 +89,7 @@ class Running(unittest.TestCase):
                 self.eventually(lambda: abs(self.vehicle()["position"]["z"] + 3 + number) < 1e-9)
                 vehicle = self.vehicle()
                 self.assertIn(encoding, vehicle["source"])
-                self.assertTrue(1 <= vehicle["position"]["x"] < 1.11, vehicle)  # carried on by the velocity for at most 0.2 s
+                self.assertTrue(1 <= vehicle["position"]["x"] < 1.11, vehicle)  # extrapolated by the velocity for at most 0.2 s
                 self.assertAlmostEqual(vehicle["position"]["y"], -2, places=9)
                 for name, value in expected.items():
                     self.assertAlmostEqual(vehicle["orientation"][name], value, places=3)
@@ -101,7 +100,7 @@ class Running(unittest.TestCase):
             self.assertAlmostEqual(vehicle["position"]["z"], -1)
             self.assertAlmostEqual(abs(vehicle["orientation"]["w"]), 1)
 
-    def test_protobuf_takes_unix_time_and_turn_rates(self):
+    def test_protobuf_with_unix_time_and_angular_velocity(self):
         with PoseSender(self.address, "protobuf", clock="wall", vehicle="rov") as poses:
             poses.send((0, 0, -9), angular_velocity=(0, 0, 0.1), timestamp=time.time())
             self.eventually(lambda: self.vehicle()["position"]["z"] == -9)
@@ -109,7 +108,7 @@ class Running(unittest.TestCase):
 
     def test_discovery(self):
         (sonar,) = discover(20, listen=self.address, enough=1)
-        self.assertEqual((sonar.address, sonar.heard_from, sonar.part_number), (self.address, self.address, 1042))
+        self.assertEqual((sonar.address, sonar.sender, sonar.part_number), (self.address, self.address, 1042))
 
     def test_control(self):
         control = Control(self.address)
@@ -135,14 +134,14 @@ class Running(unittest.TestCase):
         self.assertEqual(control.metrics()['sonard_clients{sonar="front"}'], 0)
         control.set_environment(temperature_c=12)
 
-    def test_silence_and_a_taken_sonar_are_told_apart(self):
+    def test_timeout_and_busy_sonar_have_different_errors(self):
         with OculusClient(self.address) as sonar:
             with self.assertRaisesRegex(TimeoutError, "fire"):
                 sonar.ping(timeout=0.1)
             sonar.fire(range_m=2)
             sonar.ping()
             for asks in (False, True):
-                with self.assertRaisesRegex(ConnectionError, "may have a client already"), OculusClient(self.address) as second:
+                with self.assertRaisesRegex(ConnectionError, "may already have a client"), OculusClient(self.address) as second:
                     if asks:
                         second.fire()
                     second.ping()
@@ -153,24 +152,24 @@ class Running(unittest.TestCase):
             sonar.again()
             self.assertGreater(sonar.ping(20).number, 0)
 
-    def said(self, *words):
+    def run_main(self, *words):
         out = io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
             code = main(list(words))
         return code, out.getvalue()
 
     def test_commands(self):
-        code, text = self.said("listen", self.address, "--count", "2", "--range", "5")
+        code, text = self.run_main("listen", self.address, "--count", "2", "--range", "5")
         self.assertEqual((code, text.count("\nping") + text.startswith("ping")), (0, 2), text)
-        self.assertEqual(self.said("pose", "-1", "2", "-4", "--rpy", "0", "10", "0", "--to", self.address)[0], 0)
+        self.assertEqual(self.run_main("pose", "-1", "2", "-4", "--rpy", "0", "10", "0", "--to", self.address)[0], 0)
         self.eventually(lambda: self.vehicle()["position"] == {"x": -1, "y": 2, "z": -4})
-        self.assertIn('"front"', self.said("status", "--host", self.address)[1])
-        self.assertIn("id 7001", self.said("discover", "--listen", self.address, "--enough", "1", "--seconds", "20")[1])
-        self.assertEqual(self.said("pose", "0", "0", "nan", "--to", self.address)[0], 64)
+        self.assertIn('"front"', self.run_main("status", "--host", self.address)[1])
+        self.assertIn("id 7001", self.run_main("discover", "--listen", self.address, "--enough", "1", "--seconds", "20")[1])
+        self.assertEqual(self.run_main("pose", "0", "0", "nan", "--to", self.address)[0], 64)
         with socket.socket() as unused:
             unused.bind(("127.0.0.1", 0))
             port = str(unused.getsockname()[1])
-        code, text = self.said("status", "--port", port)
+        code, text = self.run_main("status", "--port", port)
         self.assertEqual((code, text[:15]), (69, "sonard_client: "))
 
 
@@ -184,7 +183,7 @@ class Lockstep(unittest.TestCase):
                 self.assertLess(time.monotonic(), deadline)
             began = time.monotonic()
             pings = sonar.pings_during(lambda: control.step(2.0))
-            self.assertLess(time.monotonic() - began, 10, "nobody waits for itself")
+            self.assertLess(time.monotonic() - began, 10, "step and reading must not deadlock")
             self.assertEqual([p.number for p in pings], list(range(1, 21)))
             self.assertEqual(len(sonar.pings_during(lambda: control.step(0.1))), 1)
             with self.assertRaises(ControlError):
@@ -192,7 +191,7 @@ class Lockstep(unittest.TestCase):
 
 
 class Token(unittest.TestCase):
-    def test_a_token_opens_the_door(self):
+    def test_token(self):
         with tempfile.TemporaryDirectory() as folder:
             token = pathlib.Path(folder, "token")
             token.write_text("0123456789abcdef0123\n", encoding="utf-8")
@@ -205,7 +204,7 @@ class Token(unittest.TestCase):
 
 
 class Starting(unittest.TestCase):
-    def test_a_wrong_configuration_says_why(self):
+    def test_error_contains_the_log(self):
         with self.assertRaisesRegex(DaemonFailed, "wrold"):
             with Daemon(config().replace("world", "wrold"), SONARD):
                 self.fail("it runs")
@@ -213,7 +212,7 @@ class Starting(unittest.TestCase):
             with Daemon("nowhere.yaml", SONARD):
                 self.fail("it runs")
 
-    def test_it_ends_with_the_block_and_when_told(self):
+    def test_stops_at_the_end_of_the_block_and_by_stop(self):
         with Daemon(config(), SONARD, ["--seed", "4"]) as daemon:
             process = daemon.process
             self.assertIn("seed      4", daemon.log())
@@ -231,7 +230,7 @@ def examples():
 
 
 class Manuals(unittest.TestCase):
-    """Each example is a program of its own; the addresses of the demo are replaced by those of a daemon made for it."""
+    """Runs each example as a program, against its own daemon."""
 
     def test_every_example_runs(self):
         listed = dict(examples())
@@ -246,7 +245,7 @@ class Manuals(unittest.TestCase):
                 done = subprocess.run([sys.executable, "-B", "-c", here], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
                                       capture_output=True, text=True, timeout=120, check=False)
                 self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
-                self.assertTrue(done.stdout.strip(), "an example prints something")
+                self.assertTrue(done.stdout.strip(), "an example must print something")
 
     def test_the_first_example_has_five_lines(self):
         self.assertEqual(len(dict(examples())["README.md example 1"].strip().splitlines()), 5)

@@ -60,7 +60,7 @@ def sonard_tree(program):
     """sonard lists its commands in a sentence, not in a section."""
     tree = walk(program)
     if len(tree) == 1:
-        commands = ["run", "check", "render", "replay", "bench"]
+        commands = ["run", "check", "render", "replay"]
         tree[()] = (commands, tree[()][1])
         for command in commands:
             tree[(command,)] = ([], read_help(help_of(program, (command,)))[1])

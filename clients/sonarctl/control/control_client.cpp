@@ -14,7 +14,7 @@ std::chrono::milliseconds left_until(Clock::time_point deadline) {
   return std::max(std::chrono::milliseconds(0), std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()));
 }
 
-/// Without the blanks round it, as the daemon reads it.
+/// Without surrounding blanks, as the daemon reads it.
 Result<std::string> token_from(const std::filesystem::path& file) {
   if (file.empty()) return std::string();
   constexpr const char* blanks = " \t\r\n";
@@ -37,6 +37,7 @@ Result<void> judge(const control::Response& answer) {
     case control::StatusCode::ok:
       return {};
     case control::StatusCode::refused:
+    case control::StatusCode::unauthenticated:
       return failure(ErrorKind::bad_data, "sonard refused: " + answer.text);
     case control::StatusCode::unsupported:
       return failure(ErrorKind::unavailable, "this sonard does not know the request" +
@@ -45,12 +46,12 @@ Result<void> judge(const control::Response& answer) {
     case control::StatusCode::failed:
       break;
   }
-  return failure(ErrorKind::bad_data, "sonard could not do it: " + answer.text);
+  return failure(ErrorKind::bad_data, "sonard failed: " + answer.text);
 }
 
 }  // namespace
 
-Result<ControlClient> ControlClient::open(const ControlOptions& options) {
+Result<ControlClient> ControlClient::open(const ControlOptions& options, bool* token_required) {
   const Result<Endpoint> at = parse_endpoint(options.address, {"127.0.0.1", control_port});
   if (!at) return tl::unexpected(at.error());
   const Result<std::string> token = token_from(options.token_file);
@@ -62,9 +63,11 @@ Result<ControlClient> ControlClient::open(const ControlOptions& options) {
   if (!socket) return tl::unexpected(socket.error());
   ControlClient client(std::move(*socket), *at);
   const auto met = client.request(control::Hello{control::protocol_version, "sonarctl", *token}, greeting_patience);
-  if (!met && token->empty() && met.error().text.find("wants a token") != std::string::npos)
+  if (!met && token->empty() && client.last_code_ == control::StatusCode::unauthenticated) {
+    if (token_required != nullptr) *token_required = true;
     return failure(met.error().kind, "sonard at " + text_from(*at) +
-                                         " wants a token: give --token-file FILE, the file that its control.token_file names");
+                                         " requires a token: give --token-file FILE, the file that its control.token_file names");
+  }
   if (!met) return tl::unexpected(met.error());
   return client;
 }
@@ -87,7 +90,8 @@ Result<control::Response> ControlClient::request(Operation operation, std::chron
       events_.push_back(*event);
       continue;
     }
-    if (response.id != id && response.id != 0) continue;  // of an earlier request that was not waited for
+    if (response.id != id && response.id != 0) continue;  // answer to an earlier, abandoned request
+    last_code_ = response.code;
     if (const Result<void> sound = judge(response); !sound) return tl::unexpected(sound.error());
     if (response.id == id) return std::move(response);
   }
@@ -97,7 +101,7 @@ Result<control::DaemonStatus> ControlClient::status(std::chrono::milliseconds pa
   Result<control::Response> answer = request(control::GetStatus{}, patience);
   if (!answer) return tl::unexpected(answer.error());
   auto* status = std::get_if<control::DaemonStatus>(&answer->body);
-  if (status == nullptr) return failure(ErrorKind::bad_data, "sonard answered the question for its status without one");
+  if (status == nullptr) return failure(ErrorKind::bad_data, "sonard answered the status request without a status");
   return std::move(*status);
 }
 
@@ -115,13 +119,13 @@ Result<std::optional<control::Event>> ControlClient::next_event(std::chrono::mil
 }
 
 Error ControlClient::no_control_stream(const std::string& why) const {
-  return {ErrorKind::bad_data, "what listens at tcp " + text_from(at_) + " is not sonard's control stream (" + why +
+  return {ErrorKind::bad_data, "the service at tcp " + text_from(at_) + " is not sonard's control stream (" + why +
                                    "): something else, or a sonard that is stopped. The control stream is on tcp " +
                                    std::to_string(control_port) +
-                                   " if the configuration says nothing else, and sonard's banner names it: --control HOST:PORT"};
+                                   " unless configured otherwise; sonard's banner names it: --control HOST:PORT"};
 }
 
-/// Nothing when the time is over, or, `until_signal`, when a signal came.
+/// nullopt at the end of the time or, with `until_signal`, after a signal.
 Result<std::optional<control::Response>> ControlClient::next_message(Clock::time_point deadline, bool until_signal) {
   for (;;) {
     auto message = parser_.next();
@@ -133,17 +137,17 @@ Result<std::optional<control::Response>> ControlClient::next_message(Clock::time
     }
     std::array<std::byte, 16384> chunk;
     const Read read = read_some(socket_, chunk, left_until(deadline));
-    if (read.what == Wait::closed && !heard_) return tl::unexpected(no_control_stream("it closes the connection"));
+    if (read.what == Wait::closed && !received_) return tl::unexpected(no_control_stream("it closes the connection"));
     if (read.what == Wait::closed)
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " closed the control stream" +
                                                  (read.error.empty() ? "" : ": " + read.error) +
-                                                 "; its log says why (a token, a stop)");
+                                                 "; see its log (a token, a stop)");
     if (read.what == Wait::timed_out || (read.what == Wait::interrupted && until_signal))
       return std::optional<control::Response>{};
     if (read.what != Wait::data) continue;
     const auto received = std::span<const std::byte>(chunk).first(read.size);
-    if (!heard_ && starts_as_http(received)) return tl::unexpected(no_control_stream("it speaks HTTP"));
-    heard_ = true;
+    if (!received_ && starts_as_http(received)) return tl::unexpected(no_control_stream("it speaks HTTP"));
+    received_ = true;
     parser_.feed(received);
   }
 }

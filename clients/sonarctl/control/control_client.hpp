@@ -1,5 +1,5 @@
-// A conversation with a running daemon on its control stream: Hello, requests and their answers, events. Blocking, with limits on
-// every wait. Used by pose, status, events, set, load, object and doctor.
+// Client of a daemon's control stream: Hello, requests and their answers, events. Blocking, with a limit on every wait. Used by
+// pose, status, events, set, load, object and doctor.
 #pragma once
 
 #include <deque>
@@ -17,7 +17,7 @@ inline constexpr std::uint16_t control_port = 14770;
 
 struct ControlOptions {
   std::string address;               // HOST:PORT, empty = 127.0.0.1:14770
-  std::filesystem::path token_file;  // what the daemon's control.token_file holds, when it has one
+  std::filesystem::path token_file;  // the daemon's control.token_file, if it has one
   std::chrono::milliseconds connect_patience{2000};
 };
 
@@ -25,17 +25,17 @@ class ControlClient {
  public:
   using Operation = decltype(control::Request::op);
   static constexpr std::chrono::milliseconds usual_patience{10000};
-  /// A sonard greets at once, whatever it is doing: what is silent for longer is something else.
+  /// sonard greets at once even when busy; a longer silence means another service.
   static constexpr std::chrono::milliseconds greeting_patience{2000};
 
-  /// Connected and greeted. Refused with one sentence: nobody there, no sonard, the token.
-  static Result<ControlClient> open(const ControlOptions& options);
+  /// Connects and greets. Errors: no connection, another service, the token. `token_required` is set when sonard requires a token
+  /// and no token file is given.
+  static Result<ControlClient> open(const ControlOptions& options, bool* token_required = nullptr);
 
-  /// The answer to one request; an answer that says no is an error with sonard's own sentence. Events that come meanwhile are
-  /// kept.
+  /// The answer to one request; a refusal is an error with sonard's text. Events that arrive meanwhile are kept.
   Result<control::Response> request(Operation operation, std::chrono::milliseconds patience = usual_patience);
   Result<control::DaemonStatus> status(std::chrono::milliseconds patience = usual_patience);
-  /// What was subscribed to; nothing when `patience` is over or a signal came.
+  /// The next subscribed event; nullopt after `patience` or a signal.
   Result<std::optional<control::Event>> next_event(std::chrono::milliseconds patience);
 
   const Endpoint& at() const { return at_; }
@@ -48,9 +48,10 @@ class ControlClient {
   Socket socket_;
   Endpoint at_;
   control::DelimitedParser parser_;
-  bool heard_ = false;  // a byte
+  bool received_ = false;  // a byte
   std::deque<control::Event> events_;
   std::uint64_t last_id_ = 0;
+  control::StatusCode last_code_ = control::StatusCode::ok;  // of the last answer
 };
 
 }  // namespace sonar::clients

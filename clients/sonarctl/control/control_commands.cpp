@@ -12,7 +12,7 @@ namespace sonar::clients {
 namespace {
 
 constexpr std::chrono::minutes scene_patience{6};  // the daemon gives up after five
-constexpr std::chrono::hours step_patience{24};    // as long as the pings take; Ctrl-C ends it
+constexpr std::chrono::hours step_patience{24};    // until the pings are computed; Ctrl-C ends it
 
 std::vector<std::string> lines_of(const std::string& text, int most) {
   std::vector<std::string> lines;
@@ -37,7 +37,7 @@ Result<void> watch(ControlClient& client, const StatusOptions& options) {
     if (!status) return tl::unexpected(status.error());
     const bool read = options.json ? std::puts(control::json_of(*status).c_str()) >= 0 && std::fflush(stdout) == 0
                                    : screen.show(lines_of(text_from(*status), terminal_size().lines - 1));
-    if (!read) break;  // nobody reads any more
+    if (!read) break;  // output closed
     wait_s(options.period_s);
   }
   return {};
@@ -64,13 +64,13 @@ Result<void> print_events(const EventsOptions& options) {
     const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return interrupted != 0 || (options.seconds > 0 && elapsed_s >= options.seconds);
   };
-  for (std::uint64_t told = 0; !over() && (options.count == 0 || told < options.count);) {
+  for (std::uint64_t printed = 0; !over() && (options.count == 0 || printed < options.count);) {
     const auto event = client->next_event(std::chrono::milliseconds(100));
     if (!event) return tl::unexpected(event.error());
     if (!*event) continue;
-    ++told;
+    ++printed;
     std::puts(options.json ? control::json_of(**event).c_str() : text_from(**event).c_str());
-    if (std::fflush(stdout) != 0) break;  // nobody reads any more
+    if (std::fflush(stdout) != 0) break;  // output closed
   }
   return {};
 }
@@ -96,7 +96,7 @@ Result<void> step_time(const StepOptions& options) {
     else
       std::printf("%.9f s  %" PRIu64 " ping%s\n", 1e-9 * static_cast<double>(stepped->now_ns), stepped->pings,
                   stepped->pings == 1 ? "" : "s");
-    if (std::fflush(stdout) != 0) break;  // nobody reads any more
+    if (std::fflush(stdout) != 0) break;  // output closed
   }
   return {};
 }

@@ -1,5 +1,5 @@
-// Asking and steering a running daemon: what each command does with one conversation on the control stream. The command line
-// fills the options; results go to standard output.
+// Commands that query or control a running daemon over one connection to its control stream. The command line fills the options;
+// results go to standard output.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@ namespace sonar::clients {
 
 struct StatusOptions {
   ControlOptions control;
-  bool json = false;   // one object a line
-  bool watch = false;  // again every second, until interrupted
+  bool json = false;   // one object per line
+  bool watch = false;  // repeat every second, until interrupted
   double period_s = 1;
 };
 Result<void> print_status(const StatusOptions& options);
@@ -26,7 +26,7 @@ struct EventsOptions {
 };
 Result<void> print_events(const EventsOptions& options);
 
-/// One request and what to say when it was done.
+/// One request and the text to print on success.
 Result<void> steer(const ControlOptions& control, ControlClient::Operation operation, const std::string& done);
 
 struct StepOptions {
@@ -35,10 +35,10 @@ struct StepOptions {
   std::uint64_t count = 1;
   bool json = false;
 };
-/// Step by step, until interrupted; a line says what time it is then, and how many pings came of it.
+/// Step by step, until interrupted; prints per step the time and the number of pings.
 Result<void> step_time(const StepOptions& options);
 
-/// The path as the daemon will find it: a file that exists here is named in full, since the daemon has another folder.
+/// The path for the daemon: absolute for a file that exists here, since the daemon has another working directory.
 std::string scene_path_for(const Endpoint& daemon, const std::string& path);
 Result<void> load_scene(const ControlOptions& control, const std::string& path);
 

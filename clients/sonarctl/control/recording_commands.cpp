@@ -1,4 +1,4 @@
-// recording on the command line: files that a running sonard writes itself, on its own computer.
+// Command line of recording: files that a running sonard writes on its own computer.
 #include <CLI/CLI.hpp>
 #include <memory>
 
@@ -18,9 +18,7 @@ struct RecordingArguments {
 
 CLI::App& add_command(CLI::App& recording, const std::string& name, const std::string& help, RecordingArguments& arguments) {
   CLI::App& command = *recording.add_subcommand(name, help);
-  command.add_option("--control", arguments.control.address, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)")
-      ->check(address());
-  command.add_option("--token-file", arguments.control.token_file, "the daemon's control.token_file, when it has one");
+  add_control_options(command, arguments.control.address, arguments.control.token_file);
   return command;
 }
 
@@ -28,26 +26,27 @@ CLI::App& add_command(CLI::App& recording, const std::string& name, const std::s
 
 Run add_recording(CLI::App& app) {
   CLI::App& recording =
-      *app.add_subcommand("recording", "files that a running sonard writes itself, with true poses and what each beam meets");
+      *app.add_subcommand("recording", "files written by a running sonard, with true poses and the first object of each beam");
   recording.require_subcommand(1);
   recording.footer(
       "examples:\n"
       "  sonarctl recording start run-1.mcap          in the folder that its configuration names\n"
       "  sonarctl recording stop\n"
-      "sonarctl status shows what is recorded; sonarctl record writes files here, as a client of the sonar");
+      "sonarctl status lists the recordings; sonarctl record writes files here, as a client of the sonar");
   const auto arguments = std::make_shared<RecordingArguments>();
   RecordingArguments& a = *arguments;
 
-  CLI::App& start = add_command(recording, "start", "a new file; its end says the kind: .mcap, .pcap, .oculus, .raw", a);
-  start.add_option("FILE", a.start.file, "its name, without a folder")->required();
-  start.add_option("--sonar", a.start.sonar, "which; may be left out when there is one");
+  CLI::App& start =
+      add_command(recording, "start", "start a file; its suffix selects the format: .mcap, .pcap, .oculus, .raw", a);
+  start.add_option("FILE", a.start.file, "file name, without a folder")->required();
+  start.add_option("--sonar", a.start.sonar, "name of the sonar (default: the only one)");
   start.footer("examples:\n  sonarctl recording start run-1.mcap\n  sonarctl recording start left.oculus --sonar left");
   start.callback([&a] {
     a.what = [&a] { return steer(a.control, a.start, a.start.file + " is being recorded; sonarctl status shows how it goes"); };
   });
 
   CLI::App& stop = add_command(recording, "stop", "finish a file, or all of them", a);
-  stop.add_option("FILE", a.stop.file, "which; left out: all");
+  stop.add_option("FILE", a.stop.file, "name of the file (default: all)");
   stop.footer("examples:\n  sonarctl recording stop\n  sonarctl recording stop run-1.mcap");
   stop.callback([&a] {
     a.what = [&a] {

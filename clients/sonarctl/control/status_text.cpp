@@ -103,7 +103,7 @@ std::string text_from(const control::ObjectStatus& o) {
   return text;
 }
 
-/// Only where it is not what every clock on the wall says.
+/// Only for clocks other than real time.
 std::string clock_time(const control::DaemonStatus& s) {
   return s.clock == "realtime" ? std::string() : format(" at %.3f s", 1e-9 * static_cast<double>(s.now_ns));
 }
@@ -113,7 +113,7 @@ std::string text_from(const control::DaemonStatus& s) {
   text += line("config", s.config);
   text += line("scene", s.scene + "  seed " + std::to_string(s.seed) + "  clock " + s.clock + clock_time(s));
   text += line("engine", s.engine);
-  if (!s.control.empty())  // an older daemon does not say it
+  if (!s.control.empty())  // older daemons do not report it
     text += line("control", "tcp " + s.control + (s.http.empty() ? std::string("  http off") : "  http " + s.http));
   text += line("water", water_text(s.environment));
   for (const control::SonarStatus& sonar : s.sonars) text += sonar_text(sonar);

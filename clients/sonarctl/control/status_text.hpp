@@ -1,4 +1,4 @@
-// What a daemon says of itself, as text for people. Pure; status and events print it.
+// Status and events of a daemon as text. No I/O; status and events print it.
 #pragma once
 
 #include <string>

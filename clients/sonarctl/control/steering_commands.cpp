@@ -1,4 +1,4 @@
-// status, events, set, load and object on the command line: everything that goes over the control stream.
+// Command lines of status, events, set, load and object, which use the control stream.
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <utility>
@@ -16,12 +16,10 @@ using text::one_of;
 using text::whole_number;
 
 void add_control_options(CLI::App& command, ControlOptions& control) {
-  command.add_option("--control", control.address, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)")
-      ->check(address());
-  command.add_option("--token-file", control.token_file, "the daemon's control.token_file, when it has one");
+  clients::add_control_options(command, control.address, control.token_file);
 }
 
-/// A body's place on the command line: in the frame named, into the house's.
+/// Pose of a body on the command line, converted from the given frame to ENU/FLU.
 struct PlaceArguments {
   std::vector<double> xyz_m, rpy_deg{0, 0, 0};
   control::Frame frame = control::Frame::enu_flu;
@@ -33,7 +31,7 @@ struct PlaceArguments {
         ->expected(3)
         ->delimiter(',')
         ->check(number());
-    add_frame_option(command, frame, "of these: enu (FLU body, default) or ned (FRD body)");
+    add_frame_option(command, frame, "frame of the pose: enu (FLU body, default) or ned (FRD body)");
   }
   Pose pose() const {
     const RollPitchYaw rpy{rad_from_deg(rpy_deg[0]), rad_from_deg(rpy_deg[1]), rad_from_deg(rpy_deg[2])};
@@ -42,7 +40,7 @@ struct PlaceArguments {
   }
 };
 
-/// `value` takes what was given; it stays empty otherwise.
+/// Sets `value` only when the option was given.
 template <class T>
 CLI::Option* add_optional(CLI::App& command, const std::string& name, std::optional<T>& value, const std::string& help) {
   return command.add_option_function<T>(
@@ -51,7 +49,7 @@ CLI::Option* add_optional(CLI::App& command, const std::string& name, std::optio
 
 std::string name_or_its(const std::string& name) { return name.empty() ? "the sonar" : name; }
 
-/// Commands share one ControlOptions; `what` is set by the sub-command that was named.
+/// Commands share one ControlOptions; the selected sub-command sets `what`.
 struct Steering {
   ControlOptions control;
   std::function<Result<void>()> what;
@@ -74,13 +72,13 @@ struct SonarArguments {
     const bool any = finished.range_m || finished.rate_hz || finished.gain_percent || finished.mode || finished.beams ||
                      finished.transmit || finished.mount;
     if (!any)
-      return failure(ErrorKind::usage, "say what to set: --range, --rate, --gain, --mode, --beams, --transmit or --mount");
+      return failure(ErrorKind::usage, "nothing to set: give --range, --rate, --gain, --mode, --beams, --transmit or --mount");
     return finished;
   }
 };
 
 void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
-  CLI::App& command = *set.add_subcommand("sonar", "as one more client of the sonar would: the last who asks wins");
+  CLI::App& command = *set.add_subcommand("sonar", "change settings as a client of the sonar does; the latest request applies");
   command.footer(
       "examples:\n"
       "  sonarctl set sonar --range 5 --rate 5\n"
@@ -89,13 +87,13 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
   const auto arguments = std::make_shared<SonarArguments>();
   control::SetSonar& s = arguments->sonar;
   add_control_options(command, steering->control);
-  command.add_option("SONAR", s.sonar, "its name; may be left out when there is one");
+  command.add_option("SONAR", s.sonar, "its name (default: the only one)");
   add_optional(command, "--range", s.range_m, "metres")->check(number());
-  add_optional(command, "--rate", s.rate_hz, "pings a second, the product's nearest; 0 = standby")->check(number());
+  add_optional(command, "--rate", s.rate_hz, "ping rate [Hz], rounded to one of the product; 0 = standby")->check(number());
   add_optional(command, "--gain", s.gain_percent, "per cent")->check(number());
   add_optional(command, "--mode", s.mode, "frequency mode, from 0: lowest first")->check(whole_number(0, 255));
-  add_optional(command, "--beams", s.beams, "as the product has them")->check(whole_number(0, 65535));
-  command.add_option("--transmit", arguments->transmit, "off: it hears noise only, whatever its clients ask")
+  add_optional(command, "--beams", s.beams, "number of beams; depends on the product")->check(whole_number(0, 65535));
+  command.add_option("--transmit", arguments->transmit, "on, or off: receive only noise, for all clients")
       ->check(one_of({"on", "off"}));
   CLI::Option* mount = command.add_option("--mount", arguments->mount_xyz_m, "X,Y,Z of the sonar on its vehicle, m");
   mount->expected(3)->delimiter(',')->check(number());
@@ -104,7 +102,7 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
       ->delimiter(',')
       ->check(number())
       ->needs(mount);
-  command.add_option("--mount-frame", arguments->mount_frame, "of these: frd (default) or flu")
+  command.add_option("--mount-frame", arguments->mount_frame, "frame of the mount: frd (default) or flu")
       ->check(one_of({"frd", "flu"}))
       ->needs(mount);
   command.callback([steering, arguments] {
@@ -131,7 +129,7 @@ void add_set_water(CLI::App& set, const std::shared_ptr<Steering>& steering) {
   command.callback([steering, water] {
     steering->what = [steering, water]() -> Result<void> {
       if (!water->temperature_c && !water->salinity_psu && !water->ph && !water->sound_speed_mps)
-        return failure(ErrorKind::usage, "say what to set: --temperature, --salinity, --ph or --sound-speed");
+        return failure(ErrorKind::usage, "nothing to set: give --temperature, --salinity, --ph or --sound-speed");
       return steer(steering->control, *water, "the water is set");
     };
   });
@@ -144,17 +142,17 @@ struct TrajectoryArguments {
   Result<control::SetTrajectory> finish() const {
     control::SetTrajectory finished = wanted;
     if (object) finished.of = control::PoseSample::Of::object;
-    if (object && finished.name.empty()) return failure(ErrorKind::usage, "say which object");
+    if (object && finished.name.empty()) return failure(ErrorKind::usage, "give the name of the object");
     if (pause && resume) return failure(ErrorKind::usage, "either --pause or --resume");
     if (pause || resume) finished.paused = pause;
     if (!finished.paused && !finished.position_s && !finished.speed)
-      return failure(ErrorKind::usage, "say what to do: --pause, --resume, --seek or --speed");
+      return failure(ErrorKind::usage, "nothing to change: give --pause, --resume, --seek or --speed");
     return finished;
   }
 };
 
 void add_set_trajectory(CLI::App& set, const std::shared_ptr<Steering>& steering) {
-  CLI::App& command = *set.add_subcommand("trajectory", "pause, resume, seek or speed of what a body plays from a file");
+  CLI::App& command = *set.add_subcommand("trajectory", "pause, resume, seek or change the speed of a body's trajectory file");
   command.footer(
       "examples:\n"
       "  sonarctl set trajectory --pause\n"
@@ -162,18 +160,18 @@ void add_set_trajectory(CLI::App& set, const std::shared_ptr<Steering>& steering
       "  sonarctl set trajectory buoy --object --seek 0");
   const auto arguments = std::make_shared<TrajectoryArguments>();
   add_control_options(command, steering->control);
-  command.add_option("NAME", arguments->wanted.name, "of the vehicle; may be left out when there is one");
+  command.add_option("NAME", arguments->wanted.name, "name of the vehicle (default: the only one)");
   command.add_flag("--object", arguments->object, "NAME is a moving object of the scene");
-  command.add_flag("--pause", arguments->pause, "it stands still");
+  command.add_flag("--pause", arguments->pause, "stop the body where it is");
   command.add_flag("--resume", arguments->resume, "it goes on");
   add_optional(command, "--seek", arguments->wanted.position_s, "seconds from the start of the trajectory")->check(number(0));
-  add_optional(command, "--speed", arguments->wanted.speed, "seconds of the trajectory for one of the clock")
+  add_optional(command, "--speed", arguments->wanted.speed, "seconds of the trajectory per second of the clock")
       ->check(number(0.001, 1000));
   command.callback([steering, arguments] {
     steering->what = [steering, arguments]() -> Result<void> {
       const Result<control::SetTrajectory> wanted = arguments->finish();
       if (!wanted) return tl::unexpected(wanted.error());
-      return steer(steering->control, *wanted, "done; sonarctl status shows where it is");
+      return steer(steering->control, *wanted, "done; sonarctl status shows the position");
     };
   });
 }
@@ -186,7 +184,7 @@ Run run_of(const std::shared_ptr<Steering>& steering) {
 }  // namespace
 
 Run add_status(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand("status", "what a running sonard says of itself: sonars, clients, figures, vehicles");
+  CLI::App& command = *app.add_subcommand("status", "status of a running sonard: sonars, clients, statistics, vehicles");
   command.footer(
       "examples:\n"
       "  sonarctl status\n"
@@ -195,15 +193,15 @@ Run add_status(CLI::App& app) {
   const auto options = std::make_shared<StatusOptions>();
   add_control_options(command, options->control);
   command.add_flag("--json", options->json, "one JSON object (names as in control.proto)");
-  command.add_flag("--watch", options->watch, "again and again, until Ctrl-C");
-  command.add_option("--period", options->period_s, "seconds between two, with --watch")
+  command.add_flag("--watch", options->watch, "repeat until Ctrl-C");
+  command.add_option("--period", options->period_s, "interval with --watch [s]")
       ->check(number(0.05, 3600.0))
       ->capture_default_str();
   return [options] { return print_status(*options); };
 }
 
 Run add_events(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand("events", "what happens in a running sonard, as it happens");
+  CLI::App& command = *app.add_subcommand("events", "print the events of a running sonard");
   command.footer(
       "examples:\n"
       "  sonarctl events                              clients, poses and scenes\n"
@@ -211,12 +209,12 @@ Run add_events(CLI::App& app) {
   const auto options = std::make_shared<EventsOptions>();
   add_control_options(command, options->control);
   command.add_flag("--pings", options->wanted.pings, "every ping");
-  command.add_flag("--clients", options->wanted.clients, "who connects and leaves");
-  command.add_flag("--poses", options->wanted.poses, "poses that stop, come back, or come from somebody else");
+  command.add_flag("--clients", options->wanted.clients, "clients that connect and disconnect");
+  command.add_flag("--poses", options->wanted.poses, "poses that stop, resume or change their source");
   command.add_flag("--scene", options->wanted.scene, "scenes loaded and changed");
-  command.add_option("--count", options->count, "stop after so many")->check(whole_number());
+  command.add_option("--count", options->count, "stop after this number of events")->check(whole_number());
   command.add_option("--seconds", options->seconds, "stop after this time")->check(number(0));
-  command.add_flag("--json", options->json, "one JSON object a line");
+  command.add_flag("--json", options->json, "one JSON object per line");
   return [options] {
     control::Subscribe& wanted = options->wanted;
     if (!wanted.pings && !wanted.clients && !wanted.poses && !wanted.scene) wanted.clients = wanted.poses = wanted.scene = true;
@@ -240,8 +238,7 @@ Run add_set(CLI::App& app) {
 }
 
 Run add_step(CLI::App& app) {
-  CLI::App& command =
-      *app.add_subcommand("step", "let the time of a sonard with clock: lockstep pass, and wait for the pings due in it");
+  CLI::App& command = *app.add_subcommand("step", "advance the time of a sonard with clock: lockstep and wait for the pings due");
   command.footer(
       "examples:\n"
       "  sonarctl step 0.1                        a tenth of a second; a ping due at its very end belongs to the next step\n"
@@ -249,13 +246,14 @@ Run add_step(CLI::App& app) {
   const auto options = std::make_shared<StepOptions>();
   add_control_options(command, options->control);
   command.add_option("SECONDS", options->dt_s, "more than 0, at most 3600")->required()->check(number(0, 3600));
-  command.add_option("--count", options->count, "so many steps, one after the other (default 1)")->check(whole_number(1));
-  command.add_flag("--json", options->json, "one JSON object a step");
+  command.add_option("--count", options->count, "number of steps (default 1)")->check(whole_number(1));
+  command.add_flag("--json", options->json, "one JSON object per step");
   return [options] { return step_time(*options); };
 }
 
 Run add_load(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand("load", "another scene for a running sonard; pings go on with the old one until then");
+  CLI::App& command =
+      *app.add_subcommand("load", "load another scene into a running sonard; pings use the old one until it is loaded");
   command.footer(
       "examples:\n"
       "  sonarctl load scenes/tank-rod.yaml           a file of this computer\n"
@@ -297,7 +295,7 @@ Run add_object(CLI::App& app) {
       "  sonarctl object add crate-2 --like crate --xyz 3,1,-5 --material steel\n"
       "  sonarctl object place crate-2 --xyz 4,1,-5 --rpy 0,0,45\n"
       "  sonarctl object hide crate-2\n"
-      "an object that moves all the time: sonarctl pose circle --object NAME");
+      "to move an object continuously: sonarctl pose circle --object NAME");
   const auto steering = std::make_shared<Steering>();
   const auto arguments = std::make_shared<ObjectArguments>();
   const auto does = [steering](CLI::App& command, const std::string& example, std::function<Result<void>()> what) {
@@ -305,13 +303,13 @@ Run add_object(CLI::App& app) {
     command.callback([steering, what = std::move(what)] { steering->what = what; });
   };
 
-  does(add_object_command(object, "list", "names, materials, places", steering, arguments), "list",
+  does(add_object_command(object, "list", "list names, materials, poses", steering, arguments), "list",
        [steering] { return list_objects(steering->control); });
 
-  CLI::App& add = add_object_command(object, "add", "one more, in the shape of another", steering, arguments);
-  add.add_option("--like", arguments->added.like, "the object whose shape it takes")->required();
-  add.add_option("--material", arguments->added.material, "of the scene's materials; left out: that of the other");
-  add.add_flag("--moving", arguments->added.moving, "it takes poses from then on (sonarctl pose --object)");
+  CLI::App& add = add_object_command(object, "add", "add an object with the shape of another", steering, arguments);
+  add.add_option("--like", arguments->added.like, "the object whose shape is used")->required();
+  add.add_option("--material", arguments->added.material, "material of the scene (default: that of the other object)");
+  add.add_flag("--moving", arguments->added.moving, "the object accepts poses (sonarctl pose --object)");
   arguments->place.add_to(add, true);
   does(add, "add crate-2 --like crate --xyz 3,1,-5", [steering, arguments] {
     control::AddObject wanted = arguments->added;
@@ -320,13 +318,13 @@ Run add_object(CLI::App& app) {
     return steer(steering->control, wanted, arguments->name + " is in the scene");
   });
 
-  does(add_object_command(object, "remove", "out of the scene for good", steering, arguments), "remove crate-2",
+  does(add_object_command(object, "remove", "remove an object from the scene", steering, arguments), "remove crate-2",
        [steering, arguments] {
          return steer(steering->control, control::RemoveObject{arguments->name}, arguments->name + " is removed");
        });
   for (const bool visible : {true, false}) {
     const std::string name = visible ? "show" : "hide";
-    does(add_object_command(object, name, visible ? "back into the scene" : "out of the scene until it is shown again", steering,
+    does(add_object_command(object, name, visible ? "show a hidden object" : "hide an object until it is shown again", steering,
                             arguments),
          name + " crate-2", [steering, arguments, visible] {
            return steer(steering->control, control::SetObject{arguments->name, visible, {}},
@@ -334,7 +332,7 @@ Run add_object(CLI::App& app) {
          });
   }
 
-  CLI::App& place = add_object_command(object, "place", "to another place", steering, arguments);
+  CLI::App& place = add_object_command(object, "place", "move an object", steering, arguments);
   arguments->place.add_to(place, true);
   does(place, "place crate-2 --xyz 4,1,-5 --rpy 0,0,45", [steering, arguments] {
     return steer(steering->control, control::SetObject{arguments->name, {}, arguments->place.pose()},

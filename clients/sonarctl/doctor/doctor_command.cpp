@@ -1,12 +1,12 @@
-// doctor on the command line.
+// Command line of sonarctl doctor.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 
 #include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
+#include "clients/sonarctl/doctor/checks.hpp"
 #include "clients/sonarctl/doctor/gather.hpp"
-#include "clients/sonarctl/doctor/judge.hpp"
 #include "core/text/arguments.hpp"
 
 namespace sonar::clients {
@@ -25,38 +25,36 @@ Result<void> examine(const Arguments& arguments) {
   questions.status_on = *status_on;
   const Result<doctor::Facts> facts = doctor::gather(questions);
   if (!facts) return tl::unexpected(facts.error());
-  const std::vector<doctor::Finding> findings = doctor::judge(*facts);
+  const std::vector<doctor::Finding> findings = doctor::run_checks(*facts);
   std::fputs(arguments.json ? (doctor::json_from(findings) + "\n").c_str() : doctor::text_from(findings).c_str(), stdout);
   if (!doctor::any_failed(findings)) return {};
-  return failure(ErrorKind::unavailable, "a driver would not be served as it is; the lines that begin with fail say why");
+  return failure(ErrorKind::unavailable, "a driver would not be served; see the lines that begin with fail");
 }
 
 }  // namespace
 
 Run add_doctor(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand("doctor", "is everything as a driver needs it? Each check with cause and cure");
+  CLI::App& command = *app.add_subcommand("doctor", "check everything that a driver needs; faults with cause and cure");
   command.footer(
       "examples:\n"
       "  sonarctl doctor\n"
       "  sonarctl doctor 192.168.2.42 --control 192.168.2.42:14770 --token-file token\n"
       "  sonarctl doctor --json\n"
-      "a sonar that has a client is left alone (--take connects anyway); exit code 0 when nothing failed, 69 otherwise");
+      "does not connect to a sonar that has a client (--take does); exit code 0 when nothing failed, 69 otherwise");
   const auto arguments = std::make_shared<Arguments>();
   doctor::Questions& questions = arguments->questions;
-  command.add_option("ADDRESS", questions.address, "of one sonar, HOST or HOST:PORT; left out: every sonar that can be found")
+  command.add_option("ADDRESS", questions.address, "of one sonar, HOST or HOST:PORT (default: every sonar found)")
       ->check(address());
   command.add_flag("--json", arguments->json, "one JSON object");
   command.add_flag("--take", questions.take,
-                   "connect to sonars that have a client, too; with clients.when_full: take_over it loses its place");
-  command.add_option("--within", questions.within_s, "seconds that all checks together may take")
+                   "also connect to sonars that have a client; with clients.when_full: take_over that client is disconnected");
+  command.add_option("--within", questions.within_s, "time limit of all checks [s]")
       ->check(text::number(1, 600))
       ->capture_default_str();
-  command.add_option("--control", questions.control, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)")
-      ->check(address());
-  command.add_option("--token-file", questions.token_file, "the daemon's control.token_file, when it has one");
+  add_control_options(command, questions.control, questions.token_file);
   command
       .add_option("--http", questions.http,
-                  "HOST:PORT of sonard's HTTP listener (default: where the daemon says, else 127.0.0.1:8088)")
+                  "HOST:PORT of sonard's HTTP listener (default: as the daemon reports, else 127.0.0.1:8088)")
       ->check(address());
   command.add_option("--status-on", arguments->status_on, "where to listen for status messages (default 0.0.0.0:52102)")
       ->check(address());

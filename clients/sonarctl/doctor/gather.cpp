@@ -37,15 +37,15 @@ class Gathering {
 
     ask_control(*control);
     ask_http(*http);
-    given->host = ipv4_of(given->host).value_or(given->host);  // a name that has no address is told by look_at()
+    given->host = ipv4_of(given->host).value_or(given->host);  // examine() reports a name without an address
     const DiscoveryQuestion heads(facts_.address_given ? std::vector{given->host} : std::vector<std::string>{});
     const auto sockets = tcp_sockets();
     const auto programs = programs_by_socket();
     note_daemons(sockets, programs);
     find_sonars(*given, heads);
-    for (SonarFacts& sonar : facts_.sonars) look_at(sonar, sockets, programs);
-    hear_all();
-    heads.take_answers(facts_.heads, Steady::now());
+    for (SonarFacts& sonar : facts_.sonars) examine(sonar, sockets, programs);
+    listen_to_all();
+    heads.receive_answers(facts_.heads, Steady::now());
     facts_.kernel_ports = kernel_ports();
     return std::move(facts_);
   }
@@ -58,11 +58,9 @@ class Gathering {
     facts_.control.at = at;
     facts_.control.given = !questions_.control.empty();
     const auto patience = at.host.starts_with("127.") ? own_patience : short_patience;
-    auto client = ControlClient::open({text_from(at), questions_.token_file, until(patience)});
+    auto client = ControlClient::open({text_from(at), questions_.token_file, until(patience)}, &facts_.control.token_required);
     if (!client) {
       facts_.control.error = client.error().text;
-      const bool of_a_token = facts_.control.error.find("wants a token") != std::string::npos;
-      facts_.control.wants_token = of_a_token && questions_.token_file.empty();
       return;
     }
     auto status = client->status(until(short_patience));
@@ -76,11 +74,11 @@ class Gathering {
       control_.emplace(std::move(*client));
   }
 
-  /// Where the user says, else where the daemon that answered says, else at the usual place.
+  /// At the address given by the user, else that reported by the daemon, else the default.
   void ask_http(Endpoint at) {
     const bool given = !questions_.http.empty();
     const std::optional<control::DaemonStatus>& status = facts_.control.status;
-    if (!given && status && !status->control.empty()) {  // an older one says nothing of either
+    if (!given && status && !status->control.empty()) {  // older versions report neither
       at = parse_endpoint(status->http, usual_http).value_or(usual_http);
       if (at.host == "0.0.0.0") at.host = facts_.control.at.host;
       facts_.http.at = at;
@@ -93,7 +91,7 @@ class Gathering {
     facts_.http = ask_health(at, given, until(at.host.starts_with("127.") ? own_patience : short_patience));
   }
 
-  /// Whoever listens on the sonars' ports and is a sonard.
+  /// The sonard processes that listen on ports of sonars.
   void note_daemons(const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
     for (const SocketLine& socket : sockets) {
       const bool of_sonars = socket.local_port == oculus::tcp_port || socket.local_port == blueview::tcp_port;
@@ -106,15 +104,15 @@ class Gathering {
   void find_sonars(const Endpoint& given, const DiscoveryQuestion& heads) {
     if (facts_.address_given) {
       const auto patience = is_on_this_host(given.host) ? head_patience_here : head_patience;
-      if (!facts_.control.status) heads.take_answers(facts_.heads, no_later_than(Steady::now() + patience));
+      if (!facts_.control.status) heads.receive_answers(facts_.heads, no_later_than(Steady::now() + patience));
       return add_sonar(with_port(given), "");
     }
     if (facts_.control.status)
       for (const control::SonarStatus& s : facts_.control.status->sonars) add_sonar({s.advertised, port_of(s)}, s.name);
     if (facts_.sonars.empty()) {
       status_.listen("", no_later_than(start_ + first_status));
-      for (const HeardStatus& heard : status_.facts().heard) add_sonar({heard.advertised, oculus::tcp_port}, "");
-      heads.take_answers(facts_.heads, Steady::now());
+      for (const ReceivedStatus& received : status_.facts().received) add_sonar({received.advertised, oculus::tcp_port}, "");
+      heads.receive_answers(facts_.heads, Steady::now());
       for (const BlueViewHead& head : facts_.heads) add_sonar(*parse_endpoint(head.at, {}), "");
     }
     if (facts_.sonars.empty()) add_sonar(with_port(given), "");
@@ -129,7 +127,7 @@ class Gathering {
     return s.advertised == host || s.listens.starts_with(host + ":");
   }
 
-  /// Where no port was given: that of the sonar that is known to be there.
+  /// Without a port: that of the sonar known at this address.
   Endpoint with_port(const Endpoint& given) const {
     if (given.port != 0) return given;
     if (facts_.control.status)
@@ -155,32 +153,32 @@ class Gathering {
     facts_.sonars.push_back(std::move(sonar));
   }
 
-  const control::SonarStatus* said_of(const SonarFacts& sonar, const control::DaemonStatus& status) const {
+  const control::SonarStatus* reported_by(const SonarFacts& sonar, const control::DaemonStatus& status) const {
     for (const control::SonarStatus& s : status.sonars)
       if (is_at(s, sonar.at.host) && port_of(s) == sonar.at.port) return &s;
     return nullptr;
   }
 
   void note_clients(SonarFacts& sonar, const std::vector<SocketLine>& sockets) {
-    const control::SonarStatus* said = facts_.control.status ? said_of(sonar, *facts_.control.status) : nullptr;
-    if (said != nullptr) {
-      sonar.says = *said;
-      if (sonar.name.empty()) sonar.name = said->name;
-      for (const control::ClientStatus& client : said->clients) sonar.clients.push_back(client.address);
+    const control::SonarStatus* reported = facts_.control.status ? reported_by(sonar, *facts_.control.status) : nullptr;
+    if (reported != nullptr) {
+      sonar.reported = *reported;
+      if (sonar.name.empty()) sonar.name = reported->name;
+      for (const control::ClientStatus& client : reported->clients) sonar.clients.push_back(client.address);
       return;
     }
-    // Nobody tells: the kernel knows of this computer, the status message of any.
+    // Without a daemon: the connections of this computer's kernel, else the client named by the status message.
     for (const SocketLine& socket : sockets)
       if (socket.state == established && socket.local_port == sonar.at.port && socket.local_host == sonar.at.host)
         sonar.clients.push_back(socket.remote_host + ":" + std::to_string(socket.remote_port));
     if (!sonar.clients.empty() || sonar.blueview) return;
     status_.listen(sonar.at.host, no_later_than(start_ + first_status));
-    for (const HeardStatus& heard : status_.facts().heard)
-      if (!heard.client.empty() && (heard.advertised == sonar.at.host || heard.from == sonar.at.host))
-        sonar.clients.push_back(heard.client);
+    for (const ReceivedStatus& received : status_.facts().received)
+      if (!received.client.empty() && (received.advertised == sonar.at.host || received.from == sonar.at.host))
+        sonar.clients.push_back(received.client);
   }
 
-  void look_at(SonarFacts& sonar, const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
+  void examine(SonarFacts& sonar, const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
     const auto ip = ipv4_of(sonar.at.host);
     if (!ip) {
       sonar.unresolved = ip.error().text;
@@ -194,24 +192,24 @@ class Gathering {
         sonar.listeners.push_back(holder_of(socket, programs));
     }
     if (left_until(deadline_) < 500ms) {
-      sonar.time_was_over = true;
+      sonar.out_of_time = true;
       return;
     }
     note_clients(sonar, sockets);
     if (sonar.clients.empty() || questions_.take) watch_pings(sonar, control_ ? &*control_ : nullptr, deadline_, facts_.control);
-    note_figures(sonar);
+    update_stats(sonar);
   }
 
-  /// With the pings just seen.
-  void note_figures(SonarFacts& sonar) {
+  /// Status of the daemon including the pings just received.
+  void update_stats(SonarFacts& sonar) {
     if (!control_) return;
     const auto status = control_->status(until(short_patience));
-    const control::SonarStatus* said = status ? said_of(sonar, *status) : nullptr;
-    if (said != nullptr) sonar.says = *said;
+    const control::SonarStatus* reported = status ? reported_by(sonar, *status) : nullptr;
+    if (reported != nullptr) sonar.reported = *reported;
   }
 
-  void hear_all() {
-    for (const SonarFacts& sonar : facts_.sonars)  // heads say nothing of themselves before they are asked
+  void listen_to_all() {
+    for (const SonarFacts& sonar : facts_.sonars)  // BlueView heads send nothing unless asked
       if (!sonar.blueview) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
     status_.finish();
     facts_.status = status_.facts();

@@ -1,5 +1,5 @@
-// Asks the network and the kernel what doctor wants to know, in an order that disturbs nobody: first who is connected, then a
-// connection to sonars that are free. See judge.hpp for what is made of it.
+// Gathers the facts of doctor from the network and the kernel without disturbing clients: first it lists the connected clients,
+// then it connects to the sonars without one. checks.hpp interprets the facts.
 #pragma once
 
 #include "clients/sonarctl/control/control_client.hpp"
@@ -8,15 +8,15 @@
 namespace sonar::clients::doctor {
 
 struct Questions {
-  std::string address;                   // HOST or HOST:PORT; empty = every sonar that can be found, or the demo's place
-  Endpoint status_on{"0.0.0.0", 52102};  // where status messages are listened for
-  std::string control, http;             // HOST:PORT; empty = the usual places
+  std::string address;                   // HOST or HOST:PORT; empty = every sonar found, or the address of the demo
+  Endpoint status_on{"0.0.0.0", 52102};  // address of the status messages
+  std::string control, http;             // HOST:PORT; empty = the defaults
   std::filesystem::path token_file;
-  bool take = false;  // connect to sonars that have a client, too
+  bool take = false;  // also connect to sonars that have a client
   double within_s = 8;
 };
 
-/// Always an answer, within about `within_s`; an address that cannot be read is refused.
+/// Returns within about `within_s`. usage: an invalid address.
 Result<Facts> gather(const Questions& questions);
 
 }  // namespace sonar::clients::doctor

@@ -15,6 +15,7 @@
 #include <fstream>
 
 #include "clients/sonarctl/doctor/proc_net.hpp"
+#include "core/text/ipv4.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/decode.hpp"
 
@@ -29,14 +30,14 @@ std::optional<sockaddr_in> address_of(const Endpoint& at) {
   return address;
 }
 
-// The casts are the sockets interface's own.
+// The socket API requires these casts.
 const sockaddr* generic(const sockaddr_in& address) { return reinterpret_cast<const sockaddr*>(&address); }
 
 struct Datagram {
   std::string from;
   std::vector<std::byte> bytes;
 };
-/// The next one that is there already, or comes before the deadline.
+/// The next datagram that has arrived or arrives before the deadline.
 std::optional<Datagram> receive(const Socket& socket, Steady::time_point deadline) {
   for (;;) {
     pollfd ready{socket.fd(), POLLIN, 0};
@@ -47,15 +48,11 @@ std::optional<Datagram> receive(const Socket& socket, Steady::time_point deadlin
     sockaddr_in from{};
     socklen_t size = sizeof from;
     const ssize_t received = ::recvfrom(socket.fd(), buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
-    if (received < 0) continue;  // an earlier question was refused
+    if (received < 0) continue;  // ICMP error of an earlier query
     char text[INET_ADDRSTRLEN] = "";
     ::inet_ntop(AF_INET, &from.sin_addr, text, sizeof text);
     return Datagram{text, {buffer.begin(), buffer.begin() + received}};
   }
-}
-
-std::string dotted(const std::array<std::uint8_t, 4>& ip) {
-  return std::to_string(ip[0]) + "." + std::to_string(ip[1]) + "." + std::to_string(ip[2]) + "." + std::to_string(ip[3]);
 }
 
 Socket udp_socket() { return Socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)); }
@@ -116,44 +113,44 @@ StatusListener::StatusListener(const Endpoint& on) {
     socket_.emplace(std::move(socket));
     return;
   }
-  facts_.error = address ? std::strerror(errno) : "\"" + on.host + "\" is no IPv4 address";
+  facts_.error = address ? std::strerror(errno) : "\"" + on.host + "\" is not an IPv4 address";
   const auto programs = programs_by_socket();
   for (const SocketLine& line : udp_sockets())
     if (line.local_port == on.port) facts_.holders.push_back(holder_of(line, programs));
 }
 
-bool StatusListener::heard(const std::string& host) const {
-  return std::any_of(facts_.heard.begin(), facts_.heard.end(),
-                     [&host](const HeardStatus& h) { return host.empty() || h.advertised == host || h.from == host; });
+bool StatusListener::has_received(const std::string& host) const {
+  return std::any_of(facts_.received.begin(), facts_.received.end(),
+                     [&host](const ReceivedStatus& h) { return host.empty() || h.advertised == host || h.from == host; });
 }
 
 void StatusListener::listen(const std::string& host, Steady::time_point deadline) {
   if (!socket_) return;
-  while (const auto datagram = receive(*socket_, Steady::now())) take(datagram->from, datagram->bytes);
-  while (!heard(host)) {
+  while (const auto datagram = receive(*socket_, Steady::now())) add(datagram->from, datagram->bytes);
+  while (!has_received(host)) {
     const auto datagram = receive(*socket_, deadline);
     if (!datagram) return;
-    take(datagram->from, datagram->bytes);
+    add(datagram->from, datagram->bytes);
   }
 }
 
-void StatusListener::take(const std::string& from, std::span<const std::byte> datagram) {
+void StatusListener::add(const std::string& from, std::span<const std::byte> datagram) {
   const auto status = oculus::decode_status(datagram);
-  if (!status) return;  // somebody else's
-  HeardStatus heard;
-  heard.from = from;
-  heard.advertised = dotted(status->ip_address);
-  if (status->connected_ip != std::array<std::uint8_t, 4>{}) heard.client = dotted(status->connected_ip);
-  heard.device_id = status->device_id;
-  heard.size = datagram.size();
-  heard.complaints = oculus::status_violations(*status, datagram.size());
-  const auto known = std::find_if(facts_.heard.begin(), facts_.heard.end(), [&heard](const HeardStatus& h) {
-    return h.from == heard.from && h.advertised == heard.advertised;
+  if (!status) return;  // not a status message
+  ReceivedStatus received;
+  received.from = from;
+  received.advertised = text::format_ipv4(status->ip_address);
+  if (status->connected_ip != std::array<std::uint8_t, 4>{}) received.client = text::format_ipv4(status->connected_ip);
+  received.device_id = status->device_id;
+  received.size = datagram.size();
+  received.complaints = oculus::status_violations(*status, datagram.size());
+  const auto known = std::find_if(facts_.received.begin(), facts_.received.end(), [&received](const ReceivedStatus& h) {
+    return h.from == received.from && h.advertised == received.advertised;
   });
-  if (known == facts_.heard.end())
-    facts_.heard.push_back(std::move(heard));
+  if (known == facts_.received.end())
+    facts_.received.push_back(std::move(received));
   else
-    *known = std::move(heard);
+    *known = std::move(received);
 }
 
 void StatusListener::finish() { facts_.waited_s = std::chrono::duration<double>(Steady::now() - since_).count(); }
@@ -162,14 +159,18 @@ DiscoveryQuestion::DiscoveryQuestion(const std::vector<std::string>& hosts) {
   socket_.emplace(udp_socket());
   const int yes = 1;
   ::setsockopt(socket_->fd(), SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
-  const std::array<std::uint8_t, 6> question{'B', 'V', 'E', '?', 1, 0};  // docs/protocols/blueview-link.md, "Discovery"
+  wire::Bytes question;
+  const blueview::Put put(question);
+  put("mark", blueview::discovery_question);
+  put("version", blueview::protocol_version);
   const std::vector<std::string> everywhere{"127.255.255.255", "255.255.255.255"};
   for (const std::string& host : hosts.empty() ? everywhere : hosts)
     if (const auto to = address_of({host, blueview::discovery_port}))
-      ::sendto(socket_->fd(), question.data(), question.size(), 0, generic(*to), sizeof *to);  // no network, no answer
+      ::sendto(socket_->fd(), question.data(), question.size(), 0, generic(*to),
+               sizeof *to);  // fails without a network: then no answer arrives
 }
 
-void DiscoveryQuestion::take_answers(std::vector<BlueViewHead>& heads, Steady::time_point deadline) const {
+void DiscoveryQuestion::receive_answers(std::vector<BlueViewHead>& heads, Steady::time_point deadline) const {
   while (const auto datagram = receive(*socket_, heads.empty() ? deadline : Steady::now())) {
     wire::Reader reader(datagram->bytes);
     std::array<std::uint8_t, 4> mark{};
@@ -178,9 +179,9 @@ void DiscoveryQuestion::take_answers(std::vector<BlueViewHead>& heads, Steady::t
     reader("version", version);
     reader("port", port);
     BlueViewHead head;
-    head.model = blueview::take_text(reader, "model");
-    head.serial = blueview::take_text(reader, "serial");
-    if (!reader.ok() || mark != std::array<std::uint8_t, 4>{'B', 'V', 'E', '!'}) continue;
+    head.model = blueview::read_text(reader, "model");
+    head.serial = blueview::read_text(reader, "serial");
+    if (!reader.ok() || mark != blueview::discovery_answer) continue;
     head.at = datagram->from + ":" + std::to_string(port);
     const bool known = std::any_of(heads.begin(), heads.end(), [&head](const BlueViewHead& h) { return h.at == head.at; });
     if (!known) heads.push_back(std::move(head));

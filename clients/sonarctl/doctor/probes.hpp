@@ -1,4 +1,4 @@
-// Single questions to the network, each with a limit in time. Used by gather, which puts them in order.
+// Single queries to the network, each with a time limit. Used by gather, which orders them.
 #pragma once
 
 #include <optional>
@@ -13,35 +13,35 @@ namespace sonar::clients::doctor {
 using Steady = std::chrono::steady_clock;
 std::chrono::milliseconds left_until(Steady::time_point deadline);
 
-/// "127.0.0.2" of a name, or a sentence.
+/// "127.0.0.2" of a host name. usage: no address.
 Result<std::string> ipv4_of(const std::string& host);
 /// All of 127.0.0.0/8, and the addresses of the interfaces.
 bool is_on_this_host(const std::string& ipv4);
 
-/// Listens for status messages and sorts them; they may come while other questions are asked.
+/// Receives status messages and sorts them, also those that arrive during other queries.
 class StatusListener {
  public:
   explicit StatusListener(const Endpoint& on);
-  /// Takes what came; waits until one of `host` was heard (any host when it is empty) or `deadline`.
+  /// Processes received messages; waits for one from `host` (any host when it is empty) until `deadline`.
   void listen(const std::string& host, Steady::time_point deadline);
-  bool heard(const std::string& host) const;
+  bool has_received(const std::string& host) const;
   const StatusFacts& facts() const { return facts_; }
   void finish();
 
  private:
-  void take(const std::string& from, std::span<const std::byte> datagram);
+  void add(const std::string& from, std::span<const std::byte> datagram);
 
   std::optional<Socket> socket_;
   Steady::time_point since_ = Steady::now();
   StatusFacts facts_;
 };
 
-/// Broadcasts on this computer and its networks, or asks `hosts` alone (IPv4); answers are read by `take_answers`.
+/// Broadcasts on this computer and its networks, or asks `hosts` alone (IPv4); answers are read by `receive_answers`.
 class DiscoveryQuestion {
  public:
   explicit DiscoveryQuestion(const std::vector<std::string>& hosts);
-  /// Adds those that are new; waits for the first until `deadline`.
-  void take_answers(std::vector<BlueViewHead>& heads, Steady::time_point deadline) const;
+  /// Adds new heads; waits for the first answer until `deadline`.
+  void receive_answers(std::vector<BlueViewHead>& heads, Steady::time_point deadline) const;
 
  private:
   std::optional<Socket> socket_;

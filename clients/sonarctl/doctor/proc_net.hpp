@@ -1,5 +1,5 @@
-// Sockets of this computer as /proc/net shows them, and the programs they belong to as far as /proc lets us see. Used by doctor
-// to name who holds a port.
+// Sockets of this computer by /proc/net, and their programs as far as /proc is readable. Used by doctor to name the program that
+// holds a port.
 #pragma once
 
 #include <cstdint>
@@ -20,14 +20,14 @@ struct SocketLine {
 };
 inline constexpr int established = 1, listening = 10;
 
-/// Lines of /proc/net/tcp, tcp6, udp or udp6; the header and what cannot be read are passed over.
+/// Lines of /proc/net/tcp, tcp6, udp or udp6; the header and unreadable lines are skipped.
 std::vector<SocketLine> parse_proc_net(std::string_view text);
 
 /// Of all sockets, IPv4 and IPv6. Empty where there is no /proc.
 std::vector<SocketLine> tcp_sockets();
 std::vector<SocketLine> udp_sockets();
 
-/// Program by socket inode. Of other users' programs nothing is known.
+/// Program by socket inode, without those of other users.
 struct Program {
   int pid = 0;
   std::string name;

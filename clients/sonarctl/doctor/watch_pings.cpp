@@ -4,6 +4,7 @@
 #include <map>
 
 #include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
 
@@ -17,9 +18,7 @@ constexpr std::uint64_t enough_pings = 15;
 constexpr auto connect_patience = 1000ms, watch_time = 1600ms;
 
 double unix_now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
-double seconds_since(Steady::time_point start) { return std::chrono::duration<double>(Steady::now() - start).count(); }
-
-/// What drivers commonly ask for; version 2 has stamps that can be read.
+/// Common settings of drivers; version 2 carries readable stamps.
 oculus::FireRequest usual_request() {
   oculus::FireRequest fire;
   fire.version = 2;
@@ -43,7 +42,7 @@ class Watch {
       ended = item.what == Wait::closed;
       if (item.what != Wait::data) continue;
       if (item.ping)
-        take(*item.ping);
+        add(*item.ping);
       else
         ++others;
     }
@@ -55,12 +54,12 @@ class Watch {
     conclude();
   }
 
-  /// Of each ping, as the control stream's events have it: by how much later it came than it was fired, and what it took.
-  struct Told {
+  /// Per ping, by the events of the control stream: delay from transmission to arrival, and computing time.
+  struct DaemonTimes {
     std::vector<double> delays_s, computing_ms;
   };
-  Told told(ControlClient& control, const std::string& sonar) const {
-    Told told;
+  DaemonTimes daemon_times(ControlClient& control, const std::string& sonar) const {
+    DaemonTimes daemon_times;
     for (int i = 0; i < 1000; ++i) {
       const auto event = control.next_event(i == 0 ? 50ms : 0ms);
       if (!event || !*event) break;
@@ -68,10 +67,10 @@ class Watch {
       if (ping == nullptr || ping->sonar != sonar) continue;
       const auto arrived = arrived_unix_s_.find(ping->number);
       if (arrived == arrived_unix_s_.end()) continue;
-      told.delays_s.push_back(arrived->second - static_cast<double>(ping->fired_at_ns) * 1e-9);
-      told.computing_ms.push_back(ping->simulation_ms);
+      daemon_times.delays_s.push_back(arrived->second - static_cast<double>(ping->fired_at_ns) * 1e-9);
+      daemon_times.computing_ms.push_back(ping->simulation_ms);
     }
-    return told;
+    return daemon_times;
   }
 
  private:
@@ -80,7 +79,7 @@ class Watch {
     return facts_.pings > 0 ? seconds_since(first_) * 1s >= watch_time : Steady::now() >= give_up_;
   }
 
-  void take(const AnyPing& ping) {
+  void add(const AnyPing& ping) {
     const double at_s = seconds_since(start_);
     const PingFacts seen = facts_of(ping);
     if (facts_.pings == 0) {
@@ -91,7 +90,7 @@ class Watch {
     const PingReport report = log_.add(ping, at_s);
     ++facts_.pings;
     if (!report.errors.empty() && ++facts_.broken == 1) facts_.first_complaint = report.errors.front();
-    if (facts_.pings == 1) return;  // the first is computed with everything still to be made: its time is told apart
+    if (facts_.pings == 1) return;  // the first ping includes the initial setup: reported separately
     arrived_unix_s_[seen.number] = unix_now_s();
     if (const auto* stamped = std::get_if<oculus::DecodedPing>(&ping); stamped && stamped->head.fixed.ping_start_time_s > 0)
       behind_stamp_s_.push_back(at_s - stamped->head.fixed.ping_start_time_s);
@@ -108,24 +107,25 @@ class Watch {
 
   StreamFacts& facts_;
   Steady::time_point start_ = Steady::now(), first_ = start_, deadline_;
-  Steady::time_point give_up_ = start_ + left_until(deadline_) / 2;  // on the first ping: others want to be looked at, too
+  Steady::time_point give_up_ =
+      start_ + left_until(deadline_) / 2;  // for the first ping; the rest of the time is for other sonars
   PingLog log_{std::nullopt};
   std::map<std::uint32_t, double> arrived_unix_s_;
   std::vector<double> behind_stamp_s_;
 };
 
-/// Of a connection that failed, or a head's greeting.
+/// Of a failed connection or greeting of a head.
 Outcome outcome_of(const Error& error) {
   if (error.kind == ErrorKind::io) return Outcome::closed_without_a_byte;
   if (error.kind == ErrorKind::bad_data) return Outcome::no_ping;
   return error.text.find("refused") != std::string::npos ? Outcome::refused : Outcome::unreachable;
 }
 
-void take_delays(SonarFacts& sonar, const std::vector<double>& delays_s, ControlFacts& clocks) {
+void set_latency(SonarFacts& sonar, const std::vector<double>& delays_s, ControlFacts& clocks) {
   if (delays_s.empty()) return;
   const double p50 = percentile(delays_s, 0.5), p99 = percentile(delays_s, 0.99);
   if (!sonar.on_this_host) clocks.clock_ahead_s = -*std::min_element(delays_s.begin(), delays_s.end());
-  if (p50 < 0 || p50 > 2) return;  // clocks differ: no latency can be told
+  if (p50 < 0 || p50 > 2) return;  // clocks differ: latency unknown
   sonar.stream.latency_p50_ms = 1000 * p50;
   sonar.stream.latency_p99_ms = 1000 * p99;
 }
@@ -148,9 +148,9 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
   }
   watch.run(std::move(*stream));
   if (control == nullptr) return;
-  const Watch::Told told = watch.told(*control, sonar.name);
-  if (!told.computing_ms.empty()) facts.computing_ms = percentile(told.computing_ms, 0.5);
-  take_delays(sonar, told.delays_s, clocks);
+  const Watch::DaemonTimes daemon_times = watch.daemon_times(*control, sonar.name);
+  if (!daemon_times.computing_ms.empty()) facts.computing_ms = percentile(daemon_times.computing_ms, 0.5);
+  set_latency(sonar, daemon_times.delays_s, clocks);
 }
 
 }  // namespace sonar::clients::doctor

@@ -1,4 +1,4 @@
-// A short look at one sonar's pings, as a driver would connect: how soon, what, how often, how late. Used by gather.
+// Connects to one sonar as a driver would and measures delay, size, rate and latency of its pings. Used by gather.
 #pragma once
 
 #include "clients/sonarctl/control/control_client.hpp"
@@ -6,8 +6,8 @@
 
 namespace sonar::clients::doctor {
 
-/// Connects, asks for pings unless somebody else is connected, reads a dozen of them and leaves. `control`: subscribed to pings,
-/// or null; tells when each was fired. A difference of the clocks goes to `clocks`.
+/// Connects, requests pings unless another client is connected, reads about 15 of them and disconnects. `control`: subscribed to
+/// pings, or null; source of the transmission times. A difference of the clocks goes to `clocks`.
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks);
 
 }  // namespace sonar::clients::doctor

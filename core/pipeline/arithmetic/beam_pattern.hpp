@@ -1,5 +1,5 @@
 // Directivity of the receive array in azimuth and of transmitter times receiver in elevation, as closed forms.
-// Used by the coupling of columns to beams, by the cells' amplitudes, and by whoever predicts a level.
+// Used by the beamforming of columns to beams, by the cells' amplitudes, and for predicted levels.
 // C++17-clean, standard library only: nvcc reads it too.
 #pragma once
 
@@ -79,7 +79,7 @@ SONAR_HD inline double width_factor(Taper taper) {
   return taper == Taper::unit ? 1.0 : 2 * main_lobe_crossing(taper_series(taper), std::sqrt(0.5));
 }
 
-/// Aperture in wavelengths for a -3 dB width [rad] at broadside: the beam spans +-sin(width / 2) (docs/acoustics.md, section 6).
+/// Aperture in wavelengths for a -3 dB width [rad] at broadside: the beam spans +-sin(width / 2) (docs/acoustics.md, eq. 33).
 SONAR_HD inline double aperture_in_wavelengths(Taper taper, double width_rad) {
   return width_factor(taper) / (2 * std::sin(0.5 * width_rad));
 }

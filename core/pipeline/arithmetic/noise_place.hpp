@@ -11,15 +11,19 @@ namespace sonar {
 
 inline constexpr std::uint32_t noise_table_samples = 1u << 18;
 
-/// A random start and one of four quarter turns: the table's own pattern never stands still.
+/// The leak's draws: its sonar numbers, and the ping number of the part that is the same in every ping.
+SONAR_HD constexpr std::uint32_t leak_sonar(std::uint32_t sonar) { return sonar ^ static_cast<std::uint32_t>(Domain::leak); }
+inline constexpr std::uint32_t every_ping = 0xFFFFFFFFu;
+/// The water's grains have these columns; the receiver's noise has the columns below.
+inline constexpr std::uint32_t first_volume_column = 1u << 24;
+
+/// A random start and one of four quarter turns: the table's own pattern never stands still. `key`: Domain::noise_place.
 struct NoisePlace {
   std::uint32_t first = 0;
   bool negative = false, quarter = false;
 };
-SONAR_HD inline NoisePlace noise_place(std::uint32_t seed_low, std::uint32_t seed_high, std::uint32_t sonar, std::uint32_t ping,
-                                       std::uint32_t column) {
-  constexpr std::uint32_t place_key = 0x706c6163u;  // keeps these draws apart from the table's
-  const Random4 draw = philox(column, ping, sonar, place_key, seed_low, seed_high);
+SONAR_HD inline NoisePlace noise_place(const RandomKey& key, std::uint32_t sonar, std::uint32_t ping, std::uint32_t column) {
+  const Random4 draw = philox(column, ping, sonar, key);
   return {draw.v[0] % noise_table_samples, (draw.v[1] & 1u) != 0, (draw.v[1] & 2u) != 0};
 }
 

@@ -18,21 +18,21 @@ SONAR_HD inline double thermal_noise_db(double centre_hz) { return -15 + 20 * st
 SONAR_HD inline double directivity_index_db(double azimuth_width_rad, double elevation_width_rad) {
   return 10 * std::log10(4 * pi / (azimuth_width_rad * elevation_width_rad));
 }
-/// NL at a beam's output [dB re 1 uPa]: NSL + 10 log B_n - DI + NF.
+/// NL at a beam's output [dB re 1 uPa] (docs/acoustics.md, eq. 30): NSL + 10 log B_n - DI + NF.
 SONAR_HD inline double noise_level_db(const FrequencyMode& mode, double noise_bandwidth_hz) {
   return thermal_noise_db(static_cast<double>(mode.centre_hz)) + 10 * std::log10(noise_bandwidth_hz) -
          directivity_index_db(static_cast<double>(mode.pattern.azimuth_width_rad),
                               static_cast<double>(mode.pattern.elevation_width_rad)) +
          static_cast<double>(mode.receiver.noise_figure_db);
 }
-/// sqrt(E|s|^2) of the noise at a beam's output [uPa]. A column gets this over sqrt(sum_k W_jk^2), before coupling.
+/// sqrt(E|s|^2) of the noise at a beam's output [uPa]. A column gets this over sqrt(sum_k W_jk^2), before beamforming.
 SONAR_HD inline double noise_rms_upa(const FrequencyMode& mode, double noise_bandwidth_hz) {
   return std::pow(10.0, noise_level_db(mode, noise_bandwidth_hz) / 20);
 }
 
-/// Time-varied gain [dB]: X log10 r + 2 alpha r, r held below the minimum range, the sum held at the ceiling.
-/// `range_m` and `alpha_db_per_m` (one way) are what the device believes.
-SONAR_HD inline double tvg_db(const ReceiverLaw& law, double range_m, double alpha_db_per_m) {
+/// Time-varied gain [dB] (docs/acoustics.md, eq. 36): X log10 r + 2 alpha r, r held below the minimum range, the sum held at the
+/// ceiling. `range_m` and `alpha_db_per_m` (one way) are what the device believes.
+SONAR_HD inline double tvg_db(const ReceiverModel& law, double range_m, double alpha_db_per_m) {
   const double floor_m = static_cast<double>(law.tvg_minimum_range_m), ceiling_db = static_cast<double>(law.tvg_ceiling_db);
   const double r = range_m > floor_m ? range_m : floor_m;
   const double gain_db = static_cast<double>(law.tvg_slope_db) * std::log10(r) + 2 * alpha_db_per_m * r;
@@ -40,7 +40,7 @@ SONAR_HD inline double tvg_db(const ReceiverLaw& law, double range_m, double alp
 }
 
 /// Amplitude factor from pressure [uPa] to fractions of full scale, for a total gain [dB] (TVG + the client's knob).
-SONAR_HD inline double full_scale_factor(const ReceiverLaw& law, double gain_db) {
+SONAR_HD inline double full_scale_factor(const ReceiverModel& law, double gain_db) {
   return std::pow(10.0, gain_db / 20) / static_cast<double>(law.full_scale_upa);
 }
 
@@ -52,7 +52,7 @@ SONAR_HD inline std::uint32_t row_power_gain(double row_tvg_db, double smallest_
   return gain >= 4294967295.0 ? 4294967295u : static_cast<std::uint32_t>(gain);
 }
 
-/// Sample code of v = amplitude over full scale: round(max_code v^gamma), held at max_code; NaN and negative give 0.
+/// Sample code of v = amplitude over full scale (eq. 37): round(max_code v^gamma), held at max_code; NaN and negative give 0.
 SONAR_HD inline std::uint32_t quantise(double v, const SampleFormat& format) {
   if (!(v > 0)) return 0;
   if (v >= 1) return format.max_code;

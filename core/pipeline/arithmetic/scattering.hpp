@@ -13,8 +13,6 @@ namespace sonar {
 inline constexpr double cosine_floor = 1e-3;
 /// Range [m] below which nothing echoes: inside the housing, and 1/r^2 has no meaning.
 inline constexpr double nearest_scatterer_m = 1e-2;
-/// Largest Lambert coefficient that conserves energy, 10 log10(1/pi) dB.
-inline constexpr double largest_lambert_db = -4.971498726941338;
 
 /// mu [1/sr] from 10 log10 mu.
 SONAR_HD inline double lambert_coefficient(double lambert_db) { return std::pow(10.0, 0.1 * lambert_db); }

@@ -8,17 +8,18 @@ namespace {
 constexpr std::size_t tiles_a_batch = 16;
 constexpr std::size_t batches_a_round = 64;  // echoes of one round wait in memory, then are summed
 
-std::vector<Leg> legs_that_see(const std::vector<FlatMirror>& mirrors, const BounceMap& map) {
-  std::vector<Leg> legs{leg_by(mirrors, -1)};
+std::vector<Path> paths_in_view(const std::vector<FlatMirror>& mirrors, const BounceMap& map) {
+  // Direct, over one mirror, over two different mirrors: those that the traced map contains.
+  std::vector<Path> paths{path_by(mirrors, -1)};
   const int n = static_cast<int>(mirrors.size());
   for (int a = 0; a < n; ++a)
     for (int b = -1; b < n; ++b)
-      if (const Leg leg = leg_by(mirrors, a, b); a != b && !map.owns_nothing(leg)) legs.push_back(leg);
-  return legs;
+      if (const Path path = path_by(mirrors, a, b); a != b && !map.owns_nothing(path)) paths.push_back(path);
+  return paths;
 }
 
-/// Cells wherever a way by mirrors may reach; their sizes follow the ways' lengths, reach[0] being the straight one.
-CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pose> bodies, const std::vector<LegReach>& reach) {
+/// Cells wherever a path by mirrors may reach; their sizes follow the paths' lengths, reach[0] being the straight one.
+CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pose> bodies, const std::vector<PathReach>& reach) {
   CellView view;
   view.sonar_in_world = s.seen_from;
   view.bodies_in_world = bodies;
@@ -26,13 +27,14 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
   view.levels = plan.levels;
   view.seen_between = [&reach](Vec3d from_sonar_m, double radius_m) {
     std::optional<DistanceSpan> all;
-    const auto join = [&](const LegReach& r) {
+    const auto join = [&](const PathReach& r) {
       const std::optional<DistanceSpan> one = r.seen_between(from_sonar_m, radius_m);
       if (!one) return;
       if (!all) all = one;
       all->nearest_m = std::min(all->nearest_m, one->nearest_m);
       all->farthest_m = std::max(all->farthest_m, one->farthest_m);
     };
+    // The span of distances over all paths; the direct one counts only where another reaches.
     for (std::size_t l = 1; l < reach.size(); ++l) join(reach[l]);
     if (all) join(reach[0]);
     return all;
@@ -41,12 +43,13 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
 }
 
 /// In rounds: batches of tiles become echoes, sorted by column group; then groups sum them, batch by batch. So the order of
-/// every sum is that of the tiles, whoever does the work.
+/// every sum is that of the tiles, whichever thread does the work.
 class Rounds {
  public:
   Rounds(MultipathWork& work, const PingPlan& plan, const simd::Kernels& kernels, Parallel& pool)
       : work_(work), plan_(plan), kernels_(kernels), pool_(pool) {
-    groups_ = static_cast<std::size_t>((plan.columns.count + GhostScatterer::group_columns - 1) / GhostScatterer::group_columns);
+    groups_ = static_cast<std::size_t>((plan.columns.count + MultipathScatterer::group_columns - 1) /
+                                       MultipathScatterer::group_columns);
     work.batches.resize(batches_a_round);
     for (auto& batch : work.batches) batch.resize(groups_);
     work.spectral.resize(groups_);
@@ -54,17 +57,19 @@ class Rounds {
     for (std::size_t g = 0; g < groups_; ++g) plan.spectral->begin(first_column(g + 1) - first_column(g), work.spectral[g]);
   }
 
-  std::size_t run(std::vector<GhostScatterer>& scatterers, const std::vector<TileInView>& tiles) {
+  std::size_t run(std::vector<MultipathScatterer>& scatterers, const std::vector<TileInView>& tiles) {
     std::size_t echoes = 0;
     for (std::size_t first = 0; first < tiles.size(); first += tiles_a_batch * batches_a_round) {
       const std::size_t here = std::min(tiles.size() - first, tiles_a_batch * batches_a_round);
       const std::size_t batches = (here + tiles_a_batch - 1) / tiles_a_batch;
+      // Batches of tiles in parallel: each writes its own buffers, one for each group of columns.
       pool_.for_each(batches, [&](std::size_t b, int worker) {
         const std::size_t from = first + b * tiles_a_batch, to = std::min(from + tiles_a_batch, tiles.size());
-        for (std::size_t t = from; t < to; ++t) scatterers[static_cast<std::size_t>(worker)].sound(tiles[t], work_.batches[b]);
+        for (std::size_t t = from; t < to; ++t) scatterers[static_cast<std::size_t>(worker)].scatter(tiles[t], work_.batches[b]);
       });
       for (std::size_t b = 0; b < batches; ++b)
         for (const Echoes& e : work_.batches[b]) echoes += static_cast<std::size_t>(e.count);
+      // Groups in parallel: each sums its buffers in the order of the batches.
       pool_.for_each(groups_, [&](std::size_t g, int) {
         for (std::size_t b = 0; b < batches; ++b) sum_pulses(work_.batches[b][g], g);
       });
@@ -78,7 +83,7 @@ class Rounds {
 
  private:
   int first_column(std::size_t group) const {
-    return std::min(static_cast<int>(group) * GhostScatterer::group_columns, plan_.columns.count);
+    return std::min(static_cast<int>(group) * MultipathScatterer::group_columns, plan_.columns.count);
   }
   void sum_pulses(Echoes& echoes, std::size_t group) {
     if (plan_.spectral)
@@ -96,40 +101,44 @@ class Rounds {
 
 }  // namespace
 
-MultipathCounts sound_ghosts(const RayScene& scene, SurfaceCells& cells, std::span<const Pose> bodies,
-                             const std::vector<LawTable>& laws, const PingPlan& plan, const PingScalars& s,
-                             const simd::Kernels& kernels, Parallel& pool, MultipathWork& work, std::vector<PointEcho>& points) {
-  work.heard = false;
+MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& work, std::vector<PointEcho>& points) {
+  const PingPlan& plan = context.plan;
+  const PingScalars& s = context.scalars;
+  work.has_echoes = false;
   if (!work.faces_found) {
-    work.faces = find_flat_faces(scene.scene(), least_reflectance);
+    work.faces = find_flat_faces(context.scene(), least_reflectance);
     work.faces_found = true;
   }
-  Ways& ways = work.ways;
-  ways.bubbles = BubbleLayer(scene.scene().sea_surface);
-  ways.mirrors = mirrors_of(work.faces, scene.scene(), bodies, plan, s);
+  ImagePaths& image_paths = work.image_paths;
+  // Image method (docs/acoustics.md, section 3, eq. 10): mirrors, rays through them, then echoes of all pairs of paths.
+  image_paths.bubbles = BubbleLayer(context.scene().sea_surface);
+  image_paths.mirrors = mirrors_of(context, work.faces);
   MultipathCounts counts;
-  if (ways.mirrors.empty()) return counts;
-  counts.rays = trace_bounces(scene, plan, s, work.faces, ways.mirrors, pool, ways.map);
-  ways.legs = legs_that_see(ways.mirrors, ways.map);
-  ghosts_of_points(scene, bodies, work.faces, ways, plan, s, points);
-  if (ways.legs.size() == 1) return counts;
+  if (image_paths.mirrors.empty()) return counts;
+  counts.rays = trace_bounces(context, work.faces, image_paths.mirrors, image_paths.map);
+  image_paths.paths = paths_in_view(image_paths.mirrors, image_paths.map);
+  multipath_of_points(context, work.faces, image_paths, points);
+  if (image_paths.paths.size() == 1) return counts;
 
-  std::vector<LegReach> reach;
-  for (const Leg& leg : ways.legs) reach.emplace_back(leg, ways, plan, s);
-  const CellView view = view_of(plan, s, bodies, reach);
-  const std::vector<TileInView>& tiles = cells.in_view(view, pool);
+  std::vector<PathReach> reach;
+  for (const Path& path : image_paths.paths) reach.emplace_back(path, image_paths, plan, s);
+  const CellView view = view_of(plan, s, context.bodies_in_world, reach);
+  const std::vector<TileInView>& tiles = context.cells.in_view(view, context.pool);
+  // gamma of eq. 21: needed for the cross term of a pair ij, ji in expected power only.
   const std::vector<float> correlation = plan.expected_power ? beam_correlation_over_columns(plan) : std::vector<float>{};
-  std::vector<GhostScatterer> scatterers;
-  for (int worker = 0; worker < pool.threads(); ++worker) scatterers.emplace_back(ways, reach, cells, laws, correlation, plan, s);
+  std::vector<MultipathScatterer> scatterers;
+  for (int worker = 0; worker < context.pool.threads(); ++worker)
+    scatterers.emplace_back(context, image_paths, reach, correlation);
+  // Columns of their own, summed before the transmitter's pattern and the noise are applied.
   work.columns.shape(plan.columns.count, plan.samples, plan.taps);
   clear_columns(work.columns, 0, plan.columns.count);
-  counts.echoes = Rounds(work, plan, kernels, pool).run(scatterers, tiles);
-  work.heard = counts.echoes > 0;
+  counts.echoes = Rounds(work, plan, context.kernels, context.pool).run(scatterers, tiles);
+  work.has_echoes = counts.echoes > 0;
   return counts;
 }
 
-void add_ghosts(const MultipathWork& work, int first, int last, ColumnSignals& signals) {
-  if (!work.heard) return;
+void add_multipath(const MultipathWork& work, int first, int last, ColumnSignals& signals) {
+  if (!work.has_echoes) return;
   const std::ptrdiff_t from = first * signals.stride, to = last * signals.stride;
   for (std::ptrdiff_t i = from; i < to; ++i)
     signals.data[static_cast<std::size_t>(i)] += work.columns.data[static_cast<std::size_t>(i)];

@@ -1,5 +1,5 @@
-// Multipath, opt-in (Switches::multipath): everything that comes back by way of flat mirrors, as signals of their own columns
-// that are added to the direct ones. Runs once per ping before the columns are sounded (docs/acoustics.md, section 3).
+// Multipath, opt-in (Switches::multipath): everything that comes back via flat mirrors, as signals of their own columns
+// that are added to the direct ones. Runs once per ping before the columns are simulated (docs/acoustics.md, section 3).
 #pragma once
 
 #include <vector>
@@ -14,23 +14,21 @@ namespace sonar {
 struct MultipathWork {
   bool faces_found = false;
   FlatFaces faces;
-  Ways ways;
-  ColumnSignals columns;                     // echoes by way of mirrors
-  bool heard = false;                        // whether there are any
+  ImagePaths image_paths;
+  ColumnSignals columns;                     // echoes via mirrors
+  bool has_echoes = false;                   // whether there are any
   std::vector<std::vector<Echoes>> batches;  // echoes waiting, per batch of tiles and group of columns
-  std::vector<SpectralScratch> spectral;     // per group of columns, where pulses are summed by way of the spectrum
+  std::vector<SpectralScratch> spectral;     // per group of columns, where pulses are summed via the spectrum
 };
 struct MultipathCounts {
   std::size_t rays = 0, echoes = 0;
 };
 
 /// Fills `work.columns` (before the transmitter's pattern and noise) and appends the ghosts of point targets to `points`.
-/// Calls cells.in_view: results of earlier calls become invalid.
-MultipathCounts sound_ghosts(const RayScene& scene, SurfaceCells& cells, std::span<const Pose> bodies_in_world,
-                             const std::vector<LawTable>& laws, const PingPlan& plan, const PingScalars& scalars,
-                             const simd::Kernels& kernels, Parallel& pool, MultipathWork& work, std::vector<PointEcho>& points);
+/// Calls in_view of the cells: results of earlier calls become invalid.
+MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& work, std::vector<PointEcho>& points);
 
-/// Adds columns [first, last) of what was heard to `signals`.
-void add_ghosts(const MultipathWork& work, int first, int last, ColumnSignals& signals);
+/// Adds columns [first, last) of the multipath echoes to `signals`.
+void add_multipath(const MultipathWork& work, int first, int last, ColumnSignals& signals);
 
 }  // namespace sonar

@@ -8,32 +8,38 @@
 namespace sonar {
 namespace {
 
-/// A point target by one way.
+/// A point target by one path.
 struct PointArrival {
   double range_m = 0, sine = 0, transmit = 0, sample_shift = 0;
   std::complex<double> carried;  // pressure per source, with the carrier's phase
 };
 
-class PointGhosts {
+class PointMultipath {
  public:
-  PointGhosts(const RayScene& scene, const FlatFaces& faces, const Ways& ways, const PingPlan& plan, const PingScalars& scalars)
-      : scene_(scene), faces_(faces), ways_(ways), plan_(plan), s_(scalars), pattern_(plan.mode.pattern) {
-    // All pairs of mirrors, not only those that own a part of the sampled map: a point's ways are traced one by one.
-    const int n = static_cast<int>(ways.mirrors.size());
-    legs_.push_back(leg_by(ways.mirrors, -1));
-    for (int a = 0; a < n; ++a) legs_.push_back(leg_by(ways.mirrors, a));
+  PointMultipath(const PingContext& context, const FlatFaces& faces, const ImagePaths& image_paths)
+      : scene_(context.rays),
+        faces_(faces),
+        image_paths_(image_paths),
+        plan_(context.plan),
+        s_(context.scalars),
+        pattern_(plan_.mode.pattern) {
+    // All pairs of mirrors, not only those that own a part of the sampled map: a point's paths are traced one by one.
+    const int n = static_cast<int>(image_paths.mirrors.size());
+    paths_.push_back(path_by(image_paths.mirrors, -1));
+    for (int a = 0; a < n; ++a) paths_.push_back(path_by(image_paths.mirrors, a));
     for (int a = 0; a < n; ++a)
       for (int b = 0; b < n; ++b)
-        if (a != b) legs_.push_back(leg_by(ways.mirrors, a, b));
+        if (a != b) paths_.push_back(path_by(image_paths.mirrors, a, b));
   }
 
+  /// Eq. 10 for a point: every pair of arrivals, one out and one back, but for the direct pair.
   void add(Vec3d place, double strength_m, std::vector<PointEcho>& points) const {
     std::vector<PointArrival> arrivals;
     bool direct = false;
-    for (const Leg& leg : legs_) {
-      const std::optional<PointArrival> arrival = arrive(leg, place);
+    for (const Path& path : paths_) {
+      const std::optional<PointArrival> arrival = arrive(path, place);
       if (!arrival) continue;
-      direct = direct || leg.first < 0;
+      direct = direct || path.first < 0;
       arrivals.push_back(*arrival);
     }
     for (std::size_t i = 0; i < arrivals.size(); ++i)
@@ -47,17 +53,19 @@ class PointGhosts {
   }
 
  private:
-  std::optional<PointArrival> arrive(const Leg& leg, Vec3d place) const {
-    if (!is_lit(leg, ways_.mirrors, place)) return {};
-    const Vec3d image = leg.image_of(place);
-    const Vec3d p = s_.meet(image).from_sonar_m;
+  std::optional<PointArrival> arrive(const Path& path, Vec3d place) const {
+    if (!is_lit(path, image_paths_.mirrors, place)) return {};
+    const Vec3d image = path.image_of(place);
+    const Vec3d p = s_.echo_geometry(image).from_sonar_m;
     const double r = length(p);
     if (r < nearest_scatterer_m || r + length(place) > 2 * s_.max_range_m || image.x <= 0) return {};
     const ConicalDirection direction = plan_.direction_of(p);
-    const std::optional<std::size_t> column = plan_.column_of(direction, ways_.map.fan.half_angle_rad);
+    const std::optional<std::size_t> column = plan_.column_of(direction, image_paths_.map.fan.half_angle_rad);
     if (!column) return {};
-    if (!reaches(scene_, s_, faces_, ways_.mirrors, leg, place)) return {};
-    const double size = reflectance_of(leg, ways_.mirrors, (1 / r) * p) * std::exp(-s_.absorption_np_per_m * r) / r *
+    // Traced last: it costs the most.
+    if (!reaches(scene_, s_, faces_, image_paths_.mirrors, path, place)) return {};
+    // m / r D(psi) e^{-a r}, and the carrier's phase of one way, -2 pi (f / c) r.
+    const double size = reflectance_of(path, image_paths_.mirrors, (1 / r) * p) * std::exp(-s_.absorption_np_per_m * r) / r *
                         static_cast<double>(pattern_(static_cast<float>(std::pow(std::sin(direction.psi_rad), 2))));
     return PointArrival{r, direction.u, static_cast<double>(plan_.columns.transmit[*column]), s_.doppler_samples(p),
                         size * std::polar(1.0, -2 * pi * fraction_of_turn(0.5 * r * s_.turns_per_m))};
@@ -65,23 +73,24 @@ class PointGhosts {
 
   const RayScene& scene_;
   const FlatFaces& faces_;
-  const Ways& ways_;
+  const ImagePaths& image_paths_;
   const PingPlan& plan_;
   const PingScalars& s_;
   OneWayPattern pattern_;
-  std::vector<Leg> legs_;
+  std::vector<Path> paths_;
 };
 
 }  // namespace
 
-void ghosts_of_points(const RayScene& scene, std::span<const Pose> bodies, const FlatFaces& faces, const Ways& ways,
-                      const PingPlan& plan, const PingScalars& s, std::vector<PointEcho>& points) {
-  if (scene.scene().point_targets.empty()) return;
-  const PointGhosts ghosts(scene, faces, ways, plan, s);
-  const Pose world_in_sonar = inverse(s.seen_from);
-  for (const PointTarget& target : scene.scene().point_targets) {
-    const Vec3d in_world = scene.scene().in_world(target, bodies);
-    ghosts.add(transform(world_in_sonar, in_world), amplitude_from_db(static_cast<double>(target.target_strength_db)), points);
+void multipath_of_points(const PingContext& context, const FlatFaces& faces, const ImagePaths& image_paths,
+                         std::vector<PointEcho>& points) {
+  const Scene& scene = context.scene();
+  if (scene.point_targets.empty()) return;
+  const PointMultipath arrivals(context, faces, image_paths);
+  const Pose world_in_sonar = inverse(context.scalars.seen_from);
+  for (const PointTarget& target : scene.point_targets) {
+    const Vec3d in_world = scene.in_world(target, context.bodies_in_world);
+    arrivals.add(transform(world_in_sonar, in_world), amplitude_from_db(static_cast<double>(target.target_strength_db)), points);
   }
 }
 

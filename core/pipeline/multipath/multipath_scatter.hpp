@@ -1,4 +1,4 @@
-// Echoes by way of mirrors: every pair of ways, one out and one back, between the sonar and a cell or a point target. Pairs that
+// Echoes via mirrors: every pair of paths, one out and one back, between the sonar and a cell or a point target. Pairs that
 // differ in direction only have one delay and one phase, and so add coherently (docs/acoustics.md, section 3).
 #pragma once
 
@@ -11,29 +11,29 @@
 
 namespace sonar {
 
-/// What the echoes of one ping by way of mirrors are made with.
-struct Ways {
+/// What the echoes of one ping via mirrors are made with.
+struct ImagePaths {
   std::vector<FlatMirror> mirrors;
-  std::vector<Leg> legs;  // those that own a part of the map; [0] is the straight one
+  std::vector<Path> paths;  // those that own a part of the map; [0] is the straight one
   BounceMap map;
   BubbleLayer bubbles;
 };
 
-/// By how long a way a ball about a place in the axes of PingScalars::seen_from can be seen, with a delay within the record.
-class LegReach {
+/// By how long a path a ball about a place in the axes of PingScalars::seen_from can be seen, with a delay within the record.
+class PathReach {
  public:
-  LegReach(const Leg& leg, const Ways& ways, const PingPlan& plan, const PingScalars& scalars);
+  PathReach(const Path& path, const ImagePaths& image_paths, const PingPlan& plan, const PingScalars& scalars);
   std::optional<DistanceSpan> seen_between(Vec3d place, double radius_m) const;
 
  private:
-  const Leg& leg_;
-  const Ways& ways_;
+  const Path& path_;
+  const ImagePaths& image_paths_;
   struct Span {
     double low_rad = 1, high_rad = -1;  // elevations; empty at first
   };
   const PingPlan& plan_;
   double longest_m_;         // out and back together
-  std::vector<Span> spans_;  // of the leg's windows, per block of columns
+  std::vector<Span> spans_;  // of the path's windows, per block of columns
 };
 
 /// Amplitude of one pattern, transmitter's or receiver's, at an elevation.
@@ -47,24 +47,23 @@ class OneWayPattern {
 };
 
 /// Sounds tiles of cells; one per worker and ping.
-class GhostScatterer {
+class MultipathScatterer {
  public:
   static constexpr int group_columns = 64;  // echoes are sorted by groups of so many receiving columns
 
-  GhostScatterer(const Ways& ways, const std::vector<LegReach>& reach, const SurfaceCells& cells,
-                 const std::vector<LawTable>& laws, const std::vector<float>& beam_correlation, const PingPlan& plan,
-                 const PingScalars& scalars);
-  void sound(const TileInView& tile, std::vector<Echoes>& by_group);
+  MultipathScatterer(const PingContext& context, const ImagePaths& image_paths, const std::vector<PathReach>& reach,
+                     const std::vector<float>& beam_correlation);
+  void scatter(const TileInView& tile, std::vector<Echoes>& by_group);
 
  private:
-  struct Way {  // a leg as it looks at one tile
-    const Leg* leg;
+  struct TilePath {  // a path as it looks at one tile
+    const Path* path;
     float from_sonar_object[3], from_sonar[3], turn[9];  // of the tile's image, as in simd::TileSeen
     float range_m, sample_shift, half_turns, amplitude;
     float reflection, rough_normal[2][3];  // product of the mirrors' Rc; their normals times sqrt(2) k h, sonar axes
     float lit_normal[3], lit_height;       // object axes; places with dot + height above 0 are lit by the last mirror
   };
-  struct Arrival {                      // one cell by one way
+  struct Arrival {                      // one cell by one path
     float range_m, sample_shift, size;  // size: pressure per source, root of the scattering law included
     std::complex<float> carried;        // the same with the carrier's phase
     float transmit, sine;
@@ -77,16 +76,17 @@ class GhostScatterer {
     std::complex<float> weight;  // xi * root of the area * source; the root alone in expected power
   };
 
-  Way look_at(const TileInView& tile, const Leg& leg) const;
-  void sound_cell(const Cell& cell, const LawTable& law, const CellLevel& level, std::vector<Echoes>& by_group);
-  bool arrive(const Way& way, const Cell& cell, float range_m, float offset_m, const LawTable& law, Arrival& out) const;
+  TilePath look_at(const TileInView& tile, const Path& path) const;
+  void scatter_cell(const Cell& cell, const LawTable& law, const CellLevel& level, std::vector<Echoes>& by_group);
+  bool arrive(const TilePath& tile_path, const Cell& cell, float range_m, float offset_m, const LawTable& law,
+              Arrival& out) const;
   void pair_up(const Cell& cell, float fade, std::vector<Echoes>& by_group) const;
   void add(float sample, std::complex<float> amplitude, int column, std::vector<Echoes>& by_group) const;
   float beam_correlation(const Arrival& a, const Arrival& b) const;
-  bool is_visible(const Leg& leg, int column, float bin, float nearness) const;
+  bool is_visible(const Path& path, int column, float bin, float nearness) const;
 
-  const Ways& ways_;
-  const std::vector<LegReach>& reach_;
+  const ImagePaths& image_paths_;
+  const std::vector<PathReach>& reach_;
   const SurfaceCells& cells_;
   const std::vector<LawTable>& laws_;
   const std::vector<float>& beam_correlation_;
@@ -95,16 +95,16 @@ class GhostScatterer {
   OneWayPattern pattern_;
   float first_edge_sine_, columns_per_sine_, tolerance_m_, absorption_np_per_m_, half_turns_per_m_;
   Vec3d tile_middle_;  // one of its cells, in the axes of PingScalars::seen_from
-  std::vector<Way> tile_ways_;
+  std::vector<TilePath> tile_paths_;
   std::vector<Arrival> arrivals_;
-  bool direct_ = false;  // whether arrivals_[0] is the straight way
+  bool direct_ = false;  // whether arrivals_[0] is the direct path
 };
 
 /// sum_k W(k) W(k + n) / sum_k W(k)^2 of the receive pattern over columns: how much two columns n apart have in common.
 std::vector<float> beam_correlation_over_columns(const PingPlan& plan);
 
 /// Echoes of the point targets; appends to `points`.
-void ghosts_of_points(const RayScene& scene, std::span<const Pose> bodies_in_world, const FlatFaces& faces, const Ways& ways,
-                      const PingPlan& plan, const PingScalars& scalars, std::vector<PointEcho>& points);
+void multipath_of_points(const PingContext& context, const FlatFaces& faces, const ImagePaths& image_paths,
+                         std::vector<PointEcho>& points);
 
 }  // namespace sonar

@@ -40,7 +40,7 @@ class ChainTracer {
   int count() const { return count_; }
   std::uint32_t all() const { return count_ == RayPacket::size ? 0xFFFFu : (1u << count_) - 1u; }
 
-  /// Follows the active rays to the next surface: `travelled` grows, or the ray's object says that it missed.
+  /// Follows the active rays to the next surface: `travelled` grows, or the ray's object is RayPacket::miss.
   void go(std::uint32_t active, bool coherent) {
     scene_.trace(packet, active, coherent);
     for (std::size_t i = 0; i < RayPacket::size; ++i) {
@@ -60,7 +60,9 @@ class ChainTracer {
     const Vec3 n = normals_[mirror];
     const Vec3 d{packet.direction_x[i], packet.direction_y[i], packet.direction_z[i]};
     const float along = dot(n, d);
+    // Rough mirrors reflect at grazing angles only: below least_reflectance the ray ends here.
     if (std::abs(mirrors_[mirror].reflectance(static_cast<double>(along))) <= least_reflectance) return BounceMap::no_mirror;
+    // d' = d - 2 (d . n) n, from a little off the mirror so that the ray does not hit it again.
     const float lift = along > 0 ? -lift_m : lift_m;
     packet.origin_x[i] += packet.far[i] * d.x + lift * n.x;
     packet.origin_y[i] += packet.far[i] * d.y + lift * n.y;
@@ -89,12 +91,12 @@ class ChainTracer {
 
 /// A direction's chain of surfaces.
 struct Chain : FanSample {
-  SurfaceMet met[3];
+  SurfaceHit surface[3];
   std::uint8_t mirror[2] = {BounceMap::no_mirror, BounceMap::no_mirror};
 
   int stages() const { return mirror[0] == BounceMap::no_mirror ? 1 : mirror[1] == BounceMap::no_mirror ? 2 : 3; }
-  const SurfaceMet& met_at(int stage) const { return met[stage]; }
-  bool same_way(const Chain& b) const { return std::equal(mirror, mirror + 2, b.mirror); }
+  const SurfaceHit& surface_at(int stage) const { return surface[stage]; }
+  bool same_mirrors(const Chain& b) const { return std::equal(mirror, mirror + 2, b.mirror); }
 };
 
 /// Columns [first, last), at most a packet wide: samples refined where neighbours differ, then drawn into the map.
@@ -116,6 +118,7 @@ class ColumnsTracer {
 
   void aim(float elevation_rad, int column, Chain& chain) {
     const double u = plan_.columns.sine(first_ + column);
+    // A ray of column u at elevation psi (docs/acoustics.md, section 1).
     const auto along = static_cast<float>(u), across = static_cast<float>(std::sqrt(std::max(0.0, 1 - u * u)));
     const float cosine = std::cos(elevation_rad), sine = std::sin(elevation_rad);
     const bool conical = plan_.switches.conical;
@@ -127,13 +130,14 @@ class ColumnsTracer {
   /// Follows the packet; its lanes are the samples `index`.
   void follow(const std::array<std::int32_t, RayPacket::size>& index) {
     std::uint32_t active = rays_.all();
+    // Up to two bounces: stage s is the surface met after s mirrors.
     for (std::size_t stage = 0; stage < 3 && active; ++stage) {
       rays_.go(active, stage == 0);
       for (std::size_t i = 0; i < RayPacket::size; ++i) {
         if (!(active >> i & 1)) continue;
         Chain& chain = at(index[i]);
-        chain.met[stage] = SurfaceMet::by(rays_.packet, i, rays_.travelled[i], chain.forward);
-        direction_[stage][i] = SurfaceMet::direction(rays_.packet, i);
+        chain.surface[stage] = SurfaceHit::by(rays_.packet, i, rays_.travelled[i], chain.forward);
+        direction_[stage][i] = SurfaceHit::direction(rays_.packet, i);
         if (stage < 2) chain.mirror[stage] = rays_.bounce(i);
         if (stage == 2 || chain.mirror[stage] == BounceMap::no_mirror) active &= ~(1u << i);
       }
@@ -174,6 +178,7 @@ class ColumnsTracer {
 
   void draw(int k) {
     const BounceFan& fan = map_.fan;
+    // Nodes at even tangents of elevation between consecutive samples.
     int bin = 0;
     for (std::int32_t i = k * elevations(); at(i).next >= 0; i = at(i).next) {
       const Chain &a = at(i), &b = at(at(i).next);
@@ -190,16 +195,18 @@ class ColumnsTracer {
     const std::size_t node =
         static_cast<std::size_t>(column) * static_cast<std::size_t>(map_.fan.bins + 1) + static_cast<std::size_t>(bin);
     const Chain& nearer = part < 0.5f ? a : b;
-    bool same_way = true;
+    bool same_mirrors = true;
     for (std::size_t stage = 0; stage < 3; ++stage) {
-      float seen = nearer.met[stage].inverse_x;
-      if (same_way)
-        seen = a.edge_above ? std::min(a.met[stage].inverse_x, b.met[stage].inverse_x)
-                            : std::max(0.0f, a.met[stage].inverse_x + part * (b.met[stage].inverse_x - a.met[stage].inverse_x));
+      float seen = nearer.surface[stage].inverse_x;
+      if (same_mirrors)
+        seen =
+            a.edge_above
+                ? std::min(a.surface[stage].inverse_x, b.surface[stage].inverse_x)
+                : std::max(0.0f, a.surface[stage].inverse_x + part * (b.surface[stage].inverse_x - a.surface[stage].inverse_x));
       map_.nodes[node].inverse_x[stage] = seen;
       if (stage == 2) break;
       map_.nodes[node].mirror[stage] = nearer.mirror[stage];
-      same_way = same_way && a.mirror[stage] == b.mirror[stage];
+      same_mirrors = same_mirrors && a.mirror[stage] == b.mirror[stage];
     }
   }
 
@@ -213,11 +220,12 @@ class ColumnsTracer {
   std::array<std::array<Vec3, RayPacket::size>, 3> direction_;  // of the packet's rays at each stage
 };
 
-/// Which part of a block of columns each way owns.
+/// Which part of a block of columns each path owns.
 void find_windows(std::size_t block, BounceMap& map) {
   auto& windows = map.windows[block];
   windows.fill({});
-  windows[BounceMap::index_of(-1, -1)] = {0, map.fan.bins};  // the straight way has no mirror to keep within
+  windows[BounceMap::index_of(-1, -1)] = {0, map.fan.bins};  // the direct path has no mirror to keep within
+  // Bounds over a block of columns let whole tiles be skipped (PathReach).
   const int row = map.fan.bins + 1, first = static_cast<int>(block) * BounceMap::block_columns;
   const auto number = [](std::uint8_t mirror) { return mirror == BounceMap::no_mirror ? -1 : static_cast<int>(mirror); };
   for (int k = first; k < std::min(first + BounceMap::block_columns, map.columns); ++k)
@@ -226,7 +234,7 @@ void find_windows(std::size_t block, BounceMap& map) {
       const int a = number(map.nodes[node].mirror[0]), b = number(map.nodes[node].mirror[1]);
       if (a < 0) continue;
       for (const int second : {-1, b}) {
-        LegWindow& w = windows[BounceMap::index_of(a, second)];
+        PathWindow& w = windows[BounceMap::index_of(a, second)];
         w.first_bin = std::min(w.first_bin, bin), w.last_bin = std::max(w.last_bin, bin);
       }
     }
@@ -239,10 +247,12 @@ BounceFan make_bounce_fan(const PingPlan& plan) {
   fan.half_angle_rad = plan.fan.half_angle_rad;
   if (plan.mode.pattern.elevation_taper != Taper::unit)
     fan.half_angle_rad = std::max(fan.half_angle_rad, std::min(elevation_reach_rad(plan.mode.pattern, fan_edge_two_way), 1.4));
+  // The same bins a tangent as the direct fan, over its own wider angle.
   const double tangent = std::tan(fan.half_angle_rad);
   fan.bins_per_tangent = plan.fan.bins_per_tangent;
   fan.bins = static_cast<int>(std::ceil(2 * tangent * static_cast<double>(fan.bins_per_tangent)));
   fan.first_tangent = static_cast<float>(-tangent);
+  // As dense in elevation as the direct fan.
   const double step = 2 * plan.fan.half_angle_rad / static_cast<double>(plan.fan.elevation_rad.size());
   const int n = static_cast<int>(std::ceil(2 * fan.half_angle_rad / step)) + 1;
   for (int e = 0; e < n; ++e) {
@@ -252,39 +262,42 @@ BounceFan make_bounce_fan(const PingPlan& plan) {
   return fan;
 }
 
-std::size_t trace_bounces(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, const FlatFaces& faces,
-                          const std::vector<FlatMirror>& mirrors, Parallel& pool, BounceMap& map) {
+std::size_t trace_bounces(const PingContext& context, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors,
+                          BounceMap& map) {
+  const PingPlan& plan = context.plan;
   map.fan = make_bounce_fan(plan);
   map.columns = plan.columns.count;
   const auto nodes = static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.fan.bins + 1);
   map.nodes.resize(nodes);
   const auto blocks = static_cast<std::size_t>((map.columns + BounceMap::block_columns - 1) / BounceMap::block_columns);
   map.windows.resize(blocks);
+  // A packet of columns a task; each writes its own part of the map.
   std::vector<std::size_t> traced(blocks);
-  pool.for_each(blocks, [&](std::size_t block, int) {
-    ChainTracer rays(scene, scalars, faces, mirrors);
+  context.pool.for_each(blocks, [&](std::size_t block, int) {
+    ChainTracer rays(context.rays, context.scalars, faces, mirrors);
     const int first = static_cast<int>(block) * BounceMap::block_columns;
     const int last = std::min(first + BounceMap::block_columns, map.columns);
-    ColumnsTracer(rays, plan, static_cast<float>(2 * scalars.max_range_m), first, last, map).run();
+    ColumnsTracer(rays, plan, static_cast<float>(2 * context.scalars.max_range_m), first, last, map).run();
     find_windows(block, map);
     traced[block] = rays.traced;
   });
   return std::accumulate(traced.begin(), traced.end(), std::size_t{0});
 }
 
-bool BounceMap::owns_nothing(const Leg& leg) const {
+bool BounceMap::owns_nothing(const Path& path) const {
   for (std::size_t block = 0; block < windows.size(); ++block)
-    if (!window(block, leg).empty()) return false;
+    if (!window(block, path).empty()) return false;
   return true;
 }
 
 bool reaches(const RayScene& scene, const PingScalars& scalars, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors,
-             const Leg& leg, Vec3d place) {
-  const Vec3d image = leg.image_of(place);
+             const Path& path, Vec3d place) {
+  const Vec3d image = path.image_of(place);
   const double range = length(image);
   ChainTracer ray(scene, scalars, faces, mirrors);
+  // Toward the image, and almost as far: the place itself must not hide the ray.
   ray.add(to_float((1 / range) * image), static_cast<float>(range * 0.9999));
-  for (const int wanted : {leg.first, leg.second}) {
+  for (const int wanted : {path.first, path.second}) {
     ray.go(1u, false);
     if (wanted < 0) return ray.packet.object[0] == RayPacket::miss;
     if (ray.bounce(0) != static_cast<std::uint8_t>(wanted)) return false;

@@ -113,7 +113,7 @@ std::vector<std::complex<double>> Pulse::spectrum_s(const spectral::FrequencyGri
     }
     return values;
   }
-  // From samples, which tell nothing of frequencies beyond half their rate.
+  // From samples, which contain no frequencies beyond half their rate.
   const double rate = shape_ == Shape::lfm ? 4 * scale_hz_ : scale_hz_;
   std::vector<spectral::Arrival> arrivals;
   if (shape_ == Shape::lfm)

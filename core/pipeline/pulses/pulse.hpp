@@ -48,7 +48,7 @@ class Pulse {
   int middle_ = 0;
 };
 
-/// The sentence that says why such a pulse cannot be used on a grid of this sample time; empty when it can.
+/// A sentence with the reason why such a pulse cannot be used on a grid of this sample time; empty when it can.
 std::string why_invalid(const Waveform& waveform, double sample_time_s);
 
 /// The sweep's bandwidth for a -3 dB width of the compressed pulse in delay.

@@ -35,9 +35,9 @@ std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const Frequen
 std::vector<Complex> fast_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid, int width = 6);
 
 /// Non-uniform Fourier transform, type 1: every echo is spread over `width` points of a grid twice as fine as needed with the
-/// kernel exp(2.3 width (sqrt(1 - x^2) - 1)), the grid is transformed, and the kernel's own transform divided out. Relative L2
-/// errors by width: 4 8e-4, 5 7e-5, 6 8e-6, 7 9e-7, 8 1e-7, 10 1e-9. Made once; may then be used by many threads, each with a
-/// grid of its own.
+/// kernel exp(2.3 width (sqrt(1 - x^2) - 1)) (docs/acoustics.md, eq. 26), the grid is transformed, and the kernel's own transform
+/// divided out. Relative L2 errors by width: 4 8e-4, 5 7e-5, 6 8e-6, 7 9e-7, 8 1e-7, 10 1e-9. Made once; may then be used by many
+/// threads, each with a grid of its own.
 class FrequencySums {
  public:
   explicit FrequencySums(int count, int width = 6);

@@ -47,6 +47,7 @@ void SpectralColumns::finish(int first, int last, SpectralScratch& scratch, Colu
   const int count = sums_.count();
   for (int k = first; k < last; ++k) {
     spectral::Complex* grid = scratch.grids.data() + static_cast<std::ptrdiff_t>(k - first) * sums_.grid_points();
+    // docs/acoustics.md, eq. 25: F(nu_m) P(nu_m), folded to one value a sample and transformed back.
     sums_.transform(grid, scratch.sums.data());
     scratch.folded.assign(static_cast<std::size_t>(period_), 0.0);
     // count is a whole number of periods: frequency m - count / 2 falls on the place of its rest.

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "core/pipeline/pulses/pulse.hpp"
-#include "core/pipeline/scatter.hpp"
-#include "core/pipeline/synthesize.hpp"
+#include "core/pipeline/pulses/spectral.hpp"
+#include "core/pipeline/signals.hpp"
 
 namespace sonar {
 

@@ -1,5 +1,5 @@
 // The discrete Fourier transform of the frequency-domain path (docs/acoustics.md, section 4): FFTW behind one class.
-// Its .cpp is the only file that includes FFTW; a build without it (SONAR_FFTW=OFF) knows from have_transform.
+// Its .cpp is the only file that includes FFTW; in a build without it (SONAR_FFTW=OFF) have_transform is false.
 #pragma once
 
 #include <complex>
@@ -11,7 +11,7 @@ using Complex = std::complex<double>;
 
 /// Whether this build has a transform. Without one an Fft must not be made.
 extern const bool have_transform;
-/// Why not, and what to do: one sentence for whoever asked.
+/// The reason and what to do, as one sentence for the user.
 inline constexpr const char* no_transform =
     "this build has no Fourier transform: measured and exact pulses need one; install libfftw3-dev and build with SONAR_FFTW=ON";
 

@@ -44,6 +44,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
   const Lanes bins = all(static_cast<float>(g.bins)), nearest = all(window.from_m), farthest = all(window.to_m);
   const int row = g.bins + 1;
   int m = 0;
+  // r^2 = r0^2 + e with e = d . (2 q + d), d the cell's offset from the tile's centre: no difference of large numbers.
   for (int i = from; i < from + n; i += lanes) {
     const Lanes dx = unit * counts(tx + i), dy = unit * counts(ty + i), dz = unit * counts(tz + i);
     const Lanes e = dx * (2 * qx0 + dx) + dy * (2 * qy0 + dy) + dz * (2 * qz0 + dz);
@@ -62,6 +63,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
     keep = both(keep, below(all(1e-6f), x));
     if (!any(keep)) continue;
 
+    // Depth map between two bins, against the cell's own 1 / x with the tolerance of section 3.
     const Lanes bin_here = choose(keep, bin, all(0));
     const LaneNumbers bin_below = whole_part(bin_here);
     const LaneNumbers at = (whole_part(choose(keep, column, first_column)) - g.first_column) * row + bin_below;
@@ -70,6 +72,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
     keep = both(keep, not_below(inverse_h * (1.0f + g.depth_tolerance_m * inverse_r), seen));
     if (!any(keep)) continue;
 
+    // r cos(alpha): normal times the vector from sonar to cell, object axes.
     const Lanes along = counts(nx + i) * (qx0 + dx) + counts(ny + i) * (qy0 + dy) + counts(nz + i) * (qz0 + dz);
     const Lanes weight_re = counts(wr + i), weight_im = counts(wi + i);
     pack(c.range + m, keep, r);
@@ -89,27 +92,10 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
   return m;
 }
 
-inline Lanes cross_fade(const TileSeen& s, Lanes r) {
-  const Lanes in = (r - s.fade_in_from_m) * s.fade_in_per_m, out = (s.fade_out_to_m - r) * s.fade_out_per_m;
-  return larger(smaller(smaller(in, out), all(1)), all(0));
-}
-
-/// Two-way elevation pattern, polynomial in w = sin^2.
-inline Lanes elevation_pattern(const float (&e)[elevation_terms], Lanes w) {
-  Lanes p = all(e[elevation_terms - 1]);
-  for (int term = elevation_terms - 2; term >= 0; --term) p = e[term] + w * p;
-  return p;
-}
-
 /// Replaces the cosines by the root of the material's scattering strength; without a table Lambert's cosine is that already.
 __attribute__((noinline)) void apply_law(const float* __restrict law, int n, Chunk& c) {
 #pragma GCC ivdep
-  for (int i = 0; i < n; ++i) {
-    const float at = static_cast<float>(law_steps) * std::sqrt(larger(1.0f - c.cosine[i], 0.0f));
-    const std::int32_t step = static_cast<std::int32_t>(at);
-    const float a = law[step], b = law[step + 1];
-    c.cosine[i] = a + (at - static_cast<float>(step)) * (b - a);
-  }
+  for (int i = 0; i < n; ++i) c.cosine[i] = law_root(law, c.cosine[i]);
 }
 
 inline Lanes sine_of_turns(Lanes turns) {
@@ -121,12 +107,12 @@ inline Lanes sine_of_turns(Lanes turns) {
 }
 
 /// Amplitude and carrier of every visible cell, times its speckle.
-__attribute__((noinline)) void sound_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
+__attribute__((noinline)) void scatter_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
   for (int i = 0; i < n; i += lanes) {
     const Lanes r = load(c.range + i), offset = load(c.offset + i), d = -g.decay_per_m * offset;
-    const Lanes loss = 1.0f + d * (1.0f + d * (0.5f + d * (1.0f / 6.0f + d * (1.0f / 24.0f))));
-    const Lanes amplitude = s.amplitude * root_of(cross_fade(s, r)) * load(c.cosine + i) *
-                            elevation_pattern(g.elevation, load(c.sine2 + i)) * loss * reciprocal(r * r);
+    // Eq. 6 for a cell: level weight, law, D_v, absorption relative to the centre, 1 / r^2; then its phase and its xi.
+    const Lanes amplitude = s.amplitude * root_of(level_weight(s, r)) * load(c.cosine + i) *
+                            elevation_pattern(g.elevation, load(c.sine2 + i)) * exp_near_0(d) * reciprocal(r * r);
     const Lanes turns = -(s.phase_turns + g.turns_per_m * offset);
     const Lanes cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
     const Lanes a = load(c.weight_re + i), b = load(c.weight_im + i);
@@ -145,7 +131,7 @@ inline void power_of_cells(const TileSeen& s, const GroupView& g, int n, const C
     for (int l = 0; l < lanes; ++l) loss[l] = std::exp(-g.decay_per_m * c.offset[i + l]);
     const Lanes amplitude = s.area_amplitude * load(c.cosine + i) * elevation_pattern(g.elevation, load(c.sine2 + i)) * loss *
                             reciprocal(r * r);
-    store(out.re + i, amplitude * amplitude * cross_fade(s, r) * load(c.weight_re + i));
+    store(out.re + i, amplitude * amplitude * level_weight(s, r) * load(c.weight_re + i));
     store(out.im + i, Lanes{});
     store(out.sample + i, r * g.samples_per_m - (g.sample_offset - s.sample_shift));
     *reinterpret_cast<LaneNumbers*>(out.column + i) = whole_part(load(c.column + i));
@@ -163,7 +149,7 @@ int scatter_tile(const TileSeen& s, const GroupView& g, EchoArrays out) {
     if (g.expected_power)
       power_of_cells(s, g, m, c, out);
     else
-      sound_cells(s, g, m, c, out);
+      scatter_cells(s, g, m, c, out);
     out = {out.sample + m, out.re + m, out.im + m, out.column + m};
     appended += m;
   }

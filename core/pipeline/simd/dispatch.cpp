@@ -2,6 +2,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/base/enum_names.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 
 namespace sonar::simd {
@@ -10,10 +11,7 @@ namespace {
 SimdLevel level_from_environment() {
   const char* given = std::getenv("SONARD_SIMD");
   const std::string name = given == nullptr || *given == '\0' ? "auto" : given;
-  if (name == "auto") return SimdLevel::automatic;
-  if (name == "portable") return SimdLevel::portable;
-  if (name == "avx2") return SimdLevel::avx2;
-  if (name == "avx512") return SimdLevel::avx512;
+  if (const auto level = enum_from<SimdLevel>(name, simd_level_names)) return *level;
   throw std::runtime_error("SONARD_SIMD: unknown instruction set \"" + name + "\"; use auto, portable, avx2 or avx512");
 }
 

@@ -22,18 +22,19 @@ __attribute__((noinline)) void draw_hits(const HitDraw& d, int n, float* __restr
   const std::uint32_t* __restrict first = d.counter[0];
   const std::uint32_t* __restrict second = d.counter[1];
   const std::uint32_t* __restrict third = d.counter[2];
-  const std::uint32_t c3 = d.last_counter, k0 = d.key[0], k1 = d.key[1];
+  const std::uint32_t c3 = d.key.domain, k0 = d.key.low, k1 = d.key.high;
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) {
     std::uint32_t a, b;
     philox_of(first[i], second[i], third[i], c3, k0, k1, a, b);
     const float u = (static_cast<float>(static_cast<std::int32_t>(a >> 9)) + 0.5f) * (1.0f / 8388608.0f);
+    // Box-Muller: |z| = sqrt(-ln u), E|z|^2 = 1.
     radius[i] = std::sqrt(larger(-0.69314718f * log2_of(u), 0.0f));
     turns[i] = (static_cast<float>(static_cast<std::int32_t>(b >> 9)) + 0.5f) * (1.0f / 8388608.0f);
   }
 }
 
-/// Carriers in double, folded to less than a turn: a float knows a range to a thousandth of a turn at best.
+/// Carriers in double, folded to less than a turn: a float resolves a range to a thousandth of a turn at best.
 __attribute__((noinline)) void turn_carriers(const float* __restrict range, double turns_per_m, int n, float* __restrict turns) {
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) {
@@ -42,8 +43,8 @@ __attribute__((noinline)) void turn_carriers(const float* __restrict range, doub
   }
 }
 
-void sound_hits(const HitsToSound& h, int n, float* re, float* im) {
-  alignas(64) float radius[HitsToSound::most], turns[HitsToSound::most];
+void scatter_hits(const HitsToScatter& h, int n, float* re, float* im) {
+  alignas(64) float radius[HitsToScatter::most], turns[HitsToScatter::most];
   draw_hits(h.draw, n, radius, turns);
   turn_carriers(h.range_m, h.turns_per_m, n, turns);
   const float* __restrict range = h.range_m;
@@ -53,6 +54,7 @@ void sound_hits(const HitsToSound& h, int n, float* re, float* im) {
   const float decay = -1.44269504f * h.decay_per_m;
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) {
+    // e^{-2 a r} as a power of two.
     const float amplitude = weight[i] * exp2_of(decay * range[i]) * radius[i];
     out_re[i] = amplitude * sine_of_turns(turns[i] + 0.25f);
     out_im[i] = amplitude * sine_of_turns(turns[i]);

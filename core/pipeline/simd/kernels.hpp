@@ -1,21 +1,18 @@
 // The hot loops of a ping, compiled once per instruction set from kernels.inl and picked at run time.
-// Plain arrays in, plain arrays out: what they compute is explained where they are called (scatter, synthesize, couple, receive).
+// Plain arrays in, plain arrays out: what they compute is explained where they are called (scatter, synthesize, form_beams,
+// receive).
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
+#include "core/base/random.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simd/beam_transform.hpp"
 #include "core/scene/cells/surface_cells.hpp"
 
 namespace sonar::simd {
-
-/// Degree of the even polynomial that stands for the elevation pattern, in w = sin^2(elevation angle).
-inline constexpr int elevation_terms = 9;
-
-/// Intervals of a tabulated scattering law, see TileSeen::law.
-inline constexpr int law_steps = 128;
 
 /// One tile as one ping sees it.
 struct TileSeen {
@@ -59,9 +56,9 @@ struct EchoArrays {
 /// Rays that are scatterers: each draws a complex Gaussian of its own, a function of its counters (core/base/random.hpp).
 struct HitDraw {
   const std::uint32_t* counter[3];
-  std::uint32_t last_counter, key[2];
+  RandomKey key;
 };
-struct HitsToSound {
+struct HitsToScatter {
   static constexpr int most = 256;  // at once
   HitDraw draw;
   const float* range_m;
@@ -92,8 +89,8 @@ struct Kernels {
   const char* name;
   /// Appends the visible cells of a tile; `out` has room for tile.count + 16 more. Returns how many were appended.
   int (*scatter_tile)(const TileSeen&, const GroupView&, EchoArrays out);
-  /// re + i im = weight * draw * exp(-decay_per_m range - i 2 pi turns_per_m range), of n <= HitsToSound::most hits.
-  void (*sound_hits)(const HitsToSound&, int n, float* re, float* im);
+  /// re + i im = weight * draw * exp(-decay_per_m range - i 2 pi turns_per_m range), of n <= HitsToScatter::most hits.
+  void (*scatter_hits)(const HitsToScatter&, int n, float* re, float* im);
   /// Adds the echoes' kernels to grid[2 (points + width)].
   void (*spread)(const SpreadGrid&, const SpreadEchoes&, int count, double* grid);
   /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im). Reads and
@@ -101,7 +98,7 @@ struct Kernels {
   void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column,
                      int lead);
   /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.
-  void (*couple_panel)(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats);
+  void (*form_beam_panel)(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats);
   /// Beams of `floats` (a multiple of 32) interleaved values of each column, by way of a transform across the columns; `work`:
   /// BeamTransformTables::work_floats(), 64-byte aligned.
   void (*transform_beams)(const BeamTransform&, const float* columns, std::ptrdiff_t stride, int floats, float* work, float* out,

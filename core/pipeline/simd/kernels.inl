@@ -5,50 +5,9 @@
 
 #include "core/pipeline/simd/lanes.inl"
 
-inline float larger(float a, float b) { return a > b ? a : b; }
-inline float smaller(float a, float b) { return a < b ? a : b; }
-
-inline float sine_of_turns(float turns) {
-  float x = turns - std::floor(turns + 0.5f);
-  const float folded = (x > 0 ? 0.5f : -0.5f) - x;
-  x = std::fabs(x) > 0.25f ? folded : x;
-  const float y = 6.2831853071795865f * x, y2 = y * y;
-  float p = -2.5052108e-8f;
-  p = p * y2 + 2.7557319e-6f;
-  p = p * y2 - 1.9841270e-4f;
-  p = p * y2 + 8.3333333e-3f;
-  p = p * y2 - 1.6666667e-1f;
-  return y + y * y2 * p;
-}
-
-inline float log2_of(float x) {  // x > 0 and normal; relative error of 2^(log2 x) about 2e-7
-  const std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
-  const std::int32_t exponent = static_cast<std::int32_t>((bits - 0x3f3504f3u)) >> 23;
-  const float m = std::bit_cast<float>(bits - (static_cast<std::uint32_t>(exponent) << 23));  // in [sqrt(1/2), sqrt(2))
-  const float t = (m - 1.0f) / (m + 1.0f), t2 = t * t;
-  float p = 2.0f / 11.0f;
-  p = p * t2 + 2.0f / 9.0f;
-  p = p * t2 + 2.0f / 7.0f;
-  p = p * t2 + 2.0f / 5.0f;
-  p = p * t2 + 2.0f / 3.0f;
-  p = p * t2 + 2.0f;
-  return static_cast<float>(exponent) + 1.44269504f * t * p;
-}
-
-inline float exp2_of(float x) {
-  x = x < -126.0f ? -126.0f : (x > 126.0f ? 126.0f : x);
-  const float whole = std::floor(x + 0.5f);
-  const float f = (x - whole) * 0.69314718f;
-  float p = 1.0f / 5040.0f;
-  p = p * f + 1.0f / 720.0f;
-  p = p * f + 1.0f / 120.0f;
-  p = p * f + 1.0f / 24.0f;
-  p = p * f + 1.0f / 6.0f;
-  p = p * f + 0.5f;
-  p = p * f + 1.0f;
-  p = p * f + 1.0f;
-  return p * std::bit_cast<float>(static_cast<std::uint32_t>(static_cast<std::int32_t>(whole) + 127) << 23);
-}
+inline std::uint32_t bits_of(float x) { return std::bit_cast<std::uint32_t>(x); }
+inline float float_of(std::uint32_t bits) { return std::bit_cast<float>(bits); }
+#include "core/pipeline/arithmetic/kernel_math.inl"
 
 template <int taps>
 void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
@@ -122,7 +81,7 @@ void accumulate(const EchoArrays& e, int count, const PulseRows& pulse, float* c
     accumulate_taps<0>(e, count, pulse, columns, stride, first_column, lead);
 }
 
-void couple_panel(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats) {
+void form_beam_panel(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats) {
   constexpr int width = 2;  // vectors side by side: eight sums in flight hide the latency of the multiply-add
   for (int f = 0; f < floats; f += width * lanes) {
     Lanes sum[4][width] = {};

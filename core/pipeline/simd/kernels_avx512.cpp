@@ -12,8 +12,8 @@ constexpr int lanes = 16;
 }  // namespace avx512
 
 extern const Kernels avx512_kernels;
-const Kernels avx512_kernels{"avx512",           avx512::scatter_tile,  avx512::sound_hits,      avx512::spread,
-                             avx512::accumulate, avx512::couple_panel,  avx512::transform_beams, avx512::detect,
+const Kernels avx512_kernels{"avx512",           avx512::scatter_tile,    avx512::scatter_hits,    avx512::spread,
+                             avx512::accumulate, avx512::form_beam_panel, avx512::transform_beams, avx512::detect,
                              avx512::quantise,   avx512::quantise_bytes};
 
 }  // namespace sonar::simd

@@ -12,8 +12,8 @@ constexpr int lanes = 4;
 }  // namespace portable
 
 extern const Kernels portable_kernels;
-const Kernels portable_kernels{"portable",           portable::scatter_tile,  portable::sound_hits,      portable::spread,
-                               portable::accumulate, portable::couple_panel,  portable::transform_beams, portable::detect,
+const Kernels portable_kernels{"portable",           portable::scatter_tile,    portable::scatter_hits,    portable::spread,
+                               portable::accumulate, portable::form_beam_panel, portable::transform_beams, portable::detect,
                                portable::quantise,   portable::quantise_bytes};
 
 }  // namespace sonar::simd

@@ -18,6 +18,7 @@ inline Lanes exp2_of(Lanes x) {  // as exp2_of(float)
 }
 
 inline Lanes codes_of(const float* power, float gain, float half_gamma, float max_code) {
+  // (power gain)^(gamma / 2): docs/acoustics.md, eq. 37.
   const Lanes v = exp2_of(half_gamma * log2_of(larger(load(power) * gain, all(1e-30f))));
   return smaller(v * max_code + 0.5f, all(max_code));
 }

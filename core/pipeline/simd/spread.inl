@@ -16,7 +16,7 @@ inline double sine_of_turns_exact(double turns) {  // to 1e-11
 
 inline constexpr int spread_at_once = 64;
 
-/// Turns the echoes on, and says where on the grid they begin and how far between its points.
+/// Advances the echoes' phases; finds each echo's first grid point and its offset between grid points.
 __attribute__((noinline)) void place_on_grid(const SpreadGrid& g, const SpreadEchoes& e, int from, int n, double* __restrict re,
                                              double* __restrict im, double* __restrict first, double* __restrict between) {
   const double* __restrict turns = e.turns + from;
@@ -26,6 +26,7 @@ __attribute__((noinline)) void place_on_grid(const SpreadGrid& g, const SpreadEc
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) {
     const double phase = -turn_on * turns[i];
+    // e^{-i 2 pi turn_on turns}.
     const double c = sine_of_turns_exact(phase - std::floor(phase) + 0.25), s = sine_of_turns_exact(phase - std::floor(phase));
     re[i] = in_re[i] * c - in_im[i] * s;
     im[i] = in_re[i] * s + in_im[i] * c;

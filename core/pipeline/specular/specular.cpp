@@ -24,13 +24,15 @@ class Sight {
       : scene_(scene), s_(s), object_(object), object_in_world_(object_in_world) {}
 
   /// Bit i: place i of the point's surface is the first thing that a ray toward it meets. At most 16 places.
-  std::uint32_t seen(const MirrorPoint& point, std::span<const std::array<double, 2>> places) const {
+  std::uint32_t seen(const SpecularPoint& point, std::span<const std::array<double, 2>> places) const {
+    // Facets stand off the true surface by an amount that grows with its curvature.
     double slack = sight_slack_m;
     const double sharpest = std::max(std::abs(point.curvature[0]), std::abs(point.curvature[1]));
     if (sharpest > 0) slack += std::min(bent_slack / sharpest, most_bent_slack_m);
     RayPacket rays{};
     float expected[RayPacket::size] = {};
     for (std::size_t i = 0; i < places.size(); ++i) {
+      // A ray to each place; it is seen when the first hit is this object at this range.
       const Vec3d there = transform(object_in_world_, point.place(places[i][0], places[i][1])) - s_.seen_from.position_m;
       const double r = length(there);
       const Vec3 d = to_float((1 / r) * there);
@@ -55,7 +57,7 @@ class Sight {
 };
 
 /// A cell's middle, a little off: a ray along an edge between two triangles can slip through.
-double middle_of(const std::array<double, MirrorWindow::cells + 1>& edge, double cell) {
+double middle_of(const std::array<double, SpecularWindow::cells + 1>& edge, double cell) {
   const auto c = static_cast<std::size_t>(cell);
   const double part = cell - static_cast<double>(c) + 0.5137;
   return edge[c] + part * (edge[c + 1] - edge[c]);
@@ -63,8 +65,8 @@ double middle_of(const std::array<double, MirrorWindow::cells + 1>& edge, double
 
 /// Looks along the two principal directions and over the quarters between: whether all, a part or nothing is in sight.
 enum class Part { none, some, all };
-Part glance(const MirrorPoint& point, const MirrorWindow& w, const Sight& sight) {
-  constexpr std::size_t n = MirrorWindow::cells;
+Part glance(const SpecularPoint& point, const SpecularWindow& w, const Sight& sight) {
+  constexpr std::size_t n = SpecularWindow::cells;
   std::array<double, 2> middle{};
   for (std::size_t k = 0; k < 2; ++k) {
     const double from = w.edge[k].front(), size = w.edge[k].back() - from;
@@ -73,6 +75,7 @@ Part glance(const MirrorPoint& point, const MirrorWindow& w, const Sight& sight)
   }
   int looked = 0, met = 0;
   std::array<std::array<double, 2>, n> places{};
+  // 48 rays: along each principal direction, and over a 4 x 4 grid.
   for (int pattern = 0; pattern < 3; ++pattern) {
     std::size_t count = 0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -92,8 +95,8 @@ Part glance(const MirrorPoint& point, const MirrorWindow& w, const Sight& sight)
   return met == 0 ? Part::none : (met == looked ? Part::all : Part::some);
 }
 
-void hide(const MirrorPoint& point, MirrorWindow& w, const Sight& sight) {
-  constexpr std::size_t n = MirrorWindow::cells;
+void hide(const SpecularPoint& point, SpecularWindow& w, const Sight& sight) {
+  constexpr std::size_t n = SpecularWindow::cells;
   std::array<std::array<double, 2>, n> places{};
   std::array<std::size_t, n> cell{};
   for (std::size_t row = 0; row < n; ++row) {
@@ -101,6 +104,7 @@ void hide(const MirrorPoint& point, MirrorWindow& w, const Sight& sight) {
     for (std::size_t c = 0; c < n; ++c) {
       const std::array<double, 2> at{middle_of(w.edge[0], static_cast<double>(c)),
                                      middle_of(w.edge[1], static_cast<double>(row))};
+      // Cells beside the surface need no ray.
       if (!on_surface(point, at[0], at[1])) continue;
       cell[count] = row * n + c;
       places[count++] = at;
@@ -113,18 +117,19 @@ void hide(const MirrorPoint& point, MirrorWindow& w, const Sight& sight) {
 }
 
 /// K_vis with its phase, as far as the surface is in sight.
-std::complex<double> visible_factor(const MirrorPoint& point, double wavelength_m, const Sight& sight) {
-  const std::complex<double> whole = mirror_factor(point, wavelength_m);
+std::complex<double> visible_factor(const SpecularPoint& point, double wavelength_m, const Sight& sight) {
+  // K_1 K_2 of eq. 7 and 19 over the whole extent; hidden cells are left out only where some are hidden.
+  const std::complex<double> whole = specular_factor(point, wavelength_m);
   if (point.outline.empty() && std::abs(whole) < least_factor) return 0;
-  MirrorWindow window = make_window(point, wavelength_m);
+  SpecularWindow window = make_window(point, wavelength_m);
   const Part part = glance(point, window, sight);
   if (part == Part::none) return 0;
   if (part == Part::all) return whole;
   hide(point, window, sight);
-  return mirror_factor(point, wavelength_m, window);
+  return specular_factor(point, wavelength_m, window);
 }
 
-/// How far from straight ahead the columns hear; more when the sonar turns while the ping is under way.
+/// Largest angle from straight ahead that the columns cover; more when the sonar turns while the ping is under way.
 double widest_direction_rad(const PingPlan& plan) {
   constexpr double while_turning_rad = 0.05;
   const double sine = std::min(1.0, plan.columns.first_sine + plan.columns.spacing);
@@ -134,13 +139,14 @@ double widest_direction_rad(const PingPlan& plan) {
 }  // namespace
 
 double coherent_reflection(const Material& m, double wavelength_m) {
+  // Rc e^{-2 k^2 h^2} (docs/acoustics.md, eq. 18); rough from k h = 1.5 on.
   const double kh = 2 * pi / wavelength_m * static_cast<double>(m.roughness_m);
   if (!(kh < smooth_below_kh)) return 0;
   const double left = static_cast<double>(m.reflection) * std::exp(-2 * kh * kh);
   return std::abs(left) < least_reflection ? 0 : left;
 }
 
-MirrorEchoes::PreparedMesh& MirrorEchoes::prepared(std::size_t object, const std::shared_ptr<const Mesh>& mesh) {
+SpecularEchoes::PreparedMesh& SpecularEchoes::prepared(std::size_t object, const std::shared_ptr<const Mesh>& mesh) {
   if (object < mesh_of_.size() && meshes_[mesh_of_[object]].mesh == mesh) return meshes_[mesh_of_[object]];
   mesh_of_.resize(std::max(mesh_of_.size(), object + 1));
   const auto at = std::find_if(meshes_.begin(), meshes_.end(), [&](const PreparedMesh& m) { return m.mesh == mesh; });
@@ -157,16 +163,17 @@ MirrorEchoes::PreparedMesh& MirrorEchoes::prepared(std::size_t object, const std
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
+  // A ball about the mesh: objects out of range are skipped without a search.
   made.centre_m = 0.5 * (low + high);
   made.radius_m = 0.5 * length(high - low);
   return meshes_.emplace_back(std::move(made));
 }
 
-void MirrorEchoes::candidates(const Object& object, PreparedMesh& mesh, const MirrorQuery& query) {
+void SpecularEchoes::candidates(const Object& object, PreparedMesh& mesh, const SpecularQuery& query) {
   points_.clear();
   if (object.primitive.kind != Primitive::Kind::none) {
-    find_mirror_points(object.primitive, query, points_);
-    for (MirrorPoint& p : points_) p.material = mesh.materials.front();
+    find_specular_points(object.primitive, query, points_);
+    for (SpecularPoint& p : points_) p.material = mesh.materials.front();
     return;
   }
   mirrors_.assign(reflection_.size(), false);
@@ -175,17 +182,19 @@ void MirrorEchoes::candidates(const Object& object, PreparedMesh& mesh, const Mi
                          [this](const PreparedMesh::Surface& s) { return s.mirrors == mirrors_; });
   if (at == mesh.surfaces.end()) {
     if (mesh.surfaces.size() >= most_surfaces_of_a_mesh) mesh.surfaces.erase(mesh.surfaces.begin());
-    at = mesh.surfaces.insert(mesh.surfaces.end(), {mirrors_, std::make_unique<const MirrorMesh>(*mesh.mesh, mirrors_)});
+    at = mesh.surfaces.insert(mesh.surfaces.end(), {mirrors_, std::make_unique<const SpecularMesh>(*mesh.mesh, mirrors_)});
   }
   at->mesh->find(query, points_);
 }
 
-void MirrorEchoes::find(const RayScene& rays, std::span<const Pose> bodies_in_world, const PingPlan& plan, const PingScalars& s,
-                        std::vector<PointEcho>& echoes) {
-  const Scene& scene = rays.scene();
-  MirrorQuery query;
+void SpecularEchoes::find(const PingContext& context, std::vector<PointEcho>& echoes) {
+  const Scene& scene = context.scene();
+  const PingPlan& plan = context.plan;
+  const PingScalars& s = context.scalars;
+  SpecularQuery query;
   query.wavelength_m = s.sound_speed_mps / static_cast<double>(plan.mode.centre_hz);
   query.max_range_m = s.max_range_m;
+  // Feet outside this cone cannot reach a column.
   query.widest_rad = widest_direction_rad(plan);
   reflection_.clear();
   for (const Material& m : scene.materials) reflection_.push_back(coherent_reflection(m, query.wavelength_m));
@@ -197,25 +206,27 @@ void MirrorEchoes::find(const RayScene& rays, std::span<const Pose> bodies_in_wo
     if (!object.visible || object.mesh->triangles.empty()) continue;
     PreparedMesh& mesh = prepared(i, object.mesh);
     if (std::all_of(mesh.materials.begin(), mesh.materials.end(), [&](std::uint16_t m) { return reflection_[m] == 0; })) continue;
-    const Pose in_world = scene.in_world(object, bodies_in_world);
+    const Pose in_world = scene.in_world(object, context.bodies_in_world);
     const Pose world_in_object = inverse(in_world);
     query.sonar_m = transform(world_in_object, s.seen_from.position_m);
     query.ahead = rotate(world_in_object.orientation, rotate(s.seen_from.orientation, Vec3d{1, 0, 0}));
     if (length(query.sonar_m - mesh.centre_m) - mesh.radius_m > query.max_range_m) continue;
     candidates(object, mesh, query);
-    const Sight sight(rays, s, static_cast<std::uint32_t>(i), in_world);
-    for (const MirrorPoint& point : points_) {
+    const Sight sight(context.rays, s, static_cast<std::uint32_t>(i), in_world);
+    for (const SpecularPoint& point : points_) {
       const double reflection = reflection_[point.material];
       if (reflection == 0) continue;
       const std::array<double, 2> at = nearest_on_surface(point);
-      const Vec3d heard_from = transform(world_in_sonar, transform(in_world, point.place(at[0], at[1])));
-      const double r = length(heard_from);
-      // Eq. 7 without what point_echo knows (source, absorption, patterns, 1 / r^2, the phase of its own range).
+      const Vec3d from_sonar = transform(world_in_sonar, transform(in_world, point.place(at[0], at[1])));
+      const double r = length(from_sonar);
+      // docs/acoustics.md, eq. 7, without the factors of point_echo (source, absorption, patterns, 1 / r^2, phase of its own
+      // range): strength = Rc r^2 / (2 r sqrt((1 + r / R1) (1 + r / R2))), times K_1 K_2 (visible_factor).
       const double bends = bending(point.range_m, point.curvature[0]) * bending(point.range_m, point.curvature[1]);
       const double strength = reflection * r * r / (2 * point.range_m * std::sqrt(std::abs(bends)));
       const double beside_turns = (r - point.range_m) * s.turns_per_m;
-      std::optional<PointEcho> echo = point_echo(heard_from, std::polar(1.0, 2 * pi * fraction_of_turn(beside_turns)), plan, s);
+      std::optional<PointEcho> echo = point_echo(from_sonar, std::polar(1.0, 2 * pi * fraction_of_turn(beside_turns)), plan, s);
       if (!echo) continue;
+      // The most expensive step last: occlusion and the Fresnel integrals.
       const std::complex<double> factor = visible_factor(point, query.wavelength_m, sight);
       if (std::abs(factor) < least_factor) continue;
       echo->amplitude *= strength * factor;

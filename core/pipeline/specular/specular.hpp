@@ -1,4 +1,4 @@
-// Mirror echoes: smooth surfaces whose normal passes through the sonar send back a part of the wave as a whole (eq. 7 of the
+// Specular echoes: smooth surfaces whose normal passes through the sonar send back a part of the wave as a whole (eq. 7 of the
 // model; docs/acoustics.md, section 3). Their echoes are points, added to the beams at their exact direction.
 #pragma once
 
@@ -9,9 +9,9 @@
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/ping_scalars.hpp"
 #include "core/pipeline/scatter.hpp"
-#include "core/scene/mirrors/mirror_mesh.hpp"
-#include "core/scene/mirrors/mirror_primitives.hpp"
 #include "core/scene/ray_scene.hpp"
+#include "core/scene/specular/specular_mesh.hpp"
+#include "core/scene/specular/specular_primitives.hpp"
 
 namespace sonar {
 
@@ -20,11 +20,10 @@ namespace sonar {
 double coherent_reflection(const Material& material, double wavelength_m);
 
 /// What is kept between pings: every mesh with smooth materials, prepared when it is first looked at.
-class MirrorEchoes {
+class SpecularEchoes {
  public:
-  /// Appends the mirror echoes of the scene's surfaces, as far as rays find them in sight. Bodies must have been placed.
-  void find(const RayScene& scene, std::span<const Pose> bodies_in_world, const PingPlan& plan, const PingScalars& scalars,
-            std::vector<PointEcho>& echoes);
+  /// Appends the specular echoes of the scene's surfaces, as far as rays find them in sight.
+  void find(const PingContext& context, std::vector<PointEcho>& echoes);
 
  private:
   struct PreparedMesh {
@@ -36,18 +35,18 @@ class MirrorEchoes {
     /// on those before it.
     struct Surface {
       std::vector<bool> mirrors;  // by material
-      std::unique_ptr<const MirrorMesh> mesh;
+      std::unique_ptr<const SpecularMesh> mesh;
     };
     std::vector<Surface> surfaces;  // oldest first
   };
   PreparedMesh& prepared(std::size_t object, const std::shared_ptr<const Mesh>& mesh);
-  void candidates(const Object& object, PreparedMesh& mesh, const MirrorQuery& query);
+  void candidates(const Object& object, PreparedMesh& mesh, const SpecularQuery& query);
 
   std::vector<PreparedMesh> meshes_;  // in the order in which they were met
   std::vector<std::size_t> mesh_of_;  // object to place in meshes_
   std::vector<double> reflection_;    // per material, this ping
   std::vector<bool> mirrors_;         // those of a mesh that do
-  std::vector<MirrorPoint> points_;
+  std::vector<SpecularPoint> points_;
 };
 
 }  // namespace sonar

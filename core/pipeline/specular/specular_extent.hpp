@@ -7,27 +7,27 @@
 #include <complex>
 #include <span>
 
-#include "core/scene/mirrors/mirror_point.hpp"
+#include "core/scene/specular/specular_point.hpp"
 
 namespace sonar {
 
-/// The extent cut into cells about the place that matters most, to tell which parts are hidden. Outermost cells go on to the
+/// The extent cut into cells about the place that matters most, to find the hidden parts. Outermost cells go on to the
 /// edge.
-struct MirrorWindow {
+struct SpecularWindow {
   static constexpr std::size_t cells = 16;
   std::array<std::array<double, cells + 1>, 2> edge{};  // along the principal directions [m]
   std::bitset<cells * cells> hidden;                    // y * cells + x
 };
-MirrorWindow make_window(const MirrorPoint& point, double wavelength_m);
+SpecularWindow make_window(const SpecularPoint& point, double wavelength_m);
 
 /// K_1 K_2 of eq. 7 with its phase: 1 for an endless mirror, i for each focus on the way (time convention e^{+i 2 pi f t}).
-std::complex<double> mirror_factor(const MirrorPoint& point, double wavelength_m);
+std::complex<double> specular_factor(const SpecularPoint& point, double wavelength_m);
 /// The same without the cells that are hidden.
-std::complex<double> mirror_factor(const MirrorPoint& point, double wavelength_m, const MirrorWindow& window);
+std::complex<double> specular_factor(const SpecularPoint& point, double wavelength_m, const SpecularWindow& window);
 
 /// Whether a place in the tangent plane belongs to the surface.
-bool on_surface(const MirrorPoint& point, double x, double y);
+bool on_surface(const SpecularPoint& point, double x, double y);
 /// The place of the surface that is nearest to the foot.
-std::array<double, 2> nearest_on_surface(const MirrorPoint& point);
+std::array<double, 2> nearest_on_surface(const SpecularPoint& point);
 
 }  // namespace sonar

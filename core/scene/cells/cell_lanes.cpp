@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "core/base/random.hpp"
+
 // Compiled for three instruction sets, and chosen when the program starts. This file is built without contraction into fused
 // operations, so that all round alike.
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
@@ -16,8 +18,7 @@
 namespace sonar::cell_lanes {
 namespace {
 
-constexpr std::uint32_t block_key = 0x6e6574u;  // keeps the draws of blocks apart from those of cells
-constexpr int across = 4;                       // blocks along a tile, and cells along a block
+constexpr int across = 4;  // blocks along a tile, and cells along a block
 
 /// Which quarter of its cell a point lies in, across a 4 x 4 block, from where the cell lies along it: two binary digits, each
 /// flipped by random bits that depend on the digits before it (nested scrambling).
@@ -39,7 +40,7 @@ struct Draws {
 };
 inline void draw(const DrawKey& key, const std::uint32_t* i, const std::uint32_t* j, Draws& d) {
   for (int l = 0; l < block; ++l) {
-    d.v[0][l] = key.sheet;
+    d.v[0][l] = key.patch;
     d.v[1][l] = i[l];
     d.v[2][l] = j[l];
     d.v[3][l] = key.level;
@@ -104,7 +105,7 @@ SONAR_CLONES void draw_points(const DrawKey& key, std::int32_t first_i, std::int
     i[b] = static_cast<std::uint32_t>(first_i / across + b % across);
     j[b] = static_cast<std::uint32_t>(first_j / across + b / across);
   }
-  draw({key.sheet, key.level, key.lo ^ block_key, key.hi}, i, j, of_blocks);
+  draw({key.patch, key.level, key.lo ^ static_cast<std::uint32_t>(Domain::cell_blocks), key.hi}, i, j, of_blocks);
   for (int b = 0; b < blocks; ++b) {
     const std::int32_t at_i = first_i + b % across * across, at_j = first_j + b / across * across;
     alignas(64) double quarter_u[block], quarter_v[block];

@@ -14,7 +14,7 @@ constexpr int block = 16, blocks = points / block;
 
 /// What the draws of a tile depend on, beside the cells' indices along u and v.
 struct DrawKey {
-  std::uint32_t sheet, level, lo, hi;
+  std::uint32_t patch, level, lo, hi;
 };
 
 /// A tile's lattice points: places in the lattice plane [m], and the draws that their speckle comes from.
@@ -35,9 +35,9 @@ struct FacetTest {
   double low_u, end_u, low_v, end_v, low_w, end_w;
   double u0, v0, w0, nu, nv, nw;  // plane: a corner and the unit normal
 };
-/// Who owns the points of a tile, and how high they lie [m].
+/// The facet that owns each point of a tile, and the point's height [m].
 struct Owners {
-  alignas(64) std::int64_t facet[points];  // -1: nobody
+  alignas(64) std::int64_t facet[points];  // -1: no owner
   alignas(64) double w[points];
 };
 /// Which points of a block the facet owns, as bits, and their heights.
@@ -45,7 +45,7 @@ struct BlockHeights {
   alignas(64) double w[block];
   alignas(64) std::int64_t owned[block];  // all bits or none
 };
-/// Gives the points of one block to a facet. Returns false, with `found` filled and nobody changed, where one of them is owned
+/// Gives the points of one block to a facet. Returns false, with `found` filled and no owner changed, where one of them is owned
 /// already: another surface at the same height, or another that folds back.
 bool own_block(const FacetTest& test, const Points& in, int which, std::int64_t facet, Owners& owners, BlockHeights& found);
 

@@ -138,7 +138,7 @@ CellList list_cells(Ownership& all) {
   auto again = all.again.cbegin();
   int n = 0;
   for (int p = 0; p < cell_lanes::points; ++p) {
-    cells.put(n, all.points, p, all.first.facet[p], all.first.w[p]);  // the next takes its place where nobody owns it
+    cells.put(n, all.points, p, all.first.facet[p], all.first.w[p]);  // the next takes its place where it has no owner
     n += all.first.facet[p] >= 0;
     for (; again != all.again.cend() && again->point == p; ++again) cells.put(n++, all.points, p, again->facet, again->w);
   }
@@ -195,12 +195,11 @@ void pack(const Ownership& all, const TileAddress& a, const CellList& cells, Cel
   cell_lanes::pack_weights(cells.im, n, tile.weight_unit, column(CellTile::weight_im));
 }
 
-cell_lanes::DrawKey key_of(const TileAddress& a, std::uint32_t texture_seed, Seed seed) {
-  const auto bits = static_cast<std::uint64_t>(seed);
-  const std::uint32_t sheet = static_cast<std::uint32_t>(a.object) * 8u + static_cast<std::uint32_t>(a.axis) * 2u +
+cell_lanes::DrawKey draw_key(const TileAddress& a, std::uint32_t texture_seed, Seed seed) {
+  const RandomKey key = key_of(seed, Domain::cells);
+  const std::uint32_t patch = static_cast<std::uint32_t>(a.object) * 8u + static_cast<std::uint32_t>(a.axis) * 2u +
                               static_cast<std::uint32_t>(a.negative_side);
-  return {sheet, static_cast<std::uint32_t>(a.level), static_cast<std::uint32_t>(bits),
-          static_cast<std::uint32_t>(bits >> 32) ^ texture_seed};
+  return {patch, static_cast<std::uint32_t>(a.level), key.low, key.high ^ texture_seed};
 }
 
 }  // namespace
@@ -219,7 +218,7 @@ CellTile build_tile(const TileAddress& a, const Mesh& mesh, std::span<const std:
 
   Ownership all;
   all.facets.reserve(triangles.size());
-  cell_lanes::draw_points(key_of(a, texture_seed, seed), a.i * side, a.j * side, lattice::cell_size_m(a.level), all.points);
+  cell_lanes::draw_points(draw_key(a, texture_seed, seed), a.i * side, a.j * side, lattice::cell_size_m(a.level), all.points);
   std::fill(std::begin(all.first.facet), std::end(all.first.facet), -1);
   for (const std::uint32_t t : triangles) own(lattice::facet_of(mesh, t, a.axis), a, all);
   const CellList cells = list_cells(all);

@@ -12,7 +12,7 @@ namespace sonar {
 
 class TextureField;
 
-/// Which lattice cube, of which sheet: the triangles of one object that share material, dominant axis and side.
+/// Which lattice cube, of which patch: the triangles of one object that share material, dominant axis and side.
 struct TileAddress {
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;

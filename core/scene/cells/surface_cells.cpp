@@ -27,7 +27,7 @@ struct SurfaceCells::Node {
 };
 
 /// The triangles of one object that share material, dominant axis and side of the normal: one lattice.
-class SurfaceCells::Sheet {
+class SurfaceCells::SurfacePatch {
  public:
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
@@ -71,7 +71,7 @@ int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles) {
 
 }  // namespace
 
-void SurfaceCells::Sheet::plant(const std::vector<std::uint32_t>& triangles) {
+void SurfaceCells::SurfacePatch::plant(const std::vector<std::uint32_t>& triangles) {
   const int level = root_level(*mesh, triangles);
   const double e = lattice::tile_edge_m(level);
   std::map<std::tuple<std::int32_t, std::int32_t, std::int32_t>, std::unique_ptr<Node>> planted;
@@ -99,7 +99,7 @@ void SurfaceCells::Sheet::plant(const std::vector<std::uint32_t>& triangles) {
   for (auto& [where, node] : planted) roots.push_back(std::move(node));
 }
 
-std::size_t SurfaceCells::Sheet::divide(Node& node) const {
+std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
   node.divided = true;
   std::array<TileAddress, 8> inside;
   std::array<Cube, 8> cubes;
@@ -137,7 +137,7 @@ std::size_t SurfaceCells::Sheet::divide(Node& node) const {
   return bytes;
 }
 
-std::size_t SurfaceCells::Sheet::forget_below(Node& node, std::uint64_t then) {
+std::size_t SurfaceCells::SurfacePatch::forget_below(Node& node, std::uint64_t then) {
   std::size_t freed = 0;
   bool stale = node.divided;
   for (const auto& child : node.children) {
@@ -174,23 +174,23 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
       sorted[{object.mesh->material[t], axis, along < 0}].push_back(t);
     }
     for (const auto& [key, triangles] : sorted) {
-      auto sheet = std::make_unique<Sheet>();
-      sheet->object = static_cast<int>(o);
-      std::tie(sheet->material, sheet->axis, sheet->negative_side) = key;
-      sheet->mesh = object.mesh;
-      sheet->plant(triangles);
-      for (auto& root : sheet->roots) roots_.push_back({sheet.get(), root.get()});
-      sheets_.push_back(std::move(sheet));
+      auto patch = std::make_unique<SurfacePatch>();
+      patch->object = static_cast<int>(o);
+      std::tie(patch->material, patch->axis, patch->negative_side) = key;
+      patch->mesh = object.mesh;
+      patch->plant(triangles);
+      for (auto& root : patch->roots) roots_.push_back({patch.get(), root.get()});
+      patches_.push_back(std::move(patch));
     }
   }
 }
 
 SurfaceCells::~SurfaceCells() = default;
 
-void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& turn,
+void SurfaceCells::visit(SurfacePatch& patch, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& turn,
                          Found& found) const {
   const Cube cube = cube_of(node.address);
-  const Vec3d centre = lattice::from_permuted(cube.u, cube.v, cube.w, sheet.axis);
+  const Vec3d centre = lattice::from_permuted(cube.u, cube.v, cube.w, patch.axis);
   const double radius = cube.half * 1.7320508075688772 * 1.0001;
   const Vec3d q = centre - sonar_in_object.position_m;
   const auto& m = turn.m;
@@ -215,13 +215,13 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
     if (!overlaps) continue;
     if (level.level == node.address.level) {
       found.wanted.push_back(&node);
-      found.in_view.push_back({&node.tile, &level, q, p, sheet.object});
+      found.in_view.push_back({&node.tile, &level, q, p, patch.object});
     } else if (level.level > node.address.level) {
       finer = true;
     }
   }
   if (!finer) return;
-  if (!node.divided) found.new_bytes += sheet.divide(node);
+  if (!node.divided) found.new_bytes += patch.divide(node);
   for (const auto& child : node.children) {  // they lie anywhere in memory: ask for all before the first
     if (!child) continue;
     const auto* at = reinterpret_cast<const char*>(child.get());
@@ -229,7 +229,7 @@ void SurfaceCells::visit(Sheet& sheet, Node& node, const CellView& view, const P
     __builtin_prefetch(at + 64);
   }
   for (auto& child : node.children)
-    if (child) visit(sheet, *child, view, sonar_in_object, turn, found);
+    if (child) visit(patch, *child, view, sonar_in_object, turn, found);
 }
 
 /// Stretches of roots side by side; what each finds stays apart, so that the order does not depend on who looked.
@@ -249,9 +249,9 @@ void SurfaceCells::look(const CellView& view, Parallel& pool) {
     found.wanted.clear();
     found.new_bytes = 0;
     for (std::size_t r = s * stretch; r < std::min(roots_.size(), (s + 1) * stretch); ++r) {
-      Sheet& sheet = *roots_[r].sheet;
-      const auto object = static_cast<std::size_t>(sheet.object);
-      visit(sheet, *roots_[r].node, view, sonar_in_object_[object], rotations_[object], found);
+      SurfacePatch& patch = *roots_[r].patch;
+      const auto object = static_cast<std::size_t>(patch.object);
+      visit(patch, *roots_[r].node, view, sonar_in_object_[object], rotations_[object], found);
     }
   });
 }
@@ -290,9 +290,9 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
 void SurfaceCells::keep_within_budget() {
   for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {
     if (age >= now_ || (kept_since_ > 0 && now_ - age >= kept_since_)) continue;
-    for (auto& sheet : sheets_)
-      for (auto& root : sheet->roots) {
-        cached_bytes_ -= Sheet::forget_below(*root, now_ - age + 1);
+    for (auto& patch : patches_)
+      for (auto& root : patch->roots) {
+        cached_bytes_ -= SurfacePatch::forget_below(*root, now_ - age + 1);
         if (root->built && root->last_visited <= now_ - age) {
           cached_bytes_ -= root->tile.bytes();
           root->tile = CellTile{};

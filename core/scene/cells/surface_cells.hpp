@@ -1,6 +1,6 @@
 // Scatterers as a property of the surfaces: a lattice of cells in object coordinates, made on demand from the mesh triangles and
 // kept between pings (docs/architecture.md, "Surface cells"; Choi 2025 eq. 2 for the statistics of one scatterer).
-// `scatter` asks for the tiles in view of a ping; the cells' speckle is theirs, whatever ray or ping looks at them.
+// `scatter` asks for the tiles in view of a ping; the cells' speckle does not depend on ray or ping.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace sonar {
 
-/// Up to 16 x 16 cells (more where sheets overlap) in a cube of the lattice, in one allocation of int16 columns.
+/// Up to 16 x 16 cells (more where patches overlap) in a cube of the lattice, in one allocation of int16 columns.
 /// Positions are relative to the cube's centre. Padding cells have zero weight.
 struct CellTile {
   int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
@@ -103,10 +103,10 @@ class SurfaceCells {
   std::size_t built_last_time() const { return built_; }
 
  private:
-  class Sheet;
+  class SurfacePatch;
   struct Node;
   struct Root {
-    Sheet* sheet;
+    SurfacePatch* patch;
     Node* node;
   };
   struct Found {  // by those who look through some of the roots
@@ -115,8 +115,8 @@ class SurfaceCells {
     std::size_t new_bytes = 0;
   };
   void look(const CellView& view, Parallel& pool);
-  void visit(Sheet& sheet, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& sonar_from_object,
-             Found& found) const;
+  void visit(SurfacePatch& patch, Node& node, const CellView& view, const Pose& sonar_in_object,
+             const Rotation& sonar_from_object, Found& found) const;
   void keep_within_budget();
 
   std::shared_ptr<const Scene> scene_;
@@ -126,8 +126,8 @@ class SurfaceCells {
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
   double fan_cosine_ = 1, fan_sine_ = 0;    // of the last view's half angle
-  std::vector<std::unique_ptr<Sheet>> sheets_;
-  std::vector<Root> roots_;            // of all sheets, in order
+  std::vector<std::unique_ptr<SurfacePatch>> patches_;
+  std::vector<Root> roots_;            // of all patches, in order
   std::vector<Pose> sonar_in_object_;  // of the last view, per object
   std::vector<Rotation> rotations_;
   std::vector<TileInView> in_view_;

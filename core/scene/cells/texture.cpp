@@ -4,12 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "core/base/random.hpp"
-
 namespace sonar {
 namespace {
 
-constexpr std::uint32_t texture_key = 0x74657874u;  // keeps these draws apart from the cells'
 constexpr int quantiles = 256;
 constexpr double widest_normal = 5;
 constexpr double weakest = 1e-4;  // -40 dB; nearer to nothing a cell could not be told from an empty one
@@ -45,6 +42,7 @@ IncompleteGamma incomplete_gamma(double a, double x, double log_gamma_a) {
 /// The Gamma variable of shape nu and mean 1 that as much lies below as lies below a standard normal.
 double gamma_at_normal(double nu, double log_gamma_nu, double normal) {
   const double below = 0.5 * std::erfc(-normal / std::sqrt(2.0)), above = 0.5 * std::erfc(normal / std::sqrt(2.0));
+  // Bisection in log x: after 48 halvings the error is far below the rounding of the float results.
   double low = std::log(weakest * nu), high = std::log(nu + 40 * std::sqrt(nu) + 60);
   for (int i = 0; i < 48; ++i) {
     const double middle = 0.5 * (low + high);
@@ -64,6 +62,7 @@ Blend blend_at(double x) {
   const auto whole = static_cast<std::int32_t>(x + 0.5);
   const std::int32_t nearest = whole - (whole > x + 0.5);  // the floor, without a call
   const double t = x - nearest;
+  // Quadratic B-spline weights at distance t from the nearest lattice point.
   const double w[3] = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
   const double scale = 1 / std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
   return {nearest - 1, {static_cast<float>(w[0] * scale), static_cast<float>(w[1] * scale), static_cast<float>(w[2] * scale)}};
@@ -72,13 +71,12 @@ Blend blend_at(double x) {
 }  // namespace
 
 TextureField::TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed)
-    : lattice_m_(static_cast<double>(texture.correlation_m)) {
-  const auto bits = static_cast<std::uint64_t>(seed);
-  key_lo_ = static_cast<std::uint32_t>(bits);
-  key_hi_ = static_cast<std::uint32_t>(bits >> 32) ^ texture_seed;
+    : lattice_m_(static_cast<double>(texture.correlation_m)), key_(key_of(seed, Domain::texture)) {
+  key_.high ^= texture_seed;
   const double nu = static_cast<double>(texture.shape), log_gamma_nu = std::lgamma(nu);
   double mean = 0, weight = 0;
   std::vector<double> values;
+  // x = P^-1(nu, Phi(z)) / nu at even z; the mean over the normal density is divided out.
   for (int i = 0; i <= quantiles; ++i) {
     const double normal = widest_normal * (2.0 * i / quantiles - 1), density = std::exp(-0.5 * normal * normal);
     values.push_back(gamma_at_normal(nu, log_gamma_nu, normal));
@@ -91,12 +89,13 @@ TextureField::TextureField(const Texture& texture, std::uint32_t texture_seed, S
 
 float TextureField::normal_at(int object, std::int32_t i, std::int32_t j, std::int32_t k) const {
   const Random4 draw = philox(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(k),
-                              texture_key ^ static_cast<std::uint32_t>(object), key_lo_, key_hi_);
+                              key_.domain ^ static_cast<std::uint32_t>(object), key_.low, key_.high);
   return 1.41421356f * complex_normal(draw.v[0], draw.v[1]).re;
 }
 
 float TextureField::root_of(float normal) const {
   constexpr float per_normal = static_cast<float>(quantiles / (2 * widest_normal));
+  // Linear between the tabulated quantiles.
   const float at = std::clamp((normal + static_cast<float>(widest_normal)) * per_normal, 0.0f, static_cast<float>(quantiles));
   const auto i = static_cast<std::size_t>(at);
   return roots_[i] + (at - static_cast<float>(i)) * (roots_[i + 1] - roots_[i]);
@@ -127,6 +126,7 @@ void TexturePatch::stand_at(std::int32_t i, std::int32_t j, std::int32_t k) {
 }
 
 float TexturePatch::root_at(Vec3d place_m) {
+  // Blend of 27 lattice normals; the weights' squares add to 1, so the result is again standard normal.
   const double per_m = 1 / field_.lattice_m();
   const Blend x = blend_at(place_m.x * per_m), y = blend_at(place_m.y * per_m), z = blend_at(place_m.z * per_m);
   stand_at(x.first, y.first, z.first);

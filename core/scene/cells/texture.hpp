@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/geometry.hpp"
+#include "core/base/random.hpp"
 #include "core/base/units.hpp"
 #include "core/scene/scene.hpp"
 
@@ -27,7 +28,7 @@ class TextureField {
 
  private:
   double lattice_m_;
-  std::uint32_t key_lo_, key_hi_;
+  RandomKey key_;
   std::vector<float> roots_;
 };
 

@@ -1,4 +1,4 @@
-// The only file that knows Assimp. Local files at load time only, never bytes from a network.
+// The only file that includes Assimp. Local files at load time only, never bytes from a network.
 #include "core/scene/files/load_mesh.hpp"
 
 #include <assimp/config.h>

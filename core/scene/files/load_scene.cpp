@@ -68,7 +68,7 @@ Result<std::shared_ptr<const Scene>> load_built_in_scene(std::string_view name) 
   const std::span<const BuiltInFile> files = built_in_files();
   const auto file = std::find_if(files.begin(), files.end(), [&](const BuiltInFile& f) { return f.name == name; });
   if (file == files.end() || !is_built_in_scene(name))
-    return failure(ErrorKind::missing_file, "no scene called " + std::string(name) + " is built in; give a scene file");
+    return failure(ErrorKind::missing_file, "there is no built-in scene \"" + std::string(name) + "\"; give a scene file");
   auto document = text::parse_yaml(file->contents, "built-in " + std::string(name), {.error_kind = ErrorKind::bug});
   if (!document) return tl::make_unexpected(document.error());
   return read_document(*document, {}, std::string(name.substr(0, name.find('.'))), files);

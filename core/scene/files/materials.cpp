@@ -12,8 +12,6 @@ namespace {
 
 using text::Range;
 
-constexpr double most_backscatter_db = -4.97;  // 1 / pi per steradian: Lambert's surface that sends back all it receives
-
 float read_number(text::Map& keys, const char* key, float fallback, Range range) {
   return static_cast<float>(keys.optional(key).number_or(static_cast<double>(fallback), range));
 }
@@ -25,7 +23,7 @@ float read_angle_rad(text::Map& keys, const char* key, float fallback_rad) {
 
 GsabLaw read_gsab(const text::Node& node, GsabLaw law) {
   text::Map keys = node.map();
-  const Range strength = Range::between(-200, most_backscatter_db);
+  const Range strength = Range::between(-200, largest_lambert_db);
   law.a_db = read_number(keys, "a_db", law.a_db, strength);
   law.b_rad = read_angle_rad(keys, "b_deg", law.b_rad);
   law.c_db = read_number(keys, "c_db", law.c_db, strength);
@@ -35,8 +33,9 @@ GsabLaw read_gsab(const text::Node& node, GsabLaw law) {
   // All three terms are strongest at normal incidence.
   double sum = 0;
   for (const float db : {law.a_db, law.c_db, law.e_db}) sum += power_from_db(static_cast<double>(db));
-  if (10 * std::log10(sum) > most_backscatter_db)
-    node.fail("sends back more than 1/pi (-4.97 dB) at normal incidence, more than can come in; lower a_db, c_db or e_db");
+  if (10 * std::log10(sum) > largest_lambert_db)
+    node.fail(
+        "backscatters more than 1/pi (-4.97 dB) at normal incidence, more than the incident energy; lower a_db, c_db or e_db");
   return law;
 }
 
@@ -75,7 +74,7 @@ void MaterialTable::read_one(const std::string& name, text::Map keys) {
   }
   m.name = name;
   m.law = keys.optional("law").choice_or(m.law, {{"lambert", ScatteringLaw::lambert}, {"gsab", ScatteringLaw::gsab}});
-  m.lambert_db = read_number(keys, "lambert_db", m.lambert_db, Range::between(-80, most_backscatter_db));
+  m.lambert_db = read_number(keys, "lambert_db", m.lambert_db, Range::between(-80, largest_lambert_db));
   if (const text::Node node = keys.optional("gsab")) {
     if (m.law != ScatteringLaw::gsab) node.fail("has no effect under law: lambert; add law: gsab");
     m.gsab = read_gsab(node, m.gsab);

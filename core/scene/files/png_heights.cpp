@@ -1,4 +1,4 @@
-// Grey PNG images as heights; the only file of the scene that knows libpng.
+// Grey PNG images as heights; the only file of the scene that includes libpng.
 #include <png.h>
 
 #include <csetjmp>
@@ -49,7 +49,7 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
   png_read_end(png, nullptr);
 }
 
-// libpng leaves by longjmp: everything with a destructor lives in the caller.
+// libpng leaves by longjmp: everything with a destructor belongs to the caller.
 bool read_picture(std::FILE* file, Picture& picture, std::vector<png_byte>& row) {
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &picture, on_error, on_warning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;

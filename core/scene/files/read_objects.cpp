@@ -25,7 +25,7 @@ Pose pose_from(Map keys) {
   return pose;
 }
 
-// One walk over the list; knows which names are taken and which of them move.
+// One pass over the list; keeps the names in use and which of them move.
 class ObjectsReader {
  public:
   explicit ObjectsReader(ShapeReader& shapes) : shapes_(shapes), scene_(shapes.scene) {}
@@ -42,8 +42,8 @@ class ObjectsReader {
     const std::string_view type = types[type_node.choice_index(types)];
     if (type_node.text() != type) return;  // said already
     const std::string name = name_node.text_or(std::string(type) + " " + std::to_string(++unnamed_), 64);
-    if (!names_.insert(name).second) name_node.fail("name used twice; objects need names of their own");
-    if (moving && attached.present()) attached.fail("an object moves by itself or with another, not both");
+    if (!names_.insert(name).second) name_node.fail("name is used twice; object names must be unique");
+    if (moving && attached.present()) attached.fail("give moving: true or attached_to, not both");
     int body = attached.present() ? body_named(attached) : -1;
     if (type == "point") return read_point(keys, name, body, moving);
 
@@ -57,7 +57,7 @@ class ObjectsReader {
       return place(node, shape, name, moving ? Pose{} : pose, body, visible);
     }
     if (pose_node.present()) pose_node.fail("give pose or instances, not both");
-    if (moving) instances.fail("a moving object has one pose; write one object for each");
+    if (moving) instances.fail("a moving object has one pose only; write one object per instance");
     std::size_t n = 0;
     for (const Node& instance : instances.items(1, max_objects)) {
       place(instance, shape, name + "[" + std::to_string(n++) + "]", pose_from(instance.map()), body, visible);
@@ -157,12 +157,12 @@ void read_sea_surface(const Node& node, ShapeReader& shapes) {
   Scene& scene = shapes.scene;
   SeaSurface& sea = scene.sea_surface;
   sea.present = true;
-  number("lambert_db", sea.lambert_db, Range::between(-80, -4.97));
+  number("lambert_db", sea.lambert_db, Range::between(-80, largest_lambert_db));
   number("roughness_m", sea.roughness_m, Range::between(0, 20));
   number("bubble_layer_m", sea.bubble_layer_m, Range::between(0, 100));
   number("bubble_loss_db_per_m", sea.bubble_loss_db_per_m, Range::between(0, 1000));
   if (sea.bubble_loss_db_per_m > 0 && !(sea.bubble_layer_m > 0))
-    node.fail("bubble_loss_db_per_m needs bubble_layer_m, the thickness of the layer that it holds for");
+    node.fail("bubble_loss_db_per_m needs bubble_layer_m, the thickness of the layer");
   if (size[0] <= 0 || size[1] <= 0) return;
   Material air{.name = "sea_surface", .lambert_db = sea.lambert_db, .roughness_m = sea.roughness_m, .reflection = -1};
   Mesh mesh = make_plane(size[0], size[1], std::max(1.0, std::max(size[0], size[1]) / 100));

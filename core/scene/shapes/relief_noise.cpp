@@ -10,7 +10,7 @@ double mix(double a, double b, double t) { return a + t * (b - a); }
 
 double lattice_value(std::int64_t x, std::int64_t y, std::int64_t z, std::uint32_t seed, std::uint32_t stream) {
   const Random4 r = philox(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), static_cast<std::uint32_t>(z), 0, seed,
-                           stream ^ 0x76616C75u);
+                           stream ^ static_cast<std::uint32_t>(Domain::relief_value));
   return 2.0 * static_cast<double>(uniform_open(r.v[0])) - 1;
 }
 
@@ -39,7 +39,8 @@ GradientField::GradientField(double half_x_m, double half_y_m, double wavelength
   slopes_.reserve(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
   for (int y = first_y_; y < first_y_ + rows_; ++y) {
     for (int x = first_x_; x < first_x_ + columns_; ++x) {
-      const Random4 r = philox(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), stream, 1, seed, 0x67726164u);
+      const Random4 r = philox(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), stream, 1, seed,
+                               static_cast<std::uint32_t>(Domain::relief_gradient));
       const double a = 2 * pi * static_cast<double>(uniform_open(r.v[0]));
       slopes_.push_back({static_cast<float>(std::cos(a)), static_cast<float>(std::sin(a))});
     }

@@ -1,45 +1,26 @@
 #include "protocol/recording/mcap/mcap_json.hpp"
 
-#include <array>
-#include <charconv>
-#include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
 
 namespace sonar::recording::mcap {
 namespace {
 
-/// Shortest text that reads back the same; JSON has no infinities.
-template <class T>
-std::string number(T value) {
-  if constexpr (std::is_floating_point_v<T>)
-    if (!std::isfinite(value)) return "0";
-  std::array<char, 32> text;
-  const auto told = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), told.ptr};
-}
+using Json = nlohmann::ordered_json;
 
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return out + "\"";
-}
+/// Invalid UTF-8 in names is replaced, not refused.
+std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
-std::string timestamp(Time at) {
+Json json_of(Time at) {
   const auto since = at.time_since_epoch();
   const auto whole = std::chrono::floor<std::chrono::seconds>(since);
-  return std::string("{\"sec\":").append(number(whole.count())).append(",\"nsec\":") + number((since - whole).count()) + "}";
+  return {{"sec", whole.count()}, {"nsec", (since - whole).count()}};
 }
 
-std::string pose_text(const Pose& pose) {
+Json json_of(const Pose& pose) {
   const Vec3d& p = pose.position_m;
   const Quatd& q = pose.orientation;
-  std::string text = "{\"position\":{\"x\":";
-  text.append(number(p.x)).append(",\"y\":").append(number(p.y)).append(",\"z\":").append(number(p.z));
-  text.append("},\"orientation\":{\"x\":").append(number(q.x)).append(",\"y\":").append(number(q.y));
-  return text.append(",\"z\":").append(number(q.z)).append(",\"w\":").append(number(q.w)).append("}}");
+  return {{"position", {{"x", p.x}, {"y", p.y}, {"z", p.z}}}, {"orientation", {{"x", q.x}, {"y", q.y}, {"z", q.z}, {"w", q.w}}}};
 }
 
 /// Rows by range, little-endian, of `width` bytes a sample.
@@ -77,32 +58,33 @@ wire::Bytes as_floats(const Picture& picture) {
 
 std::string image_text(Time at, const std::string& frame, const Picture& picture) {
   const std::size_t width = picture.width;
-  const char* const encoding = width == 1 ? "mono8" : width == 2 ? "16UC1" : "32FC1";
-  std::string text = "{\"timestamp\":";
-  text.append(timestamp(at)).append(",\"frame_id\":").append(quoted(frame)).append(",\"width\":").append(number(picture.beams));
-  text.append(",\"height\":").append(number(picture.rows)).append(",\"encoding\":\"").append(encoding).append("\",\"step\":");
-  text.append(number(picture.beams * (width <= 2 ? width : 4)));
-  return text.append(",\"data\":\"").append(base64(width <= 2 ? picture.samples : as_floats(picture))).append("\"}");
+  std::string text = text_of({{"timestamp", json_of(at)},
+                              {"frame_id", frame},
+                              {"width", picture.beams},
+                              {"height", picture.rows},
+                              {"encoding", width == 1   ? "mono8"
+                                           : width == 2 ? "16UC1"
+                                                        : "32FC1"},
+                              {"step", picture.beams * (width <= 2 ? width : 4)}});
+  text.pop_back();  // base64 needs no escapes: appended without a search for them, since an image can exceed 1 MB
+  return text.append(R"(,"data":")").append(base64(width <= 2 ? picture.samples : as_floats(picture))).append("\"}");
 }
 
-/// The objects that a beam met, each once.
-std::string objects_met(const PingTruth& truth) {
-  std::set<std::uint32_t> met;
+/// The objects that the beams hit, each once.
+Json objects_hit(const PingTruth& truth) {
+  std::set<std::uint32_t> hit;
   for (const BeamTruth& beam : truth.beams)
-    if (truth.names != nullptr && beam.object < truth.names->objects.size()) met.insert(beam.object);
-  std::string text;
-  for (const std::uint32_t object : met)
-    text.append(text.empty() ? "" : ",").append("{\"index\":").append(number(object)).append(",\"name\":") +=
-        quoted(truth.names->objects[object]) + "}";
-  return text;
+    if (truth.names != nullptr && beam.object < truth.names->objects.size()) hit.insert(beam.object);
+  Json objects = Json::array();
+  for (const std::uint32_t object : hit) objects.push_back({{"index", object}, {"name", truth.names->objects[object]}});
+  return objects;
 }
 
-std::string bodies_there(const PingTruth& truth) {
-  std::string text;
+Json moving_bodies(const PingTruth& truth) {
+  Json bodies = Json::array();
   for (std::size_t i = 0; truth.names != nullptr && i < truth.names->bodies.size() && i < truth.bodies_in_world.size(); ++i)
-    text.append(text.empty() ? "" : ",").append("{\"name\":").append(quoted(truth.names->bodies[i])).append(",\"pose\":") +=
-        pose_text(truth.bodies_in_world[i]) + "}";
-  return text;
+    bodies.push_back({{"name", truth.names->bodies[i]}, {"pose", json_of(truth.bodies_in_world[i])}});
+  return bodies;
 }
 
 }  // namespace
@@ -127,60 +109,74 @@ std::string image_json(Time at, const std::string& frame, const oculus::DecodedP
 std::string image_json(Time at, const std::string& frame, const Ping& ping) { return image_text(at, frame, picture_of(ping)); }
 
 std::string pose_json(Time at, const std::string& frame, const Pose& pose) {
-  std::string text = "{\"timestamp\":";
-  text.append(timestamp(at)).append(",\"frame_id\":").append(quoted(frame));
-  return text.append(",\"pose\":").append(pose_text(pose)).append("}");
+  return text_of({{"timestamp", json_of(at)}, {"frame_id", frame}, {"pose", json_of(pose)}});
 }
 
 std::string truth_json(const PingTruth& truth) {
-  std::string ranges, objects;
+  Json ranges_m = Json::array(), objects = Json::array();
   for (const BeamTruth& beam : truth.beams) {
     const bool hit = beam.object != BeamTruth::nothing;
-    ranges.append(ranges.empty() ? "" : ",").append(number(hit ? beam.range_m : 0.0f));
-    objects.append(objects.empty() ? "" : ",").append(hit ? number(beam.object) : "-1");
+    ranges_m.push_back(hit ? beam.range_m : 0.0f);
+    objects.push_back(hit ? Json(beam.object) : Json(-1));
   }
-  std::string text = "{\"timestamp\":";
-  text.append(timestamp(truth.fired_at)).append(",\"ping\":").append(number(truth.ping)).append(",\"sonar_in_world\":");
-  text.append(pose_text(truth.sonar_in_world)).append(",\"range_m\":[").append(ranges).append("],\"object\":[").append(objects);
-  text.append("],\"objects\":[").append(objects_met(truth)).append("],\"bodies\":[").append(bodies_there(truth));
-  return text.append("]}");
+  return text_of({{"timestamp", json_of(truth.fired_at)},
+                  {"ping", truth.ping},
+                  {"sonar_in_world", json_of(truth.sonar_in_world)},
+                  {"range_m", std::move(ranges_m)},
+                  {"object", std::move(objects)},
+                  {"objects", objects_hit(truth)},
+                  {"bodies", moving_bodies(truth)}});
 }
 
 // ---- the schemas
 
+namespace {
+
+Json type(const char* name) { return {{"type", name}}; }
+Json object(Json properties) { return {{"type", "object"}, {"properties", std::move(properties)}}; }
+Json array(Json items) { return {{"type", "array"}, {"items", std::move(items)}}; }
+Json timestamp() { return object({{"sec", type("integer")}, {"nsec", type("integer")}}); }
+Json pose() {
+  Json position{{"x", type("number")}, {"y", type("number")}, {"z", type("number")}};
+  Json orientation = position;
+  orientation["w"] = type("number");
+  return object({{"position", object(std::move(position))}, {"orientation", object(std::move(orientation))}});
+}
+
+JsonSchema schema(const char* title, const char* description, Json properties) {
+  return {title,
+          text_of({{"title", title}, {"description", description}, {"type", "object"}, {"properties", std::move(properties)}})};
+}
+
+}  // namespace
+
 JsonSchema image_schema() {
-  return {
-      "foxglove.RawImage",
-      R"({"title":"foxglove.RawImage","description":"Samples as sent: a row a range, the nearest first; a column a beam, port first",)"
-      R"("type":"object","properties":{)"
-      R"("timestamp":{"type":"object","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},"frame_id":{"type":"string"},)"
-      R"("width":{"type":"integer"},"height":{"type":"integer"},"encoding":{"type":"string"},"step":{"type":"integer"},)"
-      R"("data":{"type":"string","contentEncoding":"base64"}}})"};
+  return schema("foxglove.RawImage", "Samples as sent: one row per range, nearest first; one column per beam, port first",
+                {{"timestamp", timestamp()},
+                 {"frame_id", type("string")},
+                 {"width", type("integer")},
+                 {"height", type("integer")},
+                 {"encoding", type("string")},
+                 {"step", type("integer")},
+                 {"data", {{"type", "string"}, {"contentEncoding", "base64"}}}});
 }
 
 JsonSchema pose_schema() {
-  return {
-      "foxglove.PoseInFrame",
-      R"({"title":"foxglove.PoseInFrame","description":"World ENU, body FLU: x ahead, y to port, z up",)"
-      R"("type":"object","properties":{)"
-      R"("timestamp":{"type":"object","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},"frame_id":{"type":"string"},"pose":)"
-      R"({"type":"object","properties":{"position":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},)"
-      R"("orientation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}}}})"};
+  return schema("foxglove.PoseInFrame", "World ENU, body FLU: x ahead, y to port, z up",
+                {{"timestamp", timestamp()}, {"frame_id", type("string")}, {"pose", pose()}});
 }
 
 JsonSchema truth_schema() {
-  return {
+  return schema(
       "sonard.PingTruth",
-      R"({"title":"sonard.PingTruth","description":"Where the sonar and what moves were, and per beam (port first) range and index of the first object; -1 = none",)"
-      R"("type":"object","properties":{)"
-      R"("timestamp":{"type":"object","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},"ping":{"type":"integer"},"sonar_in_world":)"
-      R"({"type":"object","properties":{"position":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},)"
-      R"("orientation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}},)"
-      R"("range_m":{"type":"array","items":{"type":"number"}},"object":{"type":"array","items":{"type":"integer"}},"objects":{"type":"array","items":{"type":"object","properties":)"
-      R"({"index":{"type":"integer"},"name":{"type":"string"}}}},"bodies":{"type":"array","items":{"type":"object","properties":)"
-      R"({"name":{"type":"string"},"pose":{"type":"object","properties":{"position":{"type":"object","properties":)"
-      R"({"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},"orientation":{"type":"object","properties":)"
-      R"({"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}}}}}}})"};
+      "Poses of the sonar and of the moving bodies; per beam (port first) range and index of the first object, -1 = none",
+      {{"timestamp", timestamp()},
+       {"ping", type("integer")},
+       {"sonar_in_world", pose()},
+       {"range_m", array(type("number"))},
+       {"object", array(type("integer"))},
+       {"objects", array(object({{"index", type("integer")}, {"name", type("string")}}))},
+       {"bodies", array(object({{"name", type("string")}, {"pose", pose()}}))}});
 }
 
 }  // namespace sonar::recording::mcap

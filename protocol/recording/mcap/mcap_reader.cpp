@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "protocol/recording/crc32.hpp"
+#include "protocol/recording/zlib.hpp"
 
 namespace sonar::recording::mcap {
 namespace {
@@ -22,7 +22,7 @@ Result<Reader> Reader::open(std::unique_ptr<Source> source) {
   const bool right =
       there == front.size() && std::equal(front.begin(), front.end(), magic.begin(),
                                           [](std::byte a, std::uint8_t b) { return std::to_integer<std::uint8_t>(a) == b; });
-  if (!right) return failure(ErrorKind::bad_data, source->name() + " is no MCAP file");
+  if (!right) return failure(ErrorKind::bad_data, source->name() + " is not an MCAP file");
   return Reader(std::move(source));
 }
 
@@ -63,12 +63,12 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   };
   if (end - at < record_front_bytes) {
     if (end == at && damages_.any())
-      ended_ = true;  // what is missing has been told
+      ended_ = true;  // the missing part has been reported
     else
       give_up("the file ends" + at_byte(at) + " without the end of its data: it was not closed");
     return std::nullopt;
   }
-  RecordReader front(scan_.take(record_front_bytes));
+  RecordReader front(scan_.read(record_front_bytes));
   const auto code = front.number<Opcode>();
   const auto length = front.number<std::uint64_t>();
   if (code == Opcode::chunk && !in_chunk && length > end - scan_.position()) {
@@ -88,7 +88,7 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
     if (chunk_end_ != 0) return std::nullopt;
   } else if (code == Opcode::message || code == Opcode::schema || code == Opcode::channel) {
     const bool is_message = code == Opcode::message, is_long = length > (is_message ? longest_record : longest_description);
-    const BytesView content = is_long ? BytesView{} : scan_.take(static_cast<std::size_t>(length));
+    const BytesView content = is_long ? BytesView{} : scan_.read(static_cast<std::size_t>(length));
     if (is_long) {
       damages_.add("the record" + at_byte(at) + " is too long, " + std::to_string(length) + " bytes");
     } else if (is_message) {
@@ -103,7 +103,7 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   return std::nullopt;
 }
 
-/// A schema or a channel. Files may say the same ones again and again; the first counts.
+/// A schema or a channel. Files may repeat them; the first applies.
 void Reader::take_description(Opcode code, BytesView content, std::uint64_t at) {
   bool is_new = false;
   if (code == Opcode::schema) {
@@ -155,23 +155,23 @@ void Reader::enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut) {
     return damages_.add("the chunk" + at_byte(at) + " is compressed (" + compression.substr(0, 16) +
                         "), which is not read: write the file without compression");
   if (stored != size || (!is_cut && stored != end - begin))
-    return damages_.add("the chunk" + at_byte(at) + " does not have the size it says");
+    return damages_.add("the chunk" + at_byte(at) + " does not have its stated size");
   if (!is_cut && crc != 0 && !is_chunk_sound(begin, size, crc))
-    return damages_.add("the chunk" + at_byte(at) + " is damaged (CRC): its messages are left out");
+    return damages_.add("the chunk" + at_byte(at) + " is damaged (CRC): its messages are skipped");
   scan_.seek(begin);
   if (begin < end) chunk_end_ = end;
 }
 
 bool Reader::is_chunk_sound(std::uint64_t from, std::uint64_t size, std::uint32_t crc) {
-  Crc32 found;
+  std::uint32_t found = 0;
   scan_.seek(from);
   for (std::uint64_t left = size; left > 0;) {
-    const BytesView block = scan_.take(static_cast<std::size_t>(std::min<std::uint64_t>(left, 256 << 10)));
+    const BytesView block = scan_.read(static_cast<std::size_t>(std::min<std::uint64_t>(left, 256 << 10)));
     if (block.empty()) return false;
-    found.add(block);
+    found = crc32(block, found);
     left -= block.size();
   }
-  return found.value() == crc;
+  return found == crc;
 }
 
 }  // namespace sonar::recording::mcap

@@ -1,12 +1,12 @@
-// Reads the messages of an MCAP file front to back, chunk by chunk, with or without summary: what a crash or a full disk left is
-// read up to where it ends. Uncompressed chunks only; a chunk whose CRC is wrong is left out.
+// Reads the messages of an MCAP file front to back, chunk by chunk, with or without summary; a file cut by a crash or a full disk
+// is read up to its end. Uncompressed chunks only; skips chunks with a wrong CRC.
 #pragma once
 
 #include <map>
 #include <memory>
 
 #include "protocol/recording/mcap/mcap_records.hpp"
-#include "protocol/recording/piece.hpp"
+#include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording::mcap {
 

@@ -79,7 +79,7 @@ std::optional<Schema> read_schema(BytesView content) {
   schema.id = record.number<std::uint16_t>();
   schema.name = record.string();
   schema.encoding = record.string();
-  record.bytes(record.number<std::uint32_t>());  // the text, which nobody here reads
+  record.bytes(record.number<std::uint32_t>());  // the text, unused
   if (!record.ok()) return std::nullopt;
   return schema;
 }

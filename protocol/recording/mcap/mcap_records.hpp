@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/units.hpp"
-#include "protocol/recording/store.hpp"
+#include "protocol/recording/byte_source.hpp"
 
 namespace sonar::recording::mcap {
 
@@ -32,7 +32,7 @@ inline constexpr std::size_t record_front_bytes = 9;                         // 
 inline constexpr std::size_t message_front_bytes = 22;                       // channel, sequence, two times
 inline constexpr std::size_t longest_record = 64 << 20;                      // of a foreign file; chunks are not read whole
 inline constexpr std::size_t longest_description = 1 << 20;                  // of a schema or channel
-inline constexpr std::uint64_t latest_time_ns = 4'000'000'000'000'000'000u;  // in 2096; what is later is damage
+inline constexpr std::uint64_t latest_time_ns = 4'000'000'000'000'000'000u;  // in 2096; later times are damage
 
 struct Schema {
   std::uint16_t id = 0;              // not 0
@@ -73,7 +73,7 @@ class RecordWriter {
   std::size_t length_at_ = 0;
 };
 
-/// Consumes fields of a record's content; ok() tells whether all were there.
+/// Consumes fields of a record's content; ok() is false when one was missing.
 class RecordReader {
  public:
   explicit RecordReader(BytesView content) : reader_(content) {}
@@ -83,7 +83,7 @@ class RecordReader {
     reader_("number", value);
     return value;
   }
-  /// 1970 for what is no time: differences of two are never too large to hold.
+  /// 1970 for an invalid time, so that differences never overflow.
   Time time() {
     const auto since_1970_ns = number<std::uint64_t>();
     return since_1970_ns > latest_time_ns ? Time{} : Time(std::chrono::nanoseconds(static_cast<std::int64_t>(since_1970_ns)));

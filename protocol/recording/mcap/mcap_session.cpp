@@ -9,28 +9,28 @@ namespace {
 constexpr const char* replayed_encoding = "oculus";  // of opaque messages: the vendor whose recordings are read
 constexpr std::size_t most_names = 16;
 
-class McapPieceReader final : public PieceReader {
+class McapRecordingReader final : public RecordingReader {
  public:
-  McapPieceReader(mcap::Reader reader, std::string sonar)
-      : reader_(std::move(reader)), wished_(std::move(sonar)), sonar_(wished_) {}
+  McapRecordingReader(mcap::Reader reader, std::string sonar)
+      : reader_(std::move(reader)), requested_(std::move(sonar)), sonar_(requested_) {}
 
-  std::optional<Piece> next() override {
+  std::optional<RecordedMessage> next() override {
     while (auto message = reader_.next()) {
       const mcap::Channel& channel = reader_.channels().at(message->channel);
       if (channel.message_encoding != replayed_encoding) continue;
-      const auto told = [&channel](const char* key) {
+      const auto metadata = [&channel](const char* key) {
         const auto found = channel.metadata.find(key);
         return found == channel.metadata.end() ? std::string() : found->second;
       };
-      const std::string sonar = told("sonar");
-      if (!chosen_ && wished_.empty()) sonar_ = sonar;
+      const std::string sonar = metadata("sonar");
+      if (!chosen_ && requested_.empty()) sonar_ = sonar;
       chosen_ = true;
       if (sonar != sonar_) {
         if (others_.size() < most_names) others_.insert(sonar);
         continue;
       }
-      return Piece{message->logged_at, told("from") == "client" ? Origin::client : Origin::device,
-                   told("carrier") == "udp" ? Carrier::datagram : Carrier::stream, std::move(message->data)};
+      return RecordedMessage{message->logged_at, metadata("from") == "client" ? Origin::client : Origin::device,
+                             metadata("carrier") == "udp" ? Carrier::datagram : Carrier::stream, std::move(message->data)};
     }
     return std::nullopt;
   }
@@ -44,7 +44,7 @@ class McapPieceReader final : public PieceReader {
 
  private:
   mcap::Reader reader_;
-  std::string wished_, sonar_;
+  std::string requested_, sonar_;
   bool chosen_ = false;
   std::set<std::string> others_;
 };
@@ -77,13 +77,13 @@ std::uint16_t McapSession::json_channel(const char* topic, const mcap::JsonSchem
   return writer_.add_channel(std::move(channel));
 }
 
-Result<void> McapSession::write(const Piece& piece) {
-  const std::uint16_t channel = piece.from == Origin::client ? client_ : piece.by == Carrier::datagram ? status_ : device_;
-  if (Result<void> written = writer_.write(channel, piece.at, piece.bytes); !written) return written;
-  if (vendor_ != replayed_encoding || channel != device_ || piece.bytes.size() < oculus::header_size) return {};
-  if (oculus::header_of(piece.bytes).type != oculus::MessageType::ping_result) return {};
-  const auto ping = oculus::decode_ping(piece.bytes);
-  return ping && ping->has_image ? write_json(image_, piece.at, mcap::image_json(piece.at, sonar_, *ping)) : Result<void>{};
+Result<void> McapSession::write(const RecordedMessage& message) {
+  const std::uint16_t channel = message.from == Origin::client ? client_ : message.by == Carrier::datagram ? status_ : device_;
+  if (Result<void> written = writer_.write(channel, message.at, message.bytes); !written) return written;
+  if (vendor_ != replayed_encoding || channel != device_ || message.bytes.size() < oculus::header_size) return {};
+  if (oculus::header_of(message.bytes).type != oculus::MessageType::ping_result) return {};
+  const auto ping = oculus::decode_ping(message.bytes);
+  return ping && ping->has_image ? write_json(image_, message.at, mcap::image_json(message.at, sonar_, *ping)) : Result<void>{};
 }
 
 Result<void> McapSession::write_pose(Time at, Time of, const Pose& sonar_in_world) {
@@ -104,10 +104,10 @@ Result<void> McapSession::write_json(std::uint16_t channel, Time at, const std::
   return writer_.write(channel, at, bytes);
 }
 
-Result<std::unique_ptr<PieceReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar) {
+Result<std::unique_ptr<RecordingReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar) {
   auto reader = mcap::Reader::open(std::move(source));
   if (!reader) return tl::unexpected(reader.error());
-  return std::make_unique<McapPieceReader>(std::move(*reader), std::move(sonar));
+  return std::make_unique<McapRecordingReader>(std::move(*reader), std::move(sonar));
 }
 
 }  // namespace sonar::recording

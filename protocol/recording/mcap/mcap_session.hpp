@@ -7,20 +7,20 @@
 #include "protocol/recording/mcap/mcap_json.hpp"
 #include "protocol/recording/mcap/mcap_reader.hpp"
 #include "protocol/recording/mcap/mcap_writer.hpp"
-#include "protocol/recording/piece.hpp"
+#include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording {
 
 /// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose, /NAME/truth in JSON.
-class McapSession final : public PieceWriter {
+class McapSession final : public RecordingWriter {
  public:
-  /// `vendor`: whose messages these are; only pings of "oculus" become pictures by themselves.
+  /// `vendor`: vendor of the messages; only pings of "oculus" are converted to images automatically.
   McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::string vendor = "oculus");
 
-  Result<void> write(const Piece& piece) override;
-  /// Where the sonar was, and when. `at` as in Piece: never before what was written last.
+  Result<void> write(const RecordedMessage& message) override;
+  /// Pose of the sonar at time `of`. `at` as in RecordedMessage: must not decrease.
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
-  /// Of a ping whose message is no Oculus message.
+  /// Image of a ping of another vendor than Oculus.
   Result<void> write_image(Time at, const Ping& ping);
   Result<void> write_truth(Time at, const mcap::PingTruth& truth);
   Result<void> close() override { return writer_.close(); }
@@ -35,7 +35,7 @@ class McapSession final : public PieceWriter {
   std::uint16_t device_, client_, status_, image_, pose_, truth_;
 };
 
-/// The vendor's bytes of one sonar: the one named, or the first there is. bad_data when it is no MCAP file.
-Result<std::unique_ptr<PieceReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar = {});
+/// The vendor's bytes of one sonar: the named one, or the first. bad_data: not an MCAP file.
+Result<std::unique_ptr<RecordingReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar = {});
 
 }  // namespace sonar::recording

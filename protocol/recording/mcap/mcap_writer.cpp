@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "protocol/recording/zlib.hpp"
+
 namespace sonar::recording::mcap {
 
 std::uint16_t Writer::add_schema(std::string name, std::string encoding, std::string text) {
@@ -26,7 +28,7 @@ Result<void> Writer::put(const Bytes& bytes) {
     return written;
   }
   position_ += bytes.size();
-  data_crc_.add(bytes);
+  data_crc_ = crc32(bytes, data_crc_);
   return {};
 }
 
@@ -37,12 +39,12 @@ Result<void> Writer::begin() {
   for (const std::uint8_t b : magic) record.number(b);
   record.begin(Opcode::header);
   record.string("");        // no profile
-  record.string("sonard");  // who wrote it
+  record.string("sonard");  // library
   record.end();
   return put(front);
 }
 
-/// The channel and its schema, where none of the marked ones has brought it.
+/// Writes the channel and, unless already marked, its schema.
 void Writer::announce(Bytes& out, const Channel& channel, std::vector<bool>& schemas) const {
   if (channel.schema != 0 && !schemas[channel.schema - 1u]) {
     append(out, schemas_[channel.schema - 1u]);
@@ -221,7 +223,7 @@ Result<void> Writer::close() {
   Bytes end;
   RecordWriter record(end);
   record.begin(Opcode::data_end);
-  record.number(data_crc_.value());
+  record.number(data_crc_);
   record.end();
   position_ += end.size();
   Bytes rest = summary();

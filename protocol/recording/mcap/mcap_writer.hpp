@@ -1,10 +1,9 @@
-// Writes MCAP files: uncompressed chunks with their CRC and indexes, a summary, a footer. Channels and what is in their messages
-// are the caller's business (mcap_session.hpp).
+// Writes MCAP files: uncompressed chunks with their CRC and indexes, a summary, a footer. Channels and
+// contents of messages are up to the caller (mcap_session.hpp).
 #pragma once
 
 #include <memory>
 
-#include "protocol/recording/crc32.hpp"
 #include "protocol/recording/mcap/mcap_records.hpp"
 
 namespace sonar::recording::mcap {
@@ -17,11 +16,11 @@ class Writer {
   explicit Writer(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
 
   std::uint16_t add_schema(std::string name, std::string encoding, std::string text);
-  std::uint16_t add_channel(Channel channel);  // whose id is set here
-  /// Messages of a channel are numbered from 0. io: nothing more can be written; what is in the file stays readable.
+  std::uint16_t add_channel(Channel channel);  // sets its id
+  /// Messages of a channel are numbered from 0. io: later calls fail; the file stays readable.
   Result<void> write(std::uint16_t channel, Time at, BytesView data);
-  /// Ends the last chunk, adds summary and footer, closes. After an error of write(): tries to add what belongs to the chunks
-  /// that are in the file, and tells the first error. io.
+  /// Ends the last chunk, adds summary and footer, closes. After an error of write(): tries to add those of the
+  /// chunks in the file, and returns the first error. io.
   Result<void> close();
 
  private:
@@ -52,7 +51,7 @@ class Writer {
   std::vector<ChunkPlace> chunks_;
   std::map<std::uint16_t, std::uint64_t> counts_;  // of messages in whole chunks
   std::uint64_t position_ = 0;
-  Crc32 data_crc_;
+  std::uint32_t data_crc_ = 0;
   bool begun_ = false;
   std::optional<Error> broken_;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/text/ipv4.hpp"
 #include "protocol/recording/pcap/numbers_at.hpp"
 
 namespace sonar::recording {
@@ -43,7 +44,7 @@ std::optional<BytesView> ip_packet(std::uint32_t link_type, BytesView frame) {
       return behind(frame, 16, u16_at(frame, 14) == ip_type);
     case cooked2:
       return behind(frame, 20, u16_at(frame, 0) == ip_type);
-    case null_link:  // family 2 in the byte order of whoever captured
+    case null_link:  // family 2 in the byte order of the capturing host
       return behind(frame, 4, u32_at(frame, 0) == 2 || u32_at(frame, 0) == 0x02000000);
     case loop_link:
       return behind(frame, 4, u32_at(frame, 0) == 2);
@@ -72,9 +73,7 @@ std::optional<Segment> udp_datagram(Segment found, BytesView body) {
 }  // namespace
 
 std::string text_of(const IpEnd& end) {
-  std::string text;
-  for (int shift = 24; shift >= 0; shift -= 8) text += std::to_string(end.address >> shift & 0xFFu) + (shift > 0 ? "." : ":");
-  return text + std::to_string(end.port);
+  return text::format_ipv4(text::ipv4_from_number(end.address)) + ":" + std::to_string(end.port);
 }
 
 bool is_known_link_type(std::uint32_t link_type) {
@@ -86,7 +85,7 @@ std::optional<Segment> parse_packet(std::uint32_t link_type, BytesView packet) {
   const auto ip = ip_packet(link_type, packet);
   if (!ip || ip->size() < 20 || u8_at(*ip, 0) >> 4 != 4) return std::nullopt;
   const std::size_t header = (u8_at(*ip, 0) & 0x0Fu) * std::size_t{4};
-  // Segments that the network card was to cut up carry the length 0 when they are longer than it can say.
+  // With segmentation offload, segments too long for the 16-bit field have the length 0.
   const std::size_t total = u16_at(*ip, 2) == 0 ? ip->size() : std::min<std::size_t>(u16_at(*ip, 2), ip->size());
   const bool is_fragment = (u16_at(*ip, 6) & 0x3FFFu) != 0;
   if (header < 20 || total < header || is_fragment) return std::nullopt;

@@ -29,11 +29,11 @@ struct Segment {
   wire::BytesView payload;  // as far as it was captured
 };
 
-/// Link types Ethernet (with VLAN tags), raw IP, Linux cooked 1 and 2, BSD loopback. Nothing for other packets: other protocols,
-/// IPv6, fragments, headers cut short.
+/// Link types Ethernet (with VLAN tags), raw IP, Linux cooked 1 and 2, BSD loopback. nullopt for other packets: other protocols,
+/// IPv6, fragments, cut headers.
 std::optional<Segment> parse_packet(std::uint32_t link_type, wire::BytesView packet);
 
-/// True for link types that parse_packet knows.
+/// True for link types that parse_packet supports.
 bool is_known_link_type(std::uint32_t link_type);
 
 }  // namespace sonar::recording

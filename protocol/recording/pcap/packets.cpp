@@ -39,7 +39,7 @@ std::nullopt_t PacketReader::stop(std::string why) {
 
 Result<PacketReader> PacketReader::open(Source& source) {
   PacketReader reader(source);
-  if (!reader.read_front()) return failure(ErrorKind::bad_data, source.name() + " is no capture file (pcap or pcapng)");
+  if (!reader.read_front()) return failure(ErrorKind::bad_data, source.name() + " is not a capture file (pcap or pcapng)");
   return reader;
 }
 
@@ -58,10 +58,10 @@ bool PacketReader::read_front() {
   for (const auto endian : {wire::Endian::little, wire::Endian::big}) {
     const std::uint32_t found = u32_at(magic, 0, endian);
     if (found != micro_magic && found != nano_magic) continue;
-    const BytesView header = scan_.take(24);
+    const BytesView header = scan_.read(24);
     if (header.size() < 24) return false;
     endian_ = endian;
-    // The upper bits say how long the frame's checksum is.
+    // The upper bits hold the length of the frame checksum.
     interfaces_.push_back({u32_at(header, 20, endian) & 0xFFFFu, found == nano_magic ? 1'000'000'000u : 1'000'000u});
     return true;
   }
@@ -75,12 +75,12 @@ std::optional<Packet> PacketReader::next() {
 
 std::optional<Packet> PacketReader::next_classic() {
   const std::string at = "byte " + std::to_string(scan_.position());
-  const BytesView header = scan_.take(16);
+  const BytesView header = scan_.read(16);
   if (header.size() < 16) return stop("the packet at " + at + " is cut short by the end of the file");
   const std::uint32_t whole_s = u32_at(header, 0, endian_), rest = u32_at(header, 4, endian_), size = u32_at(header, 8, endian_);
   if (size > longest_packet) return stop("the packet at " + at + " would have " + std::to_string(size) + " bytes");
   const std::uint64_t per_s = interfaces_.front().ticks_per_s;
-  const BytesView bytes = scan_.take(size);
+  const BytesView bytes = scan_.read(size);
   if (bytes.size() < size) return stop("the packet at " + at + " is cut short by the end of the file");
   return Packet{time_of(whole_s * per_s + rest, per_s), interfaces_.front().link_type, bytes};
 }
@@ -129,7 +129,7 @@ std::optional<Packet> PacketReader::next_block() {
     const std::uint64_t at = scan_.position();
     const std::string place = "the block at byte " + std::to_string(at);
     if (u32_at(scan_.peek(4), 0, endian_) == section_magic && !begin_section(at)) return stop(place + " begins no section");
-    const BytesView front = scan_.take(8);
+    const BytesView front = scan_.read(8);
     const std::uint32_t type = u32_at(front, 0, endian_), size = u32_at(front, 4, endian_);
     if (front.size() < 8 || (size >= 12 && size - 8 > scan_.left())) return stop(place + " is cut short by the end of the file");
     if (size < 12 || size % 4 != 0) return stop(place + " has an impossible length, " + std::to_string(size));
@@ -138,7 +138,7 @@ std::optional<Packet> PacketReader::next_block() {
       continue;
     }
     if (size > most_block) return stop(place + " would have " + std::to_string(size) + " bytes");
-    const BytesView rest = scan_.take(size - 8);
+    const BytesView rest = scan_.read(size - 8);
     const BytesView body = rest.first(rest.size() - 4);  // the length once more
     if (u32_at(rest, body.size(), endian_) != size) return stop(place + " does not end as it begins");
     if (type == interface_block) {
@@ -146,7 +146,7 @@ std::optional<Packet> PacketReader::next_block() {
       continue;
     }
     if (auto packet = type == enhanced_block ? enhanced(body) : simple(body)) return packet;
-    damages_.add("the packet block at byte " + std::to_string(at) + " does not hold what it says");
+    damages_.add("the packet block at byte " + std::to_string(at) + " has an inconsistent length");
   }
   return std::nullopt;
 }

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "protocol/recording/piece.hpp"
-#include "protocol/recording/store.hpp"
+#include "protocol/recording/byte_source.hpp"
+#include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording {
 

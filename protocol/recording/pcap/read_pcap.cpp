@@ -19,7 +19,7 @@ bool begins_message(BytesView payload) {
   return header.oculus_id == oculus::magic && is_known(header);
 }
 
-// ---- first reading: who is the sonar?
+// ---- first pass: find the sonar
 
 struct Sender {
   std::uint64_t bytes = 0;
@@ -60,7 +60,7 @@ Result<Found> find_device(Source& source, const PcapReading& reading) {
   return Found{*best, others.empty() ? "" : "the capture holds other sonars too: " + others};
 }
 
-// ---- second reading: what it and its clients said
+// ---- second pass: messages of the sonar and its clients
 
 struct Connection {
   TcpStream device_stream, client_stream;
@@ -72,12 +72,12 @@ struct Connection {
   }
 };
 
-class PcapReader final : public PieceReader {
+class PcapReader final : public RecordingReader {
  public:
   PcapReader(std::unique_ptr<Source> source, PacketReader packets, Found found)
       : source_(std::move(source)), packets_(std::move(packets)), found_(std::move(found)) {}
 
-  std::optional<Piece> next() override {
+  std::optional<RecordedMessage> next() override {
     while (ready_.empty()) {
       const auto packet = packets_.next();
       if (!packet) {
@@ -86,12 +86,12 @@ class PcapReader final : public PieceReader {
         continue;
       }
       ++packet_number_;
-      if (const auto segment = parse_packet(packet->link_type, packet->bytes)) take(packet->at, *segment);
+      if (const auto segment = parse_packet(packet->link_type, packet->bytes)) add(packet->at, *segment);
     }
     if (ready_.empty()) return std::nullopt;
-    Piece piece = std::move(ready_.front());
+    RecordedMessage message = std::move(ready_.front());
     ready_.pop_front();
-    return piece;
+    return message;
   }
 
   std::optional<Error> damage() const override {
@@ -112,7 +112,7 @@ class PcapReader final : public PieceReader {
  private:
   using Place = std::map<IpEnd, Connection>::iterator;
 
-  void take(Time at, const Segment& segment) {
+  void add(Time at, const Segment& segment) {
     const IpEnd& device = found_.device;
     if (!segment.tcp) {
       if (segment.target.port == oculus::status_port && segment.source.address == device.address &&
@@ -163,7 +163,7 @@ class PcapReader final : public PieceReader {
       MessageSplitter& splitter = from == Origin::device ? place->second.device : place->second.client;
       const std::uint64_t losses = splitter.losses();
       splitter.finish();
-      while (auto piece = splitter.next()) ready_.push_back(std::move(*piece));
+      while (auto message = splitter.next()) ready_.push_back(std::move(*message));
       if (splitter.losses() > losses)
         damages_.add("the last message from " + text_of(from == Origin::device ? found_.device : place->first) + " to " +
                      text_of(from == Origin::device ? place->first : found_.device) + " is not whole");
@@ -181,7 +181,7 @@ class PcapReader final : public PieceReader {
       const std::uint64_t lost = splitter.lost_bytes();
       if (run->missing_before > 0 || run->from_middle) splitter.break_off();
       splitter.append(run->at, run->bytes);
-      while (auto piece = splitter.next()) ready_.push_back(std::move(*piece));
+      while (auto message = splitter.next()) ready_.push_back(std::move(*message));
       if (run->missing_before > 0)
         damages_.add("before packet " + std::to_string(packet_number_) + " the capture lacks " +
                      std::to_string(run->missing_before) + " bytes of the connection with " + text_of(client));
@@ -195,13 +195,13 @@ class PcapReader final : public PieceReader {
   Found found_;
   std::uint64_t packet_number_ = 0;  // as Wireshark counts
   std::map<IpEnd, Connection> connections_;
-  std::deque<Piece> ready_;
+  std::deque<RecordedMessage> ready_;
   Damages damages_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<PieceReader>> read_pcap(std::unique_ptr<Source> source, const PcapReading& reading) {
+Result<std::unique_ptr<RecordingReader>> read_pcap(std::unique_ptr<Source> source, const PcapReading& reading) {
   auto found = find_device(*source, reading);
   if (!found) return tl::unexpected(found.error());
   auto packets = PacketReader::open(*source);

@@ -17,7 +17,7 @@ void TcpStream::add(Time at, std::uint32_t sequence, wire::BytesView payload, bo
     begin(sequence, syn);
   }
   if (payload.empty()) return;
-  // Sequence numbers wrap; what is meant lies within half their range of what is awaited.
+  // Sequence numbers wrap: each is taken as the one nearest to the expected number.
   const auto expected = static_cast<std::uint32_t>(first_ + position_);
   const auto ahead = static_cast<std::int32_t>(sequence + (syn ? 1u : 0u) - expected);
   if (ahead <= 0) {

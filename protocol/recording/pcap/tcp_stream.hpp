@@ -1,5 +1,5 @@
-// One direction of a TCP connection, put in order again: retransmitted bytes once, early segments when their turn comes, lost
-// ones told. Third step of reading a capture; the bytes then go to a MessageSplitter.
+// Reassembles one direction of a TCP connection: drops retransmitted bytes, holds early segments, reports lost ones.
+// Third step of reading a capture; its output goes to a MessageSplitter.
 #pragma once
 
 #include <deque>
@@ -13,7 +13,7 @@ namespace sonar::recording {
 
 class TcpStream {
  public:
-  static constexpr std::size_t most_waiting_bytes = 8u << 20;  // early segments; more means that what is missing is lost
+  static constexpr std::size_t most_waiting_bytes = 8u << 20;  // early segments; beyond this the missing bytes count as lost
   static constexpr std::size_t most_waiting = 8192;
 
   struct Run {
@@ -25,10 +25,10 @@ class TcpStream {
 
   /// `sequence` is that of the first byte, or of the SYN itself.
   void add(Time at, std::uint32_t sequence, wire::BytesView payload, bool syn);
-  /// The connection or the capture is over: what waits comes out.
+  /// Ends the connection or the capture: releases held segments.
   void finish();
   std::optional<Run> next();
-  /// For early segments, with what keeping each of them costs.
+  /// Memory of early segments, including overhead.
   std::size_t held_bytes() const { return waiting_bytes_ + waiting_.size() * 128; }
   /// True when a SYN with this number begins another connection than the one that is being read.
   bool is_other(std::uint32_t syn_sequence) const { return begun_ && (!saw_syn_ || first_ != syn_sequence + 1); }

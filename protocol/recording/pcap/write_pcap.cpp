@@ -5,7 +5,7 @@
 namespace sonar::recording {
 namespace {
 
-constexpr std::size_t most_segment = 65'495;  // what an IPv4 packet holds behind two headers of 20 bytes
+constexpr std::size_t most_segment = 65'495;  // capacity of an IPv4 packet after two headers of 20 bytes
 constexpr std::uint8_t window_scale = 7;      // windows of 8 MB: no message waits for an acknowledgement
 constexpr std::uint8_t tcp_protocol = 6, udp_protocol = 17;
 
@@ -86,7 +86,7 @@ struct End {
   std::uint32_t sequence = 0;  // of its next byte
 };
 
-class PcapWriter final : public PieceWriter {
+class PcapWriter final : public RecordingWriter {
  public:
   PcapWriter(std::unique_ptr<Sink> sink, const PcapConversation& conversation)
       : sink_(std::move(sink)),
@@ -94,20 +94,20 @@ class PcapWriter final : public PieceWriter {
         device_{conversation.device, conversation.first_device_sequence},
         client_{conversation.client, conversation.first_client_sequence} {}
 
-  Result<void> write(const Piece& piece) override {
+  Result<void> write(const RecordedMessage& message) override {
     Bytes packets;
     const auto before = std::tuple(device_, client_, identification_, begun_, connected_);
-    last_ = piece.at;
+    last_ = message.at;
     begin(packets);
-    if (piece.by == Carrier::datagram) {
-      datagram(packets, piece);
+    if (message.by == Carrier::datagram) {
+      datagram(packets, message);
     } else {
       connect(packets);
-      End& from = piece.from == Origin::device ? device_ : client_;
-      End& to = piece.from == Origin::device ? client_ : device_;
-      for (std::size_t at = 0; at < piece.bytes.size(); at += most_segment) {
-        const auto part = BytesView(piece.bytes).subspan(at, std::min(most_segment, piece.bytes.size() - at));
-        const bool last = at + part.size() == piece.bytes.size();
+      End& from = message.from == Origin::device ? device_ : client_;
+      End& to = message.from == Origin::device ? client_ : device_;
+      for (std::size_t at = 0; at < message.bytes.size(); at += most_segment) {
+        const auto part = BytesView(message.bytes).subspan(at, std::min(most_segment, message.bytes.size() - at));
+        const bool last = at + part.size() == message.bytes.size();
         segment(packets, from, to, static_cast<std::uint8_t>(tcp_flag::ack | (last ? tcp_flag::psh : 0)), part);
       }
       segment(packets, to, from, tcp_flag::ack, {});
@@ -152,7 +152,7 @@ class PcapWriter final : public PieceWriter {
     Bytes body;
     if (syn) header.length = 0x70;
     wire::append(body, header, wire::Endian::big);
-    if (syn)  // largest segment; window scale, with a byte of nothing before it
+    if (syn)  // largest segment; window scale, preceded by a NOP byte
       for (const unsigned b :
            {2u, 4u, unsigned{most_segment >> 8}, unsigned{most_segment & 0xFF}, 1u, 3u, 3u, unsigned{window_scale}})
         body.push_back(static_cast<std::byte>(b));
@@ -163,15 +163,15 @@ class PcapWriter final : public PieceWriter {
     from.sequence += static_cast<std::uint32_t>(payload.size()) + (takes_a_number ? 1u : 0u);
   }
 
-  void datagram(Bytes& packets, const Piece& piece) {
+  void datagram(Bytes& packets, const RecordedMessage& message) {
     const IpEnd &from = conversation_.status_from, &to = conversation_.status_to;
     Bytes body;
     wire::Writer writer(body, wire::Endian::big);
-    const auto size = static_cast<std::uint16_t>(8 + std::min<std::size_t>(piece.bytes.size(), most_segment));
+    const auto size = static_cast<std::uint16_t>(8 + std::min<std::size_t>(message.bytes.size(), most_segment));
     for (const std::uint16_t value : {from.port, to.port, size, std::uint16_t{0}}) writer("u16", value);
-    body.insert(body.end(), piece.bytes.begin(), piece.bytes.begin() + (size - 8));
+    body.insert(body.end(), message.bytes.begin(), message.bytes.begin() + (size - 8));
     const std::uint16_t sum = transport_checksum(udp_protocol, from, to, body);
-    put_u16(body, 6, sum == 0 ? 0xFFFF : sum);  // 0 would mean that there is none
+    put_u16(body, 6, sum == 0 ? 0xFFFF : sum);  // 0 means no checksum
     packet(packets, udp_protocol, from, to, body);
   }
 
@@ -217,7 +217,7 @@ class PcapWriter final : public PieceWriter {
 
 }  // namespace
 
-std::unique_ptr<PieceWriter> write_pcap(std::unique_ptr<Sink> sink, const PcapConversation& conversation) {
+std::unique_ptr<RecordingWriter> write_pcap(std::unique_ptr<Sink> sink, const PcapConversation& conversation) {
   return std::make_unique<PcapWriter>(std::move(sink), conversation);
 }
 

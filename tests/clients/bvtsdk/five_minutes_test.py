@@ -54,7 +54,7 @@ class FiveMinutes(unittest.TestCase):
         self.assertIn("window.correlation_of_adjacent_beams", result.stdout)
 
     def test_doctor_is_content(self):
-        for control in (14770, 1):  # also where nobody tells what it is
+        for control in (14770, 1):  # also without a control stream
             result = run(SONARCTL, "doctor", self.address, "--control", f"{self.address}:{control}", "--http",
                          f"{self.address}:8088", "--within", "60", "--status-on", self.address)
             self.assertIn(f"tcp {self.address}:14750 accepts, first ping decoded after", result.stdout)

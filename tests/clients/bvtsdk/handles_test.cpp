@@ -58,7 +58,7 @@ TEST(Handles, StaleOnesStayStaleWhenTheirPlaceIsUsedAgain) {
   EXPECT_EQ(table.live(), 0u);
 }
 
-TEST(Handles, ObjectsLiveAsLongAsSomebodyWorksOnThem) {
+TEST(Handles, ObjectsLiveWhileACallUsesThem) {
   Handles table;
   void* handle = table.add(std::make_shared<Fish>());
   const std::shared_ptr<Fish> held = table.find<Fish>(handle);

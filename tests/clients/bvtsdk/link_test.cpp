@@ -42,7 +42,7 @@ class Peer {
     for (;;) {
       FrameHeader header;
       Bytes head = exactly(frame_header_size);
-      if (!take_header(head, header)) return {};
+      if (!read_header(head, header)) return {};
       payload = exactly(header.payload_size);
       if (keep_alives || header.type != FrameType::keep_alive) return header;
     }
@@ -122,8 +122,8 @@ TEST(Link, GreetsAndLearnsWhatTheSonarIs) {
     Bytes payload;
     const FrameHeader hello = peer.next(payload);
     Reader reader(payload);
-    EXPECT_EQ(reader.take<std::uint16_t>(), 1);
-    EXPECT_EQ(reader.take<std::uint16_t>(), 3);
+    EXPECT_EQ(reader.read<std::uint16_t>(), 1);
+    EXPECT_EQ(reader.read<std::uint16_t>(), 3);
     EXPECT_FALSE(reader.text().empty());
     peer.reply(hello, encode_description(some_sonar()));
     peer.wait_for_the_end();
@@ -331,7 +331,7 @@ TEST(LinkOpen, LogsWhatFailedWhereAndWhatToDo) {
   link.reset();
 }
 
-TEST(LinkOpen, TellsWhyNobodyCanBeReached) {
+TEST(LinkOpen, ReportsWhyNoSonarIsReached) {
   std::unique_ptr<Link> link;
   SonarDescription sonar;
   for (const char* endpoint : {"", ":14750", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:65536", "127.0.0.1:port"})

@@ -1,7 +1,6 @@
 """A host whose daemon goes away, comes back, or freezes: the codes it is told, and that opening again is all it takes."""
 import ctypes
 import signal
-import subprocess
 import time
 import unittest
 
@@ -45,15 +44,6 @@ class Host:
 
 
 class LostAndBack(unittest.TestCase):
-    def restart(self, daemon):
-        command = daemon.process.args
-        with open(daemon.log_path, "wb") as log:
-            daemon.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
-        deadline = time.monotonic() + 60
-        while "ready in" not in daemon.log() and time.monotonic() < deadline:
-            time.sleep(0.05)
-        self.assertIn("ready in", daemon.log())
-
     def test_killed_and_started_again(self):
         with l_targets() as daemon:
             host = Host(daemon.address)
@@ -66,7 +56,7 @@ class LostAndBack(unittest.TestCase):
             self.assertEqual(host.ping(), CLOSED)
             self.assertEqual(host.connected(), 0)
             self.assertEqual(host.open(), CONNECTION_TIMEDOUT)
-            self.restart(daemon)
+            daemon.restart()
             self.assertEqual(host.open(), SUCCESS)
             self.assertEqual(host.ping(), SUCCESS)
             self.assertEqual(host.connected(), 1)
@@ -83,7 +73,7 @@ class LostAndBack(unittest.TestCase):
                 self.assertEqual(host.ping(), READ_TIMEOUT)
                 self.assertGreater(time.monotonic() - start, 5)
                 self.assertEqual(host.connected(), 0)
-                self.assertEqual(late.open(), CONNECTION_TIMEDOUT)  # the kernel takes the connection, nobody greets
+                self.assertEqual(late.open(), CONNECTION_TIMEDOUT)  # the kernel takes the connection, no greeting comes
             finally:
                 daemon.process.send_signal(signal.SIGCONT)
             self.assertEqual(host.open(), SUCCESS)

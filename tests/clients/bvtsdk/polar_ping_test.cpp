@@ -164,7 +164,7 @@ TEST(PolarPing, WithoutSamplesIsAPingWithoutASignal) {
   EXPECT_FALSE(q->has_signal());
 }
 
-TEST(NavData, LeavesOutWhatIsNoNumberAndRefusesFieldsNobodyKnows) {
+TEST(NavData, OmitsNonFiniteNumbersAndRefusesUnknownFields) {
   NavData nav;
   nav.present = nav_latitude | nav_roll;
   nav.latitude_deg = std::nan("");
@@ -172,12 +172,12 @@ TEST(NavData, LeavesOutWhatIsNoNumberAndRefusesFieldsNobodyKnows) {
   Bytes bytes;
   put_nav(bytes, nav);
   Reader reader(bytes);
-  const NavData back = take_nav(reader);
+  const NavData back = decode_nav(reader);
   EXPECT_TRUE(reader.ok());
   EXPECT_EQ(back.present, nav_roll);
   EXPECT_EQ(back.roll_deg, 3);
   const Bytes strange{0x00, 0x80, 0, 0, 0, 0};
   Reader other(strange);
-  EXPECT_EQ(take_nav(other).present, 0);
+  EXPECT_EQ(decode_nav(other).present, 0);
   EXPECT_FALSE(other.ok());
 }

@@ -93,7 +93,7 @@ TEST_F(DescribeScene, WarnsOfWhatLooksWrong) {
               UnorderedElementsAre(HasSubstr("cm: big.stl is 300 m long; if the file is in centimetres"),
                                    HasSubstr("mm: big.stl is 3 mm long"), HasSubstr("more than 1 km from the origin"),
                                    HasSubstr("wholly above z = 0, the water's surface: gull"), HasSubstr("no seabed")));
-  EXPECT_THAT(remarks("objects: []").warnings, ElementsAre(HasSubstr("nothing is in it")));
+  EXPECT_THAT(remarks("objects: []").warnings, ElementsAre(HasSubstr("the scene is empty")));
 }
 
 TEST_F(DescribeScene, ErrorsAreTheLoadersOwn) {

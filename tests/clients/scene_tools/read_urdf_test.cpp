@@ -49,8 +49,7 @@ TEST(ReadUrdf, MeshesAndTheRest) {
 
 TEST(ReadUrdf, MistakesAreToldWithFileAndLine) {
   Reading r;
-  EXPECT_THAT(r.error(robot(part("a") + joint("j", "a", "b"))),
-              testing::StartsWith("w.sdf:3: joint \"j\": there is no link \"b\""));
+  EXPECT_THAT(r.error(robot(part("a") + joint("j", "a", "b"))), testing::StartsWith("w.sdf:3: joint \"j\": no link \"b\""));
   EXPECT_THAT(r.error(robot(part("a") + part("b") + joint("j", "a", "b") + joint("k", "b", "a"))), HasSubstr("form a circle"));
   EXPECT_THAT(r.error(robot(part("a") + part("b") + joint("j", "a", "b") + joint("k", "a", "b"))),
               HasSubstr("hangs on two joints"));

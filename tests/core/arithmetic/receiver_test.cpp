@@ -62,7 +62,7 @@ TEST(Receiver, Quantise) {
 }
 
 TEST(Receiver, Oracle42_TvgCancelsSpreadingAndAbsorption) {
-  ReceiverLaw law;
+  ReceiverModel law;
   law.tvg_slope_db = 40;
   law.tvg_minimum_range_m = 0;
   law.tvg_ceiling_db = std::numeric_limits<float>::infinity();
@@ -73,7 +73,7 @@ TEST(Receiver, Oracle42_TvgCancelsSpreadingAndAbsorption) {
 }
 
 TEST(Receiver, TvgClampAndCeiling) {
-  ReceiverLaw law;
+  ReceiverModel law;
   EXPECT_NEAR(tvg_db(law, 0.01, 0.3), tvg_db(law, 0.5, 0.3), 1e-9);
   EXPECT_NEAR(tvg_db(law, 0.5, 0.3), 30 * std::log10(0.5) + 0.3, 1e-6);
   EXPECT_EQ(tvg_db(law, 60, 1), 80);
@@ -83,7 +83,7 @@ TEST(Receiver, TvgClampAndCeiling) {
 }
 
 TEST(Receiver, FullScale) {
-  ReceiverLaw law;
+  ReceiverModel law;
   law.full_scale_upa = 200;
   EXPECT_NEAR(full_scale_factor(law, 20) * 20, 1, 1e-9);
 }

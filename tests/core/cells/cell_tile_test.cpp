@@ -48,10 +48,10 @@ std::array<LatticePoint, side * side> draw_points(const TileAddress& a, std::uin
   std::array<LatticePoint, side * side> points;
   const double s = lattice::cell_size_m(a.level);
   const auto bits = static_cast<std::uint64_t>(seed);
-  const std::uint32_t sheet = static_cast<std::uint32_t>(a.object) * 8u + static_cast<std::uint32_t>(a.axis) * 2u +
+  const std::uint32_t patch = static_cast<std::uint32_t>(a.object) * 8u + static_cast<std::uint32_t>(a.axis) * 2u +
                               static_cast<std::uint32_t>(a.negative_side);
   const auto draw_at = [&](std::int32_t i, std::int32_t j, std::uint32_t key) {
-    return philox(sheet, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(a.level),
+    return philox(patch, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(a.level),
                   static_cast<std::uint32_t>(bits) ^ key, static_cast<std::uint32_t>(bits >> 32) ^ texture_seed);
   };
   std::array<Random4, (side / 4) * (side / 4)> blocks;
@@ -168,7 +168,7 @@ CellTile built_plainly(const TileAddress& a, const Mesh& mesh, std::span<const s
 }
 
 /// Every triangle whose normal leans most to the axis, on the side that the address names.
-std::vector<std::uint32_t> of_sheet(const Mesh& mesh, const TileAddress& a) {
+std::vector<std::uint32_t> of_patch(const Mesh& mesh, const TileAddress& a) {
   std::vector<std::uint32_t> triangles;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     const Vec3d n = lattice::normal_of(mesh, t);
@@ -205,9 +205,9 @@ void expect_the_same(const CellTile& found, const CellTile& expected, Compared& 
   }
 }
 
-/// All tiles of one sheet with indices from -reach to reach.
+/// All tiles of one patch with indices from -reach to reach.
 void compare(const Mesh& mesh, TileAddress a, int reach, const TextureField* texture, Compared& sum) {
-  const std::vector<std::uint32_t> triangles = of_sheet(mesh, a);
+  const std::vector<std::uint32_t> triangles = of_patch(mesh, a);
   for (a.i = -reach; a.i <= reach; ++a.i)
     for (a.j = -reach; a.j <= reach; ++a.j)
       for (a.k = -reach; a.k <= reach; ++a.k) {
@@ -254,7 +254,7 @@ TEST(CellTile, EqualsTheOneMadePointByPointWithTexture) {
   EXPECT_GT(sum.cells, 500);
 }
 
-// Two sheets through one cube own the same points; so do two copies of one triangle, and the earlier comes first.
+// Two patches through one cube own the same points; so do two copies of one triangle, and the earlier comes first.
 TEST(CellTile, PointsWithSeveralSurfacesKeepTheirOrder) {
   Mesh mesh;
   for (const float z : {0.1f, 0.3f, 0.1f}) {
@@ -300,7 +300,7 @@ TEST(CellTile, BytesDoNotDependOnTheInstructionSet) {
   const auto take = [&](std::uint32_t x) { digest = (digest ^ x) * 0x100000001b3u; };
   int cells = 0;
   TileAddress a{.object = 1, .axis = 1, .level = 5};
-  const std::vector<std::uint32_t> triangles = of_sheet(mesh, a);
+  const std::vector<std::uint32_t> triangles = of_patch(mesh, a);
   for (a.i = -3; a.i <= 3; ++a.i)
     for (a.j = -3; a.j <= 3; ++a.j)
       for (a.k = -3; a.k <= 3; ++a.k) {

@@ -121,12 +121,13 @@ TEST(TrajectoryFile, HoldsSeveralBodiesOnOneClock) {
   for (const auto& b : file.bodies) EXPECT_EQ(b.trajectory->duration(), seconds(10));
   EXPECT_EQ(trajectory_of(file, "p.csv", "buoy").value(), file.bodies[1].trajectory);
   EXPECT_THAT(trajectory_of(file, "p.csv", "bouy").error().text, HasSubstr("did you mean \"buoy\""));
-  EXPECT_THAT(trajectory_of(file, "p.csv", "").error().text, HasSubstr("several bodies; say which: body; there are: rov, buoy"));
+  EXPECT_THAT(trajectory_of(file, "p.csv", "").error().text,
+              HasSubstr("the file has several bodies; choose one with body; there are: rov, buoy"));
   const TrajectoryFile nameless = parsed("t,x,y,z\n0,1,2,3\n");
   EXPECT_TRUE(trajectory_of(nameless, "p.csv", ""));
   EXPECT_THAT(trajectory_of(nameless, "p.csv", "rov").error().text, HasSubstr("leave out body"));
   EXPECT_THAT(refusal("body,t,x,y,z\nrov,1,0,0,0\nbuoy,0,0,0,0\nrov,1,0,0,0\n"), "p.csv:4: the time does not rise for \"rov\"");
-  EXPECT_THAT(refusal("body,t,x,y,z\n,1,0,0,0\n"), "p.csv:2: a body's name has 1 to 64 printable characters");
+  EXPECT_THAT(refusal("body,t,x,y,z\n,1,0,0,0\n"), "p.csv:2: a body's name must have 1 to 64 printable characters");
 }
 
 TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
@@ -150,7 +151,7 @@ TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
       {"x,y,z\n", "p.csv:1: column t_s is missing"},
       {"t,t_ns,x,y,z\n", "p.csv:1: give the time once"},
       {"t,x,y,z,yaw_dge\n", "did you mean \"yaw_deg\""},
-      {"t,x,y,z,x_m\n", "p.csv:1: column x_m stands twice"},
+      {"t,x,y,z,x_m\n", "p.csv:1: column x_m appears twice"},
       {"t,x,y,z,qw\n", "p.csv:1: a quaternion needs"},
       {"t,x,y,z,qw,qx,qy,qz,yaw\n", "not both"},
       {"t,x,y,z,vx\n", "p.csv:1: a velocity needs"},
@@ -171,8 +172,8 @@ TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
   const ReadOptions ten_hz{.frame = Frame::enu_flu, .rate_hz = 10};
   EXPECT_THAT(refusal("0 1 2 3 0 0 0 1\n", ten_hz), "p.csv:1: the lines have times, they need no rate_hz");
   EXPECT_THAT(refusal("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 -1 0\n", ten_hz),
-              "p.csv:2: the first three columns of the matrix are no rotation");
-  EXPECT_THAT(refusal("2 0 0 0 0 2 0 0 0 0 2 0\n", ten_hz), HasSubstr("no rotation"));
+              "p.csv:2: the first three columns of the matrix are not a rotation");
+  EXPECT_THAT(refusal("2 0 0 0 0 2 0 0 0 0 2 0\n", ten_hz), HasSubstr("not a rotation"));
   EXPECT_THAT(refusal("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 0\n", {.frame = Frame::enu_flu, .rate_hz = 1e-300}),
               "p.csv:2: the time is beyond 146 years");
 }
@@ -206,7 +207,7 @@ TEST(TrajectoryFile, PosesThatTheMemoryDoesNotSufficeForAreRefused) {
 
 /// The page shows what can be read: every block of it that is marked with a format.
 TEST(TrajectoryFile, TheManualsExamplesAreRead) {
-  std::ifstream in(std::string(SONARD_SOURCE_DIR) + "/docs/trajectories.md");
+  std::ifstream in(std::string(SONARD_SOURCE_DIR) + "/docs/poses.md");
   std::string line, block, format;
   std::vector<std::string> read;
   while (std::getline(in, line)) {

@@ -67,8 +67,7 @@ TEST(Trajectory, MotionIsThatOfItsPoses) {
   Points points;
   for (int i = 0; i < 50; ++i) {
     points.times.push_back(milliseconds(100 * i));
-    points.poses.push_back(
-        {{value(dice), value(dice), value(dice)}, quat_from_rotation({value(dice), value(dice), value(dice)})});
+    points.poses.push_back({{value(dice), value(dice), value(dice)}, turned_by({value(dice), value(dice), value(dice)})});
   }
   const Trajectory way(points);
   const Ns step = std::chrono::microseconds(1);

@@ -8,7 +8,7 @@
 #include "core/base/random.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/beam_transform.hpp"
-#include "core/pipeline/couple.hpp"
+#include "core/pipeline/form_beams.hpp"
 
 namespace sonar {
 namespace {
@@ -35,8 +35,8 @@ TEST_P(BeamTransform, IsTheSumOverColumns) {
   const FrequencyMode mode = mode_with(c.aperture_deg, c.width_deg, c.spacing);
   const std::vector<double> sines = make_beam_sines(mode, c.beams);
   const Columns columns = make_columns(mode, c.beams);
-  Coupling coupling;
-  coupling.transform = std::make_shared<const BeamTransformTables>(receive_pattern(mode.pattern), columns, sines);
+  BeamWeights beam_weights;
+  beam_weights.transform = std::make_shared<const BeamTransformTables>(receive_pattern(mode.pattern), columns, sines);
 
   constexpr int samples = 48;
   ColumnSignals signals;
@@ -48,9 +48,10 @@ TEST_P(BeamTransform, IsTheSumOverColumns) {
       float* at = signals.column(k) + 2 * (signals.lead + n);
       at[0] = z.re, at[1] = z.im;
     }
-  CoupleScratch scratch;
+  BeamScratch scratch;
   BeamSignals beams;
-  couple(signals, coupling, simd::kernels_for(level), 0, samples, c.beams, scratch, beams);
+  beams.shape(c.beams, 0, samples);
+  form_beams(signals, beam_weights, simd::kernels_for(level), scratch, beams);
 
   const ReceivePattern pattern = receive_pattern(mode.pattern);
   double off = 0, all = 0, worst = 0;
@@ -89,11 +90,11 @@ TEST(BeamTransformTables, WeighAsMuchAsAllColumnsTogether) {
   const FrequencyMode mode = mode_with(90, 1, in_angle);
   const Columns columns = make_columns(mode, 512);
   const std::vector<double> sines = make_beam_sines(mode, 512);
-  const Coupling ours = make_coupling(mode, columns, sines, false);
-  const Coupling band = make_coupling(mode, columns, sines, false, {.dropped_energy = 0, .transform = false});
+  const BeamWeights ours = make_beam_weights(mode, columns, sines, false);
+  const BeamWeights band = make_beam_weights(mode, columns, sines, false, {.dropped_energy = 0, .transform = false});
   ASSERT_TRUE(ours.transform);
   EXPECT_NEAR(ours.weight_energy, band.weight_energy, 1e-9 * band.weight_energy);
-  EXPECT_FALSE(make_coupling(mode, columns, sines, true).transform) << "powers keep their sums";
+  EXPECT_FALSE(make_beam_weights(mode, columns, sines, true).transform) << "powers keep their sums";
 }
 
 }  // namespace

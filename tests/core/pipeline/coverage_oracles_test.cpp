@@ -100,7 +100,7 @@ TEST(CoverageOracles, Oracle32_EveryShippedSonarFillsAFlatBed) {
   for (const auto& model : oculus::models()) {
     for (const FrequencyMode& mode : model->modes) {
       const double range = static_cast<double>(mode.max_range_m);
-      const oculus::RowLaw rows = oculus::row_law(range, 1500);
+      const oculus::RowGrid rows = oculus::row_grid(range, 1500);
       if (!is_new(mode, range, rows.spacing_m)) continue;
       look(*model, mode, default_rows(rows.count * rows.spacing_m, rows.count));
     }

@@ -37,7 +37,7 @@ std::vector<std::vector<Complex>> ElementArray::beams(std::span<const PlacedScat
                                                       std::span<const double> beam_sines, const Grid& grid, const Envelope& p,
                                                       double reach_s) const {
   std::vector<std::vector<Complex>> s(beam_sines.size(), std::vector<Complex>(static_cast<std::size_t>(grid.samples)));
-  const double across_s = std::abs(place_m_.front()) / sound_speed_mps_ * 2;  // by so much elements may hear earlier or later
+  const double across_s = std::abs(place_m_.front()) / sound_speed_mps_ * 2;  // elements may receive earlier or later by so much
   for (std::size_t j = 0; j < beam_sines.size(); ++j)
     for (const PlacedScatterer& scatterer : scatterers) {
       const double r = length(scatterer.in_sonar), sine = scatterer.in_sonar.y / r, delay_s = 2 * r / grid.sound_speed_mps;

@@ -1,5 +1,5 @@
-// Eq. (9) against an array element by element: what beams hear of a handful of points, near and far, through the engine's point
-// path and through columns and coupling; and where such an array has grating lobes.
+// Eq. (9) against an array element by element: what beams receive from a handful of points, near and far, through the engine's
+// point path and through columns and beamforming; and where such an array has grating lobes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "core/pipeline/arithmetic/scattering.hpp"
-#include "core/pipeline/couple.hpp"
+#include "core/pipeline/form_beams.hpp"
 #include "core/pipeline/pulses/pulse.hpp"
+#include "core/pipeline/synthesize.hpp"
 #include "tests/core/pipeline/element_array.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
@@ -59,7 +60,7 @@ std::vector<Vec3d> places(double nearest_m, double farthest_m) {
 }
 
 // A pulse as long as this crosses the array as a whole; the near field is focused away, range by range.
-TEST(Elements, PointsThroughTheEngineAreWhatTheArrayHears) {
+TEST(Elements, PointsThroughTheEngineMatchTheArray) {
   for (const FrequencyMode& mode : {p900(), oculus_high()})
     for (const double nearest : {0.7, 4.0}) {
       const std::vector<Vec3d> at = places(nearest, nearest + 2);
@@ -89,8 +90,8 @@ TEST(Elements, PointsThroughTheEngineAreWhatTheArrayHears) {
     }
 }
 
-// The same by columns and the banded coupling, with the points in the middle of columns.
-TEST(Elements, ColumnsAndCouplingAreWhatTheArrayHears) {
+// The same by columns and the banded beamforming, with the points in the middle of columns.
+TEST(Elements, ColumnsAndBeamWeightsMatchTheArray) {
   FrequencyMode mode = p900();
   mode.beam_spacing = BeamSpacing::uniform_in_sine;
   PingSettings settings = native_rows(6, 0.0254);
@@ -115,9 +116,10 @@ TEST(Elements, ColumnsAndCouplingAreWhatTheArrayHears) {
     scatterers.push_back({{r * std::sqrt(1 - u * u), r * u, 0}, amplitude});
   }
   synthesize(echoes, plan.pulse(), kernels, columns);
-  CoupleScratch scratch;
+  BeamScratch scratch;
   BeamSignals beams;
-  couple(columns, plan.coupling, kernels, 0, plan.samples, settings.beam_count, scratch, beams);
+  beams.shape(settings.beam_count, 0, plan.samples);
+  form_beams(columns, plan.beam_weights, kernels, scratch, beams);
   Signals got(static_cast<std::size_t>(settings.beam_count), std::vector<Complex>(static_cast<std::size_t>(plan.samples)));
   for (int j = 0; j < settings.beam_count; ++j)
     for (int n = 0; n < plan.samples; ++n)

@@ -1,5 +1,5 @@
-// Every part of the model at once: two sonars take turns in one engine, and each ping is the same bytes whoever computes it and
-// whatever came before. And a part that is switched off is as if its data were not there.
+// Every part of the model at once: two sonars take turns in one engine, and each ping is the same bytes whichever thread computes
+// it and whatever came before. And a part that is switched off is as if its data were not there.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -101,8 +101,8 @@ TEST(Everything, SwitchedOffIsAsIfItsDataWereNotThere) {
       &Switches::volume, [](Scene& s) { s.water_column = {}; }, as_it_is);
   same(
       &Switches::interference, [](Scene& s) { s.other_sonars.clear(); }, as_it_is);
-  same(&Switches::leak, as_it_is, receiver([](ReceiverLaw& law) { law.leak_upa = 0; }));
-  same(&Switches::crosstalk, as_it_is, receiver([](ReceiverLaw& law) { law.crosstalk_db = -200; }));
+  same(&Switches::leak, as_it_is, receiver([](ReceiverModel& law) { law.leak_upa = 0; }));
+  same(&Switches::crosstalk, as_it_is, receiver([](ReceiverModel& law) { law.crosstalk_db = -200; }));
 }
 
 TEST(Everything, AtRestMotionAndDopplerChangeNothing) {

@@ -58,7 +58,7 @@ class Other final : public Interruption {
  public:
   Other(PingEngine& engine, PingRequest request) : engine_(engine), request_(std::move(request)) {}
   bool expected() const override { return true; }
-  void take() override { pings.push_back(engine_.run({&request_, 1}).at(0)); }
+  void run_other() override { pings.push_back(engine_.run({&request_, 1}).at(0)); }
   std::vector<Ping> pings;
 
  private:
@@ -80,12 +80,12 @@ TEST_P(Interrupted, PingsAreAsTheyAreAlone) {
   // Room for hardly a tile: what is not in use is forgotten at once.
   const auto engine = make_cpu_engine(scene, pool, {.cell_cache_bytes = 1 << 12});
   Other other(*engine, quick);
-  engine->let_in(&other);
+  engine->set_interruption(&other);
   const Ping ping = engine->run({&slow, 1}).at(0);
   EXPECT_TRUE(ping.samples == alone(slow));
   ASSERT_GE(other.pings.size(), 2u) << "between groups of columns";
   for (const Ping& let_in : other.pings) EXPECT_TRUE(let_in.samples == alone(quick));
-  engine->let_in(nullptr);
+  engine->set_interruption(nullptr);
   EXPECT_TRUE(engine->run({&slow, 1}).at(0).samples == ping.samples);
 }
 

@@ -68,11 +68,14 @@ TEST(KernelSets, AgreeOnAPing) {
 }
 
 // A ray of the fixed fan: an echo of sqrt(sigma) e^{-2 alpha r} / r^2 D(psi), with a draw and a carrier of its own.
-TEST(KernelSets, HitsOfTheFixedFanSoundAsDefined) {
+TEST(KernelSets, HitsOfTheFixedFanScatterAsDefined) {
   Material smooth;
   smooth.lambert_db = -15;
   smooth.roughness_m = 1e-4f;
   const auto scene = SceneMaker().add(wall(5, 5), -20, {5, 0, 0}).add_of(wall(5, 5), smooth, {7, 0, 0}).make();
+  Parallel pool;
+  const RayScene rays(scene, 1);
+  SurfaceCells cells(scene, Seed{77}, 1 << 20);
   for (const bool conical : {false, true}) {
     PingRequest request = Sounding(scene, p900(), default_rows(10, 394)).request;
     request.switches.conical = conical;
@@ -96,7 +99,7 @@ TEST(KernelSets, HitsOfTheFixedFanSoundAsDefined) {
     ASSERT_EQ(laws[1].root.empty(), false) << "one of the two materials has a law that is tabulated";
     for (const simd::Kernels* kernels : kernel_sets()) {
       Echoes echoes;
-      scatter_hits(hits, *scene, laws, plan, scalars, Seed{77}, *kernels, echoes);
+      scatter_hits({rays, cells, {}, laws, plan, scalars, *kernels, pool}, hits, Seed{77}, echoes);
       ASSERT_EQ(echoes.count, 500);
       double off = 0, all = 0;
       for (std::size_t i = 0; i < hits.size(); ++i) {

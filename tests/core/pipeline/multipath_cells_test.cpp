@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/pipeline/pulses/spectral.hpp"
-#include "core/scene/mirrors/mirrors.hpp"
 #include "core/scene/shapes/primitives.hpp"
+#include "core/scene/specular/flat_faces.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
@@ -138,18 +138,18 @@ TEST(MultipathCells, SpeckleOfTheTwoWaysRoundIsOne) {
   Sounding s(with_mirrors(maker, 1), silent(without_elevation_pattern(p900())), settings);
   s.request.sonar_in_world.position_m = {0, 0, -0.8};
   s.request.switches.multipath = true;
-  const auto heard = [&] { return s.ping(), energy(s, 5, 8.6, 60, 67); };
+  const auto received = [&] { return s.ping(), energy(s, 5, 8.6, 60, 67); };
   s.request.switches.expected_power = true;
-  const double expected = heard();
+  const double expected = received();
   s.request.switches.multipath = false;
-  EXPECT_GT(expected, 3 * heard());
+  EXPECT_GT(expected, 3 * received());
   s.request.switches.multipath = true;
   s.request.switches.expected_power = false;
   double mean = 0;
   constexpr int draws = 20;
   for (int draw = 0; draw < draws; ++draw) {
     s.request.seed = Seed{static_cast<std::uint64_t>(draw) + 1};
-    mean += heard() / draws;
+    mean += received() / draws;
   }
   record_oracle(no_number, "coherent pairs of ghosts, mean over speckle against expected power", 0,
                 10 * std::log10(mean / expected), 0.3, "dB");
@@ -195,7 +195,7 @@ TEST(MultipathCells, ATankRingsOnBehindItsWalls) {
   EXPECT_NEAR(10 * std::log10(energy(on, 2, 11.5, 0, 512) / by_cones), 0, 1);
 }
 
-TEST(MultipathCells, PulsesByWayOfTheSpectrumSoundTheSame) {
+TEST(MultipathCells, PulsesByWayOfTheSpectrumGiveTheSameEchoes) {
   if (!spectral::have_transform) GTEST_SKIP() << "built without FFTW";
   SceneMaker maker;
   maker.add(sheet(40, 40), silent_db).add(sphere(0.2, 4), -20, {5, 0.5, -1.2});

@@ -17,11 +17,11 @@ Mesh sheet(double length_x_m, double length_y_m) {
 }
 Quatd upright_along_x() { return quat_from_rpy({pi / 2, 0, 0}); }  // turns a level sheet into a side wall, normal along y
 
-struct MirrorMaterial {
+struct SpecularMaterial {
   float reflection = -1, roughness_m = 0;
 };
 /// The scene with its first `count` materials as mirrors.
-std::shared_ptr<const Scene> mirrored(const SceneMaker& maker, std::size_t count, MirrorMaterial as = {}) {
+std::shared_ptr<const Scene> mirrored(const SceneMaker& maker, std::size_t count, SpecularMaterial as = {}) {
   auto scene = std::make_shared<Scene>(*maker.make());
   for (std::size_t m = 0; m < count; ++m) {
     scene->materials[m].reflection = as.reflection;
@@ -58,10 +58,10 @@ struct UnderSurface {
   double sonar_depth_m, point_depth_m, distance_m;
   double direct_m() const { return std::hypot(distance_m, point_depth_m - sonar_depth_m); }
   double mirrored_m() const { return std::hypot(distance_m, point_depth_m + sonar_depth_m); }
-  std::shared_ptr<const Scene> scene(MirrorMaterial surface = {}) const {
+  std::shared_ptr<const Scene> scene(SpecularMaterial surface = {}) const {
     return mirrored(SceneMaker().add(sheet(40, 40), silent_db).add_point({distance_m, 0, -point_depth_m}, -20), 1, surface);
   }
-  Sounding sounding(const FrequencyMode& mode, MirrorMaterial surface = {}) const {
+  Sounding sounding(const FrequencyMode& mode, SpecularMaterial surface = {}) const {
     PingSettings settings = native_rows(12, 0.0254);
     settings.beam_count = 511;  // the middle beam looks straight ahead
     Sounding s(scene(surface), mode, settings);

@@ -31,7 +31,7 @@ std::vector<Material> seabeds() { return {gsab(-12, 5, -32), gsab(-8, 8, -24), g
 /// As the kernels read it.
 double looked_up(const LawTable& law, double cosine) {
   if (!law.table()) return law.mu * cosine * cosine;
-  const double at = simd::law_steps * std::sqrt(1 - cosine);
+  const double at = law_steps * std::sqrt(1 - cosine);
   const auto i = static_cast<std::size_t>(at);
   const double root = static_cast<double>(law.root[i]) +
                       (at - static_cast<double>(i)) * (static_cast<double>(law.root[i + 1]) - static_cast<double>(law.root[i]));
@@ -118,7 +118,7 @@ TEST(ScatteringLaw, TrendWithFrequency) {
   }
 }
 
-// What the mirror echo loses is what scatters: 0.6, 2.5 and 9.9 dB at 900 kHz; 3.4 and 13 dB at 2.1 MHz.
+// What the specular echo loses is what scatters: 0.6, 2.5 and 9.9 dB at 900 kHz; 3.4 and 13 dB at 2.1 MHz.
 TEST(ScatteringLaw, RoughnessSharesEnergyBetweenMirrorAndScatter) {
   struct Case {
     double hz;
@@ -179,7 +179,7 @@ TEST(ScatteringLaw, LevelOfABedThatFollowsGsab) {
     for (const double tilt : {rad_from_deg(75), 0.45, 0.25}) {
       Sounding s(bed_of(material), without_elevation_pattern(p900()), native_rows(9, 0.0254));
       s.request.switches.expected_power = true;
-      s.request.switches.specular = material.law == ScatteringLaw::lambert;  // its mirror echo is elsewhere: straight down
+      s.request.switches.specular = material.law == ScatteringLaw::lambert;  // its specular echo is elsewhere: straight down
       const bool straight_down = tilt > 1;
       const int block = straight_down ? 6 : 20;
       const double nearest = straight_down ? (s.request.switches.specular ? 2.12 : 2.0) : height / std::sin(0.4 + tilt) + 0.1;

@@ -8,7 +8,7 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "core/pipeline/bubbles.hpp"
-#include "core/pipeline/multipath/multipath_legs.hpp"
+#include "core/pipeline/multipath/multipath_paths.hpp"
 #include "core/pipeline/scattering_law.hpp"
 #include "core/scene/files/load_scene.hpp"
 #include "tests/core/pipeline/scenes.hpp"
@@ -101,7 +101,7 @@ TEST(Bubbles, OfAPlaceBehindTheMirrorAreStillAFactor) {
   const BubbleLayer bubbles(SeaSurface{.present = true, .bubble_layer_m = 0.5f, .bubble_loss_db_per_m = 4});
   PingScalars s;
   s.seen_from.position_m.z = -1;
-  const auto factor = [&](double z) { return bubble_factor(bubbles, leg_by(mirrors, 0), mirrors, {3, 0, z}, s); };
+  const auto factor = [&](double z) { return bubble_factor(bubbles, path_by(mirrors, 0), mirrors, {3, 0, z}, s); };
   for (const double z : {-2.0, 0.0, 0.999, 1.0, 1.5, 2.0, 2.5, 40.0}) {
     EXPECT_GT(factor(z), 0) << z;
     EXPECT_LT(factor(z), 1) << z;
@@ -176,7 +176,7 @@ TEST(SeaSurface, OneAtItSeesAsOneJustBelow) {
   EXPECT_NEAR(10 * std::log10(at_it / deeper), 0, 0.5) << "the bed";
 }
 
-TEST(SeaSurface, OneAboveItHearsNoise) {
+TEST(SeaSurface, OneAboveItReceivesNoise) {
   OverABed bed, without("");
   const Ping& in_air = bed.from(0.0011);
   EXPECT_TRUE(in_air.request.blank) << "so that it can be told";

@@ -7,6 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/synthesize.hpp"
 #include "tests/core/pipeline/pulses.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"

@@ -87,7 +87,7 @@ TEST_F(SpectralWithTransform, TransformsThereAndBackAgain) {
 }
 
 // Beams uniform in the sine: eq. (9) is a convolution over columns, which a transform carries out whole, without a band.
-TEST_F(SpectralWithTransform, Oracle19_CouplingByTransformAgainstDenseSum) {
+TEST_F(SpectralWithTransform, Oracle19_BeamsByTransformAgainstDenseSum) {
   const double spacing = 0.0018, aperture = aperture_in_wavelengths(Taper::taylor30, 0.00698);
   const int beams = 512, margin = 12, columns = beams + 2 * margin, size = quick_size(2 * columns);
   const auto weight = [&](int apart) { return directivity(Taper::taylor30, aperture, apart * spacing); };

@@ -1,11 +1,12 @@
-// Oracles 10 to 12 and their neighbours: mirror echoes of primitives and of their meshes, near and far, through the whole engine.
+// Oracles 10 to 12 and their neighbours: specular echoes of primitives and of their meshes, near and far, through the whole
+// engine.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 
 #include "core/scene/shapes/primitives.hpp"
-#include "tests/core/pipeline/mirror_worlds.hpp"
+#include "tests/core/pipeline/specular_worlds.hpp"
 #include "tests/oracles/record.hpp"
 
 namespace sonar::test {
@@ -26,14 +27,14 @@ INSTANTIATE_TEST_SUITE_P(Mirrors, BothWays, testing::Bool(),
 TEST_P(BothWays, Oracle10_SphereAtAnyRange) {
   for (const double a : {0.05, 0.25, 1.0})
     for (const double r : {0.7, 3.013, 11.0}) {
-      Mirror sphere = sphere_mirror(a);
+      Mirror sphere = specular_sphere(a);
       sphere.in_world.position_m = {r + a, 0, 0};
-      MirrorSounding s(world_of({sphere}, as_meshes()), p900(), native_rows(12, 0.0254));
+      SpecularSounding s(world_of({sphere}, as_meshes()), p900(), native_rows(12, 0.0254));
       record(10, "sphere, eq. 7", db(1 / (2 * r * (1 + r / a))), db(s.strength_per_m(r)), 0.1);
     }
-  Mirror small = sphere_mirror(0.05);
+  Mirror small = specular_sphere(0.05);
   small.in_world.position_m = {34.05, 0, 0};
-  MirrorSounding s(world_of({small}, as_meshes()), p900(), native_rows(35, 0.0254));
+  SpecularSounding s(world_of({small}, as_meshes()), p900(), native_rows(35, 0.0254));
   record(10, "sphere, far: TS = 20 log(a / 2)", db(0.05 / 2), db(s.strength_per_m(34)) + 40 * std::log10(34.0), 0.1);
 }
 
@@ -48,24 +49,24 @@ double rod_echo(double wavelength_m, double a, double length_m, double axis_m, d
 
 TEST_P(BothWays, Oracle11_CylinderBroadside) {
   {
-    Mirror far = cylinder_mirror(0.05, 0.1);
+    Mirror far = specular_cylinder(0.05, 0.1);
     far.in_world = standing(34.05);
-    MirrorSounding s(world_of({far}, as_meshes()), p900(), native_rows(35, 0.0254));
+    SpecularSounding s(world_of({far}, as_meshes()), p900(), native_rows(35, 0.0254));
     const double sigma = 0.05 * 0.1 * 0.1 / (2 * s.wavelength_m());
     record(11, "cylinder, far: a L^2 / (2 lambda)", 10 * std::log10(sigma), db(s.strength_per_m(34)) + 40 * std::log10(34.0),
            0.5);
   }
   for (const double length_m : {0.1778, 0.6})
     for (const double r : {0.5, 2.0}) {
-      Mirror near = cylinder_mirror(0.0508, length_m);
+      Mirror near = specular_cylinder(0.0508, length_m);
       near.in_world = standing(r + 0.0508);
-      MirrorSounding s(world_of({near}, as_meshes()), p900(), native_rows(12, 0.0254));
+      SpecularSounding s(world_of({near}, as_meshes()), p900(), native_rows(12, 0.0254));
       record(11, "cylinder, near: Kirchhoff's integral", db(rod_echo(s.wavelength_m(), 0.0508, length_m, r + 0.0508)),
              db(s.strength_per_m(r)), 0.5);
     }
-  Mirror rod = cylinder_mirror(0.0508, 4);
+  Mirror rod = specular_cylinder(0.0508, 4);
   rod.in_world = standing(0.5508);
-  MirrorSounding s(world_of({rod}, as_meshes()), oculus_high(), native_rows(2, 0.0054));
+  SpecularSounding s(world_of({rod}, as_meshes()), oculus_high(), native_rows(2, 0.0054));
   record(11, "rod of the paper's tank at 0.5 m, long", -10.35, db(s.strength_per_m(0.5)), 0.5);
 }
 
@@ -79,50 +80,50 @@ double plate_echo(double wavelength_m, double ly, double lz, double x, double y0
 
 TEST_P(BothWays, Oracle12_PlateFacingUs) {
   {
-    Mirror far = plane_mirror(0.1, 0.08);
+    Mirror far = specular_plane(0.1, 0.08);
     far.in_world = facing(34);
-    MirrorSounding s(world_of({far}, as_meshes()), p900(), native_rows(35, 0.0254));
+    SpecularSounding s(world_of({far}, as_meshes()), p900(), native_rows(35, 0.0254));
     record(12, "plate, far: (area / lambda)^2", db(0.1 * 0.08 / s.wavelength_m()),
            db(s.strength_per_m(34)) + 40 * std::log10(34.0), 0.5);
   }
   for (const double r : {0.8, 1.7, 4.0, 9.0}) {
-    Mirror near = plane_mirror(0.3, 0.5);  // along z and along y, as turned
+    Mirror near = specular_plane(0.3, 0.5);  // along z and along y, as turned
     near.in_world = facing(r);
-    MirrorSounding s(world_of({near}, as_meshes()), p900(), native_rows(12, 0.0254));
+    SpecularSounding s(world_of({near}, as_meshes()), p900(), native_rows(12, 0.0254));
     record(12, "plate, near: Kirchhoff's integral", db(plate_echo(s.wavelength_m(), 0.5, 0.3, r)), db(s.strength_per_m(r)), 0.5);
   }
 }
 
 TEST_P(BothWays, Oracle12_WallFarFromItsEdges) {
-  Mirror wall = plane_mirror(12, 14);
+  Mirror wall = specular_plane(12, 14);
   wall.in_world = facing(3);
-  MirrorSounding s(world_of({wall}, as_meshes()), p900(), native_rows(12, 0.0254));
+  SpecularSounding s(world_of({wall}, as_meshes()), p900(), native_rows(12, 0.0254));
   record(12, "wall: 1 / (2 r)", db(1 / 6.0), db(s.strength_per_m(3)), 0.3);
 }
 
 TEST_P(BothWays, PlateBesideTheFoot) {
   // Turned a little, the foot of the perpendicular leaves the plate: the main lobe goes on beyond its edge.
   for (const double tilt : {0.0, 0.004, 0.008, 0.02}) {
-    Mirror plate = plane_mirror(0.3, 0.1);
+    Mirror plate = specular_plane(0.3, 0.1);
     plate.in_world = facing(9, tilt);
-    MirrorSounding s(world_of({plate}, as_meshes()), p900(), native_rows(12, 0.0254));
+    SpecularSounding s(world_of({plate}, as_meshes()), p900(), native_rows(12, 0.0254));
     const double expected = plate_echo(s.wavelength_m(), 0.1, 0.3, 9, 0, -tilt);
     EXPECT_NEAR(db(s.strength_per_m(9)), db(expected), 1.5) << tilt;
   }
 }
 
 TEST_P(BothWays, BoxShowsItsFaceLikeAPlate) {
-  Mirror box = box_mirror({0.4, 0.5, 0.3});
+  Mirror box = specular_box({0.4, 0.5, 0.3});
   box.in_world = {{2.2, 0, 0}, {}};
-  MirrorSounding s(world_of({box}, as_meshes()), p900(), native_rows(12, 0.0254));
+  SpecularSounding s(world_of({box}, as_meshes()), p900(), native_rows(12, 0.0254));
   EXPECT_NEAR(db(s.strength_per_m(2)), db(plate_echo(s.wavelength_m(), 0.5, 0.3, 2)), 0.5);
 }
 
 TEST_P(BothWays, TiltedPolishedRodLosesTensOfDecibels) {
   const auto level = [&](double tilt) {
-    Mirror rod = cylinder_mirror(0.0508, 0.1778);
+    Mirror rod = specular_cylinder(0.0508, 0.1778);
     rod.in_world = standing(0.5508, tilt);
-    MirrorSounding s(world_of({rod}, as_meshes()), oculus_low(), native_rows(2, 0.0054));
+    SpecularSounding s(world_of({rod}, as_meshes()), oculus_low(), native_rows(2, 0.0054));
     return db(s.strength_per_m(0.5, 0.1));
   };
   const double upright = level(0);
@@ -131,9 +132,9 @@ TEST_P(BothWays, TiltedPolishedRodLosesTensOfDecibels) {
 }
 
 TEST_P(BothWays, CapOfACylinder) {
-  Mirror drum = cylinder_mirror(0.09, 0.8);
+  Mirror drum = specular_cylinder(0.09, 0.8);
   drum.in_world = facing(2.4);
-  MirrorSounding s(world_of({drum}, as_meshes()), p900(), native_rows(12, 0.0254));
+  SpecularSounding s(world_of({drum}, as_meshes()), p900(), native_rows(12, 0.0254));
   // On the axis of a disc: |1 - exp(-i 2 k (edge - middle))| / (2 r), but for the edge's own range.
   const double edge = std::hypot(2.0, 0.09);
   const double expected = std::abs(1.0 - std::polar(1.0, -4 * pi / s.wavelength_m() * (edge - 2))) / 4;
@@ -141,35 +142,35 @@ TEST_P(BothWays, CapOfACylinder) {
 }
 
 TEST_P(BothWays, SilentBehindABox) {
-  Mirror sphere = sphere_mirror(0.25);
+  Mirror sphere = specular_sphere(0.25);
   sphere.in_world.position_m = {4.25, 0, 0};
-  Mirror box = box_mirror({0.2, 1, 1});
+  Mirror box = specular_box({0.2, 1, 1});
   box.in_world = {{2, 0, 0}, quat_from_rpy({0, 0.5, 0.5})};
-  MirrorSounding open(world_of({sphere}, as_meshes()), p900(), native_rows(12, 0.0254));
-  MirrorSounding hidden(world_of({sphere, box}, as_meshes()), p900(), native_rows(12, 0.0254));
+  SpecularSounding open(world_of({sphere}, as_meshes()), p900(), native_rows(12, 0.0254));
+  SpecularSounding hidden(world_of({sphere, box}, as_meshes()), p900(), native_rows(12, 0.0254));
   EXPECT_GT(open.strength_per_m(4), 0);
   EXPECT_LT(db(hidden.strength_per_m(4)), db(open.strength_per_m(4)) - 60);
 }
 
 TEST_P(BothWays, HalfHiddenIsHalfAsStrong) {
   // A screen whose edge runs through the line of sight: half of every Fresnel zone is left, 6 dB less.
-  Mirror wall = plane_mirror(8, 8);
+  Mirror wall = specular_plane(8, 8);
   wall.in_world = facing(4);
-  Mirror screen = box_mirror({0.02, 2, 2});
+  Mirror screen = specular_box({0.02, 2, 2});
   screen.in_world = {{2, 1, 0}, quat_from_rpy({0, 0, 0})};
   screen.material.reflection = 0;
-  MirrorSounding s(world_of({wall, screen}, as_meshes()), p900(), native_rows(12, 0.0254));
+  SpecularSounding s(world_of({wall, screen}, as_meshes()), p900(), native_rows(12, 0.0254));
   EXPECT_NEAR(db(s.strength_per_m(4)), db(1 / 8.0) - 6.02, 1);
 }
 
 TEST(SpecularOracles, RoughnessTakesTheMirrorAway) {
   // Model, section 2.1.1: 0.6 dB at 0.05 mm, 2.5 dB at 0.1 mm, 9.9 dB at 0.2 mm at 900 kHz and 1500 m/s.
   const auto level = [](double roughness_m) {
-    Mirror sphere = sphere_mirror(0.5);
+    Mirror sphere = specular_sphere(0.5);
     sphere.material.lambert_db = -80;
     sphere.material.roughness_m = static_cast<float>(roughness_m);
     sphere.in_world.position_m = {2.5, 0, 0};
-    MirrorSounding s(world_of({sphere}), p900(), native_rows(12, 0.0254));
+    SpecularSounding s(world_of({sphere}), p900(), native_rows(12, 0.0254));
     return db(s.strength_per_m(2));
   };
   const double smooth = level(0);
@@ -180,17 +181,17 @@ TEST(SpecularOracles, RoughnessTakesTheMirrorAway) {
 }
 
 TEST(SpecularOracles, ReflectionScalesTheEcho) {
-  Mirror weak = sphere_mirror(0.5);
+  Mirror weak = specular_sphere(0.5);
   weak.material.reflection = -0.1f;
   weak.in_world.position_m = {2.5, 0, 0};
-  MirrorSounding s(world_of({weak}), p900(), native_rows(12, 0.0254));
+  SpecularSounding s(world_of({weak}), p900(), native_rows(12, 0.0254));
   EXPECT_NEAR(db(s.strength_per_m(2)), db(0.1 / (4 * 5.0)), 0.1);
 }
 
 TEST_P(BothWays, SwitchedOffThereIsNothing) {
-  Mirror sphere = sphere_mirror(0.5);
+  Mirror sphere = specular_sphere(0.5);
   sphere.in_world.position_m = {2.5, 0, 0};
-  MirrorSounding s(world_of({sphere}, as_meshes()), p900(), native_rows(12, 0.0254));
+  SpecularSounding s(world_of({sphere}, as_meshes()), p900(), native_rows(12, 0.0254));
   EXPECT_GT(s.strength_per_m(2), 0);
   s.sounding().request.switches.specular = false;
   s.sounding().request.switches.expected_power = true;
@@ -201,9 +202,9 @@ TEST_P(BothWays, SwitchedOffThereIsNothing) {
 }
 
 TEST_P(BothWays, ExpectedPowerHoldsTheSameEcho) {
-  Mirror sphere = sphere_mirror(0.5);
+  Mirror sphere = specular_sphere(0.5);
   sphere.in_world.position_m = {2.5, 0, 0};
-  MirrorSounding s(world_of({sphere}, as_meshes()), p900(), native_rows(12, 0.0254));
+  SpecularSounding s(world_of({sphere}, as_meshes()), p900(), native_rows(12, 0.0254));
   const double level = s.strength_per_m(2);
   s.sounding().request.switches.expected_power = true;
   s.turn(0);
@@ -219,11 +220,11 @@ TEST_P(BothWays, ExpectedPowerHoldsTheSameEcho) {
 TEST_P(BothWays, TankFromInside) {
   // The round wall seen from beside its axis: in front 1 - r / a is negative, the echo has gone through a line of focus.
   const double a = 1.1684, height = 1.2;
-  Mirror tank = cylinder_mirror(a, height);
+  Mirror tank = specular_cylinder(a, height);
   tank.primitive.inside = true;
   for (const double off : {0.4, 0.2, 0.02, 0.0}) {
     tank.in_world.position_m = {off, 0, 0};
-    MirrorSounding s(world_of({tank}, as_meshes()), oculus_high(), native_rows(2, 0.0054));
+    SpecularSounding s(world_of({tank}, as_meshes()), oculus_high(), native_rows(2, 0.0054));
     const double r = a + off;
     const double expected = 1 / (2 * r * std::sqrt(std::max(r / a - 1, 0.05)));
     const double measured = s.strength_per_m(r);
@@ -236,12 +237,12 @@ TEST_P(BothWays, TankFromInside) {
 }
 
 TEST_P(BothWays, MovesWithItsBody) {
-  Mirror sphere = sphere_mirror(0.5);
+  Mirror sphere = specular_sphere(0.5);
   auto scene = std::make_shared<Scene>(*world_of({sphere}, as_meshes()));
   scene->objects[0].body = 0;
   scene->body_names = {"ball"};
   scene->bodies_in_world = {Pose{}};
-  MirrorSounding s(scene, p900(), native_rows(12, 0.0254));
+  SpecularSounding s(scene, p900(), native_rows(12, 0.0254));
   for (const double r : {2.0, 5.0}) {
     s.sounding().request.bodies_in_world = {Pose{{r + 0.5, 0, 0}, quat_from_rpy({0.3, 0.2, 1})}};
     s.turn(0);
@@ -251,9 +252,9 @@ TEST_P(BothWays, MovesWithItsBody) {
 
 TEST(SpecularOracles, MeshOfASphereFromEverySide) {
   for (int i = 0; i < 10; ++i) {
-    Mirror sphere = sphere_mirror(0.25);
+    Mirror sphere = specular_sphere(0.25);
     sphere.in_world = {{3.25, 0, 0}, quat_from_rpy({0.61 * i, 0.37 * i, 1.13 * i})};
-    MirrorSounding s(world_of({sphere}, true), p900(), native_rows(12, 0.0254));
+    SpecularSounding s(world_of({sphere}, true), p900(), native_rows(12, 0.0254));
     EXPECT_NEAR(db(s.strength_per_m(3)), db(1 / (6 * (1 + 3 / 0.25))), 0.5) << i;
   }
 }
@@ -262,11 +263,11 @@ TEST(SpecularOracles, CapsuleAndTorusFromFacets) {
   // Shapes without a closed form in the engine: radii a (half sphere end-on), and a with R + a (torus seen in its plane).
   Mirror capsule{.mesh = make_capsule(0.3, 0.8, segments_for(0.3))};
   capsule.in_world = facing(2.7);
-  MirrorSounding end_on(world_of({capsule}), p900(), native_rows(12, 0.0254));
+  SpecularSounding end_on(world_of({capsule}), p900(), native_rows(12, 0.0254));
   EXPECT_NEAR(db(end_on.strength_per_m(2)), db(1 / (4 * (1 + 2 / 0.3))), 1);
   Mirror torus{.mesh = make_torus(0.5, 0.1, 128)};
   torus.in_world = {{2.6, 0, 0}, {}};
-  MirrorSounding ring(world_of({torus}), p900(), native_rows(12, 0.0254));
+  SpecularSounding ring(world_of({torus}), p900(), native_rows(12, 0.0254));
   EXPECT_NEAR(db(ring.strength_per_m(2)), db(1 / (4 * std::sqrt((1 + 2 / 0.1) * (1 + 2 / 0.6)))), 1);
 }
 

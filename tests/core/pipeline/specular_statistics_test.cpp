@@ -1,12 +1,12 @@
-// What a slightly rough surface sends back: the part that mirrors and the part that scatters share the energy, and where both are
-// heard the echo is Rician (oracle 25).
+// Echoes of a slightly rough surface: the specular and the scattered part share the energy, and where both reach a beam their
+// sum is Rician (oracle 25).
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "core/pipeline/scattering_law.hpp"
 #include "core/pipeline/specular/specular.hpp"
-#include "tests/core/pipeline/mirror_worlds.hpp"
+#include "tests/core/pipeline/specular_worlds.hpp"
 #include "tests/oracles/record.hpp"
 
 namespace sonar::test {
@@ -41,7 +41,7 @@ TEST(SpecularStatistics, SmoothTurnsIntoRoughWithoutAStep) {
 class Plate {
  public:
   explicit Plate(double reflection) {
-    Mirror plate = plane_mirror(1, 1);
+    Mirror plate = specular_plane(1, 1);
     plate.in_world = facing(2);
     plate.material.roughness_m = 1.5e-4f;
     plate.material.lambert_db = -10;

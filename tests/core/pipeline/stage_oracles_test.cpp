@@ -1,5 +1,5 @@
-// Oracles on single stages: column synthesis and coupling against direct sums in double, quantisation, and inputs that must not
-// break a ping.
+// Oracles on single stages: column synthesis and beamforming against direct sums in double, quantisation, and inputs that must
+// not break a ping.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +12,8 @@
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/pipeline/couple.hpp"
+#include "core/pipeline/check_request.hpp"
+#include "core/pipeline/form_beams.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/scatter.hpp"
 #include "core/pipeline/synthesize.hpp"
@@ -75,13 +76,13 @@ TEST(StageOracles, PulseThatBeginsBeforeOrEndsAfterTheRecordIsCutNotWrapped) {
   }
 }
 
-struct CouplingCase {
+struct BeamWeightsCase {
   FrequencyMode mode;
   int beams;
 };
 
 /// Random columns through the stage, the dense sum and the banded sum.
-void check_coupling(const CouplingCase& c, const simd::Kernels& kernels) {
+void check_beam_weights(const BeamWeightsCase& c, const simd::Kernels& kernels) {
   PingSettings settings = default_rows(8, 40);
   settings.beam_count = c.beams;
   const PingPlan plan = plan_of(c.mode, settings);
@@ -93,9 +94,10 @@ void check_coupling(const CouplingCase& c, const simd::Kernels& kernels) {
   for (int k = 0; k < plan.columns.count; ++k) {
     for (int i = 0; i < 2 * plan.samples; ++i) columns.column(k)[2 * columns.lead + i] = normal(random);
   }
-  CoupleScratch scratch;
+  BeamScratch scratch;
   BeamSignals beams;
-  couple(columns, plan.coupling, kernels, 8, 16, c.beams, scratch, beams);
+  beams.shape(c.beams, 8, 16);
+  form_beams(columns, plan.beam_weights, kernels, scratch, beams);
 
   const double aperture =
       aperture_in_wavelengths(c.mode.pattern.azimuth_taper, static_cast<double>(c.mode.pattern.azimuth_width_rad));
@@ -107,7 +109,7 @@ void check_coupling(const CouplingCase& c, const simd::Kernels& kernels) {
     for (int k = 0; k < plan.columns.count; ++k) {
       const double w = directivity(c.mode.pattern.azimuth_taper, aperture, plan.columns.sine(k) - beam_sine);
       for (int i = 0; i < 32; ++i) dense[i] += w * static_cast<double>(columns.first_sample(k)[16 + i]);
-      all += w * w, dropped += std::abs(k - centre) <= plan.coupling.half_band ? 0 : w * w;
+      all += w * w, dropped += std::abs(k - centre) <= plan.beam_weights.half_band ? 0 : w * w;
     }
     for (int i = 0; i < 32; ++i) {
       const double off = static_cast<double>(beams.beam(j)[i]) - dense[i];
@@ -121,16 +123,17 @@ void check_coupling(const CouplingCase& c, const simd::Kernels& kernels) {
   EXPECT_LE(dropped / all, 1e-4) << "the band drops more than -40 dB";
 }
 
-TEST(StageOracles, Oracle19_CouplingAgainstDenseSum) {
+TEST(StageOracles, Oracle19_BeamsAgainstDenseSum) {
   FrequencyMode narrow = p900();
   narrow.beam_spacing = BeamSpacing::uniform_in_sine;
   FrequencyMode open = oculus_low();  // nothing to drop: the sum itself must be right to a float
   open.pattern.azimuth_taper = Taper::unit;
   for (const simd::Kernels* kernels : kernel_sets()) {
-    for (const CouplingCase& c :
-         {CouplingCase{p900(), 512}, CouplingCase{narrow, 256}, CouplingCase{oculus_high(), 512}, CouplingCase{oculus_low(), 256},
-          CouplingCase{oculus_low(), 511}, CouplingCase{p900(), 3}, CouplingCase{open, 256}}) {
-      check_coupling(c, *kernels);
+    for (const BeamWeightsCase& c :
+         {BeamWeightsCase{p900(), 512}, BeamWeightsCase{narrow, 256}, BeamWeightsCase{oculus_high(), 512},
+          BeamWeightsCase{oculus_low(), 256}, BeamWeightsCase{oculus_low(), 511}, BeamWeightsCase{p900(), 3},
+          BeamWeightsCase{open, 256}}) {
+      check_beam_weights(c, *kernels);
     }
   }
 }
@@ -277,6 +280,9 @@ TEST(StageOracles, Oracle44_AwkwardPlacesStayFinite) {
 
 TEST(StageOracles, Oracle44_AwkwardHitsGiveFiniteEchoes) {
   const auto scene = SceneMaker().add(wall(5, 5), -20, {5, 0, 0}).make();
+  Parallel pool;
+  const RayScene rays(scene, 1);
+  SurfaceCells cells(scene, Seed{1}, 1 << 20);
   const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
   std::vector<FanHit> hits;
   for (const float range : {5.0f, 0.0f, 1e-30f, -1.0f, nan, inf, -inf})
@@ -293,8 +299,8 @@ TEST(StageOracles, Oracle44_AwkwardHitsGiveFiniteEchoes) {
       const PingPlan plan = make_plan(p900(), request.settings, request.switches);
       Echoes echoes;
       const PingScalars scalars = make_scalars(plan, request, {});
-      scatter_hits(hits, *scene, laws_of(*scene, plan, scalars), plan, scalars, Seed{1}, simd::kernels_for(SimdLevel::automatic),
-                   echoes);
+      const std::vector<LawTable> laws = laws_of(*scene, plan, scalars);
+      scatter_hits({rays, cells, {}, laws, plan, scalars, simd::kernels_for(SimdLevel::automatic), pool}, hits, Seed{1}, echoes);
       for (int i = 0; i < echoes.count; ++i) {
         const auto at = static_cast<std::size_t>(i);
         bad += !(std::isfinite(echoes.sample[at]) && std::isfinite(echoes.re[at]) && std::isfinite(echoes.im[at]));

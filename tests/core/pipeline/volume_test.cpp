@@ -62,7 +62,7 @@ TEST(Volume, LevelInOpenWater) {
   }
 }
 
-TEST(Volume, FlatBeamsAndTheFixedFanHearTheSameInOpenWater) {
+TEST(Volume, FlatBeamsAndTheFixedFanReceiveTheSameInOpenWater) {
   for (const bool conical : {true, false})
     for (const int fan : {0, 200}) {
       Sounding s(in_water({}, -60), p900(), default_rows(10, 394));

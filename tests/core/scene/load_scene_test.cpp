@@ -215,7 +215,7 @@ TEST(LoadScene, ErrorsNameTheirPlaceAndTheNearestName) {
               HasSubstr("has one pose"));
   EXPECT_THAT(
       refusal("objects:\n  - {name: a, type: point, target_strength_db: 0}\n  - {name: a, type: point, target_strength_db: 0}\n"),
-      HasSubstr("s.yaml:3:12: objects[1].name: name used twice"));
+      HasSubstr("s.yaml:3:12: objects[1].name: name is used twice"));
   EXPECT_THAT(refusal("materials: {a: {like: snd}}\nobjects: []"),
               HasSubstr("materials.a.like: unknown material \"snd\"; did you mean \"sand\"?"));
   EXPECT_THAT(refusal("materials: {a: {lambert_db: -4}}\nobjects: []"), HasSubstr("must be between -80 and -4.97, found -4"));

@@ -88,7 +88,7 @@ TEST(Materials, TheLibraryHasTheNamesWePromise) {
 TEST(Materials, WhatCannotBeIsRefusedWithASentence) {
   EXPECT_THAT(refusal("lambert_db: -4"), HasSubstr("materials.it.lambert_db"));
   EXPECT_THAT(refusal("law: gsab, gsab: {a_db: -6, c_db: -10}"),
-              HasSubstr("materials.it.gsab: sends back more than 1/pi (-4.97 dB) at normal incidence"));
+              HasSubstr("materials.it.gsab: backscatters more than 1/pi (-4.97 dB) at normal incidence"));
   EXPECT_EQ(refusal("law: gsab, gsab: {a_db: -6, c_db: -15}"), "accepted");
   EXPECT_THAT(refusal("gsab: {a_db: -12}"), HasSubstr("materials.it.gsab: has no effect under law: lambert; add law: gsab"));
   EXPECT_THAT(refusal("law: gsab, gsab: {a_db: -3}"), HasSubstr("gsab.a_db"));

@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-#include "daemon/control/control_server.hpp"
+#include "daemon/server/control/control_server.hpp"
 #include "tests/daemon/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -28,8 +28,8 @@ class FakeOperations final : public Operations {
       if (load->path == "later") return later.push_back(std::move(done));
       if (load->path == "throw") throw std::runtime_error("no such luck");
       done({OperationResult::Code::failed, "no such scene: " + load->path, {}});
-    } else if (const auto* sonar = std::get_if<control::SetSonar>(&operation); sonar != nullptr && sonar->sonar == "nobody") {
-      done({OperationResult::Code::refused, "there is no sonar \"nobody\"", {}});
+    } else if (const auto* sonar = std::get_if<control::SetSonar>(&operation); sonar != nullptr && sonar->sonar == "unknown") {
+      done({OperationResult::Code::refused, "there is no sonar \"unknown\"", {}});
     } else {
       done({});
     }

@@ -41,7 +41,7 @@ TEST_F(Listeners, TakenDefaultsAreAWarningAndTheRestGoesOn) {
   ASSERT_TRUE(open());
   EXPECT_EQ(server->http().port, 0);
   EXPECT_NE(server->stream().port, 0);
-  EXPECT_THAT(log_text, HasSubstr("going on without control.http: cannot listen on"));
+  EXPECT_THAT(log_text, HasSubstr("continuing without control.http: cannot listen on"));
   server->start();
   server->stop();
 }

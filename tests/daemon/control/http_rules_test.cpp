@@ -1,5 +1,5 @@
 // Targets, hosts, origins, tokens, routes: what passes and what does not.
-#include "daemon/control/http_rules.hpp"
+#include "daemon/server/control/http_rules.hpp"
 
 #include <gmock/gmock.h>
 

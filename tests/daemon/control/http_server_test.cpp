@@ -91,9 +91,9 @@ TEST(ControlHttp, ServesManyRequestsOnOneConnection) {
 TEST(ControlHttp, OperationsAnswerWithTheirStatus) {
   ControlBench bench;
   HttpClient client(bench);
-  const auto refused = client.post("/api/v1/sonars/nobody", "{}");
+  const auto refused = client.post("/api/v1/sonars/unknown", "{}");
   EXPECT_EQ(refused.status, 400);
-  EXPECT_EQ(refused.document()["text"], "there is no sonar \"nobody\"");
+  EXPECT_EQ(refused.document()["text"], "there is no sonar \"unknown\"");
   EXPECT_EQ(refused.document()["code"], "REFUSED");
   const auto failed = client.post("/api/v1/load", R"({"path":"x"})");
   EXPECT_EQ(failed.status, 409);
@@ -146,7 +146,7 @@ TEST(ControlHttp, EventsAreLinesOfJson) {
     EXPECT_EQ(line[line.size() - 3], '\n');
   }
   client.tcp.close();
-  EXPECT_TRUE(eventually([&] {  // its listener goes when somebody is told next
+  EXPECT_TRUE(eventually([&] {  // its listener is removed at the next event
     bool heard = true;
     bench.on_io([&] {
       bench.events.tell(ping_event(9));
@@ -205,10 +205,10 @@ TEST(ControlHttp, WithATokenOnlyHealthIsOpen) {
   EXPECT_EQ(client.get("/metrics", "Authorization: Bearer wrong\r\n").status, 401);
   EXPECT_EQ(client.get("/healthz").body, "ok\n");
   bench.operations.in_trouble = true;
-  EXPECT_EQ(client.get("/healthz").body, "in trouble\n");
+  EXPECT_EQ(client.get("/healthz").body, "unhealthy\n");
   EXPECT_EQ(client.get("/api/v1/status", std::string("Authorization: Bearer ") + TokenFile::text + "\r\n").status, 200);
   EXPECT_EQ(bench.log_text().find("0123456789"), std::string::npos);
-  EXPECT_THAT(bench.log_text(), HasSubstr("control refused: this daemon wants a token: "));
+  EXPECT_THAT(bench.log_text(), HasSubstr("control refused: token required: "));
   EXPECT_EQ(bench.log_text().find("unsaid"), std::string::npos) << "nothing went unsaid";
 }
 
@@ -264,7 +264,7 @@ TEST(ControlHttp, TooManyAreToldSoAndTheSilentGiveWay) {
   EXPECT_TRUE(a.tcp.ended);
 }
 
-TEST(ControlHttp, StrangersPushOutNobodyWhoShowedTheToken) {
+TEST(ControlHttp, UntrustedClientsEvictNoTrustedOne) {
   const TokenFile file;
   ControlConfig config;
   config.token_file = file.path;
@@ -276,8 +276,8 @@ TEST(ControlHttp, StrangersPushOutNobodyWhoShowedTheToken) {
   events.send("GET", "/api/v1/events?pings=1", "", token);
   ASSERT_FALSE(events.until("\r\n\r\n").empty());
   std::this_thread::sleep_for(milliseconds(1200));  // silent long enough to be pushed out
-  std::list<Client> strangers;
-  for (int i = 0; i < 40; ++i) strangers.emplace_back(bench.address, bench.http_port());
+  std::list<Client> untrusted;
+  for (int i = 0; i < 40; ++i) untrusted.emplace_back(bench.address, bench.http_port());
   for (int i = 0; i < 20; ++i) {
     HttpClient asks(bench);
     ASSERT_EQ(asks.get("/api/v1/status", token).status, 200) << "request " << i;

@@ -60,12 +60,12 @@ TEST(ControlStream, AnswersByIdWhenTheyAreReady) {
   ASSERT_TRUE(load);
   EXPECT_EQ(load->id, 2u);
   EXPECT_EQ(load->code, StatusCode::ok);
-  control::SetSonar nobody;
-  nobody.sonar = "nobody";
-  client.send({4, nobody});
+  control::SetSonar unknown;
+  unknown.sonar = "unknown";
+  client.send({4, unknown});
   const auto refused = client.next();
   EXPECT_EQ(refused->code, StatusCode::refused);
-  EXPECT_EQ(refused->text, "there is no sonar \"nobody\"");
+  EXPECT_EQ(refused->text, "there is no sonar \"unknown\"");
   client.send({5, control::LoadScene{"x.yaml"}});
   EXPECT_EQ(client.next()->code, StatusCode::failed);
   client.send({6, control::Unsupported{}});
@@ -121,20 +121,20 @@ TEST(ControlStream, AFloodOfPosesIsReadSlowlyAndANeighbourIsNot) {
   }
 }
 
-TEST(ControlStream, NobodyIsHeardWithoutTheToken) {
+TEST(ControlStream, WithoutTheTokenNoRequestIsServed) {
   const TokenFile file;
   ControlConfig config;
   config.token_file = file.path;
   ControlBench bench(config);
   for (const std::string shown : {"", "0123456789abcdef-lax"}) {
-    StreamClient stranger(bench);
-    stranger.send({5, control::Hello{1, "test", shown}});
-    const auto answer = stranger.next();
+    StreamClient untrusted(bench);
+    untrusted.send({5, control::Hello{1, "test", shown}});
+    const auto answer = untrusted.next();
     ASSERT_TRUE(answer);
-    EXPECT_EQ(answer->code, StatusCode::refused);
+    EXPECT_EQ(answer->code, StatusCode::unauthenticated);
     EXPECT_THAT(answer->text, HasSubstr("token"));
     EXPECT_FALSE(answer->hello);
-    EXPECT_TRUE(stranger.tcp.read_to_end());
+    EXPECT_TRUE(untrusted.tcp.read_to_end());
   }
   StreamClient friendly(bench);
   friendly.greet(TokenFile::text);
@@ -182,13 +182,13 @@ TEST(ControlStream, AClientThatReadsNothingIsReadNoFurtherAndClosed) {
   constexpr int requests = 5000;
   for (int i = 0; i < requests; ++i)  // 20 MB of answers, each with its request's path: more than kernels keep
     client.send({static_cast<std::uint64_t>(i + 2), control::LoadScene{std::string(4000, 'x')}});
-  EXPECT_TRUE(eventually([&] { return bench.log_text().find("it reads nothing") != std::string::npos; }));
+  EXPECT_TRUE(eventually([&] { return bench.log_text().find("client does not read") != std::string::npos; }));
   EXPECT_LT(bench.operations.asked, requests);
   StreamClient next(bench);
   next.greet();
 }
 
-TEST(ControlStream, AnswersAfterTheClientHasLeftHurtNobody) {
+TEST(ControlStream, AnswersAfterTheClientHasLeftAreDropped) {
   ControlBench bench;
   {
     StreamClient client(bench);
@@ -227,7 +227,7 @@ TEST(ControlStream, AFaultEndsItsConnectionOnly) {
   EXPECT_THAT(bench.log_text(), HasSubstr("internal fault: no such luck"));
 }
 
-TEST(ControlStream, StrangersGetFourKilobytesAndThePlacesGoToTheBusy) {
+TEST(ControlStream, BeforeTheHelloFourKilobytesAreReadAndBusyClientsKeepTheirSlots) {
   LimitConfig limits;
   limits.control_clients = 2;
   ControlBench bench({}, limits);
@@ -245,7 +245,7 @@ TEST(ControlStream, StrangersGetFourKilobytesAndThePlacesGoToTheBusy) {
   StreamClient c(bench);
   c.greet();
   a.tcp.read_to_end();
-  EXPECT_TRUE(a.tcp.ended) << "silent for longest";
+  EXPECT_TRUE(a.tcp.ended) << "longest idle";
   b.send({3, control::GetStatus{}});
   EXPECT_TRUE(b.next());
 }
@@ -277,10 +277,10 @@ TEST(ControlStream, HttpIsKnownAndEnds) {
     EXPECT_TRUE(page.ended);
     EXPECT_EQ(page.bytes_read, 0u);
   }
-  EXPECT_THAT(bench.log_text(), HasSubstr("HTTP on the control stream"));
+  EXPECT_THAT(bench.log_text(), HasSubstr("HTTP request on the control stream"));
 }
 
-TEST(ControlStream, StrangersPushOutNobodyWhoShowedTheToken) {
+TEST(ControlStream, UntrustedClientsEvictNoTrustedOne) {
   const TokenFile file;
   ControlConfig config;
   config.token_file = file.path;
@@ -294,8 +294,8 @@ TEST(ControlStream, StrangersPushOutNobodyWhoShowedTheToken) {
     ASSERT_TRUE(subscribers.back().next());
   }
   std::this_thread::sleep_for(milliseconds(1200));  // silent long enough to be pushed out
-  std::list<Client> strangers;
-  for (int i = 0; i < 40; ++i) strangers.emplace_back(bench.address, bench.stream_port());
+  std::list<Client> untrusted;
+  for (int i = 0; i < 40; ++i) untrusted.emplace_back(bench.address, bench.stream_port());
   for (int i = 0; i < 20; ++i) {
     StreamClient asks(bench);
     asks.greet(TokenFile::text);
@@ -305,7 +305,7 @@ TEST(ControlStream, StrangersPushOutNobodyWhoShowedTheToken) {
     EXPECT_TRUE(asks.tcp.read_to_end());
   }
   bench.on_io([&] { bench.events.tell(ping_event(1)); });
-  for (StreamClient& s : subscribers) EXPECT_TRUE(s.next()) << "they keep their places";
+  for (StreamClient& s : subscribers) EXPECT_TRUE(s.next()) << "they keep their slots";
 }
 
 TEST(ControlStream, WithoutAPlaceTheTokenIsAnsweredThatItIsFull) {
@@ -329,7 +329,7 @@ TEST(ControlStream, WithoutAPlaceTheTokenIsAnsweredThatItIsFull) {
     ASSERT_TRUE(answer);
     if (answer->code == StatusCode::ok) continue;
     EXPECT_EQ(answer->code, StatusCode::failed);
-    EXPECT_THAT(answer->text, HasSubstr("all places are taken"));
+    EXPECT_THAT(answer->text, HasSubstr("all connection slots are in use"));
     EXPECT_TRUE(late.tcp.read_to_end());
     return;
   }

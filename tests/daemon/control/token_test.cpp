@@ -1,5 +1,5 @@
 // Tokens: what a file may hold, and that only the whole secret matches.
-#include "daemon/control/token.hpp"
+#include "daemon/server/control/token.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
 // Formulas of render files: what they come to, and what is said about those that cannot be read.
-#include "daemon/render/formula.hpp"
+#include "daemon/commands/render/formula.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -39,11 +39,11 @@ TEST(Formula, KnowsNamesAndFunctions) {
 }
 
 TEST(Formula, SaysWhatIsWrong) {
-  EXPECT_THAT(refusal("2*"), HasSubstr("ends where a value should stand"));
-  EXPECT_THAT(refusal(""), HasSubstr("ends where a value should stand"));
+  EXPECT_THAT(refusal("2*"), HasSubstr("ends where a value is expected"));
+  EXPECT_THAT(refusal(""), HasSubstr("ends where a value is expected"));
   EXPECT_THAT(refusal("(1 + 2"), HasSubstr("a ) is missing"));
-  EXPECT_THAT(refusal("1 2"), HasSubstr("nothing follows"));
-  EXPECT_THAT(refusal("q + 1", {{"r", 1}}), HasSubstr("nothing is called q here; there are r"));
+  EXPECT_THAT(refusal("1 2"), HasSubstr("unexpected \"2\""));
+  EXPECT_THAT(refusal("q + 1", {{"r", 1}}), HasSubstr("unknown name q; known names: r"));
   EXPECT_THAT(refusal("sin 3"), HasSubstr("parentheses"));
   EXPECT_THAT(refusal("1/0"), HasSubstr("not a finite number"));
   EXPECT_THAT(refusal("log10(0 - 1)"), HasSubstr("not a finite number"));

@@ -1,5 +1,5 @@
 // The folder of rendered pings: one run at a time, one set of inputs, whole files only.
-#include "daemon/render/output_folder.hpp"
+#include "daemon/commands/render/output_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ TEST_F(OutputFolders, NeverMixesThePingsOfTwoInputs) {
   EXPECT_THAT(claim("b").error().text, HasSubstr("holds pings of other inputs"));
   std::filesystem::remove(options_.folder / "render.json");
   put("000001.json", sidecar_);
-  EXPECT_THAT(claim("a").error().text, HasSubstr("no render.json")) << "of which inputs these are, nobody knows";
+  EXPECT_THAT(claim("a").error().text, HasSubstr("no render.json")) << "their inputs are unknown";
   EXPECT_TRUE(std::filesystem::exists(options_.folder / "000001.png"));
   options_.overwrite = true;
   ASSERT_TRUE(claim("b"));
@@ -73,7 +73,7 @@ TEST_F(OutputFolders, FilesOfOthersAreNotRemovedEvenIfTheyHaveNumbers) {
   put("000001.png", "ours");
   put("000001.json", sidecar_);
   put("000002.png", "a camera's");
-  EXPECT_THAT(claim("a").error().text, AllOf(HasSubstr("000002.png may not be sonard's"), HasSubstr("--out")));
+  EXPECT_THAT(claim("a").error().text, AllOf(HasSubstr("000002.png may not be from sonard"), HasSubstr("--out")));
   put("000002.json", R"({"camera": 2})");
   EXPECT_FALSE(claim("a"));
   EXPECT_TRUE(std::filesystem::exists(options_.folder / "000001.png"));
@@ -81,7 +81,7 @@ TEST_F(OutputFolders, FilesOfOthersAreNotRemovedEvenIfTheyHaveNumbers) {
   std::filesystem::remove(options_.folder / "000002.png");
   std::filesystem::remove(options_.folder / "000002.json");
   put("render.json", "{}");
-  EXPECT_THAT(claim("a").error().text, HasSubstr("render.json is not sonard's"));
+  EXPECT_THAT(claim("a").error().text, HasSubstr("render.json was not written by sonard"));
   std::filesystem::remove(options_.folder / "render.json");
   EXPECT_TRUE(claim("a"));
   EXPECT_FALSE(std::filesystem::exists(options_.folder / "000001.png"));

@@ -10,11 +10,11 @@
 #include <nlohmann/json.hpp>
 
 #include "core/paper/paper_engine.hpp"
-#include "daemon/render/coverage.hpp"
-#include "daemon/render/npy.hpp"
-#include "daemon/render/render_job.hpp"
-#include "daemon/render/resolution_cell.hpp"
-#include "daemon/render/sidecar.hpp"
+#include "daemon/commands/render/coverage.hpp"
+#include "daemon/commands/render/npy.hpp"
+#include "daemon/commands/render/render_job.hpp"
+#include "daemon/commands/render/resolution_cell.hpp"
+#include "daemon/commands/render/sidecar.hpp"
 
 namespace sonar::render {
 namespace {

@@ -1,5 +1,5 @@
 // The vehicle of a rendered ping: rests, circles, or follows a file in the file's own time.
-#include "daemon/render/vehicle_path.hpp"
+#include "daemon/commands/render/vehicle_path.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -20,7 +20,7 @@ inline protocol::DeviceState device(const std::string& profile = "blueview-p900-
   d.model = protocol::find_profile(profile)->model;
   d.water = {12, 30, 8.0, 0};
   d.options = *protocol::check_options(vendor(), options);
-  d.request = vendor().initial_settings(d).request;
+  d.settings = vendor().initial_settings(d).vendor_settings;
   return d;
 }
 

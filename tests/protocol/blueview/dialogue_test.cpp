@@ -17,14 +17,15 @@ using test::at_s;
 struct Host {
   explicit Host(protocol::DeviceState& d) : device(d), dialogue(make_dialogue(d, at_s(0))) {}
   Reaction say(const wire::Bytes& bytes, double s = 0) { return heed(dialogue->on_bytes(bytes, at_s(s))); }
-  Reaction tick(double s) { return heed(dialogue->on_tick(at_s(s))); }
-  protocol::Delivery ready(double s = 0) { return dialogue->on_ping(device.request, 1000, at_s(s)); }
+  Reaction tick(double s) { return heed(dialogue->on_tick(at_s(s), ping_pending)); }
+  protocol::Delivery ready(double s = 0) { return dialogue->on_ping(device.settings.get(), 1000, at_s(s)); }
   Reaction heed(Reaction r) {
     for (const auto& event : r.events)
-      if (const auto* change = std::get_if<ChangeSettings>(&event)) device.request = change->request;
+      if (const auto* change = std::get_if<ChangeSettings>(&event)) device.settings = change->vendor_settings;
     return r;
   }
   protocol::DeviceState& device;
+  bool ping_pending = false;
   std::unique_ptr<protocol::Dialogue> dialogue;
 };
 int pings_asked(const Reaction& r) {
@@ -50,10 +51,10 @@ TEST(BlueViewDialogue, HelloTellsWhatTheSonarIs) {
   std::uint32_t capabilities = 9;
   std::uint8_t heads = 0;
   reader("proto", version);
-  EXPECT_EQ(take_text(reader, "model"), "M900-2250-130");
-  EXPECT_EQ(take_text(reader, "name"), "front");
-  EXPECT_EQ(take_text(reader, "serial"), "7001");
-  take_text(reader, "firmware");
+  EXPECT_EQ(read_text(reader, "model"), "M900-2250-130");
+  EXPECT_EQ(read_text(reader, "name"), "front");
+  EXPECT_EQ(read_text(reader, "serial"), "7001");
+  read_text(reader, "firmware");
   reader("temp_c", temperature);
   reader("caps", capabilities);
   reader("n_heads", heads);
@@ -90,7 +91,7 @@ TEST(BlueViewDialogue, SettingsAreSharedByAllHosts) {
   EXPECT_EQ(set.header.type, reply_to(FrameType::set));
   const auto got = test::reply_from(two.say(test::get(3, 0, Key::stop_range)).replies.at(0));
   wire::Reader reader(got.payload);
-  EXPECT_EQ(std::get<float>(*take_value(reader, Key::stop_range)), 20);
+  EXPECT_EQ(std::get<float>(*read_value(reader, Key::stop_range)), 20);
 }
 
 TEST(BlueViewDialogue, SeveralSetsInOneReadAllHold) {
@@ -100,7 +101,7 @@ TEST(BlueViewDialogue, SeveralSetsInOneReadAllHold) {
   for (const wire::Bytes& more : {test::set(2, 0, Key::gain, 5.0f), test::set(3, 0, Key::tvg, 0.5f)})
     all.insert(all.end(), more.begin(), more.end());
   EXPECT_EQ(host.say(all).replies.size(), 3u);
-  const SonarSettings now = settings_from(device.request, device);
+  const SonarSettings now = settings_from(device.settings.get(), device);
   EXPECT_EQ(now.heads[0].gain_db, 5);
   EXPECT_EQ(now.heads[0].tvg_db_per_m, 0.5f);
 }
@@ -127,10 +128,10 @@ TEST(BlueViewDialogue, APingFiredWithOlderSettingsIsNotTheOneAskedFor) {
   auto device = test::device();
   Host host(device);
   host.say(test::hello());
-  const wire::Bytes before = device.request;
+  const auto before = device.settings;
   host.say(test::set(2, 0, Key::transmit, std::int32_t{0}));
   host.say(test::ping(3));
-  const auto stale = host.dialogue->on_ping(before, 10, at_s(0));
+  const auto stale = host.dialogue->on_ping(before.get(), 10, at_s(0));
   EXPECT_TRUE(stale.prefixes.empty());
   EXPECT_FALSE(stale.events.empty()) << "it asks again";
   const auto fresh = host.ready();
@@ -143,13 +144,25 @@ TEST(BlueViewDialogue, TriggersOfTwoHeadsAreServedOneAfterTheOther) {
   Host host(device);
   host.say(test::hello());
   host.say(test::ping(1, 0));
-  const wire::Bytes of_first_head = device.request;
+  const auto of_first_head = device.settings;
   host.say(test::ping(2, 1));
-  const auto delivery = host.dialogue->on_ping(of_first_head, 10, at_s(0));
+  const auto delivery = host.dialogue->on_ping(of_first_head.get(), 10, at_s(0));
   ASSERT_EQ(delivery.prefixes.size(), 1u);
   EXPECT_EQ(id_of(delivery.prefixes[0]), 1u);
   ASSERT_EQ(delivery.events.size(), 2u) << "the other head is next";
   EXPECT_EQ(std::get<ChangeSettings>(delivery.events[0]).settings.mode, 1);
+}
+
+TEST(BlueViewDialogue, ASubscriptionWaitsForAPendingSinglePingOfAnotherHead) {
+  auto device = test::device("blueview-m900-2250-130");
+  Host one(device), two(device);
+  for (Host* h : {&one, &two}) h->say(test::hello());
+  two.say(test::two_numbers(FrameType::subscribe, 4, 1, 200));
+  one.say(test::ping(1, 0));
+  two.ping_pending = true;
+  EXPECT_EQ(pings_asked(two.tick(0.2)), 0);
+  two.ping_pending = false;
+  EXPECT_EQ(pings_asked(two.tick(0.4)), 1);
 }
 
 TEST(BlueViewDialogue, HeadsMayBeNumberedFromZeroOrOne) {

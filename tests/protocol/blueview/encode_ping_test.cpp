@@ -58,7 +58,7 @@ TEST(BlueViewPing, BeamsLieSideBySideFromTheStartRangeOn) {
   SonarSettings all = initial_sonar_settings(device);
   all.heads[0].start_m = 2;
   all.heads[0].stop_m = 4;
-  const Decoded d = decode(encode_ping(numbered_ping(device, all), device, bytes_of_settings(all)));
+  const Decoded d = decode(encode_ping(numbered_ping(device, all), device, all));
   EXPECT_EQ(d.number, 42u);
   EXPECT_NEAR(d.t, 1.7e9 + 0.5, 1e-6);
   EXPECT_EQ(d.beams, 512);
@@ -77,7 +77,7 @@ TEST(BlueViewPing, BeamsLieSideBySideFromTheStartRangeOn) {
 TEST(BlueViewPing, CarriesTheVehiclesNavigation) {
   const auto device = test::device();
   const SonarSettings all = initial_sonar_settings(device);
-  const Decoded d = decode(encode_ping(numbered_ping(device, all), device, bytes_of_settings(all)));
+  const Decoded d = decode(encode_ping(numbered_ping(device, all), device, all));
   EXPECT_EQ(d.nav, nav_time | nav_depth | nav_pitch | nav_roll | nav_heading);
   EXPECT_NEAR(d.depth, 7, 1e-5);
   EXPECT_NEAR(d.pitch, 10, 1e-4) << "bow up";
@@ -88,8 +88,8 @@ TEST(BlueViewPing, CarriesTheVehiclesNavigation) {
 TEST(BlueViewPing, DeflateGivesTheSameSamples) {
   const auto plain = test::device(), packed = test::device("blueview-p900-90", {{"compression", "deflate"}});
   const SonarSettings all = initial_sonar_settings(plain);
-  const Decoded a = decode(encode_ping(numbered_ping(plain, all), plain, bytes_of_settings(all)));
-  const Decoded b = decode(encode_ping(numbered_ping(packed, all), packed, bytes_of_settings(all)));
+  const Decoded a = decode(encode_ping(numbered_ping(plain, all), plain, all));
+  const Decoded b = decode(encode_ping(numbered_ping(packed, all), packed, all));
   EXPECT_EQ(a.compression, 0);
   EXPECT_EQ(b.compression, 1);
   EXPECT_LT(b.body.size(), a.body.size());

@@ -49,7 +49,7 @@ TEST(BlueViewFrames, ValuesComeBack) {
     wire::Bytes bytes;
     put_value(bytes, value);
     wire::Reader reader(bytes);
-    const auto read = take_value(reader, Key::gain);
+    const auto read = read_value(reader, Key::gain);
     ASSERT_TRUE(read);
     EXPECT_EQ(read->index(), value.index());
     EXPECT_EQ(reader.remaining(), 0u);
@@ -58,7 +58,7 @@ TEST(BlueViewFrames, ValuesComeBack) {
   put_value(cut, Value(2.5f));
   cut.pop_back();
   wire::Reader reader(cut);
-  EXPECT_FALSE(take_value(reader, Key::gain));
+  EXPECT_FALSE(read_value(reader, Key::gain));
 }
 
 TEST(BlueViewDiscovery, AnswersItsOwnQuestionOnly) {
@@ -79,8 +79,8 @@ TEST(BlueViewDiscovery, AnswersItsOwnQuestionOnly) {
   EXPECT_EQ(letters[3], '!');
   EXPECT_EQ(version, 1);
   EXPECT_EQ(port, 14750);
-  EXPECT_EQ(take_text(reader, "model"), "BlueView P900-90");
-  EXPECT_EQ(take_text(reader, "serial"), "7001");
+  EXPECT_EQ(read_text(reader, "model"), "BlueView P900-90");
+  EXPECT_EQ(read_text(reader, "serial"), "7001");
   question[4] = std::byte{2};
   EXPECT_TRUE(vendor().answer(question, device).empty()) << "another version";
 }

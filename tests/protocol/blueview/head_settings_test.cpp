@@ -24,8 +24,7 @@ TEST(HeadSettings, EverythingSetReadsBack) {
                                                   {Key::name, std::string("bow")}};
   for (const auto& [key, value] : values) {
     ASSERT_TRUE(apply(all, 0, key, value, device).value) << static_cast<int>(key);
-    const SonarSettings kept = settings_from(bytes_of_settings(all), device);
-    const auto read = read_back(kept, 0, key);
+    const auto read = read_back(all, 0, key);
     ASSERT_TRUE(read);
     EXPECT_TRUE(read->index() == value.index()) << static_cast<int>(key);
     if (const auto* f = std::get_if<float>(&value)) {
@@ -103,12 +102,20 @@ TEST(HeadSettings, BecomePingSettings) {
   EXPECT_FLOAT_EQ(ping_settings(all, device).rate_hz, 15) << "no faster than the product";
 }
 
-TEST(HeadSettings, OtherBytesGiveTheInitialSettings) {
+TEST(HeadSettings, NoSettingsAreTheInitialOnes) {
   const auto device = test::device();
-  EXPECT_EQ(settings_from({}, device).heads[0].stop_m, 10);
-  wire::Bytes cut = bytes_of_settings(initial_sonar_settings(device));
-  cut.pop_back();
-  EXPECT_EQ(settings_from(cut, device).name, "front");
+  EXPECT_TRUE(settings_from(nullptr, device).equals(initial_sonar_settings(device)));
+}
+
+TEST(HeadSettings, AreEqualWhenNoHostSeesADifference) {
+  const SonarSettings initial = initial_sonar_settings(test::device());
+  SonarSettings other = initial;
+  EXPECT_TRUE(other.equals(initial));
+  other.heads[0].tvg_db_per_m = 0.5f;
+  EXPECT_FALSE(other.equals(initial));
+  other = initial;
+  other.name = "bow";
+  EXPECT_FALSE(other.equals(initial));
 }
 
 }  // namespace

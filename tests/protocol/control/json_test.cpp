@@ -67,7 +67,7 @@ TEST(ControlJson, RefusesWithASentence) {
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":"NaN"})"), HasSubstr("sonar.range_m is NaN"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":1e999})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"mode":-1})"), HasSubstr("-1"));
-  EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,"range_m":6})"), HasSubstr("\"range_m\" is said twice"));
+  EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,"range_m":6})"), HasSubstr("\"range_m\" is given twice"));
   EXPECT_THAT(refusal_of("sonar", R"({range_m:5})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5} {"range_m":6})"), HasSubstr("not JSON"));
@@ -80,8 +80,8 @@ TEST(ControlJson, RefusesWithASentence) {
   EXPECT_THAT(refusal_of("pose", R"({"position":{"x":1},"orientation":{"w":1}})"), HasSubstr("frame is missing"));
   EXPECT_THAT(refusal_of("pose", R"({"frame":"SIDEWAYS","position":{},"orientation":{"w":1}})"), HasSubstr("SIDEWAYS"));
   EXPECT_THAT(refusal_of("load", "{}"), HasSubstr("path is missing"));
-  EXPECT_EQ(refusal_of("id", "{}"), "no such request");
-  EXPECT_EQ(refusal_of("launch", "{}"), "no such request");
+  EXPECT_EQ(refusal_of("id", "{}"), "unknown request");
+  EXPECT_EQ(refusal_of("launch", "{}"), "unknown request");
 }
 
 TEST(ControlJson, TheNameMayBeSaidElsewhere) {

@@ -84,7 +84,7 @@ TEST(ControlResponses, NumbersThatAreNoneAreRefusedByTheClient) {
   status.objects[0].in_world.orientation = {3, 0, 0, 0};
   const auto stretched = decode_response(encode_response({1, StatusCode::ok, "", false, status}));
   ASSERT_FALSE(stretched);
-  EXPECT_EQ(stretched.error().text, "daemon.objects[0].orientation is no quaternion of norm 1");
+  EXPECT_EQ(stretched.error().text, "daemon.objects[0].orientation is not a quaternion of norm 1");
 }
 
 TEST(ControlResponses, TruncationsAreReadOrRefusedNeverFatal) {

@@ -12,7 +12,7 @@
 namespace sonar::mavlink {
 
 struct Sender {
-  Speaker who{1, 1, 0};
+  Identity who{1, 1, 0};
 
   template <class M>
   Bytes operator()(const M& message) {

@@ -101,7 +101,7 @@ TEST(MavlinkPoses, WhereTimeIsWhatPosesSayThoseWithoutAreNoSource) {
   EXPECT_EQ(r.poses[0].source, "system 1 LOCAL_POSITION_NED and attitude");
   EXPECT_THAT(r.refusals, IsEmpty());
   ASSERT_EQ(r.notices.size(), 2u);
-  EXPECT_THAT(r.notices[0], HasSubstr("SIM_STATE bears no time and is not used"));
+  EXPECT_THAT(r.notices[0], HasSubstr("SIM_STATE has no time stamp and is not used"));
   EXPECT_THAT(link(v(sim), 1.1).notices, IsEmpty()) << "said once";
 }
 
@@ -126,7 +126,7 @@ TEST(MavlinkPoses, GeodeticSourcesNeedAnOrigin) {
   const Reaction r = with(v(sim) + v(attitude(1, 0)) + v(global(1, 47.6, -122.33, -12)), 1);
   ASSERT_EQ(r.poses.size(), 1u);
   EXPECT_EQ(r.poses[0].source, "system 1 SIM_STATE");
-  EXPECT_EQ(r.poses[0].sample.stamp.domain, ClockDomain::arrival) << "it bears no time";
+  EXPECT_EQ(r.poses[0].sample.stamp.domain, ClockDomain::arrival) << "without a time stamp";
   expect_near(r.poses[0].sample.pose.position_m, {0, 0, -12}, 1e-6);
 }
 
@@ -249,7 +249,7 @@ TEST(MavlinkPoses, OurOwnWordsComeBackUnheard) {
 
 TEST(MavlinkPoses, JunkIsRefusedWithOneSentenceADatagram) {
   Link link;
-  EXPECT_THAT(link(Bytes(100, std::byte{7}), 1).refusals, ::testing::ElementsAre(HasSubstr("100 bytes are no MAVLink")));
+  EXPECT_THAT(link(Bytes(100, std::byte{7}), 1).refusals, ::testing::ElementsAre(HasSubstr("100 bytes are not MAVLink")));
   EXPECT_THAT(link(Bytes(MavlinkPoses::largest_datagram + 1), 1).refusals, ::testing::ElementsAre(HasSubstr("longer than")));
   Sender v;
   Bytes bad = v(odometry(1, 0));

@@ -14,7 +14,7 @@ TEST(EncodePing, EveryFormatKeepsItsIdentities) {
         FireRequest request = fire(version, 2, PingRate::hz10, flags, 3, 50);
         request.extension.flags = version == 2 ? ext : 0;
         const auto state = device();
-        const PingSettings settings = settle(request, state).settings;
+        const PingSettings settings = resolve(request, state).settings;
         const DecodedPing ping = answer(state, request, 77);
         EXPECT_THAT(ping.violations, IsEmpty()) << version << " " << flags;
         EXPECT_THAT(echo_violations(request, ping), IsEmpty()) << version << " " << flags;
@@ -53,7 +53,7 @@ TEST(EncodePing, RangeIsEchoedVerbatimEvenWhenClamped) {
 TEST(EncodePing, WithGainAssistTheEchoIsTheGainUsed) {
   const FireRequest set = fire(0, 2, PingRate::hz10, 0x19, 2, 50), clear = fire(0, 2, PingRate::hz10, 0x09, 2, 50);
   const auto assisted = [](const char* option, const FireRequest& request) {
-    return settle(request, device("oculus-m1200d", {{"gain_assist", option}})).settings.gain_assist;
+    return resolve(request, device("oculus-m1200d", {{"gain_assist", option}})).settings.gain_assist;
   };
   EXPECT_FALSE(assisted("off", set));
   EXPECT_FALSE(assisted("off", clear));
@@ -118,12 +118,12 @@ TEST(EncodePing, VersionMirrorsTheRequest) {
 TEST(EncodePing, EnvironmentFollowsTheRequest) {
   const auto state = device();
   const FireRequest request = fire(2, 1, PingRate::hz10, 0x49, 5, 50);
-  Ping ping = made_up_ping(state, settle(request, state).settings);
+  Ping ping = made_up_ping(state, resolve(request, state).settings);
   ping.request.water.temperature_c = 7.5;
   ping.request.sonar_in_world.position_m.z = -20;
   // Heading 90 (east): ahead is world +x, yaw 0 in ENU. Bow up is a negative turn about the axis to port.
   ping.request.vehicle_in_world.orientation = quat_from_rpy({rad_from_deg(4), rad_from_deg(-3), 0});
-  const auto decoded = decode_ping(encode_ping(ping, state, make_fire(request)));
+  const auto decoded = decode_ping(encode_ping(ping, state, request));
   ASSERT_TRUE(decoded.has_value());
   const PingResultV2& fixed = decoded->head.fixed;
   EXPECT_EQ(fixed.temperature_c, 7.5);

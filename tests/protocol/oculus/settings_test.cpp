@@ -14,29 +14,29 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 PingSettings settings_of(const FireRequest& request, const protocol::DeviceState& state) {
-  return settle(request, state).settings;
+  return resolve(request, state).settings;
 }
 
 // Captured ping: 2.0 m at 1490.658551265436 m/s is 703 rows of 2.8421889710794315 mm.
-TEST(RowLaw, IsTheCapturedOne) {
-  const RowLaw law = row_law(2.0, 1490.658551265436);
+TEST(RowGrid, IsTheCapturedOne) {
+  const RowGrid law = row_grid(2.0, 1490.658551265436);
   EXPECT_EQ(law.count, 703);
   EXPECT_DOUBLE_EQ(law.spacing_m, 0.0028421889710794315);
 }
 
 // The capture's request: its own double must come back in the packet, bit for bit.
-TEST(RowLaw, SpacingReachesThePacketUnrounded) {
+TEST(RowGrid, SpacingReachesThePacketUnrounded) {
   FireRequest request = fire(0, 2, PingRate{195}, 0x19, 2, 50);
   request.settings.sound_speed_mps = 1490.658551265436;
   EXPECT_EQ(answer(device(), request).head.fixed.range_resolution_m, 0.0028421889710794315);
 }
 
-TEST(RowLaw, SpacingDoublesUntilTheRowsFit) {
-  EXPECT_EQ(row_law(10, 1500).count, 437);  // 2^3
-  EXPECT_EQ(row_law(30, 1500).count, 655);  // 2^4
+TEST(RowGrid, SpacingDoublesUntilTheRowsFit) {
+  EXPECT_EQ(row_grid(10, 1500).count, 437);  // 2^3
+  EXPECT_EQ(row_grid(30, 1500).count, 655);  // 2^4
   const double base = 1500 / (2 * row_rate_hz);
   for (double range = 0.1; range < 200; range *= 1.07) {
-    const RowLaw law = row_law(range, 1500);
+    const RowGrid law = row_grid(range, 1500);
     const double doublings = std::log2(law.spacing_m / base);
     EXPECT_NEAR(doublings, std::round(doublings), 1e-9);
     EXPECT_LE(law.count, 720) << range;
@@ -47,7 +47,7 @@ TEST(RowLaw, SpacingDoublesUntilTheRowsFit) {
   }
 }
 
-TEST(RowLaw, HasAtLeastOneRow) { EXPECT_EQ(row_law(0.001, 1500).count, 1); }
+TEST(RowGrid, HasAtLeastOneRow) { EXPECT_EQ(row_grid(0.001, 1500).count, 1); }
 
 TEST(Laws, RatesAreTheTables) {
   EXPECT_EQ(table_rate_hz(PingRate{0}), 10);
@@ -101,22 +101,22 @@ TEST(Settle, GainIsDecibelsPerEffectivePerCent) {
 
 TEST(Settle, ClampsWhatIsOutOfRangeAndSaysSo) {
   const auto state = device();
-  const Settled far = settle(fire(0, 2, PingRate::hz10, 0x49, 20, 150), state);
+  const ResolvedSettings far = resolve(fire(0, 2, PingRate::hz10, 0x49, 20, 150), state);
   EXPECT_EQ(far.settings.range_m, 10);
   EXPECT_NEAR(far.settings.gain_db, 96, 1e-4) << "mapped from 100 per cent";
   EXPECT_THAT(far.clamped,
               ElementsAre("range 20 m is outside 0.1..10 m, 10 m is used", "gain 150 % is outside 0..100 %, 100 % is used"));
-  const Settled near = settle(fire(0, 1, PingRate::hz10, 0x49, -3, -5), state);
+  const ResolvedSettings near = resolve(fire(0, 1, PingRate::hz10, 0x49, -3, -5), state);
   EXPECT_NEAR(near.settings.range_m, 0.1, 1e-8);
   EXPECT_EQ(near.settings.gain_db, 0);
   EXPECT_NEAR(settings_of(fire(0, 1, PingRate::hz10, 0x49, 0, 0), device("oculus-m370s")).range_m, 0.2, 1e-7);
   for (const int mode : {0, 3, 255}) {
-    const Settled odd = settle(fire(0, mode, PingRate{9}, 0x49, 5, 50), state);
+    const ResolvedSettings odd = resolve(fire(0, mode, PingRate{9}, 0x49, 5, 50), state);
     EXPECT_EQ(odd.settings.mode, 0);
     EXPECT_EQ(odd.settings.rate_hz, 10);
     EXPECT_EQ(odd.clamped.size(), 2u);
   }
-  EXPECT_EQ(settle(fire(0, 2, PingRate::hz10, 0x49, 5, 50), device("oculus-m370s")).settings.mode, 0) << "it has one mode only";
+  EXPECT_EQ(resolve(fire(0, 2, PingRate::hz10, 0x49, 5, 50), device("oculus-m370s")).settings.mode, 0) << "it has one mode only";
   FireRequest odd_water = fire(0, 1, PingRate::hz10, 0x49, 5, 50);
   odd_water.settings.sound_speed_mps = 1e6;
   odd_water.settings.salinity_ppt = -4;

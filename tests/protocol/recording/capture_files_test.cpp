@@ -125,10 +125,10 @@ TEST(CaptureFiles, ByteOrdersAndUnits) {
     for (const std::uint32_t magic : {0xA1B2C3D4u, 0xA1B23C4Du}) {
       auto opened = open_bytes(pcap_of(raw_frames(two_pings()), 101, endian, magic));
       ASSERT_TRUE(opened);
-      const std::vector<Piece> pieces = read_all(*opened->reader);
-      ASSERT_EQ(pieces.size(), 2u);
+      const std::vector<RecordedMessage> messages = read_all(*opened->reader);
+      ASSERT_EQ(messages.size(), 2u);
       const auto last = static_cast<std::int64_t>(100 * (two_pings().size() - 1) * (magic == 0xA1B2C3D4u ? 1000 : 1));
-      EXPECT_EQ(pieces[1].at, Time(std::chrono::seconds(1000) + std::chrono::nanoseconds(last)));
+      EXPECT_EQ(messages[1].at, Time(std::chrono::seconds(1000) + std::chrono::nanoseconds(last)));
     }
 }
 
@@ -244,10 +244,10 @@ TEST(CaptureFiles, Pcapng) {
   }
   auto opened = open_bytes(file);
   ASSERT_TRUE(opened) << opened.error().text;
-  const std::vector<Piece> pieces = read_all(*opened->reader);
-  EXPECT_EQ(device_stream(pieces), both_pings);
-  ASSERT_FALSE(pieces.empty());
-  EXPECT_EQ(pieces[0].at, Time(std::chrono::nanoseconds(at_ns)));
+  const std::vector<RecordedMessage> messages = read_all(*opened->reader);
+  EXPECT_EQ(device_stream(messages), both_pings);
+  ASSERT_FALSE(messages.empty());
+  EXPECT_EQ(messages[0].at, Time(std::chrono::nanoseconds(at_ns)));
   EXPECT_FALSE(opened->reader->damage());
   Bytes damaged = file;  // the first packet names an interface that is not there
   const Bytes first = numbers(little, {{4, 1}, {4, static_cast<std::uint32_t>(at_ns >> 32)}});

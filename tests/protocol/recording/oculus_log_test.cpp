@@ -1,7 +1,7 @@
 // Log files byte by byte as others write them.
 #include <zlib.h>
 
-#include "protocol/recording/inflate.hpp"
+#include "protocol/recording/zlib.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::testing {
@@ -90,12 +90,12 @@ TEST(OculusLog, SaysWhichItemsItCannotRead) {
   wrong_length.pop_back();
   broken[20] ^= std::byte{0xFF};
   for (const auto& [bad, why] : std::initializer_list<std::pair<Bytes, const char*>>{
-           {item(10, wrong_length), "the message at byte 48 is not as long as its header says"},
+           {item(10, wrong_length), "the message at byte 48 does not have the length in its header"},
            {item(10, broken, 1), "the message at byte 48 does not decompress"},
            {item(10, ping_message(1), 7), "the message at byte 48 is compressed in a way that is not known: 7"},
            {item(10, bytes_of("SO")), "the message at byte 48 is shorter than a header"},
            {item(10, Bytes(5'000'000)), "has 5000000 bytes, more than any message"},
-           {bytes_of("somebody else's bytes"), "no item begins at byte 48"}}) {
+           {bytes_of("foreign bytes of any kind"), "no item begins at byte 48"}}) {
     auto opened = open_bytes(log_of({bad, item(10, dummy_message())}));
     ASSERT_TRUE(opened);
     EXPECT_EQ(device_stream(read_all(*opened->reader)), dummy_message()) << why;

@@ -27,16 +27,16 @@ TEST_P(EveryFormat, GivesBackWhatWasWritten) {
 }
 
 TEST_P(EveryFormat, KeepsLongMessages) {
-  std::vector<Piece> pieces;
+  std::vector<RecordedMessage> messages;
   for (std::uint32_t i = 0; i < 4; ++i)
-    pieces.push_back({after_ms(100 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i, 512, 700, 32)});
-  auto opened = open_bytes(recorded(GetParam(), pieces));
+    messages.push_back({after_ms(100 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i, 512, 700, 32)});
+  auto opened = open_bytes(recorded(GetParam(), messages));
   ASSERT_TRUE(opened) << opened.error().text;
-  expect_same(read_all(*opened->reader), pieces, opened->reader->knows_times());
+  expect_same(read_all(*opened->reader), messages, opened->reader->knows_times());
 }
 
 TEST_P(EveryFormat, GivesWhatIsReadableOfAFileCutShortAnywhere) {
-  const std::vector<Piece> written = kept_by(GetParam(), conversation());
+  const std::vector<RecordedMessage> written = kept_by(GetParam(), conversation());
   const Bytes whole = recorded(GetParam(), conversation());
   std::size_t most = 0;
   for (std::size_t size = 0; size < whole.size(); ++size) {
@@ -46,22 +46,24 @@ TEST_P(EveryFormat, GivesWhatIsReadableOfAFileCutShortAnywhere) {
       EXPECT_EQ(most, 0u) << "at " << size << " of " << whole.size() << ": " << opened.error().text;
       continue;
     }
-    const std::vector<Piece> pieces = read_all(*opened->reader);
-    ASSERT_LE(pieces.size(), written.size());
-    ASSERT_GE(pieces.size() + 1, most) << size;  // a longer file never says less, but for the order of the last two
-    for (const Piece& piece : pieces) {
-      const auto same = [&piece](const Piece& other) { return other.bytes == piece.bytes && other.from == piece.from; };
+    const std::vector<RecordedMessage> messages = read_all(*opened->reader);
+    ASSERT_LE(messages.size(), written.size());
+    ASSERT_GE(messages.size() + 1, most) << size;  // a longer file never says less, but for the order of the last two
+    for (const RecordedMessage& message : messages) {
+      const auto same = [&message](const RecordedMessage& other) {
+        return other.bytes == message.bytes && other.from == message.from;
+      };
       ASSERT_TRUE(std::any_of(written.begin(), written.end(), same)) << "cut at " << size;
     }
-    most = std::max(most, pieces.size());
+    most = std::max(most, messages.size());
   }
   EXPECT_GE(most + 1, written.size());
 }
 
 TEST_P(EveryFormat, SurvivesAnyByteBeingWrong) {
-  const std::vector<Piece> pieces{{start, Origin::device, Carrier::stream, dummy_message()},
-                                  {after_ms(10), Origin::device, Carrier::stream, dummy_message()}};
-  const Bytes whole = recorded(GetParam(), pieces);
+  const std::vector<RecordedMessage> messages{{start, Origin::device, Carrier::stream, dummy_message()},
+                                              {after_ms(10), Origin::device, Carrier::stream, dummy_message()}};
+  const Bytes whole = recorded(GetParam(), messages);
   for (std::size_t at = 0; at < whole.size(); ++at)
     for (const unsigned flip : {0x01u, 0x80u, 0xFFu}) {
       Bytes damaged = whole;
@@ -75,7 +77,7 @@ TEST_P(EveryFormat, SurvivesAnyByteBeingWrong) {
 
 TEST_P(EveryFormat, AFullDiskLeavesWhatWasWritten) {
   const TemporaryFile file("full-disk");
-  std::vector<Piece> written;
+  std::vector<RecordedMessage> written;
   std::optional<Error> error;
   {
     auto sink = create_sink(file.path());
@@ -83,9 +85,9 @@ TEST_P(EveryFormat, AFullDiskLeavesWhatWasWritten) {
     const SmallDisk disk(3'000'000);
     const auto writer = writer_for(GetParam(), std::move(*sink));
     for (std::uint32_t i = 0; i < 400 && !error; ++i) {
-      Piece piece{after_ms(100 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i, 256, 100)};
-      if (Result<void> told = writer->write(piece); !told) error = told.error();
-      written.push_back(std::move(piece));
+      RecordedMessage message{after_ms(100 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i, 256, 100)};
+      if (Result<void> told = writer->write(message); !told) error = told.error();
+      written.push_back(std::move(message));
     }
     ASSERT_TRUE(error);
     EXPECT_FALSE(writer->write(written.front()));
@@ -97,7 +99,7 @@ TEST_P(EveryFormat, AFullDiskLeavesWhatWasWritten) {
 
   auto opened = open_recording(file.path());
   ASSERT_TRUE(opened) << opened.error().text;
-  const std::vector<Piece> found = read_all(*opened->reader);
+  const std::vector<RecordedMessage> found = read_all(*opened->reader);
   EXPECT_FALSE(opened->reader->damage()) << opened->reader->damage()->text;
   ASSERT_GT(found.size(), GetParam() == Format::mcap ? 20u : 90u);
   written.resize(found.size());
@@ -111,7 +113,7 @@ TEST(Recording, RefusesOtherFiles) {
     return opened ? "" : opened.error().text;
   };
   EXPECT_EQ(text_of(""), "a file is empty");
-  EXPECT_THAT(text_of("hello"), HasSubstr("no recording: expected an .oculus log, a raw dump, pcap, pcapng or MCAP"));
+  EXPECT_THAT(text_of("hello"), HasSubstr("not a recording: expected an .oculus log, a raw dump, pcap, pcapng or MCAP"));
   EXPECT_THAT(text_of("SQLite format 3"), HasSubstr("version 2"));
   EXPECT_THAT(text_of("SO, it begins like a message"), HasSubstr("does not begin with an Oculus message"));
   const auto missing = open_recording("/no/such/recording");
@@ -123,31 +125,31 @@ TEST(Recording, RefusesOtherFiles) {
 }
 
 TEST(Recording, BytesBetweenMessagesAreKept) {
-  std::vector<Piece> pieces = conversation();
+  std::vector<RecordedMessage> messages = conversation();
   const Bytes junk = bytes_of("S?SO what");
-  pieces.insert(pieces.begin() + 3, {after_ms(120), Origin::device, Carrier::stream, junk});
+  messages.insert(messages.begin() + 3, {after_ms(120), Origin::device, Carrier::stream, junk});
   for (const Format format : {Format::raw_dump, Format::pcap, Format::mcap}) {
-    auto opened = open_bytes(recorded(format, pieces));
+    auto opened = open_bytes(recorded(format, messages));
     ASSERT_TRUE(opened);
-    EXPECT_EQ(device_stream(read_all(*opened->reader)), device_stream(pieces)) << name_of(format);
+    EXPECT_EQ(device_stream(read_all(*opened->reader)), device_stream(messages)) << name_of(format);
     EXPECT_FALSE(opened->reader->damage());
   }
 }
 
 TEST(Recording, ADamagedPlaceCostsOnlyItself) {
   for (const Format format : {Format::oculus_log, Format::mcap}) {
-    std::vector<Piece> pieces;
+    std::vector<RecordedMessage> messages;
     for (std::uint32_t i = 0; i < 9; ++i)
-      pieces.push_back({after_ms(1500 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i)});
-    Bytes file = recorded(format, pieces);
+      messages.push_back({after_ms(1500 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i)});
+    Bytes file = recorded(format, messages);
     file[file.size() / 2] ^= std::byte{0xFF};
     for (std::size_t i = 0; format == Format::oculus_log && i < 4; ++i) file[48 + i] ^= std::byte{0x55};
     auto opened = open_bytes(file);
     ASSERT_TRUE(opened);
-    const std::vector<Piece> found = read_all(*opened->reader);
+    const std::vector<RecordedMessage> found = read_all(*opened->reader);
     EXPECT_GE(found.size(), 6u) << name_of(format);
     EXPECT_LT(found.size(), 10u);
-    EXPECT_EQ(found.back().bytes, pieces.back().bytes);
+    EXPECT_EQ(found.back().bytes, messages.back().bytes);
     ASSERT_TRUE(opened->reader->damage());
     EXPECT_THAT(opened->reader->damage()->text, HasSubstr("a file: "));
     EXPECT_THAT(opened->reader->damage()->text, HasSubstr("at byte "));
@@ -162,15 +164,15 @@ TEST(Recording, KeepsTheCapturedPings) {
   if (!std::filesystem::exists(file)) file = std::filesystem::path(folder) / "oculus/three_pings_8bit.raw";
   auto dump = open_recording(file);
   if (!dump) GTEST_SKIP() << dump.error().text;
-  std::vector<Piece> pieces = read_all(*dump->reader);
-  ASSERT_EQ(pieces.size(), 3u);
+  std::vector<RecordedMessage> messages = read_all(*dump->reader);
+  ASSERT_EQ(messages.size(), 3u);
   EXPECT_FALSE(dump->reader->damage());
-  EXPECT_EQ(device_stream(pieces).size(), std::filesystem::file_size(file));
-  for (std::size_t i = 0; i < 3; ++i) pieces[i].at = after_ms(62 * static_cast<int>(i));
+  EXPECT_EQ(device_stream(messages).size(), std::filesystem::file_size(file));
+  for (std::size_t i = 0; i < 3; ++i) messages[i].at = after_ms(62 * static_cast<int>(i));
   for (const Format format : all_formats) {
-    auto opened = open_bytes(recorded(format, pieces));
+    auto opened = open_bytes(recorded(format, messages));
     ASSERT_TRUE(opened);
-    expect_same(read_all(*opened->reader), pieces, opened->reader->knows_times());
+    expect_same(read_all(*opened->reader), messages, opened->reader->knows_times());
   }
 }
 

@@ -60,7 +60,7 @@ inline Bytes status_message() {
 }
 
 /// Two settings, keep-alives, three pings, a status: both ends, both carriers.
-inline std::vector<Piece> conversation() {
+inline std::vector<RecordedMessage> conversation() {
   using enum Origin;
   using enum Carrier;
   const Bytes fire = oculus::make_fire({});
@@ -70,22 +70,23 @@ inline std::vector<Piece> conversation() {
           {after_ms(4300), device, stream, ping_message(3)}, {after_ms(4400), device, stream, dummy_message()}};
 }
 
-inline std::vector<Piece> read_all(PieceReader& reader) {
-  std::vector<Piece> pieces;
-  while (auto piece = reader.next()) pieces.push_back(std::move(*piece));
-  return pieces;
+inline std::vector<RecordedMessage> read_all(RecordingReader& reader) {
+  std::vector<RecordedMessage> messages;
+  while (auto message = reader.next()) messages.push_back(std::move(*message));
+  return messages;
 }
 
 /// Bytes the device sent by TCP.
-inline Bytes device_stream(const std::vector<Piece>& pieces) {
+inline Bytes device_stream(const std::vector<RecordedMessage>& messages) {
   Bytes stream;
-  for (const Piece& piece : pieces)
-    if (piece.from == Origin::device && piece.by == Carrier::stream)
-      stream.insert(stream.end(), piece.bytes.begin(), piece.bytes.end());
+  for (const RecordedMessage& message : messages)
+    if (message.from == Origin::device && message.by == Carrier::stream)
+      stream.insert(stream.end(), message.bytes.begin(), message.bytes.end());
   return stream;
 }
 
-inline void expect_same(const std::vector<Piece>& found, const std::vector<Piece>& expected, bool with_times = true) {
+inline void expect_same(const std::vector<RecordedMessage>& found, const std::vector<RecordedMessage>& expected,
+                        bool with_times = true) {
   ASSERT_EQ(found.size(), expected.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     SCOPED_TRACE(i);
@@ -98,7 +99,7 @@ inline void expect_same(const std::vector<Piece>& found, const std::vector<Piece
   }
 }
 
-inline std::unique_ptr<PieceWriter> writer_for(Format format, std::unique_ptr<Sink> sink) {
+inline std::unique_ptr<RecordingWriter> writer_for(Format format, std::unique_ptr<Sink> sink) {
   switch (format) {
     case Format::oculus_log:
       return write_oculus_log(std::move(sink));
@@ -112,16 +113,18 @@ inline std::unique_ptr<PieceWriter> writer_for(Format format, std::unique_ptr<Si
 }
 
 /// What this format keeps of a conversation.
-inline std::vector<Piece> kept_by(Format format, std::vector<Piece> pieces) {
+inline std::vector<RecordedMessage> kept_by(Format format, std::vector<RecordedMessage> messages) {
   if (format == Format::oculus_log || format == Format::raw_dump)
-    std::erase_if(pieces, [](const Piece& piece) { return piece.from == Origin::client || piece.by == Carrier::datagram; });
-  return pieces;
+    std::erase_if(messages, [](const RecordedMessage& message) {
+      return message.from == Origin::client || message.by == Carrier::datagram;
+    });
+  return messages;
 }
 
-inline Bytes recorded(Format format, const std::vector<Piece>& pieces) {
+inline Bytes recorded(Format format, const std::vector<RecordedMessage>& messages) {
   Bytes file;
   const auto writer = writer_for(format, sink_into(file));
-  for (const Piece& piece : pieces) EXPECT_TRUE(writer->write(piece));
+  for (const RecordedMessage& message : messages) EXPECT_TRUE(writer->write(message));
   EXPECT_TRUE(writer->close());
   return file;
 }

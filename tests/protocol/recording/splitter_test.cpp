@@ -6,7 +6,7 @@ namespace {
 
 std::vector<Bytes> drain(MessageSplitter& splitter) {
   std::vector<Bytes> found;
-  while (auto piece = splitter.next()) found.push_back(std::move(piece->bytes));
+  while (auto message = splitter.next()) found.push_back(std::move(message->bytes));
   return found;
 }
 
@@ -38,9 +38,9 @@ TEST(MessageSplitter, TimeIsThatOfTheLastByte) {
   splitter.append(after_ms(1), BytesView(ping).first(100));
   EXPECT_FALSE(splitter.next());
   splitter.append(after_ms(7), BytesView(ping).subspan(100));
-  const auto piece = splitter.next();
-  ASSERT_TRUE(piece);
-  EXPECT_EQ(piece->at, after_ms(7));
+  const auto message = splitter.next();
+  ASSERT_TRUE(message);
+  EXPECT_EQ(message->at, after_ms(7));
 }
 
 TEST(MessageSplitter, MissingBytesCostTheMessagesTheyBelongTo) {

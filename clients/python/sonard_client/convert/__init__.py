@@ -1,6 +1,6 @@
-"""Logs of others as trajectory files: `python3 -m sonard_client.convert IN -o OUT.csv`, or convert(IN).
+"""Converts logs to trajectory files: `python3 -m sonard_client.convert IN -o OUT.csv`, or convert(IN).
 
-Every format is read by code of this folder; the standard library only, but lz4 and zstandard for logs compressed by these.
+Standard library only, except lz4 and zstandard for logs with these compressions.
 """
 from ..geodesy import Geodetic
 from .formats import FORMATS, convert, format_of

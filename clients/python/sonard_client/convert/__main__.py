@@ -1,6 +1,6 @@
-"""python3 -m sonard_client.convert IN -o OUT.csv: logs of autopilots, robots and instruments as trajectory files for sonard.
+"""python3 -m sonard_client.convert IN -o OUT.csv: converts logs of autopilots, robots and instruments to trajectory files.
 
-ArduPilot dataflash (.bin), telemetry logs (.tlog), MCAP, ROS 1 bags and NMEA 0183; the format is told by the file.
+Reads ArduPilot dataflash (.bin), telemetry logs (.tlog), MCAP, ROS 1 bags and NMEA 0183, detected by content.
 """
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from .track import ConvertError, Track, gap_warning, write_csv
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python3 -m sonard_client.convert", description=__doc__)
     parser.add_argument("file", type=pathlib.Path)
-    parser.add_argument("-o", "--output", required=True, help="trajectory file; - is standard output")
-    parser.add_argument("--format", choices=FORMATS, help="where the file's beginning does not tell")
+    parser.add_argument("-o", "--output", required=True, help="trajectory file, or - for standard output")
+    parser.add_argument("--format", choices=FORMATS, help="if it cannot be detected")
     parser.add_argument("--source", help="dataflash: SIM, XKF1, XKF1:1 (second core), AHR2, ATT+POS, ..; "
                         "tlog: ODOMETRY, SIM_STATE, ATTITUDE+LOCAL_POSITION_NED, ..")
-    parser.add_argument("--topic", help="of a recording; transforms are called '/tf parent->child'")
+    parser.add_argument("--topic", help="topic of a recording; for transforms '/tf parent->child'")
     parser.add_argument("--system", type=int, help="MAVLink system of a telemetry log")
-    parser.add_argument("--component", type=int, help="of that system: take its messages only (autopilots are 1)")
-    parser.add_argument("--origin", metavar="LAT,LON[,ALT]", help="degrees and m: the world's 0, 0, 0; without it the first fix")
-    parser.add_argument("--frame", choices=("ENU_FLU", "NED_FRD"), help="of a recording that does not keep to ROS's ENU_FLU")
-    parser.add_argument("--body", help="name for a column `body`, to put several files together")
-    parser.add_argument("--keep-time", action="store_true", help="the log's own times; without it they begin at 0")
-    parser.add_argument("--depth", type=float, default=0.0, metavar="M", help="NMEA: of the vehicle, where nothing tells it (0)")
+    parser.add_argument("--component", type=int, help="use only messages of this MAVLink component (autopilots are 1)")
+    parser.add_argument("--origin", metavar="LAT,LON[,ALT]", help="origin of the world, degrees and m (default: the first fix)")
+    parser.add_argument("--frame", choices=("ENU_FLU", "NED_FRD"), help="frame of a recording that does not use ROS's ENU_FLU")
+    parser.add_argument("--body", help="adds a column `body` with this name, to combine several files")
+    parser.add_argument("--keep-time", action="store_true", help="keep the log's times (default: start at 0)")
+    parser.add_argument("--depth", type=float, default=0.0, metavar="M", help="NMEA: vehicle depth without DPT and DBT (0)")
     parser.add_argument("--bottom", type=float, metavar="M", help="NMEA: depth of the bottom; the vehicle is DPT or DBT above it")
-    parser.add_argument("--depth-is-vehicle", action="store_true", help="NMEA: DPT and DBT are the vehicle's own depth")
-    parser.add_argument("--heading", type=float, metavar="DEG", help="NMEA: as long as none is told")
+    parser.add_argument("--depth-is-vehicle", action="store_true", help="NMEA: DPT and DBT give the vehicle's own depth")
+    parser.add_argument("--heading", type=float, metavar="DEG", help="NMEA: heading, used until one is received")
     return parser
 
 
-def _say(text: str) -> None:
+def _log(text: str) -> None:
     print(f"sonard_client.convert: {text}", file=sys.stderr)
 
 
@@ -58,17 +58,17 @@ def _write(track: Track, options: argparse.Namespace) -> None:
 
 def _run(options: argparse.Namespace) -> None:
     if options.body is not None and not re.fullmatch(r"[^\s,#\"]{1,64}", options.body):
-        raise ValueError(f"body {options.body!r}: a name is at most 64 characters, without blanks, commas, quotes and #")
+        raise ValueError(f"body {options.body!r}: a name has at most 64 characters, without spaces, commas, quotes and #")
     if options.bottom is not None and options.depth_is_vehicle:
-        raise ValueError("--bottom and --depth-is-vehicle contradict each other: give one")
+        raise ValueError("--bottom and --depth-is-vehicle exclude each other: give one")
     warned: List[str] = []
 
     def warn(text: str) -> None:
         warned.append(text)
-        _say(f"{options.file}: {text}")
+        _log(f"{options.file}: {text}")
 
     if options.component is not None and not 0 <= options.component <= 255:
-        raise ValueError(f"component {options.component}: they are numbered from 0 to 255")
+        raise ValueError(f"component {options.component}: it must be 0 to 255")
     origin = parse_origin(options.origin) if options.origin else None
     kind = options.format or format_of(options.file)
     assumed = Assumptions(heading_deg=options.heading, depth_m=options.depth, depth_is_vehicle=options.depth_is_vehicle,
@@ -77,13 +77,13 @@ def _run(options: argparse.Namespace) -> None:
                     options.component)
     if options.frame:
         if kind not in ("mcap", "rosbag"):
-            raise ValueError(f"--frame is for recordings: {kind} is always {track.frame}")
+            raise ValueError(f"--frame is for MCAP and ROS bags only: {kind} is always {track.frame}")
         track.frame = options.frame
     gap = gap_warning(track.rows)
     if gap:
         warn(gap)
     _write(track, options)
-    _say(f"{options.file}: {len(track.rows)} poses of {track.source} over {track.rows[-1].t_s - track.rows[0].t_s:.1f} s, "
+    _log(f"{options.file}: {len(track.rows)} poses of {track.source} over {track.rows[-1].t_s - track.rows[0].t_s:.1f} s, "
          f"{track.frame}")
 
 
@@ -92,16 +92,16 @@ def main(arguments: Optional[List[str]] = None) -> int:
     try:
         _run(options)
     except ConvertError as error:
-        _say(str(error))
+        _log(str(error))
         return 65
     except ValueError as error:
-        _say(str(error))
+        _log(str(error))
         return 64
     except (FileNotFoundError, IsADirectoryError) as error:
-        _say(f"{error.filename}: there is no such file")
+        _log(f"{error.filename}: file not found")
         return 66
     except OSError as error:
-        _say(str(error))
+        _log(str(error))
         return 74
     return 0
 

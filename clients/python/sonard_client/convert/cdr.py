@@ -1,4 +1,4 @@
-"""The bytes of ROS messages: CDR as ROS 2 writes it, and the unpadded form of ROS 1. Only what poses need."""
+"""Decodes poses in ROS messages: CDR of ROS 2 and the unpadded encoding of ROS 1."""
 from __future__ import annotations
 
 import struct
@@ -6,18 +6,18 @@ from typing import List, Tuple
 
 
 class Broken(ValueError):
-    """The bytes are not what their type says; the text has no file in it yet."""
+    """The bytes do not match their type. The text does not name the file."""
 
 
 class Reader:
-    """Fields in order. CDR aligns numbers to their own size, counted from behind its four bytes of head."""
+    """Reads fields in order. CDR aligns numbers to their own size, counted from the end of its four-byte header."""
 
     def __init__(self, data: bytes, ros1: bool = False) -> None:
         self._data, self._at, self._base, self._aligned, self._order = data, 0, 0, not ros1, "<"
         if ros1:
             return
         if len(data) < 4 or data[0] != 0 or data[1] > 1:
-            raise Broken("no plain CDR: its first bytes are " + data[:4].hex(" "))
+            raise Broken("not plain CDR: its first bytes are " + data[:4].hex(" "))
         self._order = "<" if data[1] else ">"
         self._at = self._base = 4
 
@@ -41,7 +41,7 @@ class Reader:
         return raw.rstrip(b"\0").decode("utf-8", "replace")
 
 
-Pose = Tuple[Tuple[float, float, float], Tuple[float, float, float, float]]  # position; orientation x, y, z, w as sent
+Pose = Tuple[Tuple[float, float, float], Tuple[float, float, float, float]]  # position; orientation x, y, z, w as encoded
 
 
 def _header(reader: Reader, ros1: bool) -> Tuple[float, str]:
@@ -58,7 +58,7 @@ def _pose(reader: Reader) -> Pose:
 
 
 def decode(kind: str, data: bytes, ros1: bool) -> List[Tuple[str, float, Pose]]:
-    """Of a message of that type: for each pose in it what to add to the topic's name, the stamp [s], and the pose."""
+    """Returns for each pose of a message: suffix of the topic's name, timestamp [s], pose."""
     reader = Reader(data, ros1)
     if kind == "TFMessage":
         (count,) = reader.numbers("I")
@@ -77,12 +77,12 @@ def _transform(reader: Reader, ros1: bool) -> Tuple[str, float, Pose]:
     return f" {parent}->{child}", stamp, _pose(reader)
 
 
-# Types whose poses are read, the one to be preferred first; the package before the name does not matter.
+# Supported types, in order of preference.
 KINDS = ("Odometry", "PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "TFMessage")
 PACKAGES = ("nav_msgs", "geometry_msgs", "tf2_msgs", "tf")
 
 
 def kind_of(schema: str) -> str:
-    """Of "nav_msgs/msg/Odometry" or "nav_msgs/Odometry"; empty for all else."""
+    """The type name in "nav_msgs/msg/Odometry" or "nav_msgs/Odometry"; empty for unsupported types."""
     parts = schema.split("/")
     return parts[-1] if parts[0] in PACKAGES and parts[-1] in KINDS else ""

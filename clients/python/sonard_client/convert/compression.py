@@ -1,4 +1,4 @@
-"""Chunks of recordings, unpacked: bz2 by the standard library, lz4 and zstd where their modules are installed."""
+"""Decompresses chunks of recordings: bz2 by the standard library, lz4 and zstd if their modules are installed."""
 from __future__ import annotations
 
 import bz2
@@ -9,7 +9,7 @@ LARGEST_CHUNK = 1 << 30
 
 
 class Unreadable(Exception):
-    """Why these bytes cannot be unpacked here."""
+    """The reason why a chunk cannot be decompressed."""
 
 
 def _module(*names: str) -> Any:
@@ -22,15 +22,15 @@ def _module(*names: str) -> Any:
 
 
 def _bounded(stream: Any, data: bytes, size: int) -> bytes:
-    """At most one byte more than was promised: a few bytes can unpack to more than there is memory."""
+    """Limits the output to one byte more than declared, because a few bytes can expand beyond the available memory."""
     out = bytes(stream.decompress(data, max_length=size + 1))
     if len(out) <= size and not stream.eof:
-        raise EOFError("they break off")
+        raise EOFError("the data is truncated")
     return out
 
 
 def _read(reader: Any, size: int) -> bytes:
-    """The same from a file-like object, which may answer with less than was asked for."""
+    """The same for a file-like object, which may return less than requested."""
     out = b""
     while len(out) <= size:
         part = reader.read(size + 1 - len(out))
@@ -54,24 +54,24 @@ def _unpacker(kind: str) -> Optional[Callable[[bytes, int], bytes]]:
             return lambda data, size: _bounded(newer.ZstdDecompressor(), data, size)
         older = _module("zstandard")
         return None if older is None else lambda data, size: _read(older.ZstdDecompressor().stream_reader(data), size)
-    raise Unreadable(f"compressed by {kind!r}, which is not known here")
+    raise Unreadable(f"compressed by {kind!r}, which is not supported")
 
 
 def unpack(kind: str, data: bytes, size: int) -> bytes:
-    """Exactly `size` bytes, or Unreadable."""
+    """Returns exactly `size` bytes, or raises Unreadable."""
     if size > LARGEST_CHUNK:
-        raise Unreadable(f"a chunk of {size} bytes: more than 1 GiB is not believed")
+        raise Unreadable(f"a chunk of {size} bytes exceeds the limit of 1 GiB")
     unpacker = _unpacker(kind)
     if unpacker is None:
         package = {"lz4": "python3-lz4", "zstd": "python3-zstandard"}[kind]
-        raise Unreadable(f"compressed by {kind}: install {package} (apt) or {package[8:]} (pip), or write the recording again "
+        raise Unreadable(f"compressed by {kind}: install {package} (apt) or {package[8:]} (pip), or write the recording "
                          "without compression")
     try:
         out = unpacker(data, size)
-    except Exception as error:  # each module has its own kinds
-        raise Unreadable(f"its {kind} data cannot be unpacked: {error}") from None
+    except Exception as error:  # each module has its own exceptions
+        raise Unreadable(f"its {kind} data cannot be decompressed: {error}") from None
     if len(out) > size:
-        raise Unreadable(f"unpacks to more than the {size} bytes that were promised")
+        raise Unreadable(f"decompresses to more than the declared {size} bytes")
     if len(out) != size:
-        raise Unreadable(f"unpacks to {len(out)} bytes where {size} were promised")
+        raise Unreadable(f"decompresses to {len(out)} of {size} declared bytes")
     return out

@@ -1,6 +1,7 @@
-"""ArduPilot's dataflash logs (.bin): every message has the head A3 95 and its type; FMT messages, type 128, describe the others.
+"""Reads ArduPilot's dataflash logs (.bin). Every message starts with A3 95 and its type; FMT messages, type 128, describe the
+others.
 
-Layouts are those of ArduPilot's AP_Logger; what a log says of its messages counts, so that logs of any age are read.
+Layouts are those of ArduPilot's AP_Logger. The descriptions in the log are used, so logs of any version are readable.
 """
 from __future__ import annotations
 
@@ -16,12 +17,12 @@ from .track import ConvertError, Source, Stream, Track, Warn, chosen, track_of
 MAGIC = b"\xa3\x95"
 FMT = 128
 _FMT = struct.Struct("<BB4s16s64s")  # type, length, name, format, labels
-# Format characters: struct's, and what the number is multiplied by.
+# Format characters: struct's format and the scale factor.
 _KINDS: Dict[str, Tuple[str, float]] = {
     "a": ("64s", 0), "b": ("b", 1), "B": ("B", 1), "h": ("h", 1), "H": ("H", 1), "i": ("i", 1), "I": ("I", 1), "f": ("f", 1),
     "d": ("d", 1), "g": ("e", 1), "n": ("4s", 0), "N": ("16s", 0), "Z": ("64s", 0), "c": ("h", 0.01), "C": ("H", 0.01),
     "e": ("i", 0.01), "E": ("I", 0.01), "L": ("i", 1e-7), "M": ("B", 1), "q": ("q", 1), "Q": ("Q", 1)}
-# Ground truth of the simulator first, then what the vehicle believed.
+# In order of preference: the simulator's ground truth, then estimates.
 FULL = ("SIM", "XKF1", "NKF1", "EKF1", "AHR2")
 LOCAL = ("XKF1", "NKF1", "EKF1")  # metres from the filter's origin
 WANTED = FULL + ("ATT", "POS", "GPS", "ORGN")
@@ -32,7 +33,7 @@ FIX_2D = 2
 class Format(NamedTuple):
     name: str
     length: int
-    body: Optional[struct.Struct]  # None where the description contradicts itself
+    body: Optional[struct.Struct]  # None if the description is inconsistent
     labels: Tuple[str, ...]
     factors: Tuple[float, ...]
 
@@ -52,8 +53,8 @@ def _format(data: bytes, at: int) -> "Tuple[int, Format]":
 
 
 def records(data: bytes, warn: Warn) -> "Iterator[Tuple[str, Dict[str, float]]]":
-    """Numbers of the messages that hold poses, scaled to degrees, metres and seconds as the format says. What cannot be read is
-    passed over to the next head, and told at the end."""
+    """Yields the numbers of pose messages, scaled to degrees, metres and seconds. Unreadable bytes are skipped up to the next
+    message and reported at the end."""
     formats: Dict[int, Format] = {FMT: Format("FMT", 3 + _FMT.size, None, (), ())}
     at, skipped, first_skipped = 0, 0, -1
     while at + 3 <= len(data):
@@ -66,21 +67,21 @@ def records(data: bytes, warn: Warn) -> "Iterator[Tuple[str, Dict[str, float]]]"
             at = following
             continue
         if at + described.length > len(data):
-            warn(f"ends within a message, at byte {at}: what comes before it was read")
+            warn(f"ends within a message, at byte {at}; all messages before it were read")
             break
         if data[at + 2] == FMT:
-            kind, said = _format(data, at)
+            kind, description = _format(data, at)
             if kind != FMT:
-                formats[kind] = said
-                if said.body is None and said.name in WANTED:
-                    warn(f"at byte {at}: the description of {said.name} contradicts itself; these messages are left out")
+                formats[kind] = description
+                if description.body is None and description.name in WANTED:
+                    warn(f"at byte {at}: the description of {description.name} is inconsistent; these messages are omitted")
         elif described.name in WANTED and described.body is not None:
             values = described.body.unpack_from(data, at + 3)
             scaled = zip(described.labels, values, described.factors)
             yield described.name, {label: value * factor for label, value, factor in scaled if factor}
         at += described.length
     if skipped:
-        warn(f"{skipped} bytes are no message, the first at byte {first_skipped}; they were passed over")
+        warn(f"{skipped} bytes outside messages were skipped, the first at byte {first_skipped}")
 
 
 def _time_s(fields: Dict[str, float]) -> Optional[float]:
@@ -112,7 +113,7 @@ class _Gathered:
         self.positions: "Dict[str, Stream]" = {}
         self.origin: Optional[Geodetic] = None
 
-    def take(self, name: str, fields: Dict[str, float]) -> None:
+    def add(self, name: str, fields: Dict[str, float]) -> None:
         t = _time_s(fields)
         if name == "ORGN" and fields.get("Type", EKF_ORIGIN) == EKF_ORIGIN:
             self.origin = self.origin or _geodetic(fields)
@@ -139,13 +140,13 @@ class _Gathered:
 
 
 def read_dataflash(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None) -> Track:
-    """The vehicle's way: NED_FRD, seconds since the autopilot started."""
+    """Reads the vehicle's track: NED_FRD, seconds since the autopilot started."""
     data = path.read_bytes()
     if not data.startswith(MAGIC):
-        raise ConvertError(f"{path}: at byte 0: no dataflash log: it does not begin with A3 95")
+        raise ConvertError(f"{path}: at byte 0: not a dataflash log: it does not begin with A3 95")
     gathered = _Gathered()
     for name, fields in records(data, warn):
-        gathered.take(name, fields)
+        gathered.add(name, fields)
     wanted = chosen(gathered.sources(), source, str(path))
     local = wanted.name.split(":")[0] in LOCAL
     return track_of(wanted, str(path), warn, origin, gathered.origin if local else None)

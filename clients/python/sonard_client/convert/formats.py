@@ -1,4 +1,4 @@
-"""Which reader a file is for, told by its first bytes, and one call for all of them."""
+"""Detects the format of a log by its first bytes and converts it."""
 from __future__ import annotations
 
 import pathlib
@@ -20,11 +20,11 @@ _HEAD_BYTES = 4096
 
 
 def format_of(path: pathlib.Path) -> str:
-    """One of FORMATS, or ConvertError."""
+    """Returns one of FORMATS, or raises ConvertError."""
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     if not head:
-        raise ConvertError(f"{path}: is empty")
+        raise ConvertError(f"{path}: the file is empty")
     for magic, name in ((dataflash.MAGIC, "dataflash"), (mcap.MAGIC, "mcap"), (rosbag.MAGIC, "rosbag")):
         if head.startswith(magic):
             return name
@@ -32,16 +32,16 @@ def format_of(path: pathlib.Path) -> str:
         return "tlog"
     if b"$" in head and b"," in head and all(byte < 128 for byte in head):
         return "nmea"
-    raise ConvertError(f"{path}: at byte 0: none of {', '.join(FORMATS)}; say which with --format if it is one whose beginning "
-                       "is broken")
+    raise ConvertError(f"{path}: at byte 0: none of {', '.join(FORMATS)}; if its beginning is damaged, name the format "
+                       "with --format")
 
 
 def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source: Optional[str] = None,
             topic: Optional[str] = None, origin: Optional[Geodetic] = None, system: Optional[int] = None,
             assumed: Assumptions = Assumptions(), warn: Warn = lambda text: None, component: Optional[int] = None) -> Track:
-    """The way of one vehicle. kind: one of FORMATS, told by the file without it. source: which messages of a dataflash or
-    telemetry log; topic: which topic of a recording; system: which vehicle of a telemetry log, component:
-    as which of its components tells. ConvertError, OSError."""
+    """Reads the track of one vehicle. kind: one of FORMATS; default: detected. source: messages of a dataflash or telemetry log.
+    topic: topic of a recording. system, component: MAVLink system and component of a telemetry log. Raises ConvertError and
+    OSError."""
     file = pathlib.Path(path)
     chosen = kind or format_of(file)
     readers: "dict[str, Callable[[], Track]]" = {
@@ -53,5 +53,5 @@ def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source
     if chosen not in readers:
         raise ValueError(f"format is {chosen!r}: it must be one of {', '.join(FORMATS)}")
     if origin is not None and chosen in ("mcap", "rosbag"):
-        raise ValueError("an origin is for positions in degrees; poses of recordings are metres already")
+        raise ValueError("an origin needs positions in degrees; poses of recordings are in metres")
     return readers[chosen]()

@@ -1,7 +1,7 @@
-"""MAVLink frames of versions 1 and 2 as bytes, and the messages that say where a vehicle is.
+"""Parses MAVLink 1 and 2 frames and the messages with positions and attitudes.
 
-Layouts and CRC seeds follow from MAVLink's message definitions (minimal, standard, common): fields by falling size, extensions
-behind them. A payload of version 2 is sent without its trailing zeros.
+Layouts and CRC seeds follow from MAVLink's message definitions (minimal, standard, common): fields by decreasing size, then
+extensions. Version 2 payloads are sent without trailing zeros.
 """
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SIGNATURE_BYTES = 13
 
 class Message(NamedTuple):
     name: str
-    seed: int           # of the CRC: CRC_EXTRA
+    seed: int           # CRC_EXTRA
     fixed: str          # struct's format without extensions
     extensions: str
     fields: Tuple[str, ...]
@@ -44,7 +44,7 @@ MESSAGES: Dict[int, Message] = {
 }
 # MAV_FRAME, as frame_id and child_frame_id of ODOMETRY.
 LOCAL_NED, LOCAL_FRD = 1, 20
-BODY_NED, BODY_FRD, BODY_FLU = 8, 12, 13  # the first as old as MAVLink, and meant as FRD
+BODY_NED, BODY_FRD, BODY_FLU = 8, 12, 13  # BODY_NED is deprecated and means FRD
 
 
 def _crc_of_byte(value: int) -> int:
@@ -57,7 +57,7 @@ _CRCS = tuple(map(_crc_of_byte, range(256)))
 
 
 def crc(data: bytes, seed: int) -> int:
-    """CRC-16/MCRF4XX over everything behind the magic byte, then over the seed."""
+    """CRC-16/MCRF4XX over all bytes after the magic byte, then over the seed."""
     value = 0xFFFF
     for byte in data:
         value = value >> 8 ^ _CRCS[(value ^ byte) & 0xFF]
@@ -69,12 +69,12 @@ class Frame(NamedTuple):
     system: int
     component: int
     payload: bytes
-    length: int          # of the frame, magic to signature
-    intact: "Optional[bool]"  # None: a message whose seed is not known here
+    length: int          # bytes, from magic to signature
+    intact: "Optional[bool]"  # None: a message with unknown seed
 
 
 def frame_length(data: bytes, at: int) -> Optional[int]:
-    """Of the frame that begins there, from its first bytes; None where none can. May reach beyond the data."""
+    """Length of the frame at `at`, or None if no frame begins there. The frame may exceed the data."""
     if at + 3 > len(data):
         return None
     if data[at] == V1:
@@ -85,7 +85,7 @@ def frame_length(data: bytes, at: int) -> Optional[int]:
 
 
 def read_frame(data: bytes, at: int) -> Optional[Frame]:
-    """The frame that begins there; None where there is none, or not all of it."""
+    """Returns the frame at `at`; None if there is none or it is incomplete."""
     length = frame_length(data, at)
     if length is None or at + length > len(data):
         return None
@@ -102,8 +102,8 @@ def read_frame(data: bytes, at: int) -> Optional[Frame]:
 
 
 def fields_of(frame: Frame) -> "Optional[Dict[str, float]]":
-    """Of a known message; extensions that were not sent are 0, as MAVLink has it. None for others, and for payloads that no
-    layout has."""
+    """Fields of a known message; extensions that were not sent are 0, as MAVLink requires. None for unknown messages and for
+    payloads that are too long."""
     known = MESSAGES.get(frame.message_id)
     if known is None:
         return None

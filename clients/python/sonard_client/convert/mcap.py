@@ -1,6 +1,6 @@
-"""MCAP recordings, read from the front without the index: records of an opcode, a length, and content; chunks hold records.
+"""Reads MCAP recordings sequentially, without the index. A record has an opcode, a length and content; chunks contain records.
 
-After the format's specification at mcap.dev. A recording that breaks off is read to its last whole record.
+Written from the specification at mcap.dev. A truncated recording is read up to its last complete record.
 """
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class _Reader:
             head = file.read(RECORD_HEAD.size)
             opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
             if not opcode or length > min(LARGEST_RECORD, size - at - RECORD_HEAD.size):
-                self.warn(f"ends within a record, at byte {at}: what comes before it was read")
+                self.warn(f"ends within a record, at byte {at}; all records before it were read")
                 return
             if opcode in (DATA_END, FOOTER):
                 return
@@ -73,7 +73,7 @@ class _Reader:
             else:
                 file.seek(length, 1)
             at += RECORD_HEAD.size + length
-        self.warn("has no end: it was not closed; every record in it was read")
+        self.warn("was not closed: its end is missing; all records were read")
 
     def _record(self, opcode: int, content: bytes, at: int) -> Iterator[Recorded]:
         fields = _Fields(content)
@@ -94,7 +94,7 @@ class _Reader:
             else:
                 yield from self._chunk(fields, at)
         except Broken as error:
-            self.warn(f"at byte {at}: {error}; the record was left out")
+            self.warn(f"at byte {at}: {error}; the record was omitted")
 
     def _chunk(self, fields: _Fields, at: int) -> Iterator[Recorded]:
         fields.number("Q")
@@ -103,7 +103,7 @@ class _Reader:
         try:
             data = unpack(kind, fields.block("Q"), size)
             if crc and zlib.crc32(data) != crc:
-                raise Unreadable("the checksum of its records is wrong")
+                raise Unreadable("its checksum is wrong")
         except Unreadable as error:
             self.refused += 1
             self.why = self.why or f"at byte {at}: a chunk is {error}" if str(error).startswith("compressed") else \
@@ -121,14 +121,14 @@ class _Reader:
 
 
 def read_mcap(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
-    """The poses of one topic; ROS and foxglove mean ENU_FLU."""
+    """Reads the poses of one topic; ROS and foxglove use ENU_FLU."""
     reader = _Reader(str(path), warn)
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
-            raise ConvertError(f"{path}: at byte 0: no MCAP file: it does not begin with its magic bytes")
+            raise ConvertError(f"{path}: at byte 0: not an MCAP file: the magic bytes are missing")
         messages = list(reader.records(file, path.stat().st_size))
     if reader.refused and not messages:
         raise ConvertError(f"{path}: {reader.why}")
     if reader.refused:
-        warn(f"{reader.why}; {reader.refused} chunks were left out")
+        warn(f"{reader.why}; chunks omitted: {reader.refused}")
     return track_from(messages, str(path), warn, topic)

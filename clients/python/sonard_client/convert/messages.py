@@ -1,4 +1,4 @@
-"""Poses in the messages of a recording: ROS, JSON, and the protobuf schemas PoseInFrame and FrameTransform of foxglove."""
+"""Extracts poses from messages of a recording: ROS, JSON, and foxglove's protobuf schemas PoseInFrame and FrameTransform."""
 from __future__ import annotations
 
 import json
@@ -14,9 +14,9 @@ FOXGLOVE = ("foxglove.PoseInFrame", "foxglove.FrameTransform")
 
 
 class Found(NamedTuple):
-    topic: str         # with " parent->child" behind it for transforms
+    topic: str         # with suffix " parent->child" for transforms
     rank: int          # smaller is preferred
-    t_s: Optional[float]  # None: the message has no time of its own
+    t_s: Optional[float]  # None: the message has no timestamp
     position_m: Vector3
     orientation: Quaternion
     frame: str
@@ -25,13 +25,13 @@ class Found(NamedTuple):
 def may_hold_poses(encoding: str, schema: str) -> bool:
     if encoding in ("cdr", "ros1"):
         return bool(kind_of(schema))
-    if encoding == "json":  # other schemas of these two are images and ranges: long to read, and no poses
+    if encoding == "json":  # other schemas of these two are large and have no poses
         return schema in FOXGLOVE or not schema.startswith(("foxglove.", "sonard."))
     return encoding == "protobuf" and schema in FOXGLOVE
 
 
 def poses_in(topic: str, encoding: str, schema: str, data: bytes) -> List[Found]:
-    """Broken where the bytes are not what the channel says. JSON without a pose in it is empty."""
+    """Returns the poses of a message. Raises Broken if the bytes do not match the channel; JSON may have no poses."""
     if encoding == "json":
         return _from_json(topic, data)
     if encoding == "protobuf":
@@ -43,7 +43,7 @@ def poses_in(topic: str, encoding: str, schema: str, data: bytes) -> List[Found]
 
 def _checked(position: Vector3, xyzw: "Tuple[float, ...]") -> Tuple[Vector3, Quaternion]:
     if not all(map(math.isfinite, position)):
-        raise Broken("a position that is no number")
+        raise Broken("the position is not finite")
     try:
         return position, unit((xyzw[3], xyzw[0], xyzw[1], xyzw[2]))
     except ValueError as error:
@@ -69,11 +69,11 @@ def _json_time(value: Dict[str, Any]) -> Optional[float]:
 
 
 def _from_json(topic: str, data: bytes) -> List[Found]:
-    """sonard's own JSON lines, and position and orientation with named members, at the top or below `pose`."""
+    """Accepts sonard's JSON lines, and objects with position and orientation, at the top level or in `pose`."""
     try:
         value = json.loads(data)
     except (ValueError, RecursionError):
-        raise Broken("no JSON") from None
+        raise Broken("not JSON") from None
     if not isinstance(value, dict):
         return []
     t = _json_time(value)
@@ -82,11 +82,11 @@ def _from_json(topic: str, data: bytes) -> List[Found]:
             position = [float(p) for p in value["position"]]
             turn = orientation(value.get("quaternion"), value.get("attitude"))
         except (TypeError, ValueError):
-            raise Broken("a pose whose numbers are none") from None
+            raise Broken("the pose has invalid numbers") from None
         if len(position) != 3 or not all(map(math.isfinite, position)):
-            raise Broken("a position that is not three numbers")
+            raise Broken("the position is not three finite numbers")
         if value.get("frame", "NED_FRD") not in FRAMES:
-            raise Broken("a frame that is neither NED_FRD nor ENU_FLU")
+            raise Broken("the frame is neither NED_FRD nor ENU_FLU")
         return [Found(topic, 1, t, (position[0], position[1], position[2]), turn, str(value.get("frame", "NED_FRD")))]
     inner: Any = value
     for _ in range(2):
@@ -99,7 +99,7 @@ def _from_json(topic: str, data: bytes) -> List[Found]:
 
 
 def _protobuf(data: bytes) -> "Iterator[Tuple[int, Union[int, float, bytes]]]":
-    """Field numbers and values, as the wire has them: varints, doubles, bytes."""
+    """Yields field numbers and values: varints, doubles, bytes."""
     at = 0
 
     def varint() -> int:
@@ -113,7 +113,7 @@ def _protobuf(data: bytes) -> "Iterator[Tuple[int, Union[int, float, bytes]]]":
             value |= (byte & 0x7F) << shift
             if byte < 0x80:
                 return value
-        raise Broken("a number without an end")
+        raise Broken("a varint is too long")
 
     while at < len(data):
         key = varint()
@@ -122,7 +122,7 @@ def _protobuf(data: bytes) -> "Iterator[Tuple[int, Union[int, float, bytes]]]":
             continue
         size = {1: 8, 5: 4}.get(key & 7) if key & 7 != 2 else varint()
         if size is None or at + size > len(data):
-            raise Broken("ends within a field, or is no protobuf")
+            raise Broken("ends within a field, or is not protobuf")
         raw = data[at:at + size]
         at += size
         yield key >> 3, struct.unpack("<d", raw)[0] if key & 7 == 1 else raw
@@ -134,7 +134,7 @@ def _fields(data: Any) -> Dict[int, Any]:
 
 def _from_protobuf(topic: str, schema: str, data: bytes) -> Found:
     """PoseInFrame: timestamp, frame_id, pose (position, orientation). FrameTransform: timestamp, parent, child, translation,
-    rotation. Vectors are x, y, z, quaternions x, y, z, w; zeros are not sent."""
+    rotation. Vectors are x, y, z, quaternions x, y, z, w; zeros are not encoded."""
     fields = _fields(data)
     stamp = _fields(fields.get(1, b""))
     t = float(stamp.get(1, 0)) + 1e-9 * float(stamp.get(2, 0))

@@ -1,4 +1,4 @@
-"""Logs of NMEA 0183 sentences: a pose at every fix, with the attitude and depth that were last told."""
+"""Reads logs of NMEA 0183 sentences: a pose for each fix, with the latest attitude and depth."""
 from __future__ import annotations
 
 import pathlib
@@ -11,7 +11,7 @@ from .track import ConvertError, Row, Track, Warn, rising
 
 
 def read_nmea(path: pathlib.Path, warn: Warn, origin: Optional[Geodetic] = None, assumed: Assumptions = Assumptions()) -> Track:
-    """In NED_FRD, seconds of the day. Depth is what `assumed` makes of DPT and DBT."""
+    """Reads a track in NED_FRD, seconds of the day. `assumed` determines the depth from DPT and DBT."""
     poses = NmeaPoses(assumed._replace(origin=origin))
     rows: List[Row] = []
     refused, first_refused, too_early, at = 0, "", 0, 0
@@ -33,15 +33,15 @@ def read_nmea(path: pathlib.Path, warn: Warn, origin: Optional[Geodetic] = None,
         else:
             rows.append(Row(poses.instruments.fix_time_s, pose[0], quaternion_from_rpy(*pose[1])))
     if refused:
-        warn(f"{first_refused}; {refused} lines were left out")
+        warn(f"{first_refused}; lines omitted: {refused}")
     if not rows:
         raise ConvertError(f"{path}: no poses: {'; '.join(poses.unknown()[:2]) or 'no fix with a time'}")
     if too_early:
-        warn(f"{too_early} fixes before the first heading were left out")
+        warn(f"fixes omitted before the first heading: {too_early}")
     for phrase in poses.unknown():
-        warn(f"not told: {phrase}")
+        warn(f"missing: {phrase}")
     kept = [row for _, row in rising([(row.t_s, row) for row in rows])]
     if len(kept) < len(rows):
-        warn(f"{len(rows) - len(kept)} fixes whose time does not rise were left out")
-    kinds = ", ".join(sorted(poses.instruments.heard))
+        warn(f"fixes omitted because their time does not increase: {len(rows) - len(kept)}")
+    kinds = ", ".join(sorted(poses.instruments.received))
     return Track("NED_FRD", f"NMEA {kinds}", kept, [f"origin: {poses.origin}" + ("" if origin else " (the first fix)")])

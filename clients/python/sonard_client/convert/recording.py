@@ -1,4 +1,4 @@
-"""From the messages of a recording, MCAP or bag, to the way of one body: which topic it is, and times without jumps back."""
+"""Makes the track of one body from the messages of a recording (MCAP or bag): selects the topic, drops decreasing times."""
 from __future__ import annotations
 
 from typing import Dict, Iterable, List, NamedTuple, Optional
@@ -14,7 +14,7 @@ class Recorded(NamedTuple):
     schema: str
     logged_s: float
     data: bytes
-    at: int  # byte in the file that an error names
+    at: int  # byte offset in the file, for errors
 
 
 class _Topic:
@@ -27,15 +27,15 @@ def _choice(topics: Dict[str, _Topic], wanted: Optional[str], name: str) -> str:
     listed = ", ".join(f"{topic!r} ({len(t.rows)} poses)" for topic, t in sorted(topics.items()))
     if wanted is not None:
         if wanted not in topics:
-            raise ConvertError(f"{name}: no poses on topic {wanted!r}; there is {listed or 'no topic with poses'}")
+            raise ConvertError(f"{name}: no poses on topic {wanted!r}; topics with poses: {listed or 'none'}")
         return wanted
     if not topics:
-        raise ConvertError(f"{name}: no poses: no message of nav_msgs/Odometry, geometry_msgs/PoseStamped, a transform, or JSON "
-                           "with a position and an orientation")
+        raise ConvertError(f"{name}: no poses found: expected nav_msgs/Odometry, geometry_msgs/PoseStamped, a transform, or "
+                           "JSON with position and orientation")
     best = min(t.rank for t in topics.values())
     candidates = [topic for topic, t in topics.items() if t.rank == best]
     if len(candidates) > 1:
-        raise ConvertError(f"{name}: several topics hold poses: {listed}; say which with --topic")
+        raise ConvertError(f"{name}: several topics have poses: {listed}; select one with --topic")
     return candidates[0]
 
 
@@ -54,10 +54,10 @@ def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optio
             there = topics.setdefault(pose.topic, _Topic(pose.rank, pose.frame))
             there.rows.append((message.logged_s if pose.t_s is None else pose.t_s, pose))
     if faults:
-        warn(f"{faults[0]}" + (f"; {len(faults)} messages were left out" if len(faults) > 1 else "; it was left out"))
+        warn(f"{faults[0]}" + f"; messages omitted: {len(faults)}")
     chosen = _choice(topics, topic, name)
-    of_it = topics[chosen]
-    rows = rising(of_it.rows)
-    if len(rows) < len(of_it.rows):
-        warn(f"{len(of_it.rows) - len(rows)} poses of {chosen} whose time does not rise were left out")
-    return Track(of_it.frame, chosen, [Row(t, f.position_m, f.orientation) for t, f in rows])
+    selected = topics[chosen]
+    rows = rising(selected.rows)
+    if len(rows) < len(selected.rows):
+        warn(f"poses of {chosen} omitted because their time does not increase: {len(selected.rows) - len(rows)}")
+    return Track(selected.frame, chosen, [Row(t, f.position_m, f.orientation) for t, f in rows])

@@ -1,4 +1,4 @@
-"""ROS 1 bags, format 2.0: records of named header fields and data; chunks hold connections and messages."""
+"""Reads ROS 1 bags, format 2.0: records have named header fields and data; chunks contain connections and messages."""
 from __future__ import annotations
 
 import pathlib
@@ -23,7 +23,7 @@ def _header(raw: bytes) -> Header:
         (length,) = struct.unpack_from("<I", raw, at)
         name, equals, value = raw[at + 4:at + 4 + length].partition(b"=")
         if not equals or at + 4 + length > len(raw):
-            raise Broken("a header field without a name")
+            raise Broken("a header field has no name")
         fields[name.decode("latin-1")] = value
         at += 4 + length
     return fields
@@ -32,19 +32,19 @@ def _header(raw: bytes) -> Header:
 def _number(header: Header, name: str) -> int:
     value = header.get(name, b"")
     if len(value) not in (1, 4, 8):
-        raise Broken(f"a record without {name}")
+        raise Broken(f"a record has no {name}")
     return int.from_bytes(value, "little")
 
 
 def _records(data: bytes, begin: int) -> "Iterator[Tuple[int, Header, bytes]]":
-    """Byte, header and data; Broken where the bytes end within a record."""
+    """Yields offset, header and data. Raises Broken if the bytes end within a record."""
     at = begin
     while at < len(data):
         start = at
         parts = []
         for _ in range(2):
             if at + 4 > len(data) or at + 4 + int.from_bytes(data[at:at + 4], "little") > len(data):
-                raise Broken(f"ends within a record, at byte {start}: what comes before it was read")
+                raise Broken(f"ends within a record, at byte {start}; all records before it were read")
             length = int.from_bytes(data[at:at + 4], "little")
             parts.append(data[at + 4:at + 4 + length])
             at += 4 + length
@@ -54,7 +54,7 @@ def _records(data: bytes, begin: int) -> "Iterator[Tuple[int, Header, bytes]]":
 class _Bag:
     def __init__(self, warn: Warn) -> None:
         self.warn = warn
-        self.connections: Dict[int, Tuple[str, str]] = {}  # topic and type
+        self.connections: Dict[int, Tuple[str, str]] = {}  # topic, type
         self.unreadable = ""
 
     def messages(self, data: bytes, begin: int, outer: Optional[int] = None) -> Iterator[Recorded]:
@@ -80,7 +80,7 @@ class _Bag:
             try:
                 inner = unpack(how, content, _number(header, "size"))
             except Unreadable as error:
-                self.unreadable = self.unreadable or f"at byte {at}: a chunk is not readable: {error}"
+                self.unreadable = self.unreadable or f"at byte {at}: a chunk cannot be read: {error}"
                 return
             yield from self.messages(inner, 0, at)
 
@@ -88,7 +88,7 @@ class _Bag:
 def read_rosbag(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
     data = path.read_bytes()
     if not data.startswith(MAGIC):
-        raise ConvertError(f"{path}: at byte 0: no ROS 1 bag of format 2.0")
+        raise ConvertError(f"{path}: at byte 0: not a ROS 1 bag of format 2.0")
     bag = _Bag(warn)
     messages = list(bag.messages(data, len(MAGIC)))
     if bag.unreadable and not messages:

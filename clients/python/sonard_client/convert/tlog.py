@@ -1,5 +1,5 @@
-"""Telemetry logs of ground stations (.tlog): for every MAVLink frame the time of its arrival, microseconds since 1970 in eight
-bytes, the highest first, and the frame.
+"""Reads telemetry logs of ground stations (.tlog): for every MAVLink frame its time of receipt (microseconds since 1970 as a
+big-endian 64-bit integer) and the frame.
 """
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from .mavlink import (BODY_FLU, BODY_FRD, BODY_NED, LOCAL_FRD, LOCAL_NED, MESSAG
 from .track import ConvertError, Source, Stream, Track, Warn, chosen, track_of
 
 STAMP_BYTES = 8
-RESTART_S = 5.0  # frames that come late by less are only late
-SILENCE_S = 5.0  # of a component, after which another one that sends the same message is listened to, as the daemon does
+RESTART_S = 5.0  # a smaller step back is a delayed frame, not a restart
+SILENCE_S = 5.0  # after this, another component with the same message is used, as in the daemon
 FULL = ("ODOMETRY", "SIM_STATE", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE")
 ATTITUDES, POSITIONS = ("ATTITUDE_QUATERNION", "ATTITUDE"), ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
 
 
 class Logged(NamedTuple):
-    arrived_s: float
+    received_s: float
     frame: Frame
 
 
-def _believable(data: bytes, at: int, frame: Frame) -> bool:
-    """Whether a record begins there: an intact frame, or one of an unknown message with another record or the end behind it."""
+def _is_plausible(data: bytes, at: int, frame: Frame) -> bool:
+    """Whether a record begins here: an intact frame, or an unknown message followed by another record or the end."""
     if frame.intact is not None:
         return frame.intact
-    behind = at + STAMP_BYTES + frame.length
-    return behind == len(data) or frame_length(data, behind + STAMP_BYTES) is not None
+    following = at + STAMP_BYTES + frame.length
+    return following == len(data) or frame_length(data, following + STAMP_BYTES) is not None
 
 
 def records(data: bytes, warn: Warn) -> Iterator[Logged]:
-    """The frames whose CRC holds, or cannot be judged since the message holds no pose."""
+    """Yields the frames whose CRC is correct or, for messages without poses, unknown."""
     at, skipped, first_skipped = 0, 0, -1
     while at + STAMP_BYTES < len(data):
         length = frame_length(data, at + STAMP_BYTES)
         if length is not None and at + STAMP_BYTES + length > len(data) and len(data) - at < STAMP_BYTES + 300:
-            warn(f"ends within a frame, at byte {at}: what comes before it was read")
+            warn(f"ends within a frame, at byte {at}; all frames before it were read")
             break
         frame = read_frame(data, at + STAMP_BYTES) if length is not None else None
-        if frame is None or not _believable(data, at, frame):
+        if frame is None or not _is_plausible(data, at, frame):
             first_skipped = at if first_skipped < 0 else first_skipped
             skipped += 1
             at += 1
@@ -50,7 +50,7 @@ def records(data: bytes, warn: Warn) -> Iterator[Logged]:
         yield Logged(1e-6 * int.from_bytes(data[at:at + STAMP_BYTES], "big"), frame)
         at += STAMP_BYTES + frame.length
     if skipped:
-        warn(f"{skipped} bytes are no intact frame, the first at byte {first_skipped}; they were passed over")
+        warn(f"{skipped} bytes outside intact frames were skipped, the first at byte {first_skipped}")
 
 
 def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
@@ -58,13 +58,13 @@ def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
     return unit(parts) if abs(sum(p * p for p in parts) - 1) < 1e-3 else None
 
 
-def _is_served(f: Dict[str, float]) -> bool:
-    """An ODOMETRY. The frame of the world, said for the body, is that of the velocity: the attitude is that of FRD then."""
+def _is_supported(f: Dict[str, float]) -> bool:
+    """Whether the frames of an ODOMETRY are supported. A world frame as child_frame_id is the velocity's; the body is FRD."""
     return f["frame_id"] in (LOCAL_NED, LOCAL_FRD) and f["child_frame_id"] in (BODY_NED, BODY_FRD, BODY_FLU, f["frame_id"])
 
 
 def _of_frd(q: Quaternion) -> Quaternion:
-    """From that of FLU: half a turn about the axis ahead comes before it, q (0, 1, 0, 0)."""
+    """Attitude of the FRD body from that of the FLU body: q (0, 1, 0, 0), half a turn about the forward axis."""
     return -q[1], q[0], q[3], -q[2]
 
 
@@ -79,47 +79,47 @@ def _metres(f: Dict[str, float]) -> "Optional[Tuple[float, float, float]]":
 
 
 def _simulated_place(f: Dict[str, float]) -> Geodetic:
-    """Older simulators send the places as float degrees only, steps of 0.4 m at middle latitudes."""
+    """Older simulators send positions as float degrees only, in steps of 0.4 m at middle latitudes."""
     if f["lat_int"] or f["lon_int"]:
         return Geodetic(1e-7 * f["lat_int"], 1e-7 * f["lon_int"], f["alt"])
     return Geodetic(f["lat"], f["lon"], f["alt"])
 
 
 class _Vehicle:
-    """What one system of the network said of itself; `component`: the only one of its components that is listened to."""
+    """Poses of one MAVLink system. component: use only messages of this component."""
 
     def __init__(self, component: Optional[int] = None) -> None:
         self.component = component
-        self.there: "set[int]" = set()  # components that sent anything
+        self.senders: "set[int]" = set()  # components that sent any message
         self.attitudes: Dict[str, Stream[Quaternion]] = {}
         self.positions: "Dict[str, Stream]" = {}
         self.origin: Optional[Geodetic] = None
-        self.left_out: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id
+        self.unsupported: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id
         self.heading_is_local = False
         self.restarts = 0
-        self._boot: "Optional[Tuple[float, float]]" = None  # the last time since start, and when it arrived
-        self._before_s = 0.0  # what times since start are counted from, after a restart
-        self._heard: "Dict[str, Tuple[int, float]]" = {}  # of each message its component, and when that was last heard
-        self.components: Dict[str, List[int]] = {}  # of each message those listened to, one after the other
-        self.unheard: "Dict[str, Dict[int, int]]" = {}  # of each message those that were not, and how often
+        self._boot: "Optional[Tuple[float, float]]" = None  # the latest time since start, and its time of receipt
+        self._before_s = 0.0  # offset of times since start, after restarts
+        self._current: "Dict[str, Tuple[int, float]]" = {}  # by message: its component and its last time of receipt
+        self.components: Dict[str, List[int]] = {}  # by message: the components used, in sequence
+        self.omitted: "Dict[str, Dict[int, int]]" = {}  # by message: the other components and their number of messages
 
-    def take(self, logged: Logged) -> None:
+    def add(self, logged: Logged) -> None:
         fields = fields_of(logged.frame)
         name = MESSAGES[logged.frame.message_id].name if fields is not None else "HEARTBEAT"
-        if fields is None or name == "HEARTBEAT" or not self._is_heard(name, logged):
+        if fields is None or name == "HEARTBEAT" or not self._is_used(name, logged):
             return
         if name == "GPS_GLOBAL_ORIGIN":
             place = Geodetic(1e-7 * fields["latitude"], 1e-7 * fields["longitude"], 1e-3 * fields["altitude"])
             self.origin = self.origin or (place if place.is_fix else None)
             return
-        # Attitude and position are paired by the vehicle's clock where both carry it; otherwise arrival has to do.
-        t = self._since_start(1e-3 * fields["time_boot_ms"], logged.arrived_s) if "time_boot_ms" in fields else \
-            1e-6 * fields["time_usec"] if fields.get("time_usec") else logged.arrived_s
+        # Attitude and position are paired by the vehicle's clock if both have it, else by time of receipt.
+        t = self._since_start(1e-3 * fields["time_boot_ms"], logged.received_s) if "time_boot_ms" in fields else \
+            1e-6 * fields["time_usec"] if fields.get("time_usec") else logged.received_s
         attitude: Optional[Quaternion] = None
         position: "Optional[tuple]" = None
-        if name == "ODOMETRY" and not _is_served(fields):
+        if name == "ODOMETRY" and not _is_supported(fields):
             frames = fields["frame_id"], fields["child_frame_id"]
-            self.left_out[frames] = self.left_out.get(frames, 0) + 1
+            self.unsupported[frames] = self.unsupported.get(frames, 0) + 1
             return
         if name in ("ODOMETRY", "ATT_POS_MOCAP", "ATTITUDE_QUATERNION", "SIM_STATE"):
             attitude = _quaternion(fields)
@@ -141,34 +141,34 @@ class _Vehicle:
         if position is not None:
             self.positions.setdefault(name, []).append((t, position))
 
-    def _is_heard(self, name: str, logged: Logged) -> bool:
-        """Of several components that send the same message one is listened to: tracks of two are never woven into one."""
+    def _is_used(self, name: str, logged: Logged) -> bool:
+        """Uses one of several components that send the same message, so that their tracks are not mixed."""
         component = logged.frame.component
-        self.there.add(component)
+        self.senders.add(component)
         if self.component is not None and component != self.component:
-            return name == "GPS_GLOBAL_ORIGIN"  # is the whole system's, whoever tells it
-        known = self._heard.get(name)
-        if known is not None and known[0] != component and logged.arrived_s - known[1] <= SILENCE_S:
-            counts = self.unheard.setdefault(name, {})
+            return name == "GPS_GLOBAL_ORIGIN"  # valid for the whole system
+        known = self._current.get(name)
+        if known is not None and known[0] != component and logged.received_s - known[1] <= SILENCE_S:
+            counts = self.omitted.setdefault(name, {})
             counts[component] = counts.get(component, 0) + 1
             return False
-        self._heard[name] = component, logged.arrived_s
+        self._current[name] = component, logged.received_s
         if known is None or known[0] != component:
             self.components.setdefault(name, []).append(component)
         return True
 
     def choices(self) -> List[str]:
-        """Of components, where there was one."""
-        return [f"{name}: component {', later '.join(map(str, taken))} (left out: " +
-                (", ".join(f"{n} messages of {c}" for c, n in sorted(self.unheard.get(name, {}).items())) or "none") + ")"
-                for name, taken in sorted(self.components.items()) if name in self.unheard or len(taken) > 1]
+        """Describes which components were used, for messages that several components sent."""
+        return [f"{name}: component {', later '.join(map(str, used))} (omitted: " +
+                (", ".join(f"{n} messages of {c}" for c, n in sorted(self.omitted.get(name, {}).items())) or "none") + ")"
+                for name, used in sorted(self.components.items()) if name in self.omitted or len(used) > 1]
 
-    def _since_start(self, boot_s: float, arrived_s: float) -> float:
-        """Goes on by the time of arrival when the vehicle starts again."""
+    def _since_start(self, boot_s: float, received_s: float) -> float:
+        """Time since the first start; after a restart continued by the time of receipt."""
         if self._boot is not None and boot_s < self._boot[0] - RESTART_S:
-            self._before_s += self._boot[0] - boot_s + max(0.0, arrived_s - self._boot[1])
+            self._before_s += self._boot[0] - boot_s + max(0.0, received_s - self._boot[1])
             self.restarts += 1
-        self._boot = boot_s, arrived_s
+        self._boot = boot_s, received_s
         return self._before_s + boot_s
 
     def sources(self) -> List[Source]:
@@ -184,47 +184,47 @@ def _vehicle(vehicles: Dict[int, _Vehicle], system: Optional[int], name: str, wa
     with_poses = sorted((n for n, v in vehicles.items() if v.weight), key=lambda n: -vehicles[n].weight)
     if system is not None:
         if system not in vehicles:
-            raise ConvertError(f"{name}: system {system} does not occur; there are " +
+            raise ConvertError(f"{name}: system {system} is not in the log; systems: " +
                                (", ".join(map(str, sorted(vehicles))) or "none"))
         return vehicles[system]
     if len(with_poses) > 1:
-        warn(f"poses of systems {', '.join(map(str, sorted(with_poses)))}; taking {with_poses[0]}, which has most: --system N "
-             "takes another")
+        warn(f"systems with poses: {', '.join(map(str, sorted(with_poses)))}; using {with_poses[0]}, which has most: --system N "
+             "selects another")
     if with_poses:
         return vehicles[with_poses[0]]
-    return next((v for v in vehicles.values() if v.left_out), _Vehicle())  # which can say why
+    return next((v for v in vehicles.values() if v.unsupported), _Vehicle())  # its warnings give the reason
 
 
 def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None,
               system: Optional[int] = None, component: Optional[int] = None) -> Track:
-    """The vehicle's way, NED_FRD; as one component of it tells, where that is named."""
+    """Reads the vehicle's track, NED_FRD; from one component if given."""
     data = path.read_bytes()
     vehicles: Dict[int, _Vehicle] = {}
     frames = 0
     for logged in records(data, warn):
         frames += 1
-        vehicles.setdefault(logged.frame.system, _Vehicle(component)).take(logged)
+        vehicles.setdefault(logged.frame.system, _Vehicle(component)).add(logged)
     if not frames:
-        raise ConvertError(f"{path}: at byte 0: no telemetry log: it holds no MAVLink frame behind a time of eight bytes")
+        raise ConvertError(f"{path}: at byte 0: not a telemetry log: it has no MAVLink frame after an eight-byte time")
     vehicle = _vehicle(vehicles, system, str(path), warn)
-    if component is not None and not vehicle.weight and not vehicle.left_out:
-        there = sorted(set().union(*(v.there for n, v in vehicles.items() if system in (None, n))))
+    if component is not None and not vehicle.weight and not vehicle.unsupported:
+        there = sorted(set().union(*(v.senders for n, v in vehicles.items() if system in (None, n))))
         if component not in there:
-            raise ConvertError(f"{path}: component {component} tells no pose; such messages come from " +
+            raise ConvertError(f"{path}: component {component} sends no poses; components: " +
                                (", ".join(map(str, there)) or "none"))
-    if vehicle.left_out:
+    if vehicle.unsupported:
         warn("ODOMETRY with " + ", ".join(f"frame_id {world:.0f} and child_frame_id {body:.0f} ({n} messages)"
-                                          for (world, body), n in sorted(vehicle.left_out.items())) +
-             " was left out: local NED and FRD (1, 20) are read, with bodies in FRD (12, 8 or that of the world) or FLU (13)")
+                                          for (world, body), n in sorted(vehicle.unsupported.items())) +
+             " was omitted: supported are local NED and FRD (1, 20) with bodies in FRD (12, 8 or the world frame) or FLU (13)")
     choices = vehicle.choices()
     if choices:
-        warn("several components send the same message; taking the one heard first, another one after "
+        warn("several components send the same message; using the first, and another one after "
              f"{SILENCE_S:.0f} s of silence: {'; '.join(choices)}")
     wanted = chosen(vehicle.sources(), source, str(path))
     if wanted.name == "ODOMETRY" and vehicle.heading_is_local:
-        warn("ODOMETRY is in a local frame whose heading need not be north; x is taken as north")
+        warn("ODOMETRY is in a local frame that may not point north; x is used as north")
     if vehicle.restarts:
-        warn(f"the vehicle started again ({vehicle.restarts} x); its clock is carried on by the times of arrival")
+        warn(f"the vehicle restarted ({vehicle.restarts} x); its clock was continued by the times of receipt")
     local = not isinstance(wanted.positions[0][1], Geodetic)
     of_local = vehicle.origin if local and wanted.name.endswith("LOCAL_POSITION_NED") else None
     return track_of(wanted, str(path), warn, origin, of_local)

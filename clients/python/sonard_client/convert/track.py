@@ -1,4 +1,4 @@
-"""What every reader of this folder ends with: times and poses, and how they are written as a trajectory file."""
+"""Tracks (times and poses), common to all readers of this folder, and their output as a trajectory file."""
 from __future__ import annotations
 
 import bisect
@@ -8,14 +8,14 @@ from typing import Callable, List, NamedTuple, Optional, Sequence, TextIO, Tuple
 from ..geodesy import Geodetic, LocalPlane
 from ..rotations import Quaternion, Vector3, between
 
-Warn = Callable[[str], None]  # one sentence; the file's name is put before it
+Warn = Callable[[str], None]  # takes one sentence, without the file's name
 Value = TypeVar("Value")
 Stream = List[Tuple[float, Value]]  # times in s
 LONG_GAP_S = 1.0
 
 
 class ConvertError(Exception):
-    """One sentence: the file, the place in it where there is one, what is wrong, and what to do."""
+    """The text names the file, the location if known, the cause and what to do."""
 
 
 class Row(NamedTuple):
@@ -33,7 +33,7 @@ class Track:
 
 
 class Source(NamedTuple):
-    """Attitudes and positions of one origin; both of the same messages, or of two kinds."""
+    """Attitudes and positions from one type of message, or from two."""
     name: str
     attitudes: Stream[Quaternion]
     positions: "Stream[Union[Vector3, Geodetic]]"
@@ -43,7 +43,7 @@ class Source(NamedTuple):
 
 
 def rising(stream: Stream[Value]) -> Stream[Value]:
-    """Without what comes at or before the time of its predecessor."""
+    """Drops items whose time does not increase."""
     kept: Stream[Value] = []
     for item in stream:
         if not kept or item[0] > kept[-1][0]:
@@ -52,21 +52,21 @@ def rising(stream: Stream[Value]) -> Stream[Value]:
 
 
 def chosen(sources: Sequence[Source], wanted: Optional[str], name: str) -> Source:
-    """The one asked for, or the first that has anything."""
+    """Returns the requested source, or the first with poses."""
     there = [s for s in sources if s.attitudes and s.positions]
     if wanted is not None:
         for source in there:
             if source.name == wanted:
                 return source
-        listed = ", ".join(map(str, there)) or "nothing that is a pose"
-        raise ConvertError(f"{name}: no poses of {wanted!r}; there is {listed}")
+        listed = ", ".join(map(str, there)) or "none"
+        raise ConvertError(f"{name}: no poses of {wanted!r}; sources: {listed}")
     if not there:
-        raise ConvertError(f"{name}: no poses: they need attitude and position, and this file has neither or one of them")
+        raise ConvertError(f"{name}: no poses: the file lacks attitude, position or both")
     return there[0]
 
 
 def paired(attitudes: Stream[Quaternion], positions: Stream[Vector3]) -> List[Row]:
-    """Poses at the times of whichever comes more often; the other is taken between its neighbours, nowhere beyond its ends."""
+    """Poses at the times of the more frequent stream; the other one is interpolated, never extrapolated."""
     by_attitude = len(attitudes) >= len(positions)
     times_of_other = [t for t, _ in (positions if by_attitude else attitudes)]
     rows = []
@@ -86,11 +86,11 @@ def paired(attitudes: Stream[Quaternion], positions: Stream[Vector3]) -> List[Ro
 
 def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] = None,
              own_origin: Optional[Geodetic] = None) -> Track:
-    """In NED_FRD. origin: the one asked for. own_origin: what the file's metres are measured from, where it says so."""
+    """Makes a track in NED_FRD. origin: as requested. own_origin: origin of the file's metres, if it contains one."""
     attitudes, positions = rising(source.attitudes), rising(source.positions)
     late = len(source.attitudes) + len(source.positions) - len(attitudes) - len(positions)
     if late:
-        warn(f"{late} messages of {source.name} whose time does not rise were left out")
+        warn(f"messages of {source.name} omitted because their time does not increase: {late}")
     geodetic = isinstance(positions[0][1], Geodetic)
     comments: List[str] = []
     if geodetic:
@@ -107,8 +107,8 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
                 mine, theirs = LocalPlane(origin), LocalPlane(own_origin)
                 local = [(t, mine.ned_from(theirs, p)) for t, p in local]
         elif origin is not None:
-            raise ConvertError(f"{name}: positions of {source.name} are metres from a place that the file does not tell; leave "
-                               "the origin out, or choose a source with latitude and longitude")
+            raise ConvertError(f"{name}: positions of {source.name} are metres from an unknown origin; omit the origin, or "
+                               "select a source with latitude and longitude")
     rows = paired(attitudes, local)
     if not rows:
         raise ConvertError(f"{name}: attitudes and positions of {source.name} do not overlap in time")
@@ -116,15 +116,15 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
 
 
 def gap_warning(rows: Sequence[Row]) -> str:
-    """Of the longest time without a pose; empty where there is none worth a word."""
+    """Describes the longest gap between poses; empty if it is short."""
     longest = max(((b.t_s - a.t_s, a.t_s) for a, b in zip(rows, rows[1:])), default=(0.0, 0.0))
     if longest[0] <= LONG_GAP_S:
         return ""
-    return f"no pose for {longest[0]:.1f} s after second {longest[1] - rows[0].t_s:.1f}; players go straight on between poses"
+    return f"no pose for {longest[0]:.1f} s after second {longest[1] - rows[0].t_s:.1f}; playback interpolates linearly"
 
 
 def write_csv(track: Track, out: TextIO, body: str = "", keep_time: bool = False) -> None:
-    """Times begin at 0 unless keep_time; a comment tells what 0 is. With a body's name there is a column for it."""
+    """Times start at 0 unless keep_time; a comment gives the original start. `body` adds a column with that name."""
     zero_s = 0.0 if keep_time else track.rows[0].t_s
     out.write(f"# frame: {track.frame}\n")
     for comment in [f"source: {track.source}"] + track.comments + ([] if keep_time else [f"t = 0 was {zero_s:.6f} s"]):

@@ -1,0 +1,134 @@
+#include <algorithm>
+#include <cmath>
+
+#include "clients/sonarctl/doctor/checks.hpp"
+#include "core/text/format.hpp"
+
+namespace sonar::clients::doctor {
+namespace {
+
+constexpr double largest_clock_difference_s = 0.5;  // stamps of WALL poses are refused from about one second on
+
+bool serves(const control::DaemonStatus& status, const SonarFacts& sonar) {
+  return std::any_of(status.sonars.begin(), status.sonars.end(), [&sonar](const control::SonarStatus& s) {
+    return s.advertised == sonar.at.host || s.listens == text_from(sonar.at);
+  });
+}
+
+void check_control(const Facts& facts, std::vector<Finding>& findings) {
+  const ControlFacts& control = facts.control;
+  const std::string at = "control tcp " + text_from(control.at);
+  if (!control.status) {
+    const bool ours = std::any_of(facts.sonars.begin(), facts.sonars.end(), [](const SonarFacts& s) {
+      return s.on_this_host && (s.stream.outcome == StreamFacts::Outcome::pings || !s.clients.empty());
+    });
+    if (!control.given && !ours && !control.token_required)
+      return;  // a sonar of another computer, or none: no daemon is expected here
+    if (control.token_required)
+      findings.push_back({Level::warn, "control",
+                          at + " requires a token, and none was given: poses, clients and engine were not checked",
+                          "give it: --token-file FILE, the file named by control.token_file of its configuration"});
+    else
+      findings.push_back({control.given ? Level::fail : Level::warn, "control", control.error,
+                          "without it poses, clients and engine were not checked"});
+    return;
+  }
+  const control::DaemonStatus& status = *control.status;
+  findings.push_back({Level::ok, "control",
+                      at + " answers: sonard " + status.version + ", " + std::to_string(status.sonars.size()) +
+                          (status.sonars.size() == 1 ? " sonar, " : " sonars, ") + status.clock + " clock",
+                      ""});
+  for (const SonarFacts& sonar : facts.sonars)
+    if (!serves(status, sonar))
+      findings.push_back({Level::warn, "control", "that sonard does not serve " + sonar.at.host,
+                          "give the control stream of the sonard that does with --control"});
+  if (!status.engine.empty()) findings.push_back({Level::ok, "engine", "trace backend: " + status.engine, ""});
+}
+
+/// True when the daemon reports faults of the vehicle's poses.
+bool has_notes(const control::DaemonStatus& status, const std::string& vehicle) {
+  return std::any_of(status.notes.begin(), status.notes.end(),
+                     [&vehicle](const control::Note& note) { return note.vehicle == vehicle; });
+}
+
+void check_poses(const control::DaemonStatus& status, std::vector<Finding>& findings) {
+  for (const control::VehicleStatus& v : status.vehicles) {
+    if (v.stale)
+      findings.push_back({Level::warn, "poses", "poses of " + v.name + " have stopped, the last came from " + v.source,
+                          "start the sender again, or choose poses.on_stale for the time without poses"});
+    else if (!has_notes(status, v.name))
+      findings.push_back({Level::ok, "poses", "poses of " + v.name + ": " + v.source, ""});
+  }
+  for (const control::Note& note : status.notes) findings.push_back({Level::warn, "note", note.text, note.cure});
+  if (status.poses.refused > 0)
+    findings.push_back({Level::warn, "poses",
+                        std::to_string(status.poses.refused) + " messages were refused as poses, " +
+                            std::to_string(status.poses.accepted) + " accepted",
+                        "see sonard's log for the reason: not JSON, the frame, a quaternion's norm, a name, the clock"});
+}
+
+void check_http(const Facts& facts, std::vector<Finding>& findings) {
+  const HttpFacts& http = facts.http;
+  const std::string url = "http://" + text_from(http.at) + "/healthz";
+  if (http.place == HttpFacts::Place::not_served) {
+    findings.push_back({Level::ok, "http", "HTTP is not served: no metrics, no curl", ""});
+  } else if (http.place == HttpFacts::Place::only_over_there) {
+    findings.push_back({Level::ok, "http", url + " accepts only clients on that computer; not checked", ""});
+  } else if (http.code == 200) {
+    findings.push_back({Level::ok, "http", url + " returns " + http.text, ""});
+  } else if (http.code != 0) {
+    findings.push_back({http.code >= 500 ? Level::fail : Level::warn, "http",
+                        url + " answers " + std::to_string(http.code) + ": " + http.text,
+                        http.code == 401 || http.code == 403 ? "it requires a token or another host name, see docs/control.md"
+                                                             : "see sonard's log"});
+  } else if (http.given || facts.control.status) {
+    findings.push_back({http.given ? Level::fail : Level::warn, "http", url + " does not answer: no metrics, no curl",
+                        "give its address, control.http of the configuration, with --http HOST:PORT"});
+  }
+}
+
+/// When one address was given, the other sonars were not examined.
+bool was_examined(const Facts& facts, const control::SonarStatus& sonar) {
+  return !facts.address_given || std::any_of(facts.sonars.begin(), facts.sonars.end(),
+                                             [&sonar](const SonarFacts& s) { return s.at.host == sonar.advertised; });
+}
+
+void check_heads(const Facts& facts, std::vector<Finding>& findings) {
+  for (const BlueViewHead& head : facts.heads)
+    findings.push_back({Level::ok, "blueview",
+                        "BlueView head " + head.model + " (" + head.serial + ") answers discovery at tcp " + head.at, ""});
+  if (!facts.control.status) return;
+  for (const control::SonarStatus& sonar : facts.control.status->sonars) {
+    if (!sonar.listens.ends_with(":14750") || !was_examined(facts, sonar)) continue;
+    const auto answered = [&sonar](const BlueViewHead& head) {
+      return head.at == sonar.advertised + ":14750" || head.at == sonar.listens;
+    };
+    if (std::none_of(facts.heads.begin(), facts.heads.end(), answered))
+      findings.push_back({Level::warn, "blueview",
+                          "BlueView sonar " + sonar.name + " at " + sonar.listens + " does not answer discovery on udp 14751",
+                          "hosts that are given its address need no discovery; else see whether a firewall drops udp 14751"});
+  }
+}
+
+void check_clocks(const ControlFacts& control, std::vector<Finding>& findings) {
+  if (!control.clock_ahead_s) return;
+  const std::string text = text::format("clock of that computer is %.2f s %s this one", std::abs(*control.clock_ahead_s),
+                                        *control.clock_ahead_s > 0 ? "ahead of" : "behind");
+  if (std::abs(*control.clock_ahead_s) < largest_clock_difference_s)
+    findings.push_back({Level::ok, "clock", text, ""});
+  else
+    findings.push_back({Level::warn, "clock", text + ": poses stamped with WALL time are refused from one second on",
+                        "set both by NTP or PTP (timedatectl, chronyc tracking), or send ARRIVAL stamps"});
+}
+
+}  // namespace
+
+void check_daemon(const Facts& facts, std::vector<Finding>& findings) {
+  check_control(facts, findings);
+  if (facts.control.status) check_poses(*facts.control.status, findings);
+  check_http(facts, findings);
+  check_heads(facts, findings);
+  check_clocks(facts.control, findings);
+}
+
+}  // namespace sonar::clients::doctor

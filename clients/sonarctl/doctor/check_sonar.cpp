@@ -1,0 +1,264 @@
+#include <algorithm>
+
+#include "clients/sonarctl/doctor/checks.hpp"
+#include "core/text/format.hpp"
+
+namespace sonar::clients::doctor {
+namespace {
+
+using Outcome = StreamFacts::Outcome;
+using text::format;
+
+constexpr double fastest_hz = 40;  // that an Oculus can be asked for
+constexpr const char* less_to_compute = "fewer beams, less range, more threads (engine.threads), or less else on this computer";
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string text_of(const PortHolder& holder) {
+  if (holder.pid == 0) return "a program of another user";
+  return holder.program + " (pid " + std::to_string(holder.pid) + ")";
+}
+
+bool is_loopback(const std::string& host) { return host.starts_with("127."); }
+
+const ReceivedStatus* status_from(const Facts& facts, const std::string& host) {
+  for (const ReceivedStatus& received : facts.status.received)
+    if (received.advertised == host) return &received;
+  for (const ReceivedStatus& received : facts.status.received)
+    if (received.from == host) return &received;
+  return nullptr;
+}
+
+/// The findings of one sonar; `prefix_` names it when there are several.
+class SonarChecks {
+ public:
+  SonarChecks(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings)
+      : facts_(facts), sonar_(sonar), findings_(findings), at_("tcp " + text_from(sonar.at)) {
+    if (facts.sonars.size() > 1) prefix_ = (sonar.name.empty() ? sonar.at.host : sonar.name) + ": ";
+  }
+
+  void run() {
+    if (!sonar_.unresolved.empty()) return add(Level::fail, "address", sonar_.unresolved, "");
+    if (sonar_.out_of_time)
+      return add(Level::warn, "ping", sonar_.at.host + " was not examined: the time limit was reached",
+                 "raise it with --within SECONDS, or give the address of this sonar alone");
+    if (!sonar_.blueview) check_status();
+    check_connection();
+    if (sonar_.stream.outcome == Outcome::pings) check_rate();
+    if (sonar_.stream.outcome == Outcome::not_tried) check_rate_of_others();
+  }
+
+ private:
+  void add(Level level, const std::string& check, const std::string& text, const std::string& cure) {
+    findings_.push_back({level, check, prefix_ + text, cure});
+  }
+
+  bool answers() const { return sonar_.stream.outcome >= Outcome::closed_without_a_byte || !sonar_.clients.empty(); }
+
+  void check_status() {
+    const std::string port = std::to_string(facts_.status.on.port);
+    const ReceivedStatus* received = status_from(facts_, sonar_.at.host);
+    if (!facts_.status.error.empty()) {
+      const std::string holder =
+          facts_.status.holders.empty() ? "" : ", held without address reuse by " + text_of(facts_.status.holders.front());
+      return add(Level::warn, "status", "cannot listen on udp " + port + holder + ": " + facts_.status.error,
+                 "a second driver cannot listen either; stop that program to check the broadcast");
+    }
+    if (received == nullptr) {
+      if (answers()) check_silence(port);
+      return;  // otherwise the finding of the connection names the fault
+    }
+    if (!received->complaints.empty())
+      return add(Level::fail, "status",
+                 "the status from " + received->from + " is not what drivers expect: " + joined(received->complaints),
+                 "is it a sonar? sonard sends 142 bytes");
+    std::string text = "status broadcast received back on udp " + port + " from " + received->from;
+    if (received->advertised == received->from) return add(Level::ok, "status", text, "");
+    text += ", which tells drivers to connect to " + received->advertised;
+    const bool reachable = answers() && sonar_.at.host == received->advertised;
+    add(reachable ? Level::ok : Level::fail, "status", text + (reachable ? "" : ", where no sonar answers"),
+        reachable ? "" : "set advertise_ip of the sonar to an address that reaches it from here");
+  }
+
+  /// The sonar answers, but its status message does not arrive.
+  void check_silence(const std::string& port) {
+    std::string text = "no status from " + sonar_.at.host + " on udp " + port + " within " +
+                       format("%.1f", facts_.status.waited_s) + " s: drivers that search for the sonar will not find it";
+    std::string cure =
+        "a firewall may drop udp " + port + " (nft list ruleset; ufw status), or status_to of the sonar must name this computer";
+    if (sonar_.reported)
+      cure = "it is sent to " + joined(sonar_.reported->status_to) + ": does that reach this computer? See status_to; " +
+             (is_loopback(sonar_.at.host) ? "127.255.255.255 reaches every listener here" : "a firewall may drop udp " + port);
+    add(Level::fail, "status", text, cure);
+  }
+
+  void check_connection() {
+    const StreamFacts& s = sonar_.stream;
+    switch (s.outcome) {
+      case Outcome::not_tried:
+        return add(Level::ok, "ping",
+                   sonar_.at.host + " is busy: " + joined(sonar_.clients) + " is connected; not connecting" + stats_of_daemon(),
+                   "");
+      case Outcome::refused:
+        return add(Level::fail, "ping", at_ + " refuses the connection: no program listens there", where_else());
+      case Outcome::unreachable:
+        return add(Level::fail, "ping", at_ + " does not answer: " + s.error, way_there());
+      case Outcome::closed_without_a_byte:
+        return add(Level::warn, "ping",
+                   at_ + " closed the connection without a byte: all its client slots are taken" +
+                       (sonar_.clients.empty() ? "" : " (" + joined(sonar_.clients) + ")"),
+                   "stop the other client, or raise clients.max of the sonar");
+      case Outcome::no_ping:
+        return check_no_ping();
+      case Outcome::pings:
+        break;
+    }
+    const std::string first = at_ + " accepts, first ping decoded after " + format("%.0f", s.first_ping_ms) +
+                              " ms: " + std::to_string(s.beams) + " beams x " + std::to_string(s.rows) + " ranges, " +
+                              std::to_string(s.bits) + " bit, ";
+    if (s.broken > 0 || s.junk_bytes > 0)
+      return add(Level::fail, "ping",
+                 first + (s.broken > 0 ? std::to_string(s.broken) + " of " + std::to_string(s.pings) +
+                                             " pings broken: " + s.first_complaint
+                                       : std::to_string(s.junk_bytes) + " bytes between messages that belong to none"),
+                 "sonarctl listen shows every ping; if this is sonard, please report it");
+    add(Level::ok, "ping", first + "size fields consistent", "");
+  }
+
+  void check_no_ping() {
+    const StreamFacts& s = sonar_.stream;
+    const std::string waited = " within " + format("%.1f", s.waited_s) + " s";
+    if (!s.error.empty())  // not the greeting of sonard
+      return add(Level::fail, "ping", s.error, "another program has the port; stop it, or give the sonar's own address");
+    if (s.junk_bytes > 0 && s.dummies == 0) {
+      std::string who;
+      for (const PortHolder& holder : sonar_.listeners) who = ": " + text_of(holder) + " listens on " + holder.at;
+      return add(Level::fail, "ping",
+                 at_ + " sends " + std::to_string(s.junk_bytes) + " bytes that are not Oculus messages" + who,
+                 "another program has the port; stop it, or give the sonar's own address");
+    }
+    const std::string text = at_ + " accepts, but no ping came" + waited;
+    if (!sonar_.listeners.empty() && sonar_.listeners.front().pid != 0 && sonar_.listeners.front().program != "sonard")
+      return add(Level::fail, "ping", text + ": " + text_of(sonar_.listeners.front()) + " has the port, not sonard",
+                 "stop it, or give the sonar's own address");
+    if (sonar_.reported && sonar_.reported->figures.refused > 0)
+      return add(Level::fail, "ping",
+                 text + ": the engine refused " + std::to_string(sonar_.reported->figures.refused) + " of them",
+                 "see the reason in sonard's log");
+    if (clock() == "lockstep" || clock() == "follow")
+      return add(Level::warn, "ping",
+                 text + ": with clock: " + clock() + " time stops until " +
+                     (clock() == "lockstep" ? "a client requests a step" : "the next pose comes"),
+                 clock() == "lockstep" ? "advance it meanwhile: sonarctl step 0.1 --count 20" : "start the sender of poses");
+    add(Level::fail, "ping", text,
+        s.asked ? "is the computer overloaded, or sonard stopped (SIGSTOP, a debugger)? See its log"
+                : "its client requested standby or single pings; sonarctl status shows the settings");
+  }
+
+  /// The clock mode that the daemon reports: "realtime", "stepped", ...; empty without a daemon.
+  std::string clock() const { return facts_.control.status ? facts_.control.status->clock : std::string(); }
+
+  /// Names an address where a sonar does listen.
+  std::string where_else() const {
+    std::string others;
+    for (const PortHolder& daemon : facts_.daemons) others += (others.empty() ? "" : ", ") + daemon.at;
+    if (!others.empty()) {
+      const std::string host = facts_.daemons.front().at.substr(0, facts_.daemons.front().at.find(':'));
+      return text_of(facts_.daemons.front()) + " listens on " + others + ": sonarctl doctor " + host;
+    }
+    for (const ReceivedStatus& received : facts_.status.received)
+      if (received.advertised != sonar_.at.host)
+        return "a status broadcast names a sonar at " + received.advertised + ": sonarctl doctor " + received.advertised;
+    if (sonar_.on_this_host)
+      return "start it: sonard serves its demo on 127.0.0.2 (a BlueView head: sonard --demo blueview), sonard FILE the sonars of "
+             "a "
+             "configuration";
+    return "start sonard on that computer; its banner names the address of each sonar";
+  }
+
+  std::string way_there() const {
+    if (sonar_.on_this_host)
+      return "a firewall on this computer may drop tcp " + std::to_string(sonar_.at.port) + " (nft list ruleset)";
+    return "the address is not on this host: if sonard should serve it here, add it: ip addr add " + sonar_.at.host +
+           "/24 dev eth0; if it is another computer, check that it is on, its network and its firewall";
+  }
+
+  std::string stats_of_daemon() const {
+    if (!sonar_.reported) return " (--take connects anyway)";
+    const control::SonarFigures& f = sonar_.reported->figures;
+    return "; it reports " + std::to_string(f.served) + " pings served, " + std::to_string(f.dropped) + " dropped, latency " +
+           format("%.0f", f.latency_ms_p50) + " ms p50, " + format("%.0f", f.latency_ms_p99) + " ms p99 (--take connects anyway)";
+  }
+
+  std::string latency_text() const {
+    const StreamFacts& s = sonar_.stream;
+    const auto both = [](double p50, double p99) {
+      return ", image latency " + format("%.0f", p50) + " ms p50, " + format("%.0f", p99) + " ms p99";
+    };
+    if (s.latency_p50_ms) return both(*s.latency_p50_ms, s.latency_p99_ms.value_or(*s.latency_p50_ms));
+    if (sonar_.reported && sonar_.reported->figures.latency_ms_p99 > 0)
+      return both(sonar_.reported->figures.latency_ms_p50, sonar_.reported->figures.latency_ms_p99);
+    if (s.spread_p99_ms) return ", images come " + format("%.0f", *s.spread_p99_ms) + " ms later than the earliest, p99";
+    return {};
+  }
+
+  /// Computing time of one ping: median of those just received, else the mean since the start of the daemon; 0 = unknown.
+  double computing_ms() const {
+    if (sonar_.stream.computing_ms) return *sonar_.stream.computing_ms;
+    return sonar_.reported ? sonar_.reported->figures.simulation_ms : 0;
+  }
+  bool too_slow_for(double rate_hz) const { return computing_ms() * rate_hz > 1000; }
+  std::string computing_text() const {
+    const double ms = computing_ms(), hz = 1000 / ms;
+    return "computing takes " + format("%.0f", ms) + " ms per ping: " + format("%.*f", hz < 10 ? 1 : 0, hz) + " Hz at most here";
+  }
+
+  /// The rate that another, connected client requested.
+  void check_rate_of_others() {
+    if (!sonar_.reported || !sonar_.reported->pinging || clock() != "realtime" || !too_slow_for(sonar_.reported->rate_hz)) return;
+    add(Level::warn, "rate",
+        "rate " + format("%g", sonar_.reported->rate_hz) + " Hz requested by " + joined(sonar_.clients) + ", " +
+            computing_text() + ", " + std::to_string(sonar_.reported->figures.skipped_ticks) + " ticks skipped",
+        less_to_compute);
+  }
+
+  void check_rate() {
+    const StreamFacts& s = sonar_.stream;
+    if (s.pings < 2)
+      return add(Level::warn, "rate", "one ping only in " + format("%.1f", s.waited_s) + " s: the rate cannot be measured",
+                 "sonarctl listen " + sonar_.at.host + " measures for longer");
+    if (!clock().empty() && clock() != "realtime")
+      return add(Level::ok, "rate",
+                 format("%.1f", s.rate_hz) +
+                     " pings per second of this computer's clock; the daemon uses another (clock: " + clock() + ")",
+                 "");
+    const double expected_hz = s.asked && !sonar_.blueview ? s.asked_hz : sonar_.reported ? sonar_.reported->rate_hz : 0;
+    std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
+    if (expected_hz > 0) text += (sonar_.blueview ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
+    text += latency_text();
+    const bool slow = expected_hz > 0 && s.rate_hz < 0.85 * expected_hz;
+    if (too_slow_for(slow || sonar_.blueview ? expected_hz : fastest_hz)) text += ", " + computing_text();
+    if (slow) return add(Level::warn, "rate", text + ": the simulation is slower than the rate", less_to_compute);
+    if (s.missing > 0)
+      return add(Level::warn, "rate", text + ", " + std::to_string(s.missing) + " pings missing",
+                 "the reader or the network is too slow: outbox of the sonar, sonarctl listen");
+    add(Level::ok, "rate", text, "");
+  }
+
+  const Facts& facts_;
+  const SonarFacts& sonar_;
+  std::vector<Finding>& findings_;
+  std::string at_, prefix_;
+};
+
+}  // namespace
+
+void check_sonar(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings) {
+  SonarChecks(facts, sonar, findings).run();
+}
+
+}  // namespace sonar::clients::doctor

@@ -1,0 +1,103 @@
+#include "clients/sonarctl/doctor/checks.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "core/text/format.hpp"
+
+namespace sonar::clients::doctor {
+namespace {
+
+const char* name_of(Level level) { return level == Level::ok ? "ok" : level == Level::warn ? "warn" : "fail"; }
+
+std::ptrdiff_t count_of(const std::vector<Finding>& findings, Level level) {
+  return std::count_if(findings.begin(), findings.end(), [level](const Finding& f) { return f.level == level; });
+}
+
+std::string counted(std::ptrdiff_t count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+/// Two sonars that drivers cannot tell apart.
+void check_identities(const StatusFacts& status, std::vector<Finding>& findings) {
+  for (std::size_t i = 0; i < status.received.size(); ++i) {
+    for (std::size_t k = i + 1; k < status.received.size(); ++k) {
+      const ReceivedStatus &a = status.received[i], &b = status.received[k];
+      if (a.device_id != b.device_id || a.advertised == b.advertised) continue;
+      findings.push_back({Level::warn, "identity",
+                          "the sonars at " + a.advertised + " and " + b.advertised + " have the same device id, " +
+                              std::to_string(a.device_id) + ": drivers cannot tell them apart",
+                          "give each its own device_id in the configuration"});
+    }
+  }
+}
+
+bool reserves(const std::string& list, int port) {
+  for (std::size_t begin = 0; begin < list.size();) {
+    const std::size_t end = std::min(list.find(',', begin), list.size());
+    int low = 0, high = 0;
+    const std::string part = list.substr(begin, end - begin);
+    const int read = std::sscanf(part.c_str(), "%d-%d", &low, &high);
+    if (read == 1) high = low;
+    if (read >= 1 && low <= port && port <= high) return true;
+    begin = end + 1;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<Finding> run_checks(const Facts& facts) {
+  std::vector<Finding> findings;
+  for (const SonarFacts& sonar : facts.sonars) check_sonar(facts, sonar, findings);
+  check_identities(facts.status, findings);
+  check_daemon(facts, findings);
+  const bool heads_only = std::all_of(facts.sonars.begin(), facts.sonars.end(), [](const SonarFacts& s) { return s.blueview; });
+  if (!heads_only || facts.sonars.empty()) check_ports(facts.kernel_ports, findings);  // theirs are below that range
+  return findings;
+}
+
+void check_ports(const KernelPorts& ports, std::vector<Finding>& findings) {
+  if (!ports.known) return;
+  const std::string range = std::to_string(ports.low) + "-" + std::to_string(ports.high);
+  std::string exposed;
+  for (const int port : {52100, 52102})
+    if (port >= ports.low && port <= ports.high && !reserves(ports.reserved, port))
+      exposed.append(exposed.empty() ? "" : ",").append(std::to_string(port));
+  if (exposed.empty()) {
+    const bool outside = ports.high < 52100 || ports.low > 52102;
+    findings.push_back({Level::ok, "ports",
+                        "ports 52100,52102 are " + (outside ? "outside the ephemeral range " + range : std::string("reserved")),
+                        ""});
+    return;
+  }
+  const std::string all = ports.reserved.empty() ? "52100,52102" : ports.reserved + ",52100,52102";
+  findings.push_back({Level::warn, "ports",
+                      "ports " + exposed + " lie in the ephemeral range " + range + ": an outgoing connection may take one first",
+                      "reserve: sysctl net.ipv4.ip_local_reserved_ports=" + all});
+}
+
+std::string text_from(const std::vector<Finding>& findings) {
+  std::string text;
+  for (const Finding& f : findings) {
+    text += text::format("%-6s", name_of(f.level)) + f.text + (f.cure.empty() ? "" : "; " + f.cure) + "\n";
+  }
+  return text + counted(std::ssize(findings), "check") + ", " + counted(count_of(findings, Level::fail), "error") + ", " +
+         counted(count_of(findings, Level::warn), "warning") + "\n";
+}
+
+std::string json_from(const std::vector<Finding>& findings) {
+  nlohmann::json lines = nlohmann::json::array();
+  for (const Finding& f : findings)
+    lines.push_back({{"level", name_of(f.level)}, {"check", f.check}, {"text", f.text}, {"cure", f.cure}});
+  const nlohmann::json out{{"findings", lines},
+                           {"checks", findings.size()},
+                           {"errors", count_of(findings, Level::fail)},
+                           {"warnings", count_of(findings, Level::warn)}};
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+bool any_failed(const std::vector<Finding>& findings) { return count_of(findings, Level::fail) > 0; }
+
+}  // namespace sonar::clients::doctor

@@ -1,0 +1,32 @@
+// Interprets the facts: one finding per check, with cause and cure of a fault. Pure functions, tested without a network.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "clients/sonarctl/doctor/facts.hpp"
+
+namespace sonar::clients::doctor {
+
+enum class Level { ok, warn, fail };
+struct Finding {
+  Level level = Level::ok;
+  std::string check;  // "status", "ping", "rate", "ports", ...: for programs
+  std::string text;
+  std::string cure;  // empty for Level::ok
+};
+
+std::vector<Finding> run_checks(const Facts& facts);
+
+/// Parts of run_checks().
+void check_sonar(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings);
+void check_daemon(const Facts& facts, std::vector<Finding>& findings);
+void check_ports(const KernelPorts& ports, std::vector<Finding>& findings);
+
+/// "ok    text" or "warn  text; cure"; lines end with a newline, the last is "5 checks, 0 errors, 1 warning".
+std::string text_from(const std::vector<Finding>& findings);
+/// One object: the findings and their number per level.
+std::string json_from(const std::vector<Finding>& findings);
+bool any_failed(const std::vector<Finding>& findings);
+
+}  // namespace sonar::clients::doctor

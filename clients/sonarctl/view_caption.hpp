@@ -1,0 +1,28 @@
+// The line under a picture: ping number, geometry, rate and number of missed pings. Used by view; no I/O.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+
+#include "clients/sonarctl/ping_log.hpp"
+
+namespace sonar::clients {
+
+class ViewCaption {
+ public:
+  void add(const AnyPing& ping, Seconds at);
+  std::uint64_t pings() const { return pings_; }
+  /// "ping 123  10.00 m  2.1 MHz  512 beams x 437 rows  10.0 Hz  no gaps"; the rate from the second ping on.
+  std::string text() const;
+
+ private:
+  static constexpr std::size_t remembered = 20;  // arrivals that determine the rate
+  oculus::PingSequence sequence_;
+  bool has_sequence_ = false;  // false for heads, whose numbers may skip
+  std::deque<Seconds> arrivals_;
+  std::uint64_t pings_ = 0;
+  std::string ping_text_;
+};
+
+}  // namespace sonar::clients

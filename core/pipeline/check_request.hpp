@@ -1,0 +1,13 @@
+// Which requests can be simulated. Every engine checks before a ping.
+#pragma once
+
+#include <string>
+
+#include "core/sonar/ping.hpp"
+
+namespace sonar {
+
+/// A sentence with the reason why a request cannot be simulated; empty when it can.
+std::string why_invalid(const PingRequest& request);
+
+}  // namespace sonar

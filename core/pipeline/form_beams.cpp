@@ -1,0 +1,76 @@
+#include "core/pipeline/form_beams.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <utility>
+
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+
+namespace sonar {
+
+void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
+                BeamSignals& out) {
+  const int floats = static_cast<int>(out.stride), first_sample = out.first_sample;
+  // Eq. 9 for all beams at once: a convolution over columns that are even in u = sin(azimuth) (beam_transform.hpp).
+  if (beam_weights.transform) {
+    scratch.transform.resize(beam_weights.transform->work_floats());
+    kernels.transform_beams(beam_weights.transform->tables(), columns.first_sample(0) + 2 * first_sample, columns.stride, floats,
+                            scratch.transform.data(), out.data.data(), floats);
+    return;
+  }
+  scratch.window.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>(columns.columns));
+  for (int k = 0; k < columns.columns; ++k) {
+    const float* from = columns.first_sample(k) + 2 * first_sample;
+    std::copy(from, from + floats, scratch.window.data() + static_cast<std::ptrdiff_t>(k) * floats);
+  }
+  // Eq. 9 as a banded product: four beams a panel, over the columns within half_band of them.
+  for (const BeamPanel& panel : beam_weights.panels)
+    kernels.form_beam_panel(scratch.window.data() + static_cast<std::ptrdiff_t>(panel.first_column) * floats, floats,
+                            beam_weights.weights.data() + panel.weights, panel.count, out.beam(panel.first_beam), floats);
+}
+
+SampledPulse place_pulse(const PointEcho& point, const PingPlan& plan, int from, int to) {
+  const int middle = static_cast<int>(std::floor(point.sample));
+  SampledPulse pulse;
+  // Only the samples within half the pulse's taps of the echo are not 0.
+  pulse.first_sample = std::max(middle - plan.taps / 2 + 1, from);
+  const int end = std::min(middle + plan.taps / 2 + 1, to);
+  for (int n = pulse.first_sample; n < end; ++n)
+    pulse.values.push_back(point.amplitude * plan.pulse_shape.at(plan.sample_time_s * (n - point.sample)));
+  return pulse;
+}
+
+void add_points(std::span<const PointEcho> points, const PingPlan& plan, BeamSignals& out) {
+  struct Placed {
+    double sine;
+    SampledPulse pulse;
+  };
+  std::vector<Placed> here;
+  for (const PointEcho& point : points) {
+    SampledPulse pulse = place_pulse(point, plan, out.first_sample, out.first_sample + out.samples);
+    if (!pulse.values.empty()) here.push_back({point.sine, std::move(pulse)});
+  }
+  if (here.empty()) return;
+
+  // A point's weight is the pattern at its exact direction, W(u - u_j), not that of its nearest column.
+  const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
+  std::vector<std::complex<double>> sum;
+  for (int j = 0; j < out.beams; ++j) {
+    sum.assign(static_cast<std::size_t>(out.samples), 0.0);
+    for (const auto& [sine, pulse] : here) {
+      const double weight = pattern(sine - plan.beam_sine[static_cast<std::size_t>(j)]);
+      const auto first = static_cast<std::size_t>(pulse.first_sample - out.first_sample);
+      for (std::size_t i = 0; i < pulse.values.size(); ++i) sum[first + i] += weight * pulse.values[i];
+    }
+    float* beam = out.beam(j);
+    for (int n = 0; n < out.samples; ++n) {
+      // In expected power the points still add coherently among themselves; the power of their sum is added.
+      const std::complex<double> s = sum[static_cast<std::size_t>(n)];
+      beam[2 * n] += static_cast<float>(plan.expected_power ? std::norm(s) : s.real());
+      if (!plan.expected_power) beam[2 * n + 1] += static_cast<float>(s.imag());
+    }
+  }
+}
+
+}  // namespace sonar

@@ -1,0 +1,110 @@
+#include "core/pipeline/multipath/multipath_paths.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar {
+namespace {
+
+constexpr double most_grazing_cosine = 0.17;  // faces that do not mirror at 10 degrees grazing are left out
+
+/// Mirroring of places: p - 2 (n . p + height) n.
+struct Image {
+  Rotation turn;
+  Vec3d shift_m;
+  Vec3d of(Vec3d p) const { return turn * p + shift_m; }
+};
+Image image_in(const FlatMirror& m) {
+  const double n[3] = {m.normal.x, m.normal.y, m.normal.z};
+  Image image;
+  // Householder matrix I - 2 n n^T, and the shift of the plane.
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) image.turn.m[i][j] -= 2 * n[i] * n[j];
+  image.shift_m = (-2 * m.height_m) * m.normal;
+  return image;
+}
+
+const FlatMirror& at(const std::vector<FlatMirror>& mirrors, int i) { return mirrors[static_cast<std::size_t>(i)]; }
+
+}  // namespace
+
+std::vector<FlatMirror> mirrors_of(const PingContext& context, const FlatFaces& faces) {
+  const Scene& scene = context.scene();
+  const PingScalars& s = context.scalars;
+  std::vector<FlatMirror> mirrors;
+  const double wave_number = 2 * pi * static_cast<double>(context.plan.mode.centre_hz) / s.sound_speed_mps;
+  for (std::size_t f = 0; f < faces.faces.size() && static_cast<int>(mirrors.size()) < most_mirrors; ++f) {
+    const FlatFace& face = faces.faces[f];
+    const Material& material = scene.materials[static_cast<std::size_t>(face.material)];
+    FlatMirror m;
+    m.face = static_cast<int>(f);
+    m.reflection = static_cast<double>(material.reflection);
+    // Coherent reflectance Rc e^{-2 k^2 h^2 cos^2 a} of a face of rms roughness h (docs/acoustics.md, eq. 20).
+    const double kh = wave_number * static_cast<double>(material.roughness_m);
+    m.twice_kh_squared = 2 * kh * kh;
+    if (std::abs(m.reflectance(most_grazing_cosine)) <= least_reflectance) continue;
+    const Pose in_sonar = compose(inverse(s.seen_from),
+                                  scene.in_world(scene.objects[static_cast<std::size_t>(face.object)], context.bodies_in_world));
+    m.normal = rotate(in_sonar.orientation, face.normal);
+    m.height_m = -(face.offset_m + dot(m.normal, in_sonar.position_m));
+    if (m.height_m < 0) m.normal = -1.0 * m.normal, m.height_m = -m.height_m;
+    if (m.height_m < touching_m || m.height_m > 2 * s.max_range_m) continue;
+    mirrors.push_back(m);
+  }
+  return mirrors;
+}
+
+Path path_by(const std::vector<FlatMirror>& mirrors, int first, int second) {
+  Path path;
+  path.first = first, path.second = second;
+  if (first < 0) return path;
+  const Image a = image_in(at(mirrors, first));
+  path.turn = a.turn, path.shift_m = a.shift_m;
+  if (second < 0) return path;
+  const Image b = image_in(at(mirrors, second));
+  // The last mirror's image first: a place is mirrored in b, its image in a.
+  path.turn = a.turn * b.turn;
+  path.shift_m = a.turn * b.shift_m + a.shift_m;
+  path.second_normal = a.turn * at(mirrors, second).normal;
+  path.beyond_front =
+      at(mirrors, second).height_of(a.shift_m) > 0;  // the sonar's own image in the first mirror lies at a.shift_m
+  return path;
+}
+
+double reflectance_of(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d direction) {
+  if (path.first < 0) return 1;
+  const double once = at(mirrors, path.first).reflectance(dot(at(mirrors, path.first).normal, direction));
+  return path.second < 0 ? once : once * at(mirrors, path.second).reflectance(dot(path.second_normal, direction));
+}
+
+bool is_lit(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place) {
+  if (path.first < 0) return true;
+  const double height = at(mirrors, path.second < 0 ? path.first : path.second).height_of(place);
+  return (path.beyond_front ? height : -height) > touching_m;
+}
+
+double bubble_factor(const BubbleLayer& bubbles, const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place,
+                     const PingScalars& s) {
+  if (!bubbles.present()) return 1;
+  // Backwards from the place: where the line from the sonar's last image to it meets each mirror.
+  std::vector<Vec3d> bends{place};
+  for (const int mirror : {path.second, path.first}) {
+    if (mirror < 0) continue;
+    const Vec3d end = bends.back();
+    const bool two_left = mirror == path.second;
+    const Vec3d source = two_left ? image_in(at(mirrors, path.second)).of(image_in(at(mirrors, path.first)).of({}))
+                                  : image_in(at(mirrors, path.first)).of({});
+    const double from = at(mirrors, mirror).height_of(source), to = at(mirrors, mirror).height_of(end);
+    // A place on the dark side has no such line; tiles that reach through the mirror may be represented by one.
+    const double part = from == to ? 0.5 : std::clamp(from / (from - to), 0.0, 1.0);
+    bends.push_back(source + part * (end - source));
+  }
+  bends.push_back({});
+  double factor = 1;
+  const auto height = [&s](Vec3d p) { return s.seen_from.position_m.z + (s.world_from_sonar * p).z; };
+  for (std::size_t i = 0; i + 1 < bends.size(); ++i)
+    factor *= std::sqrt(bubbles.two_way(height(bends[i]), height(bends[i + 1]), length(bends[i] - bends[i + 1])));
+  return factor;
+}
+
+}  // namespace sonar

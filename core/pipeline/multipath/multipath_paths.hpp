@@ -1,0 +1,58 @@
+// Paths between the sonar and a place: straight, or via one or two flat mirrors (docs/acoustics.md, section 3). By the image
+// method a path is a straight line to the place's image, so each is a mirroring of the sonar's axes.
+#pragma once
+
+#include <vector>
+
+#include "core/pipeline/bubbles.hpp"
+#include "core/pipeline/ping_context.hpp"
+#include "core/scene/specular/flat_faces.hpp"
+
+namespace sonar {
+
+/// At most so many mirrors take part in a ping: the largest that can reflect.
+inline constexpr int most_mirrors = 16;
+/// A mirror that would reflect less than this (pressure, at the angle in question) is none.
+inline constexpr double least_reflectance = 0.05;
+/// Nearer to a mirror than this a place, or the sonar, lies in it.
+inline constexpr double touching_m = 1e-3;
+
+/// A flat face as one ping meets it, in the axes of PingScalars::seen_from: dot(normal, p) + height_m = 0 on its plane.
+struct FlatMirror {
+  int face = 0;  // index into FlatFaces::faces
+  Vec3d normal;  // unit, towards the sonar
+  double height_m = 0;
+  double reflection = 0;
+  double twice_kh_squared = 0;  // 2 (k h)^2, h = rms roughness
+
+  /// Of pressure, at a cosine of incidence: Rc exp(-2 k^2 h^2 cos^2): the specular echo's factor, off normal incidence.
+  double reflectance(double cosine) const { return reflection * std::exp(-twice_kh_squared * cosine * cosine); }
+  double height_of(Vec3d p) const { return dot(normal, p) + height_m; }
+};
+
+/// One path out or back. The image of a place p lies at turn * p + shift_m, straight ahead of where the path leaves the sonar.
+struct Path {
+  int first = -1, second = -1;  // indices of mirrors in the order of the path out; -1 = none
+  Rotation turn;                // improper for one bounce
+  Vec3d shift_m;
+  Vec3d second_normal;       // of the second mirror, as seen in the first
+  bool beyond_front = true;  // places lie on the sonar's side of the last mirror, or on the other
+
+  Vec3d image_of(Vec3d p) const { return turn * p + shift_m; }
+};
+
+/// The mirrors of a ping, largest first.
+std::vector<FlatMirror> mirrors_of(const PingContext& context, const FlatFaces& faces);
+
+Path path_by(const std::vector<FlatMirror>& mirrors, int first, int second = -1);
+
+/// Product of the reflectances for a path that leaves in this unit direction.
+double reflectance_of(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d direction);
+/// Whether a place lies where the path can come from its last mirror: off the mirror itself, on the side that is lit.
+bool is_lit(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place);
+
+/// Pressure factor of a layer of bubbles over one path to a place, bend by bend.
+double bubble_factor(const BubbleLayer& bubbles, const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place,
+                     const PingScalars& scalars);
+
+}  // namespace sonar

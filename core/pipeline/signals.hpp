@@ -1,0 +1,95 @@
+// What the stages of a ping hand to each other: columns, depth map, echoes, signals by column and by beam.
+#pragma once
+
+#include <complex>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/aligned.hpp"
+#include "core/pipeline/simd/kernels.hpp"
+
+namespace sonar {
+
+/// Columns of constant direction sine u = y / r, cones about the array axis (flat beams: sine of azimuth), falling from port to
+/// starboard like the beams.
+struct Columns {
+  int count = 0;
+  double first_sine = 0;        // centre of column 0
+  double spacing = 0;           // in u
+  std::vector<float> transmit;  // amplitude of the transmitter per column: flat over the sector, soft beyond
+  double sine(int column) const { return first_sine - column * spacing; }
+};
+
+/// What the rays saw, column by column: 1 / x (x = forward coordinate in the sonar's frame) against the tangent z / x. For flat
+/// beams (conical off) the horizontal distance stands in for x.
+struct DepthMap {
+  int first_column = 0, columns = 0, bins = 0;
+  std::vector<float> inverse_x;  // [columns][bins + 1], 0 = nothing was hit
+
+  /// Of columns [first, last), to be drawn.
+  void shape(int first, int last, int bin_count) {
+    first_column = first, columns = last - first, bins = bin_count;
+    inverse_x.resize(static_cast<std::size_t>(columns) * static_cast<std::size_t>(bins + 1));
+  }
+  float* column(int k) { return inverse_x.data() + static_cast<std::ptrdiff_t>(k - first_column) * (bins + 1); }
+};
+
+/// One hit of the fixed fan (paper-style sampling: a ray is a scatterer).
+struct FanHit {
+  int column = 0, ray = 0;
+  float range_m = 0, elevation_rad = 0, cosine = 0;
+  std::uint32_t object = 0, triangle = 0;
+};
+
+/// Echoes waiting to be summed. In expected power, re holds the power and im is 0.
+struct Echoes {
+  explicit Echoes(int capacity = 0) { reserve(capacity); }
+  void reserve(int capacity);
+  int capacity() const { return static_cast<int>(column.size()) - 16; }  // kernels may write one vector past the end
+  simd::EchoArrays at(int index) { return {sample.data() + index, re.data() + index, im.data() + index, column.data() + index}; }
+  void add(float at_sample, std::complex<float> amplitude, int in_column);
+
+  int count = 0;
+  std::vector<float> sample, re, im;
+  std::vector<std::int32_t> column;
+};
+
+/// An echo without a surface: beamformed to the beams at its exact direction, never snapped to a column.
+struct PointEcho {
+  double sine = 0;  // y / r
+  double sample = 0;
+  std::complex<double> amplitude;  // [uPa]
+};
+
+/// A pulse on the sample grid: complex values of samples from first_sample on.
+struct SampledPulse {
+  int first_sample = 0;
+  std::vector<std::complex<double>> values;
+};
+
+/// Complex signals per column at the sample centres, interleaved; in expected power, re is a power.
+struct ColumnSignals {
+  int columns = 0, samples = 0;
+  int lead = 0;               // samples of room before sample 0, for pulses that begin earlier
+  std::ptrdiff_t stride = 0;  // floats from column to column
+  AlignedFloats data;         // so is every column, on a cache line
+
+  void shape(int column_count, int sample_count, int taps);
+  float* column(int k) { return data.data() + k * stride; }
+  const float* first_sample(int k) const { return data.data() + k * stride + 2 * lead; }
+};
+
+/// Complex beam signals of samples [first_sample, first_sample + samples), interleaved; in expected power, re is a power.
+struct BeamSignals {
+  int beams = 0, first_sample = 0, samples = 0;
+  std::ptrdiff_t stride = 0;  // floats from beam to beam
+  std::vector<float> data;
+
+  /// Of samples [first, first + count), rows of whole vectors.
+  void shape(int beam_count, int first, int count);
+  const float* beam(int j) const { return data.data() + j * stride; }
+  float* beam(int j) { return data.data() + j * stride; }
+};
+
+}  // namespace sonar

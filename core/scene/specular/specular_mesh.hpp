@@ -1,0 +1,76 @@
+// Mirror points of triangle meshes. The mesh is prepared once: facets that meet at small angles form patches; a patch in one
+// plane becomes a face with an outline, any other a curved surface with normals and curvatures at its vertices.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "core/scene/specular/specular_point.hpp"
+
+namespace sonar {
+
+/// Facets that meet at less than this are one smooth surface, as a modeller meant it.
+inline constexpr double smooth_edge_rad = 0.42;
+
+class SpecularMesh {
+ public:
+  /// Prepares the triangles whose material is set in `wanted` (indexed like Mesh::material).
+  SpecularMesh(const Mesh& mesh, const std::vector<bool>& wanted);
+
+  /// Appends the mirror points that may be audible; the caller tests occlusion.
+  void find(const SpecularQuery& query, std::vector<SpecularPoint>& out) const;
+
+  std::size_t faces() const { return faces_.size(); }
+  std::size_t curved_triangles() const { return triangles_.size(); }
+
+ private:
+  /// Facets in one plane.
+  struct Face {
+    Vec3d origin, normal;
+    std::array<Vec3d, 2> along;
+    std::array<double, 2> from{}, to{};  // bounds of the outline
+    std::vector<OutlineEdge> outline;    // relative to the origin
+    std::uint16_t material = 0;
+  };
+  struct Vertex {
+    Vec3 position, normal;
+    std::array<float, 6> bend{};  // symmetric: xx xy xz yy yz zz of d normal / d place [1/m]
+  };
+  struct Triangle {
+    std::array<std::uint32_t, 3> vertex{};
+    std::array<std::int32_t, 3> across{-1, -1, -1};  // the triangle beyond the edge opposite to that vertex; -1: the surface ends
+    std::uint16_t material = 0;
+  };
+  /// Of a tree over the curved triangles: a ball round the places, a cone round the normals.
+  struct Node {
+    Vec3 centre, axis;
+    float radius = 0, angle_rad = 0;
+    std::uint32_t first = 0, count = 0;  // triangles of a leaf
+    std::uint32_t second_child = 0;      // the first child follows its parent; 0 in a leaf
+  };
+  /// Where a triangle's interpolated normal meets the sonar.
+  struct Foot {
+    std::array<double, 3> weight{};  // of the vertices; negative beside the triangle
+    Vec3d normal;                    // the mesh's side
+    double height_m = 0;             // of the sonar along it
+  };
+  class Maker;
+
+  void find_on_faces(const SpecularQuery& query, std::vector<SpecularPoint>& out) const;
+  void find_on_curves(const SpecularQuery& query, std::vector<SpecularPoint>& out) const;
+  std::optional<Foot> foot_on(const Triangle& triangle, Vec3d sonar_m) const;
+  void bend_at(const Triangle& triangle, const std::array<double, 3>& weight, double side, SpecularPoint& point) const;
+  void solve(std::uint32_t triangle, const SpecularQuery& query, std::vector<SpecularPoint>& out) const;
+  double walk(std::uint32_t triangle, Vec3d from, Vec3d direction, const SpecularPoint& point, std::size_t axis,
+              double unit_m) const;
+
+  std::vector<Face> faces_;
+  std::vector<Vertex> vertices_;
+  std::vector<Triangle> triangles_;  // in the order of the leaves
+  std::vector<Node> nodes_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,65 @@
+// Places on smooth surfaces that throw an echo straight back: where the surface's normal passes through the sonar, how the
+// surface bends there and how far it reaches. Found by specular_primitives and specular_mesh, turned into echoes by
+// core/pipeline/specular.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar {
+
+/// A piece of an outline in the tangent plane [m].
+struct OutlineEdge {
+  double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
+/// The foot of the perpendicular from the sonar, in object coordinates. It may lie beside the surface that it belongs to; its
+/// echo then comes from the surface's edge.
+struct SpecularPoint {
+  Vec3d foot_m;
+  Vec3d normal;                       // unit, toward the sonar
+  std::array<Vec3d, 2> along;         // principal directions, unit
+  std::array<double, 2> curvature{};  // 1/m, along them; positive where the surface bends away from the sonar
+  double range_m = 0;                 // sonar to foot
+
+  // How far the surface reaches from the foot along the principal directions (arc length) [m]; infinite where it just curves
+  // away.
+  std::array<double, 2> from{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  std::array<double, 2> to{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+  std::vector<OutlineEdge> outline;  // closed, relative to the foot; empty = the rectangle of `from` and `to`
+  std::uint16_t material = 0;
+
+  /// The place so far along the principal directions, on arcs of the two curvatures.
+  Vec3d place(double x, double y) const {
+    const auto arc = [](double s, double k) { return std::abs(k * s) > 1e-9 ? std::sin(k * s) / k : s; };
+    const auto drop = [](double s, double k) { return std::abs(k * s) > 1e-4 ? (1 - std::cos(k * s)) / k : 0.5 * k * s * s; };
+    return foot_m + arc(x, curvature[0]) * along[0] + arc(y, curvature[1]) * along[1] -
+           (drop(x, curvature[0]) + drop(y, curvature[1])) * normal;
+  }
+};
+
+/// The sonar as the search for specular points needs it.
+struct SpecularQuery {
+  Vec3d sonar_m;  // in object coordinates
+  double wavelength_m = 1e-3;
+  double max_range_m = 0;
+  // Echoes from outside a cone about a direction are of no interest; by default there is no cone.
+  Vec3d ahead{1, 0, 0};
+  double widest_rad = 4;
+};
+
+/// Surfaces whose edge is farther from the foot than this many Fresnel units sqrt(lambda rho) / 2 are left out: below -33 dB.
+inline constexpr double farthest_edge_in_units = 10;
+/// Nor those that lie at more than about 30 degrees from the perpendicular.
+inline constexpr double farthest_edge_in_ranges = 0.6;
+/// sqrt(lambda rho) / 2 along a direction: the length that the Fresnel integral counts in.
+double fresnel_unit_m(double wavelength_m, double range_m, double curvature_per_m);
+/// 1 + r / R, its modulus held above 0.05: at a focus the sum of rays would be infinite.
+double bending(double range_m, double curvature_per_m);
+
+}  // namespace sonar

@@ -1,0 +1,217 @@
+#include "daemon/commands/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <string_view>
+
+#include "core/base/enum_names.hpp"
+#include "core/text/arguments.hpp"
+#include "core/text/nearest.hpp"
+#include "daemon/config/move_addresses.hpp"
+#include "daemon/config/products.hpp"
+
+namespace sonar {
+namespace {
+
+using text::number;
+using text::one_of;
+using text::whole_number;
+
+constexpr std::uint64_t most_rendered_pings = 999999;      // six digits in the names of the files
+constexpr const char* blueview_demo = "blueview-p900-90";  // the best documented of them
+
+void add_run_options(CLI::App& app, RunCommand& run) {
+  app.add_option("config", run.config, "configuration file; without one sonard looks in the usual places, then runs the demo");
+  app.add_option_function<std::string>(
+         "--demo", [&run](const std::string& maker) { run.demo = true, run.demo_of = maker; },
+         "run the built-in demo, whatever files there are; --demo blueview: with a BlueView head instead of an Oculus")
+      ->expected(0, 1)
+      ->type_name("TEXT:oculus|blueview");  // complaint() judges it: a file is not meant for a maker
+  app.add_option("--profile", run.profile, "run the demo with this product, as blueview-m900-130 (docs/configuration.md)");
+  app.add_option(
+         "--clock", run.clock,
+         "realtime, or stepped (when clients have taken the last ping), lockstep (sonarctl step), follow (stamps of poses)")
+      ->check(one_of({clock_modes.begin(), clock_modes.end()}))
+      ->envname("SONARD_CLOCK");
+  add_engine_options(app, run.engine);
+  app.add_option("--bind", run.bind, "address of the first sonar instead of its bind_ip and advertise_ip")
+      ->envname("SONARD_BIND");
+  app.add_option(
+         "--offset", run.offset,
+         "for another sonard on this computer: sonars move from 127.0.0.x to 127.0.N.x, ports of poses and control up by 10 N")
+      ->check(whole_number(0, highest_offset))
+      ->envname("SONARD_OFFSET");
+  app.add_option("--clients", run.clients, "clients that each sonar serves at a time, instead of its clients.max")
+      ->check(whole_number(1, 16));
+  app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings")->check(whole_number());
+  app.add_flag("--digest", run.digest, "print the SHA-256 of every client's byte stream at the end");
+  app.add_option("--log-format", run.log_format, "text or json (default text)")
+      ->check(one_of({"text", "json"}))
+      ->envname("SONARD_LOG_FORMAT");
+  app.add_option("--log-level", run.log_level, "debug, info, warning or error (default info)")
+      ->check(one_of({log_levels.begin(), log_levels.end()}))
+      ->envname("SONARD_LOG_LEVEL");
+}
+
+void add_render_options(CLI::App& app, RenderCommand& render) {
+  app.add_option("config", render.config, "configuration or render file (docs/render.md)");
+  app.add_option("--out", render.out, "folder for the files; made when it is not there");
+  app.add_option("--pings", render.pings, "pings to render (1; with --poses: one for every line)")
+      ->check(whole_number(1, most_rendered_pings));
+  app.add_option("--first", render.first, "number of the first ping, to make a part of a longer run (1)")
+      ->check(whole_number(1, most_rendered_pings));
+  app.add_option("--format", render.formats, "npy, png, raw: any of them, comma between (default npy,png)")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(one_of({"npy", "png", "raw"}));
+  app.add_option("--image-rings", render.image_rings, "range rings in the pictures (default on)")->check(one_of({"on", "off"}));
+  app.add_flag("--complex", render.complex, "also the complex beam signal, before magnitude and gain (npy)");
+  app.add_option("--sonar", render.sonar, "which sonar of the configuration, when it has several");
+  app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, TUM, EuRoC, KITTI");
+  app.add_option("--pose-frame", render.pose_frame, "of that file, when it does not say so itself")
+      ->check(one_of({"ENU_FLU", "NED_FRD"}));
+  app.add_option("--pose-rate", render.pose_rate_hz, "of that file, lines a second: KITTI files have no times")
+      ->check(number(0.001, 10000.0));
+  app.add_option("--rate", render.rate_hz, "pings a second (as the sonar is set; with --poses: at every line)")
+      ->check(number(0.001, 10000.0));
+  app.add_option("--batch", render.batch,
+                 "pings to make before they are written by all threads at once, for data sets (default 1)")
+      ->check(whole_number(1, 4096));
+  app.add_option("--report", render.report,
+                 "coverage: every bin of a plane bed against the closed form; without a configuration "
+                 "for every sonar there is")
+      ->check(one_of({"coverage"}));
+  app.add_flag("--check-expectations", render.check_expectations,
+               "measure what the render file expects; exit code 1 if it is not so");
+  app.add_flag("--overwrite", render.overwrite, "replace the pings of other inputs in the folder");
+  app.add_flag("--quiet", render.quiet, "no progress");
+  add_engine_options(app, render.engine);
+}
+
+/// What is missing or makes no sense together; empty = nothing.
+std::string complaint(const RenderCommand& render) {
+  const bool writes = render.report.empty() && !render.check_expectations;
+  if (render.config.empty() && render.report.empty()) return "it needs a configuration or render file: sonard render FILE";
+  if (writes && render.out.empty()) return "say where the files go: --out DIR";
+  if (!writes && !render.out.empty()) return "--report and --check-expectations write no files: leave out --out";
+  if (render.pose_rate_hz && render.poses.empty()) return "--pose-rate is about --poses FILE, which is not given";
+  if (render.first - 1 + render.pings.value_or(1) > most_rendered_pings)
+    return "--first and --pings go beyond ping " + std::to_string(most_rendered_pings) + ", the last that has a name";
+  if (!render.pose_frame.empty() && render.poses.empty()) return "--pose-frame is about --poses FILE, which is not given";
+  return {};
+}
+
+Leave complain(const std::string& wrong) {
+  std::fprintf(stderr, "sonard: %s\n", wrong.c_str());
+  return Leave{exit_code(ErrorKind::usage)};
+}
+
+bool is_like_a_file(std::string_view word) {
+  std::error_code ec;
+  return word.find_first_of("./") != std::string_view::npos || std::filesystem::exists(word, ec);
+}
+
+/// What makes no sense together; empty = nothing.
+std::string complaint(const RunCommand& run) {
+  const bool known = run.demo_of.empty() || run.demo_of == "oculus" || run.demo_of == "blueview";
+  const std::string file = !known && is_like_a_file(run.demo_of) ? run.demo_of : run.config;
+  if (run.demo && !file.empty()) return "--demo runs the built-in demo, not " + file + ": leave out one of the two";
+  if (!known)
+    return "there is no demo \"" + run.demo_of + "\"; there are oculus and blueview, and --profile NAME for any product";
+  if (!run.profile.empty() && !file.empty())
+    return "--profile chooses the demo's sonar, and " + file + " says itself what its sonars are: leave out one of the two";
+  if (!run.profile.empty() && !run.demo_of.empty())
+    return "--demo " + run.demo_of + " and --profile " + run.profile + " both choose the demo's sonar: leave out one of the two";
+  return {};
+}
+
+/// The first word when it is neither an option, a command nor a file name; else empty.
+std::string unknown_command(std::string_view word) {
+  if (word.empty() || word[0] == '-' || is_like_a_file(word)) return {};
+  constexpr std::array<std::string_view, 4> commands{"run", "check", "render", "replay"};
+  return "there is no command or file \"" + std::string(word) + "\"" + text::suggestion(word, commands, "the commands are");
+}
+
+}  // namespace
+
+Command parse_command_line(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == "bench")
+    return complain("the benchmark is a program of its own, sonard_bench, which is built with the tests (docs/benchmarks.md)");
+
+  CLI::App app{"sonard: emulates imaging sonars on the network, from a 3D scene", "sonard"};
+  app.set_version_flag("--version", std::string("sonard " SONARD_VERSION));
+  RunCommand run;
+  CheckCommand check;
+  RenderCommand render;
+  ReplayCommand replay;
+  // `sonard CONFIG` is `sonard run CONFIG`: the word may be left out.
+  constexpr std::array<std::string_view, 4> words{"run", "check", "render", "replay"};
+  const bool bare = argc < 2 || std::find(words.begin(), words.end(), argv[1]) == words.end();
+  if (bare) {
+    add_run_options(app, run);
+    app.footer(
+        "examples:\n"
+        "  sonard                           the configuration found in the usual places, else the demo\n"
+        "  sonard --demo blueview           the demo with a BlueView head; --profile NAME: with any product\n"
+        "  sonard my.yaml --log-level debug\n"
+        "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, replay FILE; each has --help.\n"
+        "Oculus sonars are wire-compatible. BlueView sonars are compatible with the vendor's SDK by libraries of our own, not on "
+        "the wire. Not affiliated with either vendor.");
+  } else {
+    app.require_subcommand(1);
+    CLI::App& run_app = *app.add_subcommand("run", "serve the sonars of a configuration");
+    run_app.footer("examples:\n  sonard run my.yaml\n  sonard run --demo --clock stepped --exit-after-pings 20 --digest");
+    add_run_options(run_app, run);
+    CLI::App& check_app = *app.add_subcommand("check", "validate a configuration and its scene, then exit");
+    check_app.footer("examples:\n  sonard check my.yaml");
+    check_app.add_option("config", check.config, "the configuration file to look at")->required();
+    CLI::App& render_app = *app.add_subcommand("render", "render pings into files, or check what they should hold");
+    render_app.footer(
+        "examples:\n  sonard render my.yaml --out pings --pings 5 --format npy,png\n  sonard render my.yaml "
+        "--check-expectations");
+    add_render_options(render_app, render);
+    add_replay_options(*app.add_subcommand("replay", "serve a recording to a driver, byte for byte"), replay);
+  }
+  const std::vector<std::string> typed(argv + std::min(argc, 1), argv + argc);
+  if (const std::string wrong = bare && argc > 1 ? unknown_command(argv[1]) : ""; !wrong.empty())
+    return complain(wrong + text::where_help_is(app));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (const std::string wrong = text::complaint_about(app, e, typed); !wrong.empty()) return complain(wrong);
+    app.exit(e);  // --help and --version
+    return Leave{0};
+  }
+  if (!bare && app.got_subcommand("check")) return check;
+  if (!bare && app.got_subcommand("replay")) return replay;
+  if (!bare && app.got_subcommand("render")) {
+    const std::string wrong = complaint(render);
+    if (wrong.empty()) return render;
+    return complain(wrong + text::where_help_is(app));
+  }
+  if (const std::string wrong = complaint(run); !wrong.empty()) return complain(wrong + text::where_help_is(app));
+  if (run.demo_of == "blueview") run.profile = blueview_demo;
+  run.demo = run.demo || !run.profile.empty();
+  return run;
+}
+
+Result<void> override_config(Config& config, const RunCommand& command) {
+  if (!command.profile.empty())
+    if (const auto r = use_product(config, command.profile); !r) return failure(r.error().kind, "--profile: " + r.error().text);
+  if (const auto mode = enum_from<ClockMode>(command.clock, clock_modes)) config.clock = *mode, config.clock_place = "--clock";
+  if (const auto r = override_engine(config.engine, config.seed, command.engine); !r) return r;
+  if (!command.log_format.empty()) config.log.json = command.log_format == "json";
+  config.log.level = enum_from<LogLevel>(command.log_level, log_levels).value_or(config.log.level);
+  if (command.clients)
+    for (SonarConfig& sonar : config.sonars) sonar.max_clients = *command.clients;
+  if (command.offset > 0)
+    if (const auto r = move_addresses(config, command.offset, command.bind.empty()); !r)
+      return failure(r.error().kind, "--offset: " + r.error().text);
+  if (!command.bind.empty())
+    if (const auto r = rebind(config, command.bind); !r) return failure(r.error().kind, "--bind: " + r.error().text);
+  return check_time_can_pass(config);
+}
+
+}  // namespace sonar

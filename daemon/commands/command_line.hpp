@@ -1,0 +1,56 @@
+// What the user typed, command by command. CLI11 is included by few .cpp files only: it is slow to compile.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/commands/engine_options.hpp"
+#include "daemon/commands/replay/replay_command.hpp"
+#include "daemon/config/config.hpp"
+
+namespace sonar {
+
+struct RunCommand {
+  std::string config;  // empty = search
+  bool demo = false;
+  std::string demo_of;  // whose sonar the demo has, "oculus" or "blueview"; empty = its own
+  std::string profile;  // of the demo's sonar; empty = its own
+  std::uint64_t exit_after_pings = 0;
+  bool digest = false;
+  // Empty = as the configuration says.
+  std::string clock, log_format, log_level, bind;
+  std::optional<int> clients;
+  int offset = 0;
+  EngineOptionsGiven engine;
+};
+struct RenderCommand {
+  std::string config;  // may be empty for the coverage report
+  std::string out;
+  std::uint64_t first = 1;             // number of the first ping
+  std::optional<std::uint64_t> pings;  // nothing: one, or one for every line of a file of poses
+  std::vector<std::string> formats{"npy", "png"};
+  std::optional<double> pose_rate_hz;  // of a KITTI file, which has no times
+  std::string sonar, poses, pose_frame, report;
+  std::string image_rings = "on";
+  std::optional<double> rate_hz;
+  int batch = 1;
+  bool complex = false, quiet = false, overwrite = false, check_expectations = false;
+  EngineOptionsGiven engine;
+};
+struct CheckCommand {
+  std::string config;
+};
+struct Leave {  // help, version or a usage error, already printed
+  int exit_code = 0;
+};
+using Command = std::variant<RunCommand, CheckCommand, RenderCommand, ReplayCommand, Leave>;
+
+Command parse_command_line(int argc, char** argv);
+/// What was given on the command line, or stands for it in the environment, wins over the file.
+Result<void> override_config(Config& config, const RunCommand& command);
+
+}  // namespace sonar

@@ -1,0 +1,35 @@
+// Compares a rendered bed with its closed form: every bin of a flat bed in expected power against the closed form of its level
+// (docs/acoustics.md, section 3), with the beams' patterns. The command's --report coverage, and a measure of expectations.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/commands/render/render_job.hpp"
+
+namespace sonar::render {
+
+struct Coverage {
+  std::size_t bins = 0, good = 0;  // good: within 1 dB
+  std::size_t empty = 0;           // 10 dB or more below: no energy to speak of
+  double worst_db = 0;             // signed, of the bin farthest off
+  double mean_db = 0;              // of all bins' powers over their closed form
+  double percent() const { return bins == 0 ? 0 : 100.0 * static_cast<double>(good) / static_cast<double>(bins); }
+};
+
+/// The job with only the parts that the closed form has: expected power, no noise, mirrors, texture, volume or motion. Expected
+/// power has smaller surface cells than a picture (0.4 of them each way): coverage measures those, not the picture's.
+RenderJob with_bed_only(RenderJob job);
+
+/// The ping must be of with_bed_only(job). Bins count whose whole footprint, two pulses and a beam to either side, lies on the
+/// bed where the two-way pattern is above -20 dB: the closed form takes the pattern as even over the footprint. Errors: no level
+/// plane below the sonar, a sonar that rolls, flat beams, the comparison modes, beams without a width.
+Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
+
+/// That product over a level bed, a fifth of the range above it and 0.25 rad nose down.
+RenderJob over_a_level_bed(std::shared_ptr<const SonarModel> model, const PingSettings& settings, const std::string& name);
+/// Every mode of every product over a level bed: at its stored range, or its longest if that is shorter.
+std::vector<RenderJob> shipped_sonars_over_a_bed();
+
+}  // namespace sonar::render

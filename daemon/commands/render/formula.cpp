@@ -1,0 +1,196 @@
+#include "daemon/commands/render/formula.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+
+#include "core/base/geometry.hpp"
+#include "core/text/decimal.hpp"
+
+namespace sonar::render {
+namespace {
+
+std::string quoted(std::string_view text) { return std::string("\"").append(text).append("\""); }
+bool begins_name(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool in_name(char c) { return begins_name(c) || is_digit(c); }
+
+struct Function {
+  std::string_view name;
+  double (*of)(double);
+};
+constexpr Function functions[] = {
+    {"log10", [](double x) { return std::log10(x); }}, {"ln", [](double x) { return std::log(x); }},
+    {"exp", [](double x) { return std::exp(x); }},     {"sqrt", [](double x) { return std::sqrt(x); }},
+    {"abs", [](double x) { return std::abs(x); }},     {"sin", [](double x) { return std::sin(x); }},
+    {"cos", [](double x) { return std::cos(x); }},     {"tan", [](double x) { return std::tan(x); }},
+    {"asin", [](double x) { return std::asin(x); }},   {"acos", [](double x) { return std::acos(x); }},
+    {"atan", [](double x) { return std::atan(x); }},   {"deg", [](double x) { return deg_from_rad(x); }},
+    {"rad", [](double x) { return rad_from_deg(x); }},
+};
+
+/// Recursive descent; the first thing wrong ends it.
+class Parser {
+ public:
+  Parser(std::string_view text, const Values& values) : text_(text), values_(values) {}
+
+  Result<double> run() {
+    const double value = sum();
+    skip_blanks();
+    if (wrong_.empty() && at_ < text_.size()) wrong_ = "unexpected " + quoted(text_.substr(at_));
+    if (wrong_.empty() && !std::isfinite(value)) wrong_ = "is not a finite number";
+    if (!wrong_.empty()) return failure(ErrorKind::config, "formula " + quoted(text_) + ": " + wrong_);
+    return value;
+  }
+
+ private:
+  void skip_blanks() {
+    while (at_ < text_.size() && text_[at_] == ' ') ++at_;
+  }
+  bool take(char c) {
+    skip_blanks();
+    if (at_ >= text_.size() || text_[at_] != c) return false;
+    ++at_;
+    return true;
+  }
+  void complain(std::string what) {
+    if (wrong_.empty()) wrong_ = std::move(what);
+    at_ = text_.size();
+  }
+
+  double sum() {
+    double value = product();
+    for (;;) {
+      if (take('+'))
+        value += product();
+      else if (take('-'))
+        value -= product();
+      else
+        return value;
+    }
+  }
+  double product() {
+    double value = sign();
+    for (;;) {
+      if (take('*'))
+        value *= sign();
+      else if (take('/'))
+        value /= sign();
+      else
+        return value;
+    }
+  }
+  double sign() {
+    if (++depth_ > deepest) return complain("is nested too deeply"), 0;
+    const double value = take('-') ? -sign() : power();
+    --depth_;
+    return value;
+  }
+  double power() {
+    const double base = atom();
+    return take('^') ? std::pow(base, sign()) : base;
+  }
+  double atom() {
+    double value = 0;
+    skip_blanks();
+    if (take('(')) {
+      value = sum();
+      if (!take(')')) complain("a ) is missing");
+    } else if (at_ < text_.size() && (is_digit(text_[at_]) || text_[at_] == '.')) {
+      value = number();
+    } else if (at_ < text_.size() && begins_name(text_[at_])) {
+      value = named();
+    } else {
+      complain("ends where a value is expected");
+    }
+    return value;
+  }
+  double number() {
+    std::size_t end = at_;
+    while (end < text_.size() && (is_digit(text_[end]) || text_[end] == '.')) ++end;
+    if (end < text_.size() && (text_[end] == 'e' || text_[end] == 'E')) {
+      ++end;
+      if (end < text_.size() && (text_[end] == '-' || text_[end] == '+')) ++end;
+      while (end < text_.size() && is_digit(text_[end])) ++end;
+    }
+    const auto value = text::parse_decimal(text_.substr(at_, end - at_));
+    if (!value) return complain(quoted(text_.substr(at_, end - at_)).append(" is not a number")), 0;
+    at_ = end;
+    return *value;
+  }
+  double named() {
+    std::size_t end = at_;
+    while (end < text_.size() && in_name(text_[end])) ++end;
+    const std::string_view name = text_.substr(at_, end - at_);
+    at_ = end;
+    const auto function =
+        std::find_if(std::begin(functions), std::end(functions), [&](const Function& f) { return f.name == name; });
+    if (function != std::end(functions)) {
+      if (!take('(')) return complain(std::string(name) + " needs its argument in parentheses"), 0;
+      const double argument = sum();
+      if (!take(')')) complain("a ) is missing");
+      return function->of(argument);
+    }
+    if (name == "pi") return pi;
+    const auto value = values_.find(name);
+    if (value != values_.end()) return value->second;
+    std::string known;
+    for (const auto& [other, ignored] : values_) known += (known.empty() ? "" : ", ") + other;
+    complain("unknown name " + std::string(name) + "; known names: " + (known.empty() ? "none" : known));
+    return 0;
+  }
+
+  static constexpr int deepest = 50;
+  std::string_view text_;
+  const Values& values_;
+  std::size_t at_ = 0;
+  int depth_ = 0;
+  std::string wrong_;
+};
+
+/// The end of the $name or $(formula) that begins at `at`; `at` itself when it is neither.
+std::size_t end_of_reference(std::string_view text, std::size_t at) {
+  std::size_t end = at + 1;
+  if (end < text.size() && text[end] == '(') {
+    for (int open = 0; end < text.size() && text[end] != '\n'; ++end) {
+      if (text[end] == '(') ++open;
+      if (text[end] == ')' && --open == 0) return end + 1;
+    }
+    return text.size();
+  }
+  if (end >= text.size() || !begins_name(text[end])) return at;
+  while (end < text.size() && in_name(text[end])) ++end;
+  return end;
+}
+
+}  // namespace
+
+Result<double> evaluate(std::string_view formula, const Values& values) { return Parser(formula, values).run(); }
+
+Result<std::string> substitute(std::string_view text, const Values& values, const std::string& name) {
+  std::string out;
+  std::size_t at = 0;
+  for (;;) {
+    const std::size_t dollar = text.find('$', at);
+    out += text.substr(at, dollar - at);
+    if (dollar == std::string_view::npos) return out;
+    const std::size_t end = end_of_reference(text, dollar);
+    if (end == dollar) {
+      out += '$';
+      at = dollar + 1;
+      continue;
+    }
+    const auto value = evaluate(text.substr(dollar + 1, end - dollar - 1), values);
+    if (!value) {
+      const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(dollar), '\n');
+      return failure(ErrorKind::config, name + ":" + std::to_string(line) + ": " + value.error().text);
+    }
+    char number[40];
+    std::snprintf(number, sizeof number, "%.15g", *value);
+    out += number;
+    at = end;
+  }
+}
+
+}  // namespace sonar::render

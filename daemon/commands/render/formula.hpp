@@ -1,0 +1,22 @@
+// Formulas in render files: scene values that depend on a swept value, and the values of expectations.
+// + - * / ^, parentheses, pi, named values, and log10 ln exp sqrt abs sin cos tan asin acos atan deg rad.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+
+namespace sonar::render {
+
+using Values = std::map<std::string, double, std::less<>>;
+
+/// Angles in radians; deg() and rad() convert. Errors: a sentence when it cannot be parsed or is not a finite number.
+Result<double> evaluate(std::string_view formula, const Values& values);
+
+/// The text with every $name and $(formula) replaced by its number. Errors start with `name`:line.
+Result<std::string> substitute(std::string_view text, const Values& values, const std::string& name);
+
+}  // namespace sonar::render

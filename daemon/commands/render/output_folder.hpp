@@ -1,0 +1,56 @@
+// The output folder of `sonard render`: for one set of inputs, and one run at a time. Complete pings in it are kept, so that an
+// interrupted run continues where it stopped.
+#pragma once
+
+#include <filesystem>
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/commands/render/render_job.hpp"
+
+namespace sonar::render {
+
+struct OutputOptions {
+  std::filesystem::path folder;
+  bool npy = true, png = true, raw = false, complex = false;
+  bool rings = true;                   // in pictures
+  int batch = 1;                       // pings that are made before they are written, by all threads at once
+  bool overwrite = false;              // pings of other inputs in the folder are removed
+  std::uint64_t first = 1;             // number of the first ping; those before it are left out
+  std::optional<std::uint64_t> pings;  // of each job; nothing: one, or one for every pose of the file
+  std::optional<double> rate_hz;       // nothing: as the settings say, or at every pose
+};
+
+class OutputFolder {
+ public:
+  /// Creates the folder and locks it while this object lives. Errors: io; usage when it has pings of other inputs that may not be
+  /// removed, or another run writes into it.
+  static Result<OutputFolder> claim(const RenderInput& input, const OutputOptions& options, std::string digest);
+  OutputFolder(OutputFolder&& other) noexcept;
+  OutputFolder& operator=(OutputFolder&&) = delete;
+  ~OutputFolder();
+
+  /// The common start of the names of a ping's files: "folder/000001".
+  std::string stem(std::uint64_t number) const;
+  /// Whether all files of a ping are there, of these inputs.
+  bool holds(std::uint64_t number) const;
+  std::uint64_t size_of(std::uint64_t number) const;
+  const std::string& digest() const { return digest_; }
+  const OutputOptions& options() const { return options_; }
+
+ private:
+  OutputFolder(OutputOptions options, std::string digest, int lock);
+  std::vector<std::filesystem::path> files_of(std::uint64_t number) const;
+
+  OutputOptions options_;
+  std::string digest_;
+  int lock_ = -1;  // an open folder with the lock on it; -1 where the file system has no locks
+};
+
+/// Writes the parts into one file, which is renamed when complete. io: a full disk, a folder that is missing or not writable.
+Result<void> write_output(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts);
+
+}  // namespace sonar::render

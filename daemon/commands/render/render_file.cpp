@@ -1,0 +1,249 @@
+// Reads what `sonard render` is given: a configuration, or a render file with its sweep.
+#include <algorithm>
+
+#include "core/base/regular_file.hpp"
+#include "core/text/strict_yaml.hpp"
+#include "daemon/commands/render/render_job.hpp"
+#include "daemon/commands/render/sonar_keys.hpp"
+#include "daemon/config/config_parts.hpp"
+#include "daemon/config/read_trajectory.hpp"
+#include "daemon/emulator/world/world_parts.hpp"
+
+namespace sonar::render {
+namespace {
+
+using text::Map;
+using text::Node;
+using text::Range;
+
+constexpr std::size_t most_steps = 1000;
+
+/// A sonar that is no product: a wide fan of 1 by 20 degrees at 900 kHz, 16 bit samples.
+SonarModel plain_model() {
+  FrequencyMode mode;
+  mode.name = "plain";
+  mode.centre_hz = 900e3f;
+  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(90));
+  mode.min_range_m = 1e-3f;
+  mode.max_range_m = 1e5f;
+  mode.source_level_db = 210;
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(1));
+  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(20));
+  mode.receiver.full_scale_upa = 1e9f;
+  SonarModel model;
+  model.profile = model.name = "plain";
+  model.modes = {mode};
+  return model;
+}
+
+PingSettings plain_settings(const Water& water, double depth_m, const FrequencyMode& mode) {
+  PingSettings s;
+  s.pulse_width_m = 0.0254f;
+  s.device_sound_speed_mps = static_cast<float>(true_sound_speed_mps(water, depth_m));
+  s.device_absorption_db_per_m = static_cast<float>(absorption_db_per_m(water, depth_m, static_cast<double>(mode.centre_hz)));
+  s.format = {.bits = 16, .max_code = 65535, .gamma = 1, .row_gains = false};
+  return s;
+}
+
+void read_path(const Node& node, const std::filesystem::path& folder, RenderJob& job) {
+  if (!node.present()) return;
+  Map keys = node.map();
+  job.path.initial = read_world_pose(keys.optional("at"));
+  job.path.orbits = keys.optional("orbit").boolean_or(false);
+  const TrajectoryKeys trajectory(keys);
+  if (!trajectory.file) return;
+  const TrajectoryFiles::Named named = TrajectoryFiles(folder).read(trajectory);
+  const std::string body = trajectory.body.text_or({}, 64);
+  if (!named.file) return;
+  auto path = path_in(*named.file, named.name, body);
+  if (!path) return trajectory.file.fail(path.error().text);
+  job.path = *std::move(path);
+}
+
+/// Needs the water and the path.
+void read_sonar(const Node& node, RenderJob& job) {
+  Map keys = node.map();
+  const Node profile_node = keys.optional("profile"), options = keys.optional("options");
+  job.sonar_name = keys.optional("name").text_or("sonar", 64);
+  job.mount = read_mount(keys.optional("mount"));
+  const double depth_m = depth_from_z(compose(vehicle_at(job.path, Time{}), job.mount).position_m.z);
+  const Node ping = keys.optional("ping"), model_node = keys.optional("model");
+  protocol::Profile profile{nullptr, std::make_shared<const SonarModel>(plain_model())};
+  protocol::OptionValues values;
+  if (profile_node.present()) {
+    auto found = protocol::find_profile(profile_node.text(64));
+    if (!found) return profile_node.fail(found.error().text);
+    profile = *std::move(found);
+    values = read_options(options, *profile.vendor);
+    auto tuned = profile.vendor->tuned(profile.model, values);
+    if (!tuned) return options.fail(tuned.error().text);
+    profile.model = *std::move(tuned);
+  } else if (options.present()) {
+    return options.fail("need a profile, which is not given");
+  }
+  const int first_mode = profile.vendor ? device_settings(profile, values, job.water, depth_m).mode : 0;
+  const int mode = read_mode(ping.map().optional("mode"), *profile.model, first_mode);
+  SonarModel model = *profile.model;
+  read_model(model_node.map(), model.modes[static_cast<std::size_t>(mode)]);
+  profile.model = job.model = std::make_shared<const SonarModel>(std::move(model));
+  job.settings = profile.vendor ? device_settings(profile, values, job.water, depth_m)
+                                : plain_settings(job.water, depth_m, job.model->modes.front());
+  job.settings.mode = mode;
+  read_ping(ping.map(), *job.model, !profile.vendor, job.settings);
+}
+
+/// The scene's keys inline, or the name of a file. What is wrong with the scene is bad data, as where a file of its own holds it.
+/// All else must have been read: errors of the document are taken for the scene's.
+Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::filesystem::path& folder, const std::string& name,
+                                                   const text::Document& document) {
+  if (node.is_map()) {
+    std::shared_ptr<const Scene> scene = read_scene(node.map(), folder, name);
+    if (auto error = document.finish()) return failure(ErrorKind::bad_data, std::move(error->text));
+    return scene;
+  }
+  const SceneFile file = read_scene_file(node, folder);
+  if (auto error = document.finish()) return tl::make_unexpected(*std::move(error));
+  auto scene = load_scene(file);
+  if (!scene) return failure(scene.error().kind, node.location() + ": " + node.path() + ": " + scene.error().text);
+  return *std::move(scene);
+}
+
+Result<RenderJob> read_job(const std::string& text, const std::string& name, const std::filesystem::path& folder,
+                           const Values& values) {
+  const auto document = text::parse_yaml(text, name, {.error_kind = ErrorKind::config});
+  if (!document) return tl::make_unexpected(document.error());
+  Map root = document->root();
+  RenderJob job;
+  job.values = values;
+  job.name = root.optional("name").text_or(std::filesystem::path(name).stem().string(), 200);
+  root.optional("about").text_or("", 4096);
+  job.water = read_water(root.optional("water"));
+  job.seed = root.optional("seed").unsigned_integer_or(1);
+  job.engine = read_engine(root.optional("engine"));
+  read_path(root.optional("poses"), folder, job);
+  const Node scene_node = root.required("scene");
+  read_sonar(root.optional("sonar"), job);
+  root.optional("sweep").map().entries();
+  root.optional("let").map().entries();
+  job.expectations = read_expectations(root.optional("expect"));
+  if (auto error = document->finish()) return tl::make_unexpected(*error);
+  auto scene = read_scene_of(scene_node, folder, job.name, *document);
+  if (!scene) return tl::make_unexpected(scene.error());
+  job.scene = *std::move(scene);
+  return job;
+}
+
+/// What each step of the sweep sets, and what `let` makes of it; one step without a sweep.
+Result<std::vector<Values>> read_steps(const text::Document& document) {
+  Map root = document.root();
+  std::vector<Values> steps(1);
+  bool first = true;
+  for (const auto& [name, list] : root.optional("sweep").map().entries()) {
+    const auto items = list.items(1, most_steps);
+    if (first) steps.resize(std::max<std::size_t>(items.size(), 1));
+    if (items.size() != steps.size()) list.fail("lists of a sweep must be equally long");
+    for (std::size_t i = 0; i < std::min(items.size(), steps.size()); ++i) steps[i][name] = items[i].number();
+    first = false;
+  }
+  for (const auto& [name, formula] : root.optional("let").map().entries())
+    for (Values& step : steps) {
+      const auto value = evaluate(formula.text(1000), step);
+      if (!value) formula.fail(value.error().text);
+      step[name] = value.value_or(0);
+    }
+  if (auto error = document.error()) return tl::make_unexpected(*error);
+  return steps;
+}
+
+Result<std::string> text_of_file(const std::filesystem::path& file) {
+  auto text = read_regular(file, text::YamlLimits{}.max_bytes);  // of one that is too long, enough to be refused as such
+  if (text && text->empty()) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": it is empty");
+  return text;
+}
+
+Result<RenderInput> from_config(const std::filesystem::path& file, const std::string& text, const std::string& sonar) {
+  const auto config = parse_config(text, file.string(), file.parent_path());
+  if (!config) return tl::make_unexpected(config.error());
+  std::size_t index = 0;
+  std::string names;
+  for (const SonarConfig& s : config->sonars) names += (names.empty() ? "" : ", ") + s.name;
+  while (index < config->sonars.size() && config->sonars[index].name != sonar) ++index;
+  if (sonar.empty() && config->sonars.size() > 1)
+    return failure(ErrorKind::usage, file.string() + " has several sonars, choose one: --sonar " + config->sonars[0].name +
+                                         " (there are " + names + ")");
+  if (sonar.empty()) index = 0;
+  if (index == config->sonars.size())
+    return failure(ErrorKind::usage, "no sonar \"" + sonar + "\" in " + file.string() + "; there are " + names);
+  const auto scene = load_scene(config->scene);
+  if (!scene) return tl::make_unexpected(scene.error());
+  const SonarConfig& s = config->sonars[index];
+  const VehicleConfig& vehicle = config->vehicles[s.vehicle];
+  RenderJob job;
+  job.name = file.stem().string();
+  job.scene = *scene;
+  job.model = s.profile.model;
+  job.sonar_name = s.name;
+  job.sonar_id = static_cast<std::uint32_t>(index);
+  job.water = config->water;
+  job.seed = config->seed;
+  job.engine = config->engine;
+  job.mount = s.mount;
+  job.vehicle_name = vehicle.name;
+  job.path = {vehicle.initial_pose, vehicle.orbits, vehicle.plan.trajectory, {}};
+  if (const std::string why = why_not_movable(*job.scene, *config); !why.empty()) return failure(ErrorKind::config, why);
+  for (const BodyStart& body : bodies_of(*job.scene, *config)) job.body_paths.push_back(body.plan.trajectory);
+  const double depth_m = depth_from_z(compose(vehicle_at(job.path, Time{}), job.mount).position_m.z);
+  job.settings = device_settings(s.profile, s.options, job.water, depth_m);
+  RenderInput input{file.string(), {}, text};
+  if (!config->scene.built_in)
+    if (const auto more = text_of_file(config->scene.path)) input.text += *more;
+  input.jobs.push_back(std::move(job));
+  return input;
+}
+
+bool is_scene(const Map& root) { return root.has("objects") && !root.has("scene") && !root.has("world"); }
+
+std::string what_to_do_with_a_scene(const std::filesystem::path& file) {
+  const std::string scene = std::filesystem::absolute(file).lexically_normal().string();
+  return file.string() + " is a scene, without a sonar. A render file names a scene and a sonar: echo '{scene: \"" + scene +
+         "\", sonar: {profile: oculus-m1200d}, poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}}' > render.yaml && "
+         "sonard render render.yaml --out pings (docs/render.md)";
+}
+
+}  // namespace
+
+Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
+  const auto outline = text::parse_yaml(text, name, {.error_kind = ErrorKind::config});
+  if (!outline) return tl::make_unexpected(outline.error());
+  const auto steps = read_steps(*outline);
+  if (!steps) return tl::make_unexpected(steps.error());
+  RenderInput input{name, {}, std::string(text)};
+  for (const Values& values : *steps) {
+    const auto filled = substitute(text, values, name);
+    if (!filled) return tl::make_unexpected(filled.error());
+    auto job = read_job(*filled, name, folder, values);
+    if (!job) return tl::make_unexpected(job.error());
+    input.jobs.push_back(*std::move(job));
+  }
+  return input;
+}
+
+Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar) {
+  const auto text = text_of_file(file);
+  if (!text) return tl::make_unexpected(text.error());
+  const auto outline = text::parse_yaml(*text, file.string(), {.error_kind = ErrorKind::config});
+  if (!outline) return tl::make_unexpected(outline.error());
+  Map root = outline->root();
+  if (is_scene(root)) return failure(ErrorKind::config, what_to_do_with_a_scene(file));
+  const bool is_config = root.has("world");
+  if (!is_config && !sonar.empty())
+    return failure(ErrorKind::usage, "--sonar is for configurations; " + file.string() + " is a render file");
+  auto input = is_config ? from_config(file, *text, sonar) : parse_render_file(*text, file.string(), file.parent_path());
+  if (!input) return input;
+  const bool wants_motion =
+      root.optional("engine").map().optional("motion").choice_or<bool>(false, {{"on", true}, {"off", false}});
+  for (RenderJob& job : input->jobs) job.wants_motion = wants_motion;
+  return input;
+}
+
+}  // namespace sonar::render

@@ -1,0 +1,30 @@
+// Renders the pings of a job into a folder: arrays, pictures and a sidecar each (docs/render.md). Finished pings
+// are kept, so that an interrupted run continues where it stopped.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "core/base/parallel.hpp"
+#include "daemon/commands/render/output_folder.hpp"
+#include "daemon/commands/render/render_job.hpp"
+
+namespace sonar::render {
+
+struct Progress {
+  std::uint64_t done = 0, all = 0, kept = 0;
+  std::uint64_t bytes = 0;  // written
+};
+
+/// When the pings of a job are fired [s], from the first wanted on. usage: more pings than the poses last.
+Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& options);
+
+/// One sentence when the sonar is above the sea surface in some of them; else empty, and where the times are refused.
+std::string note_of_air(const RenderInput& input, const OutputOptions& options);
+
+/// Calls `told` after every ping, in order. Errors: io; requests that the engine rejects.
+Result<Progress> render_pings(const RenderInput& input, const OutputOptions& options, Parallel& pool,
+                              const std::function<void(const Progress&)>& told);
+
+}  // namespace sonar::render

@@ -1,0 +1,199 @@
+#include "daemon/commands/render/sidecar.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/pipeline/water_line.hpp"
+#include "daemon/commands/render/sonar_version.hpp"
+#include "daemon/config/effective_switches.hpp"
+#include "daemon/server/system/sha256.hpp"
+
+namespace sonar::render {
+namespace {
+
+using nlohmann::json;
+
+json json_of(Vec3d v) { return {v.x, v.y, v.z}; }
+json json_of(const Pose& pose) {
+  const Quatd& q = pose.orientation;
+  return {{"xyz_m", json_of(pose.position_m)}, {"wxyz", {q.w, q.x, q.y, q.z}}};
+}
+double deg(float rad) { return deg_from_rad(static_cast<double>(rad)); }
+/// JSON has no infinity.
+json finite(float x) { return std::isfinite(x) ? json(x) : json(nullptr); }
+
+const char* name_of(Taper taper) {
+  constexpr const char* names[] = {"uniform", "taylor30", "hamming", "hann", "unit"};
+  return names[static_cast<int>(taper)];
+}
+const char* name_of(Waveform::Shape shape) {
+  constexpr const char* names[] = {"gaussian", "cw", "lfm", "measured"};
+  return names[static_cast<int>(shape)];
+}
+
+json json_of(const SonarModel& model, const FrequencyMode& mode) {
+  const ReceiverModel& law = mode.receiver;
+  return {{"profile", model.profile},
+          {"model", model.name},
+          {"mode", mode.name},
+          {"centre_hz", mode.centre_hz},
+          {"aperture_deg", deg(mode.horizontal_aperture_rad)},
+          {"source_level_db", mode.source_level_db},
+          {"beam_spacing", mode.beam_spacing == BeamSpacing::uniform_in_sine ? "uniform_in_sine" : "uniform_in_angle"},
+          {"azimuth_width_deg", deg(mode.pattern.azimuth_width_rad)},
+          {"azimuth_taper", name_of(mode.pattern.azimuth_taper)},
+          {"elevation_width_deg", deg(mode.pattern.elevation_width_rad)},
+          {"elevation_taper", name_of(mode.pattern.elevation_taper)},
+          {"elevation_width_is", mode.pattern.elevation_width_is == ElevationWidthIs::one_way ? "one_way" : "two_way"},
+          {"waveform",
+           {{"shape", name_of(mode.waveform.shape)},
+            {"sweep_s", mode.waveform.sweep_s},
+            {"falling", mode.waveform.falling},
+            {"exact", mode.waveform.exact},
+            {"samples", mode.waveform.samples.size()}}},
+          {"receiver",
+           {{"tvg_slope_db", law.tvg_slope_db},
+            {"tvg_minimum_range_m", law.tvg_minimum_range_m},
+            {"tvg_ceiling_db", finite(law.tvg_ceiling_db)},
+            {"full_scale_upa", law.full_scale_upa},
+            {"noise_figure_db", law.noise_figure_db},
+            {"crosstalk_db", law.crosstalk_db},
+            {"leak_upa", law.leak_upa},
+            {"leak_decay_db_per_m", law.leak_decay_db_per_m}}}};
+}
+
+json json_of(const PingSettings& s) {
+  return {{"mode", s.mode + 1},
+          {"beams", s.beam_count},
+          {"rows", s.range_bin_count},
+          {"range_m", s.range_m},
+          {"row_spacing_m", s.range_bin_m},
+          {"row_centre", s.row_centre},
+          {"pulse_width_m", s.pulse_width_m},
+          {"samples_per_row", s.samples_per_row},
+          {"rate_hz", s.rate_hz},
+          {"gain_db", s.gain_db},
+          {"tvg", s.tvg},
+          {"device_sound_speed_mps", s.device_sound_speed_mps},
+          {"device_absorption_db_per_m", s.device_absorption_db_per_m},
+          {"bits", s.format.bits},
+          {"max_code", s.format.max_code},
+          {"gamma", s.format.gamma},
+          {"row_gains", s.format.row_gains}};
+}
+
+json json_of(const Switches& switches) {
+  json all{{"mode", name_of(switches.mode)}, {"expected_power", switches.expected_power}, {"fixed_fan", switches.fixed_fan}};
+  for (const NamedSwitch& part : named_switches) all[part.name] = switches.*part.is_on;
+  return all;
+}
+
+json json_of(const Water& water) {
+  return {{"temperature_c", water.temperature_c},
+          {"salinity_psu", water.salinity_psu},
+          {"ph", water.ph},
+          {"sound_speed_mps", water.sound_speed_mps}};
+}
+
+/// Range, index and name of what each beam met first; null where it met nothing.
+json truth_of(const Ping& ping, const Scene& scene) {
+  json range = json::array(), object = json::array(), name = json::array();
+  for (const BeamTruth& t : ping.truth) {
+    const bool hit = t.object != BeamTruth::nothing;
+    range.push_back(hit ? json(t.range_m) : json(nullptr));
+    object.push_back(hit ? json(t.object) : json(nullptr));
+    name.push_back(hit ? json(scene.objects[t.object].name) : json(nullptr));
+  }
+  return {{"first_hit_m", range}, {"object", object}, {"object_name", name}};
+}
+
+void add(Sha256& hash, const json& value) {
+  const std::string text = value.dump();
+  hash.add(std::as_bytes(std::span(text.data(), text.size())));
+}
+
+void add_way(Sha256& hash, const std::shared_ptr<const motion::Trajectory>& way, Time begins_at) {
+  if (!way) return;
+  const motion::Points& p = way->points();
+  add(hash, {begins_at.time_since_epoch().count(), p.times.size()});
+  hash.add(std::as_bytes(std::span(p.times)));
+  hash.add(std::as_bytes(std::span(p.poses)));
+  hash.add(std::as_bytes(std::span(p.velocities_mps)));
+  hash.add(std::as_bytes(std::span(p.angular_velocities_radps)));
+}
+
+void add_scene(Sha256& hash, const Scene& scene) {
+  for (const Object& o : scene.objects) {
+    add(hash, {o.name, o.visible, json_of(o.in_world)});
+    hash.add(std::as_bytes(std::span(o.mesh->vertices)));
+    hash.add(std::as_bytes(std::span(o.mesh->triangles)));
+    hash.add(std::as_bytes(std::span(o.mesh->material)));
+  }
+  for (const Material& m : scene.materials)
+    add(hash,
+        {m.name, m.lambert_db, m.roughness_m, m.reflection, m.trend_db_per_decade, m.texture.shape, m.gsab.a_db, m.gsab.c_db});
+}
+
+}  // namespace
+
+json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, const PingStatistics& count,
+             const std::string& digest) {
+  const PingRequest& r = ping.request;
+  const PingSettings& s = r.settings;
+  const FrequencyMode& mode = ping.mode();
+  const double depth_m = depth_from_z(r.sonar_in_world.position_m.z);
+  return {{"sonard", version},
+          {"inputs", digest},
+          {"ping", static_cast<std::uint32_t>(r.number)},
+          {"time_s", seconds(r.fired_at.time_since_epoch())},
+          {"scene", job.scene->name},
+          {"sweep", job.values},
+          {"sonar", json_of(*r.model, mode)},
+          {"sonar_name", job.sonar_name},
+          {"settings", json_of(s)},
+          {"row_0_m", s.row_centre * s.range_bin_m},
+          {"row_spacing_m", s.range_bin_m},
+          {"beam_azimuth_rad", ping.beam_azimuth_rad},
+          {"row_gain", ping.row_gain},
+          {"water",
+           [&] {
+             json water = json_of(r.water);
+             water["true_sound_speed_mps"] = true_sound_speed_mps(r.water, depth_m);
+             water["absorption_db_per_m"] = absorption_db_per_m(r.water, depth_m, static_cast<double>(mode.centre_hz));
+             return water;
+           }()},
+          {"sonar_in_world", json_of(r.sonar_in_world)},
+          {"vehicle_in_world", json_of(r.vehicle_in_world)},
+          {"above_sea_surface", is_in_air(r.sonar_in_world, *job.scene)},
+          {"twist",
+           {{"velocity_mps", json_of(r.sonar_moves.velocity_mps)},
+            {"angular_rate_radps", json_of(r.sonar_moves.angular_rate_radps)}}},
+          {"seed", static_cast<std::uint64_t>(r.seed)},
+          {"switches", json_of(effective_switches(r.switches))},
+          {"engine", engine},
+          {"counts", {{"rays", count.rays}, {"echoes", count.echoes}, {"tiles", count.tiles}, {"cells", count.cells}}},
+          {"truth", truth_of(ping, *job.scene)}};
+}
+
+std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictures) {
+  Sha256 hash;
+  add(hash, {version, input.text, rate_hz});
+  if (plain_pictures) add(hash, "plain pictures");
+  for (const RenderJob& job : input.jobs) {
+    add(hash, json_of(*job.model, job.mode()));
+    hash.add(std::as_bytes(std::span(job.mode().waveform.samples)));
+    add(hash, {json_of(job.settings), json_of(job.water), json_of(job.engine.switches), job.seed, job.sonar_id, job.values,
+               static_cast<int>(job.engine.simd) + 16 * static_cast<int>(job.engine.device), json_of(job.mount),
+               json_of(job.path.initial), job.path.orbits});
+    add_way(hash, job.path.trajectory, job.path.begins_at);
+    if (job.path.snapshots) add(hash, "snapshots");
+    for (std::size_t i = 0; i < job.body_paths.size(); ++i) {
+      if (job.body_paths[i]) add(hash, i);
+      add_way(hash, job.body_paths[i], job.path.begins_at);
+    }
+    add_scene(hash, *job.scene);
+  }
+  return hash.hex();
+}
+
+}  // namespace sonar::render

@@ -1,0 +1,143 @@
+#include "daemon/commands/render/sonar_keys.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/geometry.hpp"
+#include "core/pipeline/arithmetic/waveform.hpp"
+#include "core/text/decimal.hpp"
+
+namespace sonar::render {
+namespace {
+
+using text::Map;
+using text::Node;
+using text::Range;
+
+void set(const Node& node, Range range, float& value) {
+  value = static_cast<float>(node.number_or(static_cast<double>(value), range));
+}
+void set_deg(const Node& node, Range range_deg, float& value_rad) {
+  if (node.present()) value_rad = static_cast<float>(rad_from_deg(node.number(range_deg)));
+}
+
+void read_waveform(const Node& node, Waveform& waveform) {
+  if (!node.present()) return;
+  Map keys = node.map();
+  using Shape = Waveform::Shape;
+  waveform.shape = keys.required("shape").choice<Shape>(
+      {{"gaussian", Shape::gaussian}, {"cw", Shape::cw}, {"lfm", Shape::lfm}, {"measured", Shape::measured}});
+  set(keys.optional("sweep_s"), Range::between(1e-6, 1), waveform.sweep_s);
+  waveform.falling = keys.optional("falling").boolean_or(waveform.falling);
+  waveform.exact = keys.optional("exact").boolean_or(waveform.exact);
+  if (waveform.shape != Shape::measured) return;
+  waveform.sample_rate_hz = keys.required("sample_rate_hz").number(Range::between(1, 1e9));
+  waveform.samples.clear();
+  for (const Node& sample : keys.required("samples").items(3, 65536)) {
+    const auto part = sample.numbers<2>();
+    waveform.samples.emplace_back(static_cast<float>(part[0]), static_cast<float>(part[1]));
+  }
+}
+
+void read_receiver(const Node& node, ReceiverModel& law) {
+  if (!node.present()) return;
+  Map keys = node.map();
+  const float infinity = std::numeric_limits<float>::infinity();
+  set(keys.optional("tvg_slope_db"), Range::between(0, 100), law.tvg_slope_db);
+  set(keys.optional("tvg_minimum_range_m"), Range::between(1e-3, 1000), law.tvg_minimum_range_m);
+  const Node ceiling = keys.optional("tvg_ceiling_db");
+  if (ceiling.present())
+    law.tvg_ceiling_db = ceiling.is_scalar() && text::parse_infinity(ceiling.text())
+                             ? infinity
+                             : static_cast<float>(ceiling.number(Range::between(-200, 400)));
+  set(keys.optional("full_scale_upa"), {.min = 0, .min_excluded = true}, law.full_scale_upa);
+  set(keys.optional("noise_figure_db"), Range::between(-100, 200), law.noise_figure_db);
+  set(keys.optional("crosstalk_db"), Range::between(-300, 0), law.crosstalk_db);
+  set(keys.optional("leak_upa"), Range::at_least(0), law.leak_upa);
+  set(keys.optional("leak_decay_db_per_m"), Range::between(0, 1e4), law.leak_decay_db_per_m);
+}
+
+}  // namespace
+
+void read_model(Map keys, FrequencyMode& mode) {
+  mode.name = keys.optional("name").text_or(mode.name, 64);
+  set(keys.optional("centre_hz"), Range::between(100, 1e8), mode.centre_hz);
+  set_deg(keys.optional("aperture_deg"), Range::between(0.1, 170), mode.horizontal_aperture_rad);
+  set(keys.optional("source_level_db"), Range::between(0, 300), mode.source_level_db);
+  mode.beam_spacing = keys.optional("beam_spacing")
+                          .choice_or(mode.beam_spacing, {{"uniform_in_sine", BeamSpacing::uniform_in_sine},
+                                                         {"uniform_in_angle", BeamSpacing::uniform_in_angle}});
+  set_deg(keys.optional("azimuth_width_deg"), Range::between(0.01, 60), mode.pattern.azimuth_width_rad);
+  set_deg(keys.optional("elevation_width_deg"), Range::between(0.1, 120), mode.pattern.elevation_width_rad);
+  mode.pattern.azimuth_taper = keys.optional("azimuth_taper")
+                                   .choice_or(mode.pattern.azimuth_taper, {{"uniform", Taper::uniform},
+                                                                           {"taylor30", Taper::taylor30},
+                                                                           {"hamming", Taper::hamming},
+                                                                           {"hann", Taper::hann},
+                                                                           {"unit", Taper::unit}});
+  mode.pattern.elevation_taper =
+      keys.optional("elevation_taper")
+          .choice_or(mode.pattern.elevation_taper, {{"uniform", Taper::uniform}, {"unit", Taper::unit}});
+  mode.pattern.elevation_width_is = keys.optional("elevation_width_is")
+                                        .choice_or(mode.pattern.elevation_width_is, {{"one_way", ElevationWidthIs::one_way},
+                                                                                     {"two_way", ElevationWidthIs::two_way}});
+  read_waveform(keys.optional("waveform"), mode.waveform);
+  read_receiver(keys.optional("receiver"), mode.receiver);
+}
+
+int read_mode(const Node& node, const SonarModel& model, int fallback) {
+  if (!node.present()) return fallback;
+  if (text::parse_integer(node.text(64))) {
+    const int modes = static_cast<int>(model.modes.size());
+    return std::clamp(static_cast<int>(node.integer(1, modes)), 1, modes) - 1;  // what is outside has been said by then
+  }
+  std::vector<std::string_view> names;
+  for (const FrequencyMode& mode : model.modes) names.push_back(mode.name);
+  return static_cast<int>(node.choice_index(std::move(names)));
+}
+
+void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s) {
+  const PingSettings before = s;
+  s.mode = read_mode(keys.optional("mode"), model, s.mode);
+  const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
+  if (!own_grid) s.range_m = std::min(s.range_m, static_cast<double>(mode.max_range_m));
+  s.range_m = keys.optional("range_m").number_or(s.range_m, Range::between(1e-3, 1e5));
+  s.beam_count = static_cast<int>(keys.optional("beams").integer_or(s.beam_count, 1, 2048));
+  s.device_sound_speed_mps = static_cast<float>(
+      keys.optional("device_sound_speed_mps").number_or(static_cast<double>(s.device_sound_speed_mps), Range::between(100, 1e4)));
+  set(keys.optional("device_absorption_db_per_m"), Range::between(0, 1000), s.device_absorption_db_per_m);
+
+  // The grid: rows, their spacing and the pulse follow one from the other where they are not given.
+  const Node rows = keys.optional("rows"), spacing = keys.optional("row_spacing_m"), pulse = keys.optional("pulse_width_m");
+  const Range a_length = Range::between(1e-5, 100);
+  if (pulse.present()) s.pulse_width_m = static_cast<float>(pulse.number(a_length));
+  const double c = static_cast<double>(s.device_sound_speed_mps);
+  if (spacing.present())
+    s.range_bin_m = spacing.number(a_length);
+  else if (rows.present())
+    s.range_bin_m = s.range_m / static_cast<double>(std::max<std::int64_t>(rows.integer(1, 65535), 1));
+  else if (own_grid)
+    s.range_bin_m = c / (2 * native_sample_rate_hz(envelope_parameter_hz(c, static_cast<double>(s.pulse_width_m))));
+  else
+    s.range_bin_m = before.range_bin_m * s.range_m / before.range_m;
+  if (!(s.range_bin_m > 0)) return;  // said already
+  s.range_bin_count = static_cast<int>(
+      rows.integer_or(std::clamp<std::int64_t>(std::llround(std::ceil(s.range_m / s.range_bin_m - 1e-9)), 1, 65535), 1, 65535));
+  if (!pulse.present() && !own_grid)
+    s.pulse_width_m = static_cast<float>(static_cast<double>(before.pulse_width_m) * s.range_bin_m / before.range_bin_m);
+
+  s.row_centre = keys.optional("row_centre").number_or(s.row_centre, Range::between(0, 1));
+  s.samples_per_row = static_cast<int>(keys.optional("samples_per_row").integer_or(s.samples_per_row, 1, 64));
+  set(keys.optional("rate_hz"), Range::between(0.001, 1000), s.rate_hz);
+  set(keys.optional("gain_db"), Range::between(-200, 200), s.gain_db);
+  s.tvg = keys.optional("tvg").boolean_or(s.tvg);
+  const Node bits = keys.optional("bits");
+  s.format.bits = bits.choice_or<int>(s.format.bits, {{"8", 8}, {"16", 16}, {"32", 32}});
+  if (bits.present()) s.format.max_code = s.format.bits == 8 ? 254 : s.format.bits == 16 ? 65535 : 0xFFFFFFFFu;
+  s.format.max_code = static_cast<std::uint32_t>(keys.optional("max_code").unsigned_integer_or(s.format.max_code, 0xFFFFFFFFu));
+  set(keys.optional("gamma"), Range::between(0.01, 10), s.format.gamma);
+  s.format.row_gains = keys.optional("row_gains").boolean_or(s.format.row_gains);
+}
+
+}  // namespace sonar::render

@@ -1,0 +1,99 @@
+#include "daemon/commands/replay/replay_command.hpp"
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+
+#include "core/text/arguments.hpp"
+#include "core/text/decimal.hpp"
+#include "daemon/commands/replay/replay_server.hpp"
+
+namespace sonar {
+
+void add_replay_options(CLI::App& app, ReplayCommand& replay) {
+  app.footer(
+      "examples:\n"
+      "  sonard replay run.oculus                          at 127.0.0.2, at the pace it was recorded with\n"
+      "  sonard replay capture.pcapng --speed 4 --loop\n"
+      "  sonard replay run.mcap --stepped                  as fast as the driver reads\n"
+      "Ends when a driver has had the whole recording, or, with --loop, by Ctrl-C.");
+  app.add_option("file", replay.file, "recording: .oculus log, raw dump, pcap, pcapng or MCAP")->required();
+  app.add_option("--ip", replay.ip, "address to serve it at, one of this computer's")->capture_default_str();
+  app.add_option("--port", replay.port, "TCP port; drivers expect 52100")
+      ->check(text::whole_number(1, 65535))
+      ->capture_default_str();
+  app.add_option("--status-to", replay.status_to,
+                 "IP or IP:PORT for status datagrams (default: broadcast of the address's network)");
+  CLI::Option* speed = app.add_option("--speed", replay.speed, "2 = twice as fast as recorded")
+                           ->check(text::number(0.001, 1000))
+                           ->capture_default_str();
+  app.add_flag("--stepped", replay.stepped, "no pace: the next message when the driver has taken the last")->excludes(speed);
+  app.add_flag("--loop", replay.loop, "from the front again and again");
+  app.add_option("--rate", replay.rate_hz, "messages a second of raw dumps, which know no times")
+      ->check(text::number(0.001, 10000))
+      ->capture_default_str();
+  app.add_option("--sonar", replay.sonar, "which of several in the file: its address in captures, its name in MCAP");
+  app.add_option("--part-number", replay.part_number, "of the sonar, where the recording holds no status (1042 = M1200d)")
+      ->check(text::whole_number(1, 65535))
+      ->capture_default_str();
+  app.add_option("--log-format", "text or json (default text)")
+      ->check(text::one_of({"text", "json"}))
+      ->each([&replay](const std::string& format) { replay.json = format == "json"; });
+}
+
+namespace {
+
+Result<ReplayOptions> options_from(const ReplayCommand& command) {
+  ReplayOptions options;
+  const auto usage = [](const Error& error) { return failure(ErrorKind::usage, error.text); };
+  const auto ip = parse_ipv4(command.ip);
+  if (!ip) return usage(ip.error());
+  options.at = {*ip, command.port};
+  for (const std::string& place : command.status_to) {
+    const std::size_t colon = place.find(':');
+    const auto to = parse_ipv4(place.substr(0, colon));
+    if (!to) return usage(to.error());
+    Endpoint endpoint{*to, 0};
+    if (colon != std::string::npos) {
+      const auto port = text::parse_integer(std::string_view(place).substr(colon + 1));
+      if (!port || *port < 1 || *port > 65535)
+        return failure(ErrorKind::usage, "--status-to: \"" + place + "\" is not IP or IP:PORT, such as 127.255.255.255");
+      endpoint.port = static_cast<std::uint16_t>(*port);
+    }
+    options.status_to.push_back(endpoint);
+  }
+  options.speed = command.speed;
+  options.stepped = command.stepped;
+  options.loop = command.loop;
+  options.rate_hz = command.rate_hz;
+  options.handle_signals = true;
+  return options;
+}
+
+}  // namespace
+
+Result<void> run_replay(const ReplayCommand& command) {
+  std::signal(SIGPIPE, SIG_IGN);
+  const auto options = options_from(command);
+  if (!options) return tl::make_unexpected(options.error());
+  auto opened = recording::open_recording(std::filesystem::path(command.file), command.sonar);
+  if (!opened) return tl::make_unexpected(opened.error());
+  auto device = find_replay_device(*opened->reader, command.file, command.part_number);
+  if (!device) return tl::make_unexpected(device.error());
+  LogOptions log_options;
+  log_options.json = command.json;
+  Log log(log_options);
+  asio::io_context io;
+  ReplayServer server(io, *opened->reader, *device, *options, log);
+  if (auto listening = server.open(); !listening) return listening;
+  if (!opened->reader->note().empty()) log.info(opened->reader->note());
+  log.announce(std::string("replaying ") + command.file + " (" + recording::name_of(opened->format) + ") as sonar " +
+               std::to_string(device->status.device_id) + " on tcp " + text_of(server.at()) + "; Ctrl-C stops\n");
+  server.start();
+  io.run();
+  const ReplayServer::Figures& done = server.figures();
+  log.announce("served " + std::to_string(done.messages) + " messages, " + std::to_string(done.bytes) + " bytes, to " +
+               std::to_string(done.clients) + (done.clients == 1 ? " client\n" : " clients\n"));
+  return server.outcome();
+}
+
+}  // namespace sonar

@@ -1,0 +1,220 @@
+#include "daemon/commands/replay/replay_server.hpp"
+
+#include <csignal>
+#include <cstdlib>
+
+#include "daemon/server/system/listen.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr auto goodbye_limit = std::chrono::milliseconds(1500);
+constexpr auto status_period = std::chrono::seconds(1);
+
+std::string text_of_bytes(std::uint64_t bytes) { return std::to_string((bytes + 500'000) / 1'000'000) + " MB"; }
+
+}  // namespace
+
+ReplayServer::ReplayServer(asio::io_context& io, recording::RecordingReader& reader, ReplayDevice device, ReplayOptions options,
+                           Log& log)
+    : io_(io),
+      reader_(reader),
+      device_(std::move(device)),
+      options_(std::move(options)),
+      log_(log),
+      acceptor_(io),
+      status_(io),
+      status_timer_(io),
+      deadline_(io),
+      signals_(io) {}
+
+Result<void> ReplayServer::open() {
+  at_ = options_.at;
+  if (Result<void> listening = listen_tcp(acceptor_, at_); !listening) return listening;
+  error_code ec;
+  at_.port = acceptor_.local_endpoint(ec).port();
+  SonarConfig network;  // mask and broadcast address as a configured sonar has them
+  network.advertise_ip = at_.ip;
+  derive_addresses(network);
+  mask_ = network.netmask;
+  for (const Endpoint& to : options_.status_to.empty() ? network.status_to : options_.status_to)
+    status_to_.emplace_back(address_of(to.ip), to.port == 0 ? oculus::status_port : to.port);
+  return bind_udp(status_, {at_.ip, 0}, true);
+}
+
+/// An exception in one of its coroutines would leave a server that runs and serves no client.
+template <class Coroutine>
+void ReplayServer::spawn(Coroutine coroutine) {
+  asio::co_spawn(io_, std::move(coroutine), [this](std::exception_ptr fault) {
+    if (!fault) return;
+    outcome_ = failure(ErrorKind::bug, "internal fault: " + text_of(fault) + " (please report it); it ended the replay");
+    end();
+  });
+}
+
+void ReplayServer::start() {
+  spawn(accept());
+  spawn(send_status());
+  if (options_.handle_signals) spawn(watch_signals());
+}
+
+asio::awaitable<void> ReplayServer::watch_signals() {
+  error_code ec;
+  signals_.add(SIGINT, ec);
+  signals_.add(SIGTERM, ec);
+  co_await signals_.async_wait(into(ec));
+  if (ec || over_) co_return;
+  stop();
+  if (over_) co_return;  // no client was connected
+  co_await signals_.async_wait(into(ec));
+  if (!ec && !over_) std::_Exit(EXIT_FAILURE);  // asked twice
+}
+
+void ReplayServer::stop() {
+  if (stopping_ || over_) return;
+  stopping_ = true;
+  error_code ec;
+  acceptor_.close(ec);
+  if (!client_) return end();
+  client_->wake.cancel();
+  deadline_.expires_after(goodbye_limit);
+  deadline_.async_wait([this](const error_code& e) {
+    if (e || !client_) return;
+    error_code ignored;
+    client_->socket.set_option(asio::socket_base::linger(true, 0), ignored);
+    client_->socket.close(ignored);
+  });
+}
+
+/// Nothing is left that would keep io.run() going.
+void ReplayServer::end() {
+  over_ = true;
+  error_code ec;
+  acceptor_.close(ec);
+  status_.close(ec);
+  if (client_) client_->socket.close(ec);
+  status_timer_.cancel();
+  deadline_.cancel();
+  signals_.cancel(ec);
+}
+
+asio::awaitable<void> ReplayServer::accept() {
+  while (!over_ && !stopping_) {
+    error_code ec;
+    tcp::socket socket(io_);
+    co_await acceptor_.async_accept(socket, into(ec));
+    if (over_ || stopping_) co_return;
+    if (ec) {  // out of descriptors, say: not for ever
+      asio::steady_timer pause(io_, std::chrono::milliseconds(100));
+      co_await pause.async_wait(into(ec));
+      continue;
+    }
+    const auto client = std::make_shared<Client>(std::move(socket));
+    const tcp::endpoint peer = client->socket.remote_endpoint(ec);
+    if (ec) continue;
+    client->name = peer.address().to_string() + ":" + std::to_string(peer.port());
+    if (client_) {
+      ++figures_.turned_away;
+      say_at_times(log_, turned_away_limit_, LogLevel::info, "client turned away: another one is being served",
+                   {{"client", client->name}});
+      continue;  // closes it
+    }
+    client->ip = peer.address().to_v4().to_bytes();
+    client->socket.set_option(tcp::no_delay(true), ec);
+    client->socket.set_option(asio::socket_base::keep_alive(true), ec);
+    client_ = client;
+    ++figures_.clients;
+    log_.info("client connected", {{"client", client->name}});
+    spawn(serve(client));
+    spawn(listen_to(client));
+  }
+}
+
+asio::awaitable<void> ReplayServer::serve(ClientPointer client) {
+  std::optional<std::chrono::nanoseconds> interval;
+  if (!reader_.knows_times()) interval = nanoseconds_from(1 / options_.rate_hz);
+  ReplayPace pace(options_.speed, interval);
+  const std::uint64_t messages = figures_.messages, bytes = figures_.bytes;
+  Played played = Played::to_the_end;
+  do {
+    reader_.rewind();
+    played = co_await play(client, pace);
+    pace.begin_again();
+    if (played == Played::to_the_end) ++figures_.times_through;
+  } while (played == Played::to_the_end && options_.loop && !stopping_);
+  if (played != Played::left) co_await say_goodbye(client);
+  error_code ec;
+  client->socket.close(ec);
+  client_.reset();
+  const char* const how = played == Played::to_the_end ? "recording served to its end"
+                          : played == Played::left     ? "client left"
+                                                       : "stopped";
+  log_.info(
+      how,
+      {{"client", client->name}, {"messages", figures_.messages - messages}, {"sent", text_of_bytes(figures_.bytes - bytes)}});
+  if (stopping_ || played == Played::to_the_end) end();
+}
+
+asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, ReplayPace& pace) {
+  bool any = false;
+  while (auto message = reader_.next()) {
+    if (message->from != recording::Origin::device || message->by != recording::Carrier::stream) continue;
+    if (stopping_) co_return Played::stopped;
+    if (client->gone) co_return Played::left;
+    error_code ec;
+    if (!options_.stepped) {
+      client->wake.expires_at(pace.due(message->at, Steady::now()));
+      co_await client->wake.async_wait(into(ec));
+    }
+    if (stopping_) co_return Played::stopped;
+    if (client->gone) co_return Played::left;
+    co_await asio::async_write(client->socket, asio::buffer(message->bytes), into(ec));
+    if (ec) co_return stopping_ ? Played::stopped : Played::left;
+    ++figures_.messages;
+    figures_.bytes += message->bytes.size();
+    any = true;
+  }
+  if (const auto damage = reader_.damage(); damage && !std::exchange(damage_told_, true)) log_.warning(damage->text);
+  co_return any ? Played::to_the_end : Played::left;
+}
+
+/// What a client says changes nothing; it is read so that the client can go on saying it.
+asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
+  std::array<std::byte, 4096> ignored;
+  bool told = false;
+  while (true) {
+    error_code ec;
+    const std::size_t n = co_await client->socket.async_read_some(asio::buffer(ignored), into(ec));
+    if (ec) break;
+    figures_.client_bytes += n;
+    if (!std::exchange(told, true)) log_.info("settings of a client have no effect on a recording", {{"client", client->name}});
+  }
+  client->gone = true;
+  client->wake.cancel();
+}
+
+/// The end of our stream; then the client's, so that none of our last bytes is lost to a reset.
+asio::awaitable<void> ReplayServer::say_goodbye(ClientPointer client) {
+  error_code ec;
+  client->socket.shutdown(tcp::socket::shutdown_send, ec);
+  client->wake.expires_after(goodbye_limit);
+  if (!client->gone && !ec) co_await client->wake.async_wait(into(ec));
+}
+
+asio::awaitable<void> ReplayServer::send_status() {
+  bool told = false;
+  while (!over_) {
+    const protocol::Bytes status = device_.status_at(at_.ip, mask_, client_ ? client_->ip : Ipv4{});
+    error_code ec;
+    for (const udp::endpoint& to : status_to_) {
+      co_await status_.async_send_to(asio::buffer(status), to, into(ec));
+      if (over_) co_return;
+      if (ec && !std::exchange(told, true))
+        log_.warning("cannot send status: " + ec.message(), {{"to", to.address().to_string()}});
+    }
+    status_timer_.expires_after(status_period);
+    co_await status_timer_.async_wait(into(ec));
+  }
+}
+
+}  // namespace sonar

@@ -1,0 +1,88 @@
+// Serves a recording as the sonar it came from would: TCP, one client at a time, its messages byte for byte; status datagrams.
+// The whole of `sonard replay` but its command line; one thread, no scene, no engine.
+#pragma once
+
+#include <memory>
+
+#include "daemon/commands/replay/replay_device.hpp"
+#include "daemon/commands/replay/replay_pace.hpp"
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/log.hpp"
+
+namespace sonar {
+
+struct ReplayOptions {
+  Endpoint at{{127, 0, 0, 2}, oculus::tcp_port};
+  std::vector<Endpoint> status_to;  // empty = the broadcast address of `at`'s network, port 52102
+  double speed = 1;                 // of the recorded pace
+  bool stepped = false;             // no pace: the next message when the client has taken the last
+  bool loop = false;                // from the front again and again
+  double rate_hz = 10;              // messages a second of recordings that know no times
+  bool handle_signals = false;
+};
+
+class ReplayServer {
+ public:
+  struct Figures {
+    std::uint64_t clients = 0, turned_away = 0, messages = 0, bytes = 0, times_through = 0, client_bytes = 0;
+  };
+
+  /// The recording has been rewound. All must outlive io.run().
+  ReplayServer(asio::io_context& io, recording::RecordingReader& reader, ReplayDevice device, ReplayOptions options, Log& log);
+
+  /// Listens. unavailable.
+  Result<void> open();
+  /// Everything then happens inside io.run(), which returns when the recording was served to its end (not with loop), or stopped.
+  void start();
+  /// The message under way is finished, then the client has the end of the stream; after 1.5 s it is cut off.
+  void stop();
+
+  const Figures& figures() const { return figures_; }
+  /// After io.run(). bug, when an exception in one of its parts ended it.
+  const Result<void>& outcome() const { return outcome_; }
+  Endpoint at() const { return at_; }
+
+ private:
+  using Steady = std::chrono::steady_clock;
+  struct Client {
+    explicit Client(tcp::socket s) : socket(std::move(s)), wake(socket.get_executor()) {}
+    tcp::socket socket;
+    asio::steady_timer wake;  // ended early when the client goes
+    Ipv4 ip{};
+    std::string name;
+    bool gone = false;
+  };
+  using ClientPointer = std::shared_ptr<Client>;
+  enum class Played { to_the_end, left, stopped };
+
+  asio::awaitable<void> accept();
+  asio::awaitable<void> serve(ClientPointer client);
+  asio::awaitable<Played> play(ClientPointer client, ReplayPace& pace);
+  asio::awaitable<void> listen_to(ClientPointer client);
+  asio::awaitable<void> say_goodbye(ClientPointer client);
+  asio::awaitable<void> send_status();
+  asio::awaitable<void> watch_signals();
+  template <class Coroutine>
+  void spawn(Coroutine coroutine);
+  void end();
+
+  asio::io_context& io_;
+  recording::RecordingReader& reader_;
+  ReplayDevice device_;
+  ReplayOptions options_;
+  Log& log_;
+  Endpoint at_;
+  Ipv4 mask_{};
+  std::vector<udp::endpoint> status_to_;
+  tcp::acceptor acceptor_;
+  udp::socket status_;
+  asio::steady_timer status_timer_, deadline_;
+  asio::signal_set signals_;
+  ClientPointer client_;
+  LogLimiter turned_away_limit_;
+  Figures figures_;
+  Result<void> outcome_;
+  bool stopping_ = false, over_ = false, damage_told_ = false;
+};
+
+}  // namespace sonar

@@ -1,0 +1,31 @@
+// IPv4 addresses, endpoints and ranges as they stand in configurations, on command lines and in log lines.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+using protocol::Ipv4;
+
+struct Endpoint {
+  Ipv4 ip{};
+  std::uint16_t port = 0;
+  bool operator==(const Endpoint&) const = default;
+};
+struct AddressRange {  // 10.0.0.0/8
+  Ipv4 ip{};
+  int prefix_bits = 32;
+  bool contains(Ipv4 address) const;
+};
+std::string text_of(Ipv4 ip);
+std::string text_of(Endpoint endpoint);
+bool is_loopback(Ipv4 ip);
+/// config: a sentence that says what an address looks like.
+Result<Ipv4> parse_ipv4(std::string_view text);
+
+}  // namespace sonar

@@ -1,0 +1,26 @@
+// One line of the log as data: who writes it need not know where it goes.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "daemon/config/log_options.hpp"
+
+namespace sonar {
+
+struct LogField {
+  std::string key, value;
+  LogField(std::string_view k, std::string_view v) : key(k), value(v) {}
+  template <class T, class = std::enable_if_t<std::is_arithmetic_v<T>>>
+  LogField(std::string_view k, T v) : key(k), value(std::to_string(v)) {}
+};
+
+struct LogLine {
+  LogLevel level = LogLevel::info;
+  std::string phrase;
+  std::vector<LogField> fields;
+};
+
+}  // namespace sonar

@@ -1,0 +1,18 @@
+// What becomes of running sonars when the configuration is read again. Pure.
+#pragma once
+
+#include <vector>
+
+#include "daemon/config/config.hpp"
+
+namespace sonar {
+
+/// untouched and moved: it keeps its clients; changed: it is replaced; removed: it stops.
+enum class Fate { untouched, moved, changed, removed };
+/// Of a sonar that runs as `running`, when `next` takes the place of `now`.
+Fate fate_of(const SonarConfig& running, const Config& now, const Config& next);
+
+/// Null when there is none.
+const SonarConfig* sonar_named(const std::vector<SonarConfig>& sonars, const std::string& name);
+
+}  // namespace sonar

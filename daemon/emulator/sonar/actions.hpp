@@ -1,0 +1,88 @@
+// What an emulated sonar asks of its caller, which moves the bytes: returned by every call of Sonar, carried out in order.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/sonar/ping.hpp"
+#include "daemon/emulator/log_line.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+/// Chosen by the caller, unique for the life of a Sonar.
+using ConnectionId = std::uint64_t;
+
+/// Compute this ping and return it through Sonar::on_ping().
+struct ComputePing {
+  PingRequest request;
+};
+/// The connection has a slot: read its bytes and write its outbox.
+struct Serve {
+  ConnectionId connection = 0;
+};
+/// All slots are taken: keep the connection open, neither read nor write, until Serve.
+struct KeepWaiting {
+  ConnectionId connection = 0;
+};
+/// Close it without sending a byte. The Sonar has no record of it.
+struct TurnAway {
+  ConnectionId connection = 0;
+};
+/// The outbox has something to write.
+struct Wake {
+  ConnectionId connection = 0;
+};
+/// No messages after the one being written, then the end of the stream; on_closed() follows.
+struct Finish {
+  ConnectionId connection = 0;
+  std::string why;
+};
+/// At once; on_closed() follows.
+struct Reset {
+  ConnectionId connection = 0;
+  std::string why;
+};
+/// A connection is closed and forgotten.
+struct Closed {
+  std::string peer;  // its name
+  bool observer = false;
+  bool served = false;  // else it waited for a slot
+  std::uint64_t pings_written = 0, pings_dropped = 0;
+  std::string why;
+};
+/// A ping was framed and queued to every client and observer that takes it.
+struct PingQueued {
+  std::shared_ptr<const Ping> ping;
+  std::shared_ptr<const protocol::Bytes> bytes;
+  double simulation_s = 0;
+};
+/// A line for the log; those of one topic are limited together.
+struct Report {
+  enum class Topic { settings, notice, ignored, refused_ping, state, fault } topic{};
+  static constexpr std::size_t topics = 6;
+  LogLine line;
+};
+/// The engine failed: no sonar can go on.
+struct EngineFailed {
+  Error why;
+};
+
+using Action =
+    std::variant<ComputePing, Serve, KeepWaiting, TurnAway, Wake, Finish, Reset, Closed, PingQueued, Report, EngineFailed>;
+using Actions = std::vector<Action>;
+
+/// What became of a PingRequest.
+struct PingOutcome {
+  std::shared_ptr<const Ping> ping = nullptr;  // null on failure
+  std::string failure = {};
+  bool refused = false;             // only this ping could not be made: it is invalid or there was no memory for it
+  ErrorKind kind = ErrorKind::bug;  // of a failure that is more than that
+  double seconds = 0;               // wall time of its computation, without pings of other sonars computed in between
+};
+
+}  // namespace sonar

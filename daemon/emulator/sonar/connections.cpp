@@ -1,0 +1,85 @@
+#include "daemon/emulator/sonar/connections.hpp"
+
+#include <algorithm>
+
+namespace sonar {
+namespace {
+
+using State = Connection::State;
+
+void add(DeviceFigures& f, const Connection& c) {
+  f.offered += c.outbox.pings_offered();
+  f.sent += c.outbox.pings_written();
+  f.dropped += c.outbox.pings_dropped();
+  for (std::size_t why = 0; why < drop_reasons; ++why) f.dropped_by[why] += c.outbox.dropped_by_reason()[why];
+  f.waiting += c.outbox.pings_waiting();
+  f.bytes_written += c.bytes_written;
+  f.bytes_read += c.bytes_read;
+}
+
+}  // namespace
+
+std::optional<Time> Connection::next_tick() const {
+  if (finishing || dialogue == nullptr) return std::nullopt;
+  return std::max(dialogue->next_tick(), not_before);
+}
+
+std::optional<Time> Connection::next_request() const {
+  const auto request = finishing || dialogue == nullptr ? std::nullopt : dialogue->next_ping_request();
+  return request ? std::optional(std::max(*request, not_before)) : std::nullopt;
+}
+
+Connection* Connections::find(ConnectionId id) {
+  const auto it = std::find_if(all_.begin(), all_.end(), [&](const Connection& c) { return c.id == id; });
+  return it == all_.end() ? nullptr : &*it;
+}
+
+std::size_t Connections::count(Role role, State state) const {
+  return static_cast<std::size_t>(
+      std::count_if(all_.begin(), all_.end(), [&](const Connection& c) { return c.role == role && c.state == state; }));
+}
+
+Connection* Connections::oldest_client() {
+  const auto it = std::find_if(all_.begin(), all_.end(),
+                               [](const Connection& c) { return c.role == Role::client && c.state == State::served; });
+  return it == all_.end() ? nullptr : &*it;
+}
+
+Connection* Connections::longest_waiting() {
+  const auto it = std::find_if(all_.begin(), all_.end(), [](const Connection& c) { return c.state == State::waiting; });
+  return it == all_.end() ? nullptr : &*it;
+}
+
+Connections::Verdict Connections::verdict(Role role) const {
+  if (role == Role::observer)
+    return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::turn_away;
+  if (clients() < static_cast<std::size_t>(config_.max_clients)) return Verdict::serve;
+  if (config_.when_full == WhenClientsFull::take_over) return Verdict::take_over;
+  const bool waits = config_.when_full == WhenClientsFull::queue && waiting() < longest_queue;
+  return waits ? Verdict::wait : Verdict::turn_away;
+}
+
+Connection& Connections::add(ConnectionId id, Role role, Peer peer, State state) {
+  return all_.emplace_back(Connection{
+      .id = id, .role = role, .peer = std::move(peer), .state = state, .dialogue = nullptr, .outbox = Outbox(config_.outbox)});
+}
+
+void Connections::remove(ConnectionId id) {
+  const auto it = std::find_if(all_.begin(), all_.end(), [&](const Connection& c) { return c.id == id; });
+  if (it == all_.end()) return;
+  if (it->role == Role::client) sonar::add(gone_, *it);
+  all_.erase(it);
+}
+
+void Connections::add_to(DeviceFigures& figures) const {
+  figures.offered += gone_.offered;
+  figures.sent += gone_.sent;
+  figures.dropped += gone_.dropped;
+  for (std::size_t why = 0; why < drop_reasons; ++why) figures.dropped_by[why] += gone_.dropped_by[why];
+  figures.bytes_written += gone_.bytes_written;
+  figures.bytes_read += gone_.bytes_read;
+  for (const Connection& c : all_)
+    if (c.role == Role::client) sonar::add(figures, c);
+}
+
+}  // namespace sonar

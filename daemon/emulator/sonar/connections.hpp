@@ -1,0 +1,85 @@
+// The connections of one emulated sonar: its clients, those that wait for a slot, those that are leaving, and observers, which
+// receive every ping and change nothing. Each has its conversation in the vendor's protocol and its outbox. No sockets, no clock.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/config/config.hpp"
+#include "daemon/emulator/sonar/actions.hpp"
+#include "daemon/emulator/sonar/metrics.hpp"
+#include "daemon/emulator/sonar/outbox.hpp"
+
+namespace sonar {
+
+enum class Role { client, observer };
+
+struct Peer {
+  std::string name;     // for the log: "127.0.0.1:40123"
+  protocol::Ipv4 ip{};  // as the status message shows it
+};
+
+struct Connection {
+  enum class State {
+    waiting,  // for a slot
+    served,
+    leaving,  // told to finish: takes the rest of its message, counts as a client no more when another took over
+  };
+  ConnectionId id = 0;
+  Role role = Role::client;
+  Peer peer;
+  State state = State::served;
+  std::uint64_t number = 0;  // of clients: counted from 1
+  std::unique_ptr<protocol::Dialogue> dialogue;
+  Outbox outbox;
+  bool finishing = false;  // no more bytes are taken in, no more pings offered
+  Time not_before{};       // earliest next call of dialogue->on_tick, in unskipped time
+  std::uint64_t bytes_written = 0, bytes_read = 0;
+
+  /// When the conversation has something to do; nothing while it ends.
+  std::optional<Time> next_tick() const;
+  /// When it will request a ping by itself.
+  std::optional<Time> next_request() const;
+};
+
+class Connections {
+ public:
+  using List = std::list<Connection>;
+  static constexpr std::size_t longest_queue = 16;
+
+  explicit Connections(const SonarConfig& config) : config_(config) {}
+
+  Connection* find(ConnectionId id);
+  const Connection* find(ConnectionId id) const { return const_cast<Connections*>(this)->find(id); }
+  /// Served clients, oldest first.
+  std::size_t clients() const { return count(Role::client, Connection::State::served); }
+  std::size_t observers() const { return count(Role::observer, Connection::State::served); }
+  std::size_t waiting() const { return count(Role::client, Connection::State::waiting); }
+  bool empty() const { return all_.empty(); }
+  Connection* oldest_client();
+  const Connection* oldest_client() const { return const_cast<Connections*>(this)->oldest_client(); }
+  Connection* longest_waiting();
+
+  /// By the rules of max_clients, when_full and max_observers.
+  enum class Verdict { serve, take_over, wait, turn_away };
+  Verdict verdict(Role role) const;
+  Connection& add(ConnectionId id, Role role, Peer peer, Connection::State state);
+  void remove(ConnectionId id);
+
+  List& all() { return all_; }
+  const List& all() const { return all_; }
+  /// Adds what was sent and dropped, of clients that are here and of those that have gone.
+  void add_to(DeviceFigures& figures) const;
+
+ private:
+  std::size_t count(Role role, Connection::State state) const;
+
+  const SonarConfig& config_;
+  List all_;  // in the order of arrival
+  DeviceFigures gone_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,16 @@
+// The part of a ping request that a configuration and the world determine: served sonars and `sonard render` share it.
+#pragma once
+
+#include "daemon/config/config.hpp"
+#include "daemon/emulator/world/world.hpp"
+
+namespace sonar {
+
+/// Poses, motion, moving objects, water, seed and switches of a ping fired at `at` by a sonar mounted on that vehicle. Model,
+/// number, settings and sonar_id are the caller's.
+PingRequest ping_request(const Config& config, const World& world, std::size_t vehicle, const Pose& mount, Time at);
+
+/// As the sonar's own packets describe it, powered up at `now`; without settings.
+protocol::DeviceState device_state(const SonarConfig& sonar, const Config& config, Time now);
+
+}  // namespace sonar

@@ -1,0 +1,276 @@
+#include "daemon/emulator/sonar/sonar.hpp"
+
+#include <algorithm>
+
+#include "daemon/emulator/sonar/ping_request.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr auto air_reported_every = std::chrono::minutes(1);    // a vehicle on waves leaves the water with each of them
+constexpr auto shortest_rhythm = std::chrono::milliseconds(1);  // between two ticks of one conversation
+
+}  // namespace
+
+Sonar::Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time now, std::chrono::nanoseconds skipped)
+    : around_(around),
+      config_(std::move(config)),
+      vendor_(*config_.profile.vendor),
+      index_(index),
+      state_(device_state(config_, around.config, now)),
+      connections_(config_),
+      skipped_(skipped) {
+  update_depth(now);
+  use_initial_settings();
+}
+
+void Sonar::report(Report::Topic topic, LogLevel level, std::string phrase, std::vector<LogField> fields,
+                   Actions& actions) const {
+  fields.insert(fields.begin(), {"sonar", config_.name});
+  actions.emplace_back(Report{topic, {level, std::move(phrase), std::move(fields)}});
+}
+
+// ---- settings
+
+/// As if no client had ever connected: the next one finds the device as it comes.
+void Sonar::use_initial_settings() {
+  asked_ = false;
+  protocol::ChangeSettings initial = vendor_.initial_settings(state_);
+  settings_ = initial.settings;
+  state_.settings = std::move(initial.vendor_settings);
+  busy_unwanted_ = busy_;
+}
+
+bool Sonar::wants_pings() const {
+  return !stopping_ && connections_.clients() > 0 && (asked_ || vendor_.pings_before_first_request(state_));
+}
+
+void Sonar::change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions) {
+  // Some drivers repeat their settings at ping rate: only a change is worth a line.
+  if (!asked_ || !change.vendor_settings->equals(*state_.settings)) {
+    state_.settings = change.vendor_settings;
+    report(Report::Topic::settings, LogLevel::info, "settings: " + change.summary, {{"client", who}}, actions);
+  }
+  settings_ = change.settings;  // of a repeat too: the device's own sound speed follows its depth
+  asked_ = true;
+  if (wants_pings()) pacer_.configure(settings_, now);
+}
+
+Result<Actions> Sonar::change(const protocol::SettingsOverride& wanted, const std::string& who, Time now) {
+  const auto change = vendor_.apply_override(wanted, state_);
+  if (!change) return tl::make_unexpected(change.error());
+  Actions actions;
+  change_settings(*change, who, now, actions);
+  return actions;
+}
+
+bool Sonar::set_transmit(bool on) { return std::exchange(transmits_, on) != on; }
+
+void Sonar::move_mount(const Pose& mount, Time now) {
+  config_.mount = mount;
+  update_depth(now);
+}
+
+void Sonar::move(const SonarConfig& config, Time now) {
+  config_.vehicle = config.vehicle;
+  move_mount(config.mount, now);
+}
+
+void Sonar::use_water(const Water& water, Time now) {
+  state_.water = water;
+  // The client's request stays; what the device derives from it, its sound speed say, follows the water.
+  if (const auto same = vendor_.apply_override({}, state_)) settings_ = same->settings;
+  if (wants_pings()) pacer_.configure(settings_, now);
+}
+
+DeviceFigures Sonar::figures() const {
+  DeviceFigures f = figures_;
+  f.ticks = pacer_.ticks();
+  f.skipped = pacer_.skipped();
+  f.skipped_ticks = f.skipped.total() + f.skipped_stale;
+  f.clients_now = connections_.clients();
+  f.clients_queued = connections_.waiting();
+  connections_.add_to(f);
+  return f;
+}
+
+// ---- time
+
+std::optional<Time> Sonar::next_ping() const {
+  const auto next = pacer_.next_tick();
+  return next && waits_for_pose(*next) ? std::nullopt : next;
+}
+
+bool Sonar::waits_for_pose(Time at) const {
+  return around_.config.poses.on_stale == OnStale::stop && around_.world.is_stale(config_.vehicle, at);
+}
+
+std::optional<Time> Sonar::next_request() const {
+  const auto next = earliest(&Connection::next_request);
+  return next && waits_for_pose(*next) ? std::nullopt : next;
+}
+
+std::optional<Time> Sonar::earliest(std::optional<Time> (Connection::*of)() const) const {
+  std::optional<Time> first;
+  for (const Connection& c : connections_.all())
+    if (const auto t = (c.*of)(); t && c.role == Role::client && c.state == Connection::State::served && (!first || *t < *first))
+      first = t;
+  return first ? std::optional(clock_time(*first)) : std::nullopt;
+}
+
+std::optional<Time> Sonar::next_tick() const {
+  std::optional<Time> first = pacer_.next_tick();
+  for (const Connection& c : connections_.all())
+    if (const auto t = c.next_tick(); t && (!first || clock_time(*t) < *first)) first = clock_time(*t);
+  return first;
+}
+
+Actions Sonar::on_tick(Time now) {
+  Actions actions = tick_conversations(now);
+  for (Action& action : tick_pacer(now)) actions.push_back(std::move(action));
+  return actions;
+}
+
+Actions Sonar::tick_conversations(Time now) {
+  Actions actions;
+  const Time at = unskipped(now);
+  for (Connection& c : connections_.all()) {
+    if (c.finishing || c.dialogue == nullptr || at < c.dialogue->next_tick()) continue;
+    guarded(c, actions, [&] { handle(c, c.dialogue->on_tick(at, pacer_.trigger_waits()), now, actions); });
+    c.not_before = at + shortest_rhythm;
+  }
+  return actions;
+}
+
+Actions Sonar::tick_pacer(Time now) {
+  Actions actions;
+  const auto due = pacer_.next_tick();
+  if (!due || now < *due) return actions;
+  figures_.lateness.add(seconds(now - *due));
+  if (pacer_.fire(now, busy_)) request_ping(pacer_.last_tick(), actions);
+  return actions;
+}
+
+void Sonar::skip(std::chrono::nanoseconds by) {
+  skipped_ += by;
+  pacer_.skip(by);
+  state_.powered_up_at += by;
+}
+
+bool Sonar::settled() const {
+  return !busy_ && std::all_of(connections_.all().begin(), connections_.all().end(), [](const Connection& c) {
+    return c.role == Role::observer || c.state != Connection::State::served || c.outbox.idle();
+  });
+}
+
+// ---- pings
+
+protocol::Bytes Sonar::beacon(Time now) {
+  update_depth(now);
+  return vendor_.beacon(state_, now);
+}
+
+void Sonar::update_depth(Time now) {
+  const Pose sonar = compose(around_.world.vehicle_at(config_.vehicle, now), config_.mount);
+  state_.depth_m = depth_from_z(sonar.position_m.z);
+}
+
+/// A device that keeps its rhythm while its host does not keep up has numbers for the pings that were not made.
+PingNumber Sonar::next_number() {
+  const SkippedTicks& skipped = pacer_.skipped();
+  const std::uint64_t lost = skipped.late + skipped.busy;
+  const std::uint64_t since = lost - std::exchange(numbered_skips_, lost);
+  if (config_.overload == Overload::count && ping_number_ > 0) ping_number_ += static_cast<std::uint32_t>(since);
+  return PingNumber(++ping_number_);
+}
+
+void Sonar::request_ping(Time at, Actions& actions) {
+  const Config& config = around_.config;
+  const World& world = around_.world;
+  const bool stale = world.is_stale(config_.vehicle, at);
+  if (stale && config.poses.on_stale == OnStale::stop) {
+    ++figures_.skipped_stale;
+    return;
+  }
+  update_depth(at);
+  PingRequest request = ping_request(config, world, config_.vehicle, config_.mount, at);
+  request.model = state_.model;
+  request.number = next_number();
+  request.settings = settings_;
+  request.settings.gain_db = gain_assist_.gain_db(settings_, at);
+  request.vendor_settings = busy_settings_ = state_.settings;
+  request.sonar_id = index_;
+  request.blank = (stale && config.poses.on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
+  busy_ = true;
+  busy_blank_ = request.blank;
+  busy_unwanted_ = false;
+  actions.emplace_back(ComputePing{std::move(request)});
+}
+
+Actions Sonar::on_ping(PingOutcome outcome, Time now) {
+  Actions actions;
+  busy_ = false;
+  ++figures_.pings;
+  figures_.simulation_s += outcome.seconds;
+  figures_.simulation.add(outcome.seconds);
+  if (!settings_.triggered && pacer_.period().count() > 0)
+    if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period()),
+                                           around_.config.sonars.size() > 1))
+      report(Report::Topic::state, LogLevel::warning, *slow, {}, actions);
+  if (outcome.ping) gain_assist_.look_at(*outcome.ping);
+  if (outcome.ping) note_water(outcome.ping->request, now, actions);
+  if (outcome.refused) {
+    ++figures_.refused;
+    report(Report::Topic::refused_ping, LogLevel::warning, "ping dropped: " + outcome.failure, {}, actions);
+  } else if (!outcome.ping) {
+    actions.emplace_back(EngineFailed{{outcome.kind, "sonar " + config_.name + ": the ping engine failed: " + outcome.failure}});
+  } else if (!stopping_ && connections_.clients() > 0 && !busy_unwanted_) {
+    queue_ping(outcome, now, actions);
+    if (figures_.pings == 1)
+      report(Report::Topic::state, LogLevel::debug, "first ping simulated", {{"ms", outcome.seconds * 1e3}}, actions);
+  } else {
+    ++figures_.unwanted;
+  }
+  return actions;
+}
+
+void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
+  const auto bytes = vendor_.frame(*outcome.ping, state_);
+  std::vector<std::pair<Connection*, protocol::Event>> events;
+  for (Connection& c : connections_.all())
+    guarded(c, actions, [&] {
+      for (protocol::Event& event : offer(c, bytes, outcome.ping->request, now, actions))
+        events.emplace_back(&c, std::move(event));
+    });
+  for (const auto& [from, event] : events) on_event(*from, event, now, actions);
+  actions.emplace_back(PingQueued{outcome.ping, bytes, outcome.seconds});
+}
+
+/// Returns what the client requests next.
+std::vector<protocol::Event> Sonar::offer(Connection& to, const std::shared_ptr<const protocol::Bytes>& bytes,
+                                          const PingRequest& ping, Time now, Actions& actions) {
+  if (to.finishing || to.state != Connection::State::served) return {};
+  protocol::Delivery delivery = to.dialogue->on_ping(ping.vendor_settings.get(), bytes->size(), unskipped(now));
+  if (!delivery.prefixes.empty()) {
+    const bool as_it_is = delivery.prefixes.size() == 1 && delivery.prefixes.front().empty();
+    to.outbox.push_ping(bytes, static_cast<std::uint32_t>(ping.number),
+                        as_it_is ? std::vector<protocol::Bytes>{} : std::move(delivery.prefixes), ping.fired_at);
+    actions.emplace_back(Wake{to.id});
+  }
+  if (to.role == Role::observer) return {};
+  return std::move(delivery.events);
+}
+
+/// The engine computed noise only of a ping that was requested as any other: it compares the depth with the sea surface.
+void Sonar::note_water(const PingRequest& computed, Time now, Actions& actions) {
+  const bool was_in_air = std::exchange(in_air_, computed.blank && !busy_blank_);
+  if (!in_air_) return;
+  ++figures_.out_of_water;
+  if (was_in_air || (air_reported_ && now - *air_reported_ < air_reported_every)) return;
+  air_reported_ = now;
+  report(Report::Topic::state, LogLevel::warning,
+         "the sonar is above the sea surface and receives noise only: z = 0 is the surface, lower is negative",
+         {{"z_m", computed.sonar_in_world.position_m.z}}, actions);
+}
+
+}  // namespace sonar

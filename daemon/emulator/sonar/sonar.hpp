@@ -1,0 +1,173 @@
+// One emulated sonar without sockets, threads or a clock: settings, pacing, ping requests, and the conversations of its clients.
+//
+// Flow: the caller reports what happened (a connection, bytes, a finished ping, time passing) with the time it happened; the
+// sonar changes its state and returns the Actions to carry out. Replies and pings wait in outboxes, from which the caller takes
+// whole messages. Time is the daemon's (emulator/time); conversations run on unskipped time, which leaves out what stepped time
+// jumps over.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/sonar/gain_assist.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/emulator/sonar/actions.hpp"
+#include "daemon/emulator/sonar/connections.hpp"
+#include "daemon/emulator/sonar/metrics.hpp"
+#include "daemon/emulator/sonar/pacer.hpp"
+#include "daemon/emulator/sonar/rate_watch.hpp"
+#include "daemon/emulator/world/world.hpp"
+
+namespace sonar {
+
+class Sonar {
+ public:
+  /// Both outlive the sonar. Of the configuration it reads what all sonars share: water, seed, switches, rules for stale poses.
+  struct Surroundings {
+    const Config& config;
+    const World& world;
+  };
+  /// `index` keys its noise; `skipped`: what stepped time has jumped over so far.
+  Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time now, std::chrono::nanoseconds skipped = {});
+  Sonar(const Sonar&) = delete;
+  Sonar& operator=(const Sonar&) = delete;
+
+  // ---- connections
+
+  /// Serve, KeepWaiting or TurnAway is among the actions.
+  Actions on_connect(ConnectionId id, Role role, Peer peer, Time now);
+  Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
+  /// The next message to write, whole; empty when there is none or one is being written.
+  Outbox::Message next_message(ConnectionId id);
+  /// So many bytes of it were taken; after the last one on_written().
+  void on_sent(ConnectionId id, std::size_t bytes);
+  void on_written(ConnectionId id, const Outbox::Message& message, Time now);
+  /// The caller ends the connection after the message being written.
+  void finish(ConnectionId id);
+  /// The connection is closed; also one that waited. `why` is for the log.
+  Actions on_closed(ConnectionId id, const std::string& why, Time now);
+  /// The caller had no slot for a client that connected.
+  void count_refused_client() { ++figures_.refused_clients; }
+  /// Every connection is finished and no ping requested any more; `why` is for the log.
+  Actions stop(const std::string& why);
+
+  // ---- pings and datagrams
+
+  Actions on_ping(PingOutcome outcome, Time now);
+  /// The status broadcast; empty when the vendor has none.
+  protocol::Bytes beacon(Time now);
+  /// The answer to a datagram sent to a Port of kind udp_answer; empty = none.
+  protocol::Bytes on_datagram(protocol::BytesView datagram) const { return vendor_.answer(datagram, state_); }
+
+  // ---- time
+
+  /// Everything that is due.
+  Actions on_tick(Time now);
+  /// When on_tick() has something to do next.
+  std::optional<Time> next_tick() const;
+  // The stepped clock advances to the next of these and performs them one by one.
+  std::optional<Time> next_ping() const;
+  std::optional<Time> next_conversation() const { return earliest(&Connection::next_tick); }
+  /// When a conversation will request a ping by itself.
+  std::optional<Time> next_request() const;
+  Actions tick_pacer(Time now);
+  Actions tick_conversations(Time now);
+  /// Stepped time jumps ahead.
+  void skip(std::chrono::nanoseconds by);
+  /// No ping is being computed and every client has taken what it was sent.
+  bool settled() const;
+
+  // ---- control
+
+  /// As one more client would. Refused with a sentence that says what the product can do, and nothing is changed.
+  Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
+  /// Returns whether that was a change.
+  bool set_transmit(bool on);
+  bool transmits() const { return transmits_; }
+  void move_mount(const Pose& mount, Time now);
+  /// Vehicle and mount of a configuration that is otherwise the same.
+  void move(const SonarConfig& config, Time now);
+  void use_water(const Water& water, Time now);
+
+  const SonarConfig& config() const { return config_; }
+  const protocol::Vendor& vendor() const { return vendor_; }
+  const protocol::DeviceState& state() const { return state_; }
+  const PingSettings& settings() const { return settings_; }
+  PingSettings initial_settings() const { return vendor_.initial_settings(state_).settings; }
+  const Connections& connections() const { return connections_; }
+  std::uint32_t index() const { return index_; }
+  bool busy() const { return busy_; }
+  bool wants_pings() const;
+  DeviceFigures figures() const;
+  /// Of those: pings that at least one client has got, and pings that were made.
+  std::uint64_t served() const { return figures_.served; }
+  std::uint64_t pings() const { return figures_.pings; }
+
+ private:
+  Time unskipped(Time now) const { return now - skipped_; }
+  /// The way back, if nothing more is skipped.
+  Time clock_time(Time unskipped) const { return unskipped > Time::max() - skipped_ ? Time::max() : unskipped + skipped_; }
+  std::optional<Time> earliest(std::optional<Time> (Connection::*of)() const) const;
+  void handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions);
+  void on_event(const Connection& from, const protocol::Event& event, Time now, Actions& actions);
+  void serve(Connection& connection, Time now, Actions& actions);
+  /// An exception is a mistake in sonard: it may cost this connection, never the others.
+  template <class Call>
+  void guarded(Connection& connection, Actions& actions, Call call) {
+    try {
+      call();
+    } catch (const std::exception& e) {
+      report(Report::Topic::fault, LogLevel::error, std::string("internal fault: ") + e.what(), {}, actions);
+      finish(connection.id);
+      actions.emplace_back(Reset{connection.id, "an internal fault"});
+    }
+  }
+  void begin_finish(Connection& connection, const std::string& why, Actions& actions);
+  void on_membership(Time now);
+  void use_initial_settings();
+  void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
+  bool waits_for_pose(Time at) const;
+  void request_ping(Time at, Actions& actions);
+  PingNumber next_number();
+  void queue_ping(const PingOutcome& outcome, Time now, Actions& actions);
+  std::vector<protocol::Event> offer(Connection& to, const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,
+                                     Time now, Actions& actions);
+  void note_water(const PingRequest& computed, Time now, Actions& actions);
+  void update_depth(Time now);
+  void report(Report::Topic topic, LogLevel level, std::string phrase, std::vector<LogField> fields, Actions& actions) const;
+
+  Surroundings around_;
+  SonarConfig config_;
+  const protocol::Vendor& vendor_;
+  std::uint32_t index_;
+  protocol::DeviceState state_;
+  Connections connections_;
+  std::chrono::nanoseconds skipped_;
+
+  Pacer pacer_;
+  PingSettings settings_;
+  GainAssist gain_assist_;
+  bool asked_ = false;  // a client that is still connected has sent settings
+  bool transmits_ = true;
+  bool stopping_ = false;
+
+  // The ping that is being computed.
+  bool busy_ = false;
+  std::shared_ptr<const VendorSettings> busy_settings_;
+  bool busy_blank_ = false;     // requested as noise only
+  bool busy_unwanted_ = false;  // its clients have gone
+
+  std::uint32_t ping_number_ = 0;
+  std::uint64_t numbered_skips_ = 0;  // ticks lost to overload, as of the last ping
+  bool in_air_ = false;               // at the last ping
+  std::optional<Time> air_reported_;
+  struct {
+    std::uint32_t ping = 0;
+    Time tick{}, at{};
+  } last_served_;
+  RateWatch rate_watch_;
+  DeviceFigures figures_;
+};
+
+}  // namespace sonar

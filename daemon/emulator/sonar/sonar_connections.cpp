@@ -1,0 +1,167 @@
+// The connections of a Sonar: who gets a slot, what clients request, what they are sent.
+#include <cmath>
+
+#include "daemon/emulator/sonar/sonar.hpp"
+
+namespace sonar {
+
+Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now) {
+  Actions actions;
+  const Connections::Verdict verdict = stopping_ ? Connections::Verdict::turn_away : connections_.verdict(role);
+  if (verdict == Connections::Verdict::turn_away) {
+    if (role == Role::client) ++figures_.refused_clients;
+    actions.emplace_back(TurnAway{id});
+    return actions;
+  }
+  if (verdict == Connections::Verdict::wait) {
+    connections_.add(id, role, std::move(peer), Connection::State::waiting);
+    actions.emplace_back(KeepWaiting{id});
+    return actions;
+  }
+  if (verdict == Connections::Verdict::take_over) {
+    Connection& oldest = *connections_.oldest_client();
+    oldest.state = Connection::State::leaving;
+    begin_finish(oldest, "another client took over", actions);
+    if (connections_.clients() == 0) use_initial_settings();
+  }
+  serve(connections_.add(id, role, std::move(peer), Connection::State::waiting), now, actions);
+  return actions;
+}
+
+void Sonar::serve(Connection& connection, Time now, Actions& actions) {
+  update_depth(now);
+  connection.state = Connection::State::served;
+  connection.dialogue = vendor_.converse(state_, unskipped(now));
+  actions.emplace_back(Serve{connection.id});
+  if (connection.role == Role::observer) return;
+  connection.number = ++figures_.clients;
+  on_membership(now);
+}
+
+/// After a client came or went.
+void Sonar::on_membership(Time now) {
+  const Connection* const oldest = connections_.oldest_client();
+  state_.connected_client = oldest == nullptr ? protocol::Ipv4{} : oldest->peer.ip;
+  if (oldest == nullptr) use_initial_settings();
+  if (wants_pings())
+    pacer_.configure(settings_, now);
+  else
+    pacer_.stop();
+}
+
+Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
+  Actions actions;
+  Connection* const connection = connections_.find(id);
+  if (connection == nullptr) return actions;
+  const bool was_client = connection->role == Role::client && connection->state == Connection::State::served;
+  connection->outbox.end(connection->finishing ? DropReason::stop : DropReason::gone);
+  actions.emplace_back(Closed{connection->peer.name, connection->role == Role::observer,
+                              connection->state != Connection::State::waiting, connection->outbox.pings_written(),
+                              connection->outbox.pings_dropped(), why});
+  connections_.remove(id);
+  if (!was_client) return actions;
+  Connection* const next = stopping_ ? nullptr : connections_.longest_waiting();
+  if (next == nullptr) {
+    on_membership(now);
+    return actions;
+  }
+  if (connections_.clients() == 0) use_initial_settings();
+  serve(*next, now, actions);
+  return actions;
+}
+
+void Sonar::finish(ConnectionId id) {
+  Connection* const connection = connections_.find(id);
+  if (connection == nullptr || std::exchange(connection->finishing, true)) return;
+  connection->outbox.drop_waiting_pings(DropReason::stop);
+}
+
+void Sonar::begin_finish(Connection& connection, const std::string& why, Actions& actions) {
+  if (connection.finishing) return;
+  finish(connection.id);
+  actions.emplace_back(Finish{connection.id, why});
+}
+
+Actions Sonar::stop(const std::string& why) {
+  Actions actions;
+  stopping_ = true;
+  pacer_.stop();
+  for (Connection& c : connections_.all())
+    if (c.state == Connection::State::waiting)
+      actions.emplace_back(Reset{c.id, why});
+    else
+      begin_finish(c, why, actions);
+  return actions;
+}
+
+Actions Sonar::on_bytes(ConnectionId id, protocol::BytesView bytes, Time now) {
+  Actions actions;
+  Connection* const from = connections_.find(id);
+  if (from == nullptr || from->dialogue == nullptr) return actions;
+  from->bytes_read += bytes.size();
+  from->not_before = {};
+  if (from->finishing) return actions;
+  guarded(*from, actions, [&] { handle(*from, from->dialogue->on_bytes(bytes, unskipped(now)), now, actions); });
+  return actions;
+}
+
+void Sonar::handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions) {
+  std::string close_why;
+  for (const protocol::Event& event : reaction.events) {
+    if (const auto* close = std::get_if<protocol::Close>(&event))
+      close_why = close->why;
+    else
+      on_event(from, event, now, actions);
+  }
+  for (protocol::Bytes& reply : reaction.replies)
+    if (!from.outbox.push_reply(std::move(reply))) {
+      actions.emplace_back(Reset{from.id, "asks faster than it reads the answers"});
+      return;
+    }
+  if (!close_why.empty()) return begin_finish(from, close_why, actions);
+  if (!reaction.replies.empty()) actions.emplace_back(Wake{from.id});
+}
+
+void Sonar::on_event(const Connection& from, const protocol::Event& event, Time now, Actions& actions) {
+  if (stopping_) return;
+  if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
+    if (from.role == Role::client)
+      report(Report::Topic::notice, LogLevel::warning, notice->text, {{"client", from.peer.name}}, actions);
+  } else if (from.role == Role::observer) {
+    // Settings, triggers and addresses are for clients. An observer that sends them may have meant the other port.
+    report(Report::Topic::ignored, LogLevel::info, "request of an observer ignored: only clients change what a sonar does",
+           {{"observer", from.peer.name}}, actions);
+  } else if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
+    change_settings(*change, from.peer.name, now, actions);
+  } else if (const auto* request = std::get_if<protocol::RequestPing>(&event)) {
+    // The ping being computed will do only if it was fired with the settings that hold now.
+    const bool served = request->joins && busy_ && busy_settings_ == state_.settings;
+    if (!served) pacer_.trigger(now, request->joins);
+  } else if (const auto* store = std::get_if<protocol::StoreAddress>(&event)) {
+    state_.stored_address = store->address;
+  }
+}
+
+Outbox::Message Sonar::next_message(ConnectionId id) {
+  Connection* const to = connections_.find(id);
+  return to == nullptr ? Outbox::Message{} : to->outbox.take();
+}
+
+void Sonar::on_sent(ConnectionId id, std::size_t bytes) {
+  if (Connection* const to = connections_.find(id)) to->bytes_written += bytes;
+}
+
+void Sonar::on_written(ConnectionId id, const Outbox::Message& message, Time now) {
+  Connection* const to = connections_.find(id);
+  if (to == nullptr) return;
+  to->outbox.written();
+  if (to->role == Role::observer || message.ping == 0) return;
+  figures_.latency.add(seconds(now - message.fired_at));
+  if (message.ping <= last_served_.ping) return;
+  if (last_served_.ping != 0)
+    figures_.jitter.add(std::abs(seconds(now - last_served_.at) - seconds(message.fired_at - last_served_.tick)));
+  last_served_ = {message.ping, message.fired_at, now};
+  ++figures_.served;
+}
+
+}  // namespace sonar

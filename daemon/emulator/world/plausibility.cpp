@@ -1,0 +1,373 @@
+#include "daemon/emulator/world/plausibility.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "core/motion/trajectory_file.hpp"
+#include "core/pipeline/water_line.hpp"
+#include "core/text/format.hpp"
+
+namespace sonar {
+namespace {
+
+using text::format;
+
+constexpr double turned_over = -0.5;           // the z axis points down, by more than 30 deg below the horizon
+constexpr double tilted = 0.5;                 // it is further than 60 deg from upright
+constexpr std::size_t most_looked_at = 10000;  // poses of a trajectory, triangles of a mesh
+constexpr double ground_flatness = 0.05;       // height over width: what is flatter is ground, which may be long
+constexpr double least_ground_m = 2;           // its width: a plate is no ground
+constexpr double long_ranges = 5;              // lengths of the longest range that an object may have
+
+// Each cure is one kind of note: a kind is told once.
+constexpr const char* surface_cure =
+    "was NED taken for ENU, or the reverse? ENU_FLU counts z upwards, NED_FRD downwards: 3 m deep is z = -3 in the one and z = 3 "
+    "in the other; say the frame that was sent";
+constexpr const char* depth_cure =
+    "the scene is less deep than that: see the origin that depths are counted from, and the unit (metres)";
+constexpr const char* exchanged_cure = "with x and y exchanged it would be in the scene: ENU_FLU has east first, NED_FRD north";
+constexpr const char* far_cure =
+    "positions are metres from the world's 0, 0, 0: see the unit and the origin that they are sent in";
+constexpr const char* turned_cure =
+    "see the order of the quaternion (JSON and EuRoC: w first; TUM and ROS: w last), the unit of angles (JSON: radians), and the "
+    "body's axes (FLU: z up; FRD: z down)";
+constexpr const char* order_cure =
+    "write w where the format has it: last in a TUM line (t x y z qx qy qz qw), first in one of EuRoC";
+constexpr const char* angle_cure = "angles are radians there: were degrees sent? Multiply them by 0.0174533";
+constexpr const char* mount_cure =
+    "rpy_deg is [roll, pitch, yaw]: a roll near 180, or a pitch beyond 90, turns it over and swaps port and starboard; to look "
+    "aft, set yaw 180";
+constexpr const char* lift_cure = "move the scene down: sonarctl scene import --offset 0,0,-10, or the poses of its objects";
+
+/// How far up the body's z axis points, -1 to 1.
+double upright(Quatd q) { return 1 - 2 * (q.x * q.x + q.y * q.y); }
+
+struct Doubt {
+  std::string text;
+  const char* cure;
+};
+
+/// The lowest point of all ground above or below that place; none when there is no ground.
+std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around) {
+  std::optional<double> lowest;
+  for (const Extent& ground : around.ground)
+    if (ground.distance_m({place_m.x, place_m.y, ground.low_m.z}) == 0)
+      lowest = std::min(lowest.value_or(ground.low_m.z), ground.low_m.z);
+  return lowest;
+}
+
+enum class Place { fine, above_water, below_ground, far_away };
+Place judge_place(Vec3d sonar_m, const Surroundings& around) {
+  const Extent& scene = around.scene;
+  const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // then the scene is what is wrong
+  if (sonar_m.z > least_depth_m && !lies_above) return Place::above_water;
+  if (const auto ground_m = lowest_ground_m(sonar_m, around); ground_m && sonar_m.z < *ground_m) return Place::below_ground;
+  return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Place::far_away : Place::fine;
+}
+
+/// Of the first sonar of a carrier that is at no good place.
+std::optional<Vec3d> doubtful_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
+  for (const Pose& mount : carrier.mounts)
+    if (const Vec3d at_m = compose(vehicle_in_world, mount).position_m; judge_place(at_m, around) != Place::fine) return at_m;
+  return std::nullopt;
+}
+
+std::optional<Doubt> doubt_of_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
+  const auto sonar_m = doubtful_place(carrier, vehicle_in_world, around);
+  if (!sonar_m) return std::nullopt;
+  const std::string subject = "the sonar of " + carrier.vehicle;
+  const Place place = judge_place(*sonar_m, around);
+  if (place == Place::above_water)
+    return Doubt{subject + format(" is %.1f m above the water's surface (z = 0)", sonar_m->z), surface_cure};
+  if (place == Place::below_ground) {
+    const double ground_m = lowest_ground_m(*sonar_m, around).value_or(0);
+    return Doubt{subject + format(" is %.1f m below the lowest point of the ground (z = %.1f)", ground_m - sonar_m->z, ground_m),
+                 depth_cure};
+  }
+  const bool exchanged = around.scene.distance_m({sonar_m->y, sonar_m->x, sonar_m->z}) <= around.longest_range_m;
+  return Doubt{subject + format(" is %.0f m from everything in the scene, and hears no further than %.0f m",
+                                around.scene.distance_m(*sonar_m), around.longest_range_m),
+               exchanged ? exchanged_cure : far_cure};
+}
+
+bool is_upside_down(Quatd q) { return upright(q) <= turned_over; }
+
+std::optional<Doubt> doubt_of_attitude(const std::string& body, Quatd q) {
+  if (!is_upside_down(q)) return std::nullopt;
+  const double from_upright_rad = std::acos(std::clamp(upright(q), -1.0, 1.0));
+  return Doubt{body + format(" is upside down, %.0f deg from upright", deg_from_rad(from_upright_rad)), turned_cure};
+}
+
+/// As if the file had w at the other end of the four numbers, and in the frame that they were written in.
+bool is_upright_in_another_order(Quatd q) {
+  const auto reordered = [](Quatd r) { return std::array{upright({r.x, r.y, r.z, r.w}), upright({r.z, r.w, r.x, r.y})}; };
+  const auto as_enu = reordered(q), as_ned = reordered(enu_flu_from_ned_frd(q));
+  return std::max({as_enu[0], as_enu[1], as_ned[0], as_ned[1]}) > tilted;
+}
+
+/// CSV files name their columns and KITTI's have matrices: only here can w stand at the wrong end. `about` begins with the
+/// format.
+bool has_nameless_quaternions(const motion::Plan& plan) {
+  const auto is = [&](motion::Format format) {
+    return plan.about.starts_with((plan.file + ": ").append(name_of(format)).append(","));
+  };
+  return is(motion::Format::tum) || is(motion::Format::euroc);
+}
+
+/// Tilted where nothing that carries a sonar is, and upright with the numbers in another order.
+bool is_out_of_order(const std::vector<Pose>& poses) {
+  std::size_t lying = 0, explained = 0;
+  for (const Pose& p : poses) {
+    const bool lies = upright(p.orientation) < tilted;
+    lying += lies ? 1 : 0;
+    explained += lies && is_upright_in_another_order(p.orientation) ? 1 : 0;
+  }
+  return 10 * lying >= poses.size() && 100 * explained >= 99 * lying;
+}
+
+/// All, or every second, third, ...: no more than most_looked_at.
+std::vector<Pose> some_poses_of(const motion::Plan& plan) {
+  const std::vector<Pose>& all = plan.trajectory->points().poses;
+  const std::size_t step = 1 + (all.size() - 1) / most_looked_at;
+  std::vector<Pose> some;
+  for (std::size_t i = 0; i < all.size(); i += step) some.push_back(all[i]);
+  return some;
+}
+
+/// The doubt of the first pose that is doubtful, and how many are.
+std::optional<Doubt> doubt_of_all(const std::vector<Pose>& poses, const motion::Plan& plan,
+                                  const std::function<bool(const Pose&)>& is_doubtful,
+                                  const std::function<std::optional<Doubt>(const Pose&)>& doubt_of) {
+  const auto first = std::find_if(poses.begin(), poses.end(), is_doubtful);
+  if (first == poses.end()) return std::nullopt;
+  std::optional<Doubt> doubt = doubt_of(*first);
+  const auto count = static_cast<std::size_t>(std::count_if(first, poses.end(), is_doubtful));
+  const char* which = poses.size() < plan.trajectory->size() ? "poses looked at" : "poses";
+  if (doubt) doubt->text += format(", in %zu of %zu %s of ", count, poses.size(), which) + plan.file;
+  return doubt;
+}
+
+void add(std::vector<Note>& notes, const std::string& vehicle, const std::optional<Doubt>& doubt) {
+  if (doubt) notes.push_back({vehicle, doubt->text, doubt->cure});
+}
+void add(std::vector<Note>& notes, std::vector<Note> more) { std::move(more.begin(), more.end(), std::back_inserter(notes)); }
+
+Extent in_world(const Extent& own, const Pose& place) {
+  Extent out;
+  if (own.empty()) return out;
+  for (const double x : {own.low_m.x, own.high_m.x})
+    for (const double y : {own.low_m.y, own.high_m.y})
+      for (const double z : {own.low_m.z, own.high_m.z}) out.add(transform(place, {x, y, z}));
+  return out;
+}
+
+/// All triangles face up, of those looked at: seen from above it hides nothing of itself.
+bool is_height_field(const Mesh& mesh) {
+  const std::size_t step = 1 + mesh.triangles.size() / most_looked_at;
+  for (std::size_t i = 0; i < mesh.triangles.size(); i += step) {
+    const auto& [a, b, c] = mesh.triangles[i];
+    const Vec3 p = mesh.vertices[a];
+    if (cross(mesh.vertices[b] - p, mesh.vertices[c] - p).z <= 0) return false;
+  }
+  return !mesh.triangles.empty();
+}
+
+MeshShape shape_of(const Mesh& mesh) {
+  MeshShape shape{extent_of(mesh)};
+  const Vec3d size = shape.own.size_m();
+  shape.is_ground = size.z < ground_flatness * std::min(size.x, size.y) || is_height_field(mesh);
+  return shape;
+}
+
+/// The sheet that the loader makes of the scene's sea_surface.
+bool is_sea_surface(const Scene& scene, const Object& o) {
+  return scene.sea_surface.present && o.primitive.kind == Primitive::Kind::plane && o.name == "sea surface";
+}
+
+/// Poses are judged alike.
+bool is_same(const Surroundings& a, const Surroundings& b) {
+  return a.scene == b.scene && a.longest_range_m == b.longest_range_m && a.ground == b.ground;
+}
+
+std::vector<std::shared_ptr<const motion::Trajectory>> trajectories_of(const Config& config) {
+  std::vector<std::shared_ptr<const motion::Trajectory>> all;
+  for (const VehicleConfig& v : config.vehicles) all.push_back(v.plan.trajectory);
+  for (const ObjectConfig& o : config.objects) all.push_back(o.plan.trajectory);
+  return all;
+}
+
+std::vector<Note> notes_on_plans(const Config& config, const Surroundings& around) {
+  const std::vector<Carrier> carriers = carriers_of(config);
+  std::vector<Note> notes;
+  for (std::size_t v = 0; v < carriers.size(); ++v)
+    if (const motion::Plan& plan = config.vehicles[v].plan) add(notes, notes_on_trajectory(carriers[v], plan, around));
+  for (const ObjectConfig& o : config.objects)
+    if (o.plan)
+      for (Note& n : notes_on_trajectory({o.name, {}}, o.plan, around)) notes.push_back({"", n.text, n.cure});
+  return notes;
+}
+
+/// All but those on plans. A vehicle that waits for its first pose, without an initial one, has none to check.
+std::vector<Note> notes_on_start(const Config& config, const Scene& scene, const Surroundings& around) {
+  const std::vector<Carrier> carriers = carriers_of(config);
+  std::vector<Note> notes = notes_on_mounts(config);
+  add(notes, notes_on_scene(scene, around));
+  for (std::size_t v = 0; v < carriers.size(); ++v) {
+    const VehicleConfig& vehicle = config.vehicles[v];
+    if (!vehicle.plan && (vehicle.has_initial_pose || vehicle.orbits))
+      add(notes, notes_on_pose(carriers[v], vehicle.initial_pose, around));
+  }
+  return notes;
+}
+
+}  // namespace
+
+std::string text_of(const Note& note) { return note.text + (note.cure.empty() ? "" : "; " + note.cure); }
+
+Surroundings surroundings_of(const Config& config, const Scene& scene, const MeshShapes& known) {
+  Surroundings around;
+  for (const Object& o : scene.objects) {
+    if (!o.visible || is_sea_surface(scene, o)) continue;
+    const auto [at, is_new] = around.meshes.try_emplace(o.mesh);  // instances share their mesh
+    if (const auto before = known.find(o.mesh); is_new) at->second = before == known.end() ? shape_of(*o.mesh) : before->second;
+    const Extent there = in_world(at->second.own, o.in_world);
+    around.scene.add(there);
+    const bool lies_flat = std::abs(upright(o.in_world.orientation)) > tilted;
+    const bool is_wide = std::min(there.size_m().x, there.size_m().y) >= least_ground_m;
+    if (at->second.is_ground && lies_flat && is_wide && o.body < 0) around.ground.push_back(there);
+  }
+  for (const PointTarget& p : scene.point_targets) around.scene.add(scene.in_world(p, scene.bodies_in_world));
+  for (const SonarConfig& s : config.sonars)
+    for (const FrequencyMode& mode : s.profile.model->modes)
+      around.longest_range_m = std::max(around.longest_range_m, static_cast<double>(mode.max_range_m));
+  return around;
+}
+
+std::vector<Carrier> carriers_of(const Config& config) {
+  std::vector<Carrier> carriers;
+  for (std::size_t v = 0; v < config.vehicles.size(); ++v) {
+    Carrier& carrier = carriers.emplace_back(Carrier{config.vehicles[v].name, {}});
+    for (const SonarConfig& s : config.sonars)
+      if (s.vehicle == v) carrier.mounts.push_back(s.mount);
+  }
+  return carriers;
+}
+
+std::vector<Note> notes_on_mounts(const Config& config) {
+  std::vector<Note> notes;
+  for (const SonarConfig& s : config.sonars)
+    if (upright(s.mount.orientation) < turned_over)
+      notes.push_back({"", "sonar " + s.name + " is mounted upside down on " + config.vehicles.at(s.vehicle).name, mount_cure});
+  return notes;
+}
+
+std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around) {
+  std::vector<Note> notes;
+  if (scene.sea_surface.present && !around.scene.empty() && around.scene.low_m.z >= 0)
+    notes.push_back({"", "nothing of the scene lies below the water's surface, z = 0", lift_cure});
+  const double allowed_m = std::max(huge_mesh_m, long_ranges * around.longest_range_m);
+  std::set<const Mesh*> seen;
+  for (const Object& o : scene.objects) {
+    // A primitive's size is in the scene file, in metres; only files have a unit of their own.
+    if (!o.visible || o.primitive.kind != Primitive::Kind::none || !seen.insert(o.mesh.get()).second) continue;
+    const MeshShape& shape = around.meshes.at(o.mesh);
+    const double length_m = shape.own.longest_m();
+    if (length_m <= allowed_m || shape.is_ground) continue;
+    notes.push_back({"",
+                     o.name + format(" is %.0f m long, and no sonar hears further than %.0f m", length_m, around.longest_range_m),
+                     std::string(huge_mesh_cure)});
+  }
+  return notes;
+}
+
+std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
+  std::vector<Note> notes;
+  add(notes, carrier.vehicle, doubt_of_place(carrier, vehicle_in_world, around));
+  add(notes, carrier.vehicle, doubt_of_attitude(carrier.vehicle, vehicle_in_world.orientation));
+  return notes;
+}
+
+std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad) {
+  if (!(largest_angle_rad > 0)) return {};
+  return {{vehicle, "the attitude of " + vehicle + format(" has an angle of %.4g rad", largest_angle_rad), angle_cure}};
+}
+
+std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around) {
+  const std::vector<Pose> poses = some_poses_of(plan);
+  const auto is_misplaced = [&](const Pose& p) { return doubtful_place(carrier, p, around).has_value(); };
+  const auto is_turned = [](const Pose& p) { return is_upside_down(p.orientation); };
+  std::vector<Note> notes;
+  add(notes, carrier.vehicle,
+      doubt_of_all(poses, plan, is_misplaced, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
+  if (has_nameless_quaternions(plan) && is_out_of_order(poses))
+    add(notes, carrier.vehicle,
+        Doubt{"the quaternions of " + plan.file + " turn " + carrier.vehicle + " over, and would not with w at the other end",
+              order_cure});
+  else
+    add(notes, carrier.vehicle,
+        doubt_of_all(poses, plan, is_turned, [&](const Pose& p) { return doubt_of_attitude(carrier.vehicle, p.orientation); }));
+  return notes;
+}
+
+std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surroundings& around) {
+  std::vector<Note> notes = notes_on_start(config, scene, around);
+  add(notes, notes_on_plans(config, around));
+  return notes;
+}
+
+// ---- of a running daemon
+
+std::vector<Note> Plausibility::untold(const std::vector<Note>& notes) {
+  std::vector<Note> fresh;
+  for (const Note& n : notes)
+    if (told_.insert(n.vehicle.empty() ? n.text : n.vehicle + "|" + n.cure).second) fresh.push_back(n);
+  return fresh;
+}
+
+std::vector<Note> Plausibility::use(const Config& config, const Scene& scene) {
+  Surroundings around = surroundings_of(config, scene, around_.meshes);
+  auto played = trajectories_of(config);
+  if (played != played_ || !is_same(around, around_)) of_plans_ = notes_on_plans(config, around);
+  around_ = std::move(around);
+  played_ = std::move(played);
+  carriers_ = carriers_of(config);
+  of_setup_ = notes_on_start(config, scene, around_);
+  add(of_setup_, of_plans_);
+  std::map<std::string, LastPose> before;
+  before.swap(of_poses_);
+  for (const Carrier& c : carriers_)
+    if (const auto last = before.find(c.vehicle); last != before.end()) judge(c, of_poses_[c.vehicle] = last->second);
+  return untold(all());
+}
+
+void Plausibility::judge(const Carrier& carrier, LastPose& last) const {
+  last.notes = notes_on_pose(carrier, last.vehicle_in_world, around_);
+  auto degrees = notes_on_angles(carrier.vehicle, last.largest_angle_rad);
+  if (degrees.empty()) return;
+  std::erase_if(last.notes, [](const Note& n) { return n.cure == turned_cure; });  // it follows from that
+  add(last.notes, std::move(degrees));
+}
+
+std::vector<Note> Plausibility::use(const control::PoseSample& sample) {
+  const auto carrier = std::find_if(carriers_.begin(), carriers_.end(), [&](const Carrier& c) {
+    return c.vehicle == sample.name || sample.name.empty();  // it is the only one then
+  });
+  if (carrier == carriers_.end()) return {};
+  LastPose& last = of_poses_[carrier->vehicle];
+  last = {sample.pose, sample.largest_angle_rad, {}};
+  judge(*carrier, last);
+  return untold(last.notes);
+}
+
+std::vector<Note> Plausibility::all() const {
+  std::vector<Note> notes;
+  std::copy_if(of_setup_.begin(), of_setup_.end(), std::back_inserter(notes),
+               [this](const Note& n) { return !of_poses_.contains(n.vehicle); });
+  for (const auto& [vehicle, last] : of_poses_) notes.insert(notes.end(), last.notes.begin(), last.notes.end());
+  return notes;
+}
+
+}  // namespace sonar

@@ -1,0 +1,57 @@
+// The last two seconds of one body's poses, and the pose at any moment from them: between samples, a little beyond them, or held.
+// Used by daemon/emulator/world/world.cpp, one per vehicle and moving object; times are the sender's.
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "core/base/geometry.hpp"
+#include "core/base/units.hpp"
+#include "core/motion/trajectory.hpp"
+#include "core/motion/turning.hpp"
+
+namespace sonar {
+
+class PoseHistory {
+ public:
+  struct Sample {
+    Time at{};
+    Pose pose;                                    // body in world
+    std::optional<Vec3d> velocity_mps;            // body axes
+    std::optional<Vec3d> angular_velocity_radps;  // body axes
+  };
+  using Motion = motion::Motion;
+  static constexpr std::chrono::nanoseconds length = std::chrono::seconds(2);
+  static constexpr std::size_t most_samples = 2048;  // two seconds at the rate limit of 1 kHz
+
+  void clear() { samples_.clear(); }
+  bool empty() const { return samples_.empty(); }
+  std::size_t size() const { return samples_.size(); }
+  const Sample& newest() const { return samples_.back(); }
+
+  /// `sample.at` must not lie before newest().at; an equal time replaces.
+  void put(const Sample& sample);
+  /// In place of newest(): for poses that come faster than anybody needs. The same demand on `sample.at`; not on an empty
+  /// history.
+  void replace_newest(const Sample& sample) { samples_.back() = sample; }
+  /// Interpolated (lerp, slerp) between samples; before the first one held; after the last one carried on by its velocity, or
+  /// by the difference of the last two samples, for at most `extrapolate_max`, then held there. Not on an empty history.
+  Pose at(Time t, std::chrono::nanoseconds extrapolate_max) const;
+  /// The motion by which at() carries a pose on: between samples their difference, beyond the newest one its velocity, none
+  /// before the first and where it is held.
+  Motion motion_at(Time t, std::chrono::nanoseconds extrapolate_max) const;
+
+ private:
+  using Samples = std::deque<Sample>;
+  static Motion between(const Sample& before, const Sample& after);
+  Motion newest_motion() const;
+  /// The first sample not before t.
+  Samples::const_iterator not_before(Time t) const;
+  Pose beyond_newest(std::chrono::nanoseconds ahead) const;
+  Samples samples_;
+};
+
+using motion::rotation_between;
+using motion::slerp;
+
+}  // namespace sonar

@@ -1,0 +1,247 @@
+#include "daemon/emulator/world/world.hpp"
+
+#include <algorithm>
+
+#include <cmath>
+#include <utility>
+
+#include "core/motion/jump.hpp"
+
+namespace sonar {
+namespace {
+
+using control::ClockDomain;
+using control::PoseSample;
+
+constexpr double hidden_height_m = 1e4;  // far beyond any sonar's range, near enough for exact placement
+constexpr double smallest_orbit_m = 4;
+constexpr double orbit_speed_mps = 0.5;
+constexpr std::chrono::nanoseconds future_allowed = std::chrono::seconds(1);
+
+std::string joined_names(const std::vector<std::string>& names) {
+  std::string all;
+  for (const std::string& n : names) all += (all.empty() ? "" : ", ") + n;
+  return all.empty() ? "none" : all;
+}
+
+}  // namespace
+
+World::World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start)
+    : rules_(rules), start_(start) {
+  use_vehicles(std::move(vehicles), start);
+  use_objects(std::move(objects), start);
+}
+
+void World::use_vehicles(std::vector<BodyStart> vehicles, Time now) { vehicles_ = taken_over(vehicles_, vehicles, now); }
+void World::use_objects(std::vector<BodyStart> objects, Time now) { objects_ = taken_over(objects_, objects, now); }
+
+std::vector<World::Track> World::taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const {
+  std::vector<Track> tracks;
+  for (BodyStart& b : bodies) {
+    const auto known = std::find_if(old.begin(), old.end(), [&](const Track& t) { return t.body.name == b.name; });
+    Track t;
+    if (known != old.end()) {
+      t = std::move(*known);
+    } else {
+      t.allowance = rules_.burst;
+      t.allowance_at = start_;
+    }
+    if (t.history.empty()) t.source = b.plan ? "trajectory " + b.plan.file : b.orbits ? "demo orbit" : "initial pose";
+    if (b.plan && !motion::is_same(t.body.plan, b.plan)) t.playback = {b.plan.trajectory->duration(), b.plan.rules, now};
+    t.body = std::move(b);
+    tracks.push_back(std::move(t));
+  }
+  return tracks;
+}
+
+World::Track* World::find(PoseSample::Of of, const std::string& name, std::string& refusal) {
+  const bool vehicle = of == PoseSample::Of::vehicle;
+  std::vector<Track>& tracks = vehicle ? vehicles_ : objects_;
+  if (name.empty() && tracks.size() == 1) return &tracks.front();
+  std::vector<std::string> names;
+  for (Track& t : tracks) {
+    if (!name.empty() && t.body.name == name) return &t;
+    names.push_back(t.body.name);
+  }
+  const std::string kind = vehicle ? "vehicle" : "moving object";
+  refusal = name.empty() ? "the message names no " + kind + " and there is not exactly one; known: " + joined_names(names)
+                         : "no " + kind + " is called \"" + name.substr(0, 64) + "\"; known: " + joined_names(names);
+  return nullptr;
+}
+
+bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) const {
+  const bool known = !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain;
+  if (!known) return false;
+  // Where time goes by the stamps, silence cannot be told by it; a simulator that began anew can.
+  return rules_.follows ? at >= track.history.newest().at - rules_.stale_after : now - track.last_arrival <= rules_.stale_after;
+}
+
+/// The sender's clock is mapped by the least delay seen; a jump of more than we would extrapolate is a new relation.
+World::Ns World::offset_for(const Track& track, Time at, Time now, bool goes_on) {
+  if (rules_.follows) return followed_offset_for(track, at, now);
+  const Ns offset = now - at;
+  const bool keep = goes_on && offset >= track.offset && offset - track.offset <= rules_.extrapolate_max;
+  return keep ? track.offset : offset;
+}
+
+/// Takes one from the allowance, or says that there is none.
+bool World::over_rate(Track& track, Time now) const {
+  if (rules_.stepped) return false;
+  const double refill = rules_.most_per_s * seconds(now - track.allowance_at);
+  track.allowance = std::min(rules_.burst, track.allowance + std::max(0.0, refill));
+  track.allowance_at = now;
+  if (track.allowance < 1) return true;
+  track.allowance -= 1;
+  return false;
+}
+
+PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time now) {
+  PoseOutcome out;
+  Track* const found = find(sample.of, sample.name, out.refusal);
+  if (found == nullptr) {
+    ++counters_.refused;
+    out.verdict = PoseVerdict::unknown_name;
+    return out;
+  }
+  Track& track = *found;
+  const bool shared_clock = sample.stamp.domain == ClockDomain::wall && !rules_.stepped;
+  const Time at = sample.stamp.domain == ClockDomain::arrival ? now : Time(Ns(sample.stamp.ns));
+  if (shared_clock && (at > now + future_allowed || at < now - rules_.stale_after - future_allowed)) {
+    ++counters_.refused;
+    out.verdict = PoseVerdict::bad_time;
+    out.refusal = "WALL time stamp is " + std::to_string(seconds(at - now)) +
+                  " s from this computer's clock: synchronise the clocks, or send SIM or ARRIVAL time";
+    return out;
+  }
+
+  if (rules_.follows && sample.of == PoseSample::Of::vehicle && sample.stamp.domain == ClockDomain::arrival) {
+    ++counters_.refused;
+    out.verdict = PoseVerdict::bad_time;
+    out.refusal = "it has no time stamp, and with clock: follow time is what poses say: send SIM or WALL time";
+    return out;
+  }
+
+  const bool same_history = continues(track, sample, sender, at, now);
+  const bool reset = same_history && sample.reset_counter != track.reset_counter;
+  if (same_history && !reset) {
+    const bool seq_is_old = sample.seq != 0 && track.seq != 0 && sample.seq <= track.seq;
+    if (seq_is_old || at < track.history.newest().at) {
+      ++counters_.late;
+      out.verdict = PoseVerdict::late;
+      out.refusal = "pose came out of order";
+      return out;
+    }
+    if (at == track.history.newest().at) ++counters_.replaced;
+    if (length(sample.pose.position_m - track.history.newest().pose.position_m) > rules_.max_jump_m) {
+      ++counters_.jumps;
+      out.notice = "pose of " + track.body.name + " jumped further than max_jump_m: history cleared";
+      track.history.clear();
+    }
+  } else {
+    ++(reset ? counters_.resets : counters_.histories);
+    track.history.clear();
+  }
+
+  const bool own_clock = !shared_clock && sample.stamp.domain != ClockDomain::arrival;
+  const Ns offset = own_clock ? offset_for(track, at, now, same_history && !reset) : Ns(0);
+  const bool vehicle = sample.of == PoseSample::Of::vehicle;  // other bodies may come seldom
+  if (rules_.follows && vehicle && offset != track.offset && track.sender_id == sender.id)
+    out.notice = "stamps of " + track.body.name + " do not go on from where they were: taken as the next moments of our time";
+  track.offset = offset;
+
+  if (track.source != sender.source) {
+    out.notice = "pose source of " + track.body.name + " changed: " + track.source + " -> " + sender.source +
+                 (sample.fields.empty() ? "" : "; fields: " + sample.fields) + " (" +
+                 std::string(control::name_of(sample.sent_in)) + ")";
+  } else if (track.stale_reported) {
+    out.notice = "poses of " + track.body.name + " are back";
+  }
+  if (!out.notice.empty()) out.body = track.body.name;
+  track.source = sender.source;
+  track.sender_id = sender.id;
+  track.seq = sample.seq;
+  track.reset_counter = sample.reset_counter;
+  track.domain = sample.stamp.domain;
+  track.last_arrival = now;
+  track.hidden = sample.hidden;
+  track.hidden_for_now = false;
+  track.stale_reported = false;
+  const PoseHistory::Sample kept{at, sample.pose, sample.velocity_mps, sample.angular_velocity_radps};
+  if (over_rate(track, now) && !track.history.empty()) {
+    ++counters_.over_rate;
+    track.history.replace_newest(kept);
+  } else {
+    track.history.put(kept);
+  }
+  ++counters_.accepted;
+  return out;
+}
+
+void World::show_again() {
+  for (Track& t : objects_)
+    if (std::exchange(t.hidden_for_now, false)) t.hidden = false;
+}
+
+bool World::is_stale(const Track& track, Time now) const {
+  return !track.history.empty() && now - last_news(track) > rules_.stale_after;
+}
+
+Time World::last_news(const Track& track) const {
+  return rules_.follows ? track.history.newest().at + track.offset : track.last_arrival;
+}
+
+std::vector<World::Stale> World::newly_stale(Time now) {
+  std::vector<Stale> sentences;
+  for (Track& t : vehicles_) {  // objects may rest where they were put; a vehicle without news is a broken link
+    if (t.stale_reported || !is_stale(t, now)) continue;
+    t.stale_reported = true;
+    ++counters_.stale;
+    const auto silent = std::chrono::duration_cast<std::chrono::milliseconds>(now - last_news(t));
+    sentences.push_back(
+        {t.body.name, "no pose for " + t.body.name + " from " + t.source + " for " + std::to_string(silent.count()) + " ms"});
+  }
+  return sentences;
+}
+
+Pose World::pose_at(const Track& track, Time t) const {
+  if (track.hidden) return {{0, 0, hidden_height_m}, {}};
+  if (!track.history.empty()) return track.history.at(t - track.offset, rules_.extrapolate_max);
+  if (track.body.plan) return played(track, t).body_in_world;
+  return track.body.orbits ? orbit(track.body.initial_pose, t) : track.body.initial_pose;
+}
+
+Pose World::orbit(const Pose& initial, Time t) const {
+  const Vec3d p = initial.position_m;
+  const double radius_m = std::max(smallest_orbit_m, std::hypot(p.x, p.y));
+  const double angle = std::atan2(p.y, p.x) + orbit_speed_mps / radius_m * seconds(t - start_);
+  const RollPitchYaw inward{0, 0, angle + pi};  // the sonar looks across the middle of the world
+  return {{radius_m * std::cos(angle), radius_m * std::sin(angle), p.z}, quat_from_rpy(inward)};
+}
+
+PoseHistory::Motion World::vehicle_moves(std::size_t vehicle, Time t) const {
+  const Track& track = vehicles_[vehicle];
+  if (track.hidden) return {};
+  if (track.history.empty() && !track.body.plan) {
+    if (!track.body.orbits) return {};
+    const Vec3d p = orbit(track.body.initial_pose, t).position_m;
+    const double per_s = orbit_speed_mps / std::hypot(p.x, p.y);
+    return {{-per_s * p.y, per_s * p.x, 0}, {0, 0, per_s}};
+  }
+  const PoseHistory::Motion moves =
+      track.history.empty() ? played(track, t).moves : track.history.motion_at(t - track.offset, rules_.extrapolate_max);
+  return motion::is_jump(moves.velocity_mps, moves.angular_velocity_radps) ? PoseHistory::Motion{} : moves;
+}
+
+Twist mounted_moves(const PoseHistory::Motion& body_moves, const Pose& body_in_world, const Pose& mount) {
+  const Vec3d swing = rotate(body_in_world.orientation, cross(body_moves.angular_velocity_radps, mount.position_m));
+  return {body_moves.velocity_mps + swing, rotate(conjugate(mount.orientation), body_moves.angular_velocity_radps)};
+}
+
+std::vector<Pose> World::objects_at(Time t) const {
+  std::vector<Pose> poses;
+  poses.reserve(objects_.size());
+  for (const Track& o : objects_) poses.push_back(pose_at(o, t));
+  return poses;
+}
+
+}  // namespace sonar

@@ -1,0 +1,160 @@
+// Where everything is: the poses of vehicles and moving objects, taken from senders by the sequence and time rules of
+// docs/configuration.md, and answered for any moment. Pure: time is passed in; the daemon's I/O thread owns the only one.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/motion/playback.hpp"
+#include "core/sonar/ping.hpp"
+#include "daemon/emulator/world/pose_history.hpp"
+#include "protocol/control/operations.hpp"
+#include "protocol/control/pose_sample.hpp"
+
+namespace sonar {
+
+struct PoseRules {
+  std::chrono::nanoseconds extrapolate_max = std::chrono::milliseconds(200);
+  std::chrono::nanoseconds stale_after = std::chrono::seconds(1);
+  double max_jump_m = 50;
+  bool stepped = false;      // simulated time: WALL stamps are then read as the sender's own, and there is no rate to limit
+  bool follows = false;      // simulated time that is what the vehicles' stamps say (world_follows.cpp)
+  double most_per_s = 1000;  // poses kept of one body; faster ones replace the newest
+  double burst = 64;         // taken whole at once: what a network holds back and then delivers
+};
+
+/// A vehicle, or a moving object of the scene.
+struct BodyStart {
+  std::string name;
+  Pose initial_pose;    // in world
+  bool orbits = false;  // circles the world's z axis until the first accepted pose
+  motion::Plan plan{};  // followed until the first accepted pose
+};
+
+/// Who sent a pose. A different `id` starts a new history; a different `source` is worth a log line.
+struct Sender {
+  std::string id;      // "json udp 127.0.0.1:40123"
+  std::string source;  // "json 127.0.0.1"
+};
+
+enum class PoseVerdict { accepted, late, unknown_name, bad_time };
+
+struct PoseOutcome {
+  PoseVerdict verdict = PoseVerdict::accepted;
+  std::string refusal;  // one sentence when not accepted
+  std::string notice;   // worth a log line: the source changed, poses came back
+  std::string body;     // with a notice: whose
+};
+
+struct PoseCounters {
+  std::uint64_t accepted = 0;
+  std::uint64_t refused = 0;    // malformed, unknown name, impossible time
+  std::uint64_t late = 0;       // out of order or repeated
+  std::uint64_t replaced = 0;   // equal stamps
+  std::uint64_t over_rate = 0;  // replaced the newest because they came too fast
+  std::uint64_t jumps = 0;      // beyond max_jump
+  std::uint64_t resets = 0;     // reset counter changed
+  std::uint64_t histories = 0;  // begun: first pose, other sender, or after silence
+  std::uint64_t stale = 0;      // times a body's poses stopped coming
+};
+
+/// The motion of a sonar that is mounted on a body: its lever arm swings it round.
+Twist mounted_moves(const PoseHistory::Motion& body_moves, const Pose& body_in_world, const Pose& mount);
+
+class World {
+ public:
+  World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start);
+
+  // When the configuration is read again or the scene changes. Bodies that are there under the same name keep their poses, and
+  // trajectories that are the same play on; others begin at `now`.
+  void use_rules(const PoseRules& rules) { rules_ = rules; }
+  void use_vehicles(std::vector<BodyStart> vehicles, Time now);
+  void use_objects(std::vector<BodyStart> objects, Time now);
+
+  PoseOutcome accept(const control::PoseSample& sample, const Sender& sender, Time now);
+  void count_refused() { ++counters_.refused; }
+
+  /// Pauses, resumes, seeks a trajectory or changes its speed, from `now` on. Empty, or one sentence why not.
+  std::string steer(const control::SetTrajectory& asked, Time now);
+  /// What of a trajectory is shown; nothing where none is played.
+  std::optional<control::TrajectoryStatus> vehicle_plays(std::size_t vehicle, Time now) const {
+    return plays(vehicles_[vehicle], now);
+  }
+  std::optional<control::TrajectoryStatus> object_plays(std::size_t object, Time now) const {
+    return plays(objects_[object], now);
+  }
+
+  Pose vehicle_at(std::size_t vehicle, Time t) const { return pose_at(vehicles_[vehicle], t); }
+  /// How it moves then, as vehicle_at() carries it on; at rest where that is faster than anything that carries a sonar.
+  PoseHistory::Motion vehicle_moves(std::size_t vehicle, Time t) const;
+  std::vector<Pose> objects_at(Time t) const;
+  Pose object_at(std::size_t object, Time t) const { return pose_at(objects_[object], t); }
+  bool is_hidden(std::size_t object) const { return objects_[object].hidden; }
+  /// Until its next pose, or show_again().
+  void hide(std::size_t object, bool hidden) { objects_[object].hidden = objects_[object].hidden_for_now = hidden; }
+  /// What hide() has hidden; what poses hide stays.
+  void show_again();
+  /// True when poses came once and then stopped for longer than the rules allow.
+  bool is_stale(std::size_t vehicle, Time now) const { return is_stale(vehicles_[vehicle], now); }
+  struct Stale {
+    std::string vehicle, sentence;
+  };
+  /// The vehicles whose poses stopped since the last call.
+  std::vector<Stale> newly_stale(Time now);
+
+  // When the rules follow the vehicles' stamps.
+  /// Time may pass as far as this: the least of the newest stamps, of the vehicles that are not left behind by more than
+  /// stale_after. Nothing before the first pose.
+  std::optional<Time> followed_until() const;
+  /// How far the stamps have jumped ahead since the last call, at the first pose for example. Orbits and
+  /// trajectories stand where they stood.
+  std::chrono::nanoseconds take_skipped();
+
+  std::string_view source_of(std::size_t vehicle) const { return vehicles_[vehicle].source; }
+  const PoseCounters& counters() const { return counters_; }
+
+ private:
+  struct Track {
+    BodyStart body;
+    PoseHistory history;
+    motion::Playback playback{};  // of body.plan
+    std::string sender_id, source;
+    std::uint64_t seq = 0;
+    std::uint32_t reset_counter = 0;
+    control::ClockDomain domain{};
+    Time last_arrival{};
+    std::chrono::nanoseconds offset{0};  // our time = sender's time + offset
+    bool hidden = false, hidden_for_now = false, stale_reported = false;
+    double allowance = 0;  // poses that may be kept now; refilled with time
+    Time allowance_at{};
+  };
+  using Ns = std::chrono::nanoseconds;
+
+  std::vector<Track> taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const;
+  Track* find(control::PoseSample::Of kind, const std::string& name, std::string& refusal);
+  bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now) const;
+  /// How far our time is ahead of the sender's, who stamped a pose with `at`.
+  Ns offset_for(const Track& track, Time at, Time now, bool goes_on);
+  Ns followed_offset_for(const Track& track, Time at, Time now);
+  bool is_followed(const Track& track, Time newest) const;
+  bool over_rate(Track& track, Time now) const;
+  bool is_stale(const Track& track, Time now) const;
+  Time last_news(const Track& track) const;
+  Pose pose_at(const Track& track, Time t) const;
+  Pose orbit(const Pose& initial, Time t) const;
+  /// Of a body that follows its trajectory; moving as fast as it is played.
+  static motion::Moment played(const Track& track, Time t);
+  static std::optional<control::TrajectoryStatus> plays(const Track& track, Time now);
+
+  PoseRules rules_;
+  std::vector<Track> vehicles_, objects_;
+  Time start_;
+  std::optional<Time> newest_followed_;  // ours
+  Ns skipped_{0};
+  PoseCounters counters_;
+};
+
+}  // namespace sonar

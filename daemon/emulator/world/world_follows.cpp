@@ -1,0 +1,65 @@
+// Time that goes by the stamps of the vehicles' poses (clock: follow): how their clocks become ours, and how far it may pass.
+#include <algorithm>
+
+#include "daemon/emulator/world/world.hpp"
+
+namespace sonar {
+namespace {
+__extension__ using Wide = __int128;  // a stranger's stamps and what we make of them may lie further apart than 64 bits reach
+Wide wide(Time t) { return t.time_since_epoch().count(); }
+}  // namespace
+
+bool World::is_followed(const Track& track, Time newest) const {
+  return !track.history.empty() && track.history.newest().at + track.offset >= newest - rules_.stale_after;
+}
+
+/// Our time is the stamps' own where it can be. A stamp near the newest one, by a relation that we know, is just the next. Else
+/// the sender's clock has jumped, or this is the first pose: forwards, and without other senders, the time between is skipped;
+/// in all other cases ours goes on from where it is.
+World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
+  const Time newest = newest_followed_.value_or(now);
+  const bool vehicle = std::any_of(vehicles_.begin(), vehicles_.end(), [&](const Track& t) { return &t == &track; });
+  const auto take = [&](Ns offset) {
+    if (vehicle) newest_followed_ = std::max(newest, at + offset);
+    return offset;
+  };
+  const auto lead = [&](Ns offset) { return wide(at) + offset.count() - wide(newest); };
+  const auto is_near = [&](Ns offset) {
+    const Wide by = lead(offset);
+    return (by < 0 ? -by : by) <= rules_.stale_after.count();
+  };
+  if (!vehicle || newest_followed_) {  // the first pose is where time begins, however soon after 0
+    if (is_near(track.offset)) return take(track.offset);
+    if (is_near(Ns{0})) return take(Ns{0});
+    for (const Track& other : vehicles_)
+      if (!other.history.empty() && is_near(other.offset)) return take(other.offset);
+  }
+
+  const bool alone = std::none_of(vehicles_.begin(), vehicles_.end(),
+                                  [&](const Track& other) { return &other != &track && is_followed(other, newest); });
+  if (const Wide ahead = lead(track.offset); vehicle && alone && ahead > 0 && wide(newest) + ahead <= control::largest_stamp_ns) {
+    skipped_ += Ns(static_cast<std::int64_t>(ahead));
+    return take(track.offset);
+  }
+  return take(newest - at);
+}
+
+std::optional<Time> World::followed_until() const {
+  if (!newest_followed_) return std::nullopt;
+  Time least = *newest_followed_;
+  for (const Track& t : vehicles_)
+    if (is_followed(t, *newest_followed_)) least = std::min(least, t.history.newest().at + t.offset);
+  return least;
+}
+
+World::Ns World::take_skipped() {
+  const Ns skipped = std::exchange(skipped_, Ns{0});
+  start_ += skipped;
+  for (Track& t : objects_)
+    if (!t.history.empty()) t.offset += skipped;
+  for (std::vector<Track>* tracks : {&vehicles_, &objects_})
+    for (Track& t : *tracks) t.playback.skip(skipped);
+  return skipped;
+}
+
+}  // namespace sonar

@@ -1,0 +1,129 @@
+// The whole daemon, top down: the world, the pose listeners and one Device per sonar, run by one I/O thread until told to stop.
+// main.cpp and the tests make one; the engine factory is the seam where tests put a fake one.
+#pragma once
+
+#include <functional>
+#include <list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/emulator/world/plausibility.hpp"
+#include "daemon/emulator/world/world.hpp"
+#include "daemon/server/app_operations.hpp"
+#include "daemon/server/control/control_server.hpp"
+#include "daemon/server/engine/simulator.hpp"
+#include "daemon/server/engine/start_engine.hpp"
+#include "daemon/server/poses/mavlink_server.hpp"
+#include "daemon/server/poses/pose_intake.hpp"
+#include "daemon/server/poses/pose_server.hpp"
+#include "daemon/server/recording/recordings.hpp"
+#include "daemon/server/scene_changes.hpp"
+#include "daemon/server/sonars/admission.hpp"
+#include "daemon/server/sonars/fleet.hpp"
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/log.hpp"
+#include "daemon/server/system/notify.hpp"
+#include "daemon/server/time/clock.hpp"
+#include "daemon/server/time/stepped_time.hpp"
+
+namespace sonar {
+
+struct AppOptions {
+  std::uint64_t exit_after_pings = 0;  // served, over all sonars; 0 = never
+  bool digest = false;                 // SHA-256 of every client's stream
+  bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP reads the configuration again
+  /// How the configuration is read again, the command line's part included; any thread. Empty: there is none (the demo).
+  std::function<Result<Config>()> read_config;
+  /// Any thread. Empty: no other scene can be loaded.
+  std::function<Result<ScenePointer>(const SceneFile&)> load_scene;
+  NotifyPlace service_manager;  // is told when we are ready, stop, and that we are alive
+};
+
+class App {
+ public:
+  /// After stop() run() returns by then, whatever is still under way.
+  static constexpr std::chrono::milliseconds stop_limit{1800};
+  /// From the beginning of one reload to that of the next, however often it is asked for.
+  static constexpr std::chrono::milliseconds reload_pause{500};
+
+  /// `make_engine` is kept: later scenes get theirs on another thread. What it refers to must outlive the App.
+  App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);
+
+  /// Opens every listener; errors name the address and the next step.
+  Result<void> open();
+  /// Serves until stopped; returns 0, or an exit code when the engine failed.
+  int run();
+  /// From any thread.
+  void request_stop();
+  /// From any thread: `work` is done on the I/O thread.
+  void post(std::function<void()> work) { asio::post(io_, std::move(work)); }
+
+  const Config& config() const { return config_; }
+  const Scene& scene() const { return *changes_.scene(); }
+  const std::string& engine_description() const { return simulator_.engine_description(); }
+  /// After run(): the destructor would wait for a scene or a ping that is not needed any more, or for a disk.
+  bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0 || !recordings_.idle(); }
+  const PoseServer& poses() const { return pose_server_; }
+  const MavlinkServer& mavlink() const { return mavlink_server_; }
+  const ControlServer& control() const { return control_; }
+  const std::list<Device>& devices() const { return fleet_.devices(); }
+  /// For servers of the control protocol, on the I/O thread.
+  Operations& operations() { return operations_; }
+  Events& events() { return events_; }
+  const Admission& admission() const { return admission_; }
+  /// After run().
+  const World& world() const { return world_; }
+
+ private:
+  void stop(const std::string& why);
+  void on_change();
+  void look();  // after a change: end, or take the next step of stepped time
+  void step_time();
+  void skip_time();
+  void advance_time(Time to);
+  bool enough_served() const;
+  void say_new_notes();
+  void wait_for_signal();
+  void on_hangup();  // reload.cpp, as the next
+  void reload();
+  void take_over(Config next);
+  std::string status_line() const;
+  asio::awaitable<void> keep_house();
+
+  Config config_;
+  AppOptions options_;
+  Log& log_;
+  asio::io_context io_{1};
+  Clock clock_;
+  Events events_;
+  World world_;
+  Plausibility plausibility_;
+  SteppedTime stepped_time_;
+  Simulator simulator_;
+  Recordings recordings_;
+  SceneChanges changes_;
+  Admission admission_;
+  PoseIntake pose_intake_;
+  PoseServer pose_server_;
+  MavlinkServer mavlink_server_;
+  DeviceContext context_;
+  Fleet fleet_;
+  AppOperations operations_;
+  ControlServer control_;
+  asio::signal_set signals_;
+  asio::steady_timer house_timer_, stop_timer_, reload_timer_;
+  Notify notify_;
+  bool look_posted_ = false, stopping_ = false;
+  int reloads_ = 0;            // begun, or waiting for one that is under way
+  bool reload_waits_ = false;  // for reload_pause to be over
+  std::chrono::steady_clock::time_point no_reload_before_{};
+  bool slow_load_said_ = false;
+  bool notes_due_ = true;  // the configuration or the scene is another one
+  int exit_code_ = 0;
+};
+
+}  // namespace sonar

@@ -1,0 +1,68 @@
+// What the connections of both control servers share: time limits and the services they use.
+#pragma once
+
+#include <chrono>
+
+#include "daemon/config/config.hpp"
+#include "daemon/server/control/token.hpp"
+#include "daemon/server/operations.hpp"
+#include "daemon/server/poses/pose_intake.hpp"
+#include "daemon/server/sonars/admission.hpp"
+#include "daemon/server/sonars/shared_rate.hpp"
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/log.hpp"
+
+namespace sonar {
+
+/// Of the whole server; outlives every connection.
+struct ControlContext {
+  asio::io_context& io;
+  const ControlConfig& config;
+  const LimitConfig& limits;
+  Admission& admission;
+  Operations& operations;
+  Events& events;
+  PoseIntake& poses;
+  Log& log;
+  Token token = {};
+  SharedRate pose_rate{limits.pose_bytes_per_s};  // of poses without an answer (request id 0)
+  LogLimiter refusals = {}, notices = {}, faults = {};
+};
+
+inline constexpr std::chrono::seconds greeting_limit{10};    // for the Hello, or a whole HTTP request once it has begun
+inline constexpr std::chrono::seconds keep_alive_limit{60};  // between two HTTP requests
+inline constexpr std::chrono::minutes operation_limit{5};    // for a scene to load; HTTP stops waiting then
+
+/// Rate-limited, since any client can cause it.
+void log_refusal(ControlContext& context, const std::string& why, const std::string& from);
+void log_fault(ControlContext& context, const std::exception_ptr& fault, const std::string& at);
+
+/// Closes a socket after a time limit. One limit at a time; the next replaces the last.
+class Deadline : public std::enable_shared_from_this<Deadline> {
+ public:
+  using Steady = std::chrono::steady_clock;
+  explicit Deadline(tcp::socket& socket) : socket_(socket), timer_(socket.get_executor()) {}
+  void within(Steady::duration limit) {
+    timer_.expires_after(limit);
+    timer_.async_wait([weak = weak_from_this()](const error_code& ec) {
+      const auto self = weak.lock();
+      if (!self || ec || self->timer_.expiry() > Steady::now()) return;
+      self->passed_ = true;
+      error_code ignored;
+      self->socket_.close(ignored);
+    });
+  }
+  void none() { timer_.expires_at(Steady::time_point::max()); }  // cancels the limit
+  bool passed() const { return passed_; }
+
+ private:
+  tcp::socket& socket_;  // of the connection that owns this
+  asio::steady_timer timer_;
+  bool passed_ = false;
+};
+
+/// False when the client closed, or read no byte for limits.stall. `bytes` must stay valid until it returns.
+asio::awaitable<bool> write_whole(ControlContext& context, tcp::socket& socket, Deadline& stall, const Sender& to,
+                                  asio::const_buffer bytes);
+
+}  // namespace sonar

@@ -1,0 +1,38 @@
+// The two control interfaces of a running daemon: the control stream (protobuf over TCP) and HTTP with JSON (docs/control.md).
+// Owned by App; Operations executes the requests.
+#pragma once
+
+#include <string>
+
+#include "daemon/server/control/control_listener.hpp"
+#include "daemon/server/control/http_connection.hpp"
+#include "daemon/server/control/stream_connection.hpp"
+
+namespace sonar {
+
+class ControlServer {
+ public:
+  /// All of it outlives the server.
+  ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Admission& admission,
+                Operations& operations, Events& events, PoseIntake& poses, Log& log);
+
+  /// Reads the token and opens both listeners. A default address in use is a warning; one from the file is an error.
+  Result<void> open();
+  void start();
+  void stop();
+
+  /// Where they listen, with the ports the system chose for 0. Port 0 = not listening.
+  Endpoint stream() const { return stream_.at(); }
+  Endpoint http() const { return http_.at(); }
+
+ private:
+  Result<void> read_token();
+  template <class Connection>
+  Result<void> open(ControlListener<Connection>& listener, const PoseListener& wanted, bool given, const std::string& key);
+
+  ControlContext context_;
+  ControlListener<StreamConnection> stream_;
+  ControlListener<HttpConnection> http_;
+};
+
+}  // namespace sonar

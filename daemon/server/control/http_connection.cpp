@@ -1,0 +1,294 @@
+#include "daemon/server/control/http_connection.hpp"
+
+#include <utility>
+
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/http/chunk_encode.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/serializer.hpp>
+#include <boost/beast/http/string_body.hpp>
+
+#include "daemon/server/sonars/input_rate.hpp"
+
+namespace sonar {
+namespace {
+
+namespace http = boost::beast::http;
+using control::StatusCode;
+constexpr std::chrono::seconds drain_limit{2};  // discards what the client still sends after our last answer
+
+const HttpRefusal too_many{503, "too many connections are open"};
+
+/// The head that all answers share. The status line is HTTP/1.1 for HTTP/1.0 clients too (RFC 9112, 2.3).
+template <class Body>
+http::response<Body> response_of(unsigned status, const std::string& type) {
+  http::response<Body> response;
+  response.result(status);
+  response.set(http::field::server, "sonard");
+  response.set(http::field::content_type, type);
+  response.set(http::field::cache_control, "no-store");
+  response.set("X-Content-Type-Options", "nosniff");
+  return response;
+}
+
+enum class Part { all, head };
+template <class Body>
+std::string bytes_of(const http::response<Body>& response, Part part) {
+  http::serializer<false, Body, http::fields> serializer(response);
+  serializer.split(part == Part::head);
+  std::string bytes;
+  while (!(part == Part::head ? serializer.is_header_done() : serializer.is_done())) {
+    error_code ec;
+    serializer.next(ec, [&](error_code&, const auto& buffers) {
+      bytes += boost::beast::buffers_to_string(buffers);
+      serializer.consume(boost::beast::buffer_bytes(buffers));
+    });
+    if (ec) break;  // never: the body is in memory
+  }
+  return bytes;
+}
+
+std::string bytes_of(HttpAnswer answer, std::string_view connection, Part part) {
+  auto response = response_of<http::string_body>(answer.status, answer.type);
+  response.content_length(answer.body.size());
+  if (!connection.empty()) response.set(http::field::connection, {connection.data(), connection.size()});
+  if (!answer.allow.empty()) response.set(http::field::allow, answer.allow);
+  if (answer.status == 401) response.set(http::field::www_authenticate, "Bearer");
+  response.body() = std::move(answer.body);
+  return bytes_of(response, part);
+}
+
+std::string head_of_events(bool chunked) {
+  auto response = response_of<http::empty_body>(200, "application/x-ndjson");
+  if (chunked) response.set(http::field::transfer_encoding, "chunked");
+  response.set(http::field::connection, "close");
+  return bytes_of(response, Part::head);
+}
+
+std::string chunk_of(const std::string& line) {
+  return boost::beast::buffers_to_string(http::make_chunk(boost::asio::const_buffer(line.data(), line.size())));
+}
+
+HttpAnswer answer_from(const OperationResult& result) {
+  if (result.code == OperationResult::Code::refused) return answer_of(400, StatusCode::refused, result.text);
+  if (result.code == OperationResult::Code::failed) return answer_of(409, StatusCode::failed, result.text);
+  if (const auto* status = std::get_if<control::DaemonStatus>(&result.body)) return {200, control::json_of(*status) + "\n"};
+  if (const auto* stepped = std::get_if<control::Stepped>(&result.body)) return {200, control::json_of(*stepped) + "\n"};
+  return answer_of(200, StatusCode::ok, result.text);
+}
+
+Sender without_port(const Sender& sender) { return {sender.source, sender.source}; }
+
+}  // namespace
+
+HttpConnection::HttpConnection(ControlContext& context, tcp::socket socket, Sender sender)
+    : context_(context),
+      socket_(std::move(socket)),
+      sender_(without_port(sender)),
+      request_limit_(std::make_shared<Deadline>(socket_)),
+      stall_(std::make_shared<Deadline>(socket_)),
+      wake_reader_(context.io, never),
+      wake_writer_(context.io, never),
+      wake_operation_(context.io, never),
+      rest_(context.io),
+      reader_(context.limits.control_message_bytes) {
+  error_code ec;
+  const auto at = socket_.local_endpoint(ec);
+  if (!ec && at.address().is_v4()) reached_ = {at.address().to_v4().to_bytes(), at.port()};
+}
+
+void HttpConnection::close() {
+  error_code ec;
+  socket_.close(ec);
+  request_limit_->none();
+  wake_reader_.cancel();
+  wake_writer_.cancel();
+  wake_operation_.cancel();
+  rest_.cancel();
+}
+
+void HttpConnection::reject() {
+  refusal_ = too_many;
+  discards_ = true;
+}
+
+// ---- requests
+
+asio::awaitable<void> HttpConnection::read() {
+  std::vector<std::byte> buffer(16384);
+  InputRate rate(context_.limits.input_bytes_per_s);
+  request_limit_->within(greeting_limit);
+  while (!over()) {
+    error_code ec;
+    if (busy_ && !discards_) {  // one request after the other; later bytes wait in the kernel
+      co_await wake_reader_.async_wait(into(ec));
+      continue;
+    }
+    const std::size_t n = co_await socket_.async_read_some(asio::buffer(buffer), into(ec));
+    if (ec || over()) break;
+    active_at = Steady::now();
+    if (!discards_) {
+      if (!reader_.begun()) request_limit_->within(greeting_limit);
+      reader_.feed(std::span(buffer).first(n));
+      hand_over();
+    }
+    if (const auto pause = rate.pause_after(n, Steady::now()); pause.count() > 0 && !over()) {
+      rest_.expires_after(pause);
+      co_await rest_.async_wait(into(ec));
+    }
+  }
+  peer_closed_ = true;
+  wake_writer_.cancel();
+  if (all_sent_) close();
+}
+
+/// Passes the next complete request to write().
+void HttpConnection::hand_over() {
+  auto next = reader_.next();
+  if (!next) {
+    refusal_ = next.error();
+  } else if (*next) {
+    request_ = **std::move(next);
+  } else {
+    continue_asked_ = reader_.asks_to_continue();
+    if (continue_asked_) wake_writer_.cancel();
+    return;
+  }
+  busy_ = true;
+  request_limit_->none();
+  wake_writer_.cancel();
+}
+
+void HttpConnection::next_request() {
+  busy_ = false;
+  request_limit_->within(reader_.begun() ? std::chrono::seconds(greeting_limit) : std::chrono::seconds(keep_alive_limit));
+  hand_over();
+  wake_reader_.cancel();
+}
+
+/// Closing while the client still sends would destroy our last answer (RST): its input is discarded for a moment first.
+void HttpConnection::finish_sending() {
+  all_sent_ = true;
+  if (peer_closed_ || over()) return close();
+  error_code ec;
+  socket_.shutdown(tcp::socket::shutdown_send, ec);
+  discards_ = true;
+  request_limit_->within(drain_limit);
+  wake_reader_.cancel();
+}
+
+// ---- answers
+
+asio::awaitable<void> HttpConnection::write() {
+  while (!over() && !all_sent_) {
+    if (std::exchange(continue_asked_, false)) {
+      if (!co_await write_whole(bytes_of(http::response<http::empty_body>(http::status::continue_, 11), Part::head))) break;
+    } else if (refusal_) {
+      const StatusCode code = refusal_->status == 503 ? StatusCode::failed : StatusCode::refused;
+      const HttpAnswer refusal = answer_of(refusal_->status, code, refusal_->why);
+      if (refusal_->status != 503) log_refusal(context_, refusal_->why, sender_.id);  // logged by the listener
+      co_await write_answer(refusal, {false, false, true});
+      break;
+    } else if (request_) {
+      co_await answer(*std::exchange(request_, std::nullopt));
+    } else if (peer_closed_) {
+      break;
+    } else {
+      error_code ec;
+      co_await wake_writer_.async_wait(into(ec));
+    }
+  }
+  finish_sending();
+}
+
+/// False: it shows the token, and no slot is free.
+bool HttpConnection::has_slot(const HttpRequest& request) {
+  if (!claim_slot_ || !context_.token.matches(bearer_token(request.authorization))) return true;
+  return std::exchange(claim_slot_, nullptr)();
+}
+
+asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
+  if (!has_slot(request)) {
+    refusal_ = too_many;
+    co_return;
+  }
+  RoutedRequest routed = route_request(request, {context_.token, reached_.ip, context_.config.hosts});
+  if (!routed.pose_refusal.empty()) context_.poses.refuse(routed.pose_refusal, sender_);
+  const Head head{request.http_1_0, request.method == "HEAD", !request.keep_alive};
+  if (const auto* wanted = std::get_if<control::Subscribe>(&routed.action)) {
+    co_await stream_events(*wanted, head);
+    all_sent_ = true;
+    co_return;
+  }
+  HttpAnswer answer = co_await make_answer(std::move(routed.action));
+  if (!answer.why.empty()) log_refusal(context_, answer.why, sender_.id);
+  if (!co_await write_answer(std::move(answer), head) || head.last)
+    all_sent_ = true;
+  else
+    next_request();
+}
+
+HttpAnswer HttpConnection::health(bool with_text) const {
+  const std::string trouble = context_.operations.trouble();
+  if (trouble.empty()) return {200, "ok\n", "text/plain"};
+  return {503, (with_text ? trouble : "unhealthy") + "\n", "text/plain"};
+}
+
+asio::awaitable<HttpAnswer> HttpConnection::make_answer(HttpAction wanted) {
+  if (auto* answer = std::get_if<HttpAnswer>(&wanted)) co_return std::move(*answer);
+  if (const auto* asked = std::get_if<HealthAction>(&wanted)) co_return health(asked->with_text);
+  if (std::holds_alternative<MetricsAction>(wanted))
+    co_return HttpAnswer{200, context_.operations.metrics(), "text/plain; version=0.0.4; charset=utf-8"};
+  if (auto* asked = std::get_if<OperationAction>(&wanted)) co_return co_await perform(std::move(asked->operation));
+  co_return HttpAnswer{200, help_text(sonar::text_of(reached_)), "text/plain; charset=utf-8"};
+}
+
+/// The result may arrive at once, after minutes, or after the time limit.
+asio::awaitable<HttpAnswer> HttpConnection::perform(control::Operation operation) {
+  const auto result = std::make_shared<std::optional<OperationResult>>();
+  context_.operations.perform(operation, sender_, [weak = weak_from_this(), result](OperationResult done) {
+    *result = std::move(done);
+    if (const auto self = weak.lock()) self->wake_operation_.cancel();
+  });
+  wake_operation_.expires_after(operation_limit);
+  while (!*result && !over() && wake_operation_.expiry() > Steady::now()) {  // cancelled when the result arrives
+    error_code ec;
+    co_await wake_operation_.async_wait(into(ec));
+  }
+  if (*result) co_return answer_from(**result);
+  co_return answer_of(504, StatusCode::failed, "not finished after 5 minutes; the operation continues, see /api/v1/status");
+}
+
+asio::awaitable<void> HttpConnection::stream_events(control::Subscribe wanted, Head head) {
+  discards_ = true;  // reading continues, to notice that the client disconnects
+  wake_reader_.cancel();
+  if (!co_await write_whole(head_of_events(!head.http_1_0)) || head.without_body) co_return;
+  events_.subscribe(wanted);
+  const auto subscription = context_.events.listen([weak = weak_from_this()](const control::Event& event) {
+    if (const auto self = weak.lock(); self && self->events_.offer(event)) self->wake_writer_.cancel();
+  });
+  while (!over() && !peer_closed_) {
+    if (const auto event = events_.next()) {
+      std::string line = control::json_of(*event) + "\n";  // GCC 12 destroys a ?: inside of co_await twice
+      if (!head.http_1_0) line = chunk_of(line);
+      if (!co_await write_whole(std::move(line))) co_return;
+    } else {
+      error_code ec;
+      co_await wake_writer_.async_wait(into(ec));
+    }
+  }
+}
+
+asio::awaitable<bool> HttpConnection::write_answer(HttpAnswer answer, Head head) {
+  const char* connection = head.last ? "close" : head.http_1_0 ? "keep-alive" : "";  // HTTP/1.1 keeps the connection by default
+  return write_whole(bytes_of(std::move(answer), connection, head.without_body ? Part::head : Part::all));
+}
+
+asio::awaitable<bool> HttpConnection::write_whole(std::string bytes) {
+  const bool whole = co_await sonar::write_whole(context_, socket_, *stall_, sender_, asio::buffer(bytes));
+  if (whole) active_at = Steady::now();
+  co_return whole;
+}
+
+}  // namespace sonar

@@ -1,0 +1,69 @@
+// One HTTP client: requests one after the other, or a stream of events until it disconnects. read() parses requests and write()
+// answers them. Owned by the listener's slots and by its own coroutines.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/server/control/control_context.hpp"
+#include "daemon/server/control/event_queue.hpp"
+#include "daemon/server/control/http_router.hpp"
+
+namespace sonar {
+
+class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
+ public:
+  using Steady = std::chrono::steady_clock;
+
+  HttpConnection(ControlContext& context, tcp::socket socket, Sender sender);
+
+  asio::awaitable<void> read();
+  asio::awaitable<void> write();
+  void close();
+  bool over() const { return !socket_.is_open(); }
+  /// Before read(): no slot is free. Answers 503 and discards input for a moment.
+  void reject();
+  /// Before read(): the client is untrusted until it shows the token; `claim_slot` is then called, and is false when no slot is
+  /// free.
+  void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
+  const Sender& sender() const { return sender_; }
+
+  Steady::time_point active_at = Steady::now();
+
+ private:
+  struct Head {  // of the answer to a request
+    bool http_1_0 = false, without_body = false, last = false;
+  };
+  void hand_over();
+  asio::awaitable<void> answer(HttpRequest request);
+  bool has_slot(const HttpRequest& request);
+  asio::awaitable<HttpAnswer> make_answer(HttpAction wanted);
+  asio::awaitable<HttpAnswer> perform(control::Operation operation);
+  asio::awaitable<void> stream_events(control::Subscribe wanted, Head head);
+  asio::awaitable<bool> write_answer(HttpAnswer answer, Head head);
+  asio::awaitable<bool> write_whole(std::string bytes);
+  HttpAnswer health(bool with_text) const;
+  void next_request();
+  void finish_sending();
+
+  ControlContext& context_;
+  tcp::socket socket_;
+  Sender sender_;  // the address without the port, which differs for every curl
+  Endpoint reached_;
+  std::shared_ptr<Deadline> request_limit_, stall_;
+  asio::steady_timer wake_reader_, wake_writer_, wake_operation_, rest_;
+  HttpReader reader_;
+  std::optional<HttpRequest> request_;  // read, not yet answered
+  std::optional<HttpRefusal> refusal_;  // of a request that cannot be parsed
+  EventQueue events_;
+  std::function<bool()> claim_slot_;  // empty: trusted
+  bool continue_asked_ = false;       // send "100 Continue"
+  bool busy_ = false;                 // a request is being answered
+  bool discards_ = false;             // input is discarded
+  bool peer_closed_ = false;          // the client sends no more
+  bool all_sent_ = false;             // we send no more
+};
+
+}  // namespace sonar

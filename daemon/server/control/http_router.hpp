@@ -1,0 +1,52 @@
+// Maps a request to an action, or to the answer that rejects it: the rules of http_rules.hpp in order. Pure; HttpConnection
+// executes the action.
+#pragma once
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "daemon/server/control/http_reader.hpp"
+#include "daemon/server/control/http_rules.hpp"
+#include "daemon/server/control/token.hpp"
+#include "protocol/control/control.hpp"
+
+namespace sonar {
+
+struct HttpAnswer {
+  unsigned status = 200;
+  std::string body;
+  std::string type = "application/json";
+  std::string allow = {};  // of 405
+  std::string why = {};    // for the log, of 401 and 403
+};
+/// {"code", "text"}: the body of every answer without a document.
+HttpAnswer answer_of(unsigned status, control::StatusCode code, const std::string& text);
+
+struct HttpPolicy {
+  const Token& token;
+  Ipv4 reached;  // our end of the connection
+  const std::vector<std::string>& hosts;
+};
+
+struct HelpAction {};
+struct HealthAction {
+  bool with_text = false;  // the reason too, for authorized clients
+};
+struct MetricsAction {};
+struct OperationAction {
+  control::Operation operation;
+};
+/// What an HTTP request asks for. A Subscribe = a stream of events.
+using HttpAction = std::variant<HttpAnswer, HelpAction, HealthAction, MetricsAction, OperationAction, control::Subscribe>;
+
+struct RoutedRequest {
+  HttpAction action;
+  std::string pose_refusal = {};  // of a malformed pose: counted
+};
+RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy);
+
+/// The text of GET /.
+std::string help_text(const std::string& address);
+
+}  // namespace sonar

@@ -1,0 +1,43 @@
+// The figures as Prometheus reads them: text format 0.0.4, names by its conventions (base units, _total for counters).
+// Pure text; Operations::metrics() calls metrics_text, docs/operations.md lists what is in it.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "daemon/emulator/sonar/metrics.hpp"
+#include "daemon/server/system/process_figures.hpp"
+
+namespace sonar {
+
+/// Writes families one after the other; all samples of a family directly after its head.
+class PrometheusText {
+ public:
+  using Labels = std::vector<std::pair<std::string_view, std::string_view>>;
+  enum class Type { counter, gauge, histogram };
+
+  void family(std::string_view name, Type type, std::string_view help);
+  /// Of the family begun last. Whole numbers keep all their digits up to 2^53.
+  void sample(const Labels& labels, double value);
+  void sample(const Labels& labels, const Histogram& histogram);
+  std::string take() { return std::move(text_); }
+
+ private:
+  void line(std::string_view suffix, const Labels& labels, const std::string& value);
+
+  std::string name_, text_;
+};
+
+struct DaemonFigures {
+  std::string version;
+  double uptime_s = 0;
+  std::vector<std::pair<std::string, DeviceFigures>> sonars;  // by name
+  PoseCounters poses;
+  std::uint64_t clients_now = 0, turned_away_for_places = 0, turned_away_for_descriptors = 0;  // of all sonars
+  ProcessFigures process;
+};
+std::string metrics_text(const DaemonFigures& figures);
+
+}  // namespace sonar

@@ -1,0 +1,241 @@
+#include "daemon/server/control/stream_connection.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "daemon/server/control/http_rules.hpp"
+
+namespace sonar {
+namespace {
+
+using control::Response;
+using control::StatusCode;
+
+constexpr std::size_t longest_before_hello = 4096;  // less than a message may have later
+constexpr std::size_t work_of_a_turn = 4096;        // bytes; then other connections have their turn
+constexpr std::size_t least_work = 64;              // cost of a message beside its bytes
+
+StatusCode code_of(OperationResult::Code code) {
+  return code == OperationResult::Code::done      ? StatusCode::ok
+         : code == OperationResult::Code::refused ? StatusCode::refused
+                                                  : StatusCode::failed;
+}
+
+/// A pose without an answer.
+bool is_unasked(std::uint64_t id, const auto& operation) {
+  return id == 0 && std::holds_alternative<control::PoseSample>(operation);
+}
+
+Response response_of(std::uint64_t id, OperationResult result) {
+  Response response{id, code_of(result.code), std::move(result.text), false};
+  if (auto* status = std::get_if<control::DaemonStatus>(&result.body)) response.body = std::move(*status);
+  if (const auto* stepped = std::get_if<control::Stepped>(&result.body)) response.body = *stepped;
+  return response;
+}
+
+}  // namespace
+
+StreamConnection::StreamConnection(ControlContext& context, tcp::socket socket, Sender sender)
+    : context_(context),
+      socket_(std::move(socket)),
+      sender_(std::move(sender)),
+      greeting_(std::make_shared<Deadline>(socket_)),
+      stall_(std::make_shared<Deadline>(socket_)),
+      wake_reader_(context.io, never),
+      wake_writer_(context.io, never),
+      rest_(context.io),
+      parser_(context.limits.control_message_bytes),
+      rate_(context.limits.input_bytes_per_s) {}
+
+void StreamConnection::close() {
+  error_code ec;
+  socket_.close(ec);
+  subscription_.reset();
+  greeting_->none();
+  wake_reader_.cancel();
+  wake_writer_.cancel();
+  rest_.cancel();
+}
+
+// ---- requests
+
+asio::awaitable<void> StreamConnection::read() {
+  std::vector<std::byte> buffer(work_of_a_turn);
+  std::size_t received = 0;
+  greeting_->within(greeting_limit);
+  while (!over() && !ending_) {
+    error_code ec;
+    const std::size_t n = co_await socket_.async_read_some(asio::buffer(buffer), into(ec));
+    if (ec || over()) break;
+    active_at = Steady::now();
+    received += n;
+    if (speaks_http(std::span(buffer).first(n))) {
+      log_refusal(context_, "HTTP request on the control stream, which is protobuf; use control.http for HTTP", sender_.id);
+      break;
+    }
+    parser_.feed(std::span(buffer).first(n));
+    Work work{n};
+    while (!ending_ && !over()) {
+      const auto message = parser_.next();
+      if (!message) {
+        log_refusal(context_, message.error().text, sender_.id);
+        ending_ = true;
+        break;
+      }
+      if (!*message) break;
+      ending_ = !accept(**message, work);
+      while (!over() && answers_.size() + in_progress_ >= most_open_requests) co_await wake_reader_.async_wait(into(ec));
+    }
+    if (!greeted_ && received > longest_before_hello) ending_ = true;
+    if (!ending_ && !over()) co_await limit_rate(work);
+  }
+  ending_ = true;
+  wake_writer_.cancel();  // it writes the remaining answers, then closes
+}
+
+/// Input beyond the limits, or beyond the client's share of poses, waits in the kernel.
+asio::awaitable<void> StreamConnection::limit_rate(const Work& work) {
+  const auto now = Steady::now();
+  auto pause = rate_.pause_after(work.bytes, now);
+  if (work.pose_bytes > 0) {
+    if (!pose_rate_) pose_rate_ = context_.pose_rate.join(context_.limits.pose_bytes_per_s);
+    pause = std::max(pause, context_.pose_rate.pause_after(*pose_rate_, work.pose_bytes, now));
+  }
+  if (pause.count() == 0) co_return;
+  error_code ec;
+  rest_.expires_after(pause);
+  co_await rest_.async_wait(into(ec));
+}
+
+/// Any web page can make a browser send it; it must have no effect even if it parses as protobuf.
+bool StreamConnection::speaks_http(std::span<const std::byte> received) {
+  for (const std::byte b : received) {
+    if (first_bytes_.size() == longest_http_method) break;
+    first_bytes_ += static_cast<char>(b);
+  }
+  return begins_http_request(first_bytes_);
+}
+
+/// False: close the connection.
+bool StreamConnection::accept(control::BytesView message, Work& work) {
+  work.bytes += least_work;
+  const auto request = control::decode_request(message);
+  if (!request) {
+    if (request.error().pose && greeted_)
+      context_.poses.refuse(request.error().why, sender_);
+    else
+      log_refusal(context_, request.error().why, sender_.id);
+    answer({request.error().id, StatusCode::refused, request.error().why, false});
+    return greeted_ && request.error().is_protobuf;
+  }
+  if (const auto* hello = std::get_if<control::Hello>(&request->op)) return greet(request->id, *hello);
+  if (!greeted_) return refuse_and_end(request->id, StatusCode::refused, "the first message must be a Hello");
+  if (is_unasked(request->id, request->op)) work.pose_bytes += message.size() + least_work;
+  return accept_greeted(*request);
+}
+
+bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
+  if (hello.protocol_version != control::protocol_version) {
+    answer({id, StatusCode::refused, "protocol_version must be " + std::to_string(control::protocol_version), true});
+    return false;
+  }
+  if (!context_.token.matches(hello.token))
+    return refuse_and_end(id, StatusCode::unauthenticated,
+                          hello.token.empty() ? "token required: send the token of control.token_file in the Hello"
+                                              : "the token in the Hello is not that of control.token_file");
+  if (claim_slot_ && !claim_slot_()) {
+    answer({id, StatusCode::failed, "all connection slots are in use; try again, or close another client", false});
+    return false;
+  }
+  claim_slot_ = nullptr;
+  greeted_ = true;
+  greeting_->none();
+  context_.log.debug("control client", {{"from", sender_.id}, {"name", hello.name.substr(0, 64)}});
+  answer({id, StatusCode::ok, "", true});
+  return true;
+}
+
+bool StreamConnection::refuse_and_end(std::uint64_t id, StatusCode code, const std::string& why) {
+  log_refusal(context_, why, sender_.id);
+  answer({id, code, why, false});
+  return false;
+}
+
+bool StreamConnection::accept_greeted(const control::Request& request) {
+  std::visit(
+      [&](const auto& op) {
+        using Op = std::decay_t<decltype(op)>;
+        if constexpr (std::is_same_v<Op, control::Subscribe>) {
+          subscribe(op);
+          answer({request.id, StatusCode::ok, "", false});
+        } else if constexpr (std::is_constructible_v<control::Operation, Op>) {
+          perform(request.id, op);
+        } else {
+          answer({request.id, StatusCode::unsupported, "this version does not support the request", false});
+        }
+      },
+      request.op);
+  return true;
+}
+
+/// The result may arrive after those of later requests, and after this connection is closed.
+void StreamConnection::perform(std::uint64_t id, const control::Operation& operation) {
+  const bool unasked = is_unasked(id, operation);
+  if (!unasked) ++in_progress_;
+  context_.operations.perform(operation, sender_, [weak = weak_from_this(), id, unasked](OperationResult result) {
+    const auto self = weak.lock();
+    if (!self) return;
+    if (!unasked) --self->in_progress_;
+    self->wake_reader_.cancel();
+    const bool silent = unasked && result.code == OperationResult::Code::done;
+    if (!silent) self->answer(response_of(id, std::move(result)));
+  });
+}
+
+void StreamConnection::subscribe(const control::Subscribe& wanted) {
+  events_.subscribe(wanted);
+  if (!events_.subscribes_any()) {
+    subscription_.reset();
+  } else if (!subscription_) {
+    subscription_ = context_.events.listen([weak = weak_from_this()](const control::Event& event) {
+      if (const auto self = weak.lock(); self && self->events_.offer(event)) self->wake_writer_.cancel();
+    });
+  }
+}
+
+// ---- answers and events
+
+void StreamConnection::answer(const Response& response) {
+  answers_.push_back(control::delimited(control::encode_response(response)));
+  wake_writer_.cancel();
+}
+
+asio::awaitable<void> StreamConnection::write() {
+  while (!over()) {
+    if (!answers_.empty()) {
+      control::Bytes bytes = std::move(answers_.front());
+      answers_.pop_front();
+      if (!co_await write_whole(std::move(bytes))) break;
+      wake_reader_.cancel();
+    } else if (auto event = events_.next()) {
+      const Response response{0, StatusCode::ok, "", false, *std::move(event)};
+      if (!co_await write_whole(control::delimited(control::encode_response(response)))) break;
+    } else if (ending_ && in_progress_ == 0) {
+      error_code ec;
+      socket_.shutdown(tcp::socket::shutdown_send, ec);
+      break;
+    } else {
+      error_code ec;
+      co_await wake_writer_.async_wait(into(ec));
+    }
+  }
+  close();
+}
+
+asio::awaitable<bool> StreamConnection::write_whole(control::Bytes bytes) {
+  const bool whole = co_await sonar::write_whole(context_, socket_, *stall_, sender_, asio::buffer(bytes));
+  if (whole) active_at = Steady::now();
+  co_return whole;
+}
+
+}  // namespace sonar

@@ -1,0 +1,72 @@
+// One client of the control stream: requests in, answers and events out. One coroutine reads, one writes; answers are sent as
+// operations finish, in any order. Owned by the listener's slots and by its own coroutines.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/server/control/control_context.hpp"
+#include "daemon/server/control/event_queue.hpp"
+#include "daemon/server/sonars/input_rate.hpp"
+#include "protocol/control/control.hpp"
+#include "protocol/control/delimited.hpp"
+
+namespace sonar {
+
+class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
+ public:
+  using Steady = std::chrono::steady_clock;
+  /// Requests in progress, or answered but not yet read by the client; at this limit reading pauses.
+  static constexpr std::size_t most_open_requests = 64;
+
+  StreamConnection(ControlContext& context, tcp::socket socket, Sender sender);
+
+  asio::awaitable<void> read();
+  asio::awaitable<void> write();
+  void close();
+  bool over() const { return !socket_.is_open(); }
+  /// Before read(): no slot is free.
+  void reject() { ending_ = true; }
+  /// Before read(): the client is untrusted until it shows the token; `claim_slot` is then called, and is false when no slot is
+  /// free.
+  void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
+  const Sender& sender() const { return sender_; }
+
+  Steady::time_point active_at = Steady::now();  // last read or write: subscribers only read
+
+ private:
+  bool speaks_http(std::span<const std::byte> received);
+  struct Work {
+    std::size_t bytes = 0, pose_bytes = 0;  // pose_bytes: of poses without an answer; included in bytes
+  };
+  bool accept(control::BytesView message, Work& work);
+  asio::awaitable<void> limit_rate(const Work& work);
+  bool greet(std::uint64_t id, const control::Hello& hello);
+  bool accept_greeted(const control::Request& request);
+  void perform(std::uint64_t id, const control::Operation& operation);
+  void subscribe(const control::Subscribe& wanted);
+  void answer(const control::Response& response);
+  bool refuse_and_end(std::uint64_t id, control::StatusCode code, const std::string& why);
+  asio::awaitable<bool> write_whole(control::Bytes bytes);
+
+  ControlContext& context_;
+  tcp::socket socket_;
+  Sender sender_;
+  std::shared_ptr<Deadline> greeting_, stall_;
+  asio::steady_timer wake_reader_, wake_writer_, rest_;
+  control::DelimitedParser parser_;
+  InputRate rate_;
+  std::optional<SharedRate::Part> pose_rate_;  // from the first pose without an answer
+  std::deque<control::Bytes> answers_;         // framed
+  std::size_t in_progress_ = 0;                // requests whose answer is not in answers_ yet
+  EventQueue events_;
+  Events::Token subscription_;
+  std::string first_bytes_;                // enough of them to detect HTTP
+  std::function<bool()> claim_slot_;       // empty: trusted
+  bool greeted_ = false, ending_ = false;  // ending: the last answer is being written
+};
+
+}  // namespace sonar

@@ -1,0 +1,30 @@
+// The shared secret of control clients, from the configuration's control.token_file. Read once at start, compared in constant
+// time, never logged.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+
+namespace sonar {
+
+class Token {
+ public:
+  static constexpr std::size_t shortest = 16, longest = 1024;
+
+  Token() = default;  // none: all clients are authorized
+  explicit Token(std::string secret) : secret_(std::move(secret)) {}
+  /// The file's text without surrounding blanks. `warning` is set when other users can read the file.
+  static Result<Token> read(const std::filesystem::path& file, std::string& warning);
+
+  bool needed() const { return !secret_.empty(); }
+  /// Also true when no token is required. Constant time.
+  bool matches(std::string_view shown) const;
+
+ private:
+  std::string secret_;
+};
+
+}  // namespace sonar

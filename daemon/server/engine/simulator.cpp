@@ -1,0 +1,151 @@
+#include "daemon/server/engine/simulator.hpp"
+
+#include <unistd.h>
+
+#include <exception>
+#include <new>
+#include <stdexcept>
+
+namespace sonar {
+namespace {
+
+using Steady = std::chrono::steady_clock;
+
+double seconds_since(Steady::time_point begin) { return std::chrono::duration<double>(Steady::now() - begin).count(); }
+
+}  // namespace
+
+Simulator::Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, int nice_by)
+    : io_(io), description_(engine->description()), engine_(std::move(engine)) {
+  engine_->set_interruption(this);
+  thread_ = std::thread([this, nice_by] {
+    // Niceness belongs to the thread on Linux; a refusal costs only smoothness.
+    if (nice_by != 0 && ::nice(nice_by) == -1) {
+    }
+    queue_.run();
+  });
+}
+
+Simulator::~Simulator() {
+  queue_stays_.reset();
+  thread_.join();
+}
+
+void Simulator::submit(PingRequest request, Done done) {
+  if (unanswered_++ == 0) begun_ = Steady::now();
+  asio::post(queue_, [this, job = Job{std::move(request), std::move(done), {}, {}, asio::make_work_guard(io_)}]() mutable {
+    arrive(std::move(job));
+  });
+}
+
+void Simulator::use(std::unique_ptr<PingEngine> engine, Retired retired) {
+  description_ = engine->description();
+  asio::post(queue_, [this, job = Job{{}, {}, std::move(engine), std::move(retired), asio::make_work_guard(io_)}]() mutable {
+    arrive(std::move(job));
+  });
+}
+
+std::chrono::nanoseconds Simulator::under_way_for() const {
+  return unanswered_ == 0 ? std::chrono::nanoseconds{0} : Steady::now() - begun_;
+}
+
+// ---- the simulation thread
+
+void Simulator::arrive(Job job) {
+  if (!job.engine) turns_.ask(job.request.sonar_id);
+  waiting_.push_back(std::move(job));
+  if (!working_) work_off();
+}
+
+void Simulator::work_off() {
+  working_ = true;
+  while (!waiting_.empty()) {
+    if (waiting_.front().engine) {
+      Job job = std::move(waiting_.front());
+      waiting_.pop_front();
+      change_engine(std::move(job));
+      continue;
+    }
+    const auto next = next_to_run();
+    Job job = std::move(*next);
+    waiting_.erase(next);
+    simulate(std::move(job));
+    queue_.poll();  // requests that arrived meanwhile take part in the choice
+  }
+  working_ = false;
+}
+
+/// Who has had least, of those whose requests are for the present engine; of equals who has waited longest.
+std::list<Simulator::Job>::iterator Simulator::next_to_run() {
+  auto best = waiting_.begin();
+  for (auto it = waiting_.begin(); it != waiting_.end() && !it->engine; ++it)
+    if (turns_.used_s(it->request.sonar_id) < turns_.used_s(best->request.sonar_id)) best = it;
+  return best;
+}
+
+/// A ping is under way: lets in one of another sonar that would else wait longer than its own takes.
+void Simulator::run_other() {
+  queue_.poll();
+  if (under_way_ > 1 || waiting_.empty() || waiting_.front().engine) return;
+  const auto next = next_to_run();
+  if (!turns_.goes_first(next->request.sonar_id, running_, seconds_since(running_since_) - let_in_s_)) return;
+  Job job = std::move(*next);
+  waiting_.erase(next);
+  const auto begin = Steady::now();
+  const auto since = running_since_;
+  const std::uint32_t running = running_;
+  const double let_in_s = let_in_s_;
+  simulate(std::move(job));
+  running_ = running;
+  running_since_ = since;
+  let_in_s_ = let_in_s + seconds_since(begin);
+}
+
+void Simulator::simulate(Job job) {
+  const std::uint32_t sonar = job.request.sonar_id;
+  turns_.begin(sonar);
+  running_ = sonar;
+  running_since_ = Steady::now();
+  let_in_s_ = 0;
+  ++under_way_;
+  Outcome outcome = run(job.request);
+  --under_way_;
+  outcome.seconds = seconds_since(running_since_) - let_in_s_;
+  turns_.end(sonar, outcome.seconds);
+  asio::post(io_, [this, outcome = std::move(outcome), done = std::move(job.done), stays = std::move(job.io_stays)]() mutable {
+    --unanswered_;
+    begun_ = Steady::now();
+    done(std::move(outcome));
+  });
+}
+
+Simulator::Outcome Simulator::run(const PingRequest& request) {
+  Outcome outcome;
+  try {
+    auto pings = engine_->run({&request, 1});
+    outcome.ping = std::make_shared<const Ping>(std::move(pings.at(0)));
+  } catch (const std::invalid_argument& e) {
+    outcome.failure = e.what();
+    outcome.refused = true;
+  } catch (const std::bad_alloc&) {
+    outcome.failure = "out of memory";
+    outcome.refused = true;
+  } catch (const EngineUnavailable& e) {
+    outcome.failure = e.what();
+    outcome.kind = ErrorKind::unavailable;
+  } catch (const std::exception& e) {
+    outcome.failure = e.what();
+  }
+  return outcome;
+}
+
+void Simulator::change_engine(Job job) {
+  engine_->set_interruption(nullptr);
+  std::swap(engine_, job.engine);
+  engine_->set_interruption(this);
+  asio::post(io_, [before = std::move(job.engine), retired = std::move(job.retired), stays = std::move(job.io_stays)]() mutable {
+    retired(std::move(before));
+  });
+}
+
+}  // namespace sonar

@@ -1,0 +1,80 @@
+// The simulation thread: one thread that owns the ping engine and computes requests, those of several sonars in turns by the time
+// they take. Requests go over by value, finished pings come back on the I/O thread; nothing else is shared.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "core/base/result.hpp"
+#include "core/pipeline/ping_engine.hpp"
+#include "daemon/emulator/sonar/actions.hpp"
+#include "daemon/server/engine/fair_turns.hpp"
+#include "daemon/server/system/asio.hpp"
+
+namespace sonar {
+
+class Simulator : private Interruption {
+ public:
+  using Outcome = PingOutcome;
+  using Done = std::function<void(Outcome)>;
+  using Retired = std::function<void(std::shared_ptr<PingEngine>)>;
+
+  /// `nice_by` is added to the thread's niceness, as for the workers of the engine's pool.
+  Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, int nice_by);
+  /// Waits for the pings asked for.
+  ~Simulator() override;
+  Simulator(const Simulator&) = delete;
+  Simulator& operator=(const Simulator&) = delete;
+
+  /// I/O thread. `done` is called there; the I/O thread stays alive until it was.
+  void submit(PingRequest request, Done done);
+  /// I/O thread. Requests submitted from now on go to `engine`; the one before comes back through `retired`, called on the I/O
+  /// thread, when it has answered those before.
+  void use(std::unique_ptr<PingEngine> engine, Retired retired);
+  const std::string& engine_description() const { return description_; }
+  /// I/O thread: for how long the engine has been at its present ping; 0 = it waits for work.
+  std::chrono::nanoseconds under_way_for() const;
+
+ private:
+  struct Job {
+    PingRequest request;
+    Done done;
+    std::shared_ptr<PingEngine> engine;  // of a job that changes the engine
+    Retired retired;
+    asio::executor_work_guard<asio::io_context::executor_type> io_stays;
+  };
+
+  void arrive(Job job);
+  void work_off();
+  void change_engine(Job job);
+  void simulate(Job job);
+  Outcome run(const PingRequest& request);
+  std::list<Job>::iterator next_to_run();
+  bool expected() const override { return turns_.several(); }
+  void run_other() override;
+
+  asio::io_context& io_;
+  std::string description_;
+  std::size_t unanswered_ = 0;                     // requests without an answer; I/O thread, as the next
+  std::chrono::steady_clock::time_point begun_{};  // when the engine took up the oldest of them
+
+  // The simulation thread's.
+  std::shared_ptr<PingEngine> engine_;
+  std::list<Job> waiting_;
+  FairTurns turns_;
+  bool working_ = false;
+  int under_way_ = 0;          // pings, one let in by another included
+  double let_in_s_ = 0;        // time of pings let in by the one under way
+  std::uint32_t running_ = 0;  // whose ping is under way
+  std::chrono::steady_clock::time_point running_since_{};
+
+  asio::io_context queue_{1};
+  asio::executor_work_guard<asio::io_context::executor_type> queue_stays_{queue_.get_executor()};
+  std::thread thread_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,160 @@
+#include "daemon/server/poses/mavlink_server.hpp"
+
+#include "daemon/server/system/listen.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr auto tick_period = std::chrono::milliseconds(250);
+
+/// Heartbeats and silences are those of the wires, also where the daemon's time is stepped.
+Time wire_time() { return Time(std::chrono::steady_clock::now().time_since_epoch()); }
+
+mavlink::Settings settings_of(const MavlinkConfig& link, const Config& config) {
+  return {link.vehicle,
+          link.system_id,
+          link.component_id,
+          link.request_rates,
+          link.rate_hz,
+          config.origin,
+          config.clock == ClockMode::follow};
+}
+std::string text_of(const MavlinkConfig& link) { return (link.dials ? "udpout:" : "udpin:") + text_of(link.at); }
+std::string text_of(const udp::endpoint& e) { return e.address().to_string() + ":" + std::to_string(e.port()); }
+
+}  // namespace
+
+MavlinkServer::MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log)
+    : io_(io), config_(config), intake_(intake), log_(log) {}
+
+Result<void> MavlinkServer::open() {
+  for (const MavlinkConfig& wanted : config_.poses.mavlink) {
+    Link& link = links_.emplace_back(Link{wanted,
+                                          mavlink::MavlinkPoses(settings_of(wanted, config_)),
+                                          udp::socket(io_),
+                                          asio::steady_timer(io_),
+                                          std::nullopt,
+                                          {},
+                                          {}});
+    const Endpoint at = wanted.dials ? Endpoint{} : wanted.at;
+    if (auto r = bind_udp(link.socket, at, false); !r)
+      return failure(r.error().kind, r.error().text + "; poses.mavlink in the configuration takes another address");
+    if (wanted.dials)
+      link.peer = udp::endpoint(address_of(wanted.at.ip), wanted.at.port);
+    else
+      link.config.at.port = link.socket.local_endpoint().port();
+    link.name = std::string("mavlink ").append(text_of(link.config));
+    error_code ec;
+    link.socket.non_blocking(true, ec);  // what a full buffer does not take is lost, as datagrams may be
+  }
+  return {};
+}
+
+void MavlinkServer::start() {
+  for (Link& l : links_) {
+    keep_receiving(l);
+    keep_ticking(l);
+  }
+}
+
+void MavlinkServer::stop() {
+  stopping_ = true;
+  error_code ec;
+  for (Link& l : links_) {
+    l.socket.close(ec);
+    l.timer.cancel();
+  }
+}
+
+std::vector<std::string> MavlinkServer::endpoints() const {
+  std::vector<std::string> all;
+  for (const Link& l : links_) all.push_back(text_of(l.config));
+  return all;
+}
+std::vector<control::Note> MavlinkServer::notes() const {
+  std::vector<control::Note> all;
+  for (const Link& l : links_)
+    if (const std::string error = l.poses.health_error(wire_time()); !error.empty())
+      all.push_back({l.config.vehicle, l.name + ": " + error,
+                     "docs/poses.md lists the messages that make a pose, and how to request them"});
+  return all;
+}
+Endpoint MavlinkServer::listens_at(std::size_t link) const {
+  return link < links_.size() ? std::next(links_.begin(), static_cast<std::ptrdiff_t>(link))->config.at : Endpoint{};
+}
+
+void MavlinkServer::say_fault(const std::exception_ptr& fault, const Link& link) {
+  sonar::say_fault(log_, faults_, text_of(fault), {"at", link.name});
+}
+
+/// A link outlives whatever one datagram does to us.
+void MavlinkServer::keep_receiving(Link& link) {
+  asio::co_spawn(
+      io_, [this, &link] { return receive(link); },
+      [this, &link](std::exception_ptr fault) {
+        if (!fault || stopping_) return;
+        say_fault(fault, link);
+        keep_receiving(link);
+      });
+}
+void MavlinkServer::keep_ticking(Link& link) {
+  asio::co_spawn(
+      io_, [this, &link] { return tick(link); },
+      [this, &link](std::exception_ptr fault) {
+        if (!fault || stopping_) return;
+        say_fault(fault, link);
+        keep_ticking(link);
+      });
+}
+
+/// Accepts answers of the dialled peer, and unsolicited packets only from addresses that the configuration permits.
+bool MavlinkServer::is_allowed(const Link& link, const asio::ip::address& from) const {
+  if (link.config.dials) return from == address_of(link.config.at.ip);
+  return is_admitted(config_.poses.allow_from, from);
+}
+
+asio::awaitable<void> MavlinkServer::receive(Link& link) {
+  std::vector<std::byte> buffer(65536);
+  while (!stopping_) {
+    error_code ec;
+    udp::endpoint from;
+    const std::size_t n = co_await link.socket.async_receive_from(asio::buffer(buffer), from, into(ec));
+    if (stopping_) co_return;
+    if (ec) continue;  // an ICMP answer: the port is not open yet
+    on_datagram(link, mavlink::BytesView(buffer).first(n), from);
+  }
+}
+
+void MavlinkServer::on_datagram(Link& link, mavlink::BytesView bytes, const udp::endpoint& from) {
+  const std::string sender = "mavlink udp " + text_of(from);
+  if (!is_allowed(link, from.address())) {
+    const char* const why = link.config.dials ? "address is not the one that was dialled" : "address is not in poses.allow_from";
+    return intake_.refuse(why, {sender, sender});
+  }
+  const mavlink::Reaction reaction = link.poses.on_datagram(bytes, wire_time());
+  if (reaction.from_vehicle && !link.config.dials) link.peer = from;
+  act_on(link, reaction, sender);
+}
+
+asio::awaitable<void> MavlinkServer::tick(Link& link) {
+  while (!stopping_) {
+    act_on(link, link.poses.on_tick(wire_time()), link.name);
+    error_code ec;
+    link.timer.expires_after(tick_period);
+    co_await link.timer.async_wait(into(ec));
+  }
+}
+
+void MavlinkServer::act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from) {
+  for (const std::string& why : reaction.refusals) intake_.refuse(why, {from, from});
+  for (const mavlink::SourcedPose& pose : reaction.poses) {
+    const std::string source = link.name + " " + pose.source;  // a router may send from any port: the link is the sender
+    intake_.take(pose.sample, {source, source});
+  }
+  for (const std::string& notice : reaction.notices) say_at_times(log_, link.notices, LogLevel::info, link.name + ": " + notice);
+  error_code ignored;
+  if (link.peer)
+    for (const mavlink::Bytes& reply : reaction.replies) link.socket.send_to(asio::buffer(reply), *link.peer, 0, ignored);
+}
+
+}  // namespace sonar

@@ -1,0 +1,63 @@
+// The sockets of poses by MAVLink: one a link, listening (udpin) or dialling (udpout), each with a MavlinkPoses behind it.
+// Owned by App, beside PoseServer; what comes goes into the same PoseIntake.
+#pragma once
+
+#include <list>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/config/config.hpp"
+#include "daemon/server/poses/pose_intake.hpp"
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/log.hpp"
+#include "protocol/mavlink/mavlink_poses.hpp"
+
+namespace sonar {
+
+class MavlinkServer {
+ public:
+  /// Links and origin are those of `config` as it is now; who may send follows it.
+  MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log);
+
+  Result<void> open();
+  void start();
+  void stop();
+
+  /// "udpin:127.0.0.1:14551", with the port the system chose for 0.
+  std::vector<std::string> endpoints() const;
+  /// Of the links that bring no poses: what is missing.
+  std::vector<control::Note> notes() const;
+  /// Of a listening link, in the order of the configuration.
+  Endpoint listens_at(std::size_t link) const;
+
+ private:
+  struct Link {
+    MavlinkConfig config;
+    mavlink::MavlinkPoses poses;
+    udp::socket socket;
+    asio::steady_timer timer;
+    std::optional<udp::endpoint> peer;  // whom we answer
+    std::string name;                   // "mavlink udpin:127.0.0.1:14551"
+    LogLimiter notices = {};
+  };
+
+  void keep_receiving(Link& link);
+  void keep_ticking(Link& link);
+  asio::awaitable<void> receive(Link& link);
+  asio::awaitable<void> tick(Link& link);
+  void on_datagram(Link& link, mavlink::BytesView bytes, const udp::endpoint& from);
+  void act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from);
+  bool is_allowed(const Link& link, const asio::ip::address& from) const;
+  void say_fault(const std::exception_ptr& fault, const Link& link);
+
+  asio::io_context& io_;
+  const Config& config_;
+  PoseIntake& intake_;
+  Log& log_;
+  LogLimiter faults_;
+  std::list<Link> links_;
+  bool stopping_ = false;
+};
+
+}  // namespace sonar

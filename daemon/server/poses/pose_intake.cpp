@@ -1,0 +1,39 @@
+#include "daemon/server/poses/pose_intake.hpp"
+
+namespace sonar {
+namespace {
+constexpr auto wall_tolerance = std::chrono::milliseconds(1);
+}
+
+void PoseIntake::say_refusal(const std::string& why, const Sender& sender) {
+  say_at_times(log_, refusals_, LogLevel::warning, "pose refused: " + why, {{"from", sender.id}});
+}
+
+void PoseIntake::refuse(const std::string& why, const Sender& sender) {
+  world_.count_refused();
+  say_refusal(why, sender);
+}
+
+/// WALL stamps are of the clocks as they are now, also when ours has been set since the start; the World has a time of its
+/// own that never jumps. A shift is kept while it is right to a millisecond, so that equal stamps stay equal.
+void PoseIntake::map_wall(control::Stamp& stamp) {
+  if (stamp.domain != control::ClockDomain::wall || clock_.stepped()) return;
+  const auto shift = clock_.ahead_of_wall();
+  if (std::chrono::abs(shift - wall_shift_) > wall_tolerance) wall_shift_ = shift;
+  stamp.ns += wall_shift_.count();
+}
+
+std::string PoseIntake::take(control::PoseSample sample, const Sender& sender) {
+  map_wall(sample.stamp);
+  const PoseOutcome outcome = world_.accept(sample, sender, clock_.now());
+  if (!outcome.refusal.empty() && outcome.verdict != PoseVerdict::late) say_refusal(outcome.refusal, sender);
+  if (!outcome.notice.empty() && events_ != nullptr && events_->heard())
+    events_->tell({control::PoseEvent{outcome.body, false, outcome.notice}});
+  if (!outcome.notice.empty()) say_at_times(log_, notices_, LogLevel::info, outcome.notice);
+  if (plausibility_ != nullptr && outcome.verdict == PoseVerdict::accepted && sample.of == control::PoseSample::Of::vehicle)
+    for (const Note& note : plausibility_->use(sample)) log_.warning(text_of(note), {{"from", sender.id}});
+  on_pose_();
+  return outcome.refusal;
+}
+
+}  // namespace sonar

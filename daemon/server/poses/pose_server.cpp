@@ -1,0 +1,239 @@
+#include "daemon/server/poses/pose_server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "daemon/server/system/listen.hpp"
+#include "protocol/control/control.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::size_t most_connections = 32;
+constexpr std::size_t most_lines_of_a_datagram = 64;
+constexpr std::size_t work_of_a_turn = 4096;  // bytes; then others have theirs
+constexpr std::size_t least_work = 64;        // bytes that cost as much as a read, or a line, does beside its own
+constexpr int most_not_json = 8;              // lines in a row that begin as JSON objects and are none
+constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
+
+Sender sender_of(bool json, const char* transport, const asio::ip::address& ip, std::uint16_t port) {
+  const std::string encoding = json ? "json" : "protobuf";
+  const std::string address = ip.to_string();
+  return {encoding + " " + transport + " " + address + ":" + std::to_string(port), encoding + " " + address};
+}
+
+}  // namespace
+
+PoseServer::PoseServer(asio::io_context& io, const PoseConfig& config, const LimitConfig& limits, Admission& admission,
+                       PoseIntake& intake, Log& log)
+    : io_(io),
+      config_(config),
+      limits_(limits),
+      admission_(admission),
+      intake_(intake),
+      log_(log),
+      connections_(most_connections),
+      together_(limits.pose_bytes_per_s) {}
+
+Result<Endpoint> PoseServer::open(Listener& listener, Endpoint at) {
+  if (listener.encoding == Encoding::json) {
+    if (auto r = listen_tcp(listener.acceptor, at); !r) return tl::make_unexpected(r.error());
+    at.port = listener.acceptor.local_endpoint().port();  // for port 0: the same number for both
+  }
+  if (auto r = bind_udp(listener.datagrams, at, false); !r) return tl::make_unexpected(r.error());
+  at.port = listener.datagrams.local_endpoint().port();
+  return at;
+}
+
+Result<void> PoseServer::open() {
+  const auto add = [this](Encoding encoding, const PoseListener& wanted, Endpoint& out) -> Result<void> {
+    if (!wanted.enabled) return {};
+    listeners_.push_back(Listener{encoding, udp::socket(io_), tcp::acceptor(io_)});
+    const auto at = open(listeners_.back(), wanted.at);
+    if (!at) {
+      const std::string key = encoding == Encoding::json ? "poses.json" : "poses.protobuf";
+      return failure(at.error().kind, at.error().text + "; " + key + " in the configuration takes another address, or off");
+    }
+    out = *at;
+    return {};
+  };
+  if (auto r = add(Encoding::protobuf, config_.protobuf, protobuf_at_); !r) return r;
+  return add(Encoding::json, config_.json, json_at_);
+}
+
+void PoseServer::start() {
+  for (Listener& l : listeners_) {
+    keep_receiving(l);
+    if (l.encoding == Encoding::json) keep_accepting(l);
+  }
+}
+
+void PoseServer::say_fault(const std::exception_ptr& fault, const std::string& at) {
+  sonar::say_fault(log_, faults_, text_of(fault), {"at", at});
+}
+
+/// A listener outlives whatever one message does to us.
+void PoseServer::keep_receiving(Listener& listener) {
+  asio::co_spawn(
+      io_, [this, &listener] { return receive(listener); },
+      [this, &listener](std::exception_ptr fault) {
+        if (!fault || stopping_) return;
+        say_fault(fault, "pose datagrams");
+        keep_receiving(listener);
+      });
+}
+void PoseServer::keep_accepting(Listener& listener) {
+  asio::co_spawn(
+      io_, [this, &listener] { return accept(listener); },
+      [this, &listener](std::exception_ptr fault) {
+        if (!fault || stopping_) return;
+        say_fault(fault, "pose connections");
+        keep_accepting(listener);
+      });
+}
+
+void PoseServer::stop() {
+  stopping_ = true;
+  error_code ec;
+  for (Listener& l : listeners_) {
+    l.datagrams.close(ec);
+    l.acceptor.close(ec);
+  }
+  connections_.close_all();
+}
+
+// ---- what arrives
+
+PoseServer::Heard PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
+  if (line.too_long) {
+    intake_.refuse("line is longer than 4096 bytes", sender);
+    return Heard::no_json;
+  }
+  const auto sample = control::parse_json_pose(line.text);
+  if (sample) return intake_.take(*sample, sender).empty() ? Heard::pose : Heard::object;
+  intake_.refuse(sample.error().text, sender);
+  return control::is_json_object(line.text) ? Heard::object : Heard::no_json;
+}
+
+void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from) {
+  const Sender sender = sender_of(encoding == Encoding::json, "udp", from.address(), from.port());
+  if (encoding == Encoding::json) {  // a datagram holds whole lines; the last may lack its newline
+    control::LineParser lines;
+    lines.feed(bytes);
+    lines.feed(std::array{std::byte{'\n'}});
+    for (std::size_t taken = 0; const auto line = lines.next(); ++taken) {
+      if (taken == most_lines_of_a_datagram) return intake_.refuse("a datagram has at most 64 lines; the rest is lost", sender);
+      on_line(*line, sender);
+    }
+    return;
+  }
+  if (const auto sample = control::decode_pose_datagram(bytes))
+    intake_.take(*sample, sender);
+  else
+    intake_.refuse(sample.error().text, sender);
+}
+
+asio::awaitable<void> PoseServer::receive(Listener& listener) {
+  std::vector<std::byte> buffer(65536);
+  while (!stopping_) {
+    error_code ec;
+    udp::endpoint from;
+    const std::size_t n = co_await listener.datagrams.async_receive_from(asio::buffer(buffer), from, into(ec));
+    if (stopping_) co_return;
+    if (ec) continue;  // an ICMP answer to nothing we sent
+    if (!is_admitted(config_.allow_from, from.address())) {
+      intake_.refuse("address is not in poses.allow_from", sender_of(false, "udp", from.address(), from.port()));
+      continue;
+    }
+    on_datagram(listener.encoding, std::span(buffer).first(n), from);
+  }
+}
+
+// ---- JSON lines by TCP
+
+asio::awaitable<void> PoseServer::accept(Listener& listener) {
+  while (auto socket = co_await admission_.next_visitor(listener.acceptor, Admission::Purpose::client)) {
+    if (stopping_) co_return;
+    admit(*std::move(socket));
+  }
+}
+
+void PoseServer::admit(tcp::socket socket) {
+  error_code ec;
+  const auto peer = socket.remote_endpoint(ec);
+  if (ec) return;  // gone already
+  const Sender sender = sender_of(true, "tcp", peer.address(), peer.port());
+  if (!is_admitted(config_.allow_from, peer.address()))
+    return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
+  const bool room = connections_.make_room([this](const Connection& evicted) {
+    say_at_times(log_, notices_, LogLevel::info,
+                 "pose connection closed: without a pose, or beyond the limits, for longest, and its place was needed",
+                 {{"from", evicted.sender.id}});
+  });
+  if (!room) return intake_.refuse(std::to_string(most_connections) + " connections are open and busy already", sender);
+  end_when_silent(socket, limits_.dead_peer);
+  auto connection = std::make_shared<Connection>(std::move(socket), sender, limits_.input_bytes_per_s,
+                                                 together_.join(limits_.pose_bytes_per_s));
+  connections_.add(connection);
+  asio::co_spawn(
+      io_, [this, connection] { return read_lines(connection); },
+      [this, connection](std::exception_ptr fault) {
+        if (fault) say_fault(fault, connection->sender.id);
+        connection->close();
+        connections_.remove(connection);
+      });
+}
+
+asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
+  Connection& c = *connection;
+  std::array<std::byte, work_of_a_turn> buffer;
+  error_code ec;
+  while (true) {
+    const std::size_t n = co_await c.socket.async_read_some(asio::buffer(buffer), into(ec));
+    if (ec || stopping_) co_return;
+    c.lines.feed(std::span(buffer).first(n));
+    Work work{n + least_work};
+    for (Turn turn = Turn::not_over; turn == Turn::not_over; work = {}) {
+      turn = take_turn(c, work);
+      if (turn == Turn::end) co_return;
+      co_await rest(c, work);
+      if (!c.socket.is_open() || stopping_) co_return;
+    }
+  }
+}
+
+/// Some of the lines that have come; what they cost is added.
+PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
+  for (std::size_t taken = 0; taken < work_of_a_turn;) {
+    const auto line = c.lines.next();
+    if (!line && c.lines.may_become_object()) return Turn::over;
+    if (!line) intake_.refuse(no_json, c.sender);
+    const Heard heard = line ? on_line(*line, c.sender) : Heard::no_json;
+    c.not_json = heard == Heard::no_json ? c.not_json + 1 : 0;
+    if (c.not_json == most_not_json || (heard == Heard::no_json && !(line && line->begins_object))) {
+      say_at_times(log_, notices_, LogLevel::warning, std::string("pose connection closed: ") + no_json, {{"from", c.sender.id}});
+      return Turn::end;
+    }
+    taken += line->text.size() + least_work;
+    work.bytes += least_work;
+    work.has_pose |= heard == Heard::pose;
+  }
+  return Turn::not_over;
+}
+
+/// The others' turns; longer when it sends more than limits allow it, or its share of all: the rest waits in the kernel.
+asio::awaitable<void> PoseServer::rest(Connection& c, const Work& work) {
+  const auto now = std::chrono::steady_clock::now();
+  const auto own = c.rate.pause_after(work.bytes, now), of_all = together_.pause_after(c.of_all, work.bytes, now);
+  if (own.count() > 0)
+    say_at_times(log_, notices_, LogLevel::info,
+                 "pose connection is read more slowly: it sends more than limits.input_bytes_per_s", {{"from", c.sender.id}});
+  const auto pause = std::max(own, of_all);
+  if (work.has_pose && pause.count() == 0) c.active_at = now;
+  error_code ec;
+  c.turn.expires_after(pause);
+  co_await c.turn.async_wait(into(ec));
+}
+
+}  // namespace sonar

@@ -1,0 +1,104 @@
+// Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. Owned by App; the control stream is a server of its own
+// (daemon/server/control/). A malformed message costs its sender a counted refusal and, now and then, a log line; a connection
+// that does not speak JSON is closed. What connections send is worked on in turns of bounded work, and no faster than limits
+// allow.
+#pragma once
+
+#include <list>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/server/poses/pose_intake.hpp"
+#include "daemon/server/sonars/admission.hpp"
+#include "daemon/server/sonars/input_rate.hpp"
+#include "daemon/server/sonars/shared_rate.hpp"
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/connection_slots.hpp"
+#include "daemon/server/system/log.hpp"
+#include "protocol/control/json_pose.hpp"
+
+namespace sonar {
+
+class PoseServer {
+ public:
+  /// All of it outlives the server.
+  PoseServer(asio::io_context& io, const PoseConfig& config, const LimitConfig& limits, Admission& admission, PoseIntake& intake,
+             Log& log);
+
+  Result<void> open();
+  void start();
+  void stop();
+
+  /// Where it listens, with the ports the system chose for 0. Port 0 = off.
+  Endpoint protobuf() const { return protobuf_at_; }
+  Endpoint json() const { return json_at_; }
+
+ private:
+  enum class Encoding { protobuf, json };
+  struct Listener {
+    Encoding encoding;
+    udp::socket datagrams;
+    tcp::acceptor acceptor;  // of JSON lines only
+  };
+  /// One TCP sender; closed by stop(), or when its place is needed and it has sent no pose, or too much, for longest.
+  struct Connection {
+    Connection(tcp::socket s, Sender from, std::size_t bytes_per_s, SharedRate::Part part)
+        : socket(std::move(s)),
+          sender(std::move(from)),
+          turn(socket.get_executor()),
+          rate(bytes_per_s),
+          of_all(std::move(part)) {}
+    tcp::socket socket;
+    Sender sender;
+    asio::steady_timer turn;  // until more of what it sent is worked on
+    InputRate rate;
+    SharedRate::Part of_all;
+    control::LineParser lines;
+    int not_json = 0;                                                                    // lines in a row
+    std::chrono::steady_clock::time_point active_at = std::chrono::steady_clock::now();  // a pose, within the limits
+    void close() {
+      error_code ec;
+      socket.close(ec);
+      turn.cancel();
+    }
+  };
+  using ConnectionPointer = std::shared_ptr<Connection>;
+
+  Result<Endpoint> open(Listener& listener, Endpoint at);
+  void keep_receiving(Listener& listener);
+  void keep_accepting(Listener& listener);
+  void say_fault(const std::exception_ptr& fault, const std::string& at);
+  asio::awaitable<void> receive(Listener& listener);
+  asio::awaitable<void> accept(Listener& listener);
+  asio::awaitable<void> read_lines(ConnectionPointer connection);
+  enum class Turn { over, not_over, end };  // no whole line is left; one may be; the connection speaks no JSON
+  struct Work {
+    std::size_t bytes = 0;
+    bool has_pose = false;  // one that counts
+  };
+  Turn take_turn(Connection& connection, Work& work);
+  asio::awaitable<void> rest(Connection& connection, const Work& work);
+  void admit(tcp::socket socket);
+
+  void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);
+  enum class Heard { pose, object, no_json };  // a pose that counts; another JSON object; neither
+  Heard on_line(const control::LineParser::Line& line, const Sender& sender);
+
+  asio::io_context& io_;
+  const PoseConfig& config_;
+  const LimitConfig& limits_;
+  Admission& admission_;
+  PoseIntake& intake_;
+  Log& log_;
+  LogLimiter notices_, faults_;
+  std::list<Listener> listeners_;
+  ConnectionSlots<Connection> connections_;
+  SharedRate together_;  // of all connections
+  Endpoint protobuf_at_, json_at_;
+  bool stopping_ = false;
+};
+
+}  // namespace sonar

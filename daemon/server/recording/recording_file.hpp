@@ -1,0 +1,74 @@
+// One file of a recording inside the daemon: what a sonar sends, and in MCAP also pictures, true poses and what each beam meets.
+// Made and written on the recording thread (recordings.hpp); knows no queue, no clock and no log.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/sonar/ping.hpp"
+#include "protocol/recording/mcap/mcap_session.hpp"
+#include "protocol/recording/pcap/pcap.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+using recording::mcap::SceneNames;
+
+/// A ping on its way into files. What is large is shared with the clients that it was sent to.
+struct RecordedPing {
+  Time at{};  // when it was made
+  std::shared_ptr<const Ping> ping;
+  std::shared_ptr<const protocol::Bytes> bytes;  // the vendor's, as clients get them
+  protocol::Bytes status;                        // what the sonar announced of itself then; empty = nothing
+  std::shared_ptr<const SceneNames> names;       // of the scene that it was made in
+
+  /// That it keeps in memory while it waits.
+  std::size_t size() const;
+};
+
+/// A sonar as recordings name it.
+struct RecordedSonar {
+  std::string name, vendor;
+  recording::PcapConversation ends;  // for the headers of a capture
+};
+
+class RecordingFile {
+ public:
+  enum class Kind { mcap, pcap, oculus_log, raw_dump };
+
+  /// Of a name in the folder: letters, digits, - _ and . that does not begin it, at most 128, ending in .mcap, .pcap, .oculus or
+  /// .raw. A sentence where it is none; all but .mcap are of the Oculus family only.
+  static Result<Kind> kind_of(std::string_view name, std::string_view vendor);
+  /// io; a file that is there already is not touched.
+  static Result<std::unique_ptr<RecordingFile>> create(const std::filesystem::path& file, Kind kind, const RecordedSonar& sonar);
+
+  RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, const RecordedSonar& sonar);
+
+  /// A status message goes before it when the last one is a second old. After an error (io) only close() makes sense.
+  Result<void> write(const RecordedPing& ping);
+  /// Finishes the file, after an error too, as far as that goes. io.
+  Result<void> close() { return writer_->close(); }
+
+  struct Figures {
+    std::uint64_t pings = 0, messages = 0, bytes = 0;  // messages of the sonar; bytes of the file so far
+  };
+  Figures figures() const { return {pings_, messages_, *bytes_}; }
+
+ private:
+  Result<void> put(recording::RecordedMessage message);
+  Result<void> put_truth(const RecordedPing& ping);
+
+  Kind kind_;
+  std::string vendor_;
+  std::shared_ptr<std::uint64_t> bytes_ = std::make_shared<std::uint64_t>(0);
+  std::unique_ptr<recording::RecordingWriter> writer_;
+  recording::McapSession* mcap_ = nullptr;  // the writer, when it is one
+  std::optional<Time> status_at_;
+  std::uint64_t pings_ = 0, messages_ = 0;
+};
+
+}  // namespace sonar

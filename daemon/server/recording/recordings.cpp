@@ -1,0 +1,245 @@
+#include "daemon/server/recording/recordings.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <utility>
+
+namespace sonar {
+namespace {
+
+std::vector<LogField> fields_of(const control::RecordingStatus& told) {
+  return {{"sonar", told.sonar}, {"file", told.file}, {"pings", told.pings}, {"bytes", told.bytes}};
+}
+
+}  // namespace
+
+Recordings::Recordings(asio::io_context& io, const Config& config, Log& log, int nice_by, std::function<void()> on_change,
+                       std::size_t most_waiting_bytes)
+    : io_(io), config_(config), log_(log), on_change_(std::move(on_change)), most_waiting_bytes_(most_waiting_bytes) {
+  asio::post(thread_, [nice_by] {
+    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // costs only smoothness
+  });
+}
+
+Recordings::~Recordings() { thread_.join(); }
+
+/// `job` on the thread, `after` takes here what came of it and how far the file is. The loop lives until then.
+template <class Job, class After>
+void Recordings::on_thread(const std::shared_ptr<Work>& work, Job job, After after) {
+  ++under_way_;
+  auto guard = asio::make_work_guard(io_);
+  asio::post(thread_, [this, guard = std::move(guard), work, job = std::move(job), after = std::move(after)]() mutable {
+    Outcome outcome;
+    try {
+      outcome.result = job(*work);
+    } catch (const std::bad_alloc&) {
+      outcome.result = failure(ErrorKind::unavailable, "not enough memory to record");
+    } catch (const std::exception& e) {
+      outcome.result = failure(ErrorKind::bug, std::string("writing it failed: ").append(e.what()));
+    }
+    work->failed |= !outcome.result;
+    if (work->file) outcome.figures = work->file->figures();
+    asio::post(io_, [this, outcome = std::move(outcome), after = std::move(after)]() mutable {
+      --under_way_;
+      after(outcome);
+    });
+  });
+}
+
+std::size_t Recordings::running() const {
+  return static_cast<std::size_t>(std::count_if(recordings_.begin(), recordings_.end(),
+                                                [](const Pointer& r) { return r->state != Recording::State::ended; }));
+}
+
+// ---- asked for by control
+
+void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar, const std::string& who, Done done) {
+  const auto begun = begin(asked, sonar);
+  if (!begun) return done(tl::make_unexpected(begun.error()));
+  const Pointer recording = *begun;
+  on_thread(
+      recording->work,
+      [file = std::filesystem::path(recording->told.file), kind = recording->kind,
+       sonar = std::move(sonar)](Work& work) -> Result<void> {
+        auto made = RecordingFile::create(file, kind, sonar);
+        if (!made) return tl::make_unexpected(made.error());
+        work.file = std::move(*made);
+        return {};
+      },
+      [this, recording, who, done = std::move(done)](const Outcome& outcome) {
+        if (!outcome.result) {
+          recordings_.remove(recording);
+        } else {
+          recording->state = Recording::State::running;
+          log_.info("recording begun", {{"sonar", recording->told.sonar}, {"file", recording->told.file}, {"client", who}});
+          if (finishing_) return end(recording, "sonard stops");
+        }
+        if (!finishing_) done(outcome.result);
+        if (outcome.result && !recording->ends_with.empty()) end(recording, recording->ends_with);
+        on_change_();
+      });
+}
+
+Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& asked, const RecordedSonar& sonar) {
+  if (config_.recording.folder.empty())
+    return failure(ErrorKind::usage,
+                   "sonard may not write recordings: the configuration says where, recording: {folder: DIR} (docs/recording.md)");
+  const auto kind = RecordingFile::kind_of(asked.file, sonar.vendor);
+  if (!kind) return tl::make_unexpected(kind.error());
+  if (running() >= most_at_once)
+    return failure(ErrorKind::unavailable, std::to_string(most_at_once) + " recordings are under way already: stop one");
+  forget_the_oldest();
+  auto recording = std::make_shared<Recording>();
+  recording->name = asked.file;
+  recording->kind = *kind;
+  recording->told.sonar = sonar.name;
+  recording->told.file = (config_.recording.folder / asked.file).string();
+  recording->told.running = true;
+  recordings_.push_back(recording);
+  return recording;
+}
+
+void Recordings::forget_the_oldest() {
+  while (recordings_.size() >= most_remembered) {
+    const auto ended = [](const Pointer& r) { return r->state == Recording::State::ended; };
+    recordings_.erase(std::find_if(recordings_.begin(), recordings_.end(), ended));  // there is one: few run at once
+  }
+}
+
+void Recordings::stop(const control::StopRecording& asked, Done done) {
+  std::vector<Pointer> meant;
+  for (const Pointer& r : recordings_)
+    if (r->state != Recording::State::ended && (asked.file.empty() || asked.file == r->name)) meant.push_back(r);
+  if (meant.empty())
+    return done(failure(ErrorKind::usage, asked.file.empty() ? std::string("nothing is being recorded")
+                                                             : "no recording is called \"" + asked.file.substr(0, 128) + "\""));
+  if (std::any_of(meant.begin(), meant.end(), [](const Pointer& r) { return r->state == Recording::State::opening; }))
+    return done(failure(ErrorKind::unavailable, "the recording is just being begun: stop it when its start was answered"));
+  struct All {
+    std::size_t left = 0;
+    Result<void> first_error;
+  };
+  const auto all = std::make_shared<All>();
+  all->left = meant.size();
+  for (const Pointer& r : meant) {
+    r->at_end.emplace_back([all, done](const Result<void>& outcome) {
+      if (!outcome && all->first_error) all->first_error = outcome;
+      if (--all->left == 0) done(all->first_error);
+    });
+    end(r, "asked to stop");
+  }
+}
+
+void Recordings::end_of(const std::string& sonar, const std::string& why) {
+  for (const Pointer& r : recordings_) {
+    if (r->told.sonar != sonar) continue;
+    if (r->state == Recording::State::opening) r->ends_with = why;
+    end(r, why);
+  }
+}
+
+void Recordings::finish() {
+  finishing_ = true;
+  for (const Pointer& r : recordings_) {
+    r->at_end.clear();
+    end(r, "sonard stops");
+  }
+}
+
+// ---- pings
+
+bool Recordings::takes(const std::string& sonar) const {
+  return std::any_of(recordings_.begin(), recordings_.end(),
+                     [&](const Pointer& r) { return r->state == Recording::State::running && r->told.sonar == sonar; });
+}
+
+bool Recordings::wants_truth(const std::string& sonar) const {
+  return std::any_of(recordings_.begin(), recordings_.end(), [&](const Pointer& r) {
+    return r->state == Recording::State::running && r->told.sonar == sonar && r->kind == RecordingFile::Kind::mcap;
+  });
+}
+
+void Recordings::use_scene(const Scene& scene) {
+  auto names = std::make_shared<SceneNames>();
+  for (const Object& object : scene.objects) names->objects.push_back(object.name);
+  names->bodies = scene.body_names;
+  names_ = std::move(names);
+}
+
+void Recordings::take(const std::string& sonar, RecordedPing ping) {
+  for (const Pointer& r : recordings_)
+    if (r->state == Recording::State::running && r->told.sonar == sonar) write(r, ping);
+}
+
+bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
+  const auto is_running = [](const Pointer& r) { return r->state == Recording::State::running; };
+  std::size_t waiting = 0;
+  Pointer most = recording;
+  for (const Pointer& r : recordings_) {
+    waiting += r->waiting_bytes;  // of one that ends, too: it is still in memory
+    if (is_running(r) && r->waiting_bytes > most->waiting_bytes) most = r;
+  }
+  if (waiting > 0 && waiting + bytes > most_waiting_bytes_)
+    fail(most,
+         "its file is written too slowly: " + std::to_string(most->waiting_bytes / 1000000) + " MB of pings wait for the disk");
+  return is_running(recording);
+}
+
+void Recordings::write(const Pointer& recording, RecordedPing ping) {
+  const std::size_t size = ping.size();
+  if (!has_room_for(recording, size)) return;
+  recording->waiting_bytes += size;
+  on_thread(
+      recording->work, [ping = std::move(ping)](Work& work) { return work.failed ? Result<void>{} : work.file->write(ping); },
+      [this, recording, size](const Outcome& outcome) {
+        recording->waiting_bytes -= size;
+        recording->told.pings = outcome.figures.pings;
+        recording->told.messages = outcome.figures.messages;
+        recording->told.bytes = outcome.figures.bytes;
+        if (!outcome.result) fail(recording, outcome.result.error().text);
+      });
+}
+
+// ---- the end
+
+void Recordings::fail(const Pointer& recording, const std::string& why) {
+  if (recording->state != Recording::State::running && !(recording->state == Recording::State::ending && !recording->failed))
+    return;
+  recording->failed = true;
+  recording->told.why = why;
+  log_.error("recording stopped: " + why, fields_of(recording->told));
+  end(recording, why);
+}
+
+/// What waits is written before the file is closed.
+void Recordings::end(const Pointer& recording, const std::string& why) {
+  if (recording->state != Recording::State::running) return;
+  recording->state = Recording::State::ending;
+  recording->told.running = false;
+  recording->told.why = why;
+  on_thread(
+      recording->work, [](Work& work) { return work.file->close(); },
+      [this, recording](const Outcome& outcome) { ended(recording, outcome); });
+}
+
+void Recordings::ended(const Pointer& recording, const Outcome& outcome) {
+  if (!outcome.result) fail(recording, outcome.result.error().text);
+  recording->state = Recording::State::ended;
+  recording->told.bytes = outcome.figures.bytes;
+  if (!recording->failed) log_.info("recording ended: " + recording->told.why, fields_of(recording->told));
+  const Result<void> told =
+      recording->failed ? failure(ErrorKind::io, "the recording stopped before: " + recording->told.why) : Result<void>{};
+  for (const Done& done : std::exchange(recording->at_end, {})) done(told);
+  on_change_();
+}
+
+std::vector<control::RecordingStatus> Recordings::status() const {
+  std::vector<control::RecordingStatus> all;
+  for (const Pointer& r : recordings_) all.push_back(r->told);
+  return all;
+}
+
+}  // namespace sonar

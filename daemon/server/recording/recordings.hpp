@@ -1,0 +1,109 @@
+// Recordings inside the daemon: control starts and stops them, devices hand over the pings they send, a thread of its own writes.
+// Owned by App; everything here is called on the I/O thread.
+//
+// Pinging never waits for a file: pings wait in memory up to a bound, and beyond it, or when a file fails, the recording ends
+// with one line in the log. What was written stays readable.
+#pragma once
+
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/scene/scene.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/server/recording/recording_file.hpp"
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/log.hpp"
+#include "protocol/control/operations.hpp"
+
+namespace sonar {
+
+class Recordings {
+ public:
+  static constexpr std::size_t most_at_once = 4, most_remembered = 8;
+  static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // of all recordings together
+  /// Called once, when it was begun or has ended, before this returns or later; never after finish().
+  using Done = std::function<void(const Result<void>&)>;
+
+  /// `nice_by` is added to the niceness of the thread; `on_change` is called when a recording has ended.
+  Recordings(asio::io_context& io, const Config& config, Log& log, int nice_by, std::function<void()> on_change,
+             std::size_t most_waiting_bytes = default_most_waiting_bytes);
+  /// Waits for what is being written.
+  ~Recordings();
+  Recordings(const Recordings&) = delete;
+  Recordings& operator=(const Recordings&) = delete;
+
+  /// `who` asks, for the log. usage: the name, or that nothing may be recorded; io, unavailable.
+  void start(const control::StartRecording& asked, RecordedSonar sonar, const std::string& who, Done done);
+  /// An empty name = all that there are.
+  void stop(const control::StopRecording& asked, Done done);
+  /// The sonar stops: nothing more will come of it.
+  void end_of(const std::string& sonar, const std::string& why);
+  /// The daemon stops: files are finished, no callback is called.
+  void finish();
+
+  bool takes(const std::string& sonar) const;
+  /// What beams meet is kept in MCAP only.
+  bool wants_truth(const std::string& sonar) const;
+  void take(const std::string& sonar, RecordedPing ping);
+
+  /// Before anything is taken, and whenever another scene is put to use.
+  void use_scene(const Scene& scene);
+  /// Of the scene that pings are made in from now on.
+  const std::shared_ptr<const SceneNames>& names() const { return names_; }
+
+  /// Those that run, and the last that have ended, oldest first.
+  std::vector<control::RecordingStatus> status() const;
+  /// Nothing is open and nothing is being written.
+  bool idle() const { return under_way_ == 0 && running() == 0; }
+
+ private:
+  struct Work {  // the thread's
+    std::unique_ptr<RecordingFile> file;
+    bool failed = false;
+  };
+  struct Recording {
+    enum class State { opening, running, ending, ended } state = State::opening;
+    std::string name;  // in the folder
+    RecordingFile::Kind kind{};
+    control::RecordingStatus told;
+    std::size_t waiting_bytes = 0;
+    bool failed = false;    // and the log says so
+    std::string ends_with;  // the sonar stopped while it was opened: why
+    std::vector<Done> at_end;
+    std::shared_ptr<Work> work = std::make_shared<Work>();
+  };
+  using Pointer = std::shared_ptr<Recording>;
+  struct Outcome {
+    Result<void> result;
+    RecordingFile::Figures figures;
+  };
+
+  template <class Job, class After>
+  void on_thread(const std::shared_ptr<Work>& work, Job job, After after);
+  std::size_t running() const;
+  /// Whether this recording may let so many bytes more wait; the one that lets most wait ends when there is no room.
+  bool has_room_for(const Pointer& recording, std::size_t bytes);
+  Result<Pointer> begin(const control::StartRecording& asked, const RecordedSonar& sonar);
+  void write(const Pointer& recording, RecordedPing ping);
+  void end(const Pointer& recording, const std::string& why);
+  void fail(const Pointer& recording, const std::string& why);
+  void ended(const Pointer& recording, const Outcome& outcome);
+  void forget_the_oldest();
+
+  asio::io_context& io_;
+  const Config& config_;
+  Log& log_;
+  std::function<void()> on_change_;
+  std::size_t most_waiting_bytes_;
+  std::list<Pointer> recordings_;
+  std::shared_ptr<const SceneNames> names_ = std::make_shared<const SceneNames>();
+  std::size_t under_way_ = 0;  // jobs of the thread
+  bool finishing_ = false;
+  asio::thread_pool thread_{1};
+};
+
+}  // namespace sonar

@@ -1,0 +1,91 @@
+#include "daemon/server/scene_changes.hpp"
+
+#include <unistd.h>
+
+#include <exception>
+#include <new>
+#include <utility>
+
+namespace sonar {
+
+SceneChanges::SceneChanges(asio::io_context& io, Simulator& simulator, ScenePointer scene, EngineFactory make_engine, int nice_by,
+                           InUse in_use, std::function<void()> on_change)
+    : io_(io),
+      simulator_(simulator),
+      scene_(std::move(scene)),
+      make_engine_(std::move(make_engine)),
+      in_use_(std::move(in_use)),
+      on_change_(std::move(on_change)) {
+  asio::post(thread_, [nice_by] {
+    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // costs only smoothness
+  });
+}
+
+SceneChanges::~SceneChanges() { thread_.join(); }
+
+void SceneChanges::stop() {
+  stopped_ = true;
+  waiting_.clear();
+}
+
+std::chrono::steady_clock::duration SceneChanges::building_for() const {
+  return building_ ? std::chrono::steady_clock::now() - building_since_ : std::chrono::steady_clock::duration{};
+}
+
+void SceneChanges::submit(Change change) {
+  if (stopped_) return;
+  if (!change.make && !busy()) return change.done({});
+  waiting_.push_back(std::move(change));
+  if (!under_way_) begin();
+}
+
+void SceneChanges::begin() {
+  under_way_ = true;
+  if (!waiting_.front().make) return finish(Built{scene_, nullptr});
+  building_ = true;
+  building_since_ = std::chrono::steady_clock::now();
+  // Without `done`: what that holds (a connection, say) must not end on another thread.
+  asio::post(thread_, [this, make = waiting_.front().make, now = scene_] {
+    auto built = std::make_shared<Result<Built>>(build(make, now));
+    asio::post(io_, [this, built] { finish(std::move(*built)); });
+  });
+}
+
+Result<SceneChanges::Built> SceneChanges::build(const Make& make, const ScenePointer& now) const {
+  try {
+    auto scene = make(now);
+    if (!scene) return tl::make_unexpected(scene.error());
+    if (*scene == now || is_same(**scene, *now)) return Built{*scene, nullptr};
+    auto engine = start_engine(make_engine_, *scene);
+    if (!engine) return tl::make_unexpected(engine.error());
+    return Built{*std::move(scene), std::make_shared<std::unique_ptr<PingEngine>>(*std::move(engine))};
+  } catch (const std::bad_alloc&) {
+    return failure(ErrorKind::unavailable, "not enough memory for the changed scene; use a smaller one or free some");
+  } catch (const std::exception& e) {
+    return failure(ErrorKind::bug, std::string(e.what()) + " (this is a bug, please report it)");
+  }
+}
+
+void SceneChanges::finish(Result<Built> built) {
+  building_ = false;
+  if (stopped_) return;
+  if (built && built->engine) {
+    scene_ = built->scene;
+    simulator_.use(std::move(*built->engine), [this](std::shared_ptr<PingEngine> before) {
+      // Its cells are a hundred megabytes: they are freed on this thread, not on the I/O thread.
+      if (!stopped_) asio::post(thread_, [before = std::move(before)]() mutable { before.reset(); });
+    });
+    in_use_(scene_);
+  }
+  const auto done = std::move(waiting_.front().done);
+  waiting_.pop_front();
+  if (built)
+    done({});
+  else
+    done(tl::make_unexpected(built.error()));
+  under_way_ = false;
+  if (!stopped_ && !waiting_.empty()) begin();
+  on_change_();
+}
+
+}  // namespace sonar

@@ -1,0 +1,76 @@
+// Loads and changes the scene while pings go on: one change after the other, made and built into an engine on a thread of its
+// own, then put to use in one moment. Owned by App; everything here is called on the I/O thread, but for Change::make.
+//
+// Pings are made with the old scene until the new one is ready. Then the simulator gets the new engine and the world the new
+// moving bodies before anything else happens, so that a request's bodies are always those of the scene it meets. In stepped
+// time that moment lies before the next step, which waits for it.
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <functional>
+#include <memory>
+
+#include "daemon/emulator/world/edit_scene.hpp"
+#include "daemon/server/engine/simulator.hpp"
+#include "daemon/server/engine/start_engine.hpp"
+#include "daemon/server/system/asio.hpp"
+
+namespace sonar {
+
+class SceneChanges {
+ public:
+  /// On the thread of its own: the scene there shall be; the one there is, when it stays.
+  using Make = std::function<Result<ScenePointer>(const ScenePointer& now)>;
+  struct Change {
+    Make make;  // empty: nothing is to be made, it only waits for those before
+    /// On the I/O thread, when the new scene is in use, or nothing was changed. Never after stop().
+    std::function<void(const Result<void>& outcome)> done;
+  };
+  /// A new scene is in use: told before its Change is done.
+  using InUse = std::function<void(const ScenePointer& scene)>;
+  static constexpr std::size_t most_waiting = 64;
+
+  /// `nice_by` is added to the niceness of the thread; `on_change` is called when a Change is done.
+  SceneChanges(asio::io_context& io, Simulator& simulator, ScenePointer scene, EngineFactory make_engine, int nice_by,
+               InUse in_use, std::function<void()> on_change);
+  /// Waits for the engine being built.
+  ~SceneChanges();
+  SceneChanges(const SceneChanges&) = delete;
+  SceneChanges& operator=(const SceneChanges&) = delete;
+
+  /// Done before this returns when nothing is to be made and nothing waits.
+  void submit(Change change);
+  bool busy() const { return under_way_ || !waiting_.empty(); }
+  bool is_full() const { return waiting_.size() >= most_waiting; }
+  /// The thread is at work, perhaps for a Change that is not needed any more: the destructor would wait for it.
+  bool is_building() const { return building_; }
+  /// How long it has been at the change that is under way; 0 = none is.
+  std::chrono::steady_clock::duration building_for() const;
+  void stop();
+
+  const ScenePointer& scene() const { return scene_; }
+
+ private:
+  struct Built {
+    ScenePointer scene;
+    std::shared_ptr<std::unique_ptr<PingEngine>> engine;  // empty: the scene stays
+  };
+  void begin();
+  Result<Built> build(const Make& make, const ScenePointer& now) const;
+  void finish(Result<Built> built);
+
+  asio::io_context& io_;
+  Simulator& simulator_;
+  ScenePointer scene_;
+  EngineFactory make_engine_;
+  InUse in_use_;
+  std::function<void()> on_change_;
+  std::deque<Change> waiting_;  // the first is under way
+  bool under_way_ = false;      // until its `done` has returned, which may submit another
+  bool stopped_ = false, building_ = false;
+  std::chrono::steady_clock::time_point building_since_{};
+  asio::thread_pool thread_{1};
+};
+
+}  // namespace sonar

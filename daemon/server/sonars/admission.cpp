@@ -1,0 +1,117 @@
+#include "daemon/server/sonars/admission.hpp"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+
+namespace sonar {
+namespace {
+
+constexpr auto accept_pause = std::chrono::milliseconds(100);  // after an accept that failed
+constexpr auto spell = std::chrono::seconds(60);               // without a refusal: the next one is news again
+
+int open_reserve() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
+
+void close_politely(int descriptor) {
+  std::array<char, 4096> dustbin;
+  for (int reads = 0; reads < 16 && ::recv(descriptor, dustbin.data(), dustbin.size(), MSG_DONTWAIT) > 0; ++reads) {
+  }
+  ::shutdown(descriptor, SHUT_WR);
+}
+
+/// The first number that is not for them; the kernel hands out the lowest free one.
+std::uint64_t first_spare(const LimitConfig& limits, Admission::Purpose purpose) {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return ~std::uint64_t{0};
+  const auto most = static_cast<std::uint64_t>(limit.rlim_cur);
+  const auto spare = std::min(static_cast<std::uint64_t>(limits.spare_descriptors), most / 2);
+  return most - (purpose == Admission::Purpose::control ? spare / 2 : spare);
+}
+
+}  // namespace
+
+void raise_descriptor_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == limit.rlim_max) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);  // refused: then there are fewer, and clients are turned away sooner
+}
+
+void close_politely(tcp::socket& socket) {
+  close_politely(socket.native_handle());
+  error_code ec;
+  socket.close(ec);
+}
+
+Admission::Admission(const LimitConfig& limits, Log& log) : limits_(limits), log_(log), reserve_(open_reserve()) {}
+
+Admission::~Admission() {
+  if (reserve_ >= 0) ::close(reserve_);
+}
+
+void Admission::say(Steady::time_point& last, const char* what) {
+  const auto now = Steady::now();
+  if (last == Steady::time_point{} || now - last > spell) log_.warning(what, {{"connected", *count_}});
+  last = now;
+}
+
+bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
+  // The descriptor's number says how many are in use below it: all.
+  if (static_cast<std::uint64_t>(const_cast<tcp::socket&>(socket).native_handle()) < first_spare(limits_, purpose)) return true;
+  ++for_descriptors_;
+  say(descriptors_said_,
+      "file descriptors run out: clients are turned away until some are free (raise LimitNOFILE or ulimit -n)");
+  return false;
+}
+
+Admission::Place Admission::enter(const tcp::socket& socket) {
+  if (!leaves_spare(socket, Purpose::client)) return {};
+  if (*count_ >= static_cast<std::uint64_t>(limits_.clients)) {
+    ++for_places_;
+    say(places_said_, "all places taken: clients are turned away until one is free (limits.clients)");
+    return {};
+  }
+  ++*count_;
+  return {count_.get(), [count = count_](const void*) { --*count; }};
+}
+
+asio::awaitable<std::optional<tcp::socket>> Admission::accept(tcp::acceptor& acceptor) {
+  while (true) {
+    error_code ec;
+    tcp::socket socket = co_await acceptor.async_accept(into(ec));
+    if (!acceptor.is_open()) co_return std::nullopt;
+    if (!ec) co_return std::move(socket);
+    if (send_away(acceptor, ec)) continue;
+    asio::steady_timer pause(acceptor.get_executor(), accept_pause);
+    co_await pause.async_wait(into(ec));
+  }
+}
+
+asio::awaitable<std::optional<tcp::socket>> Admission::next_visitor(tcp::acceptor& acceptor, Purpose purpose) {
+  while (auto socket = co_await accept(acceptor)) {
+    if (leaves_spare(*socket, purpose)) co_return socket;
+    close_politely(*socket);
+  }
+  co_return std::nullopt;
+}
+
+bool Admission::send_away(tcp::acceptor& acceptor, const error_code& why) {
+  if (why.value() != EMFILE && why.value() != ENFILE) return false;
+  if (reserve_ >= 0) ::close(reserve_);
+  const int visitor = ::accept4(acceptor.native_handle(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (visitor >= 0) {
+    ++for_descriptors_;
+    close_politely(visitor);
+    ::close(visitor);
+  }
+  reserve_ = open_reserve();
+  say(descriptors_said_,
+      "file descriptors have run out: clients are turned away until some are free (raise LimitNOFILE or ulimit -n)");
+  return visitor >= 0;
+}
+
+}  // namespace sonar

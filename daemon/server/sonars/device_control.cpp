@@ -1,0 +1,115 @@
+// A Device as the control protocol sees it: what it says of itself, and what may be asked of it while it runs.
+#include "core/text/ipv4.hpp"
+#include "daemon/server/sonars/device.hpp"
+
+namespace sonar {
+namespace {
+
+double ms(double seconds) { return 1e3 * seconds; }
+
+control::SonarFigures told(const DeviceFigures& f) {
+  control::SonarFigures out;
+  out.pings = f.pings;
+  out.refused = f.refused;
+  out.served = f.served;
+  out.dropped = f.dropped;
+  out.skipped_ticks = f.skipped_ticks;
+  out.clients = f.clients;
+  out.refused_clients = f.refused_clients;
+  out.simulation_ms = f.pings > 0 ? ms(f.simulation_s) / static_cast<double>(f.pings) : 0;
+  out.latency_ms_p50 = ms(f.latency.quantile_s(0.5));
+  out.latency_ms_p99 = ms(f.latency.quantile_s(0.99));
+  out.late_ms_p99 = ms(f.lateness.quantile_s(0.99));
+  return out;
+}
+
+}  // namespace
+
+control::SonarStatus Device::status(Time now) const {
+  const protocol::DeviceState& state = sonar_.state();
+  const PingSettings& settings = sonar_.settings();
+  const FrequencyMode& mode = state.model->modes[static_cast<std::size_t>(settings.mode)];
+  control::SonarStatus s;
+  s.name = config().name;
+  s.profile = state.model->profile;
+  s.listens = text_of(Endpoint{config().bind_ip, data_endpoint().port()});
+  s.advertised = text_of(state.advertise_ip);
+  for (const udp::endpoint& to : status_to_) s.status_to.push_back(to.address().to_string() + ":" + std::to_string(to.port()));
+  s.pinging = sonar_.wants_pings() && settings.rate_hz > 0;
+  s.transmits = sonar_.transmits();
+  s.range_m = settings.range_m;
+  s.rate_hz = static_cast<double>(settings.rate_hz);
+  s.gain_db = static_cast<double>(settings.gain_db);
+  s.frequency_hz = static_cast<double>(mode.centre_hz);
+  s.beams = static_cast<std::uint32_t>(settings.beam_count);
+  s.rows = static_cast<std::uint32_t>(settings.range_bin_count);
+  s.in_world = compose(context_.world.vehicle_at(config().vehicle, now), config().mount);
+  if (observers_at_.port != 0) s.observers = text_of(observers_at_);
+  s.observing = static_cast<std::uint32_t>(sonar_.connections().observers());
+  for (const Connection& c : sonar_.connections().all()) {
+    if (c.role != Role::client || c.state != Connection::State::served) continue;
+    const SessionPointer session = session_of(c.id);
+    const double connected_s = session ? seconds(session->connected_for()) : 0;
+    s.clients.push_back({c.peer.name, c.outbox.pings_written(), c.outbox.pings_dropped(), c.bytes_written, connected_s});
+  }
+  s.figures = told(figures());
+  return s;
+}
+
+std::string Device::trouble() const {
+  const bool lost = !stopping_ && !acceptor_.is_open();
+  return lost ? "sonar " + config().name + " does not listen any more" : "";
+}
+
+RecordedSonar Device::recorded() const {
+  RecordedSonar sonar{config().name, std::string(sonar_.vendor().name()), {}};
+  sonar.ends.device = {text::number_from_ipv4(sonar_.state().advertise_ip), data_endpoint().port()};
+  sonar.ends.status_from.address = sonar.ends.device.address;
+  if (const Connection* const client = sonar_.connections().oldest_client())
+    sonar.ends.client.address = text::number_from_ipv4(client->peer.ip);
+  return sonar;
+}
+
+Result<void> Device::ask(const control::SetSonar& asked, const std::string& who) {
+  const Time now = context_.clock.now();
+  const protocol::SettingsOverride wanted{asked.range_m, asked.rate_hz, asked.gain_percent, asked.mode, asked.beams};
+  Actions actions;
+  if (wanted.range_m || wanted.rate_hz || wanted.gain_percent || wanted.mode || wanted.beams) {
+    auto changed = sonar_.change(wanted, who, now);
+    if (!changed) return tl::make_unexpected(changed.error());
+    actions = *std::move(changed);
+  }
+  if (asked.transmit && sonar_.set_transmit(*asked.transmit))
+    context_.log.info(*asked.transmit ? "transmits again" : "does not transmit any more",
+                      {{"sonar", config().name}, {"client", who}});
+  if (asked.mount) sonar_.move_mount(*asked.mount, now);
+  perform(std::move(actions));
+  return {};
+}
+
+void Device::use_water(const Water& water) {
+  sonar_.use_water(water, context_.clock.now());
+  perform({});
+}
+
+void Device::publish_ping(const PingQueued& queued) const {
+  if (!context_.events.heard()) return;
+  const PingRequest& r = queued.ping->request;
+  control::PingEvent e;
+  e.sonar = config().name;
+  e.number = static_cast<std::uint32_t>(r.number);
+  e.fired_at_ns = r.fired_at.time_since_epoch().count();
+  e.sonar_in_world = r.sonar_in_world;
+  e.range_m = r.settings.range_m;
+  e.beams = static_cast<std::uint32_t>(r.settings.beam_count);
+  e.rows = static_cast<std::uint32_t>(r.settings.range_bin_count);
+  e.clients = static_cast<std::uint32_t>(sonar_.connections().clients());
+  e.simulation_ms = ms(queued.simulation_s);
+  context_.events.tell({e});
+}
+
+void Device::publish_client(const std::string& peer, bool connected, const std::string& why) const {
+  if (context_.events.heard()) context_.events.tell({control::ClientEvent{config().name, peer, connected, why}});
+}
+
+}  // namespace sonar

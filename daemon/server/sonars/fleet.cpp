@@ -1,0 +1,172 @@
+#include "daemon/server/sonars/fleet.hpp"
+
+#include <algorithm>
+
+#include "daemon/emulator/reload_plan.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr int sweeps_before_it_goes = 3;
+
+}  // namespace
+
+Result<void> Fleet::open(const Config& config) {
+  for (const SonarConfig& sonar : config.sonars) {
+    devices_.emplace_back(context_, sonar, static_cast<std::uint32_t>(devices_.size()));
+    if (auto r = devices_.back().open(); !r) return r;
+  }
+  return {};
+}
+
+void Fleet::start() {
+  for (Device& d : devices_) d.start();
+}
+void Fleet::stop() {
+  for (Device& d : devices_) d.stop();
+}
+
+Device* Fleet::find(const std::string& name) {
+  const auto it = std::find_if(devices_.begin(), devices_.end(), [&](const Device& d) { return d.config().name == name; });
+  return it == devices_.end() ? nullptr : &*it;
+}
+
+bool Fleet::gone() const {
+  const auto is_gone = [](const Device& d) { return d.gone(); };
+  return std::all_of(devices_.begin(), devices_.end(), is_gone) &&
+         std::all_of(retired_.begin(), retired_.end(), [&](const Retired& r) { return is_gone(r.device.front()); });
+}
+
+std::uint64_t Fleet::served() const {
+  std::uint64_t served = served_before_;
+  for (const Device& d : devices_) served += d.sonar().served();
+  for (const Retired& r : retired_) served += r.device.front().sonar().served();
+  return served;
+}
+
+std::string Fleet::trouble() const {
+  if (!missing_.empty()) return missing_.front();
+  for (const Device& d : devices_)
+    if (std::string why = d.trouble(); !why.empty()) return why;
+  return {};
+}
+
+/// The place in the configuration, unless a sonar has it that goes on or was given it just now.
+std::uint32_t Fleet::free_index(std::size_t wanted, const std::vector<Opening>& given) const {
+  const auto taken = [&](std::uint32_t index) {
+    return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) { return d.sonar().index() == index; }) ||
+           std::any_of(given.begin(), given.end(), [&](const Opening& o) { return o.index == index; });
+  };
+  auto index = static_cast<std::uint32_t>(wanted);
+  if (taken(index)) index = 0;
+  while (taken(index)) ++index;
+  return index;
+}
+
+void Fleet::retire(std::list<Device>::iterator device) {
+  device->stop("the configuration changed");
+  retired_.emplace_back();
+  retired_.back().device.splice(retired_.back().device.end(), devices_, device);
+}
+
+/// Handlers that were cancelled by stop() still refer to the device: they were all queued then, and have run after a few turns.
+void Fleet::sweep() {
+  for (auto it = retired_.begin(); it != retired_.end();) {
+    const Device& device = it->device.front();
+    it->sweeps_gone = device.gone() ? it->sweeps_gone + 1 : 0;
+    if (it->sweeps_gone < sweeps_before_it_goes) {
+      ++it;
+      continue;
+    }
+    served_before_ += device.sonar().served();
+    it = retired_.erase(it);
+  }
+}
+
+bool Fleet::add(const SonarConfig& sonar, std::uint32_t index, std::vector<std::string>& errors) {
+  devices_.emplace_back(context_, sonar, index);
+  const auto opened = devices_.back().open();
+  if (opened) {
+    devices_.back().start();
+    return true;
+  }
+  errors.push_back("sonar " + sonar.name + ": " + opened.error().text);
+  retire(std::prev(devices_.end()));  // what it had begun may still be under way
+  return false;
+}
+
+bool Fleet::is_held(Ipv4 ip) const {
+  return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) {
+    const Ipv4 held = d.config().bind_ip;
+    return held == ip || held == Ipv4{} || ip == Ipv4{};
+  });
+}
+
+/// Sonars that live on move to where the new configuration has them; what is to be opened anew is returned.
+std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& next, Fates& fates) {
+  std::vector<Opening> openings;
+  for (auto it = devices_.begin(); it != devices_.end();) {
+    const auto device = it++;
+    const SonarConfig& is = device->config();
+    const SonarConfig* const wanted = sonar_named(next.sonars, is.name);
+    const Fate fate = fate_of(is, now, next);
+    if (fate == Fate::removed) {
+      fates[is.name] = "removed";
+      retire(device);
+    } else if (fate == Fate::changed) {
+      openings.push_back({wanted, device->sonar().index(), device});
+    } else {
+      fates[is.name] = fate == Fate::untouched ? "untouched" : "moved";
+      device->use_place(*wanted);
+    }
+  }
+  for (std::size_t i = 0; i < next.sonars.size(); ++i)
+    if (find(next.sonars[i].name) == nullptr) openings.push_back({&next.sonars[i], free_index(i, openings), devices_.end()});
+  return openings;
+}
+
+/// The one before goes on, if its vehicle does.
+void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Config& next) {
+  SonarConfig is = device->config();
+  const auto vehicle = std::find_if(next.vehicles.begin(), next.vehicles.end(),
+                                    [&](const VehicleConfig& v) { return v.name == now.vehicles[is.vehicle].name; });
+  if (vehicle == next.vehicles.end()) return retire(device);
+  is.vehicle = static_cast<std::size_t>(vehicle - next.vehicles.begin());
+  device->use_place(is);
+}
+
+Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
+  Change change;
+  Fates fates;
+  std::vector<Opening> openings = sort_out(now, next, fates);
+  std::vector<Opening> after;  // at an address that a sonar still holds which will be stopped
+  for (const Opening& o : openings) {
+    const bool changed = o.before != devices_.end();
+    fates[o.sonar->name] = changed ? "changed" : "added";
+    if (is_held(o.sonar->bind_ip)) {
+      after.push_back(o);
+    } else if (add(*o.sonar, o.index, change.errors)) {
+      if (changed) retire(o.before);
+    } else {
+      fates[o.sonar->name] = changed ? "as before" : "missing";
+      if (changed) stay(o.before, now, next);
+    }
+  }
+  for (const Opening& o : after)
+    if (o.before != devices_.end()) retire(o.before);
+  for (const Opening& o : after)
+    if (!add(*o.sonar, o.index, change.errors)) fates[o.sonar->name] = "missing";
+
+  for (const SonarConfig& sonar : next.sonars) {  // the configuration's order
+    const auto device =
+        std::find_if(devices_.begin(), devices_.end(), [&](const Device& d) { return d.config().name == sonar.name; });
+    if (device != devices_.end()) devices_.splice(devices_.end(), devices_, device);
+    change.summary += (change.summary.empty() ? "" : ", ") + sonar.name + " " + fates[sonar.name];
+    fates.erase(sonar.name);
+  }
+  for (const auto& [name, fate] : fates) change.summary += ", " + name + " " + fate;
+  missing_ = change.errors;
+  return change;
+}
+
+}  // namespace sonar

@@ -1,0 +1,67 @@
+// The daemon's sonars: a Device each, and those that are on their way out after the configuration was read again. Owned by App.
+// A sonar that a new configuration does not touch lives on with its clients; it keeps its index, which keys its noise.
+#pragma once
+
+#include <list>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/server/sonars/device.hpp"
+
+namespace sonar {
+
+class Fleet {
+ public:
+  explicit Fleet(DeviceContext& context) : context_(context) {}
+
+  /// Opens the listeners of all sonars of the configuration. Errors name the address and the next step.
+  Result<void> open(const Config& config);
+  void start();
+  void stop();
+
+  struct Change {
+    std::string summary;              // "front untouched, left changed, right added"
+    std::vector<std::string> errors;  // sonars that could not be opened; the one before stays where it can
+  };
+  /// Stops, starts and keeps sonars as `next` says, whose vehicles the World must know by now.
+  Change take_over(const Config& now, const Config& next);
+
+  /// Now and then: what was stopped goes when nothing of it is under way any more.
+  void sweep();
+
+  const std::list<Device>& devices() const { return devices_; }
+  std::list<Device>& devices() { return devices_; }
+  Device* find(const std::string& name);
+  bool gone() const;  // after stop(): nothing is left
+  std::uint64_t served() const;
+  /// Empty when all is well.
+  std::string trouble() const;
+
+ private:
+  struct Retired {
+    std::list<Device> device;  // one
+    int sweeps_gone = 0;
+  };
+  struct Opening {
+    const SonarConfig* sonar = nullptr;
+    std::uint32_t index = 0;
+    std::list<Device>::iterator before;  // the one it replaces, or end()
+  };
+  using Fates = std::map<std::string, std::string>;
+  bool is_held(Ipv4 ip) const;
+  std::vector<Opening> sort_out(const Config& now, const Config& next, Fates& fates);
+  void stay(std::list<Device>::iterator device, const Config& now, const Config& next);
+  std::uint32_t free_index(std::size_t wanted, const std::vector<Opening>& given) const;
+  void retire(std::list<Device>::iterator device);
+  bool add(const SonarConfig& sonar, std::uint32_t index, std::vector<std::string>& errors);
+
+  DeviceContext& context_;
+  std::list<Device> devices_;  // in the configuration's order
+  std::list<Retired> retired_;
+  std::uint64_t served_before_ = 0;   // by those swept away
+  std::vector<std::string> missing_;  // errors of sonars that should be there
+};
+
+}  // namespace sonar

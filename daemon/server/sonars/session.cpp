@@ -1,0 +1,203 @@
+#include "daemon/server/sonars/session.hpp"
+
+#include <netinet/tcp.h>
+
+#include <algorithm>
+
+#include "daemon/server/system/listen.hpp"
+
+namespace sonar {
+namespace {
+
+// Bytes the kernel may hold that are not yet on the wire. More would only make a slow client's picture older.
+constexpr int unsent_limit_bytes = 256 * 1024;
+constexpr auto idle_watch = std::chrono::seconds(1);
+
+std::string reason(const error_code& ec) {
+  if (ec == asio::error::eof) return "closed by the client";
+  return ec == asio::error::timed_out ? "connection timed out: the peer stopped reading and answering" : ec.message();
+}
+
+void prepare(tcp::socket& socket, const LimitConfig& limits) {
+  error_code ec;  // a refused option costs smoothness, not correctness
+  socket.set_option(tcp::no_delay(true), ec);
+  using UnsentLimit = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
+  socket.set_option(UnsentLimit(unsent_limit_bytes), ec);
+  end_when_silent(socket, limits.dead_peer);  // one that is gone without a word, while little or nothing is sent to it
+}
+
+}  // namespace
+
+Peer peer_of(const tcp::socket& socket) {
+  error_code ec;
+  const tcp::endpoint at = socket.remote_endpoint(ec);
+  return {at.address().to_string() + ":" + std::to_string(at.port()),
+          at.address().is_v4() ? at.address().to_v4().to_bytes() : protocol::Ipv4{}};
+}
+
+Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
+    : parent_(parent),
+      socket_(std::move(socket)),
+      peer_(peer_of(socket_)),
+      setup_(setup),
+      input_rate_(setup.limits.input_bytes_per_s),
+      wake_reader_(socket_.get_executor()),
+      wake_writer_(socket_.get_executor(), Steady::time_point::max()),
+      wake_watch_(socket_.get_executor()) {
+  prepare(socket_, setup_.limits);
+}
+
+void Session::start() {
+  spawn(&Session::read);
+  spawn(&Session::write);
+  spawn(&Session::watch);
+}
+
+/// A session without one of its parts would hold its place for ever: an exception ends it, and it alone.
+void Session::spawn(asio::awaitable<void> (Session::*part)()) {
+  const auto self = shared_from_this();
+  asio::co_spawn(
+      socket_.get_executor(), [self, part] { return ((*self).*part)(); },
+      [self](std::exception_ptr fault) {
+        if (!fault) return;
+        self->parent_.on_fault(*self, text_of(fault));
+        self->reset("an internal fault");
+      });
+}
+
+asio::awaitable<void> Session::read() {
+  const auto self = shared_from_this();
+  while (!over_) {
+    error_code ec;
+    const std::size_t n = co_await socket_.async_read_some(asio::buffer(received_), into(ec));
+    if (over_) co_return;
+    if (ec) {
+      over(finishing_ ? why_ : reason(ec));
+      co_return;
+    }
+    received_at_ = Steady::now();
+    parent_.on_bytes(*this, std::span(received_).first(n));
+    const auto pause = input_rate_.pause_after(n, Steady::now());
+    if (pause.count() > 0 && !finishing_) co_await rest(pause);
+  }
+}
+
+/// A client that sends too much waits; its FIN, too, is only read then. finish() and over() end the pause.
+asio::awaitable<void> Session::rest(Steady::duration pause) {
+  wake_reader_.expires_after(pause);
+  error_code ec;
+  co_await wake_reader_.async_wait(into(ec));
+}
+
+void Session::wake() { wake_writer_.cancel(); }
+
+asio::awaitable<bool> Session::write_whole(const Outbox::Message& message) {
+  if (message.prefixes.empty()) co_return co_await write_bytes(*message.bytes);
+  for (const protocol::Bytes& prefix : message.prefixes) {
+    if (!co_await write_bytes(prefix)) co_return false;
+    if (!co_await write_bytes(*message.bytes)) co_return false;
+  }
+  co_return true;
+}
+
+/// The bytes must live until it is done.
+asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    error_code ec;
+    const std::size_t n = co_await socket_.async_write_some(asio::buffer(bytes.data() + done, bytes.size() - done), into(ec));
+    if (over_) co_return false;
+    if (ec) {
+      over(reason(ec));
+      co_return false;
+    }
+    if (setup_.digest) digest_.add(bytes.subspan(done, n));
+    done += n;
+    parent_.on_sent(*this, n);
+    progress_at_ = Steady::now();
+  }
+  co_return true;
+}
+
+asio::awaitable<void> Session::write() {
+  const auto self = shared_from_this();
+  while (!over_) {
+    const Outbox::Message message = parent_.next_message(*this);
+    error_code ec;
+    if (message) {
+      writing_ = true;
+      progress_at_ = Steady::now();
+      if (!co_await write_whole(message)) co_return;
+      writing_ = false;
+      parent_.on_written(*this, message);
+    } else if (finishing_) {
+      socket_.shutdown(tcp::socket::shutdown_send, ec);
+      sent_fin_ = true;  // the reader waits for the client's own FIN, the watch for the deadline
+      co_return;
+    } else {
+      co_await wake_writer_.async_wait(into(ec));
+    }
+  }
+}
+
+Session::Steady::time_point Session::watch_until() const {
+  auto until = Steady::now() + idle_watch;
+  if (finishing_) until = std::min(until, finish_by_);
+  return until;
+}
+
+asio::awaitable<void> Session::watch() {
+  const auto self = shared_from_this();
+  while (!over_) {
+    wake_watch_.expires_at(watch_until());
+    error_code ec;
+    co_await wake_watch_.async_wait(into(ec));
+    if (over_) co_return;
+    const auto now = Steady::now();
+    if (finishing_ && now >= finish_by_) {
+      if (!sent_fin_) reset("did not take its last message in time");
+      over(why_);
+    } else if (writing_ && now - progress_at_ > setup_.limits.stall) {
+      reset("took no byte for " + std::to_string(setup_.limits.stall.count()) + " ms");
+    } else if (!finishing_ && is_silent(now)) {
+      finish("silent for " + std::to_string(parent_.longest_silence(*this)->count() / 1000) + " s");
+    }
+  }
+}
+
+/// Not one whose bytes wait to be read: this process may have been stopped for a while.
+bool Session::is_silent(Steady::time_point now) const {
+  const auto longest = parent_.longest_silence(*this);
+  error_code ec;
+  return longest && now - received_at_ > *longest && socket_.available(ec) == 0;
+}
+
+void Session::finish(std::string why) {
+  if (over_ || finishing_) return;
+  finishing_ = true;
+  why_ = std::move(why);
+  finish_by_ = Steady::now() + finish_limit;
+  parent_.on_finish(*this);
+  wake_reader_.cancel();
+  wake_writer_.cancel();
+  wake_watch_.cancel();
+}
+
+void Session::reset(std::string why) {
+  if (over_) return;
+  error_code ec;
+  socket_.set_option(asio::socket_base::linger(true, 0), ec);
+  over(std::move(why));
+}
+
+void Session::over(std::string why) {
+  if (std::exchange(over_, true)) return;
+  error_code ec;
+  socket_.close(ec);
+  wake_reader_.cancel();
+  wake_writer_.cancel();
+  wake_watch_.cancel();
+  parent_.on_over(*this, why);
+}
+
+}  // namespace sonar

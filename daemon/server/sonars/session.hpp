@@ -1,0 +1,102 @@
+// One connection of a sonar: its socket, read and written by two coroutines, and a timer that watches for peers that stopped.
+// What the bytes mean, and which messages wait, is the emulated sonar's business (daemon/emulator/sonar). Owned by its Device and
+// by its own coroutines; it reports to the Device once when it is over.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/config/config.hpp"
+#include "daemon/emulator/sonar/actions.hpp"
+#include "daemon/emulator/sonar/connections.hpp"
+#include "daemon/server/sonars/input_rate.hpp"
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/sha256.hpp"
+
+namespace sonar {
+
+class Session;
+
+/// What a session needs from its parent, which outlives it.
+class SessionParent {
+ public:
+  virtual ~SessionParent() = default;
+  virtual void on_bytes(Session& from, protocol::BytesView bytes) = 0;
+  /// The next message to write; empty when there is none.
+  virtual Outbox::Message next_message(Session& to) = 0;
+  virtual void on_sent(Session& to, std::size_t bytes) = 0;
+  /// A message has been handed to the kernel whole.
+  virtual void on_written(Session& to, const Outbox::Message& message) = 0;
+  /// A peer that is silent for longer has gone. Nothing: it may be silent.
+  virtual std::optional<std::chrono::milliseconds> longest_silence(const Session& of) const = 0;
+  /// It ends after the message being written.
+  virtual void on_finish(Session& session) = 0;
+  /// An exception ended one of its coroutines; on_over follows.
+  virtual void on_fault(Session& session, const std::string& what) = 0;
+  virtual void on_over(Session& session, const std::string& why) = 0;
+};
+
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  struct Setup {
+    ConnectionId id = 0;
+    bool digest = false;                // SHA-256 of what is sent
+    LimitConfig limits;                 // of one client
+    std::shared_ptr<const void> place;  // kept as long as the session lives
+  };
+  /// Longest time a client may take for its last message after finish(); then it is reset.
+  static constexpr std::chrono::milliseconds finish_limit{1500};
+
+  Session(SessionParent& parent, tcp::socket socket, const Setup& setup);
+
+  void start();
+  /// There is something to write.
+  void wake();
+  /// No more messages after the one being written; then FIN. Reset if the client does not take it in time.
+  void finish(std::string why);
+  /// At once, without FIN.
+  void reset(std::string why);
+
+  ConnectionId id() const { return setup_.id; }
+  const Sha256& digest() const { return digest_; }
+  std::chrono::steady_clock::duration connected_for() const { return Steady::now() - connected_at_; }
+  const Peer& peer() const { return peer_; }
+
+ private:
+  using Steady = std::chrono::steady_clock;
+
+  asio::awaitable<void> read();
+  asio::awaitable<void> rest(Steady::duration pause);
+  asio::awaitable<void> write();
+  asio::awaitable<void> watch();
+  asio::awaitable<bool> write_whole(const Outbox::Message& message);
+  asio::awaitable<bool> write_bytes(protocol::BytesView bytes);
+  Steady::time_point watch_until() const;
+  bool is_silent(Steady::time_point now) const;
+  void over(std::string why);
+  void spawn(asio::awaitable<void> (Session::*part)());
+
+  SessionParent& parent_;
+  tcp::socket socket_;
+  Peer peer_;
+  Setup setup_;
+  Sha256 digest_;
+  InputRate input_rate_;
+  asio::steady_timer wake_reader_, wake_writer_, wake_watch_;
+  std::array<std::byte, 8192> received_{};
+  const Steady::time_point connected_at_ = Steady::now();
+  Steady::time_point received_at_ = connected_at_;  // a byte came in
+  Steady::time_point progress_at_{};                // a byte went out, while writing
+  Steady::time_point finish_by_{};
+  bool writing_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
+  std::string why_;
+};
+
+/// Name and address of the other end, for the log and the status message.
+Peer peer_of(const tcp::socket& socket);
+
+}  // namespace sonar

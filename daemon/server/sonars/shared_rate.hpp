@@ -1,0 +1,46 @@
+// How fast several clients are read together: a bucket of bytes that all draw on. A client within its fair share of the rate does
+// not wait for the bucket, so that only those who send more wait when it is empty. Pure arithmetic, as InputRate.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+
+#include "daemon/server/sonars/input_rate.hpp"
+
+namespace sonar {
+
+class SharedRate {
+ public:
+  using Steady = InputRate::Steady;
+  /// One client's; it counts while it lives, and may outlive the rate.
+  class Part {
+    friend class SharedRate;
+    explicit Part(std::shared_ptr<const char> counted) : counted_(std::move(counted)) {}
+    std::shared_ptr<const char> counted_;
+    InputRate share_{at_once};
+  };
+
+  explicit SharedRate(std::size_t bytes_per_s) : bytes_per_s_(bytes_per_s), together_(bytes_per_s) {}
+  /// For one more client; the rate is this from now on.
+  Part join(std::size_t bytes_per_s) {
+    bytes_per_s_ = bytes_per_s;
+    together_.use(bytes_per_s);
+    return Part(counted_);
+  }
+
+  /// `bytes` of the client were read; 0 = read on.
+  Steady::duration pause_after(Part& part, std::size_t bytes, Steady::time_point now) {
+    const auto parts = static_cast<std::size_t>(std::max(counted_.use_count() - 1, 1L));
+    part.share_.use(std::max<std::size_t>(bytes_per_s_ / parts, 1));
+    const auto of_all = together_.pause_after(bytes, now);
+    return part.share_.pause_after(bytes, now).count() > 0 ? of_all : Steady::duration{};
+  }
+
+ private:
+  static constexpr std::size_t at_once = 4096;  // of a newcomer; more would be a gift to those who connect again and again
+  std::size_t bytes_per_s_;
+  InputRate together_;
+  std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // by us and by each Part
+};
+
+}  // namespace sonar

@@ -1,0 +1,54 @@
+#include "daemon/server/sonars/visit_log.hpp"
+
+#include <numeric>
+#include <utility>
+
+namespace sonar {
+
+VisitLog::VisitLog(asio::io_context& io, Log& log, std::string sonar, std::chrono::milliseconds spell)
+    : log_(log), sonar_(std::move(sonar)), spell_(spell), timer_(io) {}
+
+void VisitLog::say(Kind kind, const std::string& what, std::vector<LogField> fields) {
+  if (!ended_ && !in_spell_) begin_spell();
+  ++visits_;
+  if (ended_ || (!crowded_ && visits_ <= lines_a_spell)) {
+    fields.insert(fields.begin(), {"sonar", sonar_});
+    return log_.info(what, fields);
+  }
+  ++unsaid_[static_cast<std::size_t>(kind)];
+  last_unsaid_ = what;
+}
+
+void VisitLog::begin_spell() {
+  in_spell_ = true;
+  visits_ = 0;
+  timer_.expires_after(spell_);
+  timer_.async_wait([this](const error_code& ec) {
+    if (ec || ended_) return;
+    sum_up();
+    crowded_ = visits_ > lines_a_spell;
+    in_spell_ = false;
+    if (crowded_) begin_spell();
+  });
+}
+
+void VisitLog::sum_up() {
+  const auto unsaid = std::exchange(unsaid_, {});
+  if (std::accumulate(unsaid.begin(), unsaid.end(), std::uint64_t{0}) == 0) return;
+  const auto count = [&](Kind kind) { return unsaid[static_cast<std::size_t>(kind)]; };
+  log_.info("clients come and go", {{"sonar", sonar_},
+                                    {"connected", count(Kind::connected)},
+                                    {"gone", count(Kind::gone)},
+                                    {"turned_away", count(Kind::turned_away)},
+                                    {"wait", count(Kind::waits)},
+                                    {"within_s", spell_.count() / 1000},
+                                    {"last", last_unsaid_}});
+}
+
+void VisitLog::end() {
+  if (std::exchange(ended_, true)) return;
+  timer_.cancel();
+  sum_up();
+}
+
+}  // namespace sonar

@@ -1,0 +1,41 @@
+// What the log says of clients that come and go: a line each, and where they come and go often, one line now and then that says
+// how many did. Used by Device, for what any visitor can cause again and again. I/O thread only.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/log.hpp"
+
+namespace sonar {
+
+class VisitLog {
+ public:
+  enum class Kind { connected, gone, turned_away, waits, kinds };
+  static constexpr int lines_a_spell = 8;
+
+  /// `spell`: up to lines_a_spell visits within one are told as they happen.
+  VisitLog(asio::io_context& io, Log& log, std::string sonar, std::chrono::milliseconds spell = std::chrono::seconds(10));
+  void say(Kind kind, const std::string& what, std::vector<LogField> fields);
+  /// Writes what has been held back; from now on every line is written at once.
+  void end();
+
+ private:
+  void begin_spell();
+  void sum_up();
+
+  Log& log_;
+  std::string sonar_;
+  std::chrono::milliseconds spell_;
+  asio::steady_timer timer_;
+  bool in_spell_ = false, ended_ = false;
+  bool crowded_ = false;  // the spell before had more than its lines: this one is summed up as a whole
+  int visits_ = 0;        // in this spell
+  std::array<std::uint64_t, static_cast<std::size_t>(Kind::kinds)> unsaid_{};
+  std::string last_unsaid_;
+};
+
+}  // namespace sonar

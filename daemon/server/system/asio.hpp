@@ -1,0 +1,36 @@
+// Boost.Asio as the daemon uses it: included here and nowhere else, so that <utility> comes first (Boost 1.74's awaitable.hpp
+// needs std::exchange and does not include it) and every await spells its error code the same way.
+#pragma once
+
+#include <chrono>
+#include <exception>
+#include <string>
+#include <utility>
+
+#include <boost/asio.hpp>
+
+namespace sonar {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using asio::ip::udp;
+using boost::system::error_code;
+
+/// co_await socket.async_...(..., into(ec)): no exceptions in coroutines.
+inline auto into(error_code& ec) { return asio::redirect_error(asio::use_awaitable, ec); }
+
+/// Of a timer that waits for an event only.
+inline constexpr auto never = std::chrono::steady_clock::time_point::max();
+
+/// What an exception that ended a coroutine says. asio::detached would swallow it.
+inline std::string text_of(const std::exception_ptr& fault) {
+  try {
+    std::rethrow_exception(fault);
+  } catch (const std::exception& e) {
+    return e.what();
+  } catch (...) {
+    return "an exception of no known kind";
+  }
+}
+
+}  // namespace sonar

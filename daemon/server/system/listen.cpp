@@ -1,0 +1,83 @@
+#include "daemon/server/system/listen.hpp"
+
+#include <netinet/tcp.h>
+
+#include <algorithm>
+#include <fstream>
+
+namespace sonar {
+namespace {
+
+/// The kernel takes ports of outgoing connections from this range, Linux default 32768-60999.
+std::pair<int, int> ephemeral_range() {
+  std::pair<int, int> range{32768, 60999};
+  std::ifstream file("/proc/sys/net/ipv4/ip_local_port_range");
+  int low = 0, high = 0;
+  if (file >> low >> high) range = {low, high};
+  return range;
+}
+
+Error explain(const error_code& ec, Endpoint at) {
+  std::string text = "cannot listen on " + text_of(at) + ": ";
+  if (ec == asio::error::address_in_use) {
+    const std::string port = std::to_string(at.port);
+    text +=
+        "port in use by another program (another sonard? --offset 1, 2, ... starts one beside it, sonard replay --ip; see: ss "
+        "-anp | grep " +
+        port + ")";
+    const auto [low, high] = ephemeral_range();
+    if (at.port >= low && at.port <= high)
+      text += "; it lies in the ephemeral range " + std::to_string(low) + "-" + std::to_string(high) +
+              ", so an outgoing connection may hold it. Reserve it: sysctl net.ipv4.ip_local_reserved_ports=52100,52102";
+  } else if (ec.value() == EADDRNOTAVAIL) {
+    text += "address not on this host. Add it: ip addr add " + text_of(at.ip) + "/24 dev eth0 (or use --bind 127.0.0.2)";
+  } else {
+    text += ec.message();
+  }
+  return {ErrorKind::unavailable, text};
+}
+
+}  // namespace
+
+asio::ip::address_v4 address_of(Ipv4 ip) { return asio::ip::address_v4(ip); }
+
+Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at) {
+  error_code ec;
+  acceptor.open(tcp::v4(), ec);
+  if (!ec) acceptor.set_option(asio::socket_base::reuse_address(true), ec);  // only against connections in TIME_WAIT
+  if (!ec) acceptor.bind({address_of(at.ip), at.port}, ec);
+  if (!ec) acceptor.listen(asio::socket_base::max_listen_connections, ec);
+  if (ec) return tl::make_unexpected(explain(ec, at));
+  return {};
+}
+
+void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit) {
+  namespace option = asio::detail::socket_option;
+  // Three probes, the last with a second to spare where there is one: kernel timers are late rather than early.
+  const auto probe_s =
+      static_cast<int>(std::max(std::chrono::floor<std::chrono::seconds>(limit).count() - 1, std::int64_t{3}) / 3);
+  error_code ec;  // a refused option leaves the kernel's own patience, a quarter of an hour and more
+  socket.set_option(asio::socket_base::keep_alive(true), ec);
+  socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPIDLE>(probe_s), ec);
+  socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPINTVL>(probe_s), ec);
+  socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPCNT>(2), ec);
+  socket.set_option(option::integer<IPPROTO_TCP, TCP_USER_TIMEOUT>(3000 * probe_s), ec);
+}
+
+Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast) {
+  error_code ec;
+  socket.open(udp::v4(), ec);
+  if (!ec && broadcast) socket.set_option(asio::socket_base::broadcast(true), ec);
+  if (!ec) socket.bind({address_of(at.ip), at.port}, ec);
+  if (ec) return tl::make_unexpected(explain(ec, at));
+  return {};
+}
+
+bool is_admitted(const std::vector<AddressRange>& allow_from, const asio::ip::address& from) {
+  if (!from.is_v4()) return false;
+  const Ipv4 ip = from.to_v4().to_bytes();
+  if (allow_from.empty()) return is_loopback(ip);
+  return std::any_of(allow_from.begin(), allow_from.end(), [&](const AddressRange& r) { return r.contains(ip); });
+}
+
+}  // namespace sonar

@@ -1,0 +1,26 @@
+// Opening listeners with errors that say what, where, why and what to do next (docs/architecture.md, "Errors").
+#pragma once
+
+#include <chrono>
+
+#include "core/base/result.hpp"
+#include "daemon/config/addresses.hpp"
+#include "daemon/server/system/asio.hpp"
+
+namespace sonar {
+
+Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at);
+/// `broadcast`: may send to broadcast addresses.
+Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast);
+
+/// A peer that answers nothing, be it our bytes or the probes sent while there are none, ends the connection within `limit` with
+/// asio::error::timed_out. Whole seconds; at least 3.
+void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit);
+
+/// Whether poses from there are taken. Without ranges only this computer's: the ranges may go by a reload while the listener
+/// stays.
+bool is_admitted(const std::vector<AddressRange>& allow_from, const asio::ip::address& from);
+
+asio::ip::address_v4 address_of(Ipv4 ip);
+
+}  // namespace sonar

@@ -1,0 +1,105 @@
+#include "daemon/server/system/notify.hpp"
+
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+
+#include "core/text/decimal.hpp"
+
+namespace sonar {
+namespace {
+
+std::string from_environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+/// One line: the protocol knows no other end of a value.
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+NotifyPlace notify_place_from_environment() {
+  NotifyPlace place{from_environment("NOTIFY_SOCKET"), {}};
+  const std::string pid = from_environment("WATCHDOG_PID");
+  const auto period = text::parse_integer(from_environment("WATCHDOG_USEC"));
+  if (period && *period > 0 && (pid.empty() || pid == std::to_string(::getpid())))
+    place.watchdog = std::chrono::microseconds(*period);
+  return place;
+}
+
+Notify::Notify(asio::io_context& io, NotifyPlace place, std::function<std::chrono::nanoseconds()> ping_under_way, Log& log)
+    : place_(std::move(place)), ping_under_way_(std::move(ping_under_way)), log_(log), timer_(io) {
+  if (place_.socket.empty()) return;
+  socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  // A manager that does not read must not hold us up for longer than a client would notice.
+  const timeval patience{0, 200000};
+  if (socket_ >= 0) ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
+}
+
+Notify::~Notify() {
+  if (socket_ >= 0) ::close(socket_);
+}
+
+void Notify::ready(const std::string& status) {
+  send("READY=1\nSTATUS=" + one_line(status), 0);
+  if (place_.socket.empty() || place_.watchdog.count() == 0 || stopping_ || std::exchange(keeping_, true)) return;
+  keep_alive();
+}
+
+void Notify::reloading() {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  const auto monotonic = std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+  send("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(monotonic) + "\nSTATUS=Reloading", 0);
+}
+
+void Notify::stopping() {
+  if (std::exchange(stopping_, true)) return;
+  send("STOPPING=1\nSTATUS=Stopping", 0);
+  timer_.cancel();
+}
+
+/// Twice in the watchdog's period. A ping that takes longer than that period silences us, and the manager acts.
+void Notify::keep_alive() {
+  const bool stuck = ping_under_way_() > place_.watchdog;
+  if (stuck && !stuck_)
+    log_.error("a ping takes longer than the service manager's watchdog; no sign of life until it is done",
+               {{"watchdog_s", std::chrono::duration<double>(place_.watchdog).count()}});
+  stuck_ = stuck;
+  if (!stuck) send("WATCHDOG=1", MSG_DONTWAIT);
+  timer_.expires_after(place_.watchdog / 2);
+  timer_.async_wait([this](const error_code& ec) {
+    if (!ec && !stopping_) keep_alive();
+  });
+}
+
+void Notify::send(const std::string& message, int flags) {
+  if (place_.socket.empty()) return;
+  sockaddr_un at{};
+  at.sun_family = AF_UNIX;
+  std::string why;
+  if (place_.socket.size() >= sizeof at.sun_path || (place_.socket[0] != '/' && place_.socket[0] != '@')) {
+    why = "not the address of a local socket";
+  } else {
+    std::copy(place_.socket.begin(), place_.socket.end(), at.sun_path);
+    if (at.sun_path[0] == '@') at.sun_path[0] = '\0';  // the abstract namespace, whose names have no end mark
+    const bool abstract = at.sun_path[0] == '\0';
+    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + place_.socket.size() + (abstract ? 0 : 1));
+    const auto* address = static_cast<const sockaddr*>(static_cast<const void*>(&at));
+    const auto sent = ::sendto(socket_, message.data(), message.size(), flags | MSG_NOSIGNAL, address, size);
+    if (sent < 0) why = std::strerror(errno);
+  }
+  if (!why.empty() && !std::exchange(complained_, true))
+    log_.warning("cannot tell the service manager at " + place_.socket + " (NOTIFY_SOCKET): " + why);
+}
+
+}  // namespace sonar

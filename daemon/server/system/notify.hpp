@@ -1,0 +1,53 @@
+// Tells a service manager (systemd's sd_notify protocol, spoken by ourselves) when we serve, reload, stop, and that we are alive.
+// Owned by App; without a manager every call does nothing. I/O thread only.
+//
+// Alive means two things: the I/O loop turns, because the message is sent by a timer of that loop; and the simulation thread is
+// not stuck, because no ping has been under way for longer than the watchdog's period. A daemon without clients computes no
+// ping and is alive. What fails once (a refused ping, a client) is no reason to be restarted.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <string>
+
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/log.hpp"
+
+namespace sonar {
+
+/// What a service manager put into the environment.
+struct NotifyPlace {
+  std::string socket;                     // a path, or @name in the abstract namespace; empty = no service manager
+  std::chrono::microseconds watchdog{0};  // 0 = none
+};
+/// From NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID; a watchdog meant for another process is none.
+NotifyPlace notify_place_from_environment();
+
+class Notify {
+ public:
+  /// `ping_under_way` answers for how long the simulation thread has been at its present ping; 0 = it waits for work.
+  Notify(asio::io_context& io, NotifyPlace place, std::function<std::chrono::nanoseconds()> ping_under_way, Log& log);
+  ~Notify();
+  Notify(const Notify&) = delete;
+  Notify& operator=(const Notify&) = delete;
+
+  /// The listeners are open, after the start or a reload. The watchdog's messages begin with the first call.
+  void ready(const std::string& status);
+  /// Between this and the next ready() the configuration changes.
+  void reloading();
+  /// Ends the watchdog's messages, so that the I/O loop may return.
+  void stopping();
+
+ private:
+  void send(const std::string& message, int flags);
+  void keep_alive();
+
+  NotifyPlace place_;
+  std::function<std::chrono::nanoseconds()> ping_under_way_;
+  Log& log_;
+  asio::steady_timer timer_;
+  int socket_ = -1;  // kept open: a message must not fail for want of a descriptor
+  bool stopping_ = false, keeping_ = false, complained_ = false, stuck_ = false;
+};
+
+}  // namespace sonar

@@ -1,0 +1,45 @@
+// The daemon's time: real (UNIX time that never jumps) or stepped (moves only when told, by daemon/server/time/stepped_time.hpp).
+// I/O thread only.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+
+#include "core/base/units.hpp"
+
+namespace sonar {
+
+class Clock {
+ public:
+  /// What the computer's clock on the wall says; people and NTP set it, now() does not follow.
+  using Wall = Time (*)();
+  static Time system_wall() { return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now()); }
+  explicit Clock(bool stepped, Wall wall = system_wall)
+      : stepped_(stepped), wall_(wall), started_(std::chrono::steady_clock::now()), origin_(stepped ? Time{} : wall()) {}
+
+  bool stepped() const { return stepped_; }
+  /// Stepped time begins at the epoch: packets of two runs are the same.
+  Time now() const { return stepped_ ? origin_ : origin_ + (std::chrono::steady_clock::now() - started_); }
+  /// How far now() is ahead of the wall clock at this moment: 0 until that clock is set. Real time only.
+  std::chrono::nanoseconds ahead_of_wall() const { return now() - wall_(); }
+  /// When a timer must expire for `t`. Real time only.
+  std::chrono::steady_clock::time_point timer_at(Time t) const { return started_ + (t - origin_); }
+  /// Stepped time only; never backwards.
+  void advance_to(Time t) { origin_ = std::max(origin_, t); }
+  /// Advances the clock without advancing unskipped time (stepped mode only).
+  void skip(std::chrono::nanoseconds by) {
+    origin_ += by;
+    skipped_ += by;
+  }
+  /// All skips together. Conversations run on unskipped time, so that jumps neither end silences nor cause keep-alives.
+  std::chrono::nanoseconds skipped() const { return skipped_; }
+
+ private:
+  bool stepped_;
+  Wall wall_;
+  std::chrono::steady_clock::time_point started_;
+  std::chrono::nanoseconds skipped_{0};
+  Time origin_;  // real: the UNIX time at started_; stepped: now
+};
+
+}  // namespace sonar

@@ -1,0 +1,52 @@
+#include "daemon/server/time/stepped_time.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace sonar {
+
+SteppedTime::Bound SteppedTime::bound(std::optional<Time> for_pings) const {
+  if (mode_ == ClockMode::lockstep) return {asked_ - std::chrono::nanoseconds(1), asked_};
+  if (mode_ != ClockMode::follow) return {std::max(for_pings.value_or(Time::min()), clock_.now()), {}};
+  const std::optional<Time> stamped = world_.followed_until();
+  return {stamped.value_or(Time::min()), stamped};
+}
+
+Time SteppedTime::tick_at(Time due) const {
+  const Bound now = bound();
+  if (mode_ != ClockMode::follow || !now.then) return due;  // before the first pose there is no lead
+  const bool is_waited_for =
+      std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return w.until.last_tick >= due; });
+  return is_waited_for ? due : std::max(due, now.last_tick - most_lead);
+}
+
+std::string SteppedTime::step(double dt_s) {
+  if (mode_ != ClockMode::lockstep)
+    return "time steps on request only with clock: lockstep; here it is clock: " + std::string(name_of(mode_));
+  if (is_full()) return std::to_string(most_waiting) + " requests wait for time to pass already";
+  if (!(dt_s > 0 && dt_s <= longest_step_s))
+    return "dt_s must be more than 0 and at most " + std::to_string(static_cast<int>(longest_step_s)) + " seconds";
+  const std::chrono::nanoseconds dt = nanoseconds_from(dt_s);
+  if (dt.count() == 0) return "dt_s is less than a nanosecond";
+  if (seconds(asked_ + dt - clock_.now()) > longest_step_s)
+    return "steps that wait to be done would take more than " + std::to_string(static_cast<int>(longest_step_s)) + " seconds";
+  asked_ += dt;
+  return {};
+}
+
+void SteppedTime::wait(Reached reached) { waiting_.push_back({bound(), std::move(reached)}); }
+
+bool SteppedTime::answer(std::optional<Time> next) {
+  // One that is answered may ask for more. The bound falls when a vehicle that is behind joins those that are followed: who
+  // waited for more is answered then, or all would wait for each other.
+  bool any = false;
+  while (!waiting_.empty() && (!next || *next > std::min(waiting_.front().until.last_tick, bound().last_tick))) {
+    const Waiting done = std::move(waiting_.front());
+    waiting_.pop_front();
+    any = true;
+    done.reached(done.until.then.value_or(clock_.now()));
+  }
+  return any;
+}
+
+}  // namespace sonar

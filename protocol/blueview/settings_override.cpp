@@ -1,0 +1,72 @@
+#include "protocol/blueview/settings_override.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "protocol/blueview/head_settings.hpp"
+#include "protocol/blueview/models.hpp"
+
+namespace sonar::blueview {
+namespace {
+
+constexpr double half_gain_db = 48;  // chosen: 0 to 100 % turn the gain adjustment from -48 to 48 dB, as an Oculus' 96 dB
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
+
+Result<void> set(SonarSettings& all, Key key, const Value& value, const protocol::DeviceState& device) {
+  const Applied applied = apply(all, all.active_head, key, value, device);
+  if (!applied.value) return refused(applied.refusal.text);
+  return {};
+}
+
+Result<void> set_range(SonarSettings& all, double range_m, const protocol::DeviceState& device) {
+  const FrequencyMode& mode = device.model->modes[static_cast<std::size_t>(all.active_head)];
+  const double start_m = static_cast<double>(all.heads[static_cast<std::size_t>(all.active_head)].start_m);
+  if (range_m <= std::max(start_m, static_cast<double>(mode.min_range_m)) || range_m > static_cast<double>(mode.max_range_m)) {
+    char text[192];
+    std::snprintf(text, sizeof text, "%s has a range of %g to %g m with this head and starts at %g m; %g m is not valid",
+                  device.model->name.c_str(), static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m),
+                  start_m, range_m);
+    return refused(text);
+  }
+  return set(all, Key::stop_range, static_cast<float>(range_m), device);
+}
+
+Result<void> set_rate(SonarSettings& all, double rate_hz, const protocol::DeviceState& device) {
+  if (rate_hz < 0) return refused("a ping rate must be above 0");
+  if (rate_hz == 0) return refused("BlueView sonars have no standby: they ping when a host asks; transmit: false stops one");
+  const double interval_ms = std::max(1.0, std::round(1000 / rate_hz));
+  return set(all, Key::ping_interval, static_cast<std::int32_t>(std::min(interval_ms, 3600e3)), device);
+}
+
+}  // namespace
+
+float gain_db_from(double percent) { return static_cast<float>(half_gain_db * (percent / 50 - 1)); }
+
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
+  SonarSettings all = settings_from(device.settings.get(), device);
+  if (wanted.mode) {
+    if (*wanted.mode >= all.heads.size())
+      return refused(device.model->name + " has " + std::to_string(all.heads.size()) +
+                     " mode(s), one per head, counted from 0; no mode " + std::to_string(*wanted.mode));
+    all.active_head = static_cast<std::int32_t>(*wanted.mode);
+  }
+  if (wanted.range_m)
+    if (auto r = set_range(all, *wanted.range_m, device); !r) return tl::make_unexpected(r.error());
+  if (wanted.rate_hz)
+    if (auto r = set_rate(all, *wanted.rate_hz, device); !r) return tl::make_unexpected(r.error());
+  if (wanted.gain_percent) {
+    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
+    if (auto r = set(all, Key::gain, gain_db_from(*wanted.gain_percent), device); !r) return tl::make_unexpected(r.error());
+  }
+  if (wanted.beams) {
+    const auto beams = static_cast<std::uint32_t>(ping_settings(all, device).beam_count);
+    if (*wanted.beams != beams)
+      return refused(device.model->name + " forms " + std::to_string(beams) + " beams with this head, not " +
+                     std::to_string(*wanted.beams));
+  }
+  return protocol::ChangeSettings{ping_settings(all, device), std::make_shared<SonarSettings>(all), describe(all, device)};
+}
+
+}  // namespace sonar::blueview

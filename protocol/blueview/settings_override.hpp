@@ -1,0 +1,15 @@
+// A SettingsOverride as the settings that a BlueView host would have made.
+// Called by the vendor.
+#pragma once
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::blueview {
+
+/// The gain adjustment for 0 to 100 % of its range.
+float gain_db_from(double percent);
+
+/// Changes only the fields that are set, of the head that is or becomes active. Refuses values that the product does not support.
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+}  // namespace sonar::blueview

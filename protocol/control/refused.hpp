@@ -1,0 +1,13 @@
+// How readers of the control protocol refuse what they read.
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "core/base/result.hpp"
+
+namespace sonar::control {
+
+inline tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
+
+}  // namespace sonar::control

@@ -1,0 +1,150 @@
+// Output of MavlinkPoses: heartbeats and requests to the autopilot, reports on the system found and on missing parts of poses.
+#include <algorithm>
+#include <cmath>
+
+#include "protocol/mavlink/mavlink_poses.hpp"
+
+namespace sonar::mavlink {
+namespace {
+
+constexpr std::chrono::nanoseconds heartbeat_period = std::chrono::seconds(1);
+constexpr std::chrono::nanoseconds listen_before_report = std::chrono::seconds(1);
+constexpr std::chrono::nanoseconds silence_before_report = std::chrono::seconds(5);  // from the start, without any message
+constexpr std::chrono::nanoseconds request_period = std::chrono::seconds(5);
+constexpr std::chrono::nanoseconds first_reminder = std::chrono::seconds(15), longest_reminder = std::chrono::minutes(10);
+
+// Values of minimal.xml and common.xml.
+constexpr std::uint8_t onboard_controller = 18, state_active = 4;
+constexpr std::uint16_t set_message_interval = 511;
+constexpr std::uint8_t ardupilot = 3, px4 = 12;
+
+std::string name_of_autopilot(std::uint8_t autopilot) {
+  if (autopilot == ardupilot) return "ArduPilot";
+  if (autopilot == px4) return "PX4";
+  return "autopilot type " + std::to_string(autopilot);
+}
+
+}  // namespace
+
+Reaction MavlinkPoses::on_tick(Time now) {
+  Reaction out;
+  if (now >= next_heartbeat_) {
+    const bool in_step = now - next_heartbeat_ < heartbeat_period;
+    next_heartbeat_ = (in_step ? next_heartbeat_ : now) + heartbeat_period;
+    Heartbeat beat;
+    beat.type = onboard_controller;
+    beat.autopilot = Heartbeat::no_autopilot;
+    beat.system_status = state_active;
+    out.replies.push_back(framed(beat, self_));
+  }
+  report_changes(now, out);
+  if (system_ && settings_.request_rates && has_autopilot_ && now >= next_request_) {
+    if (!has_poses(now)) request_messages(out);
+    next_request_ = now + request_period;
+  }
+  return out;
+}
+
+bool MavlinkPoses::has_poses(Time now) const {
+  return std::any_of(last_pose_.begin(), last_pose_.end(),
+                     [now](const std::optional<Time>& at) { return at && now - *at <= system_silence; });
+}
+
+/// Repeats the report, so that it is at the end of the log when the vehicle is started or changed much later.
+void MavlinkPoses::report_changes(Time now, Reaction& out) {
+  if (!first_tick_) first_tick_ = now;
+  if (system_ ? now - found_at_ < listen_before_report : now - *first_tick_ < silence_before_report) return;
+  const bool well = has_poses(now);
+  const bool is_news = reported_ != well;
+  if (!is_news && (well || now < next_reminder_)) return;
+  reminder_period_ = is_news ? first_reminder : std::min(2 * reminder_period_, longest_reminder);
+  next_reminder_ = now + reminder_period_;
+  reported_ = well;
+  out.notices.push_back(report(now));
+}
+
+std::string MavlinkPoses::health_error(Time now) const { return has_poses(now) ? std::string() : report(now); }
+
+void MavlinkPoses::request_messages(Reaction& out) {
+  const auto ask = [&](std::uint32_t message, double rate_hz) {
+    CommandLong command;
+    command.param1 = static_cast<float>(message);
+    command.param2 = static_cast<float>(1e6 / rate_hz);  // us
+    command.command = set_message_interval;
+    command.target_system = *system_;
+    command.target_component = autopilot_component_;
+    out.replies.push_back(framed(command, self_));
+  };
+  for (const std::uint32_t message : {Odometry::id, AttitudeQuaternion::id, LocalPositionNed::id})
+    ask(message, settings_.rate_hz);
+  if (!settings_.origin) return;
+  for (const std::uint32_t message : {SimState::id, GlobalPositionInt::id}) ask(message, settings_.rate_hz);
+  ask(GpsGlobalOrigin::id, 1);
+}
+
+/// "system 1 (ArduPilot) sends HEARTBEAT, ATTITUDE; no poses yet: ..."
+std::string MavlinkPoses::report(Time now) const {
+  if (!system_) {
+    if (!ignored_) return "no poses yet: no message received; check that the autopilot or its router sends here";
+    const std::string who = "system " + std::to_string(ignored_->first) + ", component " + std::to_string(ignored_->second);
+    const bool filtered = settings_.system_id != 0 || settings_.component_id != 0;
+    return "no poses yet: " + who + " sends messages, but " +
+           (filtered ? "does not match system_id and component_id" : "neither an autopilot's heartbeat nor a pose");
+  }
+  std::string text = "system " + std::to_string(*system_);
+  if (has_autopilot_) text += " (" + name_of_autopilot(autopilot_) + ")";
+  if (const auto silent = now - last_received_; silent > system_silence)
+    return text + " has sent nothing for " + std::to_string(std::chrono::duration_cast<std::chrono::seconds>(silent).count()) +
+           " s: no poses";
+  text += " sends ";
+  bool first = true;
+  for (const auto& [id, arrival] : received_) {
+    if (!receives(id, now)) continue;
+    text.append(first ? "" : ", ").append(find_message(id)->name);
+    first = false;
+  }
+  for (std::size_t s = 0; s < source_count; ++s) {
+    if (!last_pose_[s] || now - *last_pose_[s] > system_silence) continue;
+    text += std::string("; poses from ").append(name_of(static_cast<Source>(s)));
+    const bool coarse = static_cast<Source>(s) == Source::sim_state && sim_state_is_coarse_;
+    if (coarse) text += ", in steps of up to 0.4 m: lat_int and lon_int need MAVLink 2";
+    return text;
+  }
+  const bool had_poses = std::any_of(last_pose_.begin(), last_pose_.end(), [](const auto& at) { return at.has_value(); });
+  return text + (had_poses ? "; no more poses: " : "; no poses yet: ") + missing_inputs(now);
+}
+
+std::string MavlinkPoses::missing_inputs(Time now) const {
+  const bool attitude = receives(Attitude::id, now) || receives(AttitudeQuaternion::id, now);
+  const bool local = receives(LocalPositionNed::id, now), global = receives(GlobalPositionInt::id, now);
+  const bool sim_state = receives(SimState::id, now);
+  std::vector<std::string> missing;
+  const auto note_missing_fix = [&](std::uint32_t id, bool has_fix) {
+    const std::string name(find_message(id)->name);
+    if (!settings_.origin || !has_fix) missing.push_back(name + (settings_.origin ? " has no fix" : " needs world.origin"));
+  };
+  if (global && !local) note_missing_fix(GlobalPositionInt::id, global_has_fix_);
+  if (sim_state) note_missing_fix(SimState::id, sim_state_has_fix_);
+  for (const Source source : {Source::odometry, Source::sim_state, Source::mocap, Source::vision})
+    if (timeless_[static_cast<std::size_t>(source)])
+      missing.push_back(std::string(name_of(source)) + " has no time stamp, which clock: follow needs");
+
+  const bool refused = receives(Odometry::id, now) || receives(AttPosMocap::id, now) || receives(VisionPositionEstimate::id, now);
+  if (refused && missing.empty()) missing.emplace_back("the received messages were refused");
+  if (refused || sim_state) {  // each of them would be enough
+  } else if (attitude && (local || global)) {
+    if (missing.empty()) missing.emplace_back("positions and attitudes have no common time");
+  } else {
+    if (!attitude) missing.emplace_back("an attitude is missing (ATTITUDE_QUATERNION or ATTITUDE)");
+    if (!local && !global)
+      missing.push_back(std::string("a position is missing (LOCAL_POSITION_NED, or GLOBAL_POSITION_INT") +
+                        (settings_.origin ? ")" : " with world.origin)"));
+    missing.emplace_back(settings_.request_rates ? "requested (request_rates) but not received"
+                                                 : "set its stream rates, or request_rates: true");
+  }
+  std::string text;
+  for (const std::string& l : missing) text.append(text.empty() ? "" : "; ").append(l);
+  return text;
+}
+
+}  // namespace sonar::mavlink

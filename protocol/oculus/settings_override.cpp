@@ -1,0 +1,70 @@
+#include "protocol/oculus/settings_override.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "protocol/oculus/fire.hpp"
+#include "protocol/oculus/settings.hpp"
+
+namespace sonar::oculus {
+namespace {
+
+constexpr std::array<PingRate, 5> rates{PingRate::hz2, PingRate::hz5, PingRate::hz10, PingRate::hz15, PingRate::hz40};
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
+
+PingRate nearest_rate(double rate_hz) {
+  PingRate nearest = rates.front();
+  for (const PingRate rate : rates)
+    if (std::abs(table_rate_hz(rate) - rate_hz) < std::abs(table_rate_hz(nearest) - rate_hz)) nearest = rate;
+  return nearest;
+}
+
+void set(FireSettings& fire, std::uint8_t bit, bool on) {
+  fire.flags = static_cast<std::uint8_t>(on ? fire.flags | bit : fire.flags & ~bit);
+}
+
+}  // namespace
+
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
+  FireRequest fire = fire_of(device.settings.get());
+  FireSettings& asked = fire.settings;
+  const SonarModel& model = *device.model;
+  char text[160];
+  if (wanted.mode) {
+    if (*wanted.mode >= model.modes.size())
+      return refused(model.name + " has " + std::to_string(model.modes.size()) + " mode(s), counted from 0; no mode " +
+                     std::to_string(*wanted.mode));
+    asked.mode = static_cast<std::uint8_t>(*wanted.mode + 1);
+  }
+  if (wanted.range_m) {
+    const FrequencyMode& mode = model.modes[static_cast<std::size_t>(mode_index(model, asked.mode))];
+    if (*wanted.range_m < static_cast<double>(mode.min_range_m) || *wanted.range_m > static_cast<double>(mode.max_range_m)) {
+      std::snprintf(text, sizeof text, "the range of %s is %g to %g m in mode %s, not %g m", model.name.c_str(),
+                    static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m), mode.name.c_str(),
+                    *wanted.range_m);
+      return refused(text);
+    }
+    set(asked, flag::range_in_metres, true);
+    asked.range = *wanted.range_m;
+  }
+  if (wanted.rate_hz) {
+    if (*wanted.rate_hz < 0) return refused("a ping rate must be 0 (standby) or above");
+    asked.ping_rate = *wanted.rate_hz == 0 ? PingRate::standby : nearest_rate(*wanted.rate_hz);
+  }
+  if (wanted.gain_percent) {
+    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
+    asked.gain_percent = *wanted.gain_percent;
+  }
+  if (wanted.beams) {
+    if (*wanted.beams != 256 && *wanted.beams != 512)
+      return refused(model.name + " forms 256 or 512 beams, not " + std::to_string(*wanted.beams));
+    set(asked, flag::beams_512, *wanted.beams == 512);
+  }
+  // As a driver's would be: written, sent and read.
+  const FireRequest received = parse_fire(make_fire(fire)).value_or(fire);
+  return protocol::ChangeSettings{resolve(received, device).settings, std::make_shared<HeldFire>(received), describe(received)};
+}
+
+}  // namespace sonar::oculus

@@ -1,0 +1,176 @@
+#include "protocol/recording/byte_source.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+namespace sonar::recording {
+namespace {
+
+constexpr std::size_t block_bytes = 256 << 10;
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int fd() const { return fd_; }
+  int release() { return std::exchange(fd_, -1); }
+
+ private:
+  int fd_;
+};
+
+class FileSource final : public Source {
+ public:
+  FileSource(std::string name, int fd, std::uint64_t size) : name_(std::move(name)), file_(fd), size_(size) {}
+  const std::string& name() const override { return name_; }
+  std::uint64_t size() const override { return size_; }
+  std::size_t read_at(std::uint64_t offset, std::span<std::byte> into) override {
+    std::size_t done = 0;
+    while (done < into.size()) {
+      const ssize_t n = ::pread(file_.fd(), into.data() + done, into.size() - done, static_cast<off_t>(offset + done));
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) break;
+      done += static_cast<std::size_t>(n);
+    }
+    return done;
+  }
+
+ private:
+  std::string name_;
+  Descriptor file_;
+  std::uint64_t size_;
+};
+
+class MemorySource final : public Source {
+ public:
+  MemorySource(std::string name, Bytes bytes) : name_(std::move(name)), bytes_(std::move(bytes)) {}
+  const std::string& name() const override { return name_; }
+  std::uint64_t size() const override { return bytes_.size(); }
+  std::size_t read_at(std::uint64_t offset, std::span<std::byte> into) override {
+    if (offset >= bytes_.size()) return 0;
+    const auto there = BytesView(bytes_).subspan(static_cast<std::size_t>(offset));
+    const std::size_t count = std::min(into.size(), there.size());
+    std::copy_n(there.begin(), count, into.begin());
+    return count;
+  }
+
+ private:
+  std::string name_;
+  Bytes bytes_;
+};
+
+class FileSink final : public Sink {
+ public:
+  FileSink(std::string name, int fd) : name_(std::move(name)), file_(fd) {}
+
+  Result<void> append(BytesView record) override {
+    if (broken_) return tl::unexpected(*broken_);
+    for (std::size_t done = 0; done < record.size();) {
+      const ssize_t n = ::write(file_.fd(), record.data() + done, record.size() - done);
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0) return give_up(errno);
+      done += static_cast<std::size_t>(n);
+    }
+    size_ += record.size();
+    return {};
+  }
+
+  void try_again() override { broken_.reset(); }
+
+  Result<void> close() override {
+    if (::close(file_.release()) == 0) return {};
+    return failure(ErrorKind::io, "cannot finish " + name_ + ": " + std::strerror(errno));
+  }
+
+ private:
+  Result<void> give_up(int error) {
+    // If the file system refuses this too, a cut record remains at the end, which readers accept.
+    const bool taken_back =
+        ::ftruncate(file_.fd(), static_cast<off_t>(size_)) == 0 && ::lseek(file_.fd(), static_cast<off_t>(size_), SEEK_SET) >= 0;
+    broken_ = Error{ErrorKind::io, "cannot write on to " + name_ + ": " + std::strerror(error) + "; its first " +
+                                       std::to_string(size_) + " bytes are whole" +
+                                       (taken_back ? "" : ", what follows them is cut short")};
+    return tl::unexpected(*broken_);
+  }
+
+  std::string name_;
+  Descriptor file_;
+  std::uint64_t size_ = 0;
+  std::optional<Error> broken_;
+};
+
+class MemorySink final : public Sink {
+ public:
+  explicit MemorySink(Bytes& bytes) : bytes_(bytes) {}
+  Result<void> append(BytesView record) override {
+    bytes_.insert(bytes_.end(), record.begin(), record.end());
+    return {};
+  }
+  Result<void> close() override { return {}; }
+
+ private:
+  Bytes& bytes_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Source>> open_source(const std::filesystem::path& file) {
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // does not wait for the other end of a pipe
+  if (fd < 0) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": " + std::strerror(errno));
+  Descriptor opened(fd);
+  struct stat about {};
+  if (::fstat(fd, &about) != 0) return failure(ErrorKind::io, "cannot read " + file.string() + ": " + std::strerror(errno));
+  if (!S_ISREG(about.st_mode)) return failure(ErrorKind::bad_data, file.string() + " is not a regular file: name a recording");
+  return std::make_unique<FileSource>(file.string(), opened.release(), static_cast<std::uint64_t>(about.st_size));
+}
+
+std::unique_ptr<Source> source_from(std::string name, Bytes bytes) {
+  return std::make_unique<MemorySource>(std::move(name), std::move(bytes));
+}
+
+namespace {
+
+Result<std::unique_ptr<Sink>> sink_to(const std::filesystem::path& file, int more_flags) {
+  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | more_flags, 0666);
+  const int error = errno;
+  if (fd < 0 && error == EEXIST) return failure(ErrorKind::io, file.string() + " is there already: give another name");
+  if (fd < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(error));
+  return std::make_unique<FileSink>(file.string(), fd);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file) { return sink_to(file, O_TRUNC); }
+
+Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file) { return sink_to(file, O_EXCL); }
+
+std::unique_ptr<Sink> sink_into(Bytes& bytes) { return std::make_unique<MemorySink>(bytes); }
+
+BytesView Scan::peek(std::size_t count) {
+  count = static_cast<std::size_t>(std::min<std::uint64_t>(count, left()));
+  const bool buffered = position_ >= buffered_from_ && position_ + count <= buffered_from_ + buffer_.size();
+  if (!buffered) {
+    buffer_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(std::max(count, block_bytes), left())));
+    buffered_from_ = position_;
+    buffer_.resize(source_.read_at(position_, buffer_));
+    count = std::min(count, buffer_.size());
+  }
+  return BytesView(buffer_).subspan(static_cast<std::size_t>(position_ - buffered_from_), count);
+}
+
+BytesView Scan::read(std::size_t count) {
+  const BytesView taken = peek(count);
+  position_ += taken.size();
+  return taken;
+}
+
+}  // namespace sonar::recording

@@ -1,0 +1,71 @@
+// Byte sources and sinks of recordings: read at an offset, append at the end. The formats beside this file use nothing else, so
+// that memory and files are read alike; byte_source.cpp is the only file of protocol/ that opens files.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::recording {
+
+using wire::Bytes;
+using wire::BytesView;
+
+class Source {
+ public:
+  virtual ~Source() = default;
+  /// For error texts.
+  virtual const std::string& name() const = 0;
+  virtual std::uint64_t size() const = 0;
+  /// Fills `into` from `offset` on; fewer bytes only where the source ends or cannot be read.
+  virtual std::size_t read_at(std::uint64_t offset, std::span<std::byte> into) = 0;
+};
+/// missing_file, io; a folder or a pipe is bad_data.
+Result<std::unique_ptr<Source>> open_source(const std::filesystem::path& file);
+std::unique_ptr<Source> source_from(std::string name, Bytes bytes);
+
+class Sink {
+ public:
+  virtual ~Sink() = default;
+  /// All or nothing: a partial write on a full disk is undone, so that the file ends with a whole record. io; then every later
+  /// call fails the same way.
+  virtual Result<void> append(BytesView record) = 0;
+  /// After a failure: one more record may be tried, a smaller one.
+  virtual void try_again() {}
+  /// Late errors of the file system. io.
+  virtual Result<void> close() = 0;
+};
+/// Creates the file, or empties an existing one. io.
+Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file);
+/// Creates a new file; an existing one is an error and stays unchanged. io.
+Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file);
+/// Appends to `bytes`, which must outlive it.
+std::unique_ptr<Sink> sink_into(Bytes& bytes);
+
+/// Reads a source front to back, through a buffer.
+class Scan {
+ public:
+  explicit Scan(Source& source, std::uint64_t position = 0) : source_(source), position_(position) {}
+
+  std::uint64_t position() const { return position_; }
+  std::uint64_t left() const { return source_.size() > position_ ? source_.size() - position_ : 0; }
+  /// The next `count` bytes, fewer at the end; the position moves past them. Valid until the next call. Allocates no more than
+  /// the source holds, but the caller must bound `count`, since sources can be large.
+  BytesView read(std::size_t count);
+  /// The same, without moving.
+  BytesView peek(std::size_t count);
+  void seek(std::uint64_t position) { position_ = position; }
+  void skip(std::uint64_t count) { position_ += std::min(count, left()); }
+
+ private:
+  Source& source_;
+  std::uint64_t position_ = 0, buffered_from_ = 0;
+  Bytes buffer_;
+};
+
+}  // namespace sonar::recording

@@ -1,0 +1,75 @@
+// The unit of a recording: one message between a sonar and its client, with its time and direction. The readers of every format
+// return them, the writers accept them, and replay sends them again.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "core/base/units.hpp"
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::recording {
+
+enum class Origin { device, client };
+enum class Carrier { stream, datagram };  // TCP; UDP (status)
+
+/// A whole message, or bytes between messages that do not form one. Never part of a message.
+struct RecordedMessage {
+  Time at{};  // of its last byte
+  Origin from = Origin::device;
+  Carrier by = Carrier::stream;
+  wire::Bytes bytes;
+};
+
+/// Reads a recording front to back with bounded memory. Continues after a damaged place.
+class RecordingReader {
+ public:
+  virtual ~RecordingReader() = default;
+  /// nullopt at the end.
+  virtual std::optional<RecordedMessage> next() = 0;
+  /// What could not be read so far, and where: one sentence, of kind bad_data. Complete once next() returned nullopt.
+  virtual std::optional<Error> damage() const = 0;
+  /// Starts again from the front and forgets the damage.
+  virtual void rewind() = 0;
+  /// False when the format stores no times: all are 0.
+  virtual bool knows_times() const { return true; }
+  /// Names what of the recording was skipped (other sonars in the same file); empty when nothing was.
+  virtual std::string note() const { return {}; }
+};
+
+class RecordingWriter {
+ public:
+  virtual ~RecordingWriter() = default;
+  /// Times must not decrease. After an error (io) the file stays as it was before this message, and later calls write nothing.
+  virtual Result<void> write(const RecordedMessage& message) = 0;
+  /// Finishes and closes the file. io.
+  virtual Result<void> close() = 0;
+};
+
+/// Remembers the first damage and counts the others.
+class Damages {
+ public:
+  void add(std::string where_and_what) {
+    if (count_++ == 0) first_ = std::move(where_and_what);
+  }
+  void add(const Damages& others) {
+    if (count_ == 0) first_ = others.first_;
+    count_ += others.count_;
+  }
+  void clear() { *this = {}; }
+  bool any() const { return count_ > 0; }
+  const std::string& first() const { return first_; }
+  std::optional<Error> error(const std::string& file) const {
+    if (count_ == 0) return std::nullopt;
+    const std::string others = count_ == 1 ? "" : "; " + std::to_string(count_ - 1) + " more such places";
+    return Error{ErrorKind::bad_data, file + ": " + first_ + others};
+  }
+
+ private:
+  std::uint64_t count_ = 0;
+  std::string first_;
+};
+
+}  // namespace sonar::recording

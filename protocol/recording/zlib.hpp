@@ -1,0 +1,17 @@
+// The functions of zlib that recordings need: decompression (.oculus files) and CRC-32 (MCAP).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::recording {
+
+/// The decompressed stream; nullopt when it is damaged or decompresses to more than `limit` bytes.
+std::optional<wire::Bytes> inflate(wire::BytesView stream, std::size_t limit);
+
+/// CRC-32 of the bytes; `crc` continues that of the bytes before them.
+std::uint32_t crc32(wire::BytesView bytes, std::uint32_t crc = 0);
+
+}  // namespace sonar::recording

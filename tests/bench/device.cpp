@@ -1,0 +1,97 @@
+// P10 and P11: what a device does when it gets pings in batches, as `sonard render --batch` and data sets give them.
+#include <algorithm>
+#include <cstdio>
+
+#include "cuda/cuda_engine.hpp"
+#include "cuda/cuda_status.hpp"
+#include "tests/bench/findings.hpp"
+
+namespace sonar::bench {
+namespace {
+
+using nlohmann::json;
+
+constexpr double published_reference_ms = 36;  // a frame, P1's size: IOES-Lab/dave, issue 44; on a device of its author's
+constexpr int calls_in_batches = 4;            // batches in one call: two are under way at a time
+
+Result<std::unique_ptr<PingEngine>> engine_of(const ScenePointer& scene, Parallel& pool, const BenchOptions& options, int batch,
+                                              bool steps) {
+  cuda::DeviceEngineOptions device;
+  device.batch = batch;
+  device.cpu_after_failure = false;  // its rate would be taken for the device's
+  return make_cuda_engine(scene, pool, {.simd = options.engine.simd, .now_s = steps ? now_s : nullptr}, device);
+}
+
+struct BatchRate {
+  double pings_per_second = 0;             // as a user has it
+  double processor_ms = 0, device_ms = 0;  // a ping: finding tiles and points, and the device's steps
+};
+
+/// Once to make and send the cells, then timed, pings a call.
+double rate(PingEngine& engine, Pinger& pinger, const std::vector<PingRequest>& requests, std::size_t a_call) {
+  double seconds = 0;
+  for (int round = 0; round < 2; ++round) {
+    seconds = 0;
+    for (std::size_t i = 0; i < requests.size(); i += a_call)
+      seconds += pinger.fire(engine, std::span(requests).subspan(i, std::min(a_call, requests.size() - i)));
+  }
+  return static_cast<double>(requests.size()) / seconds;
+}
+
+Result<BatchRate> rate_of(const ScenePointer& scene, Parallel& pool, Pinger& pinger, const std::vector<PingRequest>& requests,
+                          int batch, const BenchOptions& options) {
+  const std::size_t a_call = static_cast<std::size_t>(batch == 1 ? 1 : calls_in_batches * batch);
+  auto engine = engine_of(scene, pool, options, batch, false);
+  if (!engine) return tl::make_unexpected(engine.error());
+  BatchRate found;
+  found.pings_per_second = rate(**engine, pinger, requests, a_call);
+  engine->reset();  // its memory is the next one's
+  engine = engine_of(scene, pool, options, batch, true);
+  if (!engine) return tl::make_unexpected(engine.error());
+  const auto few = std::span(requests).first(std::min(requests.size(), 2 * a_call));
+  for (int round = 0; round < 2; ++round) pinger.fire(**engine, few);
+  const PingStatistics last = (*engine)->statistics();
+  const auto ms = [&](Stage s) { return 1e3 * last.seconds[static_cast<std::size_t>(s)]; };
+  for (const Stage s : {Stage::specular, Stage::multipath, Stage::cull, Stage::build_cells}) found.processor_ms += ms(s);
+  for (const Stage s : {Stage::trace, Stage::scatter, Stage::synthesize, Stage::noise, Stage::form_beams, Stage::receive})
+    found.device_ms += ms(s);
+  return found;
+}
+
+}  // namespace
+
+Result<json> find_device_rates(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options) {
+  json rates = json::array();
+  double best_of_p1 = 0;
+  for (const char* name : {"P1", "P3a"}) {
+    const BenchCase c = *find_case(name);
+    Pinger pinger(c, options);
+    std::vector<PingRequest> requests;
+    for (int k = 0; k < std::max(options.pings, 2); ++k) requests.push_back(pinger.request(k, bench_pose(c, where, k / 40.0)));
+    Parallel pool(options.threads.back());
+    for (const int batch : {1, 2, 4, 8, 16, 32}) {
+      const auto found = rate_of(scene, pool, pinger, requests, batch, options);
+      if (!found) return tl::make_unexpected(found.error());
+      std::printf(
+          "P10  %-4s %2d pings a launch: %7.1f pings/s  (ms a ping: tiles and points by the CPU %.3f, the device's steps %.3f)\n",
+          name, batch, found->pings_per_second, found->processor_ms, found->device_ms);
+      std::fflush(stdout);
+      rates.push_back({{"case", name},
+                       {"batch", batch},
+                       {"pings_per_second", found->pings_per_second},
+                       {"processor_ms", found->processor_ms},
+                       {"device_ms", found->device_ms}});
+      if (c.name == "P1") best_of_p1 = std::max(best_of_p1, found->pings_per_second);
+    }
+  }
+  const bool given = options.reference_ms > 0;
+  const double reference_ms = given ? options.reference_ms : published_reference_ms, ratio = best_of_p1 * reference_ms / 1e3;
+  std::printf("P11  %.0f times the public reference code (%.1f ms a frame, %s)\n", ratio, reference_ms,
+              given ? "as given for this device" : "as published, on another device");
+  std::fflush(stdout);
+  return json{{"name", cuda_status()},
+              {"rates", rates},
+              {"reference", {{"ms", reference_ms}, {"on_this_device", given}, {"ratio", ratio}}}};
+}
+
+}  // namespace sonar::bench

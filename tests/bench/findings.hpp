@@ -1,0 +1,36 @@
+// What the benchmark finds beside rates of warm pings: cold pings after a jump, moving objects, equal bytes, bins without energy.
+// Each prints its line and returns what goes into the JSON.
+#pragma once
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "core/base/result.hpp"
+#include "tests/bench/measure.hpp"
+
+namespace sonar::bench {
+
+using ScenePointer = std::shared_ptr<const Scene>;
+
+/// P3e: the first ping after a jump to a place without cells, everything else warm; P1 and P3d.
+nlohmann::json find_cold_pings(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
+/// P7: what 100 moving rigid objects add to a ping of P1 over the same objects at rest, and what placing them takes.
+nlohmann::json find_cost_of_objects(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
+/// P9: SHA-256 of the samples of P1, P3a and P3d, with 1, 2 and 4 threads, and again.
+nlohmann::json find_hashes(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
+/// P12: bins of a level bed 10 dB or more below their closed form, in expected power; cells, and one scatterer a ray.
+Result<nlohmann::json> find_empty_bins(const BenchOptions& options);
+
+/// P10 and P11: pings a second in batches on the device, of P1 and P3a, by the size of a batch; what of it is the processor's and
+/// what the device's; the ratio to the public reference code.
+Result<nlohmann::json> find_device_rates(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
+
+/// How the time of a ping grows with rays, rows, triangles, beams and sonars.
+nlohmann::json find_curves(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
+
+/// P5: from a pose and a trigger sent to the last byte received, of a whole daemon on loopback.
+Result<nlohmann::json> find_latency(const ScenePointer& scene, const BenchOptions& options);
+/// P8: clients that take every ping of a whole daemon; dropped pings, and what sending takes of one processor.
+Result<nlohmann::json> find_cost_of_clients(const ScenePointer& scene, int clients, double seconds, const BenchOptions& options);
+
+}  // namespace sonar::bench

@@ -1,0 +1,98 @@
+// How the benchmark measures whole pings, from pose to framed bytes: median and best of many, by the clock on the wall and by the
+// processors' time, which counts what others on the machine do not.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/pipeline/ping_engine.hpp"
+#include "daemon/config/config.hpp"
+#include "tests/bench/cases.hpp"
+
+namespace sonar::bench {
+
+double now_s();           // steady
+double processor_s();     // of all threads of this process
+double this_thread_s();   // of the calling thread
+std::string processor();  // its name and number
+
+/// Sorted at once: what half, nine tenths and all of them were below.
+struct Times {
+  explicit Times(std::vector<double> ms);
+  double min = 0, median = 0, p90 = 0, p99 = 0, max = 0;
+};
+void to_json(nlohmann::json& j, const Times& t);
+
+struct BenchOptions {
+  std::vector<std::string> cases, scenes;
+  std::vector<int> threads;
+  int pings = 100;
+  bool curves = false;
+  std::vector<std::string> given_parts;
+  std::string frequency_sum = "fast";
+  EngineConfig engine;
+  std::uint64_t seed = 1;
+  std::string scene_folder;
+  std::string json_file;
+  double reference_ms = 0;  // of P11: a frame of the public reference code on this device; 0 = not measured
+};
+
+/// An engine with the pool it runs on.
+struct Bench {
+  Parallel pool;
+  std::unique_ptr<PingEngine> engine;
+
+  /// A device is timed step by step only where that is wanted: it takes time of its own.
+  Bench(std::shared_ptr<const Scene> scene, int threads, const BenchOptions& options, bool device_steps = false);
+};
+
+/// Pings of one case, framed where its model has a vendor.
+class Pinger {
+ public:
+  Pinger(const BenchCase& c, const BenchOptions& options);
+
+  PingRequest request(int number, const Pose& sonar) const;
+  /// Seconds it took; `ping` gets the picture when it is wanted.
+  double fire(PingEngine& engine, const PingRequest& request, Ping* ping = nullptr);
+  double last_frame_s() const { return frame_s_; }
+  /// Seconds that all of them took in one call, framed too.
+  double fire(PingEngine& engine, std::span<const PingRequest> requests);
+  const Switches& switches() const { return switches_; }
+  const SonarModel& model() const { return *model_; }
+
+ private:
+  BenchCase case_;
+  Switches switches_;
+  std::uint64_t seed_;
+  std::shared_ptr<const SonarModel> model_;
+  protocol::DeviceState device_;
+  double frame_s_ = 0;
+};
+
+/// What a row of the table says.
+struct Figures {
+  std::string case_name, description, scene, engine;
+  Switches switches;
+  std::vector<std::string> parts_had;
+  int threads = 0, pings = 0;
+  double cold_ms = 0, processor_ms = 0;  // of the first ping; median of the others, all threads together
+  Times wall{{}};
+  std::array<double, static_cast<std::size_t>(Stage::stages)> stage_ms{};  // mean a ping, summed over threads
+  double frame_ms = 0;
+  PingStatistics last;
+  std::size_t scene_triangles = 0;
+  double pings_per_second() const { return wall.median > 0 ? 1e3 / wall.median : 0; }
+};
+
+/// `options.pings` of them, after a tenth as many for warming up; the sonar moves as the case says.
+Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene, PingEngine& engine, int threads,
+                const BenchOptions& options);
+void print(const Figures& figures);
+nlohmann::json json_of(const Figures& figures);
+
+}  // namespace sonar::bench

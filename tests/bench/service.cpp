@@ -1,0 +1,207 @@
+// Latency and the cost of clients of a whole daemon: the one that `sonard run` is, in a thread of this process, and clients that
+// talk the Oculus protocol to it over loopback.
+#include <pthread.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <list>
+#include <string>
+#include <thread>
+
+#include "daemon/server/app.hpp"
+#include "daemon/server/engine/choose_engine.hpp"
+#include "protocol/oculus/decode.hpp"
+#include "tests/bench/findings.hpp"
+
+namespace sonar::bench {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::uint16_t data_port = 52100;
+constexpr int patience_s = 20;
+
+/// One of 127.64..127.191, from the number of this process.
+std::string own_address() {
+  const auto process = static_cast<unsigned>(::getpid());
+  return "127." + std::to_string(64 + process / 250 % 128) + "." + std::to_string(1 + process % 250) + ".99";
+}
+
+oculus::FireRequest fire_p3a(bool triggered) {
+  oculus::FireRequest fire;
+  fire.settings.mode = 2;
+  fire.settings.ping_rate = oculus::PingRate::hz40;
+  fire.settings.flags = oculus::flag::range_in_metres | oculus::flag::simple_result | oculus::flag::beams_512;
+  if (triggered) fire.settings.flags |= oculus::flag::network_trigger;
+  fire.settings.range = 10;
+  fire.settings.gain_percent = 50;
+  return fire;
+}
+
+class Service {
+ public:
+  static Result<std::unique_ptr<Service>> start(const ScenePointer& scene, const BenchOptions& options) {
+    const std::string address = own_address();
+    auto config = parse_config(
+        "world: {scene: local-search.yaml}\n"
+        "vehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -8], rpy_deg: [0, 14.3, 0]}}\n"
+        "sonars:\n  - {name: front, profile: oculus-m1200d, clients: {max: 16}, bind_ip: " +
+            address + ", status_to: ['" + address + ":9']}\n" + "poses: {protobuf: '" + address + ":0', json: '" + address +
+            ":0'}\ncontrol: {stream: off, http: off}\n",
+        "bench", options.scene_folder);
+    if (!config) return tl::make_unexpected(config.error());
+    config->engine = options.engine;
+    auto service = std::unique_ptr<Service>(new Service(*std::move(config), scene, options));
+    if (auto opened = service->app_.open(); !opened) return tl::make_unexpected(opened.error());
+    service->address_ = address;
+    service->thread_ = std::thread([app = &service->app_] { app->run(); });
+    return service;
+  }
+  ~Service() { stop(); }
+  void stop() {
+    app_.request_stop();
+    if (thread_.joinable()) thread_.join();
+  }
+  tcp::endpoint data() const { return {asio::ip::make_address(address_), data_port}; }
+  udp::endpoint poses() const { return {asio::ip::make_address(address_), app_.poses().json().port}; }
+  /// Processor time of the thread that does all sending, while it runs.
+  double sender_s() {
+    clockid_t clock{};
+    timespec t{};
+    if (::pthread_getcpuclockid(thread_.native_handle(), &clock) != 0 || ::clock_gettime(clock, &t) != 0) return 0;
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  }
+  /// After stop().
+  DeviceFigures figures() const { return app_.devices().front().figures(); }
+
+ private:
+  Service(Config config, const ScenePointer& scene, const BenchOptions& options)
+      : pool_(options.threads.back(), 10),
+        log_(errors_only()),
+        app_(
+            std::move(config), scene,
+            [this, engine = options.engine](ScenePointer s) {
+              return choose_engine(engine.device, std::move(s), pool_, {.simd = engine.simd}, {});
+            },
+            {}, log_) {}
+
+  static LogOptions errors_only() {
+    LogOptions options;
+    options.level = LogLevel::error;
+    return options;
+  }
+
+  Parallel pool_;
+  Log log_;
+  App app_;
+  std::string address_;
+  std::thread thread_;
+};
+
+class Client {
+ public:
+  Client(asio::io_context& io, const tcp::endpoint& to) : socket_(io) {
+    socket_.connect(to);
+    socket_.set_option(tcp::no_delay(true));
+    const timeval limit{patience_s, 0};
+    ::setsockopt(socket_.native_handle(), SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  }
+  void fire(const oculus::FireRequest& fire) { asio::write(socket_, asio::buffer(oculus::make_fire(fire))); }
+  /// When the last byte of the next ping was here; 0 = the stream has ended.
+  double next_ping() {
+    for (;;) {
+      while (auto message = decoder_.next())
+        if (const auto* ping = std::get_if<oculus::DecodedPing>(&*message)) {
+          rows = static_cast<int>(ping->rows());
+          return read_at_s_;
+        }
+      error_code ec;
+      const std::size_t n = socket_.read_some(asio::buffer(buffer_), ec);
+      if (ec) return 0;
+      read_at_s_ = now_s();
+      decoder_.append(std::span(buffer_).first(n));
+    }
+  }
+  void close() {
+    error_code ec;
+    socket_.shutdown(tcp::socket::shutdown_both, ec);
+  }
+  int rows = 0;
+
+ private:
+  tcp::socket socket_;
+  std::vector<std::byte> buffer_ = std::vector<std::byte>(1 << 18);
+  oculus::Decoder decoder_;
+  double read_at_s_ = 0;
+};
+
+Error broken(const char* what) { return {ErrorKind::unavailable, std::string("the bench's daemon ") + what}; }
+
+}  // namespace
+
+Result<json> find_latency(const ScenePointer& scene, const BenchOptions& options) {
+  auto service = Service::start(scene, options);
+  if (!service) return tl::make_unexpected(service.error());
+  asio::io_context io;
+  Client client(io, (*service)->data());
+  udp::socket poses(io, udp::v4());
+  std::vector<double> latency_ms;
+  const int triggers = std::max(200, 2 * options.pings), warm_up = 10;
+  for (int k = 0; k < triggers + warm_up; ++k) {
+    const double t = k / 40.0;  // NED: one swims north at 8 m below the surface
+    char pose[160];
+    const int length = std::snprintf(pose, sizeof pose, "{\"position\":[%.4f,%.4f,8],\"attitude\":[0,-0.25,%.4f]}\n",
+                                     0.35 * std::sin(t), 0.9 * t, pi / 2 + 0.3 * std::sin(t));
+    const double begin = now_s();
+    poses.send_to(asio::buffer(pose, static_cast<std::size_t>(length)), (*service)->poses());
+    client.fire(fire_p3a(true));
+    const double end = client.next_ping();
+    if (end == 0) return tl::make_unexpected(broken("sent no ping within 20 s"));
+    if (k >= warm_up) latency_ms.push_back(1e3 * (end - begin));
+    std::this_thread::sleep_for(std::chrono::milliseconds(25));  // the ping rate a device allows
+  }
+  client.close();
+  const Times times(latency_ms);
+  std::printf("P5   pose and trigger to last byte, %d rows, %d threads: median %.2f ms, p99 %.2f, worst %.2f of %d\n",
+              client.rows, options.threads.back(), times.median, times.p99, times.max, triggers);
+  std::fflush(stdout);
+  return json{
+      {"case", "P3a"}, {"rows", client.rows}, {"threads", options.threads.back()}, {"triggers", triggers}, {"latency", times}};
+}
+
+Result<json> find_cost_of_clients(const ScenePointer& scene, int clients, double seconds, const BenchOptions& options) {
+  auto service = Service::start(scene, options);
+  if (!service) return tl::make_unexpected(service.error());
+  asio::io_context io;
+  std::list<Client> all;
+  for (int i = 0; i < clients; ++i) all.emplace_back(io, (*service)->data());
+  all.front().fire(fire_p3a(false));
+  std::atomic<std::uint64_t> received{0};
+  std::vector<std::thread> readers;
+  for (Client& client : all)
+    readers.emplace_back([&client, &received] {
+      while (client.next_ping() != 0) ++received;
+    });
+  const auto wait_s = [](double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); };
+  wait_s(1);
+  const double begin = now_s(), used = (*service)->sender_s();
+  const std::uint64_t before = received;
+  wait_s(seconds);
+  const double took_s = now_s() - begin, share = ((*service)->sender_s() - used) / took_s;
+  const double rate_hz = static_cast<double>(received - before) / took_s / clients;
+  (*service)->stop();
+  for (std::thread& reader : readers) reader.join();
+  const DeviceFigures f = (*service)->figures();
+  const std::uint64_t slow = f.dropped_by[static_cast<std::size_t>(DropReason::slow)];
+  std::printf("P8   %d clients: %.1f pings/s each, %llu dropped, %llu ticks skipped; the sender takes %.1f %% of a processor\n",
+              clients, rate_hz, static_cast<unsigned long long>(slow), static_cast<unsigned long long>(f.skipped_ticks),
+              100 * share);
+  std::fflush(stdout);
+  return json{{"clients", clients},    {"pings_per_second", rate_hz},
+              {"dropped", slow},       {"skipped_ticks", f.skipped_ticks},
+              {"sender_share", share}, {"seconds", took_s}};
+}
+
+}  // namespace sonar::bench

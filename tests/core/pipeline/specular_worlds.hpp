@@ -1,0 +1,64 @@
+// Worlds of one mirror and what their echoes should be: the Kirchhoff integral summed patch by patch, which knows neither
+// Fresnel integrals nor principal radii. For the tests of specular echoes.
+#pragma once
+
+#include <complex>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+
+namespace sonar::test {
+
+/// A material that only mirrors: smooth, and no diffuse echo left.
+Material mirror(double reflection = 1);
+
+struct Mirror {
+  Mesh mesh;
+  Primitive primitive = {};
+  Pose in_world = {};
+  Material material = mirror();
+};
+/// A scene of such objects; without their primitives when `as_meshes`.
+std::shared_ptr<const Scene> world_of(std::vector<Mirror> mirrors, bool as_meshes = false);
+
+// Mirrors in their own axes, mesh and primitive alike.
+Mirror specular_sphere(double radius_m);
+Mirror specular_cylinder(double radius_m, double length_m);
+Mirror specular_plane(double length_x_m, double length_y_m);
+Mirror specular_box(Vec3d size_m);
+/// Turned so that its z axis (a plane's normal, a cylinder's axis) points along -x, and put in front of the sonar.
+Pose facing(double x_m, double tilt_rad = 0);
+/// Its z axis along world z, or tilted about x by `tilt_rad` toward y; axis at x_m ahead.
+Pose standing(double x_m, double tilt_rad = 0);
+
+/// Pings from the origin with beam `beams / 2` looking along x; specular on.
+class SpecularSounding {
+ public:
+  SpecularSounding(std::shared_ptr<const Scene> scene, const FrequencyMode& mode, const PingSettings& settings);
+  Sounding& sounding() { return sounding_; }
+  /// Height of the loudest echo of the middle beam within `slack_m` of a range [uPa]; 0 where nothing comes.
+  double peak_upa(double range_m, double slack_m = 0.05);
+  /// The same as a pressure re source at 1 m, absorption taken out: eq. 7 without exp(-2 alpha r).
+  double strength_per_m(double range_m, double slack_m = 0.05);
+  /// Turns the sonar by this much more to port.
+  void turn(double yaw_rad);
+  double wavelength_m() const;
+
+ private:
+  Sounding sounding_;
+  double middle_azimuth_ = 0;
+};
+
+double db(double amplitude);
+/// A rigid surface's echo per source pressure at 1 m [1/m]: (1 / lambda) |integral of cos / R^2 exp(-i 2 k R) dA|, over
+/// surface(u, v), u and v in (0, 1), which returns place and area normal (length = area per du dv), sonar in the origin.
+/// Places that the sonar sees from behind do not count.
+struct Patch {
+  Vec3d place, area;
+};
+double kirchhoff_per_m(double wavelength_m, int steps_u, int steps_v, const std::function<Patch(double, double)>& surface);
+
+}  // namespace sonar::test

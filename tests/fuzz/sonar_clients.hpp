@@ -1,0 +1,69 @@
+// One emulated sonar and up to three clients in virtual time: the product's Sonar, driven without sockets, with clients that read
+// at their own pace, and everything that must hold between them. conversation_fuzz.cpp drives it by a script of bytes.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "daemon/emulator/sonar/sonar.hpp"
+#include "protocol/oculus/decode.hpp"
+
+namespace sonar::fuzz {
+
+/// What a client receives, taken apart by the driver's side of its vendor: whole messages only, pings in rising order.
+class StreamReader {
+ public:
+  virtual ~StreamReader() = default;
+  virtual void read(protocol::BytesView bytes) = 0;
+  /// Nothing of a message is left over.
+  virtual bool at_a_message_end() const = 0;
+};
+std::unique_ptr<StreamReader> oculus_reader();
+std::unique_ptr<StreamReader> blueview_reader();
+
+class SonarClients {
+ public:
+  static constexpr std::size_t places = 3;
+
+  /// `sonar` without a vehicle of its own: it rests 3 m deep.
+  explicit SonarClients(SonarConfig sonar);
+
+  void connect(std::size_t place, Role role = Role::client);
+  void receive(std::size_t place, protocol::BytesView bytes);  // from the client
+  void tick(std::size_t place);                                // at its next tick, which may be later than now
+  void wait(std::chrono::nanoseconds time);                    // whatever falls due on the way is done, up to a bound
+  void fire();                                                 // the engine is done with a ping
+  void write(std::size_t place, std::size_t bytes);            // the client takes so many
+  void finish(std::size_t place);                              // as when its peer is silent
+  void disconnect(std::size_t place);
+  /// The sonar stops; everybody takes what is left and goes; nothing may be missing.
+  void end();
+
+ private:
+  struct Client {
+    ConnectionId id = 0;
+    bool served = false, finishing = false;
+    std::unique_ptr<StreamReader> reader;
+    Outbox::Message writing = {};  // and how far it got: bytes of its copy number `part`
+    std::size_t part = 0, done = 0;
+  };
+  void perform(Actions actions);
+  std::optional<std::size_t> place_of(ConnectionId id) const;
+  void tick_all_due();
+  bool write_piece(Client& client, std::size_t& bytes);
+  void check() const;
+
+  std::unique_ptr<protocol::Vendor> vendor_;
+  Config config_;
+  World world_;
+  Time now_;
+  Sonar sonar_;
+  std::optional<PingRequest> computing_;
+  ConnectionId last_id_ = 0;
+  std::array<std::optional<Client>, places> clients_;
+};
+
+}  // namespace sonar::fuzz

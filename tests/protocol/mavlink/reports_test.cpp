@@ -1,0 +1,210 @@
+// What is said to the autopilot and to the user.
+#include <functional>
+
+#include "tests/protocol/mavlink/mavlink_testing.hpp"
+
+namespace sonar::mavlink {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::Pair;
+
+std::vector<Frame> known_frames(const std::vector<Bytes>& datagrams) {
+  std::vector<Frame> frames;
+  for (const Bytes& d : datagrams) {
+    FrameReader reader(d);
+    while (auto f = reader.next()) frames.push_back(*f);
+  }
+  return frames;
+}
+/// Message and interval in microseconds of every request.
+std::vector<std::pair<int, int>> requests(const std::vector<Bytes>& datagrams) {
+  std::vector<std::pair<int, int>> all;
+  for (const Bytes& d : datagrams) {
+    if (std::to_integer<int>(d.at(7)) != static_cast<int>(CommandLong::id)) continue;
+    Bytes payload(d.begin() + 10, d.end() - 2);
+    payload.resize(33);
+    CommandLong m;
+    wire::Reader reader(payload);
+    fields(reader, m);
+    EXPECT_EQ(m.command, 511);
+    all.emplace_back(static_cast<int>(m.param1), static_cast<int>(m.param2));
+  }
+  return all;
+}
+std::string report_of(Settings settings, const Bytes& datagram) {
+  MavlinkPoses poses(std::move(settings));
+  poses.on_datagram(datagram, at_s(10));
+  EXPECT_THAT(poses.on_tick(at_s(10.9)).notices, IsEmpty()) << "it waits for a second first";
+  const auto notices = poses.on_tick(at_s(11)).notices;
+  EXPECT_THAT(poses.on_tick(at_s(12)).notices, IsEmpty()) << "reported once";
+  return notices.size() == 1 ? notices[0] : "";
+}
+
+TEST(MavlinkReports, AHeartbeatASecondAsAnOnboardComputerOfTheSystem) {
+  MavlinkPoses poses({});
+  int beats = 0;
+  for (int i = 0; i < 40; ++i) beats += static_cast<int>(poses.on_tick(at_s(100 + 0.25 * i)).replies.size());
+  EXPECT_EQ(beats, 10);
+  Sender v{{42, 1, 0}};
+  poses.on_datagram(v(autopilot_heartbeat()), at_s(110));
+  const auto frames = known_frames(poses.on_tick(at_s(111)).replies);
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(frames[0].system, 42);
+  EXPECT_EQ(frames[0].component, MavlinkPoses::own_component);
+  const Heartbeat beat = message_in<Heartbeat>(frames[0]);
+  EXPECT_EQ(beat.type, 18);
+  EXPECT_EQ(beat.autopilot, 8);
+  EXPECT_EQ(beat.mavlink_version, 3);
+}
+
+TEST(MavlinkReports, RatesAreRequestedOnlyWhenWantedAndUntilPosesCome) {
+  Sender v;
+  MavlinkPoses quiet({});
+  quiet.on_datagram(v(autopilot_heartbeat()), at_s(1));
+  EXPECT_THAT(requests(quiet.on_tick(at_s(1.1)).replies), IsEmpty());
+
+  Settings settings;
+  settings.request_rates = true;
+  settings.rate_hz = 20;
+  MavlinkPoses asks(settings);
+  EXPECT_THAT(requests(asks.on_tick(at_s(0)).replies), IsEmpty()) << "no message yet";
+  asks.on_datagram(v(autopilot_heartbeat()), at_s(1));
+  using Pairs = std::vector<std::pair<int, int>>;
+  const Pairs wanted{{331, 50000}, {31, 50000}, {32, 50000}};
+  EXPECT_EQ(requests(asks.on_tick(at_s(1.1)).replies), wanted);
+  EXPECT_THAT(requests(asks.on_tick(at_s(2)).replies), IsEmpty());
+  EXPECT_EQ(requests(asks.on_tick(at_s(6.2)).replies), wanted) << "again: nothing came of it";
+  asks.on_datagram(v(odometry(1, 0)), at_s(7));
+  EXPECT_THAT(requests(asks.on_tick(at_s(11.5)).replies), IsEmpty());
+
+  settings.origin = Geodetic{0.8, -2, 0};
+  MavlinkPoses geodetic(settings);
+  geodetic.on_datagram(v(autopilot_heartbeat()), at_s(1));
+  EXPECT_EQ(requests(geodetic.on_tick(at_s(1)).replies),
+            (Pairs{{331, 50000}, {31, 50000}, {32, 50000}, {108, 50000}, {33, 50000}, {49, 1000000}}));
+}
+
+TEST(MavlinkReports, TheFirstSentenceNamesSystemMessagesAndSource) {
+  Sender v;
+  EXPECT_EQ(report_of({}, v(autopilot_heartbeat()) + v(attitude(1, 0)) + v(local(1, 0, 0, 0))),
+            "system 1 (ArduPilot) sends HEARTBEAT, ATTITUDE, LOCAL_POSITION_NED; poses from LOCAL_POSITION_NED and attitude");
+  EXPECT_EQ(report_of({}, Sender{{3, 1, 0}}(odometry(1, 0))), "system 3 sends ODOMETRY; poses from ODOMETRY");
+}
+
+TEST(MavlinkReports, TheFirstSentenceSaysWhatIsMissing) {
+  Sender v;
+  const Bytes beat = v(autopilot_heartbeat());
+  GlobalPositionInt global;
+  global.latitude_e7_deg = 476000000, global.longitude_e7_deg = -1223300000;
+  SimState sim;
+  sim.latitude_deg = 47.6f, sim.longitude_deg = -122.33f;
+  Settings origin;
+  origin.origin = Geodetic{rad_from_deg(47.6), rad_from_deg(-122.33), 0};
+
+  EXPECT_THAT(report_of({}, beat),
+              EndsWith("no poses yet: an attitude is missing (ATTITUDE_QUATERNION or ATTITUDE); a position is "
+                       "missing (LOCAL_POSITION_NED, or GLOBAL_POSITION_INT with world.origin); set its stream "
+                       "rates, or request_rates: true"));
+  EXPECT_THAT(report_of({}, beat + v(attitude(1, 0)) + v(global)),
+              HasSubstr("no poses yet: GLOBAL_POSITION_INT needs world.origin"));
+  EXPECT_THAT(report_of({}, beat + v(sim)), HasSubstr("SIM_STATE needs world.origin"));
+  EXPECT_THAT(report_of({}, v(local(1, 0, 0, 0))),
+              AllOf(HasSubstr("no poses yet: an attitude is missing"), Not(HasSubstr("a position is missing"))));
+  EXPECT_THAT(report_of({}, v(attitude(1, 0))),
+              AllOf(HasSubstr("no poses yet: a position is missing"), Not(HasSubstr("an attitude is missing"))));
+  EXPECT_THAT(report_of({}, v(global)), AllOf(HasSubstr("GLOBAL_POSITION_INT needs world.origin; an attitude is missing")));
+  EXPECT_THAT(report_of(origin, v(global)), AllOf(HasSubstr("an attitude is missing"), Not(HasSubstr("no fix"))));
+  Settings asks;
+  asks.request_rates = true;
+  EXPECT_THAT(report_of(asks, beat), EndsWith("requested (request_rates) but not received"));
+  EXPECT_THAT(report_of(origin, v(attitude(1, 0)) + v(GlobalPositionInt{})), HasSubstr("GLOBAL_POSITION_INT has no fix"));
+  EXPECT_THAT(report_of(origin, v.version_1(sim)), HasSubstr("poses from SIM_STATE, in steps of up to 0.4 m"));
+  Odometry broken = odometry(1, 0);
+  broken.frame_id = 99;
+  EXPECT_THAT(report_of({}, v(broken)), AllOf(HasSubstr("the received messages were refused"), Not(HasSubstr("request_rates"))));
+}
+
+/// The seconds at which a sentence was said, between two of them, and the sentences.
+std::vector<std::pair<int, std::string>> notices_of(MavlinkPoses& poses, int from_s, int to_s,
+                                                    const std::function<void(int)>& each = {}) {
+  std::vector<std::pair<int, std::string>> all;
+  for (int s = from_s; s < to_s; ++s) {
+    if (each) each(s);
+    for (const std::string& notice : poses.on_tick(at_s(s)).notices) all.emplace_back(s, notice);
+  }
+  return all;
+}
+
+TEST(MavlinkReports, WhatIsMissingIsSaidAgainEverMoreSeldomAndWhenItIsThere) {
+  Sender v;
+  MavlinkPoses poses({});
+  const auto beats = [&](int s) { poses.on_datagram(v(autopilot_heartbeat()), at_s(s)); };
+  const auto missing = notices_of(poses, 0, 121, beats);
+  std::vector<int> when;
+  for (const auto& [s, text] : missing) {
+    when.push_back(s);
+    EXPECT_THAT(text, HasSubstr("an attitude is missing"));
+  }
+  EXPECT_THAT(when, ElementsAre(1, 16, 46, 106));
+  EXPECT_THAT(poses.health_error(at_s(120)), HasSubstr("an attitude is missing"));
+
+  const auto tilts = [&](int s) { poses.on_datagram(v(attitude(static_cast<std::uint32_t>(1000 * s), 0)), at_s(s)); };
+  EXPECT_THAT(notices_of(poses, 121, 230, tilts),
+              ElementsAre(Pair(226, AllOf(HasSubstr("a position is missing"), Not(HasSubstr("an attitude is missing"))))))
+      << "what has come is missing no more";
+  const auto poses_come = [&](int s) { poses.on_datagram(v(odometry(1'000'000ull * static_cast<unsigned>(s), 1)), at_s(s)); };
+  EXPECT_THAT(notices_of(poses, 230, 900, poses_come), ElementsAre(Pair(230, HasSubstr("poses from ODOMETRY"))));
+  EXPECT_THAT(poses.health_error(at_s(900)), IsEmpty());
+  const auto silent = notices_of(poses, 900, 921);
+  ASSERT_EQ(silent.size(), 2u);
+  EXPECT_EQ(silent[0].first, 905);
+  EXPECT_THAT(silent[0].second, HasSubstr("system 1 (ArduPilot) has sent nothing for 6 s: no poses"));
+}
+
+TEST(MavlinkReports, PosesThatEndWhileTheSystemSpeaksAreReported) {
+  Sender v;
+  MavlinkPoses poses({});
+  poses.on_datagram(v(odometry(1, 0)), at_s(0));
+  const auto sentences = notices_of(poses, 1, 10, [&](int s) { poses.on_datagram(v(autopilot_heartbeat()), at_s(s)); });
+  EXPECT_THAT(sentences, ElementsAre(Pair(1, HasSubstr("poses from ODOMETRY")),
+                                     Pair(6, AllOf(HasSubstr("sends HEARTBEAT; no more poses: an attitude is missing"),
+                                                   Not(HasSubstr("sends HEARTBEAT, ODOMETRY"))))));
+}
+
+TEST(MavlinkReports, ALinkOnWhichTheRightOneNeverSpeaksIsReported) {
+  MavlinkPoses silent({});
+  EXPECT_THAT(notices_of(silent, 0, 10), ElementsAre(Pair(5, HasSubstr("no poses yet: no message received"))));
+  EXPECT_THAT(silent.health_error(at_s(1)), HasSubstr("no message received"));
+
+  Settings settings;
+  settings.system_id = 2;
+  MavlinkPoses filtered(settings);
+  const auto speaks = [&](int s) { filtered.on_datagram(Sender{{1, 1, 0}}(odometry(1, 0)), at_s(s)); };
+  EXPECT_THAT(
+      notices_of(filtered, 0, 10, speaks),
+      ElementsAre(Pair(5, "no poses yet: system 1, component 1 sends messages, but does not match system_id and component_id")));
+
+  MavlinkPoses station({});
+  Heartbeat beat = autopilot_heartbeat();
+  beat.autopilot = Heartbeat::no_autopilot;
+  const auto beats = [&](int s) { station.on_datagram(Sender{{255, 190, 0}}(beat), at_s(s)); };
+  EXPECT_THAT(notices_of(station, 0, 10, beats),
+              ElementsAre(Pair(5, HasSubstr("system 255, component 190 sends messages, but neither"))));
+}
+
+TEST(MavlinkReports, AnotherSystemIsReportedToo) {
+  MavlinkPoses poses({});
+  poses.on_datagram(Sender{{1, 1, 0}}(odometry(1, 0)), at_s(0));
+  EXPECT_THAT(poses.on_tick(at_s(2)).notices, ElementsAre(HasSubstr("system 1 ")));
+  poses.on_datagram(Sender{{2, 1, 0}}(odometry(1, 0)), at_s(10));
+  EXPECT_THAT(poses.on_tick(at_s(12)).notices, ElementsAre(HasSubstr("system 2 ")));
+}
+
+}  // namespace
+}  // namespace sonar::mavlink

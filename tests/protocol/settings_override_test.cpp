@@ -1,0 +1,112 @@
+// Settings overrides, as the control protocol sends them: applied as the request that a client of the vendor would have sent.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "protocol/oculus/fire.hpp"
+#include "protocol/vendor.hpp"
+#include "tests/protocol/blueview/blueview_testing.hpp"
+
+namespace {
+
+using namespace sonar;
+using testing::HasSubstr;
+
+/// One knob after the other: set().range(5).rate(10).
+struct Override : protocol::SettingsOverride {
+  Override& range(double m) { return range_m = m, *this; }
+  Override& rate(double hz) { return rate_hz = hz, *this; }
+  Override& gain(double percent) { return gain_percent = percent, *this; }
+  Override& of_mode(std::uint32_t index) { return mode = index, *this; }
+  Override& with_beams(std::uint32_t count) { return beams = count, *this; }
+};
+Override set() { return {}; }
+
+protocol::DeviceState oculus_device() {
+  const auto profile = protocol::find_profile("oculus-m1200d");
+  protocol::DeviceState d;
+  d.model = profile->model;
+  d.options = *protocol::check_options(*profile->vendor, {});
+  d.settings = profile->vendor->initial_settings(d).vendor_settings;
+  return d;
+}
+const protocol::Vendor& oculus() { return *protocol::vendors().front(); }
+
+TEST(OculusOverride, IsTheFireMessageThatADriverWouldHaveSent) {
+  protocol::DeviceState device = oculus_device();
+  oculus::FireRequest held = oculus::fire_of(device.settings.get());
+  held.settings.gamma = 99;
+  held.settings.flags |= oculus::flag::network_trigger;
+  held.settings.sound_speed_mps = 1488;
+  device.settings = std::make_shared<oculus::HeldFire>(held);
+
+  const auto change = oculus().apply_override(set().range(7.5).rate(14).gain(30), device);
+  ASSERT_TRUE(change) << change.error().text;
+  const oculus::FireRequest asked = oculus::fire_of(change->vendor_settings.get());
+  EXPECT_EQ(asked.settings.range, 7.5);
+  EXPECT_EQ(asked.settings.ping_rate, oculus::PingRate::hz15) << "the nearest of the table";
+  EXPECT_EQ(asked.settings.gain_percent, 30);
+  EXPECT_EQ(asked.settings.gamma, 99) << "unset fields stay";
+  EXPECT_EQ(asked.settings.sound_speed_mps, 1488);
+  EXPECT_TRUE(asked.settings.flags & oculus::flag::network_trigger);
+  EXPECT_EQ(change->settings.range_m, 7.5);
+  EXPECT_FLOAT_EQ(change->settings.rate_hz, 15);
+  EXPECT_TRUE(change->settings.triggered);
+}
+
+TEST(OculusOverride, ModesBeamsAndStandby) {
+  const protocol::DeviceState device = oculus_device();
+  const auto low = oculus().apply_override(set().of_mode(0).with_beams(256), device);
+  ASSERT_TRUE(low);
+  EXPECT_EQ(oculus::fire_of(low->vendor_settings.get()).settings.mode, 1);
+  EXPECT_EQ(low->settings.mode, 0);
+  EXPECT_EQ(low->settings.beam_count, 256);
+  const auto still = oculus().apply_override(set().rate(0), device);
+  ASSERT_TRUE(still);
+  EXPECT_EQ(still->settings.rate_hz, 0);
+  const auto far = oculus().apply_override(set().range(30).of_mode(0), device);
+  EXPECT_TRUE(far) << "the range of the mode set with it";
+}
+
+TEST(OculusOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
+  const protocol::DeviceState device = oculus_device();
+  const auto why = [&](const protocol::SettingsOverride& asked) {
+    const auto change = oculus().apply_override(asked, device);
+    return change ? "" : change.error().text;
+  };
+  EXPECT_THAT(why(set().range(11)), HasSubstr("0.1 to 10 m"));
+  EXPECT_THAT(why(set().range(0)), HasSubstr("0.1 to 10 m"));
+  EXPECT_THAT(why(set().of_mode(2)), HasSubstr("2 mode(s)"));
+  EXPECT_THAT(why(set().with_beams(300)), HasSubstr("256 or 512"));
+  EXPECT_THAT(why(set().gain(101)), HasSubstr("0 to 100"));
+  EXPECT_THAT(why(set().rate(-1)), HasSubstr("0 (standby) or above"));
+}
+
+TEST(BlueViewOverride, IsWhatAHostWouldHaveSet) {
+  protocol::DeviceState device = blueview::test::device();
+  blueview::SonarSettings held = blueview::settings_from(device.settings.get(), device);
+  held.heads[0].tvg_db_per_m = 0.25f;
+  device.settings = std::make_shared<blueview::SonarSettings>(held);
+  const auto change = blueview::vendor().apply_override(set().range(25).rate(4).gain(75), device);
+  ASSERT_TRUE(change) << change.error().text;
+  const blueview::SonarSettings now = blueview::settings_from(change->vendor_settings.get(), device);
+  EXPECT_FLOAT_EQ(now.heads[0].stop_m, 25);
+  EXPECT_FLOAT_EQ(now.heads[0].start_m, held.heads[0].start_m);
+  EXPECT_FLOAT_EQ(now.heads[0].tvg_db_per_m, 0.25f);
+  EXPECT_FLOAT_EQ(now.heads[0].gain_db, 24);
+  EXPECT_FLOAT_EQ(change->settings.rate_hz, 4);
+}
+
+TEST(BlueViewOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
+  const protocol::DeviceState device = blueview::test::device();
+  const auto why = [&](const protocol::SettingsOverride& asked) {
+    const auto change = blueview::vendor().apply_override(asked, device);
+    return change ? "" : change.error().text;
+  };
+  EXPECT_THAT(why(set().range(1000)), HasSubstr("has a range of"));
+  EXPECT_THAT(why(set().range(1)), HasSubstr("starts at 2 m"));
+  EXPECT_THAT(why(set().rate(0)), HasSubstr("no standby"));
+  EXPECT_THAT(why(set().of_mode(1)), HasSubstr("1 mode(s)"));
+  EXPECT_THAT(why(set().with_beams(256)), HasSubstr("512 beams"));
+}
+
+}  // namespace
