@@ -6,6 +6,7 @@
 #include "clients/bvtsdk/core/polar_ping.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
 #include "tests/fuzz/byte_script.hpp"
+#include "tests/protocol/delegating_vendor.hpp"
 
 namespace sonar::fuzz {
 namespace {
@@ -33,41 +34,14 @@ Bytes smallest_polar_ping(std::uint32_t number) {
 }
 
 /// The vendor itself, but for large pings.
-class SmallPings final : public protocol::Vendor {
+class SmallPings final : public protocol::DelegatingVendor {
  public:
-  explicit SmallPings(const protocol::Vendor& of) : of_(of) {}
-  std::string_view name() const override { return of_.name(); }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return of_.models(); }
-  std::span<const protocol::Port> ports() const override { return of_.ports(); }
-  std::span<const protocol::Option> options() const override { return of_.options(); }
-  int default_max_clients() const override { return of_.default_max_clients(); }
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues& options) const override {
-    return of_.tuned(std::move(model), options);
-  }
-  protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
-    return of_.initial_settings(device);
-  }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return of_.apply_override(wanted, device);
-  }
-  bool pings_before_first_request(const protocol::DeviceState& device) const override {
-    return of_.pings_before_first_request(device);
-  }
-  Bytes beacon(const protocol::DeviceState& device, Time now) const override { return of_.beacon(device, now); }
-  Bytes answer(BytesView datagram, const protocol::DeviceState& device) const override { return of_.answer(datagram, device); }
-  std::unique_ptr<protocol::Dialogue> converse(const protocol::DeviceState& device, Time now) const override {
-    return of_.converse(device, now);
-  }
+  using DelegatingVendor::DelegatingVendor;
   std::shared_ptr<const Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
     const bool small = name() == "oculus" || !ping.samples.empty();
-    return small ? of_.frame(ping, device)
+    return small ? DelegatingVendor::frame(ping, device)
                  : std::make_shared<const Bytes>(smallest_polar_ping(static_cast<std::uint32_t>(ping.request.number)));
   }
-
- private:
-  const protocol::Vendor& of_;
 };
 
 std::shared_ptr<const Ping> computed(PingRequest request) {

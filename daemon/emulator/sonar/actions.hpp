@@ -63,8 +63,7 @@ struct PingQueued {
 };
 /// A line for the log; those of one topic are limited together.
 struct Report {
-  enum class Topic { settings, notice, ignored, refused_ping, state, fault } topic{};
-  static constexpr std::size_t topics = 6;
+  enum class Topic { settings, notice, ignored, refused_ping, state, fault, topics } topic{};
   LogLine line;
 };
 /// The engine failed: no sonar can go on.

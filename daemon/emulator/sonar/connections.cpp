@@ -7,7 +7,9 @@ namespace {
 
 using State = Connection::State;
 
-void add(DeviceFigures& f, const Connection& c) {
+}  // namespace
+
+void add_traffic(DeviceFigures& f, const Connection& c) {
   f.offered += c.outbox.pings_offered();
   f.sent += c.outbox.pings_written();
   f.dropped += c.outbox.pings_dropped();
@@ -16,8 +18,6 @@ void add(DeviceFigures& f, const Connection& c) {
   f.bytes_written += c.bytes_written;
   f.bytes_read += c.bytes_read;
 }
-
-}  // namespace
 
 std::optional<Time> Connection::next_tick() const {
   if (finishing || dialogue == nullptr) return std::nullopt;
@@ -65,21 +65,7 @@ Connection& Connections::add(ConnectionId id, Role role, Peer peer, State state)
 }
 
 void Connections::remove(ConnectionId id) {
-  const auto it = std::find_if(all_.begin(), all_.end(), [&](const Connection& c) { return c.id == id; });
-  if (it == all_.end()) return;
-  if (it->role == Role::client) sonar::add(gone_, *it);
-  all_.erase(it);
-}
-
-void Connections::add_to(DeviceFigures& figures) const {
-  figures.offered += gone_.offered;
-  figures.sent += gone_.sent;
-  figures.dropped += gone_.dropped;
-  for (std::size_t why = 0; why < drop_reasons; ++why) figures.dropped_by[why] += gone_.dropped_by[why];
-  figures.bytes_written += gone_.bytes_written;
-  figures.bytes_read += gone_.bytes_read;
-  for (const Connection& c : all_)
-    if (c.role == Role::client) sonar::add(figures, c);
+  all_.remove_if([&](const Connection& c) { return c.id == id; });
 }
 
 }  // namespace sonar

@@ -45,6 +45,9 @@ struct Connection {
   std::optional<Time> next_request() const;
 };
 
+/// Adds what was sent to it, dropped and received.
+void add_traffic(DeviceFigures& figures, const Connection& of);
+
 class Connections {
  public:
   using List = std::list<Connection>;
@@ -71,15 +74,12 @@ class Connections {
 
   List& all() { return all_; }
   const List& all() const { return all_; }
-  /// Adds what was sent and dropped, of clients that are here and of those that have gone.
-  void add_to(DeviceFigures& figures) const;
 
  private:
   std::size_t count(Role role, Connection::State state) const;
 
   const SonarConfig& config_;
   List all_;  // in the order of arrival
-  DeviceFigures gone_;
 };
 
 }  // namespace sonar

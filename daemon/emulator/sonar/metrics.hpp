@@ -1,5 +1,5 @@
-// What is counted while the daemon runs: figures of one sonar, histograms of its times, figures of the process.
-// Plain values, filled by the Device and written out by prometheus.hpp; no clock, and no I/O but figures_of_this_process().
+// What is counted while the daemon runs: figures of one sonar and histograms of its times.
+// Plain values, filled by the Sonar and written out by prometheus.hpp; no clock, no I/O.
 #pragma once
 
 #include <array>

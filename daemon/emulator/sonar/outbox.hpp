@@ -1,5 +1,5 @@
 // What one client is still to be sent: the message being written, control replies in order, and at most `depth` waiting pings.
-// Filled by the Device, emptied by the Session's writer; whole messages only, so a stream can never be cut or mixed.
+// Filled by the Sonar, emptied by what writes to the client; whole messages only, so a stream can never be cut or mixed.
 #pragma once
 
 #include <array>

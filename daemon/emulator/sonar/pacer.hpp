@@ -1,5 +1,5 @@
 // When the next ping of one sonar is due: a grid computed from its start (never a sum of sleeps), or one ping per trigger.
-// Pure arithmetic on times passed in; the Device asks it and sets the timer.
+// Pure arithmetic on times passed in; the Sonar asks it and its caller sets the timer.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The part of a ping request that a configuration and the world determine: served sonars and `sonard render` share it.
+// The part of a ping request that a configuration and the world determine: poses, motion, water, switches.
 #pragma once
 
 #include "daemon/config/config.hpp"

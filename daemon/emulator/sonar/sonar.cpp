@@ -90,7 +90,8 @@ DeviceFigures Sonar::figures() const {
   f.skipped_ticks = f.skipped.total() + f.skipped_stale;
   f.clients_now = connections_.clients();
   f.clients_queued = connections_.waiting();
-  connections_.add_to(f);
+  for (const Connection& c : connections_.all())
+    if (c.role == Role::client) add_traffic(f, c);
   return f;
 }
 

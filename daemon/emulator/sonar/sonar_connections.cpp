@@ -58,6 +58,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
   actions.emplace_back(Closed{connection->peer.name, connection->role == Role::observer,
                               connection->state != Connection::State::waiting, connection->outbox.pings_written(),
                               connection->outbox.pings_dropped(), why});
+  if (connection->role == Role::client) add_traffic(figures_, *connection);
   connections_.remove(id);
   if (!was_client) return actions;
   Connection* const next = stopping_ ? nullptr : connections_.longest_waiting();

@@ -1,7 +1,5 @@
 #include "daemon/server/sonars/device.hpp"
 
-#include <poll.h>
-
 #include <algorithm>
 #include <array>
 
@@ -11,12 +9,6 @@ namespace sonar {
 namespace {
 
 constexpr int most_turned_away_at_once = 16;
-
-/// Also when what it sent is still unread: the end of the stream lies behind that.
-bool has_left(tcp::socket& socket) {
-  pollfd asked{socket.native_handle(), POLLRDHUP, 0};
-  return ::poll(&asked, 1, 0) > 0;
-}
 
 }  // namespace
 
@@ -129,7 +121,7 @@ void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role) {
   forget_who_left();
   const ConnectionId id = ++last_connection_;
   Peer peer = peer_of(socket);
-  arrived_.emplace(id, Arrived{std::move(socket), std::move(place), role, peer});
+  arrived_.emplace(id, Arrived{std::move(socket), std::move(place), role});
   perform(sonar_.on_connect(id, role, std::move(peer), context_.clock.now()));
 }
 
@@ -161,6 +153,7 @@ void Device::forget_who_left() {
     arrived_.erase(id);
     perform(sonar_.on_closed(id, "it waited for a place", context_.clock.now()));
   }
+  for (const SessionPointer& session : std::vector(sessions_.begin(), sessions_.end())) session->end_if_closed();
 }
 
 void Device::keep_announcing() {
@@ -279,11 +272,12 @@ void Device::carry_out(const Serve& action) {
   Arrived& from = arrived.mapped();
   const Session::Setup setup{action.connection, context_.digest && from.role == Role::client, context_.config.limits, from.place};
   const auto session = std::make_shared<Session>(*this, std::move(from.socket), setup);
+  const std::string& peer = sonar_.connections().find(action.connection)->peer.name;
   if (from.role == Role::client) {
-    report_visit(from.role, VisitLog::Kind::connected, "client connected", {{"client", from.peer.name}});
-    publish_client(from.peer.name, true, {});
+    report_visit(from.role, VisitLog::Kind::connected, "client connected", {{"client", peer}});
+    publish_client(peer, true, {});
   } else {
-    report_visit(from.role, VisitLog::Kind::connected, "observer connected", {{"observer", from.peer.name}});
+    report_visit(from.role, VisitLog::Kind::connected, "observer connected", {{"observer", peer}});
   }
   sessions_.push_back(session);
   session->start();

@@ -83,7 +83,8 @@ class Device final : public SessionParent {
   /// Vehicle and mount, of a configuration that is otherwise the same.
   void use_place(const SonarConfig& config) { sonar_.move(config, context_.clock.now()); }
   void use_water(const Water& water);
-  /// Closes waiting connections whose peer has hung up. Now and then, and before a slot is given or refused.
+  /// Closes connections whose peer has hung up. Now and then, and before a slot is given or refused: the listener may be ready
+  /// before the reader of the one that left.
   void forget_who_left();
 
   void on_bytes(Session& from, protocol::BytesView bytes) override;
@@ -101,7 +102,6 @@ class Device final : public SessionParent {
     tcp::socket socket;
     Admission::Place place;
     Role role = Role::client;
-    Peer peer;
   };
 
   Result<void> open_observers();
@@ -150,7 +150,7 @@ class Device final : public SessionParent {
 
   std::shared_ptr<const SceneNames> computed_names_;  // of the scene the ping is computed in
   bool started_ = false, stopping_ = false, beacon_failed_ = false;
-  std::array<LogLimiter, Report::topics> limiters_;
+  std::array<LogLimiter, static_cast<std::size_t>(Report::Topic::topics)> limiters_;
   LogLimiter faults_, observer_visits_;
   VisitLog visits_;
   std::vector<StreamDigest> digests_;

@@ -1,6 +1,7 @@
 #include "daemon/server/sonars/session.hpp"
 
 #include <netinet/tcp.h>
+#include <poll.h>
 
 #include <algorithm>
 
@@ -35,10 +36,14 @@ Peer peer_of(const tcp::socket& socket) {
           at.address().is_v4() ? at.address().to_v4().to_bytes() : protocol::Ipv4{}};
 }
 
+bool has_left(tcp::socket& socket) {
+  pollfd asked{socket.native_handle(), POLLRDHUP, 0};
+  return ::poll(&asked, 1, 0) > 0;
+}
+
 Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
     : parent_(parent),
       socket_(std::move(socket)),
-      peer_(peer_of(socket_)),
       setup_(setup),
       input_rate_(setup.limits.input_bytes_per_s),
       wake_reader_(socket_.get_executor()),
@@ -188,6 +193,16 @@ void Session::reset(std::string why) {
   error_code ec;
   socket_.set_option(asio::socket_base::linger(true, 0), ec);
   over(std::move(why));
+}
+
+void Session::end_if_closed() {
+  error_code ec;
+  if (over_ || !has_left(socket_) || socket_.available(ec) > 0) return;
+  int fault = 0;
+  socklen_t size = sizeof fault;
+  ::getsockopt(socket_.native_handle(), SOL_SOCKET, SO_ERROR, &fault, &size);
+  ec = fault == 0 ? error_code(asio::error::eof) : error_code(fault, boost::system::system_category());
+  over(finishing_ ? why_ : reason(ec));
 }
 
 void Session::over(std::string why) {

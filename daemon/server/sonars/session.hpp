@@ -60,11 +60,12 @@ class Session : public std::enable_shared_from_this<Session> {
   void finish(std::string why);
   /// At once, without FIN.
   void reset(std::string why);
+  /// When the peer has hung up and every byte from it has been read: over.
+  void end_if_closed();
 
   ConnectionId id() const { return setup_.id; }
   const Sha256& digest() const { return digest_; }
   std::chrono::steady_clock::duration connected_for() const { return Steady::now() - connected_at_; }
-  const Peer& peer() const { return peer_; }
 
  private:
   using Steady = std::chrono::steady_clock;
@@ -82,7 +83,6 @@ class Session : public std::enable_shared_from_this<Session> {
 
   SessionParent& parent_;
   tcp::socket socket_;
-  Peer peer_;
   Setup setup_;
   Sha256 digest_;
   InputRate input_rate_;
@@ -98,5 +98,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
 /// Name and address of the other end, for the log and the status message.
 Peer peer_of(const tcp::socket& socket);
+/// The peer has hung up; what it sent before may still be unread.
+bool has_left(tcp::socket& socket);
 
 }  // namespace sonar

@@ -12,6 +12,7 @@
 #include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "protocol/oculus/fire.hpp"
+#include "tests/protocol/delegating_vendor.hpp"
 
 namespace sonar {
 namespace {
@@ -290,36 +291,13 @@ class FaultyDialogue final : public protocol::Dialogue {
  private:
   Time next_;
 };
-class FaultyVendor final : public protocol::Vendor {
+class FaultyVendor final : public protocol::DelegatingVendor {
  public:
-  explicit FaultyVendor(const protocol::Vendor& of) : of_(of) {}
-  std::string_view name() const override { return of_.name(); }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return of_.models(); }
-  std::span<const protocol::Port> ports() const override { return of_.ports(); }
-  std::span<const protocol::Option> options() const override { return of_.options(); }
-  int default_max_clients() const override { return 2; }
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
-  protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
-    return of_.initial_settings(device);
-  }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return of_.apply_override(wanted, device);
-  }
-  bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
-  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
+  using DelegatingVendor::DelegatingVendor;
   std::unique_ptr<protocol::Dialogue> converse(const protocol::DeviceState&, Time now) const override {
     return std::make_unique<FaultyDialogue>(now);
   }
-  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
-    return of_.frame(ping, device);
-  }
-
- private:
-  const protocol::Vendor& of_;
+  bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
 };
 
 TEST(SonarInVirtualTime, AnExceptionEndsTheConnectionItHappensIn) {

@@ -1,0 +1,38 @@
+// A vendor that does what another does: tests override the part that they change.
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::protocol {
+
+class DelegatingVendor : public Vendor {
+ public:
+  /// `of` outlives it.
+  explicit DelegatingVendor(const Vendor& of) : of_(of) {}
+  std::string_view name() const override { return of_.name(); }
+  std::span<const std::shared_ptr<const SonarModel>> models() const override { return of_.models(); }
+  std::span<const Port> ports() const override { return of_.ports(); }
+  std::span<const Option> options() const override { return of_.options(); }
+  int default_max_clients() const override { return of_.default_max_clients(); }
+  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
+                                                  const OptionValues& options) const override {
+    return of_.tuned(std::move(model), options);
+  }
+  ChangeSettings initial_settings(const DeviceState& device) const override { return of_.initial_settings(device); }
+  Result<ChangeSettings> apply_override(const SettingsOverride& wanted, const DeviceState& device) const override {
+    return of_.apply_override(wanted, device);
+  }
+  bool pings_before_first_request(const DeviceState& device) const override { return of_.pings_before_first_request(device); }
+  Bytes beacon(const DeviceState& device, Time now) const override { return of_.beacon(device, now); }
+  Bytes answer(BytesView datagram, const DeviceState& device) const override { return of_.answer(datagram, device); }
+  std::unique_ptr<Dialogue> converse(const DeviceState& device, Time now) const override { return of_.converse(device, now); }
+  std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const override { return of_.frame(ping, device); }
+
+ private:
+  const Vendor& of_;
+};
+
+}  // namespace sonar::protocol
