@@ -26,6 +26,12 @@ using Bytes = std::vector<std::byte>;
 using BytesView = std::span<const std::byte>;
 using text::Ipv4;
 
+struct Endpoint {
+  Ipv4 ip{};
+  std::uint16_t port = 0;
+  bool operator==(const Endpoint&) const = default;
+};
+
 /// One named choice of a protocol's unknowns, settable under `options:` of a sonar in the configuration.
 struct Option {
   std::string_view name;
@@ -80,13 +86,20 @@ struct RequestPing {   // one ping now (network trigger, BlueView)
 struct StoreAddress {
   DeviceState::StoredAddress address;
 };
+/// Where the device sends the datagrams of its pings from now on. Requested in a conversation: the list is that connection's,
+/// beside those of others, and ends with it. Requested by a datagram or over HTTP: the device's own list, which replaces
+/// Port::group.
+struct SetReceivers {
+  std::vector<Endpoint> to;  // address 0.0.0.0 = that of the host which requests it
+  std::size_t stream = 0;    // which of the vendor's ports of kind udp_stream, counted from 0
+};
 struct Notice {  // worth one (rate-limited) log line, e.g. junk skipped or a request refused
   std::string text;
 };
 struct Close {
   std::string why;
 };
-using Event = std::variant<ChangeSettings, RequestPing, StoreAddress, Notice, Close>;
+using Event = std::variant<ChangeSettings, RequestPing, StoreAddress, SetReceivers, Notice, Close>;
 struct Reaction {
   std::vector<Event> events;
   std::vector<Bytes> replies;  // whole messages, in order
@@ -124,10 +137,33 @@ class Dialogue {
   }
 };
 
+/// A transport of the device. A vendor may have several of a kind, but one beacon.
 struct Port {
-  enum class Kind { tcp_listen, udp_broadcast, udp_answer } kind{};  // answers datagrams, or sends them by itself
+  enum class Kind {
+    tcp_stream,  // listens at `number`: one Dialogue for each connection
+    udp_beacon,  // sends Vendor::beacon to `number` of the configured addresses: broadcast, multicast or hosts
+    udp_answer,  // passes datagrams that arrive at `number`, broadcast ones too, to Vendor::on_datagram
+    udp_stream,  // sends Vendor::datagrams of each ping from `number` (0: any; may be that of a udp_answer) to the receivers
+    http,        // serves Vendor::on_http at `number`
+  } kind{};
   std::uint16_t number = 0;
-  std::chrono::milliseconds period{0};  // of beacons
+  std::chrono::milliseconds period{0};  // of a beacon
+  bool on_change = false;               // of a beacon: also sent at once when a client comes or goes
+  Endpoint group{};                 // of a udp_stream: its receiver until SetReceivers, often a multicast group; port 0 = none
+  std::chrono::nanoseconds gap{0};  // of a udp_stream: least time between two datagrams of a ping
+};
+
+/// One request for a resource of the device, its sizes already limited by the server.
+struct ResourceRequest {
+  std::string method, path, query, content_type, body;  // path without the query: "/api/v1/speed"
+  Ipv4 from{};
+};
+struct ResourceReply {
+  unsigned status = 200;
+  std::string body;
+  std::string content_type = "application/json";
+  std::string allow = {};  // of 405
+  std::vector<Event> events = {};
 };
 
 class Vendor {
@@ -136,6 +172,12 @@ class Vendor {
   virtual std::string_view name() const = 0;
   virtual std::span<const std::shared_ptr<const SonarModel>> models() const = 0;
   virtual std::span<const Port> ports() const = 0;
+  /// The first of that kind, or null.
+  const Port* port(Port::Kind kind) const {
+    for (const Port& port : ports())
+      if (port.kind == kind) return &port;
+    return nullptr;
+  }
   virtual std::span<const Option> options() const = 0;
   virtual int default_max_clients() const = 0;
   /// The model that a device with these (complete) options emulates; asked once, when its configuration is read.
@@ -149,15 +191,26 @@ class Vendor {
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;
   /// Empty when the vendor has no beacon.
   virtual Bytes beacon(const DeviceState& device, Time now) const = 0;
-  /// To a datagram that came to a Port of kind udp_answer; empty = none.
-  virtual Bytes answer(BytesView datagram, const DeviceState& device) const {
-    static_cast<void>(datagram), static_cast<void>(device);
+  /// Of a port of kind udp_answer. Any bytes; each reply is one datagram to the sender.
+  virtual Reaction on_datagram(const Port& port, BytesView datagram, const DeviceState& device, Time now) const {
+    static_cast<void>(port), static_cast<void>(datagram), static_cast<void>(device), static_cast<void>(now);
     return {};
   }
-  /// The state must outlive the dialogue.
-  virtual std::unique_ptr<Dialogue> converse(const DeviceState& device, Time now) const = 0;
-  /// Once per ping, shared by all sessions; with the settings the ping was made with (PingRequest::vendor_settings).
+  /// Of a port of kind http. Any path, method and body.
+  virtual ResourceReply on_http(const Port& port, const ResourceRequest& request, const DeviceState& device, Time now) const {
+    static_cast<void>(port), static_cast<void>(request), static_cast<void>(device), static_cast<void>(now);
+    return {404, "not found\n", "text/plain"};
+  }
+  /// Of a port of kind tcp_stream. The state must outlive the dialogue.
+  virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
+  /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings). Null:
+  /// pings do not travel over TCP.
   virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const = 0;
+  /// Of a port of kind udp_stream with receivers: the datagrams of a ping in order, at most 65,507 bytes each.
+  virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
+    static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
+    return {};
+  }
 };
 
 /// Fills in defaults. Unknown names and values are errors that suggest the nearest valid one.

@@ -41,15 +41,15 @@ std::string sonar_lines(const Device& device) {
   std::string text = "sonar     " + device.config().name + "  " + model.name + "  " +
                      text::frequency_text(static_cast<double>(mode.centre_hz)) +
                      format("  %d beams  %g m  %g Hz\n", s.beam_count, s.range_m, static_cast<double>(s.rate_hz));
-  const tcp::endpoint data = device.data_endpoint();
-  text += format("  data    tcp %s:%d", data.address().to_string().c_str(), data.port());
+  const Endpoint data = device.data_endpoint();
+  text += "  data    tcp " + text_of(data);
   for (const udp::endpoint& to : device.status_destinations())
     text += format("      status udp -> %s:%d (1 Hz)", to.address().to_string().c_str(), to.port());
   if (device.sonar().state().advertise_ip != device.config().bind_ip)
     text += "      advertised as " + text_of(device.sonar().state().advertise_ip);
   text += "\n";
   if (device.config().profile.vendor->name() == "blueview")
-    text += blueview_lines(text_of(device.sonar().state().advertise_ip), data.port());
+    text += blueview_lines(text_of(device.sonar().state().advertise_ip), data.port);
   return text;
 }
 

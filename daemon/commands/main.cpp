@@ -16,7 +16,7 @@
 #include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
 #include "daemon/server/app.hpp"
-#include "daemon/server/control/token.hpp"
+#include "daemon/server/connections/token.hpp"
 #include "daemon/server/engine/choose_engine.hpp"
 #include "daemon/server/system/real_time.hpp"
 #include "daemon/server/system/standard_streams.hpp"

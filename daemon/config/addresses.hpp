@@ -10,13 +10,9 @@
 
 namespace sonar {
 
+using protocol::Endpoint;
 using protocol::Ipv4;
 
-struct Endpoint {
-  Ipv4 ip{};
-  std::uint16_t port = 0;
-  bool operator==(const Endpoint&) const = default;
-};
 struct AddressRange {  // 10.0.0.0/8
   Ipv4 ip{};
   int prefix_bits = 32;

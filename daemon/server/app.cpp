@@ -41,23 +41,13 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
           world_, clock_, log_, [this] { on_change(); }, &events_, &plausibility_),
       pose_server_(io_, config_.poses, config_.limits, admission_, pose_intake_, log_),
       mavlink_server_(io_, config_, pose_intake_, log_),
-      context_{io_,
-               clock_,
-               world_,
-               simulator_,
-               admission_,
-               log_,
-               config_,
-               events_,
-               recordings_,
-               options_.digest,
-               [this] { on_change(); },
-               [this](const Error& why) {
-                 log_.error(why.text);
-                 exit_code_ = exit_code(why.kind);
-                 stop("the engine failed");
-               }},
-      fleet_(context_),
+      fleet_({io_, clock_, admission_, log_, options_.digest}, config_, world_, simulator_, recordings_, events_,
+             {[this] { on_change(); },
+              [this](const Error& why) {
+                log_.error(why.text);
+                exit_code_ = exit_code(why.kind);
+                stop("the engine failed");
+              }}),
       operations_({config_, clock_, world_, stepped_time_, simulator_, changes_, admission_, pose_intake_, fleet_, events_,
                    recordings_, control_, mavlink_server_, plausibility_, log_, [this] { on_change(); }, options_.load_scene}),
       control_(io_, config_.control, config_.limits, admission_, operations_, events_, pose_intake_, log_),

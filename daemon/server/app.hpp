@@ -14,6 +14,7 @@
 #include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/app_operations.hpp"
+#include "daemon/server/connections/admission.hpp"
 #include "daemon/server/control/control_server.hpp"
 #include "daemon/server/engine/simulator.hpp"
 #include "daemon/server/engine/start_engine.hpp"
@@ -22,7 +23,6 @@
 #include "daemon/server/poses/pose_server.hpp"
 #include "daemon/server/recording/recordings.hpp"
 #include "daemon/server/scene_changes.hpp"
-#include "daemon/server/sonars/admission.hpp"
 #include "daemon/server/sonars/fleet.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
@@ -110,7 +110,6 @@ class App {
   PoseIntake pose_intake_;
   PoseServer pose_server_;
   MavlinkServer mavlink_server_;
-  DeviceContext context_;
   Fleet fleet_;
   AppOperations operations_;
   ControlServer control_;

@@ -4,10 +4,10 @@
 #include <chrono>
 
 #include "daemon/config/config.hpp"
+#include "daemon/server/connections/admission.hpp"
 #include "daemon/server/operations.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/scene_changes.hpp"
-#include "daemon/server/sonars/admission.hpp"
 #include "daemon/server/sonars/fleet.hpp"
 #include "daemon/server/time/stepped_time.hpp"
 

@@ -11,10 +11,9 @@
 namespace sonar::blueview {
 namespace {
 
-using namespace std::chrono_literals;
-
+using PortKind = protocol::Port::Kind;
 constexpr std::array<protocol::Port, 2> port_table{
-    {{protocol::Port::Kind::tcp_listen, tcp_port, 0ms}, {protocol::Port::Kind::udp_answer, discovery_port, 0ms}}};
+    {{.kind = PortKind::tcp_stream, .number = tcp_port}, {.kind = PortKind::udp_answer, .number = discovery_port}}};
 
 class BlueViewVendor final : public protocol::Vendor {
  public:
@@ -39,10 +38,14 @@ class BlueViewVendor final : public protocol::Vendor {
   }
   bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
   protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
-  protocol::Bytes answer(protocol::BytesView datagram, const protocol::DeviceState& device) const override {
-    return answer_discovery(datagram, device);
+  protocol::Reaction on_datagram(const protocol::Port&, protocol::BytesView datagram, const protocol::DeviceState& device,
+                                 Time) const override {
+    protocol::Reaction reaction;
+    if (protocol::Bytes reply = answer_discovery(datagram, device); !reply.empty()) reaction.replies.push_back(std::move(reply));
+    return reaction;
   }
-  std::unique_ptr<protocol::Dialogue> converse(const protocol::DeviceState& device, Time now) const override {
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState& device,
+                                               Time now) const override {
     return make_dialogue(device, now);
   }
   std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {

@@ -15,8 +15,9 @@ namespace {
 using namespace std::chrono_literals;
 
 // Status once a second: the public viewer drops a sonar after 2 s without, another driver after 5 s.
-constexpr std::array<protocol::Port, 2> port_table{
-    {{protocol::Port::Kind::tcp_listen, tcp_port, 0ms}, {protocol::Port::Kind::udp_broadcast, status_port, 1000ms}}};
+using PortKind = protocol::Port::Kind;
+constexpr std::array<protocol::Port, 2> port_table{{{.kind = PortKind::tcp_stream, .number = tcp_port},
+                                                    {.kind = PortKind::udp_beacon, .number = status_port, .period = 1000ms}}};
 
 class OculusVendor final : public protocol::Vendor {
  public:
@@ -42,7 +43,8 @@ class OculusVendor final : public protocol::Vendor {
     return text_option(device.options, option_name::before_first_fire) == "pings";
   }
   protocol::Bytes beacon(const protocol::DeviceState& device, Time) const override { return make_status(device); }
-  std::unique_ptr<protocol::Dialogue> converse(const protocol::DeviceState& device, Time now) const override {
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState& device,
+                                               Time now) const override {
     return make_dialogue(device, now);
   }
   std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {

@@ -33,6 +33,7 @@ FLOORS = {
     "daemon/emulator": ["core/", "protocol/", "daemon/config/", "daemon/emulator/"],
     "daemon/server": ["core/", "cuda/", "protocol/", "daemon/config/", "daemon/emulator/", "daemon/server/"],
     "daemon/server/system": ["core/", "protocol/", "daemon/config/", "daemon/emulator/log_line.hpp", "daemon/server/system/"],
+    "daemon/server/connections": ["core/", "protocol/", "daemon/config/", "daemon/emulator/", "daemon/server/connections/", "daemon/server/system/"],
     "daemon/server/engine": ["core/", "cuda/", "protocol/", "daemon/config/", "daemon/emulator/", "daemon/server/engine/", "daemon/server/system/"],
     "daemon/server/time": ["core/", "protocol/", "daemon/config/", "daemon/emulator/", "daemon/server/system/", "daemon/server/time/"],
     "clients": ["core/base/", "core/image/", "core/sonar/", "core/text/", "protocol/", "clients/"],

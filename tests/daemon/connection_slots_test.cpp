@@ -1,5 +1,5 @@
 // Which connection is evicted for a new one.
-#include "daemon/server/system/connection_slots.hpp"
+#include "daemon/server/connections/connection_slots.hpp"
 
 #include <gtest/gtest.h>
 

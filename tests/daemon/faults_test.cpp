@@ -12,14 +12,16 @@ using ::testing::HasSubstr;
 
 struct ThrowingParent final : SessionParent {
   std::string fault, why;
-  void on_bytes(Session&, protocol::BytesView) override { throw std::runtime_error("no such luck"); }
-  Outbox::Message next_message(Session&) override { return {}; }
-  void on_sent(Session&, std::size_t) override {}
-  std::optional<milliseconds> longest_silence(const Session&) const override { return std::nullopt; }
-  void on_finish(Session&) override {}
-  void on_written(Session&, const Outbox::Message&) override {}
-  void on_fault(Session&, const std::string& what) override { fault = what; }
-  void on_over(Session&, const std::string& reason) override { why = reason; }
+  void on_bytes(ConnectionId, protocol::BytesView) override { throw std::runtime_error("no such luck"); }
+  Outbox::Message next_message(ConnectionId) override { return {}; }
+  std::vector<Endpoint> receivers(ConnectionId) const override { return {}; }
+  void on_sent(ConnectionId, std::size_t) override {}
+  std::optional<milliseconds> longest_silence(ConnectionId) const override { return std::nullopt; }
+  void on_finish(ConnectionId) override {}
+  void on_written(ConnectionId, const Outbox::Message&) override {}
+  void on_fault(const std::string& what) override { fault = what; }
+  void on_send_error(const Endpoint&, const std::string&) override {}
+  void on_over(ConnectionId, const std::string& reason) override { why = reason; }
 };
 
 TEST(Faults, EndTheSessionTheyHappenIn) {

@@ -1,9 +1,9 @@
 // A client is read at the allowed rate over any stretch of time, and at once after a pause.
-#include "daemon/server/sonars/input_rate.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 
 #include <gtest/gtest.h>
 
-#include "daemon/server/sonars/shared_rate.hpp"
+#include "daemon/server/connections/shared_rate.hpp"
 
 namespace sonar {
 namespace {

@@ -5,7 +5,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "daemon/server/sonars/admission.hpp"
+#include "daemon/server/connections/admission.hpp"
 #include "daemon/server/system/real_time.hpp"
 #include "tests/daemon/loopback.hpp"
 

@@ -111,6 +111,7 @@ Daemon::Daemon(DaemonSetup setup) : address_(setup.address) {
   if (setup.config_file) write_config(yaml_of(setup));
   auto config = setup.config_file ? load_config(config_path_) : parse_config(yaml_of(setup), "test.yaml", directory);
   if (!config) throw std::runtime_error(config.error().text);
+  if (setup.edit_config) setup.edit_config(*config);
   LogOptions log;
   log.sink = [this](LogLevel, const std::string& line) {
     std::lock_guard lock(log_mutex_);

@@ -71,6 +71,7 @@ struct DaemonSetup {
   ScenePointer scene;                               // instead of small_scene()
   std::function<void(const Scene&)> before_engine;  // on the thread that makes an engine for a later scene
   bool config_file = false;                         // the configuration is in a file and can be read again
+  std::function<void(Config&)> edit_config;         // before the daemon starts
 };
 /// The configuration of a setup: what Daemon starts with.
 std::string yaml_of(const DaemonSetup& setup);

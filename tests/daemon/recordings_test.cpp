@@ -72,7 +72,7 @@ RecordedPing ping_at(double at_s, std::size_t bytes = 64) {
   ping->truth = {{2.5f, 1}, {}};
   auto names = std::make_shared<SceneNames>();
   *names = {{"floor", "box"}, {"crate"}};
-  return {Time{} + nanoseconds_from(at_s), ping, std::make_shared<const protocol::Bytes>(bytes, std::byte{1}),
+  return {Time{} + nanoseconds_from(at_s),   ping, std::make_shared<const protocol::Bytes>(bytes, std::byte{1}), {},
           protocol::Bytes(20, std::byte{2}), names};
 }
 

@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   protocol::DeviceState device = as_it_comes;
   protocol::Bytes bytes(size);
   for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(data[i]);
-  blueview::vendor().answer(bytes, device);
+  blueview::vendor().on_datagram({}, bytes, device, Time{});
   const auto host = blueview::make_dialogue(device, Time{});
   const std::size_t half = size / 2;
   for (const protocol::BytesView part : {protocol::BytesView(bytes).first(half), protocol::BytesView(bytes).subspan(half)}) {

@@ -41,7 +41,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t piece = data[0] + std::size_t{1};
   std::vector<std::byte> stream;
   for (std::size_t i = 1; i < size; ++i) stream.push_back(static_cast<std::byte>(data[i]));
-  const auto dialogue = protocol::vendors().front()->converse(device(), Time{});
+  const auto dialogue = protocol::vendors().front()->converse({}, device(), Time{});
   std::size_t answered = 0;
   for (std::size_t at = 0; at < stream.size(); at += piece) {
     const auto part = protocol::BytesView(stream).subspan(at, std::min(piece, stream.size() - at));

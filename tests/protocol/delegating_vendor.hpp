@@ -27,9 +27,15 @@ class DelegatingVendor : public Vendor {
   }
   bool pings_before_first_request(const DeviceState& device) const override { return of_.pings_before_first_request(device); }
   Bytes beacon(const DeviceState& device, Time now) const override { return of_.beacon(device, now); }
-  Bytes answer(BytesView datagram, const DeviceState& device) const override { return of_.answer(datagram, device); }
-  std::unique_ptr<Dialogue> converse(const DeviceState& device, Time now) const override { return of_.converse(device, now); }
-  std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const override { return of_.frame(ping, device); }
+  Reaction on_datagram(const Port& port, BytesView datagram, const DeviceState& device, Time now) const override {
+    return of_.on_datagram(port, datagram, device, now);
+  }
+  std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const override {
+    return of_.converse(port, device, now);
+  }
+  std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const override {
+    return of_.frame(ping, device);
+  }
 
  private:
   const Vendor& of_;

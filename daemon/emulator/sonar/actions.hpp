@@ -17,6 +17,8 @@ namespace sonar {
 /// Chosen by the caller, unique for the life of a Sonar.
 using ConnectionId = std::uint64_t;
 
+enum class Role { client, observer, stream };  // stream: the datagrams of a port of kind udp_stream
+
 /// Compute this ping and return it through Sonar::on_ping().
 struct ComputePing {
   PingRequest request;
@@ -50,15 +52,18 @@ struct Reset {
 /// A connection is closed and forgotten.
 struct Closed {
   std::string peer;  // its name
-  bool observer = false;
+  Role role{};
   bool served = false;  // else it waited for a slot
   std::uint64_t pings_written = 0, pings_dropped = 0;
   std::string why;
 };
-/// A ping was framed and queued to every client and observer that takes it.
+/// The status broadcast has news: send it now.
+struct Announce {};
+/// A ping was framed and queued to every client, observer and stream that takes it.
 struct PingQueued {
   std::shared_ptr<const Ping> ping;
-  std::shared_ptr<const protocol::Bytes> bytes;
+  std::shared_ptr<const protocol::Bytes> bytes;                                // null: not sent over TCP
+  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // of each stream that has receivers
   double simulation_s = 0;
 };
 /// A line for the log; those of one topic are limited together.
@@ -71,8 +76,8 @@ struct EngineFailed {
   Error why;
 };
 
-using Action =
-    std::variant<ComputePing, Serve, KeepWaiting, TurnAway, Wake, Finish, Reset, Closed, PingQueued, Report, EngineFailed>;
+using Action = std::variant<ComputePing, Serve, KeepWaiting, TurnAway, Wake, Finish, Reset, Closed, Announce, PingQueued, Report,
+                            EngineFailed>;
 using Actions = std::vector<Action>;
 
 /// What became of a PingRequest.

@@ -50,6 +50,29 @@ Connection* Connections::longest_waiting() {
   return it == all_.end() ? nullptr : &*it;
 }
 
+Connection* Connections::stream(std::size_t number) {
+  for (Connection& c : all_)
+    if (c.role == Role::stream && c.receivers.front().stream == number) return &c;
+  return nullptr;
+}
+
+std::vector<protocol::Endpoint> Connections::receivers(const Connection& stream) const {
+  const std::size_t number = stream.receivers.front().stream;
+  std::vector<protocol::Endpoint> all;
+  for (const Connection& c : all_) {
+    const bool counts = c.role == Role::stream ? c.id == stream.id : !c.finishing && c.state == State::served;
+    for (const protocol::SetReceivers& list : c.receivers)
+      for (const protocol::Endpoint& to : list.to)
+        if (counts && list.stream == number && std::find(all.begin(), all.end(), to) == all.end()) all.push_back(to);
+  }
+  return all;
+}
+
+bool Connections::has_audience() const {
+  return clients() > 0 || std::any_of(all_.begin(), all_.end(),
+                                      [this](const Connection& c) { return c.role == Role::stream && !receivers(c).empty(); });
+}
+
 Connections::Verdict Connections::verdict(Role role) const {
   if (role == Role::observer)
     return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::turn_away;
@@ -59,9 +82,15 @@ Connections::Verdict Connections::verdict(Role role) const {
   return waits ? Verdict::wait : Verdict::turn_away;
 }
 
-Connection& Connections::add(ConnectionId id, Role role, Peer peer, State state) {
-  return all_.emplace_back(Connection{
-      .id = id, .role = role, .peer = std::move(peer), .state = state, .dialogue = nullptr, .outbox = Outbox(config_.outbox)});
+Connection& Connections::add(ConnectionId id, Role role, Peer peer, State state, const protocol::Port* port) {
+  return all_.emplace_back(Connection{.id = id,
+                                      .role = role,
+                                      .peer = std::move(peer),
+                                      .state = state,
+                                      .port = port,
+                                      .dialogue = nullptr,
+                                      .outbox = Outbox(config_.outbox),
+                                      .receivers = {}});
 }
 
 void Connections::remove(ConnectionId id) {

@@ -1,5 +1,6 @@
 // The connections of one emulated sonar: its clients, those that wait for a slot, those that are leaving, and observers, which
-// receive every ping and change nothing. Each has its conversation in the vendor's protocol and its outbox. No sockets, no clock.
+// receive every ping and change nothing. Each has its conversation in the vendor's protocol and its outbox. Streams of datagrams
+// are connections without a conversation. No sockets, no clock.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +15,6 @@
 #include "daemon/emulator/sonar/outbox.hpp"
 
 namespace sonar {
-
-enum class Role { client, observer };
 
 struct Peer {
   std::string name;     // for the log: "127.0.0.1:40123"
@@ -32,9 +31,12 @@ struct Connection {
   Role role = Role::client;
   Peer peer;
   State state = State::served;
-  std::uint64_t number = 0;  // of clients: counted from 1
+  std::uint64_t number = 0;              // of clients: counted from 1
+  const protocol::Port* port = nullptr;  // of the vendor's
   std::unique_ptr<protocol::Dialogue> dialogue;
   Outbox outbox;
+  /// Of a client: what it requested, one list for each stream it named. Of a stream: the device's own list, one.
+  std::vector<protocol::SetReceivers> receivers;
   bool finishing = false;  // no more bytes are taken in, no more pings offered
   Time not_before{};       // earliest next call of dialogue->on_tick, in unskipped time
   std::uint64_t bytes_written = 0, bytes_read = 0;
@@ -65,11 +67,17 @@ class Connections {
   Connection* oldest_client();
   const Connection* oldest_client() const { return const_cast<Connections*>(this)->oldest_client(); }
   Connection* longest_waiting();
+  /// The stream of that number, counted from 0 among the vendor's ports.
+  Connection* stream(std::size_t number);
+  /// Where the datagrams of a stream go: the device's own list and those of the clients, each address once.
+  std::vector<protocol::Endpoint> receivers(const Connection& stream) const;
+  /// A client is served or a stream has receivers.
+  bool has_audience() const;
 
   /// By the rules of max_clients, when_full and max_observers.
   enum class Verdict { serve, take_over, wait, turn_away };
   Verdict verdict(Role role) const;
-  Connection& add(ConnectionId id, Role role, Peer peer, Connection::State state);
+  Connection& add(ConnectionId id, Role role, Peer peer, Connection::State state, const protocol::Port* port);
   void remove(ConnectionId id);
 
   List& all() { return all_; }

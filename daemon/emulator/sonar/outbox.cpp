@@ -13,23 +13,30 @@ bool Outbox::push_reply(Bytes reply) {
   return true;
 }
 
-void Outbox::push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number, std::vector<Bytes> prefixes, Time fired_at) {
+std::size_t Outbox::Message::size() const {
+  std::size_t all = bytes ? bytes->size() : 0;
+  if (datagrams)
+    for (const Bytes& datagram : *datagrams) all += datagram.size();
+  return all;
+}
+
+void Outbox::push_ping(Message ping) {
+  const std::size_t size = ping.size();
   ++pings_offered_;
   const auto full = [&] {
-    return !pings_.empty() &&
-           (pings_.size() >= static_cast<std::size_t>(rules_.depth) || ping_bytes_ + bytes->size() > most_ping_bytes);
+    return !pings_.empty() && (pings_.size() >= static_cast<std::size_t>(rules_.depth) || ping_bytes_ + size > most_ping_bytes);
   };
   if (full() && rules_.when_full == WhenFull::drop_newest) {
     count_drop(DropReason::slow);
     return;
   }
   while (full()) {
-    ping_bytes_ -= pings_.front().bytes->size();
+    ping_bytes_ -= pings_.front().size();
     pings_.pop_front();
     count_drop(DropReason::slow);
   }
-  ping_bytes_ += bytes->size();
-  pings_.push_back({std::move(bytes), number, std::move(prefixes), fired_at});
+  ping_bytes_ += size;
+  pings_.push_back(std::move(ping));
 }
 
 Outbox::Message Outbox::take() {
@@ -39,7 +46,7 @@ Outbox::Message Outbox::take() {
   if (writing_ping_) {
     Message ping = std::move(pings_.front());
     pings_.pop_front();
-    ping_bytes_ -= ping.bytes->size();
+    ping_bytes_ -= ping.size();
     return ping;
   }
   auto reply = std::make_shared<const Bytes>(std::move(replies_.front()));

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/base/units.hpp"
@@ -30,7 +31,9 @@ class Outbox {
     std::uint32_t ping = 0;       // its number; 0 = a reply
     std::vector<Bytes> prefixes;  // of a ping: it is sent once for each, the prefix first; none = once, as it is
     Time fired_at{};              // of a ping
-    explicit operator bool() const { return bytes != nullptr; }
+    std::shared_ptr<const std::vector<Bytes>> datagrams = nullptr;  // of a ping, in place of bytes
+    explicit operator bool() const { return bytes != nullptr || datagrams != nullptr; }
+    std::size_t size() const;  // bytes, without prefixes
   };
   static constexpr std::size_t most_ping_bytes = 8u << 20;    // waiting pings of one client
   static constexpr std::size_t most_reply_bytes = 64u << 10;  // a client that asks and never reads
@@ -40,7 +43,10 @@ class Outbox {
 
   /// False when replies pile up beyond their bound: the session must be closed.
   bool push_reply(Bytes reply);
-  void push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number, std::vector<Bytes> prefixes = {}, Time fired_at = {});
+  void push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number, std::vector<Bytes> prefixes = {}, Time fired_at = {}) {
+    push_ping({std::move(bytes), number, std::move(prefixes), fired_at});
+  }
+  void push_ping(Message ping);
   /// The next message to write, whole: replies before pings. Empty while one is being written, or when there is nothing.
   Message take();
   /// The message last taken has been written to its end.

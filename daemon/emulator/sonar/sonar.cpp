@@ -42,7 +42,7 @@ void Sonar::use_initial_settings() {
 }
 
 bool Sonar::wants_pings() const {
-  return !stopping_ && connections_.clients() > 0 && (asked_ || vendor_.pings_before_first_request(state_));
+  return !stopping_ && connections_.has_audience() && (asked_ || vendor_.pings_before_first_request(state_));
 }
 
 void Sonar::change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions) {
@@ -91,7 +91,7 @@ DeviceFigures Sonar::figures() const {
   f.clients_now = connections_.clients();
   f.clients_queued = connections_.waiting();
   for (const Connection& c : connections_.all())
-    if (c.role == Role::client) add_traffic(f, c);
+    if (c.role != Role::observer) add_traffic(f, c);
   return f;
 }
 
@@ -171,10 +171,7 @@ protocol::Bytes Sonar::beacon(Time now) {
   return vendor_.beacon(state_, now);
 }
 
-void Sonar::update_depth(Time now) {
-  const Pose sonar = compose(around_.world.vehicle_at(config_.vehicle, now), config_.mount);
-  state_.depth_m = depth_from_z(sonar.position_m.z);
-}
+void Sonar::update_depth(Time now) { state_.depth_m = depth_from_z(pose_at(now).position_m.z); }
 
 /// A device that keeps its rhythm while its host does not keep up has numbers for the pings that were not made.
 PingNumber Sonar::next_number() {
@@ -225,7 +222,7 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
     report(Report::Topic::refused_ping, LogLevel::warning, "ping dropped: " + outcome.failure, {}, actions);
   } else if (!outcome.ping) {
     actions.emplace_back(EngineFailed{{outcome.kind, "sonar " + config_.name + ": the ping engine failed: " + outcome.failure}});
-  } else if (!stopping_ && connections_.clients() > 0 && !busy_unwanted_) {
+  } else if (!stopping_ && connections_.has_audience() && !busy_unwanted_) {
     queue_ping(outcome, now, actions);
     if (figures_.pings == 1)
       report(Report::Topic::state, LogLevel::debug, "first ping simulated", {{"ms", outcome.seconds * 1e3}}, actions);
@@ -238,13 +235,29 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
 void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
   const auto bytes = vendor_.frame(*outcome.ping, state_);
   std::vector<std::pair<Connection*, protocol::Event>> events;
+  PingQueued queued{outcome.ping, bytes, {}, outcome.seconds};
   for (Connection& c : connections_.all())
     guarded(c, actions, [&] {
+      if (c.role == Role::stream) return offer_datagrams(c, *outcome.ping, queued, actions);
+      if (bytes == nullptr) return;
       for (protocol::Event& event : offer(c, bytes, outcome.ping->request, now, actions))
         events.emplace_back(&c, std::move(event));
     });
-  for (const auto& [from, event] : events) on_event(*from, event, now, actions);
-  actions.emplace_back(PingQueued{outcome.ping, bytes, outcome.seconds});
+  for (const auto& [from, event] : events) on_event(source_of(*from), event, now, actions);
+  actions.emplace_back(std::move(queued));
+}
+
+void Sonar::offer_datagrams(Connection& stream, const Ping& ping, PingQueued& queued, Actions& actions) {
+  if (stream.finishing || connections_.receivers(stream).empty()) return;
+  auto datagrams = std::make_shared<const std::vector<protocol::Bytes>>(vendor_.datagrams(*stream.port, ping, state_));
+  if (datagrams->empty()) return;
+  queued.datagrams.push_back(datagrams);
+  stream.outbox.push_ping({.bytes = nullptr,
+                           .ping = static_cast<std::uint32_t>(ping.request.number),
+                           .prefixes = {},
+                           .fired_at = ping.request.fired_at,
+                           .datagrams = std::move(datagrams)});
+  actions.emplace_back(Wake{stream.id});
 }
 
 /// Returns what the client requests next.

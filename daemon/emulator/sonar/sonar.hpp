@@ -35,8 +35,13 @@ class Sonar {
 
   // ---- connections
 
-  /// Serve, KeepWaiting or TurnAway is among the actions.
-  Actions on_connect(ConnectionId id, Role role, Peer peer, Time now);
+  /// A client or an observer at a port of kind tcp_stream, by default the vendor's first. Serve, KeepWaiting or TurnAway is among
+  /// the actions.
+  Actions on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port = nullptr);
+  /// A port of kind udp_stream is open: messages for its receivers can be taken under this id.
+  Actions open_stream(ConnectionId id, const protocol::Port& port, Time now);
+  /// Where a message of the stream goes, as of now.
+  std::vector<protocol::Endpoint> receivers(ConnectionId stream) const;
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
   /// The next message to write, whole; empty when there is none or one is being written.
   Outbox::Message next_message(ConnectionId id);
@@ -57,8 +62,18 @@ class Sonar {
   Actions on_ping(PingOutcome outcome, Time now);
   /// The status broadcast; empty when the vendor has none.
   protocol::Bytes beacon(Time now);
-  /// The answer to a datagram sent to a Port of kind udp_answer; empty = none.
-  protocol::Bytes on_datagram(protocol::BytesView datagram) const { return vendor_.answer(datagram, state_); }
+  struct Answers {
+    std::vector<protocol::Bytes> datagrams;  // to send back, in order
+    Actions actions;
+  };
+  /// A datagram from a host, at a port of kind udp_answer.
+  Answers on_datagram(const protocol::Port& port, const protocol::Endpoint& from, protocol::BytesView datagram, Time now);
+  struct HttpAnswer {
+    protocol::ResourceReply reply;
+    Actions actions;
+  };
+  /// A request at a port of kind http.
+  HttpAnswer on_http(const protocol::Port& port, const protocol::ResourceRequest& request, Time now);
 
   // ---- time
 
@@ -85,6 +100,7 @@ class Sonar {
   /// Returns whether that was a change.
   bool set_transmit(bool on);
   bool transmits() const { return transmits_; }
+  Pose pose_at(Time at) const { return compose(around_.world.vehicle_at(config_.vehicle, at), config_.mount); }  // in world
   void move_mount(const Pose& mount, Time now);
   /// Vehicle and mount of a configuration that is otherwise the same.
   void move(const SonarConfig& config, Time now);
@@ -110,7 +126,16 @@ class Sonar {
   Time clock_time(Time unskipped) const { return unskipped > Time::max() - skipped_ ? Time::max() : unskipped + skipped_; }
   std::optional<Time> earliest(std::optional<Time> (Connection::*of)() const) const;
   void handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions);
-  void on_event(const Connection& from, const protocol::Event& event, Time now, Actions& actions);
+  /// `connection`: null when a datagram or an HTTP request caused it.
+  struct Source {
+    Connection* connection = nullptr;
+    std::string name;
+    protocol::Ipv4 ip{};
+  };
+  static Source source_of(Connection& connection) { return {&connection, connection.peer.name, connection.peer.ip}; }
+  void on_event(const Source& from, const protocol::Event& event, Time now, Actions& actions);
+  void set_receivers(const Source& from, protocol::SetReceivers wanted, Time now);
+  void update_pacer(Time now);
   void serve(Connection& connection, Time now, Actions& actions);
   /// An exception is a mistake in sonard: it may cost this connection, never the others.
   template <class Call>
@@ -118,13 +143,16 @@ class Sonar {
     try {
       call();
     } catch (const std::exception& e) {
-      report(Report::Topic::fault, LogLevel::error, std::string("internal fault: ") + e.what(), {}, actions);
+      report_fault(e, actions);
       finish(connection.id);
       actions.emplace_back(Reset{connection.id, "an internal fault"});
     }
   }
+  void report_fault(const std::exception& e, Actions& actions) const {
+    report(Report::Topic::fault, LogLevel::error, std::string("internal fault: ") + e.what(), {}, actions);
+  }
   void begin_finish(Connection& connection, const std::string& why, Actions& actions);
-  void on_membership(Time now);
+  void on_membership(Time now, Actions& actions);
   void use_initial_settings();
   void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
   bool waits_for_pose(Time at) const;
@@ -133,6 +161,7 @@ class Sonar {
   void queue_ping(const PingOutcome& outcome, Time now, Actions& actions);
   std::vector<protocol::Event> offer(Connection& to, const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,
                                      Time now, Actions& actions);
+  void offer_datagrams(Connection& stream, const Ping& ping, PingQueued& queued, Actions& actions);
   void note_water(const PingRequest& computed, Time now, Actions& actions);
   void update_depth(Time now);
   void report(Report::Topic topic, LogLevel level, std::string phrase, std::vector<LogField> fields, Actions& actions) const;

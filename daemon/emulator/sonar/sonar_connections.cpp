@@ -1,12 +1,20 @@
 // The connections of a Sonar: who gets a slot, what clients request, what they are sent.
+#include <algorithm>
 #include <cmath>
 
+#include "core/text/ipv4.hpp"
 #include "daemon/emulator/sonar/sonar.hpp"
 
 namespace sonar {
+namespace {
 
-Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now) {
+constexpr std::size_t most_receivers = 16;  // of one list
+
+}  // namespace
+
+Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port) {
   Actions actions;
+  if (port == nullptr) port = vendor_.port(protocol::Port::Kind::tcp_stream);
   const Connections::Verdict verdict = stopping_ ? Connections::Verdict::turn_away : connections_.verdict(role);
   if (verdict == Connections::Verdict::turn_away) {
     if (role == Role::client) ++figures_.refused_clients;
@@ -14,7 +22,7 @@ Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now) {
     return actions;
   }
   if (verdict == Connections::Verdict::wait) {
-    connections_.add(id, role, std::move(peer), Connection::State::waiting);
+    connections_.add(id, role, std::move(peer), Connection::State::waiting, port);
     actions.emplace_back(KeepWaiting{id});
     return actions;
   }
@@ -24,30 +32,96 @@ Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now) {
     begin_finish(oldest, "another client took over", actions);
     if (connections_.clients() == 0) use_initial_settings();
   }
-  serve(connections_.add(id, role, std::move(peer), Connection::State::waiting), now, actions);
+  serve(connections_.add(id, role, std::move(peer), Connection::State::waiting, port), now, actions);
   return actions;
 }
 
 void Sonar::serve(Connection& connection, Time now, Actions& actions) {
   update_depth(now);
   connection.state = Connection::State::served;
-  connection.dialogue = vendor_.converse(state_, unskipped(now));
+  connection.dialogue = vendor_.converse(*connection.port, state_, unskipped(now));
   actions.emplace_back(Serve{connection.id});
   if (connection.role == Role::observer) return;
   connection.number = ++figures_.clients;
-  on_membership(now);
+  on_membership(now, actions);
 }
 
 /// After a client came or went.
-void Sonar::on_membership(Time now) {
+void Sonar::on_membership(Time now, Actions& actions) {
   const Connection* const oldest = connections_.oldest_client();
   state_.connected_client = oldest == nullptr ? protocol::Ipv4{} : oldest->peer.ip;
   if (oldest == nullptr) use_initial_settings();
+  update_pacer(now);
+  const protocol::Port* const beacon = vendor_.port(protocol::Port::Kind::udp_beacon);
+  if (beacon != nullptr && beacon->on_change) actions.emplace_back(Announce{});
+}
+
+void Sonar::update_pacer(Time now) {
   if (wants_pings())
     pacer_.configure(settings_, now);
   else
     pacer_.stop();
 }
+
+// ---- streams of datagrams
+
+Actions Sonar::open_stream(ConnectionId id, const protocol::Port& port, Time now) {
+  const auto& all = connections_.all();
+  const auto number = std::count_if(all.begin(), all.end(), [](const Connection& c) { return c.role == Role::stream; });
+  Connection& stream = connections_.add(id, Role::stream, {}, Connection::State::served, &port);
+  stream.receivers.push_back({.to = {}, .stream = static_cast<std::size_t>(number)});
+  if (port.group.port != 0) stream.receivers.front().to.push_back(port.group);
+  update_pacer(now);
+  return {};
+}
+
+std::vector<protocol::Endpoint> Sonar::receivers(ConnectionId stream) const {
+  const Connection* const connection = connections_.find(stream);
+  return connection == nullptr ? std::vector<protocol::Endpoint>{} : connections_.receivers(*connection);
+}
+
+void Sonar::set_receivers(const Source& from, protocol::SetReceivers wanted, Time now) {
+  Connection* const stream = connections_.stream(wanted.stream);
+  if (stream == nullptr) return;
+  if (wanted.to.size() > most_receivers) wanted.to.resize(most_receivers);
+  for (protocol::Endpoint& to : wanted.to)
+    if (to.ip == protocol::Ipv4{}) to.ip = from.ip;
+  std::vector<protocol::SetReceivers>& lists = (from.connection == nullptr ? *stream : *from.connection).receivers;
+  const auto same = std::find_if(lists.begin(), lists.end(), [&](const auto& list) { return list.stream == wanted.stream; });
+  if (same == lists.end())
+    lists.push_back(std::move(wanted));
+  else
+    *same = std::move(wanted);
+  update_pacer(now);
+}
+
+Sonar::Answers Sonar::on_datagram(const protocol::Port& port, const protocol::Endpoint& from, protocol::BytesView datagram,
+                                  Time now) {
+  Answers answers;
+  try {
+    protocol::Reaction reaction = vendor_.on_datagram(port, datagram, state_, unskipped(now));
+    const std::string name = text::format_ipv4(from.ip) + ":" + std::to_string(from.port);
+    for (const protocol::Event& event : reaction.events) on_event({nullptr, name, from.ip}, event, now, answers.actions);
+    answers.datagrams = std::move(reaction.replies);
+  } catch (const std::exception& e) {
+    report_fault(e, answers.actions);
+  }
+  return answers;
+}
+
+Sonar::HttpAnswer Sonar::on_http(const protocol::Port& port, const protocol::ResourceRequest& request, Time now) {
+  HttpAnswer answer{{500, "internal fault\n", "text/plain"}, {}};
+  try {
+    answer.reply = vendor_.on_http(port, request, state_, unskipped(now));
+    const Source from{nullptr, "http " + text::format_ipv4(request.from), request.from};
+    for (const protocol::Event& event : answer.reply.events) on_event(from, event, now, answer.actions);
+  } catch (const std::exception& e) {
+    report_fault(e, answer.actions);
+  }
+  return answer;
+}
+
+// ---- the end of a connection
 
 Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
   Actions actions;
@@ -55,15 +129,14 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
   if (connection == nullptr) return actions;
   const bool was_client = connection->role == Role::client && connection->state == Connection::State::served;
   connection->outbox.end(connection->finishing ? DropReason::stop : DropReason::gone);
-  actions.emplace_back(Closed{connection->peer.name, connection->role == Role::observer,
-                              connection->state != Connection::State::waiting, connection->outbox.pings_written(),
-                              connection->outbox.pings_dropped(), why});
-  if (connection->role == Role::client) add_traffic(figures_, *connection);
+  actions.emplace_back(Closed{connection->peer.name, connection->role, connection->state != Connection::State::waiting,
+                              connection->outbox.pings_written(), connection->outbox.pings_dropped(), why});
+  if (connection->role != Role::observer) add_traffic(figures_, *connection);
   connections_.remove(id);
   if (!was_client) return actions;
   Connection* const next = stopping_ ? nullptr : connections_.longest_waiting();
   if (next == nullptr) {
-    on_membership(now);
+    on_membership(now, actions);
     return actions;
   }
   if (connections_.clients() == 0) use_initial_settings();
@@ -112,7 +185,7 @@ void Sonar::handle(Connection& from, protocol::Reaction reaction, Time now, Acti
     if (const auto* close = std::get_if<protocol::Close>(&event))
       close_why = close->why;
     else
-      on_event(from, event, now, actions);
+      on_event(source_of(from), event, now, actions);
   }
   for (protocol::Bytes& reply : reaction.replies)
     if (!from.outbox.push_reply(std::move(reply))) {
@@ -123,23 +196,25 @@ void Sonar::handle(Connection& from, protocol::Reaction reaction, Time now, Acti
   if (!reaction.replies.empty()) actions.emplace_back(Wake{from.id});
 }
 
-void Sonar::on_event(const Connection& from, const protocol::Event& event, Time now, Actions& actions) {
+void Sonar::on_event(const Source& from, const protocol::Event& event, Time now, Actions& actions) {
   if (stopping_) return;
+  const bool observer = from.connection != nullptr && from.connection->role == Role::observer;
   if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
-    if (from.role == Role::client)
-      report(Report::Topic::notice, LogLevel::warning, notice->text, {{"client", from.peer.name}}, actions);
-  } else if (from.role == Role::observer) {
+    if (!observer) report(Report::Topic::notice, LogLevel::warning, notice->text, {{"client", from.name}}, actions);
+  } else if (observer) {
     // Settings, triggers and addresses are for clients. An observer that sends them may have meant the other port.
     report(Report::Topic::ignored, LogLevel::info, "request of an observer ignored: only clients change what a sonar does",
-           {{"observer", from.peer.name}}, actions);
+           {{"observer", from.name}}, actions);
   } else if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
-    change_settings(*change, from.peer.name, now, actions);
+    change_settings(*change, from.name, now, actions);
   } else if (const auto* request = std::get_if<protocol::RequestPing>(&event)) {
     // The ping being computed will do only if it was fired with the settings that hold now.
     const bool served = request->joins && busy_ && busy_settings_ == state_.settings;
     if (!served) pacer_.trigger(now, request->joins);
   } else if (const auto* store = std::get_if<protocol::StoreAddress>(&event)) {
     state_.stored_address = store->address;
+  } else if (const auto* receivers = std::get_if<protocol::SetReceivers>(&event)) {
+    set_receivers(from, *receivers, now);
   }
 }
 

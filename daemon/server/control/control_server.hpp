@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "daemon/server/control/control_listener.hpp"
-#include "daemon/server/control/http_connection.hpp"
+#include "daemon/server/connections/connection_listener.hpp"
+#include "daemon/server/control/control_http.hpp"
 #include "daemon/server/control/stream_connection.hpp"
 
 namespace sonar {
@@ -28,11 +28,14 @@ class ControlServer {
  private:
   Result<void> read_token();
   template <class Connection>
-  Result<void> open(ControlListener<Connection>& listener, const PoseListener& wanted, bool given, const std::string& key);
+  Result<void> open(ConnectionListener<Connection>& listener, const PoseListener& wanted, bool given, const std::string& key);
 
-  ControlContext context_;
-  ControlListener<StreamConnection> stream_;
-  ControlListener<HttpConnection> http_;
+  const ControlConfig& config_;
+  ConnectionServices services_;
+  ControlTargets targets_;
+  ControlHttp answers_;
+  ConnectionListener<StreamConnection> stream_;
+  ConnectionListener<HttpConnection> http_;
 };
 
 }  // namespace sonar

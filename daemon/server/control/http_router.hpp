@@ -1,4 +1,4 @@
-// Maps a request to an action, or to the answer that rejects it: the rules of http_rules.hpp in order. Pure; HttpConnection
+// Maps a request to an action, or to the answer that rejects it: the rules of http_rules.hpp in order. Pure; ControlHttp
 // executes the action.
 #pragma once
 
@@ -6,20 +6,14 @@
 #include <variant>
 #include <vector>
 
-#include "daemon/server/control/http_reader.hpp"
+#include "daemon/server/connections/http_answer.hpp"
+#include "daemon/server/connections/http_reader.hpp"
+#include "daemon/server/connections/token.hpp"
 #include "daemon/server/control/http_rules.hpp"
-#include "daemon/server/control/token.hpp"
 #include "protocol/control/control.hpp"
 
 namespace sonar {
 
-struct HttpAnswer {
-  unsigned status = 200;
-  std::string body;
-  std::string type = "application/json";
-  std::string allow = {};  // of 405
-  std::string why = {};    // for the log, of 401 and 403
-};
 /// {"code", "text"}: the body of every answer without a document.
 HttpAnswer answer_of(unsigned status, control::StatusCode code, const std::string& text);
 

@@ -87,14 +87,6 @@ bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std
   return false;  // "null", and other schemes
 }
 
-std::string_view bearer_token(std::string_view authorization) {
-  constexpr std::string_view scheme = "Bearer ";
-  if (authorization.size() <= scheme.size() || !same_word(authorization.substr(0, scheme.size()), scheme)) return {};
-  authorization.remove_prefix(scheme.size());
-  const auto first = authorization.find_first_not_of(' ');
-  return first == std::string_view::npos ? std::string_view{} : authorization.substr(first);
-}
-
 bool begins_http_request(std::string_view bytes) {
   constexpr std::array<std::string_view, 9> methods{"GET ",     "HEAD ",    "POST ",  "PUT ",  "DELETE ",
                                                     "CONNECT ", "OPTIONS ", "TRACE ", "PATCH "};

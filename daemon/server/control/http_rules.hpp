@@ -28,8 +28,6 @@ bool host_allowed(std::string_view host, Ipv4 reached, const std::vector<std::st
 /// The same for "Origin: http://name:port": rejects cross-origin requests of browsers.
 bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std::string>& names);
 
-/// Of "Authorization: Bearer abc"; empty for anything else.
-std::string_view bearer_token(std::string_view authorization);
 /// "application/json", with any parameters.
 bool is_json(std::string_view content_type);
 

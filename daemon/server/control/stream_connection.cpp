@@ -35,17 +35,18 @@ Response response_of(std::uint64_t id, OperationResult result) {
 
 }  // namespace
 
-StreamConnection::StreamConnection(ControlContext& context, tcp::socket socket, Sender sender)
-    : context_(context),
+StreamConnection::StreamConnection(ConnectionServices& services, ControlTargets& targets, tcp::socket socket, Sender sender)
+    : services_(services),
+      targets_(targets),
       socket_(std::move(socket)),
       sender_(std::move(sender)),
       greeting_(std::make_shared<Deadline>(socket_)),
       stall_(std::make_shared<Deadline>(socket_)),
-      wake_reader_(context.io, never),
-      wake_writer_(context.io, never),
-      rest_(context.io),
-      parser_(context.limits.control_message_bytes),
-      rate_(context.limits.input_bytes_per_s) {}
+      wake_reader_(services.io, never),
+      wake_writer_(services.io, never),
+      rest_(services.io),
+      parser_(services.limits.control_message_bytes),
+      rate_(services.limits.input_bytes_per_s) {}
 
 void StreamConnection::close() {
   error_code ec;
@@ -70,7 +71,7 @@ asio::awaitable<void> StreamConnection::read() {
     active_at = Steady::now();
     received += n;
     if (speaks_http(std::span(buffer).first(n))) {
-      log_refusal(context_, "HTTP request on the control stream, which is protobuf; use control.http for HTTP", sender_.id);
+      log_refusal(services_, "HTTP request on the control stream, which is protobuf; use control.http for HTTP", sender_.id);
       break;
     }
     parser_.feed(std::span(buffer).first(n));
@@ -78,7 +79,7 @@ asio::awaitable<void> StreamConnection::read() {
     while (!ending_ && !over()) {
       const auto message = parser_.next();
       if (!message) {
-        log_refusal(context_, message.error().text, sender_.id);
+        log_refusal(services_, message.error().text, sender_.id);
         ending_ = true;
         break;
       }
@@ -98,8 +99,8 @@ asio::awaitable<void> StreamConnection::limit_rate(const Work& work) {
   const auto now = Steady::now();
   auto pause = rate_.pause_after(work.bytes, now);
   if (work.pose_bytes > 0) {
-    if (!pose_rate_) pose_rate_ = context_.pose_rate.join(context_.limits.pose_bytes_per_s);
-    pause = std::max(pause, context_.pose_rate.pause_after(*pose_rate_, work.pose_bytes, now));
+    if (!pose_rate_) pose_rate_ = targets_.pose_rate.join(services_.limits.pose_bytes_per_s);
+    pause = std::max(pause, targets_.pose_rate.pause_after(*pose_rate_, work.pose_bytes, now));
   }
   if (pause.count() == 0) co_return;
   error_code ec;
@@ -122,9 +123,9 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
   const auto request = control::decode_request(message);
   if (!request) {
     if (request.error().pose && greeted_)
-      context_.poses.refuse(request.error().why, sender_);
+      targets_.poses.refuse(request.error().why, sender_);
     else
-      log_refusal(context_, request.error().why, sender_.id);
+      log_refusal(services_, request.error().why, sender_.id);
     answer({request.error().id, StatusCode::refused, request.error().why, false});
     return greeted_ && request.error().is_protobuf;
   }
@@ -139,7 +140,7 @@ bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
     answer({id, StatusCode::refused, "protocol_version must be " + std::to_string(control::protocol_version), true});
     return false;
   }
-  if (!context_.token.matches(hello.token))
+  if (!services_.token.matches(hello.token))
     return refuse_and_end(id, StatusCode::unauthenticated,
                           hello.token.empty() ? "token required: send the token of control.token_file in the Hello"
                                               : "the token in the Hello is not that of control.token_file");
@@ -150,13 +151,13 @@ bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
   claim_slot_ = nullptr;
   greeted_ = true;
   greeting_->none();
-  context_.log.debug("control client", {{"from", sender_.id}, {"name", hello.name.substr(0, 64)}});
+  services_.log.debug("control client", {{"from", sender_.id}, {"name", hello.name.substr(0, 64)}});
   answer({id, StatusCode::ok, "", true});
   return true;
 }
 
 bool StreamConnection::refuse_and_end(std::uint64_t id, StatusCode code, const std::string& why) {
-  log_refusal(context_, why, sender_.id);
+  log_refusal(services_, why, sender_.id);
   answer({id, code, why, false});
   return false;
 }
@@ -182,7 +183,7 @@ bool StreamConnection::accept_greeted(const control::Request& request) {
 void StreamConnection::perform(std::uint64_t id, const control::Operation& operation) {
   const bool unasked = is_unasked(id, operation);
   if (!unasked) ++in_progress_;
-  context_.operations.perform(operation, sender_, [weak = weak_from_this(), id, unasked](OperationResult result) {
+  targets_.operations.perform(operation, sender_, [weak = weak_from_this(), id, unasked](OperationResult result) {
     const auto self = weak.lock();
     if (!self) return;
     if (!unasked) --self->in_progress_;
@@ -197,7 +198,7 @@ void StreamConnection::subscribe(const control::Subscribe& wanted) {
   if (!events_.subscribes_any()) {
     subscription_.reset();
   } else if (!subscription_) {
-    subscription_ = context_.events.listen([weak = weak_from_this()](const control::Event& event) {
+    subscription_ = targets_.events.listen([weak = weak_from_this()](const control::Event& event) {
       if (const auto self = weak.lock(); self && self->events_.offer(event)) self->wake_writer_.cancel();
     });
   }
@@ -233,7 +234,7 @@ asio::awaitable<void> StreamConnection::write() {
 }
 
 asio::awaitable<bool> StreamConnection::write_whole(control::Bytes bytes) {
-  const bool whole = co_await sonar::write_whole(context_, socket_, *stall_, sender_, asio::buffer(bytes));
+  const bool whole = co_await sonar::write_whole(services_, socket_, *stall_, sender_, asio::buffer(bytes));
   if (whole) active_at = Steady::now();
   co_return whole;
 }

@@ -8,9 +8,10 @@
 #include <optional>
 #include <string>
 
-#include "daemon/server/control/control_context.hpp"
+#include "daemon/server/connections/connection_services.hpp"
+#include "daemon/server/connections/input_rate.hpp"
+#include "daemon/server/control/control_targets.hpp"
 #include "daemon/server/control/event_queue.hpp"
-#include "daemon/server/sonars/input_rate.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 
@@ -22,7 +23,8 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   /// Requests in progress, or answered but not yet read by the client; at this limit reading pauses.
   static constexpr std::size_t most_open_requests = 64;
 
-  StreamConnection(ControlContext& context, tcp::socket socket, Sender sender);
+  /// `services` and `targets` outlive it.
+  StreamConnection(ConnectionServices& services, ControlTargets& targets, tcp::socket socket, Sender sender);
 
   asio::awaitable<void> read();
   asio::awaitable<void> write();
@@ -52,7 +54,8 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   bool refuse_and_end(std::uint64_t id, control::StatusCode code, const std::string& why);
   asio::awaitable<bool> write_whole(control::Bytes bytes);
 
-  ControlContext& context_;
+  ConnectionServices& services_;
+  ControlTargets& targets_;
   tcp::socket socket_;
   Sender sender_;
   std::shared_ptr<Deadline> greeting_, stall_;

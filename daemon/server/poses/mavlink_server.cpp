@@ -19,7 +19,7 @@ mavlink::Settings settings_of(const MavlinkConfig& link, const Config& config) {
           config.origin,
           config.clock == ClockMode::follow};
 }
-std::string text_of(const MavlinkConfig& link) { return (link.dials ? "udpout:" : "udpin:") + text_of(link.at); }
+std::string text_of(const MavlinkConfig& link) { return (link.dials ? "udpout:" : "udpin:") + sonar::text_of(link.at); }
 std::string text_of(const udp::endpoint& e) { return e.address().to_string() + ":" + std::to_string(e.port()); }
 
 }  // namespace

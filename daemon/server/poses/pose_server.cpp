@@ -36,21 +36,21 @@ PoseServer::PoseServer(asio::io_context& io, const PoseConfig& config, const Lim
       connections_(most_connections),
       together_(limits.pose_bytes_per_s) {}
 
-Result<Endpoint> PoseServer::open(Listener& listener, Endpoint at) {
-  if (listener.encoding == Encoding::json) {
-    if (auto r = listen_tcp(listener.acceptor, at); !r) return tl::make_unexpected(r.error());
-    at.port = listener.acceptor.local_endpoint().port();  // for port 0: the same number for both
+Result<Endpoint> PoseServer::open(Port& port, Endpoint at) {
+  if (port.encoding == Encoding::json) {
+    if (auto r = port.lines.open(at); !r) return tl::make_unexpected(r.error());
+    at = port.lines.at();  // for port 0: the same number for both
   }
-  if (auto r = bind_udp(listener.datagrams, at, false); !r) return tl::make_unexpected(r.error());
-  at.port = listener.datagrams.local_endpoint().port();
+  if (auto r = bind_udp(port.datagrams, at, false); !r) return tl::make_unexpected(r.error());
+  at.port = port.datagrams.local_endpoint().port();
   return at;
 }
 
 Result<void> PoseServer::open() {
   const auto add = [this](Encoding encoding, const PoseListener& wanted, Endpoint& out) -> Result<void> {
     if (!wanted.enabled) return {};
-    listeners_.push_back(Listener{encoding, udp::socket(io_), tcp::acceptor(io_)});
-    const auto at = open(listeners_.back(), wanted.at);
+    Port& port = ports_.emplace_back(encoding, udp::socket(io_), io_, admission_);
+    const auto at = open(port, wanted.at);
     if (!at) {
       const std::string key = encoding == Encoding::json ? "poses.json" : "poses.protobuf";
       return failure(at.error().kind, at.error().text + "; " + key + " in the configuration takes another address, or off");
@@ -63,42 +63,34 @@ Result<void> PoseServer::open() {
 }
 
 void PoseServer::start() {
-  for (Listener& l : listeners_) {
-    keep_receiving(l);
-    if (l.encoding == Encoding::json) keep_accepting(l);
+  for (Port& port : ports_) {
+    keep_receiving(port);
+    port.lines.start([this](tcp::socket socket) { admit(std::move(socket)); },
+                     [this](const std::string& fault) { say_fault(fault, "pose connections"); });
   }
 }
 
-void PoseServer::say_fault(const std::exception_ptr& fault, const std::string& at) {
-  sonar::say_fault(log_, faults_, text_of(fault), {"at", at});
+void PoseServer::say_fault(const std::string& fault, const std::string& at) {
+  sonar::say_fault(log_, faults_, fault, {"at", at});
 }
 
 /// A listener outlives whatever one message does to us.
-void PoseServer::keep_receiving(Listener& listener) {
+void PoseServer::keep_receiving(Port& port) {
   asio::co_spawn(
-      io_, [this, &listener] { return receive(listener); },
-      [this, &listener](std::exception_ptr fault) {
+      io_, [this, &port] { return receive(port); },
+      [this, &port](std::exception_ptr fault) {
         if (!fault || stopping_) return;
-        say_fault(fault, "pose datagrams");
-        keep_receiving(listener);
-      });
-}
-void PoseServer::keep_accepting(Listener& listener) {
-  asio::co_spawn(
-      io_, [this, &listener] { return accept(listener); },
-      [this, &listener](std::exception_ptr fault) {
-        if (!fault || stopping_) return;
-        say_fault(fault, "pose connections");
-        keep_accepting(listener);
+        say_fault(text_of(fault), "pose datagrams");
+        keep_receiving(port);
       });
 }
 
 void PoseServer::stop() {
   stopping_ = true;
   error_code ec;
-  for (Listener& l : listeners_) {
-    l.datagrams.close(ec);
-    l.acceptor.close(ec);
+  for (Port& port : ports_) {
+    port.datagrams.close(ec);
+    port.lines.stop();
   }
   connections_.close_all();
 }
@@ -134,30 +126,23 @@ void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes
     intake_.refuse(sample.error().text, sender);
 }
 
-asio::awaitable<void> PoseServer::receive(Listener& listener) {
+asio::awaitable<void> PoseServer::receive(Port& port) {
   std::vector<std::byte> buffer(65536);
   while (!stopping_) {
     error_code ec;
     udp::endpoint from;
-    const std::size_t n = co_await listener.datagrams.async_receive_from(asio::buffer(buffer), from, into(ec));
+    const std::size_t n = co_await port.datagrams.async_receive_from(asio::buffer(buffer), from, into(ec));
     if (stopping_) co_return;
     if (ec) continue;  // an ICMP answer to nothing we sent
     if (!is_admitted(config_.allow_from, from.address())) {
       intake_.refuse("address is not in poses.allow_from", sender_of(false, "udp", from.address(), from.port()));
       continue;
     }
-    on_datagram(listener.encoding, std::span(buffer).first(n), from);
+    on_datagram(port.encoding, std::span(buffer).first(n), from);
   }
 }
 
 // ---- JSON lines by TCP
-
-asio::awaitable<void> PoseServer::accept(Listener& listener) {
-  while (auto socket = co_await admission_.next_visitor(listener.acceptor, Admission::Purpose::client)) {
-    if (stopping_) co_return;
-    admit(*std::move(socket));
-  }
-}
 
 void PoseServer::admit(tcp::socket socket) {
   error_code ec;
@@ -179,7 +164,7 @@ void PoseServer::admit(tcp::socket socket) {
   asio::co_spawn(
       io_, [this, connection] { return read_lines(connection); },
       [this, connection](std::exception_ptr fault) {
-        if (fault) say_fault(fault, connection->sender.id);
+        if (fault) say_fault(text_of(fault), connection->sender.id);
         connection->close();
         connections_.remove(connection);
       });

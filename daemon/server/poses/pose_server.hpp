@@ -11,12 +11,12 @@
 
 #include "core/base/result.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/server/connections/connection_slots.hpp"
+#include "daemon/server/connections/input_rate.hpp"
+#include "daemon/server/connections/listener.hpp"
+#include "daemon/server/connections/shared_rate.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
-#include "daemon/server/sonars/admission.hpp"
-#include "daemon/server/sonars/input_rate.hpp"
-#include "daemon/server/sonars/shared_rate.hpp"
 #include "daemon/server/system/asio.hpp"
-#include "daemon/server/system/connection_slots.hpp"
 #include "daemon/server/system/log.hpp"
 #include "protocol/control/json_pose.hpp"
 
@@ -38,10 +38,12 @@ class PoseServer {
 
  private:
   enum class Encoding { protobuf, json };
-  struct Listener {
+  struct Port {
+    Port(Encoding e, udp::socket s, asio::io_context& io, Admission& admission)
+        : encoding(e), datagrams(std::move(s)), lines(io, admission, Admission::Purpose::client) {}
     Encoding encoding;
     udp::socket datagrams;
-    tcp::acceptor acceptor;  // of JSON lines only
+    Listener lines;  // of JSON only
   };
   /// One TCP sender; closed by stop(), or when its place is needed and it has sent no pose, or too much, for longest.
   struct Connection {
@@ -67,12 +69,10 @@ class PoseServer {
   };
   using ConnectionPointer = std::shared_ptr<Connection>;
 
-  Result<Endpoint> open(Listener& listener, Endpoint at);
-  void keep_receiving(Listener& listener);
-  void keep_accepting(Listener& listener);
-  void say_fault(const std::exception_ptr& fault, const std::string& at);
-  asio::awaitable<void> receive(Listener& listener);
-  asio::awaitable<void> accept(Listener& listener);
+  Result<Endpoint> open(Port& port, Endpoint at);
+  void keep_receiving(Port& port);
+  void say_fault(const std::string& fault, const std::string& at);
+  asio::awaitable<void> receive(Port& port);
   asio::awaitable<void> read_lines(ConnectionPointer connection);
   enum class Turn { over, not_over, end };  // no whole line is left; one may be; the connection speaks no JSON
   struct Work {
@@ -94,7 +94,7 @@ class PoseServer {
   PoseIntake& intake_;
   Log& log_;
   LogLimiter notices_, faults_;
-  std::list<Listener> listeners_;
+  std::list<Port> ports_;
   ConnectionSlots<Connection> connections_;
   SharedRate together_;  // of all connections
   Endpoint protobuf_at_, json_at_;

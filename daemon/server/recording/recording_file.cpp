@@ -43,7 +43,10 @@ class CountedSink final : public recording::Sink {
 }  // namespace
 
 std::size_t RecordedPing::size() const {
-  return bytes->size() + status.size() + ping->samples.size() + ping->truth.size() * sizeof(BeamTruth) +
+  std::size_t sent = bytes ? bytes->size() : 0;
+  for (const auto& stream : datagrams)
+    for (const protocol::Bytes& datagram : *stream) sent += datagram.size();
+  return sent + status.size() + ping->samples.size() + ping->truth.size() * sizeof(BeamTruth) +
          ping->request.bodies_in_world.size() * sizeof(Pose);
 }
 
@@ -94,7 +97,11 @@ Result<void> RecordingFile::write(const RecordedPing& ping) {
     status_at_ = ping.at;
     if (Result<void> put_it = put({ping.at, Origin::device, recording::Carrier::datagram, ping.status}); !put_it) return put_it;
   }
-  if (Result<void> put_it = put({ping.at, Origin::device, recording::Carrier::stream, *ping.bytes}); !put_it) return put_it;
+  if (ping.bytes)
+    if (Result<void> put_it = put({ping.at, Origin::device, recording::Carrier::stream, *ping.bytes}); !put_it) return put_it;
+  for (const auto& stream : ping.datagrams)
+    for (const protocol::Bytes& datagram : *stream)
+      if (Result<void> put_it = put({ping.at, Origin::device, recording::Carrier::datagram, datagram}); !put_it) return put_it;
   ++pings_;
   return mcap_ == nullptr ? Result<void>{} : put_truth(ping);
 }

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/sonar/ping.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
@@ -22,9 +23,10 @@ using recording::mcap::SceneNames;
 struct RecordedPing {
   Time at{};  // when it was made
   std::shared_ptr<const Ping> ping;
-  std::shared_ptr<const protocol::Bytes> bytes;  // the vendor's, as clients get them
-  protocol::Bytes status;                        // what the sonar announced of itself then; empty = nothing
-  std::shared_ptr<const SceneNames> names;       // of the scene that it was made in
+  std::shared_ptr<const protocol::Bytes> bytes;  // the vendor's, as clients get them; null = not sent over TCP
+  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // of each stream, as receivers get them
+  protocol::Bytes status;                   // what the sonar announced of itself then; empty = nothing
+  std::shared_ptr<const SceneNames> names;  // of the scene that it was made in
 
   /// That it keeps in memory while it waits.
   std::size_t size() const;

@@ -1,7 +1,8 @@
-// The network side of one emulated sonar: its listeners for clients and observers, its status broadcast, its timer. Bytes go to
-// the Sonar, whose Actions it carries out. Owned by Fleet. I/O thread only.
+// The network side of one emulated sonar: the ports of its vendor, its observers' port, its timer. Bytes go to the Sonar, whose
+// Actions it carries out. Owned by Fleet. I/O thread only.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <list>
 #include <map>
@@ -13,13 +14,14 @@
 #include "core/base/result.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/sonar/sonar.hpp"
-#include "daemon/emulator/world/world.hpp"
+#include "daemon/server/connections/listener.hpp"
 #include "daemon/server/engine/simulator.hpp"
-#include "daemon/server/operations.hpp"
-#include "daemon/server/recording/recordings.hpp"
-#include "daemon/server/sonars/admission.hpp"
-#include "daemon/server/sonars/datagram_answers.hpp"
+#include "daemon/server/recording/recording_file.hpp"
+#include "daemon/server/sonars/beacon.hpp"
+#include "daemon/server/sonars/datagram_port.hpp"
+#include "daemon/server/sonars/datagram_stream.hpp"
 #include "daemon/server/sonars/session.hpp"
+#include "daemon/server/sonars/sonar_http.hpp"
 #include "daemon/server/sonars/visit_log.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
@@ -27,20 +29,31 @@
 
 namespace sonar {
 
-/// What all devices share; outlives them.
-struct DeviceContext {
+class Device;
+
+/// What a device needs of the daemon beside the network; outlives it.
+class DeviceParent {
+ public:
+  virtual ~DeviceParent() = default;
+  /// `done` is called once, later, on the I/O thread.
+  virtual void compute(const Device& of, PingRequest request, Simulator::Done done) = 0;
+  virtual void on_ping_queued(const Device& of, const PingQueued& ping) = 0;
+  virtual void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) = 0;
+  /// Nothing more will come of it.
+  virtual void on_stop(const Device& of, const std::string& why) = 0;
+  /// Something stepped time, or the end, may have waited for.
+  virtual void on_change() = 0;
+  /// The daemon cannot go on.
+  virtual void on_engine_failure(const Error& why) = 0;
+};
+
+/// The network that all devices share; outlives them.
+struct DeviceNetwork {
   asio::io_context& io;
   Clock& clock;
-  World& world;
-  Simulator& simulator;
   Admission& admission;
   Log& log;
-  const Config& config;
-  Events& events;
-  Recordings& recordings;
-  bool digest = false;
-  std::function<void()> on_change;                   // something stepped time or the end may have waited for
-  std::function<void(const Error& why)> on_failure;  // the engine failed: the daemon cannot go on
+  bool digest = false;  // SHA-256 of what each client is sent
 };
 
 struct StreamDigest {
@@ -50,18 +63,19 @@ struct StreamDigest {
 
 class Device final : public SessionParent {
  public:
-  Device(DeviceContext& context, const SonarConfig& config, std::uint32_t index);
+  Device(DeviceNetwork& network, Sonar::Surroundings around, const SonarConfig& config, std::uint32_t index,
+         DeviceParent& parent);
   ~Device() override;
 
-  /// Binds the TCP listeners, then the socket of the status broadcast. Errors name the address and the next step.
+  /// Opens the ports of the vendor, then that of the observers. Errors name the address and the next step.
   Result<void> open();
   void start();
   /// Stop accepting, stop pinging, let every client have its current message whole and a FIN.
   void stop(const std::string& why = "sonard stops");
 
   // Stepped time.
-  void step() { perform(sonar_.tick_pacer(context_.clock.now())); }
-  void tick_sessions() { perform(sonar_.tick_conversations(context_.clock.now())); }
+  void step() { perform(sonar_.tick_pacer(network_.clock.now())); }
+  void tick_sessions() { perform(sonar_.tick_conversations(network_.clock.now())); }
   void skip(std::chrono::nanoseconds by) { sonar_.skip(by); }
 
   bool gone() const;  // after stop(): nothing is left
@@ -69,8 +83,9 @@ class Device final : public SessionParent {
   const SonarConfig& config() const { return sonar_.config(); }
   DeviceFigures figures() const { return sonar_.figures(); }
   std::vector<StreamDigest> digests() const;
-  tcp::endpoint data_endpoint() const;
-  std::vector<udp::endpoint> status_destinations() const { return status_to_; }
+  /// The vendor's first TCP port; port 0 when it has none.
+  Endpoint data_endpoint() const;
+  std::vector<udp::endpoint> status_destinations() const { return beacon_.destinations(); }
 
   // Control (device_control.cpp).
   control::SonarStatus status(Time now) const;
@@ -81,41 +96,46 @@ class Device final : public SessionParent {
   /// As one more client would; nothing is changed when it is refused, with a sentence that says what the product can do.
   Result<void> ask(const control::SetSonar& asked, const std::string& who);
   /// Vehicle and mount, of a configuration that is otherwise the same.
-  void use_place(const SonarConfig& config) { sonar_.move(config, context_.clock.now()); }
+  void use_place(const SonarConfig& config) { sonar_.move(config, network_.clock.now()); }
   void use_water(const Water& water);
   /// Closes connections whose peer has hung up. Now and then, and before a slot is given or refused: the listener may be ready
   /// before the reader of the one that left.
   void forget_who_left();
 
-  void on_bytes(Session& from, protocol::BytesView bytes) override;
-  Outbox::Message next_message(Session& to) override { return sonar_.next_message(to.id()); }
-  void on_sent(Session& to, std::size_t bytes) override { sonar_.on_sent(to.id(), bytes); }
-  void on_written(Session& to, const Outbox::Message& message) override;
-  std::optional<std::chrono::milliseconds> longest_silence(const Session& of) const override;
-  void on_finish(Session& session) override { sonar_.finish(session.id()); }
-  void on_fault(Session& session, const std::string& what) override;
-  void on_over(Session& session, const std::string& why) override;
+  void on_bytes(ConnectionId from, protocol::BytesView bytes) override;
+  Outbox::Message next_message(ConnectionId to) override { return sonar_.next_message(to); }
+  std::vector<Endpoint> receivers(ConnectionId stream) const override { return sonar_.receivers(stream); }
+  void on_sent(ConnectionId to, std::size_t bytes) override { sonar_.on_sent(to, bytes); }
+  void on_written(ConnectionId to, const Outbox::Message& message) override;
+  std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const override;
+  void on_finish(ConnectionId session) override { sonar_.finish(session); }
+  void on_fault(const std::string& what) override;
+  void on_send_error(const Endpoint& to, const std::string& why) override;
+  void on_over(ConnectionId session, const std::string& why) override;
 
  private:
   using SessionPointer = std::shared_ptr<Session>;
+  using StreamPointer = std::shared_ptr<DatagramStream>;
   struct Arrived {  // has no session yet
     tcp::socket socket;
     Admission::Place place;
     Role role = Role::client;
   };
+  struct TcpPort {
+    const protocol::Port* port;
+    Listener listener;
+  };
 
+  Result<void> open(const protocol::Port& port);
+  Result<DatagramPort*> datagram_port(std::uint16_t number);
   Result<void> open_observers();
-  void keep_accepting(asio::awaitable<void> (Device::*accept)());
-  asio::awaitable<void> accept_clients();
-  asio::awaitable<void> accept_observers();
-  void on_arrival(tcp::socket socket, Admission::Place place, Role role);
+  void on_client_socket(tcp::socket socket, const protocol::Port& port);
+  void on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port);
   asio::awaitable<void> turn_away(tcp::socket socket, Admission::Place place);
-  void keep_announcing();
-  asio::awaitable<void> announce();
   void arm();
-  void report_fault(const std::string& what);
   void report_visit(Role role, VisitLog::Kind kind, const std::string& what, std::vector<LogField> fields);
   SessionPointer session_of(ConnectionId id) const;
+  StreamPointer stream_of(ConnectionId id) const;
 
   void perform(Actions actions);
   void carry_out(ComputePing& action);
@@ -126,32 +146,32 @@ class Device final : public SessionParent {
   void carry_out(const Finish& action);
   void carry_out(const Reset& action);
   void carry_out(const Closed& action);
-  void carry_out(const PingQueued& action);
+  void carry_out(const Announce&) { beacon_.send_now(); }
+  void carry_out(const PingQueued& action) { parent_.on_ping_queued(*this, action); }
   void carry_out(const Report& action);
-  void carry_out(const EngineFailed& action);
-  void publish_client(const std::string& peer, bool connected, const std::string& why) const;
-  void publish_ping(const PingQueued& queued) const;
+  void carry_out(const EngineFailed& action) { parent_.on_engine_failure(action.why); }
 
-  DeviceContext& context_;
+  DeviceNetwork& network_;
+  DeviceParent& parent_;
+  const LimitConfig& limits_;
   Sonar sonar_;
-  tcp::acceptor acceptor_, observer_acceptor_;
-  udp::socket beacon_;
-  asio::steady_timer beacon_timer_, timer_;
+  std::list<TcpPort> tcp_ports_;
+  Listener observer_listener_;
+  Beacon beacon_;
+  std::list<DatagramPort> datagram_ports_;
+  std::list<SonarHttp> http_;
+  asio::steady_timer timer_;
   std::optional<std::chrono::steady_clock::time_point> timer_at_;
-  DatagramAnswers answers_;
-  std::chrono::milliseconds beacon_period_{0};
-  std::vector<udp::endpoint> status_to_;
-  Endpoint observers_at_;
 
   ConnectionId last_connection_ = 0;
   std::map<ConnectionId, Arrived> arrived_;  // being decided upon, or waiting for a slot
   std::list<SessionPointer> sessions_;
+  std::list<StreamPointer> streams_;
   int turning_away_ = 0;
 
-  std::shared_ptr<const SceneNames> computed_names_;  // of the scene the ping is computed in
-  bool started_ = false, stopping_ = false, beacon_failed_ = false;
+  bool started_ = false, stopping_ = false;
   std::array<LogLimiter, static_cast<std::size_t>(Report::Topic::topics)> limiters_;
-  LogLimiter faults_, observer_visits_;
+  LogLimiter faults_, observer_visits_, send_errors_;
   VisitLog visits_;
   std::vector<StreamDigest> digests_;
 };

@@ -1,4 +1,6 @@
 // A Device as the control protocol sees it: what it says of itself, and what may be asked of it while it runs.
+#include <algorithm>
+
 #include "core/text/ipv4.hpp"
 #include "daemon/server/sonars/device.hpp"
 
@@ -32,9 +34,10 @@ control::SonarStatus Device::status(Time now) const {
   control::SonarStatus s;
   s.name = config().name;
   s.profile = state.model->profile;
-  s.listens = text_of(Endpoint{config().bind_ip, data_endpoint().port()});
+  s.listens = text_of(data_endpoint());
   s.advertised = text_of(state.advertise_ip);
-  for (const udp::endpoint& to : status_to_) s.status_to.push_back(to.address().to_string() + ":" + std::to_string(to.port()));
+  for (const udp::endpoint& to : status_destinations())
+    s.status_to.push_back(to.address().to_string() + ":" + std::to_string(to.port()));
   s.pinging = sonar_.wants_pings() && settings.rate_hz > 0;
   s.transmits = sonar_.transmits();
   s.range_m = settings.range_m;
@@ -43,8 +46,8 @@ control::SonarStatus Device::status(Time now) const {
   s.frequency_hz = static_cast<double>(mode.centre_hz);
   s.beams = static_cast<std::uint32_t>(settings.beam_count);
   s.rows = static_cast<std::uint32_t>(settings.range_bin_count);
-  s.in_world = compose(context_.world.vehicle_at(config().vehicle, now), config().mount);
-  if (observers_at_.port != 0) s.observers = text_of(observers_at_);
+  s.in_world = sonar_.pose_at(now);
+  if (observer_listener_.at().port != 0) s.observers = text_of(observer_listener_.at());
   s.observing = static_cast<std::uint32_t>(sonar_.connections().observers());
   for (const Connection& c : sonar_.connections().all()) {
     if (c.role != Role::client || c.state != Connection::State::served) continue;
@@ -57,13 +60,14 @@ control::SonarStatus Device::status(Time now) const {
 }
 
 std::string Device::trouble() const {
-  const bool lost = !stopping_ && !acceptor_.is_open();
+  const bool lost =
+      !stopping_ && std::any_of(tcp_ports_.begin(), tcp_ports_.end(), [](const TcpPort& p) { return !p.listener.is_open(); });
   return lost ? "sonar " + config().name + " does not listen any more" : "";
 }
 
 RecordedSonar Device::recorded() const {
   RecordedSonar sonar{config().name, std::string(sonar_.vendor().name()), {}};
-  sonar.ends.device = {text::number_from_ipv4(sonar_.state().advertise_ip), data_endpoint().port()};
+  sonar.ends.device = {text::number_from_ipv4(sonar_.state().advertise_ip), data_endpoint().port};
   sonar.ends.status_from.address = sonar.ends.device.address;
   if (const Connection* const client = sonar_.connections().oldest_client())
     sonar.ends.client.address = text::number_from_ipv4(client->peer.ip);
@@ -71,7 +75,7 @@ RecordedSonar Device::recorded() const {
 }
 
 Result<void> Device::ask(const control::SetSonar& asked, const std::string& who) {
-  const Time now = context_.clock.now();
+  const Time now = network_.clock.now();
   const protocol::SettingsOverride wanted{asked.range_m, asked.rate_hz, asked.gain_percent, asked.mode, asked.beams};
   Actions actions;
   if (wanted.range_m || wanted.rate_hz || wanted.gain_percent || wanted.mode || wanted.beams) {
@@ -80,7 +84,7 @@ Result<void> Device::ask(const control::SetSonar& asked, const std::string& who)
     actions = *std::move(changed);
   }
   if (asked.transmit && sonar_.set_transmit(*asked.transmit))
-    context_.log.info(*asked.transmit ? "transmits again" : "does not transmit any more",
+    network_.log.info(*asked.transmit ? "transmits again" : "does not transmit any more",
                       {{"sonar", config().name}, {"client", who}});
   if (asked.mount) sonar_.move_mount(*asked.mount, now);
   perform(std::move(actions));
@@ -88,28 +92,8 @@ Result<void> Device::ask(const control::SetSonar& asked, const std::string& who)
 }
 
 void Device::use_water(const Water& water) {
-  sonar_.use_water(water, context_.clock.now());
+  sonar_.use_water(water, network_.clock.now());
   perform({});
-}
-
-void Device::publish_ping(const PingQueued& queued) const {
-  if (!context_.events.heard()) return;
-  const PingRequest& r = queued.ping->request;
-  control::PingEvent e;
-  e.sonar = config().name;
-  e.number = static_cast<std::uint32_t>(r.number);
-  e.fired_at_ns = r.fired_at.time_since_epoch().count();
-  e.sonar_in_world = r.sonar_in_world;
-  e.range_m = r.settings.range_m;
-  e.beams = static_cast<std::uint32_t>(r.settings.beam_count);
-  e.rows = static_cast<std::uint32_t>(r.settings.range_bin_count);
-  e.clients = static_cast<std::uint32_t>(sonar_.connections().clients());
-  e.simulation_ms = ms(queued.simulation_s);
-  context_.events.tell({e});
-}
-
-void Device::publish_client(const std::string& peer, bool connected, const std::string& why) const {
-  if (context_.events.heard()) context_.events.tell({control::ClientEvent{config().name, peer, connected, why}});
 }
 
 }  // namespace sonar

@@ -13,7 +13,7 @@ constexpr int sweeps_before_it_goes = 3;
 
 Result<void> Fleet::open(const Config& config) {
   for (const SonarConfig& sonar : config.sonars) {
-    devices_.emplace_back(context_, sonar, static_cast<std::uint32_t>(devices_.size()));
+    devices_.emplace_back(network_, around_, sonar, static_cast<std::uint32_t>(devices_.size()), *this);
     if (auto r = devices_.back().open(); !r) return r;
   }
   return {};
@@ -84,7 +84,7 @@ void Fleet::sweep() {
 }
 
 bool Fleet::add(const SonarConfig& sonar, std::uint32_t index, std::vector<std::string>& errors) {
-  devices_.emplace_back(context_, sonar, index);
+  devices_.emplace_back(network_, around_, sonar, index, *this);
   const auto opened = devices_.back().open();
   if (opened) {
     devices_.back().start();
@@ -167,6 +167,39 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   for (const auto& [name, fate] : fates) change.summary += ", " + name + " " + fate;
   missing_ = change.errors;
   return change;
+}
+
+// ---- what comes of the sonars
+
+void Fleet::compute(const Device& of, PingRequest request, Simulator::Done done) {
+  request.switches.keep_truth = recordings_.wants_truth(of.config().name);
+  computed_names_[of.sonar().index()] = recordings_.names();
+  simulator_.submit(std::move(request), std::move(done));
+}
+
+void Fleet::on_ping_queued(const Device& of, const PingQueued& queued) {
+  const Time now = network_.clock.now();
+  const std::string& name = of.config().name;
+  if (recordings_.takes(name))
+    recordings_.take(name, {now, queued.ping, queued.bytes, queued.datagrams, of.sonar().vendor().beacon(of.sonar().state(), now),
+                            computed_names_[of.sonar().index()]});
+  if (!events_.heard()) return;
+  const PingRequest& r = queued.ping->request;
+  control::PingEvent e;
+  e.sonar = name;
+  e.number = static_cast<std::uint32_t>(r.number);
+  e.fired_at_ns = r.fired_at.time_since_epoch().count();
+  e.sonar_in_world = r.sonar_in_world;
+  e.range_m = r.settings.range_m;
+  e.beams = static_cast<std::uint32_t>(r.settings.beam_count);
+  e.rows = static_cast<std::uint32_t>(r.settings.range_bin_count);
+  e.clients = static_cast<std::uint32_t>(of.sonar().connections().clients());
+  e.simulation_ms = 1e3 * queued.simulation_s;
+  events_.tell({e});
+}
+
+void Fleet::on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) {
+  if (events_.heard()) events_.tell({control::ClientEvent{of.config().name, peer, connected, why}});
 }
 
 }  // namespace sonar

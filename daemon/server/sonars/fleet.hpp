@@ -1,20 +1,36 @@
 // The daemon's sonars: a Device each, and those that are on their way out after the configuration was read again. Owned by App.
-// A sonar that a new configuration does not touch lives on with its clients; it keeps its index, which keys its noise.
+// A sonar that a new configuration does not touch lives on with its clients; it keeps its index, which keys its noise. What comes
+// of the sonars goes from here to the simulator, to recordings and to subscribers of events.
 #pragma once
 
+#include <functional>
 #include <list>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "daemon/server/operations.hpp"
+#include "daemon/server/recording/recordings.hpp"
 #include "daemon/server/sonars/device.hpp"
 
 namespace sonar {
 
-class Fleet {
+class Fleet final : public DeviceParent {
  public:
-  explicit Fleet(DeviceContext& context) : context_(context) {}
+  struct Handlers {
+    std::function<void()> on_change;                          // something stepped time, or the end, may have waited for
+    std::function<void(const Error& why)> on_engine_failure;  // the daemon cannot go on
+  };
+  /// All of it outlives the fleet.
+  Fleet(DeviceNetwork network, const Config& config, const World& world, Simulator& simulator, Recordings& recordings,
+        Events& events, Handlers handlers)
+      : network_(network),
+        around_{config, world},
+        simulator_(simulator),
+        recordings_(recordings),
+        events_(events),
+        handlers_(std::move(handlers)) {}
 
   /// Opens the listeners of all sonars of the configuration. Errors name the address and the next step.
   Result<void> open(const Config& config);
@@ -57,8 +73,21 @@ class Fleet {
   void retire(std::list<Device>::iterator device);
   bool add(const SonarConfig& sonar, std::uint32_t index, std::vector<std::string>& errors);
 
-  DeviceContext& context_;
-  std::list<Device> devices_;  // in the configuration's order
+  void compute(const Device& of, PingRequest request, Simulator::Done done) override;
+  void on_ping_queued(const Device& of, const PingQueued& ping) override;
+  void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) override;
+  void on_stop(const Device& of, const std::string& why) override { recordings_.end_of(of.config().name, why); }
+  void on_change() override { handlers_.on_change(); }
+  void on_engine_failure(const Error& why) override { handlers_.on_engine_failure(why); }
+
+  DeviceNetwork network_;
+  Sonar::Surroundings around_;
+  Simulator& simulator_;
+  Recordings& recordings_;
+  Events& events_;
+  Handlers handlers_;
+  std::map<std::uint32_t, std::shared_ptr<const SceneNames>> computed_names_;  // by index: of the scene its ping is computed in
+  std::list<Device> devices_;                                                  // in the configuration's order
   std::list<Retired> retired_;
   std::uint64_t served_before_ = 0;   // by those swept away
   std::vector<std::string> missing_;  // errors of sonars that should be there

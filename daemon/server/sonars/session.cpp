@@ -65,7 +65,7 @@ void Session::spawn(asio::awaitable<void> (Session::*part)()) {
       socket_.get_executor(), [self, part] { return ((*self).*part)(); },
       [self](std::exception_ptr fault) {
         if (!fault) return;
-        self->parent_.on_fault(*self, text_of(fault));
+        self->parent_.on_fault(text_of(fault));
         self->reset("an internal fault");
       });
 }
@@ -81,7 +81,7 @@ asio::awaitable<void> Session::read() {
       co_return;
     }
     received_at_ = Steady::now();
-    parent_.on_bytes(*this, std::span(received_).first(n));
+    parent_.on_bytes(setup_.id, std::span(received_).first(n));
     const auto pause = input_rate_.pause_after(n, Steady::now());
     if (pause.count() > 0 && !finishing_) co_await rest(pause);
   }
@@ -118,7 +118,7 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
     }
     if (setup_.digest) digest_.add(bytes.subspan(done, n));
     done += n;
-    parent_.on_sent(*this, n);
+    parent_.on_sent(setup_.id, n);
     progress_at_ = Steady::now();
   }
   co_return true;
@@ -127,14 +127,14 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
 asio::awaitable<void> Session::write() {
   const auto self = shared_from_this();
   while (!over_) {
-    const Outbox::Message message = parent_.next_message(*this);
+    const Outbox::Message message = parent_.next_message(setup_.id);
     error_code ec;
     if (message) {
       writing_ = true;
       progress_at_ = Steady::now();
       if (!co_await write_whole(message)) co_return;
       writing_ = false;
-      parent_.on_written(*this, message);
+      parent_.on_written(setup_.id, message);
     } else if (finishing_) {
       socket_.shutdown(tcp::socket::shutdown_send, ec);
       sent_fin_ = true;  // the reader waits for the client's own FIN, the watch for the deadline
@@ -165,14 +165,14 @@ asio::awaitable<void> Session::watch() {
     } else if (writing_ && now - progress_at_ > setup_.limits.stall) {
       reset("took no byte for " + std::to_string(setup_.limits.stall.count()) + " ms");
     } else if (!finishing_ && is_silent(now)) {
-      finish("silent for " + std::to_string(parent_.longest_silence(*this)->count() / 1000) + " s");
+      finish("silent for " + std::to_string(parent_.longest_silence(setup_.id)->count() / 1000) + " s");
     }
   }
 }
 
 /// Not one whose bytes wait to be read: this process may have been stopped for a while.
 bool Session::is_silent(Steady::time_point now) const {
-  const auto longest = parent_.longest_silence(*this);
+  const auto longest = parent_.longest_silence(setup_.id);
   error_code ec;
   return longest && now - received_at_ > *longest && socket_.available(ec) == 0;
 }
@@ -182,7 +182,7 @@ void Session::finish(std::string why) {
   finishing_ = true;
   why_ = std::move(why);
   finish_by_ = Steady::now() + finish_limit;
-  parent_.on_finish(*this);
+  parent_.on_finish(setup_.id);
   wake_reader_.cancel();
   wake_writer_.cancel();
   wake_watch_.cancel();
@@ -212,7 +212,7 @@ void Session::over(std::string why) {
   wake_reader_.cancel();
   wake_writer_.cancel();
   wake_watch_.cancel();
-  parent_.on_over(*this, why);
+  parent_.on_over(setup_.id, why);
 }
 
 }  // namespace sonar

@@ -9,35 +9,38 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/sonar/actions.hpp"
 #include "daemon/emulator/sonar/connections.hpp"
-#include "daemon/server/sonars/input_rate.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/sha256.hpp"
 
 namespace sonar {
 
-class Session;
-
-/// What a session needs from its parent, which outlives it.
+/// What a session or a stream of datagrams needs from its parent, which outlives it.
 class SessionParent {
  public:
   virtual ~SessionParent() = default;
-  virtual void on_bytes(Session& from, protocol::BytesView bytes) = 0;
+  virtual void on_bytes(ConnectionId from, protocol::BytesView bytes) = 0;
   /// The next message to write; empty when there is none.
-  virtual Outbox::Message next_message(Session& to) = 0;
-  virtual void on_sent(Session& to, std::size_t bytes) = 0;
+  virtual Outbox::Message next_message(ConnectionId to) = 0;
+  /// Of a stream: where its messages go.
+  virtual std::vector<Endpoint> receivers(ConnectionId stream) const = 0;
+  virtual void on_sent(ConnectionId to, std::size_t bytes) = 0;
   /// A message has been handed to the kernel whole.
-  virtual void on_written(Session& to, const Outbox::Message& message) = 0;
+  virtual void on_written(ConnectionId to, const Outbox::Message& message) = 0;
   /// A peer that is silent for longer has gone. Nothing: it may be silent.
-  virtual std::optional<std::chrono::milliseconds> longest_silence(const Session& of) const = 0;
+  virtual std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const = 0;
   /// It ends after the message being written.
-  virtual void on_finish(Session& session) = 0;
+  virtual void on_finish(ConnectionId session) = 0;
   /// An exception ended one of its coroutines; on_over follows.
-  virtual void on_fault(Session& session, const std::string& what) = 0;
-  virtual void on_over(Session& session, const std::string& why) = 0;
+  virtual void on_fault(const std::string& what) = 0;
+  /// A datagram could not be sent.
+  virtual void on_send_error(const Endpoint& to, const std::string& why) = 0;
+  virtual void on_over(ConnectionId session, const std::string& why) = 0;
 };
 
 class Session : public std::enable_shared_from_this<Session> {

@@ -73,6 +73,11 @@ Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast) {
   return {};
 }
 
+void send_multicast_from(udp::socket& socket, Ipv4 ip) {
+  error_code ec;  // a refused option leaves the system's choice
+  if (ip != Ipv4{}) socket.set_option(asio::ip::multicast::outbound_interface(address_of(ip)), ec);
+}
+
 bool is_admitted(const std::vector<AddressRange>& allow_from, const asio::ip::address& from) {
   if (!from.is_v4()) return false;
   const Ipv4 ip = from.to_v4().to_bytes();

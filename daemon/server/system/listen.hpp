@@ -13,6 +13,9 @@ Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at);
 /// `broadcast`: may send to broadcast addresses.
 Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast);
 
+/// Multicast leaves by the network interface of that address; 0.0.0.0: by the system's choice.
+void send_multicast_from(udp::socket& socket, Ipv4 ip);
+
 /// A peer that answers nothing, be it our bytes or the probes sent while there are none, ends the connection within `limit` with
 /// asio::error::timed_out. Whole seconds; at least 3.
 void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit);

@@ -1,5 +1,5 @@
 // Requests out of bytes: every split gives the same, limits hold, what is no HTTP is refused with its status.
-#include "daemon/server/control/http_reader.hpp"
+#include "daemon/server/connections/http_reader.hpp"
 
 #include <gmock/gmock.h>
 

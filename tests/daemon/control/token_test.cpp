@@ -1,5 +1,5 @@
 // Tokens: what a file may hold, and that only the whole secret matches.
-#include "daemon/server/control/token.hpp"
+#include "daemon/server/connections/token.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -67,6 +67,13 @@ TEST(Token, NoneLetsEverybodyThrough) {
   EXPECT_FALSE(Token().needed());
   EXPECT_TRUE(Token().matches(""));
   EXPECT_TRUE(Token().matches("anything"));
+}
+
+TEST(Token, IsReadFromTheAuthorizationHeader) {
+  EXPECT_EQ(bearer_token("Bearer abc"), "abc");
+  EXPECT_EQ(bearer_token("bearer   abc"), "abc");
+  for (const char* none : {"", "Bearer", "Bearer ", "Bearer   ", "Basic abc", "Bearerabc"})
+    EXPECT_EQ(bearer_token(none), "") << none;
 }
 
 }  // namespace

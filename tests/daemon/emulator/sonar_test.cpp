@@ -12,6 +12,7 @@
 #include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "protocol/oculus/fire.hpp"
+#include "tests/daemon/made_up_vendor.hpp"
 #include "tests/protocol/delegating_vendor.hpp"
 
 namespace sonar {
@@ -279,6 +280,40 @@ TEST(SonarInVirtualTime, APingWhoseClientLeftIsUnwanted) {
   EXPECT_GT(sonar.figures().offered, 1u);
 }
 
+TEST(SonarInVirtualTime, ReceiversAreTheDevicesOwnAndThoseOfItsClients) {
+  using testing_daemon::made_up_vendor;
+  VirtualTime time(yaml_of(oculus("front", "127.0.0.2", "    clients: {max: 2}\n")));
+  SonarConfig config = time.config.sonars[0];
+  config.profile = {&made_up_vendor(), made_up_vendor().models().front()};
+  Sonar sonar({time.config, time.world}, config, 0, start);
+  std::vector<const protocol::Port*> streams;
+  for (const protocol::Port& port : made_up_vendor().ports())
+    if (port.kind == protocol::Port::Kind::udp_stream) streams.push_back(&port);
+  ASSERT_THAT(streams, SizeIs(2));
+  sonar.open_stream(10, *streams[0], start);
+  EXPECT_FALSE(sonar.next_ping()) << "no ping without a receiver";
+  sonar.open_stream(11, *streams[1], start);
+  EXPECT_THAT(sonar.receivers(11), ::testing::ElementsAre(streams[1]->group));
+  EXPECT_TRUE(sonar.next_ping()) << "the group is one";
+
+  const auto line = [](const std::string& text) {
+    const auto bytes = std::as_bytes(std::span(text.data(), text.size()));
+    return protocol::Bytes(bytes.begin(), bytes.end());
+  };
+  const protocol::Endpoint own{{127, 0, 0, 9}, 7}, other{{10, 0, 0, 1}, 8};
+  sonar.on_connect(1, Role::client, {"client", own.ip}, start);
+  sonar.on_bytes(1, line("receivers 0.0.0.0:7 10.0.0.1:8 10.0.0.1:8\n"), start);
+  EXPECT_THAT(sonar.receivers(10), ::testing::ElementsAre(own, other));
+  sonar.on_datagram(made_up_vendor().ports()[3], {own.ip, 99}, line("receivers 127.0.0.9:7 10.0.0.2:9"), start);
+  EXPECT_THAT(sonar.receivers(10), ::testing::UnorderedElementsAre(own, other, protocol::Endpoint{{10, 0, 0, 2}, 9}));
+  sonar.on_closed(1, "closed by the client", start);
+  EXPECT_THAT(sonar.receivers(10), ::testing::ElementsAre(own, protocol::Endpoint{{10, 0, 0, 2}, 9}));
+  std::string many = "receivers";
+  for (int i = 1; i <= 100; ++i) many += " 10.0.1." + std::to_string(i) + ":1";
+  sonar.on_datagram(made_up_vendor().ports()[3], {own.ip, 99}, line(many), start);
+  EXPECT_THAT(sonar.receivers(10), SizeIs(16)) << "a host cannot have the world sent to";
+}
+
 /// A mistake in the code of one conversation.
 class FaultyDialogue final : public protocol::Dialogue {
  public:
@@ -294,7 +329,7 @@ class FaultyDialogue final : public protocol::Dialogue {
 class FaultyVendor final : public protocol::DelegatingVendor {
  public:
   using DelegatingVendor::DelegatingVendor;
-  std::unique_ptr<protocol::Dialogue> converse(const protocol::DeviceState&, Time now) const override {
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState&, Time now) const override {
     return std::make_unique<FaultyDialogue>(now);
   }
   bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }

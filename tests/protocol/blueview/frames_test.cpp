@@ -66,9 +66,11 @@ TEST(BlueViewDiscovery, AnswersItsOwnQuestionOnly) {
   wire::Bytes question;
   for (const char c : {'B', 'V', 'E', '?'}) question.push_back(static_cast<std::byte>(c));
   question.push_back(std::byte{1});
-  EXPECT_TRUE(vendor().answer(question, device).empty()) << "too short";
+  const auto answers = [&] { return vendor().on_datagram({}, question, device, Time{}).replies; };
+  EXPECT_TRUE(answers().empty()) << "too short";
   question.push_back(std::byte{0});
-  const protocol::Bytes answer = vendor().answer(question, device);
+  ASSERT_EQ(answers().size(), 1u);
+  const protocol::Bytes answer = answers().front();
   ASSERT_GT(answer.size(), 8u);
   wire::Reader reader(answer);
   std::array<std::uint8_t, 4> letters{};
@@ -82,7 +84,7 @@ TEST(BlueViewDiscovery, AnswersItsOwnQuestionOnly) {
   EXPECT_EQ(read_text(reader, "model"), "BlueView P900-90");
   EXPECT_EQ(read_text(reader, "serial"), "7001");
   question[4] = std::byte{2};
-  EXPECT_TRUE(vendor().answer(question, device).empty()) << "another version";
+  EXPECT_TRUE(answers().empty()) << "another version";
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ struct Conversation {
   Conversation() : Conversation(protocol::OptionValues{}) {}
   Conversation(const char* option, const char* value) : Conversation(protocol::OptionValues{{option, value}}) {}
   explicit Conversation(const protocol::OptionValues& options)
-      : state(device("oculus-m1200d", options)), dialogue(protocol::vendors().front()->converse(state, at(0))) {}
+      : state(device("oculus-m1200d", options)), dialogue(protocol::vendors().front()->converse({}, state, at(0))) {}
   Reaction say(BytesView bytes, double when_s = 0) { return dialogue->on_bytes(Exact(bytes).view(), at(when_s)); }
 };
 

@@ -208,7 +208,7 @@ TEST(Messages, PingVersion2ByHand) {
 TEST(Messages, DummyByHand) {
   const Bytes bytes = hex("53 4F  59 1B  00 00  FF 00  00 00  00 00 00 00  00 00");
   const auto state = device();
-  const auto dialogue = protocol::vendors().front()->converse(state, at(0));
+  const auto dialogue = protocol::vendors().front()->converse({}, state, at(0));
   const auto reaction = dialogue->on_tick(dialogue->next_tick(), false);
   ASSERT_EQ(reaction.replies.size(), 1u);
   EXPECT_EQ(reaction.replies[0], bytes);

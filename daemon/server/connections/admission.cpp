@@ -1,4 +1,4 @@
-#include "daemon/server/sonars/admission.hpp"
+#include "daemon/server/connections/admission.hpp"
 
 #include <fcntl.h>
 #include <sys/resource.h>

@@ -1,5 +1,5 @@
-// One HTTP client: requests one after the other, or a stream of events until it disconnects. read() parses requests and write()
-// answers them. Owned by the listener's slots and by its own coroutines.
+// One HTTP client: requests one after the other, or a stream until it disconnects. read() parses requests and write() answers
+// them. Owned by the listener's slots and by its own coroutines.
 #pragma once
 
 #include <functional>
@@ -7,9 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "daemon/server/control/control_context.hpp"
-#include "daemon/server/control/event_queue.hpp"
-#include "daemon/server/control/http_router.hpp"
+#include "daemon/server/connections/connection_services.hpp"
+#include "daemon/server/connections/http_service.hpp"
 
 namespace sonar {
 
@@ -17,7 +16,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
   using Steady = std::chrono::steady_clock;
 
-  HttpConnection(ControlContext& context, tcp::socket socket, Sender sender);
+  /// `services` and `service` outlive it.
+  HttpConnection(ConnectionServices& services, HttpService& service, tcp::socket socket, const Sender& sender);
 
   asio::awaitable<void> read();
   asio::awaitable<void> write();
@@ -29,6 +29,12 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   /// free.
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
+  /// Our end of the connection.
+  Endpoint reached() const { return reached_; }
+  /// The address of the other end.
+  Ipv4 peer() const { return peer_; }
+  /// For the service while it makes an answer.
+  asio::steady_timer& wait_timer() { return wake_operation_; }
 
   Steady::time_point active_at = Steady::now();
 
@@ -39,31 +45,29 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   void hand_over();
   asio::awaitable<void> answer(HttpRequest request);
   bool has_slot(const HttpRequest& request);
-  asio::awaitable<HttpAnswer> make_answer(HttpAction wanted);
-  asio::awaitable<HttpAnswer> perform(control::Operation operation);
-  asio::awaitable<void> stream_events(control::Subscribe wanted, Head head);
+  asio::awaitable<void> write_stream(HttpStream stream, Head head);
   asio::awaitable<bool> write_answer(HttpAnswer answer, Head head);
   asio::awaitable<bool> write_whole(std::string bytes);
-  HttpAnswer health(bool with_text) const;
   void next_request();
   void finish_sending();
 
-  ControlContext& context_;
+  ConnectionServices& services_;
+  HttpService& service_;
   tcp::socket socket_;
   Sender sender_;  // the address without the port, which differs for every curl
   Endpoint reached_;
+  Ipv4 peer_{};
   std::shared_ptr<Deadline> request_limit_, stall_;
   asio::steady_timer wake_reader_, wake_writer_, wake_operation_, rest_;
   HttpReader reader_;
   std::optional<HttpRequest> request_;  // read, not yet answered
   std::optional<HttpRefusal> refusal_;  // of a request that cannot be parsed
-  EventQueue events_;
-  std::function<bool()> claim_slot_;  // empty: trusted
-  bool continue_asked_ = false;       // send "100 Continue"
-  bool busy_ = false;                 // a request is being answered
-  bool discards_ = false;             // input is discarded
-  bool peer_closed_ = false;          // the client sends no more
-  bool all_sent_ = false;             // we send no more
+  std::function<bool()> claim_slot_;    // empty: trusted
+  bool continue_asked_ = false;         // send "100 Continue"
+  bool busy_ = false;                   // a request is being answered
+  bool discards_ = false;               // input is discarded
+  bool peer_closed_ = false;            // the client sends no more
+  bool all_sent_ = false;               // we send no more
 };
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-#include "daemon/server/control/http_reader.hpp"
+#include "daemon/server/connections/http_reader.hpp"
 
 #include <algorithm>
 #include <utility>

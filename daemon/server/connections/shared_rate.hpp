@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "daemon/server/sonars/input_rate.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 
 namespace sonar {
 

@@ -1,31 +1,28 @@
-// What the connections of both control servers share: time limits and the services they use.
+// What TCP connections of control and of sonars' HTTP share: limits, admission, the token, the log.
 #pragma once
 
 #include <chrono>
+#include <memory>
+#include <string>
 
 #include "daemon/config/config.hpp"
-#include "daemon/server/control/token.hpp"
-#include "daemon/server/operations.hpp"
-#include "daemon/server/poses/pose_intake.hpp"
-#include "daemon/server/sonars/admission.hpp"
-#include "daemon/server/sonars/shared_rate.hpp"
+#include "daemon/emulator/world/world.hpp"
+#include "daemon/server/connections/admission.hpp"
+#include "daemon/server/connections/token.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
 
 namespace sonar {
 
-/// Of the whole server; outlives every connection.
-struct ControlContext {
+/// Of one server; outlives its connections.
+struct ConnectionServices {
   asio::io_context& io;
-  const ControlConfig& config;
   const LimitConfig& limits;
   Admission& admission;
-  Operations& operations;
-  Events& events;
-  PoseIntake& poses;
   Log& log;
-  Token token = {};
-  SharedRate pose_rate{limits.pose_bytes_per_s};  // of poses without an answer (request id 0)
+  std::string server;  // for the log: "control", or the name of a sonar
+  Admission::Purpose purpose = Admission::Purpose::control;
+  Token token = {};  // without one every client is trusted
   LogLimiter refusals = {}, notices = {}, faults = {};
 };
 
@@ -34,8 +31,8 @@ inline constexpr std::chrono::seconds keep_alive_limit{60};  // between two HTTP
 inline constexpr std::chrono::minutes operation_limit{5};    // for a scene to load; HTTP stops waiting then
 
 /// Rate-limited, since any client can cause it.
-void log_refusal(ControlContext& context, const std::string& why, const std::string& from);
-void log_fault(ControlContext& context, const std::exception_ptr& fault, const std::string& at);
+void log_refusal(ConnectionServices& services, const std::string& why, const std::string& from);
+void log_fault(ConnectionServices& services, const std::string& fault, const std::string& at);
 
 /// Closes a socket after a time limit. One limit at a time; the next replaces the last.
 class Deadline : public std::enable_shared_from_this<Deadline> {
@@ -62,7 +59,7 @@ class Deadline : public std::enable_shared_from_this<Deadline> {
 };
 
 /// False when the client closed, or read no byte for limits.stall. `bytes` must stay valid until it returns.
-asio::awaitable<bool> write_whole(ControlContext& context, tcp::socket& socket, Deadline& stall, const Sender& to,
+asio::awaitable<bool> write_whole(ConnectionServices& services, tcp::socket& socket, Deadline& stall, const Sender& to,
                                   asio::const_buffer bytes);
 
 }  // namespace sonar

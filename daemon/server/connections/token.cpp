@@ -1,7 +1,9 @@
-#include "daemon/server/control/token.hpp"
+#include "daemon/server/connections/token.hpp"
 
 #include <algorithm>
 #include <system_error>
+
+#include <boost/beast/core/string.hpp>
 
 #include "core/base/regular_file.hpp"
 #include "daemon/server/system/sha256.hpp"
@@ -47,6 +49,16 @@ bool Token::matches(std::string_view shown) const {
   unsigned difference = 0;
   for (std::size_t i = 0; i < ours.size(); ++i) difference |= static_cast<unsigned char>(ours[i] ^ theirs[i]);
   return difference == 0;
+}
+
+std::string_view bearer_token(std::string_view authorization) {
+  constexpr std::string_view scheme = "Bearer ";
+  if (authorization.size() <= scheme.size() ||
+      !boost::beast::iequals({authorization.data(), scheme.size()}, {scheme.data(), scheme.size()}))
+    return {};
+  authorization.remove_prefix(scheme.size());
+  const auto first = authorization.find_first_not_of(' ');
+  return first == std::string_view::npos ? std::string_view{} : authorization.substr(first);
 }
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-#include "daemon/server/control/http_connection.hpp"
+#include "daemon/server/connections/http_connection.hpp"
 
 #include <utility>
 
@@ -9,13 +9,12 @@
 #include <boost/beast/http/serializer.hpp>
 #include <boost/beast/http/string_body.hpp>
 
-#include "daemon/server/sonars/input_rate.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 
 namespace sonar {
 namespace {
 
 namespace http = boost::beast::http;
-using control::StatusCode;
 constexpr std::chrono::seconds drain_limit{2};  // discards what the client still sends after our last answer
 
 const HttpRefusal too_many{503, "too many connections are open"};
@@ -26,7 +25,7 @@ http::response<Body> response_of(unsigned status, const std::string& type) {
   http::response<Body> response;
   response.result(status);
   response.set(http::field::server, "sonard");
-  response.set(http::field::content_type, type);
+  if (!type.empty()) response.set(http::field::content_type, type);
   response.set(http::field::cache_control, "no-store");
   response.set("X-Content-Type-Options", "nosniff");
   return response;
@@ -51,7 +50,7 @@ std::string bytes_of(const http::response<Body>& response, Part part) {
 
 std::string bytes_of(HttpAnswer answer, std::string_view connection, Part part) {
   auto response = response_of<http::string_body>(answer.status, answer.type);
-  response.content_length(answer.body.size());
+  if (answer.status != 204) response.content_length(answer.body.size());  // RFC 9110, 8.6
   if (!connection.empty()) response.set(http::field::connection, {connection.data(), connection.size()});
   if (!answer.allow.empty()) response.set(http::field::allow, answer.allow);
   if (answer.status == 401) response.set(http::field::www_authenticate, "Bearer");
@@ -59,8 +58,8 @@ std::string bytes_of(HttpAnswer answer, std::string_view connection, Part part) 
   return bytes_of(response, part);
 }
 
-std::string head_of_events(bool chunked) {
-  auto response = response_of<http::empty_body>(200, "application/x-ndjson");
+std::string head_of_stream(const std::string& type, bool chunked) {
+  auto response = response_of<http::empty_body>(200, type);
   if (chunked) response.set(http::field::transfer_encoding, "chunked");
   response.set(http::field::connection, "close");
   return bytes_of(response, Part::head);
@@ -70,32 +69,27 @@ std::string chunk_of(const std::string& line) {
   return boost::beast::buffers_to_string(http::make_chunk(boost::asio::const_buffer(line.data(), line.size())));
 }
 
-HttpAnswer answer_from(const OperationResult& result) {
-  if (result.code == OperationResult::Code::refused) return answer_of(400, StatusCode::refused, result.text);
-  if (result.code == OperationResult::Code::failed) return answer_of(409, StatusCode::failed, result.text);
-  if (const auto* status = std::get_if<control::DaemonStatus>(&result.body)) return {200, control::json_of(*status) + "\n"};
-  if (const auto* stepped = std::get_if<control::Stepped>(&result.body)) return {200, control::json_of(*stepped) + "\n"};
-  return answer_of(200, StatusCode::ok, result.text);
-}
-
 Sender without_port(const Sender& sender) { return {sender.source, sender.source}; }
 
 }  // namespace
 
-HttpConnection::HttpConnection(ControlContext& context, tcp::socket socket, Sender sender)
-    : context_(context),
+HttpConnection::HttpConnection(ConnectionServices& services, HttpService& service, tcp::socket socket, const Sender& sender)
+    : services_(services),
+      service_(service),
       socket_(std::move(socket)),
       sender_(without_port(sender)),
       request_limit_(std::make_shared<Deadline>(socket_)),
       stall_(std::make_shared<Deadline>(socket_)),
-      wake_reader_(context.io, never),
-      wake_writer_(context.io, never),
-      wake_operation_(context.io, never),
-      rest_(context.io),
-      reader_(context.limits.control_message_bytes) {
+      wake_reader_(services.io, never),
+      wake_writer_(services.io, never),
+      wake_operation_(services.io, never),
+      rest_(services.io),
+      reader_(services.limits.control_message_bytes) {
   error_code ec;
   const auto at = socket_.local_endpoint(ec);
   if (!ec && at.address().is_v4()) reached_ = {at.address().to_v4().to_bytes(), at.port()};
+  const auto peer = socket_.remote_endpoint(ec);
+  if (!ec && peer.address().is_v4()) peer_ = peer.address().to_v4().to_bytes();
 }
 
 void HttpConnection::close() {
@@ -117,7 +111,7 @@ void HttpConnection::reject() {
 
 asio::awaitable<void> HttpConnection::read() {
   std::vector<std::byte> buffer(16384);
-  InputRate rate(context_.limits.input_bytes_per_s);
+  InputRate rate(services_.limits.input_bytes_per_s);
   request_limit_->within(greeting_limit);
   while (!over()) {
     error_code ec;
@@ -185,10 +179,8 @@ asio::awaitable<void> HttpConnection::write() {
     if (std::exchange(continue_asked_, false)) {
       if (!co_await write_whole(bytes_of(http::response<http::empty_body>(http::status::continue_, 11), Part::head))) break;
     } else if (refusal_) {
-      const StatusCode code = refusal_->status == 503 ? StatusCode::failed : StatusCode::refused;
-      const HttpAnswer refusal = answer_of(refusal_->status, code, refusal_->why);
-      if (refusal_->status != 503) log_refusal(context_, refusal_->why, sender_.id);  // logged by the listener
-      co_await write_answer(refusal, {false, false, true});
+      if (refusal_->status != 503) log_refusal(services_, refusal_->why, sender_.id);  // 503: logged by the listener
+      co_await write_answer(service_.refusal(*refusal_), {false, false, true});
       break;
     } else if (request_) {
       co_await answer(*std::exchange(request_, std::nullopt));
@@ -204,7 +196,7 @@ asio::awaitable<void> HttpConnection::write() {
 
 /// False: it shows the token, and no slot is free.
 bool HttpConnection::has_slot(const HttpRequest& request) {
-  if (!claim_slot_ || !context_.token.matches(bearer_token(request.authorization))) return true;
+  if (!claim_slot_ || !services_.token.matches(bearer_token(request.authorization))) return true;
   return std::exchange(claim_slot_, nullptr)();
 }
 
@@ -213,66 +205,32 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
     refusal_ = too_many;
     co_return;
   }
-  RoutedRequest routed = route_request(request, {context_.token, reached_.ip, context_.config.hosts});
-  if (!routed.pose_refusal.empty()) context_.poses.refuse(routed.pose_refusal, sender_);
   const Head head{request.http_1_0, request.method == "HEAD", !request.keep_alive};
-  if (const auto* wanted = std::get_if<control::Subscribe>(&routed.action)) {
-    co_await stream_events(*wanted, head);
+  auto made = co_await service_.answer(request, *this);
+  if (auto* stream = std::get_if<HttpStream>(&made)) {
+    co_await write_stream(std::move(*stream), head);
     all_sent_ = true;
     co_return;
   }
-  HttpAnswer answer = co_await make_answer(std::move(routed.action));
-  if (!answer.why.empty()) log_refusal(context_, answer.why, sender_.id);
+  auto& answer = std::get<HttpAnswer>(made);
+  if (!answer.why.empty()) log_refusal(services_, answer.why, sender_.id);
   if (!co_await write_answer(std::move(answer), head) || head.last)
     all_sent_ = true;
   else
     next_request();
 }
 
-HttpAnswer HttpConnection::health(bool with_text) const {
-  const std::string trouble = context_.operations.trouble();
-  if (trouble.empty()) return {200, "ok\n", "text/plain"};
-  return {503, (with_text ? trouble : "unhealthy") + "\n", "text/plain"};
-}
-
-asio::awaitable<HttpAnswer> HttpConnection::make_answer(HttpAction wanted) {
-  if (auto* answer = std::get_if<HttpAnswer>(&wanted)) co_return std::move(*answer);
-  if (const auto* asked = std::get_if<HealthAction>(&wanted)) co_return health(asked->with_text);
-  if (std::holds_alternative<MetricsAction>(wanted))
-    co_return HttpAnswer{200, context_.operations.metrics(), "text/plain; version=0.0.4; charset=utf-8"};
-  if (auto* asked = std::get_if<OperationAction>(&wanted)) co_return co_await perform(std::move(asked->operation));
-  co_return HttpAnswer{200, help_text(sonar::text_of(reached_)), "text/plain; charset=utf-8"};
-}
-
-/// The result may arrive at once, after minutes, or after the time limit.
-asio::awaitable<HttpAnswer> HttpConnection::perform(control::Operation operation) {
-  const auto result = std::make_shared<std::optional<OperationResult>>();
-  context_.operations.perform(operation, sender_, [weak = weak_from_this(), result](OperationResult done) {
-    *result = std::move(done);
-    if (const auto self = weak.lock()) self->wake_operation_.cancel();
-  });
-  wake_operation_.expires_after(operation_limit);
-  while (!*result && !over() && wake_operation_.expiry() > Steady::now()) {  // cancelled when the result arrives
-    error_code ec;
-    co_await wake_operation_.async_wait(into(ec));
-  }
-  if (*result) co_return answer_from(**result);
-  co_return answer_of(504, StatusCode::failed, "not finished after 5 minutes; the operation continues, see /api/v1/status");
-}
-
-asio::awaitable<void> HttpConnection::stream_events(control::Subscribe wanted, Head head) {
+asio::awaitable<void> HttpConnection::write_stream(HttpStream stream, Head head) {
   discards_ = true;  // reading continues, to notice that the client disconnects
   wake_reader_.cancel();
-  if (!co_await write_whole(head_of_events(!head.http_1_0)) || head.without_body) co_return;
-  events_.subscribe(wanted);
-  const auto subscription = context_.events.listen([weak = weak_from_this()](const control::Event& event) {
-    if (const auto self = weak.lock(); self && self->events_.offer(event)) self->wake_writer_.cancel();
+  if (!co_await write_whole(head_of_stream(stream.type, !head.http_1_0)) || head.without_body) co_return;
+  const auto subscription = stream.subscribe([weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->wake_writer_.cancel();
   });
   while (!over() && !peer_closed_) {
-    if (const auto event = events_.next()) {
-      std::string line = control::json_of(*event) + "\n";  // GCC 12 destroys a ?: inside of co_await twice
-      if (!head.http_1_0) line = chunk_of(line);
-      if (!co_await write_whole(std::move(line))) co_return;
+    if (auto piece = stream.next()) {
+      if (!head.http_1_0) *piece = chunk_of(*piece);
+      if (!co_await write_whole(*std::move(piece))) co_return;
     } else {
       error_code ec;
       co_await wake_writer_.async_wait(into(ec));
@@ -286,7 +244,7 @@ asio::awaitable<bool> HttpConnection::write_answer(HttpAnswer answer, Head head)
 }
 
 asio::awaitable<bool> HttpConnection::write_whole(std::string bytes) {
-  const bool whole = co_await sonar::write_whole(context_, socket_, *stall_, sender_, asio::buffer(bytes));
+  const bool whole = co_await sonar::write_whole(services_, socket_, *stall_, sender_, asio::buffer(bytes));
   if (whole) active_at = Steady::now();
   co_return whole;
 }

@@ -1,0 +1,26 @@
+#include "daemon/server/connections/connection_services.hpp"
+
+namespace sonar {
+
+void log_refusal(ConnectionServices& services, const std::string& why, const std::string& from) {
+  say_at_times(services.log, services.refusals, LogLevel::warning, services.server + " refused: " + why, {{"from", from}});
+}
+
+void log_fault(ConnectionServices& services, const std::string& fault, const std::string& at) {
+  say_fault(services.log, services.faults, fault, {"at", at});
+}
+
+asio::awaitable<bool> write_whole(ConnectionServices& services, tcp::socket& socket, Deadline& stall, const Sender& to,
+                                  asio::const_buffer bytes) {
+  while (bytes.size() > 0) {
+    error_code ec;
+    stall.within(services.limits.stall);
+    bytes += co_await socket.async_write_some(asio::buffer(bytes), into(ec));
+    if (stall.passed()) log_refusal(services, "client does not read", to.id);
+    if (ec || !socket.is_open()) co_return false;
+  }
+  stall.none();
+  co_return true;
+}
+
+}  // namespace sonar

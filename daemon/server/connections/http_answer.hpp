@@ -1,0 +1,16 @@
+// An answer of an HTTP server, as plain data.
+#pragma once
+
+#include <string>
+
+namespace sonar {
+
+struct HttpAnswer {
+  unsigned status = 200;
+  std::string body;
+  std::string type = "application/json";
+  std::string allow = {};  // of 405
+  std::string why = {};    // for the log, of a refusal worth a line
+};
+
+}  // namespace sonar

@@ -1,0 +1,47 @@
+// A listening TCP socket and its accept loop: one for sonars, control and poses. It survives whatever one connection does to it.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "daemon/server/connections/admission.hpp"
+#include "daemon/server/system/asio.hpp"
+
+namespace sonar {
+
+class Listener {
+ public:
+  using Take = std::function<void(tcp::socket)>;
+  using Fault = std::function<void(const std::string&)>;
+
+  /// `purpose`: which of the spare descriptors may be used; nothing: the caller asks `admission` for a slot itself. `admission`
+  /// outlives the listener.
+  Listener(asio::io_context& io, Admission& admission, std::optional<Admission::Purpose> purpose)
+      : admission_(admission), purpose_(purpose), acceptor_(io) {}
+
+  /// Port 0: the system chooses one. After an error it does not listen.
+  Result<void> open(Endpoint at);
+  /// `take` gets each connection, `fault` what an exception said. Does nothing when it does not listen. The handlers' owner must
+  /// live until the I/O loop has run once more after stop().
+  void start(Take take, Fault fault);
+  void stop();
+  bool is_open() const { return acceptor_.is_open(); }
+  /// With the port the system chose. Port 0 = never opened.
+  Endpoint at() const { return at_; }
+
+ private:
+  void keep_accepting();
+  asio::awaitable<void> accept();
+
+  Admission& admission_;
+  std::optional<Admission::Purpose> purpose_;
+  tcp::acceptor acceptor_;
+  Endpoint at_;
+  Take take_;
+  Fault fault_;
+  bool stopping_ = false;
+};
+
+}  // namespace sonar

@@ -1,0 +1,78 @@
+#include "daemon/server/control/control_http.hpp"
+
+#include <utility>
+
+#include "daemon/server/control/event_queue.hpp"
+
+namespace sonar {
+namespace {
+
+using control::StatusCode;
+
+HttpAnswer answer_from(const OperationResult& result) {
+  if (result.code == OperationResult::Code::refused) return answer_of(400, StatusCode::refused, result.text);
+  if (result.code == OperationResult::Code::failed) return answer_of(409, StatusCode::failed, result.text);
+  if (const auto* status = std::get_if<control::DaemonStatus>(&result.body)) return {200, control::json_of(*status) + "\n"};
+  if (const auto* stepped = std::get_if<control::Stepped>(&result.body)) return {200, control::json_of(*stepped) + "\n"};
+  return answer_of(200, StatusCode::ok, result.text);
+}
+
+}  // namespace
+
+asio::awaitable<std::variant<HttpAnswer, HttpStream>> ControlHttp::answer(const HttpRequest& request, HttpConnection& from) {
+  RoutedRequest routed = route_request(request, {services_.token, from.reached().ip, config_.hosts});
+  if (!routed.pose_refusal.empty()) targets_.poses.refuse(routed.pose_refusal, from.sender());
+  if (auto* answer = std::get_if<HttpAnswer>(&routed.action)) co_return std::move(*answer);
+  if (const auto* wanted = std::get_if<control::Subscribe>(&routed.action)) co_return stream_of(*wanted);
+  if (const auto* asked = std::get_if<HealthAction>(&routed.action)) co_return health(asked->with_text);
+  if (std::holds_alternative<MetricsAction>(routed.action))
+    co_return HttpAnswer{200, targets_.operations.metrics(), "text/plain; version=0.0.4; charset=utf-8"};
+  if (auto* asked = std::get_if<OperationAction>(&routed.action)) co_return co_await perform(std::move(asked->operation), from);
+  co_return HttpAnswer{200, help_text(text_of(from.reached())), "text/plain; charset=utf-8"};
+}
+
+HttpAnswer ControlHttp::refusal(const HttpRefusal& refusal) const {
+  return answer_of(refusal.status, refusal.status == 503 ? StatusCode::failed : StatusCode::refused, refusal.why);
+}
+
+HttpAnswer ControlHttp::health(bool with_text) const {
+  const std::string trouble = targets_.operations.trouble();
+  if (trouble.empty()) return {200, "ok\n", "text/plain"};
+  return {503, (with_text ? trouble : "unhealthy") + "\n", "text/plain"};
+}
+
+/// The result may arrive at once, after minutes, or after the time limit.
+asio::awaitable<HttpAnswer> ControlHttp::perform(control::Operation operation, HttpConnection& from) {
+  const auto result = std::make_shared<std::optional<OperationResult>>();
+  targets_.operations.perform(operation, from.sender(), [weak = from.weak_from_this(), result](OperationResult done) {
+    *result = std::move(done);
+    if (const auto connection = weak.lock()) connection->wait_timer().cancel();
+  });
+  asio::steady_timer& timer = from.wait_timer();
+  timer.expires_after(operation_limit);
+  while (!*result && !from.over() && timer.expiry() > HttpConnection::Steady::now()) {  // cancelled when the result arrives
+    error_code ec;
+    co_await timer.async_wait(into(ec));
+  }
+  if (*result) co_return answer_from(**result);
+  co_return answer_of(504, StatusCode::failed, "not finished after 5 minutes; the operation continues, see /api/v1/status");
+}
+
+HttpStream ControlHttp::stream_of(const control::Subscribe& wanted) {
+  const auto queue = std::make_shared<EventQueue>();
+  queue->subscribe(wanted);
+  HttpStream stream;
+  stream.type = "application/x-ndjson";
+  stream.subscribe = [&events = targets_.events, queue](std::function<void()> wake) {
+    return events.listen([queue, wake = std::move(wake)](const control::Event& event) {
+      if (queue->offer(event)) wake();
+    });
+  };
+  stream.next = [queue]() -> std::optional<std::string> {
+    const auto event = queue->next();
+    return event ? std::optional(control::json_of(*event) + "\n") : std::nullopt;
+  };
+  return stream;
+}
+
+}  // namespace sonar

@@ -1,0 +1,17 @@
+// What requests of control act on, by stream or HTTP.
+#pragma once
+
+#include "daemon/server/connections/shared_rate.hpp"
+#include "daemon/server/operations.hpp"
+#include "daemon/server/poses/pose_intake.hpp"
+
+namespace sonar {
+
+struct ControlTargets {
+  Operations& operations;
+  Events& events;
+  PoseIntake& poses;
+  SharedRate pose_rate;  // of poses without an answer (request id 0)
+};
+
+}  // namespace sonar

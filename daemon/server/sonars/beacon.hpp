@@ -1,0 +1,45 @@
+// The status broadcast of an emulated sonar (Port::Kind::udp_beacon): sent again and again from a port of its own. Owned by
+// Device.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/server/system/asio.hpp"
+#include "daemon/server/system/log.hpp"
+
+namespace sonar {
+
+class Beacon {
+ public:
+  /// `make` returns the bytes as of now, or none; `fault` gets what an exception said. `log` outlives the beacon.
+  Beacon(asio::io_context& io, Log& log, std::string sonar, std::function<protocol::Bytes()> make,
+         std::function<void(const std::string&)> fault)
+      : log_(log), sonar_(std::move(sonar)), make_(std::move(make)), fault_(std::move(fault)), socket_(io), timer_(io) {}
+
+  Result<void> open(const SonarConfig& sonar, const protocol::Port& port);
+  void start();
+  /// Without waiting for the period to pass.
+  void send_now() { timer_.expires_at(std::chrono::steady_clock::now()); }
+  void stop();
+  const std::vector<udp::endpoint>& destinations() const { return to_; }
+
+ private:
+  asio::awaitable<void> send();
+
+  Log& log_;
+  std::string sonar_;
+  std::function<protocol::Bytes()> make_;
+  std::function<void(const std::string&)> fault_;
+  udp::socket socket_;
+  asio::steady_timer timer_;
+  std::chrono::milliseconds period_{0};
+  std::vector<udp::endpoint> to_;
+  bool stopping_ = false, failed_ = false;
+};
+
+}  // namespace sonar

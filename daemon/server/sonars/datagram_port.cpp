@@ -1,0 +1,72 @@
+#include "daemon/server/sonars/datagram_port.hpp"
+
+#include <span>
+
+#include "daemon/server/system/listen.hpp"
+
+namespace sonar {
+namespace {
+
+/// Several sonars of one network receive the same broadcasts.
+bool bind_shared(udp::socket& socket, const udp::endpoint& at) {
+  error_code ec;
+  socket.open(udp::v4(), ec);
+  if (!ec) socket.set_option(asio::socket_base::reuse_address(true), ec);
+  if (!ec) socket.bind(at, ec);
+  if (ec) socket.close();
+  return !ec;
+}
+
+/// On the loopback, which is 127.0.0.0/8 whatever the netmask says, hosts of this machine ask 127.255.255.255.
+Ipv4 broadcast_of(const SonarConfig& sonar) {
+  if (sonar.bind_ip[0] == 127) return {127, 255, 255, 255};
+  Ipv4 address{};
+  for (std::size_t i = 0; i < address.size(); ++i)
+    address[i] = static_cast<std::uint8_t>(sonar.bind_ip[i] | static_cast<std::uint8_t>(~sonar.netmask[i]));
+  return address;
+}
+
+}  // namespace
+
+Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port) {
+  number_ = port;
+  Socket& own = sockets_.emplace_back(io_);
+  if (auto r = bind_udp(own.socket, {sonar.bind_ip, port}, true); !r) return r;
+  send_multicast_from(own.socket, sonar.bind_ip);
+  return {};
+}
+
+void DatagramPort::answer_with(const SonarConfig& sonar, Answer answer) {
+  answer_ = std::move(answer);
+  const Ipv4 broadcast = broadcast_of(sonar);
+  if (sonar.bind_ip == Ipv4{} || broadcast == sonar.bind_ip) return;
+  Socket& all = sockets_.emplace_back(io_);
+  if (!bind_shared(all.socket, {address_of(broadcast), number_})) sockets_.pop_back();
+}
+
+void DatagramPort::start() {
+  if (!answer_) return;
+  for (Socket& socket : sockets_) receive(socket);
+}
+
+void DatagramPort::stop() {
+  stopping_ = true;
+  error_code ec;
+  for (Socket& socket : sockets_) socket.socket.close(ec);
+}
+
+void DatagramPort::receive(Socket& at) {
+  at.socket.async_receive_from(asio::buffer(at.datagram), at.from, [this, &at](const error_code& ec, std::size_t size) {
+    if (stopping_ || ec == asio::error::operation_aborted) return;
+    if (!ec && at.from.address().is_v4()) {
+      const Endpoint from{at.from.address().to_v4().to_bytes(), at.from.port()};
+      // From the sonar's own address: that is how a host learns it. A host that cannot be reached gets no answer.
+      error_code ignored;
+      for (const protocol::Bytes& answer : answer_(from, std::span(at.datagram).first(size)))
+        socket().send_to(asio::buffer(answer), at.from, 0, ignored);
+    }
+    receive(at);
+  });
+}
+
+}  // namespace sonar

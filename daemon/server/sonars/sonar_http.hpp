@@ -1,0 +1,35 @@
+// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor. Owned by Device.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "daemon/server/connections/connection_listener.hpp"
+#include "daemon/server/connections/http_connection.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+class SonarHttp final : public HttpService {
+ public:
+  using Answer = std::function<protocol::ResourceReply(const protocol::ResourceRequest&)>;
+
+  /// `limits`, `admission` and `log` outlive it. `sonar`: its name, for the log.
+  SonarHttp(asio::io_context& io, const LimitConfig& limits, Admission& admission, Log& log, const std::string& sonar,
+            Answer answer);
+
+  Result<void> open(Endpoint at) { return listener_.open(at); }
+  void start() { listener_.start(); }
+  void stop() { listener_.stop(); }
+  bool gone() const { return listener_.gone(); }
+
+  asio::awaitable<std::variant<HttpAnswer, HttpStream>> answer(const HttpRequest& request, HttpConnection& from) override;
+  HttpAnswer refusal(const HttpRefusal& refusal) const override;
+
+ private:
+  ConnectionServices services_;
+  Answer answer_;
+  ConnectionListener<HttpConnection> listener_;
+};
+
+}  // namespace sonar
