@@ -215,10 +215,15 @@ TEST(Transports, AMulticastGroupReceivesWithoutAskingForIt) {
   const std::string interface = own_address();
   if (!member.join(text::format_ipv4(group_ip), interface)) GTEST_SKIP() << "no multicast on the loopback interface here";
   Daemon daemon(made_up());
-  const std::string first = member.next(milliseconds(3000));
+  const auto next = [&](milliseconds timeout) {
+    std::string number;
+    do number = member.next(timeout);
+    while (!number.empty() && !member.sender.starts_with(daemon.address() + ":"));  // tests beside this one send there too
+    return number;
+  };
+  const std::string first = next(milliseconds(3000));
   if (first.empty()) GTEST_SKIP() << "multicast does not come back from the loopback interface here";
-  EXPECT_EQ(std::stoul(member.next()), std::stoul(first) + 1);
-  EXPECT_THAT(member.sender, StartsWith("127."));
+  EXPECT_EQ(std::stoul(next(patience)), std::stoul(first) + 1);
 }
 
 std::string http(const std::string& address, const std::string& method, const std::string& path, const std::string& body = {}) {
