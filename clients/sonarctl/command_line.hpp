@@ -1,4 +1,4 @@
-// Command line of each command: adds its options to the parser and returns the function that executes it. main.cpp lists them.
+// Command line of each command: adds its options to the parser and returns the function that executes it. command_line.cpp lists them.
 #pragma once
 
 #include <functional>
@@ -28,5 +28,8 @@ Run add_step(CLI::App& app);
 Run add_load(CLI::App& app);
 Run add_object(CLI::App& app);
 Run add_recording(CLI::App& app);
+
+/// Runs the command that the arguments name; the exit code of the program.
+int run(int argc, char** argv);
 
 }  // namespace sonar::clients

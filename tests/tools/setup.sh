@@ -77,7 +77,7 @@ configure() {
 build() {
   local preset=$1
   shift
-  cmake --build "build/$preset" --parallel "$(build_jobs)" ${1:+--target "$@"} </dev/null
+  NINJA_STATUS="[%f/%t] " cmake --build "build/$preset" --parallel "$(build_jobs)" ${1:+--target "$@"} </dev/null | tests/tools/build_progress.py
 }
 
 # setup_and_build [targets...]: the release build; without targets everything in it, tests too.

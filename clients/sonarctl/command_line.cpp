@@ -1,0 +1,52 @@
+// The list of the commands, and errors as exit codes.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+
+#include "clients/sonarctl/command_line.hpp"
+#include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/scene_command.hpp"
+#include "core/text/arguments.hpp"
+
+namespace sonar::clients {
+namespace {
+
+int complain(const std::string& text, ErrorKind kind) {
+  std::fprintf(stderr, "sonarctl: %s\n", text.c_str());
+  return exit_code(kind);
+}
+
+}  // namespace
+
+int run(int argc, char** argv) {
+  CLI::App app("sonarctl: listen to, look at and steer sonars served by sonard", "sonarctl");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", std::string("sonarctl " SONARD_VERSION));
+  app.footer(
+      "examples:\n"
+      "  sonarctl doctor                       check everything that a driver needs\n"
+      "  sonarctl view --png ping.png          one picture\n"
+      "  sonarctl COMMAND --help               explains a command, with examples");
+  const std::vector<std::pair<std::string, Run>> commands{
+      {"doctor", add_doctor(app)},       {"status", add_status(app)}, {"listen", add_listen(app)},
+      {"view", add_view(app)},           {"stats", add_stats(app)},   {"record", add_record(app)},
+      {"pose", add_pose(app)},           {"events", add_events(app)}, {"set", add_set(app)},
+      {"step", add_step(app)},           {"load", add_load(app)},     {"object", add_object(app)},
+      {"recording", add_recording(app)}, {"scene", add_scene(app)}};
+  const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const std::string complaint = text::complaint_about(app, error, words);
+    return complaint.empty() ? app.exit(error) : complain(complaint, ErrorKind::usage);
+  }
+  for (const auto& [name, command] : commands) {
+    if (!app.got_subcommand(name)) continue;
+    const Result<void> done = command();
+    std::fflush(stdout);
+    return done ? 0 : complain(done.error().text, done.error().kind);
+  }
+  return exit_code(ErrorKind::bug);
+}
+
+}  // namespace sonar::clients

@@ -1,0 +1,42 @@
+#!/usr/bin/env python3
+"""Shows how far a build is: ninja's output on standard input, one line that grows on a terminal, else a line every tenth.
+
+usage: ninja ... | build_progress.py       everything but the steps, errors say, is printed as it comes
+"""
+import re
+import sys
+import time
+
+STEP = re.compile(r"\[(\d+)/(\d+)\] (.*)")
+
+
+def spoken(seconds):
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
+
+
+def main():
+    begin, tenth, open_line = time.monotonic(), -1, False
+    for line in sys.stdin:
+        step = STEP.match(line)
+        if not step:
+            print(("\n" if open_line else "") + line, end="", flush=True)
+            open_line = False
+            continue
+        done, all_steps = int(step[1]), max(int(step[2]), 1)
+        passed = time.monotonic() - begin
+        left = passed / max(done, 1) * (all_steps - done)
+        text = f"   {100 * done // all_steps:3d} %  step {done} of {all_steps}, {spoken(passed)} so far"
+        if 0 < done < all_steps and passed > 5:
+            text += f", about {spoken(left)} left"
+        if sys.stdout.isatty():
+            print("\r\033[K" + text, end="", flush=True)
+            open_line = True
+        elif 10 * done // all_steps > tenth or done == all_steps:
+            tenth = 10 * done // all_steps
+            print(text, flush=True)
+    if open_line:
+        print()
+
+
+if __name__ == "__main__":
+    main()
