@@ -1,5 +1,6 @@
 // The configuration file: every key, every default, every refusal with file, line, column and key.
 #include "daemon/config/config.hpp"
+#include "daemon/config/find_config.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -306,6 +307,19 @@ TEST(Config, TheShippedExampleIsValid) {
   const auto demo = demo_config();
   ASSERT_TRUE(demo) << demo.error().text;
   EXPECT_EQ(text_of(demo->sonars.at(0).bind_ip), "127.0.0.2");
+}
+
+TEST(FindConfig, TakesTheFileItIsGivenUnlessTheDemoIsAskedFor) {
+  const std::string file = std::string(SONARD_SOURCE_DIR) + "/scenes/sonard.yaml";
+  const auto given = find_config(file, false);
+  ASSERT_TRUE(given) << given.error().text;
+  EXPECT_EQ(given->file, file);
+  EXPECT_EQ(given->how, file);
+  const auto demo = find_config(file, true);
+  ASSERT_TRUE(demo) << demo.error().text;
+  EXPECT_TRUE(demo->file.empty());
+  EXPECT_EQ(demo->how, "built-in demo");
+  EXPECT_FALSE(find_config("no such file.yaml", false));
 }
 
 std::string two_sonars(const std::string& first, const std::string& second_ip) {

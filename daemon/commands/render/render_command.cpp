@@ -20,11 +20,6 @@ namespace {
 
 constexpr int not_as_expected = 1;
 
-int complain(const Error& error) {
-  std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
-  return exit_code(error.kind);
-}
-
 int threads_of(const EngineConfig& engine) {
   return engine.threads > 0 ? engine.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
@@ -116,13 +111,13 @@ Result<Coverage> coverage_of(const RenderJob& given, Parallel& pool) {
   }
 }
 
-int report_coverage(const std::vector<RenderJob>& jobs) {
+Result<int> report_coverage(const std::vector<RenderJob>& jobs) {
   Parallel pool(threads_of(jobs.front().engine));
   std::printf("%-32s %5s %8s %6s %9s %9s %9s %9s\n", "sonar", "beams", "range m", "rows", "bins", "within 1dB", "worst dB",
               "mean dB");
   for (const RenderJob& job : jobs) {
     const auto c = coverage_of(job, pool);
-    if (!c) return complain(c.error());
+    if (!c) return tl::make_unexpected(c.error());
     std::printf("%-32s %5d %8.2f %6d %9zu %8.3f %% %+9.2f %+9.3f\n", job.name.c_str(), job.settings.beam_count,
                 job.settings.range_m, job.settings.range_bin_count, c->bins, c->percent(), c->worst_db, c->mean_db);
     std::fflush(stdout);
@@ -130,11 +125,11 @@ int report_coverage(const std::vector<RenderJob>& jobs) {
   return 0;
 }
 
-int check(const RenderInput& input) {
+Result<int> check(const RenderInput& input) {
   if (input.jobs.front().expectations.empty())
-    return complain({ErrorKind::config, input.source + " has no expectations: there is no expect: list"});
+    return failure(ErrorKind::config, input.source + " has no expectations: there is no expect: list");
   const auto verdicts = check_expectations(input.source, input.jobs, threads_of(input.jobs.front().engine));
-  if (!verdicts) return complain(verdicts.error());
+  if (!verdicts) return tl::make_unexpected(verdicts.error());
   bool all_met = true;
   for (const Verdict& v : *verdicts) {
     all_met &= v.met;
@@ -172,15 +167,15 @@ OutputOptions output_options(const RenderCommand& command) {
 
 }  // namespace
 
-int run_render(const RenderCommand& command) {
+Result<int> run_render(const RenderCommand& command) {
   if (command.config.empty()) {
     std::vector<RenderJob> jobs = shipped_sonars_over_a_bed();
     for (RenderJob& job : jobs)
-      if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return complain(r.error());
+      if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return tl::make_unexpected(r.error());
     return report_coverage(jobs);
   }
   auto input = input_of(command);
-  if (!input) return complain(input.error());
+  if (!input) return tl::make_unexpected(input.error());
   if (!command.report.empty()) return report_coverage(input->jobs);
   if (command.check_expectations) return check(*input);
   if (std::string note = note_of_air(*input, output_options(command)); !note.empty()) input->notes.push_back(std::move(note));
@@ -189,7 +184,7 @@ int run_render(const RenderCommand& command) {
   ProgressLine line(command.quiet);
   Parallel pool(threads_of(input->jobs.front().engine));
   const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.tell(p); });
-  if (!done) return complain(done.error());
+  if (!done) return tl::make_unexpected(done.error());
   line.conclude(*done);
   return 0;
 }

@@ -1,4 +1,4 @@
-#include "daemon/commands/banner.hpp"
+#include "daemon/commands/run/banner.hpp"
 
 #include <filesystem>
 #include <fstream>
