@@ -12,6 +12,7 @@
 #include "core/paper/paper_engine.hpp"
 #include "daemon/commands/render/coverage.hpp"
 #include "daemon/commands/render/render_pings.hpp"
+#include "daemon/commands/render/snapshots.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 
@@ -80,29 +81,31 @@ Result<RenderInput> input_of(const RenderCommand& command) {
   auto input = load_render_input(command.config, command.sonar);
   if (!input) return input;
   for (RenderJob& job : input->jobs)
-    if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return tl::make_unexpected(r.error());
+    if (const auto r = override_engine(job.config.engine, job.config.seed, command.engine); !r)
+      return tl::make_unexpected(r.error());
   if (!command.poses.empty()) {
     const auto file = poses_of(command);
     if (!file) return tl::make_unexpected(file.error());
     for (RenderJob& job : input->jobs) {  // of several bodies the vehicle's own, as where the daemon plays it
-      const auto path = path_in(*file, command.poses, file->bodies.size() > 1 ? job.vehicle_name : "");
-      if (!path) return tl::make_unexpected(path.error());
-      job.path = *path;
+      const std::string body = file->bodies.size() > 1 ? job.vehicle().name : "";
+      if (const auto r = follow(job, *file, command.poses, body); !r) return tl::make_unexpected(r.error());
     }
   }
   for (RenderJob& job : input->jobs) {
-    if (job.wants_motion || is_given_on(command.engine, &Switches::motion)) job.path.snapshots = false;
-    if (job.path.snapshots && input->notes.empty()) input->notes.push_back(note_of_snapshots(job.path));
+    if (job.wants_motion || is_given_on(command.engine, &Switches::motion)) job.snapshots = false;
+    if (job.snapshots && input->notes.empty()) input->notes.push_back(note_of_snapshots(*job.vehicle().plan.trajectory));
   }
   return input;
 }
 
 Result<Coverage> coverage_of(const RenderJob& given, Parallel& pool) {
   const RenderJob job = with_bed_only(given);
-  const auto make = [&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, {.simd = job.engine.simd}); };
+  const auto make = [&](std::shared_ptr<const Scene> s) {
+    return make_engine(std::move(s), pool, {.simd = job.config.engine.simd});
+  };
   const auto engine = start_engine(make, job.scene);
   if (!engine) return tl::make_unexpected(engine.error());
-  PingRequest request = make_request(job, PingNumber{1}, Time{});
+  PingRequest request = make_request(job, world_of(job), PingNumber{1}, Time{});
   request.switches.keep_pressure = true;
   try {
     return measure_coverage(job, (*engine)->run({&request, 1}).at(0));
@@ -112,7 +115,7 @@ Result<Coverage> coverage_of(const RenderJob& given, Parallel& pool) {
 }
 
 Result<int> report_coverage(const std::vector<RenderJob>& jobs) {
-  Parallel pool(threads_of(jobs.front().engine));
+  Parallel pool(threads_of(jobs.front().config.engine));
   std::printf("%-32s %5s %8s %6s %9s %9s %9s %9s\n", "sonar", "beams", "range m", "rows", "bins", "within 1dB", "worst dB",
               "mean dB");
   for (const RenderJob& job : jobs) {
@@ -128,7 +131,7 @@ Result<int> report_coverage(const std::vector<RenderJob>& jobs) {
 Result<int> check(const RenderInput& input) {
   if (input.jobs.front().expectations.empty())
     return failure(ErrorKind::config, input.source + " has no expectations: there is no expect: list");
-  const auto verdicts = check_expectations(input.source, input.jobs, threads_of(input.jobs.front().engine));
+  const auto verdicts = check_expectations(input.source, input.jobs, threads_of(input.jobs.front().config.engine));
   if (!verdicts) return tl::make_unexpected(verdicts.error());
   bool all_met = true;
   for (const Verdict& v : *verdicts) {
@@ -140,7 +143,7 @@ Result<int> check(const RenderInput& input) {
 
 /// A line each, however many steps a sweep has.
 void tell_notes(const RenderInput& input) {
-  std::set<std::string> notes{note_of_parts_left_out(input.jobs.front().engine.switches)};
+  std::set<std::string> notes{note_of_parts_left_out(input.jobs.front().config.engine.switches)};
   for (const RenderJob& job : input.jobs) notes.insert(note_of_range(job));
   for (const std::string& note : notes)
     if (!note.empty()) std::fprintf(stderr, "sonard: %s\n", note.c_str());
@@ -171,7 +174,8 @@ Result<int> run_render(const RenderCommand& command) {
   if (command.config.empty()) {
     std::vector<RenderJob> jobs = shipped_sonars_over_a_bed();
     for (RenderJob& job : jobs)
-      if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return tl::make_unexpected(r.error());
+      if (const auto r = override_engine(job.config.engine, job.config.seed, command.engine); !r)
+        return tl::make_unexpected(r.error());
     return report_coverage(jobs);
   }
   auto input = input_of(command);
@@ -182,7 +186,7 @@ Result<int> run_render(const RenderCommand& command) {
   if (!command.quiet) tell_notes(*input);
   for (const std::string& note : input->notes) std::fprintf(stderr, "sonard: %s\n", note.c_str());
   ProgressLine line(command.quiet);
-  Parallel pool(threads_of(input->jobs.front().engine));
+  Parallel pool(threads_of(input->jobs.front().config.engine));
   const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.tell(p); });
   if (!done) return tl::make_unexpected(done.error());
   line.conclude(*done);

@@ -75,7 +75,7 @@ sonar:
   ASSERT_EQ(input.jobs.size(), 1u);
   const RenderJob& job = input.jobs[0];
   const FrequencyMode& mode = job.mode();
-  EXPECT_EQ(job.seed, 7u);
+  EXPECT_EQ(job.config.seed, 7u);
   EXPECT_EQ(mode.centre_hz, 5e5f);
   EXPECT_NEAR(static_cast<double>(mode.horizontal_aperture_rad), pi / 3, 1e-6);
   EXPECT_EQ(mode.source_level_db, 190);
@@ -98,7 +98,7 @@ sonar:
   EXPECT_EQ(s.format.max_code, 254u);
   EXPECT_FALSE(s.tvg);
   EXPECT_EQ(s.device_sound_speed_mps, 1480);
-  EXPECT_FALSE(job.engine.switches.noise);
+  EXPECT_FALSE(job.config.engine.switches.noise);
 }
 
 TEST(RenderFile, AProfileStartsAsTheDeviceAndKeepsItsShares) {
@@ -217,15 +217,17 @@ TEST(Npy, HeadersAreAlignedAndTellTypeAndShape) {
 }
 
 TEST(RenderJob, PutsMovingObjectsWhereTheirFilesHaveThem) {
-  RenderJob job =
-      parsed(
-          "scene: {materials: {a: {lambert_db: -20}}, objects: [{name: ball, type: sphere, moving: true, material: a, "
-          "radius_m: 1, pose: {xyz_m: [5, 0, 0]}}]}\n")
-          .jobs.at(0);
-  EXPECT_EQ(make_request(job, PingNumber{1}, Time{}).bodies_in_world.at(0).position_m.x, 5);
+  RenderInput input = parsed(
+      "scene: {materials: {a: {lambert_db: -20}}, objects: [{name: ball, type: sphere, moving: true, material: a, "
+      "radius_m: 1, pose: {xyz_m: [5, 0, 0]}}]}\n");
+  RenderJob& job = input.jobs.at(0);
+  const std::string digest_at_rest = digest_of(input, 0);
+  EXPECT_EQ(make_request(job, world_of(job), PingNumber{1}, Time{}).bodies_in_world.at(0).position_m.x, 5);
   motion::Points points{{motion::Ns{0}, std::chrono::seconds(10)}, {{{0, 0, 0}, {}}, {{10, 0, 0}, {}}}, {}, {}};
-  job.body_paths = {std::make_shared<const motion::Trajectory>(std::move(points))};
-  EXPECT_EQ(make_request(job, PingNumber{1}, Time{} + std::chrono::seconds(4)).bodies_in_world.at(0).position_m.x, 4);
+  job.config.objects = {{"ball", {std::make_shared<const motion::Trajectory>(std::move(points))}, {}}};
+  EXPECT_EQ(make_request(job, world_of(job), PingNumber{1}, Time{} + std::chrono::seconds(4)).bodies_in_world.at(0).position_m.x,
+            4);
+  EXPECT_NE(digest_of(input, 0), digest_at_rest);
 }
 
 TEST(Digest, FollowsEverythingThatChangesAPing) {
@@ -238,20 +240,19 @@ TEST(Digest, FollowsEverythingThatChangesAPing) {
   };
   EXPECT_EQ(digest_of(parsed(point), 0), digest);
   EXPECT_NE(digest_of(input, 5), digest);
-  EXPECT_TRUE(changed([](RenderJob& j) { j.seed = 2; }));
-  EXPECT_TRUE(changed([](RenderJob& j) { j.engine.switches.volume = false; }));
+  EXPECT_TRUE(changed([](RenderJob& j) { j.config.seed = 2; }));
+  EXPECT_TRUE(changed([](RenderJob& j) { j.config.engine.switches.volume = false; }));
   EXPECT_TRUE(changed([](RenderJob& j) { j.settings.gain_db = 1; }));
   const auto way = [](double z_m) {
     return std::make_shared<const motion::Trajectory>(motion::Points{{motion::Ns{0}}, {{{0, 0, z_m}, {}}}, {}, {}});
   };
-  EXPECT_TRUE(changed([&](RenderJob& j) { j.path.trajectory = way(0); }));
-  EXPECT_TRUE(changed([&](RenderJob& j) { j.body_paths = {way(0)}; }));
+  EXPECT_TRUE(changed([&](RenderJob& j) { j.vehicle().plan.trajectory = way(0); }));
   RenderInput follows = input, elsewhere = input;
-  follows.jobs[0].path.trajectory = way(0);
-  elsewhere.jobs[0].path.trajectory = way(1);
+  follows.jobs[0].vehicle().plan.trajectory = way(0);
+  elsewhere.jobs[0].vehicle().plan.trajectory = way(1);
   EXPECT_NE(digest_of(follows, 0), digest_of(elsewhere, 0));
-  EXPECT_TRUE(changed([](RenderJob& j) { j.water.ph = 7; }));
-  EXPECT_FALSE(changed([](RenderJob& j) { j.engine.threads = 3; }));
+  EXPECT_TRUE(changed([](RenderJob& j) { j.config.water.ph = 7; }));
+  EXPECT_FALSE(changed([](RenderJob& j) { j.config.engine.threads = 3; }));
 }
 
 TEST(ResolutionCell, FollowsThePulseInUse) {
@@ -291,7 +292,7 @@ Coverage coverage_with(const std::string& waveform) {
                            waveform + "}}\n")
                         .jobs.at(0));
   Parallel pool(2);
-  PingRequest request = make_request(job, PingNumber{1}, Time{});
+  PingRequest request = make_request(job, world_of(job), PingNumber{1}, Time{});
   request.switches.keep_pressure = true;
   const auto coverage = measure_coverage(job, make_engine(job.scene, pool, {})->run({&request, 1}).at(0));
   if (!coverage) throw std::runtime_error(coverage.error().text);
@@ -310,14 +311,14 @@ TEST(Coverage, TakesTheEnergyOfThePulseInUse) {
 TEST(Coverage, KnowsWhatItCannotCompare) {
   RenderJob job = shipped_sonars_over_a_bed().front();
   Ping ping;
-  ping.request = make_request(job, PingNumber{1}, Time{});
+  ping.request = make_request(job, world_of(job), PingNumber{1}, Time{});
   ping.request.sonar_in_world.orientation = quat_from_rpy({0.1, 0.2, 0});
   EXPECT_THAT(measure_coverage(job, ping).error().text, HasSubstr("roll"));
   ping.request.sonar_in_world.orientation = {};
-  job.engine.switches.mode = Mode::paper;
+  job.config.engine.switches.mode = Mode::paper;
   EXPECT_THAT(measure_coverage(job, ping).error().text, HasSubstr("canonical"));
-  job.engine.switches = {};
-  job.engine.switches.conical = false;
+  job.config.engine.switches = {};
+  job.config.engine.switches.conical = false;
   EXPECT_THAT(measure_coverage(job, ping).error().text, HasSubstr("conical"));
 }
 
@@ -327,17 +328,17 @@ TEST(Sidecar, TellsTheSwitchesThatTookEffect) {
   Parallel pool(1);
   const auto switches_told = [&](const std::string& part) {
     const auto engine = make_engine(job.scene, pool, {});
-    const PingRequest request = make_request(job, PingNumber{1}, Time{});
+    const PingRequest request = make_request(job, world_of(job), PingNumber{1}, Time{});
     return sidecar(job, engine->run({&request, 1}).at(0), engine->description(), engine->statistics(), "")["switches"][part]
         .get<bool>();
   };
   EXPECT_TRUE(switches_told("specular"));
-  job.engine.switches.multipath = true;
+  job.config.engine.switches.multipath = true;
   EXPECT_TRUE(switches_told("multipath"));
-  job.engine.switches.fixed_fan = 8;
+  job.config.engine.switches.fixed_fan = 8;
   EXPECT_FALSE(switches_told("multipath"));
   EXPECT_TRUE(switches_told("specular"));
-  job.engine.switches.mode = Mode::paper;
+  job.config.engine.switches.mode = Mode::paper;
   for (const NamedSwitch& part : named_switches) EXPECT_FALSE(switches_told(part.name)) << part.name;
 }
 
