@@ -1,5 +1,7 @@
 #include "daemon/server/poses/pose_intake.hpp"
 
+#include <utility>
+
 namespace sonar {
 namespace {
 constexpr auto wall_tolerance = std::chrono::milliseconds(1);
@@ -34,6 +36,31 @@ std::string PoseIntake::take(control::PoseSample sample, const Sender& sender) {
     for (const Note& note : plausibility_->use(sample)) log_.warning(text_of(note), {{"from", sender.id}});
   on_pose_();
   return outcome.refusal;
+}
+
+std::string PoseIntake::place(const control::SetObject& asked, std::size_t body, const Sender& sender) {
+  const bool hidden = !asked.visible.value_or(!world_.is_hidden(body));
+  if (asked.in_world) {
+    control::PoseSample sample;
+    sample.of = control::PoseSample::Of::object;
+    sample.name = asked.object;
+    sample.pose = *asked.in_world;
+    sample.velocity_mps = sample.angular_velocity_radps = Vec3d{};  // it is put there: that is no movement to carry on
+    sample.reset_counter = ++placements_;
+    if (std::string refusal = take(std::move(sample), sender); !refusal.empty()) return refusal;
+  }
+  world_.hide(body, hidden);
+  return {};
+}
+
+std::string PoseIntake::steer(const control::SetTrajectory& asked, const Sender& sender) {
+  if (std::string why = world_.steer(asked, clock_.now()); !why.empty()) return why;
+  std::string text = "trajectory" + (asked.name.empty() ? std::string() : " of " + asked.name) + ":";
+  if (asked.position_s) text += " at " + std::to_string(*asked.position_s) + " s";
+  if (asked.speed) text += " speed " + std::to_string(*asked.speed);
+  if (asked.paused) text += *asked.paused ? " paused" : " playing";
+  log_.info(text, {{"client", sender.id}});
+  return {};
 }
 
 }  // namespace sonar
