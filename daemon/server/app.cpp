@@ -215,7 +215,7 @@ void App::take_over(Config next) {
   if (!listed.empty()) log_.warning("reload: these need a restart and stay as they were: " + listed);
   for (const std::string& note : notes_of_options(config_)) log_.info("reload: " + note);
   log_.info("reloaded: " + change.summary, {{"scene", scene().name}});
-  if (events_.heard()) events_.tell({control::SceneEvent{config_.scene.name(), "reloaded: " + change.summary}});
+  if (events_.has_listeners()) events_.publish({control::SceneEvent{config_.scene.name(), "reloaded: " + change.summary}});
   on_change();
 }
 
@@ -233,7 +233,7 @@ asio::awaitable<void> App::housekeeping() {
   while (!stopping_) {
     for (const World::Stale& stale : world_.newly_stale(clock_.now())) {
       log_.warning(stale.sentence);
-      if (events_.heard()) events_.tell({control::PoseEvent{stale.vehicle, true, stale.sentence}});
+      if (events_.has_listeners()) events_.publish({control::PoseEvent{stale.vehicle, true, stale.sentence}});
     }
     const std::string slow_load = monitoring_.slow_load();
     if (!slow_load.empty() && !slow_load_logged_) log_.warning(slow_load);

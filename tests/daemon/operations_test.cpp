@@ -230,9 +230,9 @@ TEST(Events, TellWhoListensAndNobodyElse) {
   std::vector<control::Event> told;  // on the I/O thread
   Events::Token token;
   daemon.on_io_thread([&] {
-    EXPECT_FALSE(daemon.app().events().heard());
+    EXPECT_FALSE(daemon.app().events().has_listeners());
     token = daemon.app().events().listen([&](const control::Event& e) { told.push_back(e); });
-    EXPECT_TRUE(daemon.app().events().heard());
+    EXPECT_TRUE(daemon.app().events().has_listeners());
   });
   {
     Client client(daemon.address());

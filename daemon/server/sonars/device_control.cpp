@@ -93,7 +93,7 @@ void Device::use_water(const Water& water) {
 }
 
 void Device::publish_ping(const PingQueued& queued) const {
-  if (!context_.events.heard()) return;
+  if (!context_.events.has_listeners()) return;
   const PingRequest& r = queued.ping->request;
   control::PingEvent e;
   e.sonar = config().name;
@@ -105,11 +105,11 @@ void Device::publish_ping(const PingQueued& queued) const {
   e.rows = static_cast<std::uint32_t>(r.settings.range_bin_count);
   e.clients = static_cast<std::uint32_t>(sonar_.connections().clients());
   e.simulation_ms = ms(queued.simulation_s);
-  context_.events.tell({e});
+  context_.events.publish({e});
 }
 
 void Device::publish_client(const std::string& peer, bool connected, const std::string& why) const {
-  if (context_.events.heard()) context_.events.tell({control::ClientEvent{config().name, peer, connected, why}});
+  if (context_.events.has_listeners()) context_.events.publish({control::ClientEvent{config().name, peer, connected, why}});
 }
 
 }  // namespace sonar

@@ -131,12 +131,12 @@ TEST(ControlHttp, EventsAreLinesOfJson) {
   EXPECT_THAT(client.until("\r\n\r\n"), HasSubstr("Transfer-Encoding: chunked"));
   EXPECT_TRUE(eventually([&] {
     bool heard = false;
-    bench.on_io([&] { heard = bench.events.heard(); });
+    bench.on_io([&] { heard = bench.events.has_listeners(); });
     return heard;
   }));
   bench.on_io([&] {
-    bench.events.tell({control::SceneEvent{"s", "not asked for"}, 0});
-    for (std::uint32_t i = 0; i < 3; ++i) bench.events.tell(ping_event(i));
+    bench.events.publish({control::SceneEvent{"s", "not asked for"}, 0});
+    for (std::uint32_t i = 0; i < 3; ++i) bench.events.publish(ping_event(i));
   });
   for (int i = 0; i < 3; ++i) {
     const std::string size = client.until("\r\n");
@@ -149,8 +149,8 @@ TEST(ControlHttp, EventsAreLinesOfJson) {
   EXPECT_TRUE(eventually([&] {  // its listener is removed at the next event
     bool heard = true;
     bench.on_io([&] {
-      bench.events.tell(ping_event(9));
-      heard = bench.events.heard();
+      bench.events.publish(ping_event(9));
+      heard = bench.events.has_listeners();
     });
     return !heard;
   }));
@@ -284,7 +284,7 @@ TEST(ControlHttp, UntrustedClientsEvictNoTrustedOne) {
     asks.tcp.finish_sending();
     EXPECT_TRUE(asks.tcp.read_to_end());
   }
-  bench.on_io([&] { bench.events.tell(ping_event(1)); });
+  bench.on_io([&] { bench.events.publish(ping_event(1)); });
   EXPECT_FALSE(events.until("\r\n").empty()) << "it keeps its place";
 }
 

@@ -152,9 +152,9 @@ TEST(ControlStream, EventsComeToThoseWhoAskedAndLossIsTold) {
   client.send({2, control::Subscribe{true, false, false, false}});
   ASSERT_EQ(client.next()->id, 2u);
   bench.on_io([&] {
-    EXPECT_TRUE(bench.events.heard());
-    bench.events.tell({control::SceneEvent{"s", "not asked for"}, 0});
-    for (std::uint32_t i = 0; i < 100; ++i) bench.events.tell(ping_event(i));  // more than wait for one
+    EXPECT_TRUE(bench.events.has_listeners());
+    bench.events.publish({control::SceneEvent{"s", "not asked for"}, 0});
+    for (std::uint32_t i = 0; i < 100; ++i) bench.events.publish(ping_event(i));  // more than wait for one
   });
   for (std::uint32_t i = 0; i < EventQueue::deepest; ++i) {
     const auto event = client.next();
@@ -162,13 +162,13 @@ TEST(ControlStream, EventsComeToThoseWhoAskedAndLossIsTold) {
     EXPECT_EQ(event->id, 0u);
     EXPECT_EQ(std::get<control::PingEvent>(std::get<control::Event>(event->body).what).number, i);
   }
-  bench.on_io([&] { bench.events.tell(ping_event(100)); });
+  bench.on_io([&] { bench.events.publish(ping_event(100)); });
   const auto after = client.next();
   ASSERT_TRUE(after);
   EXPECT_EQ(std::get<control::Event>(after->body).unsent, 100 - EventQueue::deepest);
   client.send({3, control::Subscribe{}});
   ASSERT_EQ(client.next()->id, 3u);
-  bench.on_io([&] { bench.events.tell(ping_event(101)); });
+  bench.on_io([&] { bench.events.publish(ping_event(101)); });
   client.send({4, control::GetStatus{}});
   EXPECT_EQ(client.next()->id, 4u) << "nothing is told after that";
 }
@@ -304,7 +304,7 @@ TEST(ControlStream, UntrustedClientsEvictNoTrustedOne) {
     asks.tcp.finish_sending();
     EXPECT_TRUE(asks.tcp.read_to_end());
   }
-  bench.on_io([&] { bench.events.tell(ping_event(1)); });
+  bench.on_io([&] { bench.events.publish(ping_event(1)); });
   for (StreamClient& s : subscribers) EXPECT_TRUE(s.next()) << "they keep their slots";
 }
 
