@@ -31,7 +31,7 @@ class Operations {
   /// Counters and histograms as Prometheus text, version 0.0.4.
   virtual std::string metrics() const = 0;
   /// Empty when all is well, else one sentence: /healthz and the service manager's watchdog ask.
-  virtual std::string trouble() const = 0;
+  virtual std::string problem() const = 0;
 };
 
 /// Publishes what happens to its listeners. A listener must not add or remove listeners while it is called.

@@ -218,7 +218,7 @@ TEST(PosesByControl, AreTakenAsAnyOthers) {
 TEST(Health, IsFineAndFiguresAreText) {
   Daemon daemon;
   daemon.on_io_thread([&] {
-    EXPECT_THAT(daemon.app().operations().trouble(), IsEmpty());
+    EXPECT_THAT(daemon.app().operations().problem(), IsEmpty());
     EXPECT_THAT(daemon.app().operations().metrics(), HasSubstr("sonar=\"front\""));
   });
 }

@@ -143,7 +143,7 @@ TEST(Reload, ALoadThatLastsTooLongIsTrouble) {
   Daemon daemon(setup);
   const auto trouble = [&] {
     std::string text;
-    daemon.on_io_thread([&] { text = daemon.app().operations().trouble(); });
+    daemon.on_io_thread([&] { text = daemon.app().operations().problem(); });
     return text;
   };
   ASSERT_EQ(kill(getpid(), SIGHUP), 0);
@@ -240,10 +240,10 @@ TEST(Reload, ASonarThatCannotBeOpenedStaysAsItWas) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("reload: sonar left: cannot listen on 192.0.2.18:52100"));
   EXPECT_THAT(daemon.log_text(), HasSubstr("reload: sonar front: cannot listen on 192.0.2.17:52100"));
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
-  daemon.on_io_thread([&] { EXPECT_THAT(daemon.app().operations().trouble(), HasSubstr("192.0.2.")); });
+  daemon.on_io_thread([&] { EXPECT_THAT(daemon.app().operations().problem(), HasSubstr("192.0.2.")); });
   daemon.write_config(yaml_of(setup));
   ASSERT_TRUE(reload(daemon, "reloaded: front untouched"));
-  daemon.on_io_thread([&] { EXPECT_THAT(daemon.app().operations().trouble(), IsEmpty()); });
+  daemon.on_io_thread([&] { EXPECT_THAT(daemon.app().operations().problem(), IsEmpty()); });
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
 }
 

@@ -230,7 +230,7 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
 }
 
 HttpAnswer HttpConnection::health(bool with_text) const {
-  const std::string trouble = context_.operations.trouble();
+  const std::string trouble = context_.operations.problem();
   if (trouble.empty()) return {200, "ok\n", "text/plain"};
   return {503, (with_text ? trouble : "unhealthy") + "\n", "text/plain"};
 }

@@ -19,7 +19,7 @@ class AppOperations final : public Operations {
 
   void perform(const control::Operation& operation, const Sender& sender, Done done) override;
   std::string metrics() const override { return monitoring_.metrics(); }
-  std::string trouble() const override { return monitoring_.trouble(); }
+  std::string problem() const override { return monitoring_.problem(); }
 
  private:
   SceneOperations& scene_;

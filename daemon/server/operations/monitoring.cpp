@@ -26,7 +26,7 @@ std::string Monitoring::metrics() const {
   return metrics_text(f);
 }
 
-std::string Monitoring::trouble() const {
+std::string Monitoring::problem() const {
   const auto under_way = simulator_.under_way_for();
   if (under_way > longest_ping) return "the simulation has been at one ping for " + whole_seconds(under_way);
   const std::string loading = slow_load();

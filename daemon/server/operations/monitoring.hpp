@@ -21,7 +21,7 @@ class Monitoring {
 
   /// As Operations has them.
   std::string metrics() const;
-  std::string trouble() const;
+  std::string problem() const;
   /// A change of the scene takes longer than limits.load_s: a sentence; empty when none does.
   std::string slow_load() const;
 

@@ -35,7 +35,7 @@ class FakeOperations final : public Operations {
     }
   }
   std::string metrics() const override { return "# TYPE sonard_up gauge\nsonard_up 1\n"; }
-  std::string trouble() const override { return in_trouble ? "the engine hangs" : ""; }
+  std::string problem() const override { return in_trouble ? "the engine hangs" : ""; }
 
   std::atomic<int> asked{0};            // from any thread
   std::atomic<bool> in_trouble{false};  // likewise
