@@ -39,7 +39,7 @@ struct AppOptions {
   /// How the configuration is read again, the command line's part included; any thread. Empty: there is none (the demo).
   std::function<Result<Config>()> read_config;
   LoadScene load_scene;
-  NotifyPlace service_manager;  // is told when we are ready, stop, and that we are alive
+  NotifyTarget service_manager;  // is told when we are ready, stop, and that we are alive
 };
 
 class App {

@@ -169,19 +169,19 @@ TEST(Notify, TheEnvironmentNamesTheSocketAndTheWatchdogOfThisProcessOnly) {
   ::setenv("NOTIFY_SOCKET", "@somewhere", 1);
   ::setenv("WATCHDOG_USEC", "3000000", 1);
   ::unsetenv("WATCHDOG_PID");
-  EXPECT_EQ(notify_place_from_environment().socket, "@somewhere");
-  EXPECT_EQ(notify_place_from_environment().watchdog, microseconds(3000000));
+  EXPECT_EQ(notify_target_from_environment().socket, "@somewhere");
+  EXPECT_EQ(notify_target_from_environment().watchdog, microseconds(3000000));
   ::setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
-  EXPECT_EQ(notify_place_from_environment().watchdog, microseconds(3000000));
+  EXPECT_EQ(notify_target_from_environment().watchdog, microseconds(3000000));
   ::setenv("WATCHDOG_PID", "1", 1);
-  EXPECT_EQ(notify_place_from_environment().watchdog, microseconds(0));
+  EXPECT_EQ(notify_target_from_environment().watchdog, microseconds(0));
   ::unsetenv("WATCHDOG_PID");
   for (const char* wrong : {"", "-5", "soon", "99999999999999999999"}) {
     ::setenv("WATCHDOG_USEC", wrong, 1);
-    EXPECT_EQ(notify_place_from_environment().watchdog, microseconds(0)) << wrong;
+    EXPECT_EQ(notify_target_from_environment().watchdog, microseconds(0)) << wrong;
   }
   for (const char* name : {"NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID"}) ::unsetenv(name);
-  EXPECT_EQ(notify_place_from_environment().socket, "");
+  EXPECT_EQ(notify_target_from_environment().socket, "");
 }
 
 }  // namespace

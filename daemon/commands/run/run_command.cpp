@@ -74,7 +74,7 @@ AppOptions app_options(const RunCommand& command, const std::filesystem::path& f
         if (const auto r = override_config(*again, command); !r) return tl::make_unexpected(r.error());
       return again;
     };
-  options.service_manager = notify_place_from_environment();
+  options.service_manager = notify_target_from_environment();
   return options;
 }
 
