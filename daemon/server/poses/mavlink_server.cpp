@@ -83,8 +83,8 @@ Endpoint MavlinkServer::listens_at(std::size_t link) const {
   return link < links_.size() ? std::next(links_.begin(), static_cast<std::ptrdiff_t>(link))->config.at : Endpoint{};
 }
 
-void MavlinkServer::say_fault(const std::exception_ptr& fault, const Link& link) {
-  sonar::say_fault(log_, faults_, text_of(fault), {"at", link.name});
+void MavlinkServer::log_fault(const std::exception_ptr& fault, const Link& link) {
+  say_fault(log_, faults_, text_of(fault), {"at", link.name});
 }
 
 /// A link outlives whatever one datagram does to us.
@@ -93,7 +93,7 @@ void MavlinkServer::keep_receiving(Link& link) {
       io_, [this, &link] { return receive(link); },
       [this, &link](std::exception_ptr fault) {
         if (!fault || stopping_) return;
-        say_fault(fault, link);
+        log_fault(fault, link);
         keep_receiving(link);
       });
 }
@@ -102,7 +102,7 @@ void MavlinkServer::keep_ticking(Link& link) {
       io_, [this, &link] { return tick(link); },
       [this, &link](std::exception_ptr fault) {
         if (!fault || stopping_) return;
-        say_fault(fault, link);
+        log_fault(fault, link);
         keep_ticking(link);
       });
 }

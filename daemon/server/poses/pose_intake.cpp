@@ -7,13 +7,13 @@ namespace {
 constexpr auto wall_tolerance = std::chrono::milliseconds(1);
 }
 
-void PoseIntake::say_refusal(const std::string& why, const Sender& sender) {
+void PoseIntake::log_refusal(const std::string& why, const Sender& sender) {
   say_at_times(log_, refusals_, LogLevel::warning, "pose refused: " + why, {{"from", sender.id}});
 }
 
 void PoseIntake::refuse(const std::string& why, const Sender& sender) {
   world_.count_refused();
-  say_refusal(why, sender);
+  log_refusal(why, sender);
 }
 
 /// WALL stamps are of the clocks as they are now, also when ours has been set since the start; the World has a time of its
@@ -28,7 +28,7 @@ void PoseIntake::map_wall(control::Stamp& stamp) {
 std::string PoseIntake::take(control::PoseSample sample, const Sender& sender) {
   map_wall(sample.stamp);
   const PoseOutcome outcome = world_.accept(sample, sender, clock_.now());
-  if (!outcome.refusal.empty() && outcome.verdict != PoseVerdict::late) say_refusal(outcome.refusal, sender);
+  if (!outcome.refusal.empty() && outcome.verdict != PoseVerdict::late) log_refusal(outcome.refusal, sender);
   if (!outcome.notice.empty() && events_ != nullptr && events_->has_listeners())
     events_->publish({control::PoseEvent{outcome.body, false, outcome.notice}});
   if (!outcome.notice.empty()) say_at_times(log_, notices_, LogLevel::info, outcome.notice);

@@ -32,7 +32,7 @@ class PoseIntake {
 
  private:
   void map_wall(control::Stamp& stamp);
-  void say_refusal(const std::string& why, const Sender& sender);
+  void log_refusal(const std::string& why, const Sender& sender);
 
   World& world_;
   const Clock& clock_;
