@@ -15,7 +15,7 @@ namespace sonar {
 namespace {
 
 /// On the log stream, and in its format.
-int complain(const Error& error, bool json) {
+int report_error(const Error& error, bool json) {
   LogOptions options;
   options.json = true;
   if (json)
@@ -51,10 +51,10 @@ int main(int argc, char** argv) {
   bool json = false;
   try {
     const auto code = sonar::run_command(sonar::parse_command_line(argc, argv), begin, json);
-    return code ? *code : sonar::complain(code.error(), json);
+    return code ? *code : sonar::report_error(code.error(), json);
   } catch (const std::bad_alloc&) {
-    return sonar::complain({sonar::ErrorKind::unavailable, "not enough memory; use a smaller scene or free some"}, json);
+    return sonar::report_error({sonar::ErrorKind::unavailable, "not enough memory; use a smaller scene or free some"}, json);
   } catch (const std::exception& e) {
-    return sonar::complain({sonar::ErrorKind::bug, std::string(e.what()) + " (this is a bug, please report it)"}, json);
+    return sonar::report_error({sonar::ErrorKind::bug, std::string(e.what()) + " (this is a bug, please report it)"}, json);
   }
 }

@@ -39,11 +39,12 @@ class ProgressLine {
                  static_cast<double>(p.bytes) / 1e6 / taken_s);
   }
 
-  void tell(const Progress& p) {
+  void show(const Progress& p) {
     const auto now = Clock::now();
     const bool last = p.done == p.all;
-    if (quiet_ || (!last && now - told_ < (terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(1000)))) return;
-    told_ = now;
+    if (quiet_ || (!last && now - shown_ < (terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(1000))))
+      return;
+    shown_ = now;
     const double taken_s = std::chrono::duration<double>(now - begin_).count();
     const double rate = static_cast<double>(p.done - p.kept) / std::max(taken_s, 1e-3);
     std::string bar;
@@ -60,7 +61,7 @@ class ProgressLine {
  private:
   using Clock = std::chrono::steady_clock;
   bool quiet_, terminal_ = ::isatty(STDERR_FILENO) == 1;
-  Clock::time_point begin_ = Clock::now(), told_ = begin_;
+  Clock::time_point begin_ = Clock::now(), shown_ = begin_;
 };
 
 Result<motion::TrajectoryFile> poses_of(const RenderCommand& command) {
@@ -142,7 +143,7 @@ Result<int> check(const RenderInput& input) {
 }
 
 /// A line each, however many steps a sweep has.
-void tell_notes(const RenderInput& input) {
+void print_notes(const RenderInput& input) {
   std::set<std::string> notes{note_of_parts_left_out(input.jobs.front().config.engine.switches)};
   for (const RenderJob& job : input.jobs) notes.insert(note_of_range(job));
   for (const std::string& note : notes)
@@ -183,11 +184,11 @@ Result<int> run_render(const RenderCommand& command) {
   if (!command.report.empty()) return report_coverage(input->jobs);
   if (command.check_expectations) return check(*input);
   if (std::string note = note_of_air(*input, output_options(command)); !note.empty()) input->notes.push_back(std::move(note));
-  if (!command.quiet) tell_notes(*input);
+  if (!command.quiet) print_notes(*input);
   for (const std::string& note : input->notes) std::fprintf(stderr, "sonard: %s\n", note.c_str());
   ProgressLine line(command.quiet);
   Parallel pool(threads_of(input->jobs.front().config.engine));
-  const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.tell(p); });
+  const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.show(p); });
   if (!done) return tl::make_unexpected(done.error());
   line.conclude(*done);
   return 0;

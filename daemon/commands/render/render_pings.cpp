@@ -166,7 +166,7 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
 }
 
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, Parallel& pool,
-                              const std::function<void(const Progress&)>& told) {
+                              const std::function<void(const Progress&)>& on_progress) {
   if (o.first > 1 && input.jobs.size() > 1)
     return failure(ErrorKind::usage,
                    "--first: " + input.source + " sweeps values, and its pings are counted through all steps; leave it out");
@@ -217,12 +217,12 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
           return failure(ErrorKind::unavailable, gone.what());
         }
         progress.done += made;
-        told(progress);
+        on_progress(progress);
       }
       if (is_there) {
         ++progress.kept;
         ++progress.done;
-        told(progress);
+        on_progress(progress);
       }
     }
   }
