@@ -113,6 +113,14 @@ Result<void> render_batch(const RenderJob& job, PingEngine& engine, const Output
   return {};
 }
 
+Result<std::unique_ptr<PingEngine>> engine_for(const RenderJob& job, Parallel& pool) {
+  const auto make = [&](std::shared_ptr<const Scene> s) {
+    return choose_engine(job.config.engine.device, std::move(s), pool, {.simd = job.config.engine.simd},
+                         [](const std::string& what) { std::fprintf(stderr, "sonard: %s\n", what.c_str()); });
+  };
+  return start_engine(make, job.scene);
+}
+
 }  // namespace
 
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& o) {
@@ -199,11 +207,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
       const bool full = batch.size() >= static_cast<std::size_t>(o.batch) || i + 1 == times[j].size() || is_there;
       if (full && !batch.empty()) {
         if (!engine) {
-          const auto make = [&](std::shared_ptr<const Scene> s) {
-            return choose_engine(job.config.engine.device, std::move(s), pool, {.simd = job.config.engine.simd},
-                                 [](const std::string& what) { std::fprintf(stderr, "sonard: %s\n", what.c_str()); });
-          };
-          auto started = start_engine(make, job.scene);
+          auto started = engine_for(job, pool);
           if (!started) return tl::make_unexpected(started.error());
           engine = *std::move(started);
         }
