@@ -1,7 +1,6 @@
 #include "daemon/config/config.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <set>
 
 #include "core/text/decimal.hpp"
@@ -275,14 +274,6 @@ Result<Config> demo_config() {
   auto config = parse_config(demo_yaml, "demo", {});
   if (config) config->scene = {"demo.yaml", true};  // whatever files there are
   return config;
-}
-
-std::vector<std::filesystem::path> config_search_path() {
-  std::vector<std::filesystem::path> places = {"./sonard.yaml"};
-  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
-    places.push_back(std::filesystem::path(home) / ".config/sonard/sonard.yaml");
-  places.push_back("/etc/sonard/sonard.yaml");
-  return places;
 }
 
 }  // namespace sonar

@@ -156,9 +156,6 @@ Result<void> check_time_can_pass(const Config& config);
 /// What runs when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. Needs no files.
 Result<Config> demo_config();
 
-/// ./sonard.yaml, ~/.config/sonard/sonard.yaml, /etc/sonard/sonard.yaml, in this order.
-std::vector<std::filesystem::path> config_search_path();
-
 /// Fills netmask and status_to from advertise_ip, unless the file gives them.
 void derive_addresses(SonarConfig& sonar);
 /// Moves the first sonar to another address, with all that is derived from it. Errors are sentences for the command line.

@@ -1,4 +1,4 @@
-// Which keys of a configuration that was read again take effect at the next restart only. Pure; App::reload uses it.
+// Which keys of a configuration that was read again take effect at the next restart only. Pure; used when App reloads.
 #pragma once
 
 #include <string>

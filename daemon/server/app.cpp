@@ -2,9 +2,11 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <csignal>
+#include <utility>
 
+#include "daemon/config/products.hpp"
+#include "daemon/config/restart_keys.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
 #include "daemon/server/system/real_time.hpp"
 
@@ -33,7 +35,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
             notes_due_ = true;
           },
           [this] {
-            say_new_notes();
+            log_new_notes();
             on_change();
           }),
       admission_(config_.limits, log_),
@@ -48,21 +50,26 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                 exit_code_ = exit_code(why.kind);
                 stop("the engine failed");
               }}),
-      operations_({config_, clock_, world_, stepped_time_, simulator_, changes_, admission_, pose_intake_, fleet_, events_,
-                   recordings_, control_, mavlink_server_, plausibility_, log_, [this] { on_change(); }, options_.load_scene}),
+      stepper_(clock_, world_, stepped_time_, fleet_, log_, [this] { on_change(); }),
+      scene_operations_(config_, changes_, pose_intake_, events_, log_, options_.load_scene),
+      sonar_operations_(config_, fleet_, recordings_, log_),
+      time_operations_(stepped_time_, pose_intake_, fleet_, [this] { on_change(); }),
+      status_report_(config_, clock_, world_, changes_, fleet_, [this](control::DaemonStatus& s) { add_status(s); }),
+      monitoring_(config_.limits, simulator_, changes_, world_, admission_, fleet_),
+      operations_(scene_operations_, sonar_operations_, time_operations_, status_report_, monitoring_),
       control_(io_, config_.control, config_.limits, admission_, operations_, events_, pose_intake_, log_),
       signals_(io_),
-      house_timer_(io_),
+      housekeeping_timer_(io_),
       stop_timer_(io_),
-      reload_timer_(io_),
       notify_(
-          io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_) {
+          io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_),
+      reload_(io_, changes_, log_, reload_steps()) {
   recordings_.use_scene(*changes_.scene());
-  say_new_notes();
+  log_new_notes();
 }
 
 /// What of the configuration and the scene was probably not meant. Not before a reload has changed both.
-void App::say_new_notes() {
+void App::log_new_notes() {
   if (!std::exchange(notes_due_, false)) return;
   for (const Note& note : plausibility_.use(config_, *changes_.scene())) log_.warning(text_of(note));
 }
@@ -86,7 +93,7 @@ int App::run() {
   control_.start();
   fleet_.start();
   asio::co_spawn(
-      io_, [this] { return keep_house(); }, asio::detached);
+      io_, [this] { return housekeeping(); }, asio::detached);
   notify_.ready(status_line());
   if (const int priority = config_.engine.io_priority; priority > 0)
     if (const std::string why = schedule_in_real_time(priority); !why.empty()) log_.warning(why);
@@ -108,7 +115,7 @@ void App::wait_for_signal() {
     if (signal == SIGHUP && stopping_) {
       on_change();  // look() may have cancelled before we wait again
     } else if (signal == SIGHUP) {
-      on_hangup();
+      reload_.request();
     } else {
       if (stopping_) ::_exit(128 + signal);
       stop(signal == SIGINT ? "interrupted" : "terminated");
@@ -128,8 +135,8 @@ void App::stop(const std::string& why) {
   pose_server_.stop();
   mavlink_server_.stop();
   control_.stop();
-  house_timer_.cancel();
-  reload_timer_.cancel();
+  housekeeping_timer_.cancel();
+  reload_.stop();
   changes_.stop();
   fleet_.stop();
   recordings_.finish();
@@ -165,68 +172,67 @@ void App::look() {
     }
     return;
   }
-  if (clock_.stepped()) return step_time();
-  if (enough_served()) stop("served " + std::to_string(options_.exit_after_pings) + " pings");
+  // A change of the scene takes effect before the next step.
+  const bool may_end = clock_.stepped() ? !changes_.busy() && stepper_.step([this] { return enough_served(); }) : enough_served();
+  if (may_end) stop("served " + std::to_string(options_.exit_after_pings) + " pings");
 }
 
-void App::step_time() {
-  if (changes_.busy()) return;  // a change of the scene takes effect before the next step
-  skip_time();
-  std::list<Device>& devices = fleet_.devices();
-  if (!std::all_of(devices.begin(), devices.end(), [](const Device& d) { return d.sonar().settled(); })) return;
-  Device* pings = nullptr;  // next
-  std::optional<Time> ping, request, talk;
-  const auto is_first = [](std::optional<Time> t, std::optional<Time> of) { return t && (!of || *t < *of); };
-  for (Device& d : devices) {
-    if (const auto t = d.sonar().next_ping(); is_first(t, ping)) ping = t, pings = &d;
-    if (const auto t = d.sonar().next_request(); is_first(t, request)) request = t;
-    if (const auto t = d.sonar().next_conversation(); is_first(t, talk)) talk = t;
-  }
-  const std::optional<Time> for_pings = is_first(request, ping) ? request : ping;
-  const SteppedTime::Bound bound = stepped_time_.bound(for_pings);
-  const bool talks = is_first(talk, ping) || talk == ping;  // before the ping that is due at the same moment
-  const std::optional<Time> due = talks ? talk : ping;
-  // What is said at this very moment needs no time to pass.
-  const bool may_come = due && (*due <= bound.last_tick || (talks && *due <= clock_.now()));
-  if (!may_come && bound.then) advance_time(*bound.then);
-  const bool answered = stepped_time_.answer(due);
-  if (answered) on_change();  // first the answers, in turns of their own
-  if (enough_served() && answered) return;
-  if (enough_served()) return stop("served " + std::to_string(options_.exit_after_pings) + " pings");
-  if (!may_come) return;
-  advance_time(stepped_time_.tick_at(*due));
-  if (talks) return on_change();  // what it made them say, or ask for, may be taken or due before the rest
-  pings->step();
+Reload::Steps App::reload_steps() {
+  return {.begin = [this] { notify_.reloading(); },
+          .read_config = options_.read_config,
+          .load_scene = options_.load_scene,
+          .take_over = [this](Config next) { take_over(std::move(next)); },
+          .end = [this] { notify_.ready(status_line()); }};
 }
 
-void App::advance_time(Time to) {
-  clock_.advance_to(to);
-  for (Device& d : fleet_.devices()) d.tick_sessions();
+void App::take_over(Config next) {
+  const std::vector<std::string> keys = keep_restart_keys(config_, next);
+  const bool other_water = !(config_.water == next.water);
+  std::swap(config_, next);  // devices read it through their context
+  const Config& before = next;
+  world_.use_rules(pose_rules(config_));
+  world_.use_vehicles(vehicles_of(config_), clock_.now());
+  world_.use_objects(bodies_of(scene(), config_), clock_.now());
+  world_.show_again();
+  notes_due_ = true;
+  const Fleet::Change change = fleet_.take_over(before, config_);
+  if (other_water)
+    for (Device& d : fleet_.devices()) d.use_water(config_.water);
+
+  for (const std::string& error : change.errors) log_.error("reload: " + error);
+  std::string listed;
+  for (const std::string& key : keys) listed += (listed.empty() ? "" : ", ") + key;
+  if (!listed.empty()) log_.warning("reload: these need a restart and stay as they were: " + listed);
+  for (const std::string& note : notes_of_options(config_)) log_.info("reload: " + note);
+  log_.info("reloaded: " + change.summary, {{"scene", scene().name}});
+  if (events_.has_listeners()) events_.publish({control::SceneEvent{config_.scene.name(), "reloaded: " + change.summary}});
+  on_change();
 }
 
-/// Stamps that we follow began, or jumped ahead.
-void App::skip_time() {
-  const auto skipped = world_.take_skipped();
-  if (skipped.count() == 0) return;
-  clock_.skip(skipped);
-  for (Device& d : fleet_.devices()) d.skip(skipped);
-  log_.info("time follows the poses: it jumps ahead by " + std::to_string(seconds(skipped)) + " s");
+void App::add_status(control::DaemonStatus& status) const {
+  const auto address = [](Endpoint at) { return at.port == 0 ? std::string() : text_of(at); };  // empty = no listener
+  status.engine = simulator_.engine_description();
+  status.control = address(control_.stream());
+  status.http = address(control_.http());
+  status.recordings = recordings_.status();
+  status.notes = plausibility_.all();
+  for (control::Note& note : mavlink_server_.notes()) status.notes.push_back(std::move(note));
 }
 
-asio::awaitable<void> App::keep_house() {
+asio::awaitable<void> App::housekeeping() {
   while (!stopping_) {
     for (const World::Stale& stale : world_.newly_stale(clock_.now())) {
       log_.warning(stale.sentence);
-      if (events_.heard()) events_.tell({control::PoseEvent{stale.vehicle, true, stale.sentence}});
+      if (events_.has_listeners()) events_.publish({control::PoseEvent{stale.vehicle, true, stale.sentence}});
     }
-    const std::string slow_load = operations_.slow_load();
-    if (!slow_load.empty() && !slow_load_said_) log_.warning(slow_load);
-    slow_load_said_ = !slow_load.empty();
+    const std::string slow_load = monitoring_.slow_load();
+    if (!slow_load.empty() && !slow_load_logged_) log_.warning(slow_load);
+    slow_load_logged_ = !slow_load.empty();
     fleet_.sweep();
     for (Device& d : fleet_.devices()) d.forget_who_left();
     error_code ec;
-    house_timer_.expires_after(std::chrono::milliseconds(500));
-    co_await house_timer_.async_wait(into(ec));
+    housekeeping_timer_.expires_after(std::chrono::milliseconds(500));
+    co_await housekeeping_timer_.async_wait(into(ec));
   }
 }
 

@@ -13,22 +13,22 @@
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/emulator/world/world.hpp"
-#include "daemon/server/app_operations.hpp"
 #include "daemon/server/connections/admission.hpp"
 #include "daemon/server/control/control_server.hpp"
 #include "daemon/server/engine/simulator.hpp"
 #include "daemon/server/engine/start_engine.hpp"
+#include "daemon/server/operations/app_operations.hpp"
 #include "daemon/server/poses/mavlink_server.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/poses/pose_server.hpp"
 #include "daemon/server/recording/recordings.hpp"
+#include "daemon/server/reload.hpp"
 #include "daemon/server/scene_changes.hpp"
 #include "daemon/server/sonars/fleet.hpp"
+#include "daemon/server/stepper.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
 #include "daemon/server/system/notify.hpp"
-#include "daemon/server/time/clock.hpp"
-#include "daemon/server/time/stepped_time.hpp"
 
 namespace sonar {
 
@@ -38,17 +38,14 @@ struct AppOptions {
   bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP reads the configuration again
   /// How the configuration is read again, the command line's part included; any thread. Empty: there is none (the demo).
   std::function<Result<Config>()> read_config;
-  /// Any thread. Empty: no other scene can be loaded.
-  std::function<Result<ScenePointer>(const SceneFile&)> load_scene;
-  NotifyPlace service_manager;  // is told when we are ready, stop, and that we are alive
+  LoadScene load_scene;
+  NotifyTarget service_manager;  // is told when we are ready, stop, and that we are alive
 };
 
 class App {
  public:
   /// After stop() run() returns by then, whatever is still under way.
   static constexpr std::chrono::milliseconds stop_limit{1800};
-  /// From the beginning of one reload to that of the next, however often it is asked for.
-  static constexpr std::chrono::milliseconds reload_pause{500};
 
   /// `make_engine` is kept: later scenes get theirs on another thread. What it refers to must outlive the App.
   App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);
@@ -82,17 +79,14 @@ class App {
   void stop(const std::string& why);
   void on_change();
   void look();  // after a change: end, or take the next step of stepped time
-  void step_time();
-  void skip_time();
-  void advance_time(Time to);
   bool enough_served() const;
-  void say_new_notes();
+  void log_new_notes();
   void wait_for_signal();
-  void on_hangup();  // reload.cpp, as the next
-  void reload();
-  void take_over(Config next);
+  Reload::Steps reload_steps();
+  void take_over(Config next);  // of a reload
+  void add_status(control::DaemonStatus& status) const;
   std::string status_line() const;
-  asio::awaitable<void> keep_house();
+  asio::awaitable<void> housekeeping();
 
   Config config_;
   AppOptions options_;
@@ -111,16 +105,20 @@ class App {
   PoseServer pose_server_;
   MavlinkServer mavlink_server_;
   Fleet fleet_;
+  Stepper stepper_;
+  SceneOperations scene_operations_;
+  SonarOperations sonar_operations_;
+  TimeOperations time_operations_;
+  StatusReport status_report_;
+  Monitoring monitoring_;
   AppOperations operations_;
   ControlServer control_;
   asio::signal_set signals_;
-  asio::steady_timer house_timer_, stop_timer_, reload_timer_;
+  asio::steady_timer housekeeping_timer_, stop_timer_;
   Notify notify_;
+  Reload reload_;
   bool look_posted_ = false, stopping_ = false;
-  int reloads_ = 0;            // begun, or waiting for one that is under way
-  bool reload_waits_ = false;  // for reload_pause to be over
-  std::chrono::steady_clock::time_point no_reload_before_{};
-  bool slow_load_said_ = false;
+  bool slow_load_logged_ = false;
   bool notes_due_ = true;  // the configuration or the scene is another one
   int exit_code_ = 0;
 };

@@ -31,29 +31,29 @@ class Operations {
   /// Counters and histograms as Prometheus text, version 0.0.4.
   virtual std::string metrics() const = 0;
   /// Empty when all is well, else one sentence: /healthz and the service manager's watchdog ask.
-  virtual std::string trouble() const = 0;
+  virtual std::string problem() const = 0;
 };
 
-/// Passes what happens on to those who asked to be told. A listener must not add or remove listeners while it is told.
+/// Publishes what happens to its listeners. A listener must not add or remove listeners while it is called.
 class Events {
  public:
   using Listener = std::function<void(const control::Event&)>;
-  using Token = std::shared_ptr<void>;  // the listener is told as long as its token lives
+  using Token = std::shared_ptr<void>;  // the listener is called as long as its token lives
   [[nodiscard]] Token listen(Listener listener) {
-    forget_the_gone();
+    remove_expired();
     auto kept = std::make_shared<Listener>(std::move(listener));
     listeners_.push_back(kept);
     return kept;
   }
-  bool heard() const { return !listeners_.empty(); }  // else no event needs to be made
-  void tell(const control::Event& event) {
-    forget_the_gone();
+  bool has_listeners() const { return !listeners_.empty(); }  // else no event needs to be made
+  void publish(const control::Event& event) {
+    remove_expired();
     for (const std::weak_ptr<Listener>& l : listeners_)
       if (const auto listener = l.lock()) (*listener)(event);
   }
 
  private:
-  void forget_the_gone() {
+  void remove_expired() {
     listeners_.remove_if([](const std::weak_ptr<Listener>& l) { return l.expired(); });
   }
 

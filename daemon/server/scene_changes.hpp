@@ -11,12 +11,16 @@
 #include <functional>
 #include <memory>
 
+#include "daemon/config/scene_file.hpp"
 #include "daemon/emulator/world/edit_scene.hpp"
 #include "daemon/server/engine/simulator.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 #include "daemon/server/system/asio.hpp"
 
 namespace sonar {
+
+/// Called on any thread. Empty: no scene can be loaded.
+using LoadScene = std::function<Result<ScenePointer>(const SceneFile&)>;
 
 class SceneChanges {
  public:

@@ -2,7 +2,7 @@
 
 The vehicle is mavlink_frames.py, written from the message definitions; pings are read by the Python client, and the moment of each
 ping comes from the daemon's events. Only pings are judged whose pose had left in time: what a busy computer sends late is another
-question (tests/daemon/world_test.cpp). A computer that stalls the daemon itself cannot be seen from outside, so a few pings may be
+question (tests/daemon/emulator/world/world_test.cpp). A computer that stalls the daemon itself cannot be seen from outside, so a few pings may be
 off by what the vehicle moves meanwhile, and no more.
 """
 import math

@@ -148,11 +148,11 @@ Result<json> find_empty_bins(const BenchOptions& options) {
       const BenchCase c = *find_case(name);
       if (rays == 0 && c.fixed_fan > 0) continue;  // a case of rays: cells as small as its rows would be too many
       render::RenderJob job = render::over_a_level_bed(c.profile.model, c.settings, name);
-      job.engine = options.engine;
+      job.config.engine = options.engine;
       job = render::with_bed_only(job);
-      job.engine.switches.fixed_fan = rays;
-      const auto engine = make_cpu_engine(job.scene, pool, {.simd = job.engine.simd});
-      PingRequest request = render::make_request(job, PingNumber{1}, Time{});
+      job.config.engine.switches.fixed_fan = rays;
+      const auto engine = make_cpu_engine(job.scene, pool, {.simd = job.config.engine.simd});
+      PingRequest request = render::make_request(job, render::world_of(job), PingNumber{1}, Time{});
       request.switches.keep_pressure = true;
       const auto coverage = render::measure_coverage(job, engine->run({&request, 1}).at(0));
       if (!coverage) return tl::make_unexpected(coverage.error());

@@ -10,6 +10,7 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "daemon/config/effective_switches.hpp"
+#include "daemon/emulator/sonar/ping_request.hpp"
 #include "daemon/server/engine/choose_engine.hpp"
 #include "tests/bench/parts.hpp"
 
@@ -23,10 +24,13 @@ double read_clock(clockid_t clock) {
 }
 
 /// What the case asks for wins over the command line.
-Switches switches_of(const BenchCase& c, Switches given) {
-  if (c.mode != Mode::canonical) given.mode = c.mode;
-  if (c.fixed_fan > 0) given.fixed_fan = c.fixed_fan;
-  return given;
+Config config_of(const BenchCase& c, const BenchOptions& options) {
+  Config config;
+  config.seed = options.seed;
+  config.engine = options.engine;
+  if (c.mode != Mode::canonical) config.engine.switches.mode = c.mode;
+  if (c.fixed_fan > 0) config.engine.switches.fixed_fan = c.fixed_fan;
+  return config;
 }
 
 }  // namespace
@@ -66,10 +70,7 @@ Bench::Bench(std::shared_ptr<const Scene> scene, int threads, const BenchOptions
 }
 
 Pinger::Pinger(const BenchCase& c, const BenchOptions& options)
-    : case_(c),
-      switches_(switches_of(c, options.engine.switches)),
-      seed_(options.seed),
-      model_(with_parts(c.profile.model, options.given_parts)) {
+    : case_(c), config_(config_of(c, options)), model_(with_parts(c.profile.model, options.given_parts)) {
   device_.model = model_;
   device_.id = 1;
   if (!c.profile.vendor) return;
@@ -78,14 +79,12 @@ Pinger::Pinger(const BenchCase& c, const BenchOptions& options)
 }
 
 PingRequest Pinger::request(int number, const Pose& sonar) const {
-  PingRequest r;
+  const World at_rest({}, {{{}, sonar}}, {}, Time{});
+  PingRequest r = ping_request(config_, at_rest, 0, {}, Time{});
   r.model = model_;
   r.number = PingNumber{static_cast<std::uint32_t>(number)};
   r.settings = case_.settings;
   r.vendor_settings = device_.settings;
-  r.seed = Seed{seed_};
-  r.switches = switches_;
-  r.sonar_in_world = r.vehicle_in_world = sonar;
   return r;
 }
 

@@ -62,13 +62,12 @@ class Pinger {
   double last_frame_s() const { return frame_s_; }
   /// Seconds that all of them took in one call, framed too.
   double fire(PingEngine& engine, std::span<const PingRequest> requests);
-  const Switches& switches() const { return switches_; }
+  const Switches& switches() const { return config_.engine.switches; }
   const SonarModel& model() const { return *model_; }
 
  private:
   BenchCase case_;
-  Switches switches_;
-  std::uint64_t seed_;
+  Config config_;
   std::shared_ptr<const SonarModel> model_;
   protocol::DeviceState device_;
   double frame_s_ = 0;

@@ -25,7 +25,7 @@ case $kind in
   asan)
     wanted='^tests/(protocol|daemon)/.*_test$|^tests/core/(text|motion)/.*_test$|/core_(load_scene|shapes|ray_scene)_test$|/bvtsdk_core_test$|^tests/fuzz/.*_fuzz$'
     # What reads nothing foreign: engines, their choice and their turns, and command lines.
-    left_out='/daemon_(analytic|changed_scene|choose_engine|command_line|fair_turns|start_engine)_test$'
+    left_out='/daemon_(analytic|command_line|engine)_test$'
     ;;
   asan-all)
     wanted='^tests/.*(_test|_fuzz)$'

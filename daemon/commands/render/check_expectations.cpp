@@ -17,7 +17,7 @@ Values known_values(const RenderJob& job, const PingRequest& request) {
   const FrequencyMode& mode = job.mode();
   const PingSettings& s = job.settings;
   const double depth_m = depth_from_z(request.sonar_in_world.position_m.z);
-  const double c = true_sound_speed_mps(job.water, depth_m), c_dev = static_cast<double>(s.device_sound_speed_mps);
+  const double c = true_sound_speed_mps(job.config.water, depth_m), c_dev = static_cast<double>(s.device_sound_speed_mps);
   const ResolutionCell cell = cell_of(job);
   Values v = job.values;
   v["SL"] = static_cast<double>(mode.source_level_db);
@@ -25,7 +25,7 @@ Values known_values(const RenderJob& job, const PingRequest& request) {
   v["c"] = c;
   v["c_dev"] = c_dev;
   v["lambda"] = c / static_cast<double>(mode.centre_hz);
-  v["alpha"] = absorption_db_per_m(job.water, depth_m, static_cast<double>(mode.centre_hz));
+  v["alpha"] = absorption_db_per_m(job.config.water, depth_m, static_cast<double>(mode.centre_hz));
   v["pulse"] = cell.pulse_width_m;
   v["row"] = s.range_bin_m;
   v["tau_eff"] = cell.energy_s;
@@ -60,11 +60,13 @@ tl::unexpected<Error> at_place(const Expectation& e, const Error& error) {
 
 /// One ping of the job, everything measured in it.
 Result<Step> take_step(const std::string& source, const RenderJob& job, Parallel& pool) {
-  const auto make = [&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, {.simd = job.engine.simd}); };
+  const auto make = [&](std::shared_ptr<const Scene> s) {
+    return make_engine(std::move(s), pool, {.simd = job.config.engine.simd});
+  };
   const auto engine = start_engine(make, job.scene);
   if (!engine) return tl::make_unexpected(engine.error());
-  const std::vector<Time> times = times_of(job.path);
-  PingRequest request = make_request(job, PingNumber{1}, times.empty() ? Time{} : times.front());
+  const std::vector<Time> times = pose_times(job);
+  PingRequest request = make_request(job, world_of(job), PingNumber{1}, times.empty() ? Time{} : times.front());
   request.switches.keep_pressure = true;
   Step step{known_values(job, request), {}};
   try {

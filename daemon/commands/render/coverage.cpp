@@ -40,9 +40,9 @@ class ClosedForm {
   ClosedForm(const RenderJob& job, const Ping& ping, const Bed& bed)
       : mode_(job.mode()), bed_(bed), tilt_rad_(rpy_from_quat(ping.request.sonar_in_world.orientation).pitch_rad) {
     const double depth_m = depth_from_z(ping.request.sonar_in_world.position_m.z);
-    sound_speed_mps_ = true_sound_speed_mps(job.water, depth_m);
+    sound_speed_mps_ = true_sound_speed_mps(job.config.water, depth_m);
     true_over_device_ = sound_speed_mps_ / static_cast<double>(job.settings.device_sound_speed_mps);
-    absorption_ = nepers_from_db(absorption_db_per_m(job.water, depth_m, static_cast<double>(mode_.centre_hz)));
+    absorption_ = nepers_from_db(absorption_db_per_m(job.config.water, depth_m, static_cast<double>(mode_.centre_hz)));
     const ResolutionCell cell = cell_of(job);
     area_per_m2_ = cell.beam_u * 0.5 * sound_speed_mps_ * cell.energy_s;
     has_pattern_ = mode_.pattern.elevation_taper != Taper::unit;
@@ -87,7 +87,7 @@ class ClosedForm {
 }  // namespace
 
 RenderJob with_bed_only(RenderJob job) {
-  Switches& switches = job.engine.switches;
+  Switches& switches = job.config.engine.switches;
   for (const NamedSwitch& part : named_switches)
     if (part.is_on != &Switches::conical) switches.*part.is_on = false;
   switches.expected_power = true;
@@ -102,9 +102,9 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
                    "coverage needs a level `type: plane` below the sonar; scene " + job.scene->name + " has none");
   if (std::abs(rotate(sonar.orientation, Vec3d{0, 1, 0}).z) > level_tolerance)
     return failure(ErrorKind::bad_data, "coverage is defined for a sonar without roll; level it");
-  if (!job.engine.switches.conical)
+  if (!job.config.engine.switches.conical)
     return failure(ErrorKind::bad_data, "coverage is defined for conical beams; leave out --conical off");
-  if (job.engine.switches.mode != Mode::canonical)
+  if (job.config.engine.switches.mode != Mode::canonical)
     return failure(ErrorKind::bad_data, "coverage is defined for the canonical model; leave out --mode paper or raster");
   if (job.mode().pattern.azimuth_taper == Taper::unit)
     return failure(ErrorKind::bad_data, "coverage is defined for beams with a width; azimuth_taper unit has none");
@@ -165,11 +165,11 @@ bool acoustically_equal(const RenderJob& a, const RenderJob& b) {
 
 RenderJob over_a_level_bed(std::shared_ptr<const SonarModel> model, const PingSettings& settings, const std::string& name) {
   RenderJob job;
-  job.model = std::move(model);
   job.settings = settings;
   job.name = name;
-  job.sonar_name = job.model->profile;
-  job.path.initial = {{0, 0, bed_z_m + height_in_ranges * settings.range_m}, quat_from_rpy({0, tilt_rad, 0})};
+  job.sonar().name = model->profile;
+  job.sonar().profile.model = std::move(model);
+  job.vehicle().initial_pose = {{0, 0, bed_z_m + height_in_ranges * settings.range_m}, quat_from_rpy({0, tilt_rad, 0})};
   job.scene = level_bed(2.5 * settings.range_m);
   return job;
 }
@@ -180,17 +180,19 @@ std::vector<RenderJob> shipped_sonars_over_a_bed() {
     for (const auto& model : vendor->models())
       for (std::size_t mode = 0; mode < model->modes.size(); ++mode) {
         RenderJob job;
-        job.model = model;
-        const auto options = protocol::check_options(*vendor, {});
-        job.settings = device_settings({vendor, model}, options.value_or(protocol::OptionValues{}), job.water, -bed_z_m);
+        SonarConfig& sonar = job.sonar();
+        sonar.name = model->profile;
+        sonar.profile = {vendor, model};
+        sonar.options = protocol::check_options(*vendor, {}).value_or(protocol::OptionValues{});
+        job.vehicle().initial_pose.position_m.z = bed_z_m;
+        job.settings = device_settings(job);
         const double stored_m = job.settings.range_m;
         job.settings.mode = static_cast<int>(mode);
         job.settings.range_m = std::min(stored_m, static_cast<double>(job.mode().max_range_m));
         job.settings.range_bin_m *= job.settings.range_m / stored_m;
         job.settings.pulse_width_m *= static_cast<float>(job.settings.range_m / stored_m);
         job.name = model->profile + " " + job.mode().name;
-        job.sonar_name = model->profile;
-        job.path.initial = {{0, 0, bed_z_m + height_in_ranges * job.settings.range_m}, quat_from_rpy({0, tilt_rad, 0})};
+        job.vehicle().initial_pose = {{0, 0, bed_z_m + height_in_ranges * job.settings.range_m}, quat_from_rpy({0, tilt_rad, 0})};
         if (std::any_of(jobs.begin(), jobs.end(), [&](const RenderJob& other) { return acoustically_equal(job, other); }))
           continue;
         job.scene = level_bed(2.5 * job.settings.range_m);

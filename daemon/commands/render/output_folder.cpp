@@ -75,24 +75,24 @@ Result<int> lock(const path& folder) {
 Result<void> make_way(const OutputOptions& o, const std::string& digest) {
   std::error_code ec;
   const path about = o.folder / about_file;
-  const std::string told = inputs_of(about);
-  if (told == digest) return {};
-  const bool is_told = !told.empty();
-  if (!is_told && std::filesystem::exists(about, ec))
+  const std::string inputs = inputs_of(about);
+  if (inputs == digest) return {};
+  const bool is_known = !inputs.empty();
+  if (!is_known && std::filesystem::exists(about, ec))
     return failure(ErrorKind::usage, about.string() + " was not written by sonard, and is not overwritten; choose another --out");
   const auto others = pings_in(o.folder);
   if (!others) return tl::make_unexpected(others.error());
-  if (!is_told && others->empty()) return {};
+  if (!is_known && others->empty()) return {};
   for (const path& file : *others)
-    if (!is_told && !is_sidecar(file.parent_path() / (file.filename().string().substr(0, 6) + ".json")))
+    if (!is_known && !is_sidecar(file.parent_path() / (file.filename().string().substr(0, 6) + ".json")))
       return failure(ErrorKind::usage,
                      file.string() +
                          " may not be from sonard: the folder has no render.json, and no sidecar of sonard has that "
                          "number; it is not overwritten: choose another --out");
   if (!o.overwrite)
     return failure(ErrorKind::usage, o.folder.string() +
-                                         (is_told ? " holds pings of other inputs (configuration, scene, poses or switches)"
-                                                  : " holds pings, but no render.json that identifies their inputs") +
+                                         (is_known ? " holds pings of other inputs (configuration, scene, poses or switches)"
+                                                   : " holds pings, but no render.json that identifies their inputs") +
                                          "; choose another --out, or give --overwrite to replace them");
   for (const path& file : *others)
     if (!std::filesystem::remove(file, ec) && ec)

@@ -12,6 +12,7 @@
 #include "core/paper/paper_engine.hpp"
 #include "daemon/commands/render/coverage.hpp"
 #include "daemon/commands/render/render_pings.hpp"
+#include "daemon/commands/render/snapshots.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 
@@ -19,11 +20,6 @@ namespace sonar::render {
 namespace {
 
 constexpr int not_as_expected = 1;
-
-int complain(const Error& error) {
-  std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
-  return exit_code(error.kind);
-}
 
 int threads_of(const EngineConfig& engine) {
   return engine.threads > 0 ? engine.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -43,11 +39,12 @@ class ProgressLine {
                  static_cast<double>(p.bytes) / 1e6 / taken_s);
   }
 
-  void tell(const Progress& p) {
+  void show(const Progress& p) {
     const auto now = Clock::now();
     const bool last = p.done == p.all;
-    if (quiet_ || (!last && now - told_ < (terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(1000)))) return;
-    told_ = now;
+    if (quiet_ || (!last && now - shown_ < (terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(1000))))
+      return;
+    shown_ = now;
     const double taken_s = std::chrono::duration<double>(now - begin_).count();
     const double rate = static_cast<double>(p.done - p.kept) / std::max(taken_s, 1e-3);
     std::string bar;
@@ -64,7 +61,7 @@ class ProgressLine {
  private:
   using Clock = std::chrono::steady_clock;
   bool quiet_, terminal_ = ::isatty(STDERR_FILENO) == 1;
-  Clock::time_point begin_ = Clock::now(), told_ = begin_;
+  Clock::time_point begin_ = Clock::now(), shown_ = begin_;
 };
 
 Result<motion::TrajectoryFile> poses_of(const RenderCommand& command) {
@@ -85,29 +82,31 @@ Result<RenderInput> input_of(const RenderCommand& command) {
   auto input = load_render_input(command.config, command.sonar);
   if (!input) return input;
   for (RenderJob& job : input->jobs)
-    if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return tl::make_unexpected(r.error());
+    if (const auto r = override_engine(job.config.engine, job.config.seed, command.engine); !r)
+      return tl::make_unexpected(r.error());
   if (!command.poses.empty()) {
     const auto file = poses_of(command);
     if (!file) return tl::make_unexpected(file.error());
     for (RenderJob& job : input->jobs) {  // of several bodies the vehicle's own, as where the daemon plays it
-      const auto path = path_in(*file, command.poses, file->bodies.size() > 1 ? job.vehicle_name : "");
-      if (!path) return tl::make_unexpected(path.error());
-      job.path = *path;
+      const std::string body = file->bodies.size() > 1 ? job.vehicle().name : "";
+      if (const auto r = follow(job, *file, command.poses, body); !r) return tl::make_unexpected(r.error());
     }
   }
   for (RenderJob& job : input->jobs) {
-    if (job.wants_motion || is_given_on(command.engine, &Switches::motion)) job.path.snapshots = false;
-    if (job.path.snapshots && input->notes.empty()) input->notes.push_back(note_of_snapshots(job.path));
+    if (job.wants_motion || is_given_on(command.engine, &Switches::motion)) job.snapshots = false;
+    if (job.snapshots && input->notes.empty()) input->notes.push_back(note_of_snapshots(*job.vehicle().plan.trajectory));
   }
   return input;
 }
 
 Result<Coverage> coverage_of(const RenderJob& given, Parallel& pool) {
   const RenderJob job = with_bed_only(given);
-  const auto make = [&](std::shared_ptr<const Scene> s) { return make_engine(std::move(s), pool, {.simd = job.engine.simd}); };
+  const auto make = [&](std::shared_ptr<const Scene> s) {
+    return make_engine(std::move(s), pool, {.simd = job.config.engine.simd});
+  };
   const auto engine = start_engine(make, job.scene);
   if (!engine) return tl::make_unexpected(engine.error());
-  PingRequest request = make_request(job, PingNumber{1}, Time{});
+  PingRequest request = make_request(job, world_of(job), PingNumber{1}, Time{});
   request.switches.keep_pressure = true;
   try {
     return measure_coverage(job, (*engine)->run({&request, 1}).at(0));
@@ -116,13 +115,13 @@ Result<Coverage> coverage_of(const RenderJob& given, Parallel& pool) {
   }
 }
 
-int report_coverage(const std::vector<RenderJob>& jobs) {
-  Parallel pool(threads_of(jobs.front().engine));
+Result<int> report_coverage(const std::vector<RenderJob>& jobs) {
+  Parallel pool(threads_of(jobs.front().config.engine));
   std::printf("%-32s %5s %8s %6s %9s %9s %9s %9s\n", "sonar", "beams", "range m", "rows", "bins", "within 1dB", "worst dB",
               "mean dB");
   for (const RenderJob& job : jobs) {
     const auto c = coverage_of(job, pool);
-    if (!c) return complain(c.error());
+    if (!c) return tl::make_unexpected(c.error());
     std::printf("%-32s %5d %8.2f %6d %9zu %8.3f %% %+9.2f %+9.3f\n", job.name.c_str(), job.settings.beam_count,
                 job.settings.range_m, job.settings.range_bin_count, c->bins, c->percent(), c->worst_db, c->mean_db);
     std::fflush(stdout);
@@ -130,11 +129,11 @@ int report_coverage(const std::vector<RenderJob>& jobs) {
   return 0;
 }
 
-int check(const RenderInput& input) {
+Result<int> check(const RenderInput& input) {
   if (input.jobs.front().expectations.empty())
-    return complain({ErrorKind::config, input.source + " has no expectations: there is no expect: list"});
-  const auto verdicts = check_expectations(input.source, input.jobs, threads_of(input.jobs.front().engine));
-  if (!verdicts) return complain(verdicts.error());
+    return failure(ErrorKind::config, input.source + " has no expectations: there is no expect: list");
+  const auto verdicts = check_expectations(input.source, input.jobs, threads_of(input.jobs.front().config.engine));
+  if (!verdicts) return tl::make_unexpected(verdicts.error());
   bool all_met = true;
   for (const Verdict& v : *verdicts) {
     all_met &= v.met;
@@ -144,8 +143,8 @@ int check(const RenderInput& input) {
 }
 
 /// A line each, however many steps a sweep has.
-void tell_notes(const RenderInput& input) {
-  std::set<std::string> notes{note_of_parts_left_out(input.jobs.front().engine.switches)};
+void print_notes(const RenderInput& input) {
+  std::set<std::string> notes{note_of_parts_left_out(input.jobs.front().config.engine.switches)};
   for (const RenderJob& job : input.jobs) notes.insert(note_of_range(job));
   for (const std::string& note : notes)
     if (!note.empty()) std::fprintf(stderr, "sonard: %s\n", note.c_str());
@@ -172,24 +171,25 @@ OutputOptions output_options(const RenderCommand& command) {
 
 }  // namespace
 
-int run_render(const RenderCommand& command) {
+Result<int> run_render(const RenderCommand& command) {
   if (command.config.empty()) {
     std::vector<RenderJob> jobs = shipped_sonars_over_a_bed();
     for (RenderJob& job : jobs)
-      if (const auto r = override_engine(job.engine, job.seed, command.engine); !r) return complain(r.error());
+      if (const auto r = override_engine(job.config.engine, job.config.seed, command.engine); !r)
+        return tl::make_unexpected(r.error());
     return report_coverage(jobs);
   }
   auto input = input_of(command);
-  if (!input) return complain(input.error());
+  if (!input) return tl::make_unexpected(input.error());
   if (!command.report.empty()) return report_coverage(input->jobs);
   if (command.check_expectations) return check(*input);
   if (std::string note = note_of_air(*input, output_options(command)); !note.empty()) input->notes.push_back(std::move(note));
-  if (!command.quiet) tell_notes(*input);
+  if (!command.quiet) print_notes(*input);
   for (const std::string& note : input->notes) std::fprintf(stderr, "sonard: %s\n", note.c_str());
   ProgressLine line(command.quiet);
-  Parallel pool(threads_of(input->jobs.front().engine));
-  const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.tell(p); });
-  if (!done) return complain(done.error());
+  Parallel pool(threads_of(input->jobs.front().config.engine));
+  const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.show(p); });
+  if (!done) return tl::make_unexpected(done.error());
   line.conclude(*done);
   return 0;
 }

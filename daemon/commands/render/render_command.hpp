@@ -6,7 +6,7 @@
 
 namespace sonar::render {
 
-/// The exit code: 0; 1 when an expectation is not met; else that of the error, which has been printed.
-int run_render(const RenderCommand& command);
+/// The exit code: 0, or 1 when an expectation is not met. Errors: what the input or the folder has wrong.
+Result<int> run_render(const RenderCommand& command);
 
 }  // namespace sonar::render

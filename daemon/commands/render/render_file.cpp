@@ -48,48 +48,45 @@ PingSettings plain_settings(const Water& water, double depth_m, const FrequencyM
 void read_path(const Node& node, const std::filesystem::path& folder, RenderJob& job) {
   if (!node.present()) return;
   Map keys = node.map();
-  job.path.initial = read_world_pose(keys.optional("at"));
-  job.path.orbits = keys.optional("orbit").boolean_or(false);
+  job.vehicle().initial_pose = read_world_pose(keys.optional("at"));
+  job.vehicle().orbits = keys.optional("orbit").boolean_or(false);
   const TrajectoryKeys trajectory(keys);
   if (!trajectory.file) return;
   const TrajectoryFiles::Named named = TrajectoryFiles(folder).read(trajectory);
   const std::string body = trajectory.body.text_or({}, 64);
   if (!named.file) return;
-  auto path = path_in(*named.file, named.name, body);
-  if (!path) return trajectory.file.fail(path.error().text);
-  job.path = *std::move(path);
+  if (const auto r = follow(job, *named.file, named.name, body); !r) trajectory.file.fail(r.error().text);
 }
 
-/// Needs the water and the path.
+/// Needs the water and the vehicle's poses.
 void read_sonar(const Node& node, RenderJob& job) {
   Map keys = node.map();
   const Node profile_node = keys.optional("profile"), options = keys.optional("options");
-  job.sonar_name = keys.optional("name").text_or("sonar", 64);
-  job.mount = read_mount(keys.optional("mount"));
-  const double depth_m = depth_from_z(compose(vehicle_at(job.path, Time{}), job.mount).position_m.z);
+  SonarConfig& sonar = job.sonar();
+  sonar.name = keys.optional("name").text_or("sonar", 64);
+  sonar.mount = read_mount(keys.optional("mount"));
   const Node ping = keys.optional("ping"), model_node = keys.optional("model");
-  protocol::Profile profile{nullptr, std::make_shared<const SonarModel>(plain_model())};
-  protocol::OptionValues values;
+  protocol::Profile& profile = sonar.profile = {nullptr, std::make_shared<const SonarModel>(plain_model())};
   if (profile_node.present()) {
     auto found = protocol::find_profile(profile_node.text(64));
     if (!found) return profile_node.fail(found.error().text);
     profile = *std::move(found);
-    values = read_options(options, *profile.vendor);
-    auto tuned = profile.vendor->tuned(profile.model, values);
+    sonar.options = read_options(options, *profile.vendor);
+    auto tuned = profile.vendor->tuned(profile.model, sonar.options);
     if (!tuned) return options.fail(tuned.error().text);
     profile.model = *std::move(tuned);
   } else if (options.present()) {
     return options.fail("need a profile, which is not given");
   }
-  const int first_mode = profile.vendor ? device_settings(profile, values, job.water, depth_m).mode : 0;
+  const int first_mode = profile.vendor ? device_settings(job).mode : 0;
   const int mode = read_mode(ping.map().optional("mode"), *profile.model, first_mode);
   SonarModel model = *profile.model;
   read_model(model_node.map(), model.modes[static_cast<std::size_t>(mode)]);
-  profile.model = job.model = std::make_shared<const SonarModel>(std::move(model));
-  job.settings = profile.vendor ? device_settings(profile, values, job.water, depth_m)
-                                : plain_settings(job.water, depth_m, job.model->modes.front());
+  profile.model = std::make_shared<const SonarModel>(std::move(model));
+  job.settings =
+      profile.vendor ? device_settings(job) : plain_settings(job.config.water, first_depth_m(job), profile.model->modes.front());
   job.settings.mode = mode;
-  read_ping(ping.map(), *job.model, !profile.vendor, job.settings);
+  read_ping(ping.map(), *profile.model, !profile.vendor, job.settings);
 }
 
 /// The scene's keys inline, or the name of a file. What is wrong with the scene is bad data, as where a file of its own holds it.
@@ -117,9 +114,9 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   job.values = values;
   job.name = root.optional("name").text_or(std::filesystem::path(name).stem().string(), 200);
   root.optional("about").text_or("", 4096);
-  job.water = read_water(root.optional("water"));
-  job.seed = root.optional("seed").unsigned_integer_or(1);
-  job.engine = read_engine(root.optional("engine"));
+  job.config.water = read_water(root.optional("water"));
+  job.config.seed = root.optional("seed").unsigned_integer_or(1);
+  job.config.engine = read_engine(root.optional("engine"));
   read_path(root.optional("poses"), folder, job);
   const Node scene_node = root.required("scene");
   read_sonar(root.optional("sonar"), job);
@@ -162,7 +159,7 @@ Result<std::string> text_of_file(const std::filesystem::path& file) {
 }
 
 Result<RenderInput> from_config(const std::filesystem::path& file, const std::string& text, const std::string& sonar) {
-  const auto config = parse_config(text, file.string(), file.parent_path());
+  auto config = parse_config(text, file.string(), file.parent_path());
   if (!config) return tl::make_unexpected(config.error());
   std::size_t index = 0;
   std::string names;
@@ -176,27 +173,18 @@ Result<RenderInput> from_config(const std::filesystem::path& file, const std::st
     return failure(ErrorKind::usage, "no sonar \"" + sonar + "\" in " + file.string() + "; there are " + names);
   const auto scene = load_scene(config->scene);
   if (!scene) return tl::make_unexpected(scene.error());
-  const SonarConfig& s = config->sonars[index];
-  const VehicleConfig& vehicle = config->vehicles[s.vehicle];
+  if (std::string why = why_not_movable(**scene, *config); !why.empty()) return failure(ErrorKind::config, std::move(why));
   RenderJob job;
   job.name = file.stem().string();
   job.scene = *scene;
-  job.model = s.profile.model;
-  job.sonar_name = s.name;
-  job.sonar_id = static_cast<std::uint32_t>(index);
-  job.water = config->water;
-  job.seed = config->seed;
-  job.engine = config->engine;
-  job.mount = s.mount;
-  job.vehicle_name = vehicle.name;
-  job.path = {vehicle.initial_pose, vehicle.orbits, vehicle.plan.trajectory, {}};
-  if (const std::string why = why_not_movable(*job.scene, *config); !why.empty()) return failure(ErrorKind::config, why);
-  for (const BodyStart& body : bodies_of(*job.scene, *config)) job.body_paths.push_back(body.plan.trajectory);
-  const double depth_m = depth_from_z(compose(vehicle_at(job.path, Time{}), job.mount).position_m.z);
-  job.settings = device_settings(s.profile, s.options, job.water, depth_m);
+  job.config = *std::move(config);
+  job.sonar_index = index;
+  for (VehicleConfig& v : job.config.vehicles) v.plan.rules = {};  // trajectories are in the file's own time
+  for (ObjectConfig& o : job.config.objects) o.plan.rules = {};
+  job.settings = device_settings(job);
   RenderInput input{file.string(), {}, text};
-  if (!config->scene.built_in)
-    if (const auto more = text_of_file(config->scene.path)) input.text += *more;
+  if (!job.config.scene.built_in)
+    if (const auto more = text_of_file(job.config.scene.path)) input.text += *more;
   input.jobs.push_back(std::move(job));
   return input;
 }

@@ -3,19 +3,21 @@
 #include <algorithm>
 
 #include "core/text/format.hpp"
+#include "daemon/commands/render/snapshots.hpp"
+#include "daemon/emulator/sonar/ping_request.hpp"
+#include "daemon/emulator/world/world_parts.hpp"
 
 namespace sonar::render {
 
-PingSettings device_settings(const protocol::Profile& profile, const protocol::OptionValues& options, const Water& water,
-                             double depth_m) {
-  protocol::DeviceState device;
-  device.name = profile.model->name;
-  device.id = 1;
-  device.model = profile.model;
-  device.water = water;
-  device.depth_m = depth_m;
-  device.options = options;
-  return profile.vendor->initial_settings(device).settings;
+double first_depth_m(const RenderJob& job) {
+  const World vehicles(pose_rules(job.config), vehicles_of(job.config), {}, job.begins_at);
+  return depth_from_z(compose(vehicles.vehicle_at(job.sonar().vehicle, Time{}), job.sonar().mount).position_m.z);
+}
+
+PingSettings device_settings(const RenderJob& job) {
+  protocol::DeviceState device = device_state(job.sonar(), job.config, Time{});
+  device.depth_m = first_depth_m(job);
+  return job.sonar().profile.vendor->initial_settings(device).settings;
 }
 
 std::string note_of_range(const RenderJob& job) {
@@ -24,26 +26,38 @@ std::string note_of_range(const RenderJob& job) {
   const double range_m = job.settings.range_m;
   if (range_m >= least_m / rounding && range_m <= most_m * rounding) return {};
   return text::format("range %g m: %s in mode %s takes %g to %g m; rendered all the same, where the device would use %g m",
-                      range_m, job.model->name.c_str(), job.mode().name.c_str(), least_m, most_m,
+                      range_m, job.model().name.c_str(), job.mode().name.c_str(), least_m, most_m,
                       std::clamp(range_m, least_m, most_m));
 }
 
-PingRequest make_request(const RenderJob& job, PingNumber number, Time at) {
-  PingRequest request;
-  request.model = job.model;
+Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const std::string& name, const std::string& body) {
+  auto trajectory = motion::trajectory_of(file, name, body);
+  if (!trajectory) return tl::make_unexpected(trajectory.error());
+  job.snapshots = are_snapshots(**trajectory);
+  job.begins_at = Time{} + file.begins_at;
+  job.vehicle() = {.name = job.vehicle().name, .initial_pose = {}, .plan = {.trajectory = *std::move(trajectory)}};
+  return {};
+}
+
+std::vector<Time> pose_times(const RenderJob& job) {
+  std::vector<Time> times;
+  if (const motion::Plan& plan = job.vehicle().plan)
+    for (const motion::Ns at : plan.trajectory->points().times) times.push_back(job.begins_at + at);
+  return times;
+}
+
+World world_of(const RenderJob& job) {
+  return World(pose_rules(job.config), vehicles_of(job.config), bodies_of(*job.scene, job.config), job.begins_at);
+}
+
+PingRequest make_request(const RenderJob& job, const World& world, PingNumber number, Time at) {
+  const SonarConfig& sonar = job.sonar();
+  PingRequest request = ping_request(job.config, world, sonar.vehicle, sonar.mount, at);
+  if (job.snapshots) request.sonar_moves = {};
+  request.model = sonar.profile.model;
   request.number = number;
-  request.fired_at = at;
-  request.vehicle_in_world = vehicle_at(job.path, at);
-  request.sonar_in_world = compose(request.vehicle_in_world, job.mount);
-  request.sonar_moves = sonar_twist_at(job.path, job.mount, at);
-  request.bodies_in_world = job.scene->bodies_in_world;
-  for (std::size_t i = 0; i < job.body_paths.size(); ++i)
-    if (job.body_paths[i]) request.bodies_in_world.at(i) = job.body_paths[i]->at(at - job.path.begins_at).body_in_world;
-  request.water = job.water;
   request.settings = job.settings;
-  request.sonar_id = job.sonar_id;
-  request.seed = Seed{job.seed};
-  request.switches = job.engine.switches;
+  request.sonar_id = static_cast<std::uint32_t>(job.sonar_index);
   return request;
 }
 

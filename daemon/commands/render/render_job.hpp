@@ -8,35 +8,40 @@
 #include <string>
 #include <vector>
 
+#include "core/motion/trajectory_file.hpp"
 #include "core/scene/scene.hpp"
 #include "core/sonar/ping.hpp"
 #include "daemon/commands/render/expectation.hpp"
 #include "daemon/commands/render/formula.hpp"
-#include "daemon/commands/render/vehicle_path.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/emulator/world/world.hpp"
 
 namespace sonar::render {
 
 struct RenderJob {
+  /// One sonar, without a product, at rest on one vehicle.
+  RenderJob() {
+    config.vehicles.resize(1);
+    config.sonars.resize(1);
+  }
+
   std::string name;
   std::shared_ptr<const Scene> scene;
-  std::shared_ptr<const SonarModel> model;
-  std::string sonar_name;
-  std::uint32_t sonar_id = 0;  // keys the noise, as in the daemon
+  Config config;                // a render file's has its one sonar and vehicle, water, seed and engine
+  std::size_t sonar_index = 0;  // in config.sonars; keys the noise, as in the daemon
   PingSettings settings;
-  Water water;
-  std::uint64_t seed = 1;
-  EngineConfig engine;
-  Pose mount;                // sonar in vehicle
-  std::string vehicle_name;  // of a configuration; empty in render files
-  VehiclePath path;
+  Time begins_at{};           // the time stamp at which trajectories begin
+  bool snapshots = false;     // the vehicle's poses are unrelated: the sonar rests within each ping
   bool wants_motion = false;  // engine.motion: on is written in the file
-  /// Of the scene's moving objects, in its order, on the same clock; null or not there: it rests.
-  std::vector<std::shared_ptr<const motion::Trajectory>> body_paths;
-  Values values;  // what the sweep set, and what `let` made of it
+  Values values;              // what the sweep set, and what `let` made of it
   std::vector<Expectation> expectations;
 
-  const FrequencyMode& mode() const { return model->modes[static_cast<std::size_t>(settings.mode)]; }
+  SonarConfig& sonar() { return config.sonars.at(sonar_index); }
+  const SonarConfig& sonar() const { return config.sonars.at(sonar_index); }
+  VehicleConfig& vehicle() { return config.vehicles.at(sonar().vehicle); }
+  const VehicleConfig& vehicle() const { return config.vehicles.at(sonar().vehicle); }
+  const SonarModel& model() const { return *sonar().profile.model; }
+  const FrequencyMode& mode() const { return model().modes[static_cast<std::size_t>(settings.mode)]; }
 };
 
 struct RenderInput {
@@ -54,11 +59,20 @@ Result<RenderInput> parse_render_file(std::string_view text, const std::string& 
 /// A sentence when the product cannot be set to the range, which is rendered all the same; else empty.
 std::string note_of_range(const RenderJob& job);
 
-/// Everything a ping of the job depends on.
-PingRequest make_request(const RenderJob& job, PingNumber number, Time at);
+/// The vehicle follows its trajectory in a file, in the file's own time; an empty name: of the only body in it. Errors:
+/// name:line: what.
+Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const std::string& name, const std::string& body);
+/// Times of the poses of the vehicle's trajectory; empty without one.
+std::vector<Time> pose_times(const RenderJob& job);
 
-/// The settings a device of that profile starts with.
-PingSettings device_settings(const protocol::Profile& profile, const protocol::OptionValues& options, const Water& water,
-                             double depth_m);
+/// The vehicles and moving objects of the job, as the daemon has them.
+World world_of(const RenderJob& job);
+/// Everything a ping of the job depends on. `world` = world_of(job).
+PingRequest make_request(const RenderJob& job, const World& world, PingNumber number, Time at);
+
+/// Of the sonar at time 0 [m], before there is a scene.
+double first_depth_m(const RenderJob& job);
+/// The settings that the sonar, which has a vendor, starts with at that depth.
+PingSettings device_settings(const RenderJob& job);
 
 }  // namespace sonar::render

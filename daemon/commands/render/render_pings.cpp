@@ -113,10 +113,18 @@ Result<void> render_batch(const RenderJob& job, PingEngine& engine, const Output
   return {};
 }
 
+Result<std::unique_ptr<PingEngine>> engine_for(const RenderJob& job, Parallel& pool) {
+  const auto make = [&](std::shared_ptr<const Scene> s) {
+    return choose_engine(job.config.engine.device, std::move(s), pool, {.simd = job.config.engine.simd},
+                         [](const std::string& what) { std::fprintf(stderr, "sonard: %s\n", what.c_str()); });
+  };
+  return start_engine(make, job.scene);
+}
+
 }  // namespace
 
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& o) {
-  const std::vector<Time> lines = times_of(job.path);
+  const std::vector<Time> lines = pose_times(job);
   const std::uint64_t before = o.first - 1;
   // How many pings there are from the first wanted on, of the `all` pings that the poses cover.
   const auto count_of = [&](std::uint64_t all, const char* how) -> Result<std::uint64_t> {
@@ -152,7 +160,10 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
     const auto times = firing_times(job, o);
     if (!times) return {};
     all += times->size();
-    for (const Time at : *times) in_air += is_in_air(compose(vehicle_at(job.path, at), job.mount), *job.scene) ? 1 : 0;
+    const World world = world_of(job);
+    const SonarConfig& sonar = job.sonar();
+    for (const Time at : *times)
+      in_air += is_in_air(compose(world.vehicle_at(sonar.vehicle, at), sonar.mount), *job.scene) ? 1 : 0;
   }
   if (in_air == 0) return {};
   return text::format(
@@ -163,7 +174,7 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
 }
 
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, Parallel& pool,
-                              const std::function<void(const Progress&)>& told) {
+                              const std::function<void(const Progress&)>& on_progress) {
   if (o.first > 1 && input.jobs.size() > 1)
     return failure(ErrorKind::usage,
                    "--first: " + input.source + " sweeps values, and its pings are counted through all steps; leave it out");
@@ -179,6 +190,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
   if (!folder) return tl::make_unexpected(folder.error());
   for (std::size_t j = 0; j < input.jobs.size(); ++j) {
     const RenderJob& job = input.jobs[j];
+    const World world = world_of(job);
     std::unique_ptr<PingEngine> engine;  // not before it is needed: a finished folder costs no scene
     std::vector<MadePing> batch;
     for (std::size_t i = 0; i < times[j].size(); ++i) {
@@ -187,7 +199,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
       if (!is_there) {
         MadePing& made = batch.emplace_back();
         made.number = number;
-        made.request = make_request(job, PingNumber{static_cast<std::uint32_t>(number)}, times[j][i]);
+        made.request = make_request(job, world, PingNumber{static_cast<std::uint32_t>(number)}, times[j][i]);
         made.request.switches.keep_pressure = o.npy;
         made.request.switches.keep_beams = o.complex;
         made.request.switches.keep_truth = true;
@@ -195,11 +207,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
       const bool full = batch.size() >= static_cast<std::size_t>(o.batch) || i + 1 == times[j].size() || is_there;
       if (full && !batch.empty()) {
         if (!engine) {
-          const auto make = [&](std::shared_ptr<const Scene> s) {
-            return choose_engine(job.engine.device, std::move(s), pool, {.simd = job.engine.simd},
-                                 [](const std::string& what) { std::fprintf(stderr, "sonard: %s\n", what.c_str()); });
-          };
-          auto started = start_engine(make, job.scene);
+          auto started = engine_for(job, pool);
           if (!started) return tl::make_unexpected(started.error());
           engine = *std::move(started);
         }
@@ -213,12 +221,12 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
           return failure(ErrorKind::unavailable, gone.what());
         }
         progress.done += made;
-        told(progress);
+        on_progress(progress);
       }
       if (is_there) {
         ++progress.kept;
         ++progress.done;
-        told(progress);
+        on_progress(progress);
       }
     }
   }

@@ -23,8 +23,8 @@ Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions
 /// One sentence when the sonar is above the sea surface in some of them; else empty, and where the times are refused.
 std::string note_of_air(const RenderInput& input, const OutputOptions& options);
 
-/// Calls `told` after every ping, in order. Errors: io; requests that the engine rejects.
+/// Calls `on_progress` after every ping, in order. Errors: io; requests that the engine rejects.
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& options, Parallel& pool,
-                              const std::function<void(const Progress&)>& told);
+                              const std::function<void(const Progress&)>& on_progress);
 
 }  // namespace sonar::render

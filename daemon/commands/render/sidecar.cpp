@@ -6,6 +6,7 @@
 #include "core/pipeline/water_line.hpp"
 #include "daemon/commands/render/sonar_version.hpp"
 #include "daemon/config/effective_switches.hpp"
+#include "daemon/emulator/world/world_parts.hpp"
 #include "daemon/server/system/sha256.hpp"
 
 namespace sonar::render {
@@ -149,7 +150,7 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
           {"scene", job.scene->name},
           {"sweep", job.values},
           {"sonar", json_of(*r.model, mode)},
-          {"sonar_name", job.sonar_name},
+          {"sonar_name", job.sonar().name},
           {"settings", json_of(s)},
           {"row_0_m", s.row_centre * s.range_bin_m},
           {"row_spacing_m", s.range_bin_m},
@@ -180,16 +181,18 @@ std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictu
   add(hash, {version, input.text, rate_hz});
   if (plain_pictures) add(hash, "plain pictures");
   for (const RenderJob& job : input.jobs) {
-    add(hash, json_of(*job.model, job.mode()));
+    add(hash, json_of(job.model(), job.mode()));
     hash.add(std::as_bytes(std::span(job.mode().waveform.samples)));
-    add(hash, {json_of(job.settings), json_of(job.water), json_of(job.engine.switches), job.seed, job.sonar_id, job.values,
-               static_cast<int>(job.engine.simd) + 16 * static_cast<int>(job.engine.device), json_of(job.mount),
-               json_of(job.path.initial), job.path.orbits});
-    add_way(hash, job.path.trajectory, job.path.begins_at);
-    if (job.path.snapshots) add(hash, "snapshots");
-    for (std::size_t i = 0; i < job.body_paths.size(); ++i) {
-      if (job.body_paths[i]) add(hash, i);
-      add_way(hash, job.body_paths[i], job.path.begins_at);
+    add(hash,
+        {json_of(job.settings), json_of(job.config.water), json_of(job.config.engine.switches), job.config.seed, job.sonar_index,
+         job.values, static_cast<int>(job.config.engine.simd) + 16 * static_cast<int>(job.config.engine.device),
+         json_of(job.sonar().mount), json_of(job.vehicle().initial_pose), job.vehicle().orbits});
+    add_way(hash, job.vehicle().plan.trajectory, job.begins_at);
+    if (job.snapshots) add(hash, "snapshots");
+    const std::vector<BodyStart> bodies = bodies_of(*job.scene, job.config);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (bodies[i].plan) add(hash, i);
+      add_way(hash, bodies[i].plan.trajectory, job.begins_at);
     }
     add_scene(hash, *job.scene);
   }

@@ -115,8 +115,8 @@ asio::awaitable<void> ReplayServer::accept() {
     client->name = peer.address().to_string() + ":" + std::to_string(peer.port());
     if (client_) {
       ++figures_.turned_away;
-      say_at_times(log_, turned_away_limit_, LogLevel::info, "client turned away: another one is being served",
-                   {{"client", client->name}});
+      log_limited(log_, turned_away_limit_, LogLevel::info, "client turned away: another one is being served",
+                  {{"client", client->name}});
       continue;  // closes it
     }
     client->ip = peer.address().to_v4().to_bytes();
@@ -142,7 +142,7 @@ asio::awaitable<void> ReplayServer::serve(ClientPointer client) {
     pace.begin_again();
     if (played == Played::to_the_end) ++figures_.times_through;
   } while (played == Played::to_the_end && options_.loop && !stopping_);
-  if (played != Played::left) co_await say_goodbye(client);
+  if (played != Played::left) co_await close_stream(client);
   error_code ec;
   client->socket.close(ec);
   client_.reset();
@@ -174,27 +174,27 @@ asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, R
     figures_.bytes += message->bytes.size();
     any = true;
   }
-  if (const auto damage = reader_.damage(); damage && !std::exchange(damage_told_, true)) log_.warning(damage->text);
+  if (const auto damage = reader_.damage(); damage && !std::exchange(damage_logged_, true)) log_.warning(damage->text);
   co_return any ? Played::to_the_end : Played::left;
 }
 
 /// What a client says changes nothing; it is read so that the client can go on saying it.
 asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
   std::array<std::byte, 4096> ignored;
-  bool told = false;
+  bool logged = false;
   while (true) {
     error_code ec;
     const std::size_t n = co_await client->socket.async_read_some(asio::buffer(ignored), into(ec));
     if (ec) break;
     figures_.client_bytes += n;
-    if (!std::exchange(told, true)) log_.info("settings of a client have no effect on a recording", {{"client", client->name}});
+    if (!std::exchange(logged, true)) log_.info("settings of a client have no effect on a recording", {{"client", client->name}});
   }
   client->gone = true;
   client->wake.cancel();
 }
 
 /// The end of our stream; then the client's, so that none of our last bytes is lost to a reset.
-asio::awaitable<void> ReplayServer::say_goodbye(ClientPointer client) {
+asio::awaitable<void> ReplayServer::close_stream(ClientPointer client) {
   error_code ec;
   client->socket.shutdown(tcp::socket::shutdown_send, ec);
   client->wake.expires_after(goodbye_limit);
@@ -202,14 +202,14 @@ asio::awaitable<void> ReplayServer::say_goodbye(ClientPointer client) {
 }
 
 asio::awaitable<void> ReplayServer::send_status() {
-  bool told = false;
+  bool logged = false;
   while (!over_) {
     const protocol::Bytes status = device_.status_at(at_.ip, mask_, client_ ? client_->ip : Ipv4{});
     error_code ec;
     for (const udp::endpoint& to : status_to_) {
       co_await status_.async_send_to(asio::buffer(status), to, into(ec));
       if (over_) co_return;
-      if (ec && !std::exchange(told, true))
+      if (ec && !std::exchange(logged, true))
         log_.warning("cannot send status: " + ec.message(), {{"to", to.address().to_string()}});
     }
     status_timer_.expires_after(status_period);

@@ -59,7 +59,7 @@ class ReplayServer {
   asio::awaitable<void> serve(ClientPointer client);
   asio::awaitable<Played> play(ClientPointer client, ReplayPace& pace);
   asio::awaitable<void> listen_to(ClientPointer client);
-  asio::awaitable<void> say_goodbye(ClientPointer client);
+  asio::awaitable<void> close_stream(ClientPointer client);
   asio::awaitable<void> send_status();
   asio::awaitable<void> watch_signals();
   template <class Coroutine>
@@ -82,7 +82,7 @@ class ReplayServer {
   LogLimiter turned_away_limit_;
   Figures figures_;
   Result<void> outcome_;
-  bool stopping_ = false, over_ = false, damage_told_ = false;
+  bool stopping_ = false, over_ = false, damage_logged_ = false;
 };
 
 }  // namespace sonar

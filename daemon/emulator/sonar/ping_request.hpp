@@ -1,4 +1,5 @@
-// The part of a ping request that a configuration and the world determine: poses, motion, water, switches.
+// The part of a ping request that a configuration and the world determine: poses, motion, water, switches. Used by the emulated
+// sonar, by `sonard render` and by the benchmark.
 #pragma once
 
 #include "daemon/config/config.hpp"

@@ -59,19 +59,20 @@ std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around)
   return lowest;
 }
 
-enum class Place { fine, above_water, below_ground, far_away };
-Place judge_place(Vec3d sonar_m, const Surroundings& around) {
+enum class Location { fine, above_water, below_ground, far_away };
+Location judge_location(Vec3d sonar_m, const Surroundings& around) {
   const Extent& scene = around.scene;
   const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // then the scene is what is wrong
-  if (sonar_m.z > least_depth_m && !lies_above) return Place::above_water;
-  if (const auto ground_m = lowest_ground_m(sonar_m, around); ground_m && sonar_m.z < *ground_m) return Place::below_ground;
-  return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Place::far_away : Place::fine;
+  if (sonar_m.z > least_depth_m && !lies_above) return Location::above_water;
+  if (const auto ground_m = lowest_ground_m(sonar_m, around); ground_m && sonar_m.z < *ground_m) return Location::below_ground;
+  return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Location::far_away : Location::fine;
 }
 
 /// Of the first sonar of a carrier that is at no good place.
 std::optional<Vec3d> doubtful_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
   for (const Pose& mount : carrier.mounts)
-    if (const Vec3d at_m = compose(vehicle_in_world, mount).position_m; judge_place(at_m, around) != Place::fine) return at_m;
+    if (const Vec3d at_m = compose(vehicle_in_world, mount).position_m; judge_location(at_m, around) != Location::fine)
+      return at_m;
   return std::nullopt;
 }
 
@@ -79,10 +80,10 @@ std::optional<Doubt> doubt_of_place(const Carrier& carrier, const Pose& vehicle_
   const auto sonar_m = doubtful_place(carrier, vehicle_in_world, around);
   if (!sonar_m) return std::nullopt;
   const std::string subject = "the sonar of " + carrier.vehicle;
-  const Place place = judge_place(*sonar_m, around);
-  if (place == Place::above_water)
+  const Location location = judge_location(*sonar_m, around);
+  if (location == Location::above_water)
     return Doubt{subject + format(" is %.1f m above the water's surface (z = 0)", sonar_m->z), surface_cure};
-  if (place == Place::below_ground) {
+  if (location == Location::below_ground) {
     const double ground_m = lowest_ground_m(*sonar_m, around).value_or(0);
     return Doubt{subject + format(" is %.1f m below the lowest point of the ground (z = %.1f)", ground_m - sonar_m->z, ground_m),
                  depth_cure};

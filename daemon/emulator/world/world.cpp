@@ -95,6 +95,32 @@ bool World::over_rate(Track& track, Time now) const {
   return false;
 }
 
+std::string World::why_bad_time(const PoseSample& sample, Time at, Time now) const {
+  if (has_shared_clock(sample) && (at > now + future_allowed || at < now - rules_.stale_after - future_allowed))
+    return "WALL time stamp is " + std::to_string(seconds(at - now)) +
+           " s from this computer's clock: synchronise the clocks, or send SIM or ARRIVAL time";
+  if (rules_.follows && sample.of == PoseSample::Of::vehicle && sample.stamp.domain == ClockDomain::arrival)
+    return "it has no time stamp, and with clock: follow time is what poses say: send SIM or WALL time";
+  return {};
+}
+
+bool World::is_next(Track& track, const PoseSample& sample, Time at, PoseOutcome& out) {
+  const bool seq_is_old = sample.seq != 0 && track.seq != 0 && sample.seq <= track.seq;
+  if (seq_is_old || at < track.history.newest().at) {
+    ++counters_.late;
+    out.verdict = PoseVerdict::late;
+    out.refusal = "pose came out of order";
+    return false;
+  }
+  if (at == track.history.newest().at) ++counters_.replaced;
+  if (length(sample.pose.position_m - track.history.newest().pose.position_m) > rules_.max_jump_m) {
+    ++counters_.jumps;
+    out.notice = "pose of " + track.body.name + " jumped further than max_jump_m: history cleared";
+    track.history.clear();
+  }
+  return true;
+}
+
 PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time now) {
   PoseOutcome out;
   Track* const found = find(sample.of, sample.name, out.refusal);
@@ -104,46 +130,25 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
     return out;
   }
   Track& track = *found;
-  const bool shared_clock = sample.stamp.domain == ClockDomain::wall && !rules_.stepped;
   const Time at = sample.stamp.domain == ClockDomain::arrival ? now : Time(Ns(sample.stamp.ns));
-  if (shared_clock && (at > now + future_allowed || at < now - rules_.stale_after - future_allowed)) {
+  out.refusal = why_bad_time(sample, at, now);
+  if (!out.refusal.empty()) {
     ++counters_.refused;
     out.verdict = PoseVerdict::bad_time;
-    out.refusal = "WALL time stamp is " + std::to_string(seconds(at - now)) +
-                  " s from this computer's clock: synchronise the clocks, or send SIM or ARRIVAL time";
     return out;
   }
 
-  if (rules_.follows && sample.of == PoseSample::Of::vehicle && sample.stamp.domain == ClockDomain::arrival) {
-    ++counters_.refused;
-    out.verdict = PoseVerdict::bad_time;
-    out.refusal = "it has no time stamp, and with clock: follow time is what poses say: send SIM or WALL time";
-    return out;
-  }
-
-  const bool same_history = continues(track, sample, sender, at, now);
-  const bool reset = same_history && sample.reset_counter != track.reset_counter;
-  if (same_history && !reset) {
-    const bool seq_is_old = sample.seq != 0 && track.seq != 0 && sample.seq <= track.seq;
-    if (seq_is_old || at < track.history.newest().at) {
-      ++counters_.late;
-      out.verdict = PoseVerdict::late;
-      out.refusal = "pose came out of order";
-      return out;
-    }
-    if (at == track.history.newest().at) ++counters_.replaced;
-    if (length(sample.pose.position_m - track.history.newest().pose.position_m) > rules_.max_jump_m) {
-      ++counters_.jumps;
-      out.notice = "pose of " + track.body.name + " jumped further than max_jump_m: history cleared";
-      track.history.clear();
-    }
-  } else {
-    ++(reset ? counters_.resets : counters_.histories);
+  const bool is_known = continues(track, sample, sender, at, now);
+  const bool goes_on = is_known && sample.reset_counter == track.reset_counter;
+  if (!goes_on) {
+    ++(is_known ? counters_.resets : counters_.histories);
     track.history.clear();
+  } else if (!is_next(track, sample, at, out)) {
+    return out;
   }
 
-  const bool own_clock = !shared_clock && sample.stamp.domain != ClockDomain::arrival;
-  const Ns offset = own_clock ? offset_for(track, at, now, same_history && !reset) : Ns(0);
+  const bool own_clock = !has_shared_clock(sample) && sample.stamp.domain != ClockDomain::arrival;
+  const Ns offset = own_clock ? offset_for(track, at, now, goes_on) : Ns(0);
   const bool vehicle = sample.of == PoseSample::Of::vehicle;  // other bodies may come seldom
   if (rules_.follows && vehicle && offset != track.offset && track.sender_id == sender.id)
     out.notice = "stamps of " + track.body.name + " do not go on from where they were: taken as the next moments of our time";
@@ -157,6 +162,11 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
     out.notice = "poses of " + track.body.name + " are back";
   }
   if (!out.notice.empty()) out.body = track.body.name;
+  keep(track, sample, sender, at, now);
+  return out;
+}
+
+void World::keep(Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) {
   track.source = sender.source;
   track.sender_id = sender.id;
   track.seq = sample.seq;
@@ -174,7 +184,6 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
     track.history.put(kept);
   }
   ++counters_.accepted;
-  return out;
 }
 
 void World::show_again() {

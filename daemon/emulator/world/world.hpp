@@ -135,7 +135,16 @@ class World {
 
   std::vector<Track> taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const;
   Track* find(control::PoseSample::Of kind, const std::string& name, std::string& refusal);
+  /// WALL stamps in real time are of the clock that all share.
+  bool has_shared_clock(const control::PoseSample& sample) const {
+    return sample.stamp.domain == control::ClockDomain::wall && !rules_.stepped;
+  }
+  /// Empty, or one sentence about a time stamp that cannot be accepted.
+  std::string why_bad_time(const control::PoseSample& sample, Time at, Time now) const;
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now) const;
+  /// Of a pose that continues the history: refuses late ones, and clears the history at a jump.
+  bool is_next(Track& track, const control::PoseSample& sample, Time at, PoseOutcome& out);
+  void keep(Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now);
   /// How far our time is ahead of the sender's, who stamped a pose with `at`.
   Ns offset_for(const Track& track, Time at, Time now, bool goes_on);
   Ns followed_offset_for(const Track& track, Time at, Time now);

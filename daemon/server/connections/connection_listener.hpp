@@ -69,9 +69,9 @@ class ConnectionListener {
   }
   bool make_room(ConnectionSlots<Connection>& slots, const Sender& sender) {
     const bool room = slots.make_room([this](const Connection& evicted) {
-      say_at_times(services_.log, services_.notices, LogLevel::info,
-                   services_.server + " connection closed: longest idle, and its slot was needed",
-                   {{"from", evicted.sender().id}});
+      log_limited(services_.log, services_.notices, LogLevel::info,
+                  services_.server + " connection closed: longest idle, and its slot was needed",
+                  {{"from", evicted.sender().id}});
     });
     if (!room) log_refusal(services_, "all " + std::to_string(slots.most()) + " connection slots are in use", sender.id);
     return room;

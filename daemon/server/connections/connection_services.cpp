@@ -3,11 +3,11 @@
 namespace sonar {
 
 void log_refusal(ConnectionServices& services, const std::string& why, const std::string& from) {
-  say_at_times(services.log, services.refusals, LogLevel::warning, services.server + " refused: " + why, {{"from", from}});
+  log_limited(services.log, services.refusals, LogLevel::warning, services.server + " refused: " + why, {{"from", from}});
 }
 
 void log_fault(ConnectionServices& services, const std::string& fault, const std::string& at) {
-  say_fault(services.log, services.faults, fault, {"at", at});
+  log_fault(services.log, services.faults, fault, {"at", at});
 }
 
 asio::awaitable<bool> write_whole(ConnectionServices& services, tcp::socket& socket, Deadline& stall, const Sender& to,

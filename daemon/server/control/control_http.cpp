@@ -36,9 +36,9 @@ HttpAnswer ControlHttp::refusal(const HttpRefusal& refusal) const {
 }
 
 HttpAnswer ControlHttp::health(bool with_text) const {
-  const std::string trouble = targets_.operations.trouble();
-  if (trouble.empty()) return {200, "ok\n", "text/plain"};
-  return {503, (with_text ? trouble : "unhealthy") + "\n", "text/plain"};
+  const std::string problem = targets_.operations.problem();
+  if (problem.empty()) return {200, "ok\n", "text/plain"};
+  return {503, (with_text ? problem : "unhealthy") + "\n", "text/plain"};
 }
 
 /// The result may arrive at once, after minutes, or after the time limit.

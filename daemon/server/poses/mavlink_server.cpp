@@ -83,8 +83,8 @@ Endpoint MavlinkServer::listens_at(std::size_t link) const {
   return link < links_.size() ? std::next(links_.begin(), static_cast<std::ptrdiff_t>(link))->config.at : Endpoint{};
 }
 
-void MavlinkServer::say_fault(const std::exception_ptr& fault, const Link& link) {
-  sonar::say_fault(log_, faults_, text_of(fault), {"at", link.name});
+void MavlinkServer::log_fault(const std::exception_ptr& fault, const Link& link) {
+  sonar::log_fault(log_, faults_, text_of(fault), {"at", link.name});
 }
 
 /// A link outlives whatever one datagram does to us.
@@ -93,7 +93,7 @@ void MavlinkServer::keep_receiving(Link& link) {
       io_, [this, &link] { return receive(link); },
       [this, &link](std::exception_ptr fault) {
         if (!fault || stopping_) return;
-        say_fault(fault, link);
+        log_fault(fault, link);
         keep_receiving(link);
       });
 }
@@ -102,7 +102,7 @@ void MavlinkServer::keep_ticking(Link& link) {
       io_, [this, &link] { return tick(link); },
       [this, &link](std::exception_ptr fault) {
         if (!fault || stopping_) return;
-        say_fault(fault, link);
+        log_fault(fault, link);
         keep_ticking(link);
       });
 }
@@ -151,7 +151,7 @@ void MavlinkServer::act_on(Link& link, const mavlink::Reaction& reaction, const 
     const std::string source = link.name + " " + pose.source;  // a router may send from any port: the link is the sender
     intake_.take(pose.sample, {source, source});
   }
-  for (const std::string& notice : reaction.notices) say_at_times(log_, link.notices, LogLevel::info, link.name + ": " + notice);
+  for (const std::string& notice : reaction.notices) log_limited(log_, link.notices, LogLevel::info, link.name + ": " + notice);
   error_code ignored;
   if (link.peer)
     for (const mavlink::Bytes& reply : reaction.replies) link.socket.send_to(asio::buffer(reply), *link.peer, 0, ignored);

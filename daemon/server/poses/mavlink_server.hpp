@@ -49,7 +49,7 @@ class MavlinkServer {
   void on_datagram(Link& link, mavlink::BytesView bytes, const udp::endpoint& from);
   void act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from);
   bool is_allowed(const Link& link, const asio::ip::address& from) const;
-  void say_fault(const std::exception_ptr& fault, const Link& link);
+  void log_fault(const std::exception_ptr& fault, const Link& link);
 
   asio::io_context& io_;
   const Config& config_;

@@ -1,17 +1,19 @@
 #include "daemon/server/poses/pose_intake.hpp"
 
+#include <utility>
+
 namespace sonar {
 namespace {
 constexpr auto wall_tolerance = std::chrono::milliseconds(1);
 }
 
-void PoseIntake::say_refusal(const std::string& why, const Sender& sender) {
-  say_at_times(log_, refusals_, LogLevel::warning, "pose refused: " + why, {{"from", sender.id}});
+void PoseIntake::log_refusal(const std::string& why, const Sender& sender) {
+  log_limited(log_, refusals_, LogLevel::warning, "pose refused: " + why, {{"from", sender.id}});
 }
 
 void PoseIntake::refuse(const std::string& why, const Sender& sender) {
   world_.count_refused();
-  say_refusal(why, sender);
+  log_refusal(why, sender);
 }
 
 /// WALL stamps are of the clocks as they are now, also when ours has been set since the start; the World has a time of its
@@ -26,14 +28,39 @@ void PoseIntake::map_wall(control::Stamp& stamp) {
 std::string PoseIntake::take(control::PoseSample sample, const Sender& sender) {
   map_wall(sample.stamp);
   const PoseOutcome outcome = world_.accept(sample, sender, clock_.now());
-  if (!outcome.refusal.empty() && outcome.verdict != PoseVerdict::late) say_refusal(outcome.refusal, sender);
-  if (!outcome.notice.empty() && events_ != nullptr && events_->heard())
-    events_->tell({control::PoseEvent{outcome.body, false, outcome.notice}});
-  if (!outcome.notice.empty()) say_at_times(log_, notices_, LogLevel::info, outcome.notice);
+  if (!outcome.refusal.empty() && outcome.verdict != PoseVerdict::late) log_refusal(outcome.refusal, sender);
+  if (!outcome.notice.empty() && events_ != nullptr && events_->has_listeners())
+    events_->publish({control::PoseEvent{outcome.body, false, outcome.notice}});
+  if (!outcome.notice.empty()) log_limited(log_, notices_, LogLevel::info, outcome.notice);
   if (plausibility_ != nullptr && outcome.verdict == PoseVerdict::accepted && sample.of == control::PoseSample::Of::vehicle)
     for (const Note& note : plausibility_->use(sample)) log_.warning(text_of(note), {{"from", sender.id}});
   on_pose_();
   return outcome.refusal;
+}
+
+std::string PoseIntake::place(const control::SetObject& asked, std::size_t body, const Sender& sender) {
+  const bool hidden = !asked.visible.value_or(!world_.is_hidden(body));
+  if (asked.in_world) {
+    control::PoseSample sample;
+    sample.of = control::PoseSample::Of::object;
+    sample.name = asked.object;
+    sample.pose = *asked.in_world;
+    sample.velocity_mps = sample.angular_velocity_radps = Vec3d{};  // it is put there: that is no movement to carry on
+    sample.reset_counter = ++placements_;
+    if (std::string refusal = take(std::move(sample), sender); !refusal.empty()) return refusal;
+  }
+  world_.hide(body, hidden);
+  return {};
+}
+
+std::string PoseIntake::steer(const control::SetTrajectory& asked, const Sender& sender) {
+  if (std::string why = world_.steer(asked, clock_.now()); !why.empty()) return why;
+  std::string text = "trajectory" + (asked.name.empty() ? std::string() : " of " + asked.name) + ":";
+  if (asked.position_s) text += " at " + std::to_string(*asked.position_s) + " s";
+  if (asked.speed) text += " speed " + std::to_string(*asked.speed);
+  if (asked.paused) text += *asked.paused ? " paused" : " playing";
+  log_.info(text, {{"client", sender.id}});
+  return {};
 }
 
 }  // namespace sonar

@@ -1,5 +1,6 @@
-// Where every pose goes in, whatever road it came by: its wall time is mapped to ours, the world judges it, the log hears of it.
-// PoseServer's datagrams and lines end here, and the poses that clients of the control servers send.
+// Where all that moves bodies enters, whatever way it came: poses, and requests to place objects and to steer trajectories. Wall
+// time is mapped to ours, the world judges, refusals are logged. PoseServer's datagrams and lines end here, and what clients of
+// the control servers send.
 #pragma once
 
 #include <chrono>
@@ -22,12 +23,16 @@ class PoseIntake {
 
   /// The refusal's sentence, or empty.
   std::string take(control::PoseSample sample, const Sender& sender);
+  /// Places, shows or hides a moving object of the scene, body `body` of the world. The refusal's sentence, or empty.
+  std::string place(const control::SetObject& asked, std::size_t body, const Sender& sender);
+  /// Pauses, seeks or plays a trajectory. The refusal's sentence, or empty.
+  std::string steer(const control::SetTrajectory& asked, const Sender& sender);
   /// Of what should have been a pose.
   void refuse(const std::string& why, const Sender& sender);
 
  private:
   void map_wall(control::Stamp& stamp);
-  void say_refusal(const std::string& why, const Sender& sender);
+  void log_refusal(const std::string& why, const Sender& sender);
 
   World& world_;
   const Clock& clock_;
@@ -36,6 +41,7 @@ class PoseIntake {
   Events* events_;
   Plausibility* plausibility_;
   LogLimiter refusals_, notices_;
+  std::uint32_t placements_ = 0;            // of moving objects: none is a movement from the one before
   std::chrono::nanoseconds wall_shift_{0};  // our time = WALL stamp + shift
 };
 

@@ -66,12 +66,12 @@ void PoseServer::start() {
   for (Port& port : ports_) {
     keep_receiving(port);
     port.lines.start([this](tcp::socket socket) { admit(std::move(socket)); },
-                     [this](const std::string& fault) { say_fault(fault, "pose connections"); });
+                     [this](const std::string& fault) { log_fault(fault, "pose connections"); });
   }
 }
 
-void PoseServer::say_fault(const std::string& fault, const std::string& at) {
-  sonar::say_fault(log_, faults_, fault, {"at", at});
+void PoseServer::log_fault(const std::string& fault, const std::string& at) {
+  sonar::log_fault(log_, faults_, fault, {"at", at});
 }
 
 /// A listener outlives whatever one message does to us.
@@ -80,7 +80,7 @@ void PoseServer::keep_receiving(Port& port) {
       io_, [this, &port] { return receive(port); },
       [this, &port](std::exception_ptr fault) {
         if (!fault || stopping_) return;
-        say_fault(text_of(fault), "pose datagrams");
+        log_fault(text_of(fault), "pose datagrams");
         keep_receiving(port);
       });
 }
@@ -152,9 +152,9 @@ void PoseServer::admit(tcp::socket socket) {
   if (!is_admitted(config_.allow_from, peer.address()))
     return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
   const bool room = connections_.make_room([this](const Connection& evicted) {
-    say_at_times(log_, notices_, LogLevel::info,
-                 "pose connection closed: without a pose, or beyond the limits, for longest, and its place was needed",
-                 {{"from", evicted.sender.id}});
+    log_limited(log_, notices_, LogLevel::info,
+                "pose connection closed: without a pose, or beyond the limits, for longest, and its place was needed",
+                {{"from", evicted.sender.id}});
   });
   if (!room) return intake_.refuse(std::to_string(most_connections) + " connections are open and busy already", sender);
   end_when_silent(socket, limits_.dead_peer);
@@ -164,7 +164,7 @@ void PoseServer::admit(tcp::socket socket) {
   asio::co_spawn(
       io_, [this, connection] { return read_lines(connection); },
       [this, connection](std::exception_ptr fault) {
-        if (fault) say_fault(text_of(fault), connection->sender.id);
+        if (fault) log_fault(text_of(fault), connection->sender.id);
         connection->close();
         connections_.remove(connection);
       });
@@ -197,7 +197,7 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
     const Heard heard = line ? on_line(*line, c.sender) : Heard::no_json;
     c.not_json = heard == Heard::no_json ? c.not_json + 1 : 0;
     if (c.not_json == most_not_json || (heard == Heard::no_json && !(line && line->begins_object))) {
-      say_at_times(log_, notices_, LogLevel::warning, std::string("pose connection closed: ") + no_json, {{"from", c.sender.id}});
+      log_limited(log_, notices_, LogLevel::warning, std::string("pose connection closed: ") + no_json, {{"from", c.sender.id}});
       return Turn::end;
     }
     taken += line->text.size() + least_work;
@@ -212,8 +212,8 @@ asio::awaitable<void> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
   const auto own = c.rate.pause_after(work.bytes, now), of_all = together_.pause_after(c.of_all, work.bytes, now);
   if (own.count() > 0)
-    say_at_times(log_, notices_, LogLevel::info,
-                 "pose connection is read more slowly: it sends more than limits.input_bytes_per_s", {{"from", c.sender.id}});
+    log_limited(log_, notices_, LogLevel::info,
+                "pose connection is read more slowly: it sends more than limits.input_bytes_per_s", {{"from", c.sender.id}});
   const auto pause = std::max(own, of_all);
   if (work.has_pose && pause.count() == 0) c.active_at = now;
   error_code ec;

@@ -71,7 +71,7 @@ class PoseServer {
 
   Result<Endpoint> open(Port& port, Endpoint at);
   void keep_receiving(Port& port);
-  void say_fault(const std::string& fault, const std::string& at);
+  void log_fault(const std::string& fault, const std::string& at);
   asio::awaitable<void> receive(Port& port);
   asio::awaitable<void> read_lines(ConnectionPointer connection);
   enum class Turn { over, not_over, end };  // no whole line is left; one may be; the connection speaks no JSON

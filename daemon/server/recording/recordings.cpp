@@ -10,8 +10,8 @@
 namespace sonar {
 namespace {
 
-std::vector<LogField> fields_of(const control::RecordingStatus& told) {
-  return {{"sonar", told.sonar}, {"file", told.file}, {"pings", told.pings}, {"bytes", told.bytes}};
+std::vector<LogField> fields_of(const control::RecordingStatus& status) {
+  return {{"sonar", status.sonar}, {"file", status.file}, {"pings", status.pings}, {"bytes", status.bytes}};
 }
 
 }  // namespace
@@ -62,7 +62,7 @@ void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar
   const Pointer recording = *begun;
   on_thread(
       recording->work,
-      [file = std::filesystem::path(recording->told.file), kind = recording->kind,
+      [file = std::filesystem::path(recording->status.file), kind = recording->kind,
        sonar = std::move(sonar)](Work& work) -> Result<void> {
         auto made = RecordingFile::create(file, kind, sonar);
         if (!made) return tl::make_unexpected(made.error());
@@ -74,7 +74,7 @@ void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar
           recordings_.remove(recording);
         } else {
           recording->state = Recording::State::running;
-          log_.info("recording begun", {{"sonar", recording->told.sonar}, {"file", recording->told.file}, {"client", who}});
+          log_.info("recording begun", {{"sonar", recording->status.sonar}, {"file", recording->status.file}, {"client", who}});
           if (finishing_) return end(recording, "sonard stops");
         }
         if (!finishing_) done(outcome.result);
@@ -91,18 +91,18 @@ Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& ask
   if (!kind) return tl::make_unexpected(kind.error());
   if (running() >= most_at_once)
     return failure(ErrorKind::unavailable, std::to_string(most_at_once) + " recordings are under way already: stop one");
-  forget_the_oldest();
+  remove_oldest();
   auto recording = std::make_shared<Recording>();
   recording->name = asked.file;
   recording->kind = *kind;
-  recording->told.sonar = sonar.name;
-  recording->told.file = (config_.recording.folder / asked.file).string();
-  recording->told.running = true;
+  recording->status.sonar = sonar.name;
+  recording->status.file = (config_.recording.folder / asked.file).string();
+  recording->status.running = true;
   recordings_.push_back(recording);
   return recording;
 }
 
-void Recordings::forget_the_oldest() {
+void Recordings::remove_oldest() {
   while (recordings_.size() >= most_remembered) {
     const auto ended = [](const Pointer& r) { return r->state == Recording::State::ended; };
     recordings_.erase(std::find_if(recordings_.begin(), recordings_.end(), ended));  // there is one: few run at once
@@ -135,7 +135,7 @@ void Recordings::stop(const control::StopRecording& asked, Done done) {
 
 void Recordings::end_of(const std::string& sonar, const std::string& why) {
   for (const Pointer& r : recordings_) {
-    if (r->told.sonar != sonar) continue;
+    if (r->status.sonar != sonar) continue;
     if (r->state == Recording::State::opening) r->ends_with = why;
     end(r, why);
   }
@@ -153,12 +153,12 @@ void Recordings::finish() {
 
 bool Recordings::takes(const std::string& sonar) const {
   return std::any_of(recordings_.begin(), recordings_.end(),
-                     [&](const Pointer& r) { return r->state == Recording::State::running && r->told.sonar == sonar; });
+                     [&](const Pointer& r) { return r->state == Recording::State::running && r->status.sonar == sonar; });
 }
 
 bool Recordings::wants_truth(const std::string& sonar) const {
   return std::any_of(recordings_.begin(), recordings_.end(), [&](const Pointer& r) {
-    return r->state == Recording::State::running && r->told.sonar == sonar && r->kind == RecordingFile::Kind::mcap;
+    return r->state == Recording::State::running && r->status.sonar == sonar && r->kind == RecordingFile::Kind::mcap;
   });
 }
 
@@ -171,7 +171,7 @@ void Recordings::use_scene(const Scene& scene) {
 
 void Recordings::take(const std::string& sonar, RecordedPing ping) {
   for (const Pointer& r : recordings_)
-    if (r->state == Recording::State::running && r->told.sonar == sonar) write(r, ping);
+    if (r->state == Recording::State::running && r->status.sonar == sonar) write(r, ping);
 }
 
 bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
@@ -196,9 +196,9 @@ void Recordings::write(const Pointer& recording, RecordedPing ping) {
       recording->work, [ping = std::move(ping)](Work& work) { return work.failed ? Result<void>{} : work.file->write(ping); },
       [this, recording, size](const Outcome& outcome) {
         recording->waiting_bytes -= size;
-        recording->told.pings = outcome.figures.pings;
-        recording->told.messages = outcome.figures.messages;
-        recording->told.bytes = outcome.figures.bytes;
+        recording->status.pings = outcome.figures.pings;
+        recording->status.messages = outcome.figures.messages;
+        recording->status.bytes = outcome.figures.bytes;
         if (!outcome.result) fail(recording, outcome.result.error().text);
       });
 }
@@ -209,8 +209,8 @@ void Recordings::fail(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running && !(recording->state == Recording::State::ending && !recording->failed))
     return;
   recording->failed = true;
-  recording->told.why = why;
-  log_.error("recording stopped: " + why, fields_of(recording->told));
+  recording->status.why = why;
+  log_.error("recording stopped: " + why, fields_of(recording->status));
   end(recording, why);
 }
 
@@ -218,8 +218,8 @@ void Recordings::fail(const Pointer& recording, const std::string& why) {
 void Recordings::end(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running) return;
   recording->state = Recording::State::ending;
-  recording->told.running = false;
-  recording->told.why = why;
+  recording->status.running = false;
+  recording->status.why = why;
   on_thread(
       recording->work, [](Work& work) { return work.file->close(); },
       [this, recording](const Outcome& outcome) { ended(recording, outcome); });
@@ -228,17 +228,17 @@ void Recordings::end(const Pointer& recording, const std::string& why) {
 void Recordings::ended(const Pointer& recording, const Outcome& outcome) {
   if (!outcome.result) fail(recording, outcome.result.error().text);
   recording->state = Recording::State::ended;
-  recording->told.bytes = outcome.figures.bytes;
-  if (!recording->failed) log_.info("recording ended: " + recording->told.why, fields_of(recording->told));
-  const Result<void> told =
-      recording->failed ? failure(ErrorKind::io, "the recording stopped before: " + recording->told.why) : Result<void>{};
-  for (const Done& done : std::exchange(recording->at_end, {})) done(told);
+  recording->status.bytes = outcome.figures.bytes;
+  if (!recording->failed) log_.info("recording ended: " + recording->status.why, fields_of(recording->status));
+  const Result<void> result =
+      recording->failed ? failure(ErrorKind::io, "the recording stopped before: " + recording->status.why) : Result<void>{};
+  for (const Done& done : std::exchange(recording->at_end, {})) done(result);
   on_change_();
 }
 
 std::vector<control::RecordingStatus> Recordings::status() const {
   std::vector<control::RecordingStatus> all;
-  for (const Pointer& r : recordings_) all.push_back(r->told);
+  for (const Pointer& r : recordings_) all.push_back(r->status);
   return all;
 }
 

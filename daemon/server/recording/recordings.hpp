@@ -69,7 +69,7 @@ class Recordings {
     enum class State { opening, running, ending, ended } state = State::opening;
     std::string name;  // in the folder
     RecordingFile::Kind kind{};
-    control::RecordingStatus told;
+    control::RecordingStatus status;
     std::size_t waiting_bytes = 0;
     bool failed = false;    // and the log says so
     std::string ends_with;  // the sonar stopped while it was opened: why
@@ -92,7 +92,7 @@ class Recordings {
   void end(const Pointer& recording, const std::string& why);
   void fail(const Pointer& recording, const std::string& why);
   void ended(const Pointer& recording, const Outcome& outcome);
-  void forget_the_oldest();
+  void remove_oldest();
 
   asio::io_context& io_;
   const Config& config_;

@@ -190,11 +190,11 @@ std::optional<std::chrono::milliseconds> Device::longest_silence(ConnectionId of
 }
 
 /// A mistake in sonard, not of a client: it may cost that client its connection, never the others.
-void Device::on_fault(const std::string& what) { say_fault(network_.log, faults_, what, {"sonar", config().name}); }
+void Device::on_fault(const std::string& what) { log_fault(network_.log, faults_, what, {"sonar", config().name}); }
 
 void Device::on_send_error(const Endpoint& to, const std::string& why) {
-  say_at_times(network_.log, send_errors_, LogLevel::warning, "cannot send pings: " + why,
-               {{"sonar", config().name}, {"to", text_of(to)}});
+  log_limited(network_.log, send_errors_, LogLevel::warning, "cannot send pings: " + why,
+              {{"sonar", config().name}, {"to", text_of(to)}});
 }
 
 void Device::on_over(ConnectionId id, const std::string& why) {
@@ -248,7 +248,7 @@ void Device::carry_out(ComputePing& action) {
 void Device::report_visit(Role role, VisitLog::Kind kind, const std::string& what, std::vector<LogField> fields) {
   if (role == Role::client) return visits_.say(kind, what, std::move(fields));
   fields.insert(fields.begin(), {"sonar", config().name});
-  say_at_times(network_.log, observer_visits_, LogLevel::info, what, std::move(fields));
+  log_limited(network_.log, observer_visits_, LogLevel::info, what, std::move(fields));
 }
 
 void Device::carry_out(const Serve& action) {
@@ -326,7 +326,7 @@ void Device::carry_out(const Closed& action) {
 
 void Device::carry_out(const Report& action) {
   LogLimiter& limiter = limiters_[static_cast<std::size_t>(action.topic)];
-  say_at_times(network_.log, limiter, action.line.level, action.line.phrase, action.line.fields);
+  log_limited(network_.log, limiter, action.line.level, action.line.phrase, action.line.fields);
 }
 
 }  // namespace sonar

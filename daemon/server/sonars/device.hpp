@@ -92,7 +92,7 @@ class Device final : public SessionParent {
   /// As recordings name it.
   RecordedSonar recorded() const;
   /// Empty when all is well.
-  std::string trouble() const;
+  std::string problem() const;
   /// As one more client would; nothing is changed when it is refused, with a sentence that says what the product can do.
   Result<void> ask(const control::SetSonar& asked, const std::string& who);
   /// Vehicle and mount, of a configuration that is otherwise the same.

@@ -59,7 +59,7 @@ control::SonarStatus Device::status(Time now) const {
   return s;
 }
 
-std::string Device::trouble() const {
+std::string Device::problem() const {
   const bool lost =
       !stopping_ && std::any_of(tcp_ports_.begin(), tcp_ports_.end(), [](const TcpPort& p) { return !p.listener.is_open(); });
   return lost ? "sonar " + config().name + " does not listen any more" : "";

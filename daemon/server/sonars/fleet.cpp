@@ -44,10 +44,10 @@ std::uint64_t Fleet::served() const {
   return served;
 }
 
-std::string Fleet::trouble() const {
+std::string Fleet::problem() const {
   if (!missing_.empty()) return missing_.front();
   for (const Device& d : devices_)
-    if (std::string why = d.trouble(); !why.empty()) return why;
+    if (std::string why = d.problem(); !why.empty()) return why;
   return {};
 }
 
@@ -183,7 +183,7 @@ void Fleet::on_ping_queued(const Device& of, const PingQueued& queued) {
   if (recordings_.takes(name))
     recordings_.take(name, {now, queued.ping, queued.bytes, queued.datagrams, of.sonar().vendor().beacon(of.sonar().state(), now),
                             computed_names_[of.sonar().index()]});
-  if (!events_.heard()) return;
+  if (!events_.has_listeners()) return;
   const PingRequest& r = queued.ping->request;
   control::PingEvent e;
   e.sonar = name;
@@ -195,11 +195,11 @@ void Fleet::on_ping_queued(const Device& of, const PingQueued& queued) {
   e.rows = static_cast<std::uint32_t>(r.settings.range_bin_count);
   e.clients = static_cast<std::uint32_t>(of.sonar().connections().clients());
   e.simulation_ms = 1e3 * queued.simulation_s;
-  events_.tell({e});
+  events_.publish({e});
 }
 
 void Fleet::on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) {
-  if (events_.heard()) events_.tell({control::ClientEvent{of.config().name, peer, connected, why}});
+  if (events_.has_listeners()) events_.publish({control::ClientEvent{of.config().name, peer, connected, why}});
 }
 
 }  // namespace sonar

@@ -53,7 +53,7 @@ class Fleet final : public DeviceParent {
   bool gone() const;  // after stop(): nothing is left
   std::uint64_t served() const;
   /// Empty when all is well.
-  std::string trouble() const;
+  std::string problem() const;
 
  private:
   struct Retired {

@@ -119,15 +119,15 @@ bool LogLimiter::allows(Clock::time_point now, std::uint64_t& unsaid) {
   return true;
 }
 
-void say_at_times(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields) {
+void log_limited(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields) {
   std::uint64_t unsaid = 0;
   if (!limiter.allows(LogLimiter::Clock::now(), unsaid)) return;
   if (unsaid > 0) fields.emplace_back("unsaid", unsaid);
   log.write(level, phrase, fields);
 }
 
-void say_fault(Log& log, LogLimiter& limiter, const std::string& what, const LogField& where) {
-  say_at_times(log, limiter, LogLevel::error, "internal fault: " + what + " (please report it)", {where});
+void log_fault(Log& log, LogLimiter& limiter, const std::string& what, const LogField& where) {
+  log_limited(log, limiter, LogLevel::error, "internal fault: " + what + " (please report it)", {where});
 }
 
 }  // namespace sonar

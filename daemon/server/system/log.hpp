@@ -44,8 +44,8 @@ class LogLimiter {
 };
 
 /// Says a line as often as its limiter allows; one after others that were swallowed says how many.
-void say_at_times(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields = {});
+void log_limited(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields = {});
 /// Reports a mistake in sonard; `where`: the sonar, listener or connection.
-void say_fault(Log& log, LogLimiter& limiter, const std::string& what, const LogField& where);
+void log_fault(Log& log, LogLimiter& limiter, const std::string& what, const LogField& where);
 
 }  // namespace sonar

@@ -28,18 +28,18 @@ std::string one_line(std::string text) {
 
 }  // namespace
 
-NotifyPlace notify_place_from_environment() {
-  NotifyPlace place{from_environment("NOTIFY_SOCKET"), {}};
+NotifyTarget notify_target_from_environment() {
+  NotifyTarget target{from_environment("NOTIFY_SOCKET"), {}};
   const std::string pid = from_environment("WATCHDOG_PID");
   const auto period = text::parse_integer(from_environment("WATCHDOG_USEC"));
   if (period && *period > 0 && (pid.empty() || pid == std::to_string(::getpid())))
-    place.watchdog = std::chrono::microseconds(*period);
-  return place;
+    target.watchdog = std::chrono::microseconds(*period);
+  return target;
 }
 
-Notify::Notify(asio::io_context& io, NotifyPlace place, std::function<std::chrono::nanoseconds()> ping_under_way, Log& log)
-    : place_(std::move(place)), ping_under_way_(std::move(ping_under_way)), log_(log), timer_(io) {
-  if (place_.socket.empty()) return;
+Notify::Notify(asio::io_context& io, NotifyTarget target, std::function<std::chrono::nanoseconds()> ping_under_way, Log& log)
+    : target_(std::move(target)), ping_under_way_(std::move(ping_under_way)), log_(log), timer_(io) {
+  if (target_.socket.empty()) return;
   socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   // A manager that does not read must not hold us up for longer than a client would notice.
   const timeval patience{0, 200000};
@@ -52,7 +52,7 @@ Notify::~Notify() {
 
 void Notify::ready(const std::string& status) {
   send("READY=1\nSTATUS=" + one_line(status), 0);
-  if (place_.socket.empty() || place_.watchdog.count() == 0 || stopping_ || std::exchange(keeping_, true)) return;
+  if (target_.socket.empty() || target_.watchdog.count() == 0 || stopping_ || std::exchange(keeping_, true)) return;
   keep_alive();
 }
 
@@ -70,36 +70,36 @@ void Notify::stopping() {
 
 /// Twice in the watchdog's period. A ping that takes longer than that period silences us, and the manager acts.
 void Notify::keep_alive() {
-  const bool stuck = ping_under_way_() > place_.watchdog;
+  const bool stuck = ping_under_way_() > target_.watchdog;
   if (stuck && !stuck_)
     log_.error("a ping takes longer than the service manager's watchdog; no sign of life until it is done",
-               {{"watchdog_s", std::chrono::duration<double>(place_.watchdog).count()}});
+               {{"watchdog_s", std::chrono::duration<double>(target_.watchdog).count()}});
   stuck_ = stuck;
   if (!stuck) send("WATCHDOG=1", MSG_DONTWAIT);
-  timer_.expires_after(place_.watchdog / 2);
+  timer_.expires_after(target_.watchdog / 2);
   timer_.async_wait([this](const error_code& ec) {
     if (!ec && !stopping_) keep_alive();
   });
 }
 
 void Notify::send(const std::string& message, int flags) {
-  if (place_.socket.empty()) return;
+  if (target_.socket.empty()) return;
   sockaddr_un at{};
   at.sun_family = AF_UNIX;
   std::string why;
-  if (place_.socket.size() >= sizeof at.sun_path || (place_.socket[0] != '/' && place_.socket[0] != '@')) {
+  if (target_.socket.size() >= sizeof at.sun_path || (target_.socket[0] != '/' && target_.socket[0] != '@')) {
     why = "not the address of a local socket";
   } else {
-    std::copy(place_.socket.begin(), place_.socket.end(), at.sun_path);
+    std::copy(target_.socket.begin(), target_.socket.end(), at.sun_path);
     if (at.sun_path[0] == '@') at.sun_path[0] = '\0';  // the abstract namespace, whose names have no end mark
     const bool abstract = at.sun_path[0] == '\0';
-    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + place_.socket.size() + (abstract ? 0 : 1));
+    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + target_.socket.size() + (abstract ? 0 : 1));
     const auto* address = static_cast<const sockaddr*>(static_cast<const void*>(&at));
     const auto sent = ::sendto(socket_, message.data(), message.size(), flags | MSG_NOSIGNAL, address, size);
     if (sent < 0) why = std::strerror(errno);
   }
   if (!why.empty() && !std::exchange(complained_, true))
-    log_.warning("cannot tell the service manager at " + place_.socket + " (NOTIFY_SOCKET): " + why);
+    log_.warning("cannot tell the service manager at " + target_.socket + " (NOTIFY_SOCKET): " + why);
 }
 
 }  // namespace sonar

@@ -16,17 +16,17 @@
 namespace sonar {
 
 /// What a service manager put into the environment.
-struct NotifyPlace {
+struct NotifyTarget {
   std::string socket;                     // a path, or @name in the abstract namespace; empty = no service manager
   std::chrono::microseconds watchdog{0};  // 0 = none
 };
 /// From NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID; a watchdog meant for another process is none.
-NotifyPlace notify_place_from_environment();
+NotifyTarget notify_target_from_environment();
 
 class Notify {
  public:
   /// `ping_under_way` answers for how long the simulation thread has been at its present ping; 0 = it waits for work.
-  Notify(asio::io_context& io, NotifyPlace place, std::function<std::chrono::nanoseconds()> ping_under_way, Log& log);
+  Notify(asio::io_context& io, NotifyTarget target, std::function<std::chrono::nanoseconds()> ping_under_way, Log& log);
   ~Notify();
   Notify(const Notify&) = delete;
   Notify& operator=(const Notify&) = delete;
@@ -42,7 +42,7 @@ class Notify {
   void send(const std::string& message, int flags);
   void keep_alive();
 
-  NotifyPlace place_;
+  NotifyTarget target_;
   std::function<std::chrono::nanoseconds()> ping_under_way_;
   Log& log_;
   asio::steady_timer timer_;

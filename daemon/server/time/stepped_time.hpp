@@ -1,5 +1,5 @@
 // How far time that is not real may pass, and who waits for it to get there: nothing bounds it (stepped), control requests do
-// (lockstep), or the stamps of the vehicles' poses (follow). Used by App::step_time() alone; I/O thread only.
+// (lockstep), or the stamps of the vehicles' poses (follow). Used by Stepper and by control requests; I/O thread only.
 #pragma once
 
 #include <functional>
@@ -43,8 +43,7 @@ class SteppedTime {
   void wait(Reached reached);
   /// No more requests may wait; one whose client hangs up is kept until its time is reached.
   bool is_full() const { return waiting_.size() >= most_waiting; }
-  /// Whether requests wait for time to pass: not with real time, nor with time that steps by itself.
-  bool makes_wait() const { return mode_ == ClockMode::lockstep || mode_ == ClockMode::follow; }
+  bool follows_poses() const { return mode_ == ClockMode::follow; }
   /// All is done that was due before `next`; nothing = nothing more is due. Whether there was anybody to answer.
   bool answer(std::optional<Time> next);
 

@@ -1,0 +1,11 @@
+// `sonard check`: validates a configuration and its scene, and prints what it contains and what was probably not meant.
+#pragma once
+
+#include "daemon/commands/command_line.hpp"
+
+namespace sonar {
+
+/// Errors: those of the configuration, the control token and the scene.
+Result<void> run_check(const CheckCommand& command);
+
+}  // namespace sonar

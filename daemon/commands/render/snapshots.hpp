@@ -1,0 +1,28 @@
+// Unrelated poses, as in a data set: a file whose poses lie too far apart for a vehicle's trajectory, so that they say nothing
+// about the motion within a ping.
+#pragma once
+
+#include <string>
+
+#include "core/motion/trajectory.hpp"
+
+namespace sonar::render {
+
+/// Highest speeds of a carrier of an imaging sonar: a fast boat, and a towfish that rolls. A file of poses with more than one
+/// faster step in `steps_to_one_too_far` is taken as snapshots, not as a trajectory, unless it contains velocities.
+inline constexpr double fastest_vehicle_mps = 15, fastest_vehicle_radps = 5;
+inline constexpr std::size_t steps_to_one_too_far = 10;
+/// Poses closer in time than this are one step: the jitter of a fast log is not motion.
+inline constexpr motion::Ns shortest_step = std::chrono::milliseconds(100);
+
+/// The steps of a trajectory.
+struct Steps {
+  std::size_t all = 0, too_far = 0;
+  double fastest_mps = 0, fastest_radps = 0;
+};
+Steps steps_of(const motion::Trajectory& trajectory);
+bool are_snapshots(const motion::Trajectory& trajectory);
+/// One sentence about a trajectory that is taken as snapshots.
+std::string note_of_snapshots(const motion::Trajectory& trajectory);
+
+}  // namespace sonar::render

@@ -1,0 +1,138 @@
+#include "daemon/commands/run/banner.hpp"
+
+#include <filesystem>
+#include <fstream>
+
+#include "core/text/format.hpp"
+#include "cuda/cuda_status.hpp"
+#include "protocol/blueview/frames.hpp"
+
+namespace sonar {
+namespace {
+
+using text::format;
+
+std::string address_text(const Endpoint& e) { return text_of(e); }
+
+/// Where the drop-in SDK's library lies, installed with this program or built beside it; empty = not there.
+std::filesystem::path sdk_library_folder() {
+  std::error_code ec;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", ec);
+  for (const char* folder : {"../lib/sonard", ".."}) {
+    const auto place = (program.parent_path() / folder / "bvt4/lib").lexically_normal();
+    if (!ec && std::filesystem::exists(place / "libbvtsdk.so", ec)) return place;
+  }
+  return {};
+}
+
+/// How the host of a BlueView head comes to it: by a library, not by a driver as it is.
+std::string blueview_lines(std::string at, unsigned port) {
+  const std::string folder = sdk_library_folder().string();
+  if (port != blueview::tcp_port) at += format(":%u", port);
+  return "  driver  BVTSonar_Open(sonar, \"NET\", \"" + at + "\") with sonard's libbvtsdk: " +
+         (folder.empty() ? "package sonard-bvtsdk" : "LD_LIBRARY_PATH=" + folder + " (SDK 3.x: bvt3)") +
+         ", docs/bvtsdk.md\n  look    sonarctl view " + at + " --png ping.png\n";
+}
+
+std::string sonar_lines(const Device& device) {
+  const PingSettings s = device.sonar().initial_settings();
+  const SonarModel& model = *device.sonar().state().model;
+  const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
+  std::string text = "sonar     " + device.config().name + "  " + model.name + "  " +
+                     text::frequency_text(static_cast<double>(mode.centre_hz)) +
+                     format("  %d beams  %g m  %g Hz\n", s.beam_count, s.range_m, static_cast<double>(s.rate_hz));
+  const Endpoint data = device.data_endpoint();
+  text += "  data    tcp " + text_of(data);
+  for (const udp::endpoint& to : device.status_destinations())
+    text += format("      status udp -> %s:%d (1 Hz)", to.address().to_string().c_str(), to.port());
+  if (device.sonar().state().advertise_ip != device.config().bind_ip)
+    text += "      advertised as " + text_of(device.sonar().state().advertise_ip);
+  text += "\n";
+  if (device.config().profile.vendor->name() == "blueview")
+    text += blueview_lines(text_of(device.sonar().state().advertise_ip), data.port);
+  return text;
+}
+
+std::string pose_line(const App& app) {
+  const Endpoint protobuf = app.poses().protobuf(), json = app.poses().json();
+  std::string text = "pose      ";
+  text += protobuf.port != 0 ? "udp " + address_text(protobuf) + " (protobuf)" : "protobuf off";
+  text += json.port != 0 ? "  udp and tcp " + address_text(json) + " (json)" : "  json off";
+  for (const std::string& endpoint : app.mavlink().endpoints()) text += "  " + endpoint + " (mavlink)";
+  text += "  | source: " + std::string(app.world().source_of(0)) + "\n";
+  return text;
+}
+
+std::string control_line(const App& app) {
+  const Endpoint stream = app.control().stream(), http = app.control().http();
+  std::string text = "control   ";
+  text += stream.port != 0 ? "tcp " + address_text(stream) : "tcp off";
+  text += http.port != 0 ? "   http http://" + address_text(http) : "   http off";
+  return text + (app.config().control.token_file.empty() ? "\n" : "   token needed\n");
+}
+
+/// Largest resident memory so far [MB]; 0 where the system does not tell.
+double peak_memory_mb() {
+  std::ifstream status("/proc/self/status");
+  std::string word;
+  while (status >> word) {
+    double kb = 0;
+    if (word == "VmHWM:" && status >> kb) return kb / 1024;
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::string banner(const App& app, const BannerFacts& facts) {
+  std::string text = "sonard " SONARD_VERSION "  (" + app.engine_description() + ", CUDA: " + cuda_status() + ")\n";
+  text += "config    " + facts.config_line + "\n";
+  text += "scene     " + app.scene().name +
+          format("   %zu triangles, %zu materials, %zu moving, built in %.0f ms\n", app.scene().triangle_count(),
+                 app.scene().materials.size(), app.scene().body_names.size(), facts.scene_ms);
+  for (const Device& d : app.devices()) text += sonar_lines(d);
+  text += pose_line(app);
+  text += control_line(app);
+  text += "seed      " + std::to_string(app.config().seed) + "   reproducible";
+  if (const ClockMode clock = app.config().clock; clock != ClockMode::realtime)
+    text += ", " + std::string(name_of(clock)) + " clock";
+  return text + "\n";
+}
+
+std::string ready_line(const App& app, double seconds) {
+  return format("ready in %.2f s. Connect your driver to %s.   Ctrl-C stops.\n", seconds,
+                text_of(app.config().sonars.front().advertise_ip).c_str());
+}
+
+std::string summary(const App& app) {
+  std::string text;
+  for (const Device& d : app.devices()) {
+    const DeviceFigures f = d.figures();
+    text += "sonar " + d.config().name +
+            format("  %llu pings, %llu served, %llu dropped, %llu skipped of %llu ticks, %llu clients",
+                   static_cast<unsigned long long>(f.pings), static_cast<unsigned long long>(f.served),
+                   static_cast<unsigned long long>(f.dropped), static_cast<unsigned long long>(f.skipped_ticks),
+                   static_cast<unsigned long long>(f.ticks), static_cast<unsigned long long>(f.clients));
+    if (f.pings > 0) text += format(", %.1f ms a ping", 1e3 * f.simulation_s / static_cast<double>(f.pings));
+    text += "\n";
+  }
+  const PoseCounters& p = app.world().counters();
+  if (p.accepted + p.refused + p.late > 0)
+    text += format("poses  %llu accepted, %llu refused, %llu late, %llu replaced, %llu over the rate\n",
+                   static_cast<unsigned long long>(p.accepted), static_cast<unsigned long long>(p.refused),
+                   static_cast<unsigned long long>(p.late), static_cast<unsigned long long>(p.replaced),
+                   static_cast<unsigned long long>(p.over_rate));
+  return text + format("resident memory %.0f MB at most\n", peak_memory_mb());
+}
+
+std::string digest_lines(const App& app) {
+  std::string text;
+  for (const Device& d : app.devices())
+    for (const StreamDigest& s : d.digests())
+      text += "sha256 " + s.sha256 +
+              format("  %s client %llu  %llu bytes\n", d.config().name.c_str(), static_cast<unsigned long long>(s.client),
+                     static_cast<unsigned long long>(s.bytes));
+  return text;
+}
+
+}  // namespace sonar

@@ -1,0 +1,22 @@
+// Which configuration `sonard run` uses: the file it was given, else the first in the usual places, else the demo.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "daemon/config/config.hpp"
+
+namespace sonar {
+
+struct FoundConfig {
+  Config config;
+  std::string how;             // for the banner
+  std::filesystem::path file;  // empty = none
+};
+
+/// `file` empty: ./sonard.yaml, ~/.config/sonard/sonard.yaml, /etc/sonard/sonard.yaml, in this order; `demo` wins over all files.
+/// Errors: those of load_config().
+Result<FoundConfig> find_config(const std::string& file, bool demo);
+
+}  // namespace sonar

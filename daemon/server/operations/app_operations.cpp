@@ -1,0 +1,33 @@
+#include "daemon/server/operations/app_operations.hpp"
+
+#include <utility>
+
+namespace sonar {
+namespace {
+
+template <class... F>
+struct Overloaded : F... {
+  using F::operator()...;
+};
+
+}  // namespace
+
+void AppOperations::perform(const control::Operation& operation, const Sender& sender, Done done) {
+  std::visit(Overloaded{[&](const control::GetStatus&) {
+                          done({OperationResult::Code::done, {}, status_.status()});
+                        },
+                        [&](const control::PoseSample& asked) { time_.take(asked, sender, std::move(done)); },
+                        [&](const control::Step& asked) { time_.step(asked, std::move(done)); },
+                        [&](const control::SetTrajectory& asked) { done(time_.steer(asked, sender)); },
+                        [&](const control::SetSonar& asked) { done(sonars_.set(asked, sender)); },
+                        [&](const control::SetEnvironment& asked) { done(sonars_.set(asked, sender)); },
+                        [&](const control::StartRecording& asked) { sonars_.start(asked, sender, std::move(done)); },
+                        [&](const control::StopRecording& asked) { sonars_.stop(asked, std::move(done)); },
+                        [&](const control::LoadScene& asked) { scene_.load(asked, sender, std::move(done)); },
+                        [&](const control::AddObject& asked) { scene_.add(asked, sender, std::move(done)); },
+                        [&](const control::RemoveObject& asked) { scene_.remove(asked, sender, std::move(done)); },
+                        [&](const control::SetObject& asked) { scene_.set(asked, sender, std::move(done)); }},
+             operation);
+}
+
+}  // namespace sonar

@@ -1,0 +1,32 @@
+// Carries out the requests of the control protocol (operations.hpp): hands each to the class that is responsible for it. Owned by
+// App, as they are.
+#pragma once
+
+#include "daemon/server/operations.hpp"
+#include "daemon/server/operations/monitoring.hpp"
+#include "daemon/server/operations/scene_operations.hpp"
+#include "daemon/server/operations/sonar_operations.hpp"
+#include "daemon/server/operations/status_report.hpp"
+#include "daemon/server/operations/time_operations.hpp"
+
+namespace sonar {
+
+class AppOperations final : public Operations {
+ public:
+  AppOperations(SceneOperations& scene, SonarOperations& sonars, TimeOperations& time, const StatusReport& status,
+                const Monitoring& monitoring)
+      : scene_(scene), sonars_(sonars), time_(time), status_(status), monitoring_(monitoring) {}
+
+  void perform(const control::Operation& operation, const Sender& sender, Done done) override;
+  std::string metrics() const override { return monitoring_.metrics(); }
+  std::string problem() const override { return monitoring_.problem(); }
+
+ private:
+  SceneOperations& scene_;
+  SonarOperations& sonars_;
+  TimeOperations& time_;
+  const StatusReport& status_;
+  const Monitoring& monitoring_;
+};
+
+}  // namespace sonar

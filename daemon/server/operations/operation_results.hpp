@@ -1,0 +1,23 @@
+// What operations are answered, from sentences and errors.
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "core/base/result.hpp"
+#include "daemon/server/operations.hpp"
+
+namespace sonar {
+
+inline OperationResult refused(std::string text) { return {OperationResult::Code::refused, std::move(text), {}}; }
+inline OperationResult failed(std::string text) { return {OperationResult::Code::failed, std::move(text), {}}; }
+/// Empty = done.
+inline OperationResult done_or_refused(std::string why) { return why.empty() ? OperationResult{} : refused(std::move(why)); }
+/// Mistakes in the request are refused; all else has failed.
+inline OperationResult result_of(const Error& error) {
+  const bool is_request_wrong = error.kind == ErrorKind::usage || error.kind == ErrorKind::config;
+  return is_request_wrong ? refused(error.text) : failed(error.text);
+}
+inline OperationResult result_of(const Result<void>& outcome) { return outcome ? OperationResult{} : result_of(outcome.error()); }
+
+}  // namespace sonar

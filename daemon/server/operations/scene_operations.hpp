@@ -1,0 +1,41 @@
+// Requests that change the scene: another one, objects added, removed, moved and hidden.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "daemon/config/config.hpp"
+#include "daemon/server/operations.hpp"
+#include "daemon/server/poses/pose_intake.hpp"
+#include "daemon/server/scene_changes.hpp"
+
+namespace sonar {
+
+class SceneOperations {
+ public:
+  /// `config` gets the scene's file.
+  SceneOperations(Config& config, SceneChanges& changes, PoseIntake& poses, Events& events, Log& log, LoadScene load_scene)
+      : config_(config), changes_(changes), poses_(poses), events_(events), log_(log), load_scene_(std::move(load_scene)) {}
+
+  void load(const control::LoadScene& asked, const Sender& sender, Operations::Done done);
+  void add(const control::AddObject& asked, const Sender& sender, Operations::Done done);
+  void remove(const control::RemoveObject& asked, const Sender& sender, Operations::Done done);
+  void set(const control::SetObject& asked, const Sender& sender, Operations::Done done);
+
+ private:
+  using Edit = std::function<Result<ScenePointer>(const Scene&)>;
+
+  /// Of the scene as it is when the changes before have been made. `what` = for the log: "object crate added".
+  void edit(Edit edit, const std::string& what, const Sender& sender, Operations::Done done);
+  OperationResult without_details(const Error& error, const SceneFile& file, const Sender& sender);
+  void log_change(const std::string& what, const Sender& sender);
+
+  Config& config_;
+  SceneChanges& changes_;
+  PoseIntake& poses_;
+  Events& events_;
+  Log& log_;
+  LoadScene load_scene_;
+};
+
+}  // namespace sonar

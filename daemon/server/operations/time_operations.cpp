@@ -1,0 +1,41 @@
+#include "daemon/server/operations/time_operations.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "daemon/server/operations/operation_results.hpp"
+
+namespace sonar {
+
+/// Where time follows the poses, the answer comes when the pings are out that this one made possible: a client that waits for it
+/// runs in step with the sonars.
+void TimeOperations::take(const control::PoseSample& sample, const Sender& sender, Operations::Done done) {
+  std::string refusal = poses_.take(sample, sender);
+  if (!refusal.empty()) return done(refused(std::move(refusal)));
+  if (sample.of != control::PoseSample::Of::vehicle || !time_.follows_poses()) return done({});
+  if (time_.is_full()) return done(failed("the pose counts, but too many wait for their pings already to wait for these"));
+  time_.wait([done = std::move(done)](Time) { done({}); });
+}
+
+void TimeOperations::step(const control::Step& asked, Operations::Done done) {
+  if (std::string why = time_.step(asked.dt_s); !why.empty()) return done(refused(std::move(why)));
+  time_.wait([this, done = std::move(done)](Time then) {
+    const std::uint64_t before = std::exchange(pings_reported_, pings_made());
+    // A sonar that a reload took away took its pings along.
+    const std::uint64_t pings = pings_reported_ - std::min(before, pings_reported_);
+    done({OperationResult::Code::done, {}, control::Stepped{then.time_since_epoch().count(), pings}});
+  });
+  on_change_();
+}
+
+std::uint64_t TimeOperations::pings_made() const {
+  std::uint64_t made = 0;
+  for (const Device& d : fleet_.devices()) made += d.sonar().pings();
+  return made;
+}
+
+OperationResult TimeOperations::steer(const control::SetTrajectory& asked, const Sender& sender) {
+  return done_or_refused(poses_.steer(asked, sender));
+}
+
+}  // namespace sonar

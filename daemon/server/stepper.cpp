@@ -1,0 +1,60 @@
+#include "daemon/server/stepper.hpp"
+
+#include <algorithm>
+
+namespace sonar {
+namespace {
+
+bool is_first(std::optional<Time> t, std::optional<Time> of) { return t && (!of || *t < *of); }
+
+}  // namespace
+
+Stepper::Due Stepper::next_due() {
+  Due due;
+  for (Device& d : fleet_.devices()) {
+    if (const auto t = d.sonar().next_ping(); is_first(t, due.ping)) due.ping = t, due.pings = &d;
+    if (const auto t = d.sonar().next_request(); is_first(t, due.request)) due.request = t;
+    if (const auto t = d.sonar().next_conversation(); is_first(t, due.conversation)) due.conversation = t;
+  }
+  return due;
+}
+
+bool Stepper::step(const std::function<bool()>& enough_served) {
+  skip();
+  const std::list<Device>& devices = fleet_.devices();
+  if (!std::all_of(devices.begin(), devices.end(), [](const Device& d) { return d.sonar().settled(); })) return false;
+  const Due due = next_due();
+  const SteppedTime::Bound bound = time_.bound(is_first(due.request, due.ping) ? due.request : due.ping);
+  // Before the ping that is due at the same moment.
+  const bool converses = is_first(due.conversation, due.ping) || due.conversation == due.ping;
+  const std::optional<Time> next = converses ? due.conversation : due.ping;
+  // What is said at this very moment needs no time to pass.
+  const bool may_come = next && (*next <= bound.last_tick || (converses && *next <= clock_.now()));
+  if (!may_come && bound.then) advance(*bound.then);
+  const bool answered = time_.answer(next);
+  if (answered) on_change_();  // first the answers, in turns of their own
+  if (enough_served()) return !answered;
+  if (!may_come) return false;
+  advance(time_.tick_at(*next));
+  if (converses)
+    on_change_();  // what it made them say, or ask for, may be taken or due before the rest
+  else
+    due.pings->step();
+  return false;
+}
+
+void Stepper::advance(Time to) {
+  clock_.advance_to(to);
+  for (Device& d : fleet_.devices()) d.tick_sessions();
+}
+
+/// Stamps that time follows began, or jumped ahead.
+void Stepper::skip() {
+  const auto skipped = world_.take_skipped();
+  if (skipped.count() == 0) return;
+  clock_.skip(skipped);
+  for (Device& d : fleet_.devices()) d.skip(skipped);
+  log_.info("time follows the poses: it jumps ahead by " + std::to_string(seconds(skipped)) + " s");
+}
+
+}  // namespace sonar

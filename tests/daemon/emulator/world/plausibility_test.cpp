@@ -1,0 +1,342 @@
+// What was probably not meant: each mistake that newcomers make has its note, what is right has none, and a running daemon tells
+// each kind once and keeps it in its status as long as it holds.
+#include "daemon/emulator/world/plausibility.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+
+#include "core/scene/files/load_scene.hpp"
+#include "protocol/mavlink/frames.hpp"
+#include "tests/daemon/server/loopback.hpp"
+
+namespace sonar::testing_daemon {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+Config config_with(const std::string& vehicle, const std::string& mount = "{frame: FLU}", const std::string& more = {}) {
+  auto config =
+      parse_config("world: {scene: demo.yaml}\nvehicles: [{name: rov" + vehicle +
+                       "}]\nsonars: [{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2, mount: " + mount + "}]\n" + more,
+                   "test.yaml", {});
+  if (!config) throw std::runtime_error(config.error().text);
+  return *std::move(config);
+}
+
+/// A bed of 40 x 30 m at z = -5, and what else is asked for.
+Scene bed_scene(std::vector<Object> more = {}) {
+  auto mesh = std::make_shared<Mesh>();
+  mesh->vertices = {{-20, -15, 0}, {20, -15, 0}, {20, 15, 0}, {-20, 15, 0}};
+  mesh->triangles = {{0, 1, 2}, {0, 2, 3}};
+  mesh->material = {0, 0};
+  Scene scene;
+  scene.materials = {Material{.name = "mud"}};
+  scene.objects = {Object{.name = "bed", .mesh = mesh, .in_world = {{0, 0, -5}, {}}}};
+  for (Object& o : more) scene.objects.push_back(std::move(o));
+  return scene;
+}
+/// A box of these edges about its place.
+Object box(const std::string& name, Vec3 size_m, Vec3d at_m) {
+  auto mesh = std::make_shared<Mesh>();
+  mesh->vertices = {-0.5f * size_m, 0.5f * size_m, {0, 0, 0}};
+  mesh->triangles = {{0, 1, 2}};
+  mesh->material = {0};
+  return Object{.name = name, .mesh = mesh, .in_world = {at_m, {}}};
+}
+
+std::vector<std::string> texts_of(const std::vector<Note>& notes) {
+  std::vector<std::string> texts;
+  for (const Note& n : notes) texts.push_back(text_of(n));
+  return texts;
+}
+std::vector<std::string> notes(const Config& config, const Scene& scene = bed_scene()) {
+  return texts_of(notes_on(config, scene, surroundings_of(config, scene)));
+}
+std::vector<std::string> at(const std::string& initial_pose) {
+  return notes(config_with(", initial_pose: {frame: ENU_FLU, " + initial_pose + "}"));
+}
+
+TEST(Plausibility, WhatIsMeantHasNoNotes) {
+  EXPECT_THAT(at("xyz_m: [-7, 0, -3], rpy_deg: [0, 20, 270]"), IsEmpty());
+  EXPECT_THAT(at("xyz_m: [-7, 0, 0]"), IsEmpty()) << "at the surface";
+  EXPECT_THAT(at("xyz_m: [-50, 0, -3]"), IsEmpty()) << "30 m outside, within the range of 40 m";
+  EXPECT_THAT(notes(*demo_config()), IsEmpty());
+  EXPECT_THAT(notes(config_with("", "{frame: FRD, xyz_m: [0, 0, 0.1], rpy_deg: [0, -15, 180]}")), IsEmpty()) << "looking aft";
+  EXPECT_THAT(notes(config_with("", "{frame: FRD, xyz_m: [0, 0, 0.1], rpy_deg: [90, -90, 0]}")), IsEmpty())
+      << "on its side, down";
+}
+
+TEST(Plausibility, AVehicleAboveTheWater) {
+  EXPECT_THAT(at("xyz_m: [-7, 0, 3]"),
+              ElementsAre(AllOf(HasSubstr("the sonar of rov is 3.0 m above the water's surface (z = 0); "),
+                                HasSubstr("was NED taken for ENU, or the reverse?"))));
+  // A boat at the surface with its sonar below the keel is as it should be; one on the mast is not.
+  EXPECT_THAT(notes(config_with(", initial_pose: {frame: NED_FRD, xyz_m: [0, 0, -0.3]}", "{frame: FRD, xyz_m: [0, 0, 0.6]}")),
+              IsEmpty());
+  EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 0]}", "{frame: FLU, xyz_m: [0, 0, 2]}")),
+              ElementsAre(HasSubstr("is 2.0 m above")));
+  EXPECT_THAT(at("xyz_m: [-7, 0, 0.0009]"), IsEmpty()) << "as near as pings take it for the surface";
+}
+
+TEST(Plausibility, APlaceThatNobodyGaveIsNotJudged) {
+  const std::string up = "{frame: FLU, xyz_m: [0, 0, 0.2]}";
+  EXPECT_THAT(notes(config_with("", up)), IsEmpty());
+  EXPECT_THAT(notes(config_with(", trajectory: orbit", up)), ElementsAre(HasSubstr("is 0.2 m above")));
+}
+
+Scene scene_of(const std::string& yaml) {
+  auto scene = parse_scene(yaml, "scene.yaml", {});
+  if (!scene) throw std::runtime_error(scene.error().text);
+  return **scene;
+}
+
+TEST(Plausibility, TheSeaSurfaceIsNeitherGroundNorSomethingToSee) {
+  const Config config = config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -2]}");
+  EXPECT_THAT(notes(config, scene_of("sea_surface: {}\nobjects: []\n")), IsEmpty());
+  EXPECT_THAT(
+      notes(config, scene_of("sea_surface: {}\nmaterials: {bright: {lambert_db: -10}}\nobjects:\n"
+                             "  - {name: bed, type: plane, material: bright, size_m: [40, 40], pose: {xyz_m: [0, 0, 1]}}\n")),
+      ElementsAre(HasSubstr("nothing of the scene lies below"),
+                  HasSubstr("is 3.0 m below the lowest point of the ground (z = 1.0)")));
+}
+
+TEST(Plausibility, NedTakenForEnuBelowTheBedAndFarAway) {
+  EXPECT_THAT(at("xyz_m: [3, 0, -9]"), ElementsAre(AllOf(HasSubstr("is 4.0 m below the lowest point of the ground (z = -5.0)"),
+                                                         HasSubstr("the origin that depths are counted from"))));
+  Scene strip = bed_scene();
+  strip.objects[0].in_world.position_m = {0, 500, -5};
+  EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [500, 0, -2]}"), strip),
+              ElementsAre(AllOf(HasSubstr("m from everything in the scene, and hears no further than 40 m"),
+                                HasSubstr("with x and y exchanged it would be in the scene"))));
+  EXPECT_THAT(at("xyz_m: [3000, 0, -3]"), ElementsAre(HasSubstr("positions are metres from the world's 0, 0, 0")));
+}
+
+TEST(Plausibility, OnlyGroundIsWhatASonarCanBeBelow) {
+  const auto below = [](double z_m, std::vector<Object> things) {
+    Scene scene = bed_scene(std::move(things));
+    scene.objects.erase(scene.objects.begin());  // no bed
+    return notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, " + std::to_string(z_m) + "]}"), scene);
+  };
+  EXPECT_THAT(below(-8, {box("hull", {20, 5, 5}, {0, 0, -2.5})}), IsEmpty());
+  EXPECT_THAT(below(-4, {box("buoy", {1, 1, 1}, {-3, 0, -2}), box("buoy 2", {1, 1, 1}, {3, 0, -2})}), IsEmpty());
+  Object shelf = bed_scene().objects[0], bed = shelf;
+  shelf.in_world.position_m.z = -2;
+  EXPECT_THAT(below(-4, {shelf, bed}), IsEmpty()) << "under an overhang";
+  EXPECT_THAT(below(-6, {shelf, bed}), ElementsAre(HasSubstr("is 1.0 m below the lowest point of the ground (z = -5.0)")));
+  bed.in_world.orientation = quat_from_rpy({rad_from_deg(90), 0, 0});
+  EXPECT_THAT(below(-25, {bed}), IsEmpty()) << "a wall";
+}
+
+TEST(Plausibility, ASceneThatLiesAboveTheWaterIsTheMistakeItself) {
+  Scene dry = bed_scene();
+  dry.sea_surface.present = true;
+  dry.objects[0].in_world.position_m = {0, 0, 0};
+  EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry),
+              ElementsAre(HasSubstr("nothing of the scene lies below the water's surface, z = 0; move the scene down")));
+  dry.sea_surface.present = false;
+  EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry), IsEmpty()) << "a tank on its floor";
+}
+
+TEST(Plausibility, AnUpsideDownMount) {
+  for (const char* mount :
+       {"{frame: FLU, rpy_deg: [180, 0, 0]}", "{frame: FRD, rpy_deg: [-170, 10, 0]}", "{frame: FLU, rpy_deg: [0, 165, 0]}"})
+    EXPECT_THAT(notes(config_with("", mount)),
+                ElementsAre(HasSubstr("sonar front is mounted upside down on rov; rpy_deg is [roll, pitch, yaw]")));
+}
+
+TEST(Plausibility, AMeshInMillimetres) {
+  const Config config = config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}");
+  EXPECT_THAT(
+      notes(config, bed_scene({box("wreck", {1200, 300, 250}, {0, 0, -5})})),
+      ElementsAre(HasSubstr("wreck is 1200 m long, and no sonar hears further than 40 m; if the file is in centimetres or "
+                            "millimetres, set scale: 0.01 or 0.001")));
+  EXPECT_THAT(notes(config, bed_scene({box("wreck", {120, 30, 25}, {0, 0, -5})})), IsEmpty());
+  EXPECT_THAT(notes(config, bed_scene({box("survey", {1200, 900, 12}, {0, 0, -5})})), IsEmpty()) << "ground may be long";
+  Object ridge = bed_scene().objects[0];
+  auto relief = std::make_shared<Mesh>(*ridge.mesh);
+  relief->vertices = {{-600, -400, 0}, {600, -400, 200}, {600, 400, 0}, {-600, 400, 200}};
+  ridge.name = "ridge", ridge.mesh = relief, ridge.in_world.position_m.z = -210;
+  EXPECT_THAT(notes(config, bed_scene({ridge})), IsEmpty()) << "with relief too";
+  Object quay = box("quay", {1200, 300, 250}, {0, 0, -5});
+  quay.primitive.kind = Primitive::Kind::box;
+  EXPECT_THAT(notes(config, bed_scene({quay})), IsEmpty()) << "its size is in the scene file, in metres";
+}
+
+// ---- trajectories
+
+Config playing(const std::string& lines, const std::string& name = "dive.tum") {
+  const std::string folder = ::testing::TempDir() + "plausibility-" + std::to_string(getpid());
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder + "/" + name) << lines;
+  auto config = parse_config("world: {scene: demo.yaml}\nvehicles: [{name: rov, trajectory: " + name +
+                                 "}]\nsonars: [{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}]\n",
+                             "test.yaml", folder);
+  std::filesystem::remove_all(folder);
+  if (!config) throw std::runtime_error(config.error().text);
+  return *std::move(config);
+}
+/// A turn of 360 deg on the spot, nodding a little, w where it is asked for; in FRD the body's z is down as NED's is.
+std::string turning(bool w_first, const char* frame, double z_m, const char* comma = " ", const char* unit = "") {
+  std::string lines = std::string("# frame: ") + frame + "\n";
+  for (int i = 0; i < 36; ++i) {
+    const Quatd q = quat_from_rpy({0.05, 0.1, rad_from_deg(10 * i)});
+    const std::array<double, 4> in_order = w_first ? std::array{q.w, q.x, q.y, q.z} : std::array{q.x, q.y, q.z, q.w};
+    lines += std::to_string(i) + unit;
+    for (const double v : {1.0, 2.0, z_m, in_order[0], in_order[1], in_order[2], in_order[3]}) lines += comma + std::to_string(v);
+    lines += "\n";
+  }
+  return lines;
+}
+
+TEST(Plausibility, ATrajectoryWithWAtTheWrongEnd) {
+  for (const char* frame : {"ENU_FLU", "NED_FRD"}) {
+    const double z_m = std::string(frame) == "ENU_FLU" ? -3 : 3;
+    EXPECT_THAT(notes(playing(turning(false, frame, z_m))), IsEmpty());
+    EXPECT_THAT(
+        notes(playing(turning(true, frame, z_m))),
+        ElementsAre(HasSubstr("the quaternions of dive.tum turn rov over, and would not with w at the other end; write w where "
+                              "the format has it: last in a TUM line")));
+    EXPECT_THAT(notes(playing(turning(true, frame, z_m, ",", "000000000"), "dive.csv")), IsEmpty()) << "EuRoC";
+    EXPECT_THAT(notes(playing(turning(false, frame, z_m, ",", "000000000"), "dive.csv")),
+                ElementsAre(HasSubstr("with w at the other end")));
+  }
+}
+
+TEST(Plausibility, ATrajectoryAboveTheWaterOrUpsideDown) {
+  EXPECT_THAT(notes(playing("# frame: ENU_FLU\n0 0 0 -1 0 0 0 1\n1 0 0 2 0 0 0 1\n2 0 0 3 0 0 0 1\n")),
+              ElementsAre(HasSubstr("is 2.0 m above the water's surface (z = 0), in 2 of 3 poses of dive.tum; was NED")));
+  EXPECT_THAT(notes(playing("# frame: ENU_FLU\nt,x,y,z,roll_deg,pitch_deg\n0,0,0,-3,170,40\n", "dive.csv")),
+              ElementsAre(AllOf(HasSubstr("rov is upside down"), HasSubstr("in 1 of 1 poses of dive.csv"))));
+}
+
+TEST(Plausibility, OfALongTrajectorySomePosesAreLookedAt) {
+  std::string lines = "# frame: ENU_FLU\n";
+  for (int i = 0; i < 25000; ++i) lines += std::to_string(i) + " 0 0 2 0 0 0 1\n";
+  EXPECT_THAT(notes(playing(lines)), ElementsAre(HasSubstr("in 8334 of 8334 poses looked at of dive.tum")));
+}
+
+// ---- a running daemon
+
+TEST(Plausibility, TheLastPoseIsJudgedAgainWhenTheSceneChanges) {
+  const Config config = config_with("");
+  Scene elsewhere = bed_scene();
+  elsewhere.objects[0].in_world.position_m.x = 500;
+  Plausibility plausibility;
+  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty());
+  control::PoseSample sample;
+  sample.name = "rov", sample.pose.position_m = {480, 0, -3};
+  EXPECT_THAT(texts_of(plausibility.use(sample)), ElementsAre(HasSubstr("m from everything in the scene")));
+  EXPECT_THAT(plausibility.use(config, elsewhere), IsEmpty());
+  EXPECT_THAT(plausibility.all(), IsEmpty());
+  sample.pose.position_m = {480, 0, -9};
+  EXPECT_EQ(plausibility.use(sample).size(), 1u) << "below that ground";
+  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "far away again: said before";
+  EXPECT_THAT(texts_of(plausibility.all()), ElementsAre(HasSubstr("m from everything in the scene")));
+}
+
+TEST(Plausibility, AboveTheWaterAndBelowTheGroundAreTwoMistakes) {
+  Plausibility plausibility;
+  EXPECT_THAT(plausibility.use(config_with(""), bed_scene()), IsEmpty());
+  control::PoseSample sample;
+  sample.name = "rov", sample.pose.position_m = {0, 0, -30};
+  EXPECT_THAT(texts_of(plausibility.use(sample)), ElementsAre(HasSubstr("below the lowest point of the ground")));
+  sample.pose.position_m.z = 3;
+  EXPECT_THAT(texts_of(plausibility.use(sample)), ElementsAre(HasSubstr("above the water's surface")));
+}
+
+TEST(Plausibility, ATrajectoryIsJudgedAgainWhenTheSceneChanges) {
+  const Config config = playing("# frame: ENU_FLU\n0 480 0 -3 0 0 0 1\n");
+  Scene elsewhere = bed_scene();
+  elsewhere.objects[0].in_world.position_m.x = 500;
+  Plausibility plausibility;
+  EXPECT_THAT(plausibility.use(config, elsewhere), IsEmpty());
+  EXPECT_EQ(plausibility.use(config, bed_scene()).size(), 1u);
+  EXPECT_EQ(plausibility.all().size(), 1u);
+  EXPECT_THAT(plausibility.use(config, elsewhere), IsEmpty());
+  EXPECT_THAT(plausibility.all(), IsEmpty());
+}
+
+struct RunningNotes : ::testing::Test {
+  void send(const std::string& pose) {
+    const std::uint64_t before = daemon.status().poses.accepted;
+    send_udp(daemon.address(), daemon.app().poses().json().port, bytes_of(pose));
+    ASSERT_TRUE(eventually([&] { return daemon.status().poses.accepted > before; }));
+  }
+  std::size_t times_logged(const std::string& words) {
+    const std::string log = daemon.log_text();
+    std::size_t times = 0;
+    for (std::size_t i = log.find(words); i != std::string::npos; i = log.find(words, i + 1)) ++times;
+    return times;
+  }
+  Daemon daemon;
+};
+
+TEST_F(RunningNotes, APoseAboveTheWaterIsLoggedOnceAndInTheStatusWhileItHolds) {
+  EXPECT_THAT(daemon.status().notes, IsEmpty());
+  for (int i = 0; i < 5; ++i) send(R"({"position":[0,0,-3],"attitude":[0,0,0]})");  // ENU's z, with NED's frame
+  EXPECT_EQ(times_logged("the sonar of rov is 3.0 m above the water's surface"), 1u);
+  const auto notes = daemon.status().notes;
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0].vehicle, "rov");
+  EXPECT_THAT(notes[0].cure, HasSubstr("say the frame that was sent"));
+  send(R"({"position":[0,0,3],"attitude":[0,0,0]})");
+  EXPECT_THAT(daemon.status().notes, IsEmpty());
+  send(R"({"position":[0,0,-4],"attitude":[0,0,0]})");
+  EXPECT_EQ(times_logged("above the water's surface"), 1u) << "once";
+  EXPECT_EQ(daemon.status().notes.size(), 1u);
+}
+
+TEST_F(RunningNotes, DegreesSentAsRadians) {
+  send(R"({"position":[0,0,3],"attitude":[0,0,7.1]})");  // a heading that is counted on after a whole turn
+  EXPECT_THAT(daemon.status().notes, IsEmpty());
+  send(R"({"position":[0,0,3],"attitude":[0,-10,-90]})");
+  EXPECT_THAT(
+      texts_of(daemon.status().notes),
+      ElementsAre("the attitude of rov has an angle of 90 rad; angles are radians there: were degrees sent? Multiply them by "
+                  "0.0174533"));
+  send(R"({"position":[0,0,3],"quaternion":[0,0.9848077530122081,0.17364817766693033,0]})");
+  EXPECT_THAT(texts_of(daemon.status().notes), ElementsAre(HasSubstr("rov is upside down, 180 deg from upright")));
+}
+
+TEST(StartNotes, OfTheConfigurationAreLoggedAtTheStartAndGiveWayToPoses) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    mount: {frame: FLU, xyz_m: [0, 0, 4], rpy_deg: [180, 0, 0]}\n";
+  Daemon daemon(setup);
+  EXPECT_THAT(daemon.log_text(),
+              AllOf(HasSubstr("sonar front is mounted upside down on rov"), HasSubstr("1.0 m above the water")));
+  EXPECT_EQ(daemon.status().notes.size(), 2u);
+  send_udp(daemon.address(), daemon.app().poses().json().port, bytes_of(R"({"position":[0,0,6],"attitude":[0,0,0]})"));
+  EXPECT_TRUE(eventually([&] { return daemon.status().notes.size() == 1; })) << "where it started counts no more";
+}
+
+TEST(MavlinkNotes, ALinkWithoutUsablePosesIsInTheStatusUntilTheyCome) {
+  DaemonSetup setup;
+  setup.more = "poses: {protobuf: off, json: off, mavlink: 'udpin:" + setup.address + ":0'}\n";
+  Daemon daemon(setup);
+  const auto note = [&] {
+    const auto notes = daemon.status().notes;
+    return notes.empty() ? control::Note{} : notes.front();
+  };
+  EXPECT_EQ(note().vehicle, "rov");
+  EXPECT_THAT(note().text, HasSubstr("no poses yet: no message received"));
+  const std::uint16_t port = daemon.app().mavlink().listens_at(0).port;
+  mavlink::Identity autopilot{1, 1, 0};
+  mavlink::Attitude attitude;
+  attitude.boot_ms = 1000;
+  send_udp(daemon.address(), port, framed(attitude, autopilot));
+  EXPECT_TRUE(eventually([&] { return note().text.find("a position is missing (LOCAL_POSITION_NED") != std::string::npos; }));
+  mavlink::LocalPositionNed place;
+  place.boot_ms = 1000, place.down_m = 3;
+  send_udp(daemon.address(), port, framed(place, autopilot));
+  EXPECT_TRUE(eventually([&] { return daemon.status().notes.empty(); }));
+}
+
+}  // namespace
+}  // namespace sonar::testing_daemon

@@ -1,0 +1,212 @@
+// What strangers may cost: places of the whole daemon, bytes a second, and accounts that balance whatever they do.
+#include <gmock/gmock.h>
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "daemon/server/connections/admission.hpp"
+#include "daemon/server/system/real_time.hpp"
+#include "tests/daemon/server/loopback.hpp"
+
+namespace sonar::testing_daemon {
+namespace {
+
+using oculus::PingRate;
+using ::testing::HasSubstr;
+
+std::size_t count(const std::string& text, const std::string& what) {
+  std::size_t found = 0;
+  for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++found;
+  return found;
+}
+
+TEST(Limits, PlacesOfTheWholeDaemonCountThoseWhoWaitToo) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 1, when_full: queue}\n";
+  setup.more = "limits: {clients: 2}\n";
+  Daemon daemon(setup);
+  auto served = std::make_unique<Client>(daemon.address());
+  served->fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(served->next_ping());
+  Client waits(daemon.address());
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("client waits for a place") != std::string::npos; }));
+  for (int i = 0; i < 3; ++i) {
+    Client newcomer(daemon.address());
+    EXPECT_TRUE(newcomer.read_to_end());
+    EXPECT_EQ(newcomer.bytes_read, 0u);
+  }
+  EXPECT_EQ(count(daemon.log_text(), "all places taken"), 1u) << "said once";
+  ASSERT_TRUE(served->next_ping());
+  served->close();
+  waits.fire(fire_at(PingRate::hz40));
+  EXPECT_TRUE(waits.next_ping());
+  Client queued(daemon.address());
+  EXPECT_FALSE(queued.next(milliseconds(200)));
+  EXPECT_FALSE(queued.ended) << "the place of the one that left is free";
+  daemon.stop();
+  EXPECT_EQ(daemon.figures().refused_clients, 3u);
+}
+
+TEST(Limits, AClientThatSendsTooMuchIsReadSlowlyAndLosesNothing) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 2}\n";
+  setup.more = "limits: {input_bytes_per_s: 8192}\n";
+  Daemon daemon(setup);
+  Client talks(daemon.address()), neighbour(daemon.address());
+  neighbour.fire(fire_at(PingRate::hz40, 2));
+  ASSERT_TRUE(neighbour.next_ping());
+  const auto begin = Steady::now();
+  talks.send(std::string(40000, 'x'));  // 5 s worth, of which a second's may come at once
+  talks.fire(fire_at(PingRate::hz40, 3));
+  oculus::PingSequence ids;
+  while (true) {
+    const auto ping = neighbour.next_ping();
+    ASSERT_TRUE(ping);
+    EXPECT_THAT(ids.add(*ping), ::testing::IsEmpty());
+    if (ping->head.fixed.fire.range == 3) break;
+    ASSERT_LT(Steady::now() - begin, patience);
+  }
+  EXPECT_GT(Steady::now() - begin, milliseconds(2000));
+  EXPECT_EQ(ids.skipped_ids(), 0u) << "the neighbour does not notice";
+}
+
+TEST(Limits, AccountsBalanceWhateverClientsDo) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 3}\n";
+  Daemon daemon(setup);
+  Client stays(daemon.address());
+  Client never_reads(daemon.address(), 52100, 16384);
+  auto fire = fire_at(PingRate::hz40, 4);
+  fire.settings.flags |= oculus::flag::beams_512;
+  stays.fire(fire);
+  for (int i = 0; i < 10; ++i) {
+    Client leaves(daemon.address());
+    ASSERT_TRUE(leaves.next());
+    ASSERT_TRUE(stays.next_ping());
+    i % 2 == 0 ? leaves.reset() : leaves.close();
+  }
+  never_reads.reset();
+  std::thread reader([&] { EXPECT_TRUE(stays.read_to_end()); });
+  EXPECT_EQ(daemon.stop(), 0);
+  reader.join();
+  const DeviceFigures f = daemon.figures();
+  EXPECT_EQ(f.ticks, f.pings + f.skipped_ticks);
+  EXPECT_EQ(f.waiting, 0u);
+  EXPECT_GT(f.sent, 0u);
+  EXPECT_EQ(f.offered, f.sent + f.dropped);
+  EXPECT_EQ(f.latency.count(), f.sent);
+  EXPECT_EQ(f.simulation.count(), f.pings);
+  EXPECT_GE(f.bytes_written, stays.bytes_read);
+}
+
+TEST(Limits, TheLastDescriptorsAreNotForClients) {
+  rlimit was{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &was), 0);
+  const int next = ::open("/dev/null", O_RDONLY);  // the number that the next socket would have
+  ::close(next);
+  rlimit low = was;
+  low.rlim_cur = static_cast<rlim_t>(next) + 40;
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &low), 0);
+  LimitConfig limits;
+  limits.spare_descriptors = 30;
+  std::string said;
+  LogOptions options;
+  options.sink = [&](LogLevel, const std::string& line) { said += line; };
+  Log log(options);
+  Admission admission(limits, log);
+  asio::io_context io;
+  std::vector<tcp::socket> sockets;
+  std::vector<Admission::Place> places;
+  int refused = 0;
+  for (int i = 0; i < 25; ++i) {
+    sockets.emplace_back(io, tcp::v4());
+    places.push_back(admission.enter(sockets.back()));
+    refused += places.back() ? 0 : 1;
+  }
+  EXPECT_GE(refused, 10);
+  EXPECT_LT(refused, 25);
+  EXPECT_EQ(admission.now() + static_cast<std::uint64_t>(refused), 25u);
+  EXPECT_EQ(admission.refused_for_descriptors(), static_cast<std::uint64_t>(refused));
+  EXPECT_EQ(count(said, "file descriptors run out"), 1u);
+  places.clear();
+  EXPECT_EQ(admission.now(), 0u);
+  setrlimit(RLIMIT_NOFILE, &was);
+}
+
+asio::awaitable<void> let_in(Admission& admission, tcp::acceptor& acceptor, Admission::Purpose purpose,
+                             std::vector<tcp::socket>& in) {
+  while (auto socket = co_await admission.next_visitor(acceptor, purpose)) in.push_back(*std::move(socket));
+}
+
+TEST(Limits, TheLastDescriptorsAreNotForPosesAndHalfOfThemForControl) {
+  LimitConfig limits;
+  limits.spare_descriptors = 30;
+  std::string said;
+  LogOptions options;
+  options.sink = [&](LogLevel, const std::string& line) { said += line; };
+  Log log(options);
+  Admission admission(limits, log);
+  asio::io_context io;
+  rlimit was{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &was), 0);
+  const auto visited = [&](Admission::Purpose purpose) {
+    tcp::acceptor acceptor(io, {asio::ip::make_address(own_address()), 0});
+    std::vector<tcp::socket> in, visitors;
+    asio::co_spawn(io, let_in(admission, acceptor, purpose, in), asio::detached);
+    const int next = ::open("/dev/null", O_RDONLY);
+    ::close(next);
+    rlimit low = was;
+    low.rlim_cur = static_cast<rlim_t>(next) + 40;
+    EXPECT_EQ(setrlimit(RLIMIT_NOFILE, &low), 0);
+    for (int i = 0; i < 20; ++i) {  // two descriptors each: ours and theirs
+      visitors.emplace_back(io);
+      visitors.back().connect(acceptor.local_endpoint());
+      io.restart();
+      io.poll();
+    }
+    setrlimit(RLIMIT_NOFILE, &was);
+    acceptor.close();
+    io.restart();
+    io.run();
+    return in.size();
+  };
+  const std::size_t poses = visited(Admission::Purpose::client), control = visited(Admission::Purpose::control);
+  EXPECT_GT(poses, 0u);
+  EXPECT_LE(poses, 10u);
+  EXPECT_GT(control, poses);
+  EXPECT_LE(control, 14u);
+  EXPECT_EQ(admission.refused_for_descriptors(), 40 - poses - control);
+  EXPECT_EQ(count(said, "file descriptors run out"), 1u);
+}
+
+TEST(Threads, ThatComputeAreNiceAndSoAreThoseTheyStart) {
+  int own = 0, started = 0;
+  const auto niceness = [] { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); };
+  const int here = niceness();
+  compute_apart([&] {
+    own = niceness();
+    std::thread([&] { started = niceness(); }).join();
+  });
+  EXPECT_EQ(own, std::min(here + compute_niceness, 19));
+  EXPECT_EQ(started, own);
+  EXPECT_EQ(niceness(), here);
+  EXPECT_THROW(compute_apart([] { throw std::runtime_error("no"); }), std::runtime_error);
+}
+
+TEST(Threads, RealTimeIsTakenOrTheRefusalSaysWhatToDo) {
+  std::thread([] {  // of its own: the test's stays as it is
+    const std::string why = schedule_in_real_time(1);
+    if (why.empty()) {
+      EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_FIFO);
+      std::thread([] { EXPECT_EQ(sched_getscheduler(0), SCHED_OTHER); }).join();
+    } else {
+      EXPECT_THAT(why, HasSubstr("LimitRTPRIO=1"));
+      EXPECT_THAT(why, HasSubstr("setcap cap_sys_nice+ep"));
+    }
+  })
+      .join();
+}
+
+}  // namespace
+}  // namespace sonar::testing_daemon

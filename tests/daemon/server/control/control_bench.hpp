@@ -1,0 +1,126 @@
+// A control server with a fake daemon behind it, in a thread of its own, and clients with deadlines: what the loopback tests of
+// the stream and of HTTP share.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "daemon/server/control/control_server.hpp"
+#include "tests/daemon/server/loopback.hpp"
+
+namespace sonar::testing_daemon {
+
+/// Remembers what it was asked; tests say what it answers, and when. I/O thread only, but for what is marked.
+class FakeOperations final : public Operations {
+ public:
+  void perform(const control::Operation& operation, const Sender& sender, Done done) override {
+    ++asked;
+    last_sender = sender;
+    if (std::holds_alternative<control::GetStatus>(operation)) {
+      control::DaemonStatus status;
+      status.version = "fake";
+      done({OperationResult::Code::done, "", status});
+    } else if (const auto* load = std::get_if<control::LoadScene>(&operation)) {
+      if (load->path == "later") return later.push_back(std::move(done));
+      if (load->path == "throw") throw std::runtime_error("no such luck");
+      done({OperationResult::Code::failed, "no such scene: " + load->path, {}});
+    } else if (const auto* sonar = std::get_if<control::SetSonar>(&operation); sonar != nullptr && sonar->sonar == "unknown") {
+      done({OperationResult::Code::refused, "there is no sonar \"unknown\"", {}});
+    } else {
+      done({});
+    }
+  }
+  std::string metrics() const override { return "# TYPE sonard_up gauge\nsonard_up 1\n"; }
+  std::string problem() const override { return in_trouble ? "the engine hangs" : ""; }
+
+  std::atomic<int> asked{0};            // from any thread
+  std::atomic<bool> in_trouble{false};  // likewise
+  std::vector<Done> later;
+  Sender last_sender;
+};
+
+class ControlBench {
+ public:
+  explicit ControlBench(ControlConfig wanted = {}, LimitConfig wanted_limits = {})
+      : config(std::move(wanted)), limits(wanted_limits) {
+    const Ipv4 ip = *parse_ipv4(address);
+    config.stream.at = config.http.at = {ip, 0};
+    LogOptions options;
+    options.sink = [this](LogLevel, const std::string& line) {
+      std::lock_guard lock(log_mutex_);
+      log_text_ += line + "\n";
+    };
+    log_ = std::make_unique<Log>(options);
+    intake_ = std::make_unique<PoseIntake>(world, clock_, *log_, [] {});
+    admission_ = std::make_unique<Admission>(limits, *log_);
+    server = std::make_unique<ControlServer>(io, config, limits, *admission_, operations, events, *intake_, *log_);
+    const auto opened = server->open();
+    if (!opened) throw std::runtime_error(opened.error().text);
+    server->start();
+    thread_ = std::thread([this] { io.run(); });
+  }
+  ~ControlBench() { stop(); }
+  /// As App does; run() then returns by itself, or the test hangs here.
+  void stop() {
+    asio::post(io, [this] { server->stop(); });
+    if (thread_.joinable()) thread_.join();
+  }
+  std::string log_text() {
+    std::lock_guard lock(log_mutex_);
+    return log_text_;
+  }
+  /// On the I/O thread, and waits for it.
+  template <class Work>
+  void on_io(Work&& work) {
+    std::atomic<bool> done{false};
+    asio::post(io, [&] {
+      work();
+      done = true;
+    });
+    EXPECT_TRUE(eventually([&] { return done.load(); }));
+  }
+  std::uint16_t stream_port() const { return server->stream().port; }
+  std::uint16_t http_port() const { return server->http().port; }
+
+  std::string address = own_address();
+  asio::io_context io{1};
+  ControlConfig config;
+  LimitConfig limits;
+  FakeOperations operations;
+  Events events;
+  World world{PoseRules{}, {{"rov", {}, false}}, {}, Time{}};
+  std::unique_ptr<ControlServer> server;
+
+ private:
+  const Clock clock_{false};
+  std::mutex log_mutex_;
+  std::string log_text_;
+  std::unique_ptr<Log> log_;
+  std::unique_ptr<PoseIntake> intake_;
+  std::unique_ptr<Admission> admission_;
+  std::thread thread_;
+};
+
+inline control::Event ping_event(std::uint32_t number) {
+  control::PingEvent ping;
+  ping.sonar = "front";
+  ping.number = number;
+  return {ping, 0};
+}
+
+/// A file with a token, for as long as it lives.
+struct TokenFile {
+  static constexpr const char* text = "0123456789abcdef-lab";
+  std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / ("control-token-" + own_address());
+  TokenFile() {
+    std::ofstream(path) << text << "\n";
+    std::filesystem::permissions(path, std::filesystem::perms::owner_read);
+  }
+  ~TokenFile() { std::filesystem::remove(path); }
+};
+
+}  // namespace sonar::testing_daemon

@@ -1,0 +1,179 @@
+// What senders of poses by TCP may cost: bytes a second, turns, places, and the connection when they speak something else.
+#include <gmock/gmock.h>
+
+#include <list>
+
+#include "tests/daemon/server/loopback.hpp"
+
+namespace sonar::testing_daemon {
+namespace {
+
+using oculus::PingRate;
+using ::testing::HasSubstr;
+
+struct PoseLimits : ::testing::Test {
+  /// `limits`: "input_bytes_per_s: 16384"
+  void begin(const std::string& limits) {
+    DaemonSetup setup;
+    setup.vehicle_lines = "  - {name: boat}\n";
+    setup.sonar_lines = "    vehicle: rov\n";
+    setup.more = "limits: {" + limits + "}\nposes: {protobuf: off, json: '" + setup.address + ":0'}\n";
+    daemon.emplace(setup);
+    port = daemon->app().poses().json().port;
+  }
+  static std::string line_at_x(int x, const std::string& vehicle = "rov") {
+    return "{\"position\":[0," + std::to_string(x) + ",3],\"attitude\":[0,0,0],\"vehicle\":\"" + vehicle + "\"}\n";
+  }
+  static std::string lines(std::size_t bytes) {
+    std::string text;
+    while (text.size() < bytes) text += line_at_x(1);
+    return text;
+  }
+  std::uint64_t heard() {
+    const control::PoseFigures p = daemon->status().poses;
+    return p.accepted + p.refused + p.late + p.replaced + p.over_rate;
+  }
+  bool is_at_x(int x, std::size_t vehicle = 0, milliseconds timeout = patience) {
+    return eventually([&] { return daemon->status().vehicles.at(vehicle).in_world.position_m.x == x; }, timeout);
+  }
+  /// Comes again until it is let in: there may be nobody yet who has to go. `meanwhile` is done before each time.
+  bool a_newcomer_moves_the_boat(const std::function<void()>& meanwhile = [] {}) {
+    return eventually([&] {
+      meanwhile();
+      Client late(daemon->address(), port);
+      late.send(line_at_x(22, "boat"));
+      return is_at_x(22, 1, milliseconds(300));
+    });
+  }
+  std::optional<Daemon> daemon;
+  std::uint16_t port = 0;
+};
+
+TEST_F(PoseLimits, OneThatSendsTooMuchIsReadSlowly) {
+  begin("input_bytes_per_s: 16384");
+  Client sender(daemon->address(), port);
+  const auto started = Steady::now();
+  sender.send(lines(200000));  // about 3800
+  std::this_thread::sleep_for(milliseconds(1000));
+  const double lines_heard = static_cast<double>(heard());
+  const double most_bytes = 16384 * (1 + std::chrono::duration<double>(Steady::now() - started).count());
+  EXPECT_GT(lines_heard, 100);
+  EXPECT_LT(lines_heard * 50, most_bytes + 8192);
+  EXPECT_THAT(daemon->log_text(), HasSubstr("limits.input_bytes_per_s"));
+}
+
+TEST_F(PoseLimits, ManyTogetherAreReadSlowlyAndTheirEndChangesNothing) {
+  begin("pose_bytes_per_s: 16384");
+  const auto started = Steady::now();
+  for (int i = 0; i < 8; ++i) Client(daemon->address(), port).send(lines(40000));  // and gone
+  std::this_thread::sleep_for(milliseconds(1000));
+  const double lines_heard = static_cast<double>(heard());
+  const double most_bytes = 16384 * (1 + std::chrono::duration<double>(Steady::now() - started).count());
+  EXPECT_GT(lines_heard, 100);
+  EXPECT_LT(lines_heard * 50, most_bytes + 8 * 8192);
+}
+
+TEST_F(PoseLimits, ThoseBehindGiveTheirPlacesToNewcomers) {
+  begin("pose_bytes_per_s: 262144");
+  std::list<Client> flood;
+  for (int i = 0; i < 32; ++i) {
+    flood.emplace_back(daemon->address(), port);
+    flood.back().send(lines(300000));
+  }
+  EXPECT_TRUE(a_newcomer_moves_the_boat());
+  EXPECT_THAT(daemon->log_text(), HasSubstr("beyond the limits, for longest, and its place was needed"));
+}
+
+TEST_F(PoseLimits, ThoseWhoSendNoPosesGiveTheirPlacesToNewcomers) {
+  begin("");
+  std::list<Client> idle;
+  for (int i = 0; i < 32; ++i) idle.emplace_back(daemon->address(), port);
+  EXPECT_TRUE(a_newcomer_moves_the_boat([&] {
+    for (Client& c : idle) c.send("\n{}\n");
+  }));
+}
+
+TEST_F(PoseLimits, AFloodCostsOthersNeitherPingsNorTime) {
+  begin("pose_bytes_per_s: 131072");
+  Client driver(daemon->address()), friendly(daemon->address(), port);
+  driver.fire(fire_at(PingRate::hz2));
+  const auto first = driver.next_ping();
+  ASSERT_TRUE(first);
+  std::thread pings([&] {
+    for (std::uint32_t i = 1; i <= 6; ++i) {
+      const auto ping = driver.next_ping();
+      if (!ping) return ADD_FAILURE() << "no ping";
+      EXPECT_EQ(ping->head.fixed.ping_id, first->head.fixed.ping_id + i) << "no ping is skipped";
+    }
+  });
+  std::list<Client> flood;
+  for (int i = 0; i < 31; ++i) {
+    flood.emplace_back(daemon->address(), port);
+    flood.back().send(lines(300000));
+  }
+  const auto begin = Steady::now();
+  for (int x = 100; x <= 2000; x += 100) {  // jumps: nothing is interpolated
+    friendly.send(line_at_x(x, "boat"));
+    EXPECT_TRUE(is_at_x(x, 1, std::chrono::seconds(5))) << x;
+  }
+  EXPECT_LT(Steady::now() - begin, std::chrono::seconds(5)) << "in turn with the flood each would wait for some 100 ms and more";
+  pings.join();
+}
+
+TEST_F(PoseLimits, JsonThatIsNotQuiteIsRefusedAndTheConnectionGoesOn) {
+  begin("");
+  const std::string nan = "{\"position\":[0,0,NaN],\"attitude\":[0,0,0]}\n";
+  std::string seven;
+  for (int i = 0; i < 7; ++i) seven += nan;
+  Client friendly(daemon->address(), port);
+  friendly.send("\xef\xbb\xbf" + line_at_x(300));
+  EXPECT_TRUE(is_at_x(300)) << "after a byte order mark";
+  friendly.send(seven + line_at_x(400));
+  EXPECT_TRUE(is_at_x(400));
+  friendly.send("{\"imu\":\"" + std::string(6000, 'x') + "\"}\n" + seven.substr(0, 6 * nan.size()) + line_at_x(500));
+  EXPECT_TRUE(is_at_x(500)) << "a long line is one of them";
+  EXPECT_EQ(daemon->status().poses.refused, 14u);
+  friendly.send(seven + nan + line_at_x(600));
+  friendly.read_to_end();
+  EXPECT_TRUE(friendly.ended) << "eight in a row";
+  EXPECT_EQ(daemon->status().poses.refused, 22u);
+  EXPECT_EQ(daemon->status().poses.accepted, 3u);
+}
+
+TEST_F(PoseLimits, APageOfTheWebMovesNothing) {
+  begin("");
+  const std::string body = line_at_x(44);
+  const std::string request =
+      "POST /x HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/plain\r\nContent-Length: " + std::to_string(body.size()) +
+      "\r\n\r\n" + body;
+  for (const std::string& page : {request, std::string("POS"), "\n" + body + "nonsense\n" + line_at_x(45)}) {
+    Client stranger(daemon->address(), port);
+    stranger.send(page);
+    stranger.read_to_end();
+    EXPECT_TRUE(stranger.ended) << page;
+    EXPECT_EQ(stranger.bytes_read, 0u);
+  }
+  EXPECT_THAT(daemon->log_text(), HasSubstr("pose connection closed: not JSON"));
+  EXPECT_EQ(daemon->status().poses.accepted, 1u) << "the line before the nonsense of the third";
+  EXPECT_EQ(daemon->status().poses.refused, 3u);
+  Client friendly(daemon->address(), port);
+  friendly.send("{\"no\":\"pose\"}\n" + line_at_x(7));
+  EXPECT_TRUE(is_at_x(7)) << "JSON that is no pose is refused, and costs the connection nothing";
+}
+
+TEST_F(PoseLimits, ABadLineOfADatagramCostsTheOthersNothing) {
+  begin("");
+  send_udp(daemon->address(), port, bytes_of(line_at_x(1) + "nonsense\n{\"position\":NaN}\n" + line_at_x(2)));
+  EXPECT_TRUE(is_at_x(2));
+  EXPECT_EQ(daemon->status().poses.refused, 2u);
+}
+
+TEST_F(PoseLimits, ADatagramHasSoManyLines) {
+  begin("");
+  send_udp(daemon->address(), port, bytes_of(lines(60000)));
+  EXPECT_TRUE(eventually([&] { return daemon->log_text().find("at most 64 lines") != std::string::npos; }));
+  EXPECT_EQ(heard(), 65u) << "and one refusal for the rest";
+}
+
+}  // namespace
+}  // namespace sonar::testing_daemon

@@ -1,0 +1,344 @@
+// Several clients, slow ones, dead ones, and the end of the daemon: nobody disturbs anybody, nothing is cut.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+#include "tests/daemon/server/loopback.hpp"
+
+namespace sonar::testing_daemon {
+namespace {
+
+using oculus::PingRate;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// Large pings: 512 beams, 32 bit, about 1.4 MB, so that kernel buffers fill within a second.
+oculus::FireRequest large_fire(PingRate rate) {
+  auto fire = fire_at(rate, 4);
+  fire.version = 2;
+  fire.settings.flags |= oculus::flag::beams_512 | oculus::flag::row_gains;
+  fire.extension.flags = oculus::flag::extended_32_bit;
+  return fire;
+}
+
+bool is_served(Daemon& daemon) {
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  return client.next_ping(milliseconds(500)).has_value();
+}
+
+TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 2}\n    outbox: {depth: 3}\n";
+  Daemon daemon(setup);
+  Client healthy(daemon.address());
+  Client slow(daemon.address(), 52100, 16384);
+  healthy.fire(large_fire(PingRate::hz10));
+  oculus::PingSequence healthy_ids;
+  std::uint32_t last = 0;
+  for (int i = 0; i < 25; ++i) {
+    const auto ping = healthy.next_ping();
+    ASSERT_TRUE(ping);
+    EXPECT_THAT(ping->violations, IsEmpty());
+    EXPECT_THAT(healthy_ids.add(*ping), IsEmpty());
+    last = ping->head.fixed.ping_id;
+  }
+  EXPECT_EQ(healthy_ids.skipped_ids(), 0u) << "a stalled neighbour costs nothing";
+  // The slow one wakes up: old pings from the kernel's buffers, a gap, then the newest. Nothing cut, nothing mixed.
+  oculus::PingSequence slow_ids;
+  for (std::uint32_t id = 0; id < last;) {
+    const auto ping = slow.next_ping();
+    ASSERT_TRUE(ping);
+    EXPECT_THAT(ping->violations, IsEmpty());
+    EXPECT_THAT(slow_ids.add(*ping), IsEmpty());
+    EXPECT_EQ(ping->sample(1, 1) & 0xffu, FakeEngine::sample(ping->head.fixed.ping_id, 1, 1));
+    id = ping->head.fixed.ping_id;
+  }
+  EXPECT_GT(slow_ids.skipped_ids(), 0u);
+  EXPECT_EQ(slow.decoder.skipped_bytes(), 0u);
+  daemon.stop();
+  EXPECT_GE(daemon.figures().dropped, slow_ids.skipped_ids());
+}
+
+/// What an engine that takes 60 ms a ping makes of 40 Hz: the requests of a dozen pings that a client got.
+std::vector<PingRequest> overloaded(const std::string& sonar_lines) {
+  DaemonSetup setup;
+  setup.sonar_lines = sonar_lines;
+  setup.engine_takes = milliseconds(60);
+  Daemon daemon(setup);
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  for (int i = 0; i < 12; ++i) EXPECT_TRUE(client.next_ping());
+  daemon.stop();
+  EXPECT_GT(daemon.figures().skipped.busy, 0u);
+  return daemon.requests();
+}
+
+TEST(Clients, SeeAnOverloadInThePingNumbersWhereThatIsAskedFor) {
+  std::vector<PingRequest> slow = overloaded(""), counted = overloaded("    overload: count\n");
+  ASSERT_GE(slow.size(), 12u);
+  ASSERT_GE(counted.size(), 12u);
+  for (std::size_t i = 0; i < 12; ++i) {
+    EXPECT_EQ(static_cast<std::uint32_t>(slow[i].number), i + 1);
+    const auto ticks = (counted[i].fired_at - counted[0].fired_at) / milliseconds(25);
+    EXPECT_EQ(static_cast<std::int64_t>(counted[i].number), ticks + 1) << "a number for every tick";
+  }
+  EXPECT_GT(static_cast<std::uint32_t>(counted[11].number), 24u);
+}
+
+TEST(Clients, OneThatTakesNothingIsReset) {
+  DaemonSetup setup;
+  setup.more = "limits: {stall_s: 0.3}\n";
+  Daemon daemon(setup);
+  Client stalled(daemon.address(), 52100, 16384);
+  stalled.fire(large_fire(PingRate::hz40));
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("took no byte for 300 ms") != std::string::npos; }));
+  Client next(daemon.address());
+  next.fire(fire_at(PingRate::hz10));
+  EXPECT_TRUE(next.next_ping()) << "its place is free again";
+  EXPECT_FALSE(stalled.read_to_end());
+  EXPECT_TRUE(stalled.was_reset);
+}
+
+TEST(Clients, OneWhoseComputerDiedInStandbyFreesItsPlace) {
+  DaemonSetup setup;
+  setup.more = "limits: {dead_peer_s: 3}\n";
+  setup.sonar_lines = "    options: {dummy_period_ms: 200}\n";
+  Daemon daemon(setup);
+  Client dead(daemon.address());
+  dead.fire(fire_at(PingRate::standby));
+  ASSERT_TRUE(dead.next());
+  dead.die();
+  EXPECT_TRUE(eventually([&] { return daemon.log_text().find("stopped reading and answering") != std::string::npos; }))
+      << "the kernel alone would try for a quarter of an hour";
+  Client next(daemon.address());
+  next.fire(fire_at(PingRate::hz10));
+  EXPECT_TRUE(next.next_ping());
+}
+
+/// Nothing is sent to it: dummies are far apart, so only the kernel's probes can find out.
+TEST(Clients, OneWhoseComputerDiedInSilenceFreesItsPlace) {
+  DaemonSetup setup;
+  setup.more = "limits: {dead_peer_s: 3}\n";
+  setup.sonar_lines = "    options: {dummy_period_ms: 60000}\n";
+  Daemon daemon(setup);
+  Client dead(daemon.address());
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("client connected") != std::string::npos; }));
+  dead.die();
+  EXPECT_TRUE(eventually([&] { return daemon.log_text().find("stopped reading and answering") != std::string::npos; }));
+}
+
+TEST(Clients, DeadOnesFreeTheirPlace) {
+  Daemon daemon;
+  for (int i = 0; i < 10; ++i) {
+    Client client(daemon.address());
+    client.fire(fire_at(PingRate::hz40));
+    ASSERT_TRUE(client.next_ping()) << "client " << i;
+    i % 2 == 0 ? client.reset() : client.close();
+    ASSERT_TRUE(eventually([&] { return is_served(daemon); })) << "client " << i;
+  }
+}
+
+TEST(Clients, PingIdsGoOnAcrossClientsAndSettingsDoNot) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    options: {dummy_period_ms: 30}\n";
+  Daemon daemon(setup);
+  std::uint32_t last = 0;
+  {
+    Client first(daemon.address());
+    first.fire(fire_at(PingRate::hz40));
+    for (int i = 0; i < 3; ++i) last = first.next_ping()->head.fixed.ping_id;
+  }
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("client gone") != std::string::npos; }));
+  Client second(daemon.address());
+  const auto message = second.next();
+  ASSERT_TRUE(message);
+  EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*message)) << "no pings before its own fire";
+  second.fire(fire_at(PingRate::hz10));
+  EXPECT_GT(second.next_ping()->head.fixed.ping_id, last);
+}
+
+/// The first thing `heir` is sent while a ping made for the client before it is still being computed.
+void expect_only_its_own_pings(Daemon& daemon, Client& heir) {
+  const std::size_t asked = daemon.requests().size();
+  const auto first = heir.next();
+  ASSERT_TRUE(first);
+  EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*first)) << "a ping of the client before it";
+  heir.fire(fire_at(PingRate::hz10, 3));
+  const auto ping = heir.next_ping();
+  ASSERT_TRUE(ping);
+  EXPECT_EQ(ping->head.fixed.fire.range, 3);
+  EXPECT_EQ(daemon.requests().at(asked - 1).settings.range_m, 2) << "the other one was under way, or this shows nothing";
+}
+
+TEST(Clients, APingUnderWayIsNotForTheNextClient) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    options: {dummy_period_ms: 600}\n";
+  setup.engine_takes = milliseconds(400);
+  Daemon daemon(setup);
+  auto first = std::make_unique<Client>(daemon.address());
+  first->fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(eventually([&] { return daemon.requests().size() == 2; }));
+  first.reset();
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("client gone") != std::string::npos; }));
+  Client second(daemon.address());
+  expect_only_its_own_pings(daemon, second);
+}
+
+TEST(Admission, TakingOverWhileAPingIsUnderWayDoesNotInheritIt) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 1, when_full: take_over}\n    options: {dummy_period_ms: 600}\n";
+  setup.engine_takes = milliseconds(400);
+  Daemon daemon(setup);
+  Client old(daemon.address());
+  old.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(eventually([&] { return daemon.requests().size() == 2; }));
+  Client heir(daemon.address());
+  expect_only_its_own_pings(daemon, heir);
+}
+
+TEST(Admission, CloseNewSendsTheSecondAFinAndNoByte) {
+  Daemon daemon;
+  Client first(daemon.address());
+  first.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(first.next_ping());
+  Client second(daemon.address());
+  second.fire(fire_at(PingRate::standby));  // bytes on their way must not turn the FIN into a reset
+  EXPECT_TRUE(second.read_to_end());
+  EXPECT_EQ(second.bytes_read, 0u);
+  oculus::PingSequence ids;
+  for (int i = 0; i < 5; ++i) EXPECT_THAT(ids.add(*first.next_ping()), IsEmpty());
+  EXPECT_EQ(ids.skipped_ids(), 0u) << "the first is undisturbed";
+  daemon.stop();
+  EXPECT_EQ(daemon.figures().refused_clients, 1u);
+}
+
+TEST(Admission, TakeOverEndsTheOldOneAtAMessageBoundary) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 1, when_full: take_over}\n";
+  Daemon daemon(setup);
+  Client old(daemon.address());
+  old.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(old.next_ping());
+  Client heir(daemon.address());
+  heir.fire(fire_at(PingRate::hz10));
+  EXPECT_TRUE(heir.next_ping());
+  EXPECT_TRUE(old.read_to_end());
+  EXPECT_EQ(old.decoder.buffered_bytes(), 0u);
+}
+
+TEST(Admission, QueueServesTheNextWhenAPlaceIsFree) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 1, when_full: queue}\n";
+  Daemon daemon(setup);
+  auto first = std::make_unique<Client>(daemon.address());
+  first->fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(first->next_ping());
+  Client second(daemon.address());
+  second.fire(fire_at(PingRate::hz10));
+  EXPECT_FALSE(second.next(milliseconds(200)));
+  EXPECT_FALSE(second.ended);
+  first.reset();
+  EXPECT_TRUE(second.next_ping()) << "and its fire message was kept";
+}
+
+TEST(Admission, WhoHangsUpWhileWaitingLosesThePlaceInTheQueue) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 1, when_full: queue}\n";
+  Daemon daemon(setup);
+  auto first = std::make_unique<Client>(daemon.address());
+  first->fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(first->next_ping());
+  for (int i = 0; i < 40; ++i) {  // more than may wait; what they sent lies before the end of their streams
+    Client leaves(daemon.address());
+    leaves.fire(fire_at(PingRate::hz40, 2));
+  }
+  Client stays(daemon.address());
+  stays.fire(fire_at(PingRate::hz40, 3));
+  EXPECT_FALSE(stays.next(milliseconds(200)));
+  EXPECT_FALSE(stays.ended);
+  EXPECT_TRUE(eventually([&] {
+    std::uint64_t queued = 0;
+    daemon.on_io_thread([&] { queued = daemon.figures().clients_queued; });
+    return queued == 1;
+  }));
+  first.reset();
+  const auto ping = stays.next_ping();
+  ASSERT_TRUE(ping);
+  EXPECT_EQ(ping->head.fixed.fire.range, 3) << "nobody who had gone was asked";
+}
+
+TEST(Admission, TheLastFireWinsAmongSeveral) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 3}\n";
+  Daemon daemon(setup);
+  Client a(daemon.address()), b(daemon.address());
+  a.fire(fire_at(PingRate::hz40, 2));
+  ASSERT_TRUE(a.next_ping());
+  ASSERT_TRUE(b.next_ping()) << "pings go to all";
+  b.fire(fire_at(PingRate::hz40, 3));
+  ASSERT_TRUE(eventually([&] { return a.next_ping()->head.fixed.fire.range == 3; }));
+  a.fire(fire_at(PingRate::hz40, 2));  // byte-identical to a's last, but no longer what the device does
+  EXPECT_TRUE(eventually([&] { return b.next_ping()->head.fixed.fire.range == 2; }));
+}
+
+TEST(Clients, AReconnectStormLeavesNothingBehind) {
+  const auto begin = Steady::now();
+  Daemon daemon;
+  for (int i = 0; i < 100; ++i) {
+    Client client(daemon.address());
+    if (i % 3 == 0) client.fire(fire_at(PingRate::hz40));
+    if (i % 2 == 0) client.reset();
+  }
+  EXPECT_TRUE(eventually([&] { return is_served(daemon); }));
+  const auto took = Steady::now() - begin;
+  const std::string log = daemon.log_text();
+  const auto lines = std::count(log.begin(), log.end(), '\n');
+  EXPECT_GE(lines, 5);
+  EXPECT_LE(lines, 20 + 3 * (took / std::chrono::seconds(1))) << "a storm of visitors is no flood of lines";
+}
+
+TEST(GracefulStop, ReadingClientsGetAWholeLastMessageAndStalledOnesAReset) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 2}\n";
+  Daemon daemon(setup);
+  Client healthy(daemon.address());
+  Client stalled(daemon.address(), 52100, 16384);
+  healthy.fire(large_fire(PingRate::hz15));
+  for (int i = 0; i < 12; ++i) ASSERT_TRUE(healthy.next_ping());
+  bool whole = false;
+  std::thread reader([&] { whole = healthy.read_to_end(); });
+  const auto begin = Steady::now();
+  EXPECT_EQ(daemon.stop(), 0);
+  const auto took = Steady::now() - begin;
+  reader.join();
+  EXPECT_TRUE(whole) << "FIN";
+  EXPECT_EQ(healthy.decoder.buffered_bytes(), 0u) << "no message was cut";
+  EXPECT_GE(took, milliseconds(1400)) << "the stalled one had its time";
+  EXPECT_LT(took, milliseconds(8000)) << "the promise is 2 s; this allows for a busy machine";
+  EXPECT_THAT(daemon.log_text(), HasSubstr("did not take its last message in time"));
+}
+
+TEST(GracefulStop, WithoutClientsItIsImmediate) {
+  Daemon daemon;
+  const auto begin = Steady::now();
+  EXPECT_EQ(daemon.stop(), 0);
+  EXPECT_LT(Steady::now() - begin, milliseconds(5000));
+}
+
+TEST(GracefulStop, ClientsThatCloseOnFinDoNotHoldItUp) {
+  Daemon daemon;
+  auto client = std::make_unique<Client>(daemon.address());
+  client->fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(client->next_ping());
+  std::thread reader([&] {
+    EXPECT_TRUE(client->read_to_end());
+    client.reset();
+  });
+  EXPECT_EQ(daemon.stop(), 0);
+  reader.join();
+  EXPECT_THAT(daemon.log_text(), HasSubstr("client gone: sonard stops"));
+}
+
+}  // namespace
+}  // namespace sonar::testing_daemon

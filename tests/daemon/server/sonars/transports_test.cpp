@@ -1,0 +1,277 @@
+// Every kind of port, served end to end by a sonar that no vendor makes: TCP streams, a beacon, datagrams that are answered,
+// pings as datagrams to receivers and to a multicast group, HTTP resources, and conversations across them.
+#include <gmock/gmock.h>
+
+#include <arpa/inet.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "daemon/config/addresses.hpp"
+#include "tests/daemon/server/loopback.hpp"
+#include "tests/daemon/server/sonars/made_up_vendor.hpp"
+
+namespace sonar::testing_daemon {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+DaemonSetup made_up(const std::string& more = {}) {
+  DaemonSetup setup;
+  setup.sonar_lines = "    clients: {max: 2}\n    status_to: ['127.0.0.1:0']\n" + more;
+  setup.edit_config = [](Config& config) {
+    config.sonars.front().profile = {&made_up_vendor(), made_up_vendor().models().front()};
+    config.sonars.front().options.clear();
+  };
+  return setup;
+}
+
+std::string text_of(const std::vector<std::byte>& bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
+
+class UdpSocket {
+ public:
+  explicit UdpSocket(const std::string& address = "127.0.0.1", std::uint16_t port = 0) {
+    fd_ = socket(AF_INET, SOCK_DGRAM, 0);
+    const int on = 1, room = 1 << 20;
+    setsockopt(fd_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &room, sizeof room);
+    sockaddr_in at = address_of(address, port);
+    if (bind(fd_, reinterpret_cast<sockaddr*>(&at), sizeof at) != 0) ADD_FAILURE() << "cannot bind " << address;
+    socklen_t size = sizeof at;
+    getsockname(fd_, reinterpret_cast<sockaddr*>(&at), &size);
+    port_ = ntohs(at.sin_port);
+  }
+  ~UdpSocket() { ::close(fd_); }
+  UdpSocket(const UdpSocket&) = delete;
+  UdpSocket& operator=(const UdpSocket&) = delete;
+
+  bool join(const std::string& group, const std::string& interface) {
+    ip_mreq wanted{};
+    inet_pton(AF_INET, group.c_str(), &wanted.imr_multiaddr);
+    inet_pton(AF_INET, interface.c_str(), &wanted.imr_interface);
+    return setsockopt(fd_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &wanted, sizeof wanted) == 0;
+  }
+  void send(const std::string& text, const std::string& address, std::uint16_t port) {
+    const sockaddr_in to = address_of(address, port);
+    sendto(fd_, text.data(), text.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+  }
+  /// Empty at the deadline.
+  std::string next(milliseconds timeout = patience) {
+    pollfd p{fd_, POLLIN, 0};
+    if (poll(&p, 1, static_cast<int>(timeout.count())) <= 0) return {};
+    std::string bytes(65536, '\0');
+    sockaddr_in from{};
+    socklen_t size = sizeof from;
+    const auto n = recvfrom(fd_, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
+    bytes.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
+    std::array<char, INET_ADDRSTRLEN> ip{};
+    inet_ntop(AF_INET, &from.sin_addr, ip.data(), ip.size());
+    sender = std::string(ip.data()) + ":" + std::to_string(ntohs(from.sin_port));
+    return bytes;
+  }
+  std::uint16_t port() const { return port_; }
+  std::string at() const { return "127.0.0.1:" + std::to_string(port_); }
+  std::string sender;  // of the last datagram
+
+ private:
+  static sockaddr_in address_of(const std::string& address, std::uint16_t port) {
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_port = htons(port);
+    inet_pton(AF_INET, address.c_str(), &at.sin_addr);
+    return at;
+  }
+  int fd_ = -1;
+  std::uint16_t port_ = 0;
+};
+
+struct Part {
+  unsigned ping = 0, part = 0, parts = 0;
+  std::string samples;
+};
+Part part_of(const std::string& datagram) {
+  Part part;
+  EXPECT_EQ(std::sscanf(datagram.c_str(), "PING %u %u %u", &part.ping, &part.part, &part.parts), 3) << datagram;
+  part.samples = datagram.substr(datagram.find('\n') + 1);
+  return part;
+}
+
+/// The samples of the next whole ping.
+std::string next_ping(UdpSocket& from, unsigned* number = nullptr) {
+  Part part = part_of(from.next());
+  while (part.part != 0) part = part_of(from.next());
+  const unsigned ping = part.ping;
+  std::string samples = part.samples;
+  while (part.part + 1 < part.parts) {
+    const Part next = part_of(from.next());
+    EXPECT_EQ(next.ping, ping) << "pings are not mixed";
+    EXPECT_EQ(next.part, part.part + 1);
+    if (next.ping != ping) return {};
+    samples += next.samples;
+    part = next;
+  }
+  if (number != nullptr) *number = ping;
+  return samples;
+}
+
+std::string pattern(unsigned ping, std::size_t rows = 100, std::size_t beams = 32) {
+  std::string samples;
+  for (std::size_t r = 0; r < rows; ++r)
+    for (std::size_t b = 0; b < beams; ++b) samples += static_cast<char>(FakeEngine::sample(ping, r, b));
+  return samples;
+}
+
+std::string ask(Client& client, const std::string& line) {
+  client.send(line + "\n");
+  return text_of(client.read_raw(3));
+}
+
+TEST(Transports, ATcpCommandNamesAReceiverOfDatagramsUntilItsConnectionEnds) {
+  Daemon daemon(made_up());
+  UdpSocket receiver, silent;
+  auto client = std::make_unique<Client>(daemon.address(), command_port);
+  EXPECT_EQ(ask(*client, "range 8"), "ok\n");
+  EXPECT_EQ(ask(*client, "receivers 0.0.0.0:" + std::to_string(receiver.port())), "ok\n") << "the host's own address";
+  unsigned ping = 0;
+  for (int i = 0; i < 3; ++i) {
+    const std::string samples = next_ping(receiver, &ping);
+    EXPECT_EQ(samples, pattern(ping));
+    EXPECT_EQ(receiver.sender, daemon.address() + ":" + std::to_string(udp_port));
+  }
+  EXPECT_EQ(daemon.requests().back().settings.range_m, 8);
+  client.reset();
+  EXPECT_TRUE(eventually([&] { return receiver.next(milliseconds(500)).empty(); })) << "its list of receivers ended with it";
+  EXPECT_EQ(silent.next(milliseconds(1)), "");
+  daemon.stop();
+  const DeviceFigures f = daemon.figures();
+  EXPECT_EQ(f.offered, f.sent + f.dropped);
+  EXPECT_EQ(f.latency.count(), f.sent);
+}
+
+TEST(Transports, ReceiversOfSeveralConnectionsGetTheSameDatagrams) {
+  Daemon daemon(made_up());
+  UdpSocket one, other;
+  Client first(daemon.address(), command_port), second(daemon.address(), command_port);
+  EXPECT_EQ(ask(first, "receivers " + one.at()), "ok\n");
+  EXPECT_EQ(ask(second, "receivers " + other.at() + " " + one.at()), "ok\n") << "each address once";
+  unsigned ping = 0, same = 0;
+  const std::string samples = next_ping(other, &ping);
+  EXPECT_EQ(samples, pattern(ping));
+  while (same < ping) next_ping(one, &same);
+  EXPECT_EQ(same, ping);
+  next_ping(one, &same);
+  EXPECT_GT(same, ping) << "not twice";
+}
+
+TEST(Transports, TwoTcpPortsHaveConversationsOfTheirOwn) {
+  Daemon daemon(made_up());
+  Client data(daemon.address(), data_port), commands(daemon.address(), command_port);
+  EXPECT_EQ(ask(commands, "jump"), "no: unknown command\n");
+  const std::string head = "PING ";
+  const std::string received = text_of(data.read_raw(2 * (3200 + 12)));
+  ASSERT_THAT(received, StartsWith(head));
+  unsigned ping = 0, size = 0;
+  ASSERT_EQ(std::sscanf(received.c_str(), "PING %u %u", &ping, &size), 2);
+  const std::size_t at = received.find('\n') + 1;
+  EXPECT_EQ(received.substr(at, size), pattern(ping));
+  EXPECT_THAT(received.substr(at + size), StartsWith(head + std::to_string(ping + 1)));
+  EXPECT_EQ(ask(commands, "range 3"), "ok\n") << "no ping came between";
+  EXPECT_EQ(daemon.status().sonars.front().listens, daemon.address() + ":15000");
+}
+
+TEST(Transports, DatagramsAreAnsweredAndSetTheDevicesOwnReceivers) {
+  Daemon daemon(made_up());
+  UdpSocket host;
+  host.send("who", daemon.address(), udp_port);
+  EXPECT_EQ(host.next(), "front 5\n");
+  EXPECT_EQ(host.sender, daemon.address() + ":" + std::to_string(udp_port));
+  host.send("fault", daemon.address(), udp_port);
+  host.send("range 7", daemon.address(), udp_port);
+  EXPECT_EQ(host.next(), "ok\n") << "a mistake in the vendor's code costs one datagram";
+  EXPECT_THAT(daemon.log_text(), HasSubstr("internal fault: a mistake in the vendor's code"));
+  host.send("receivers " + host.at(), daemon.address(), udp_port);
+  EXPECT_EQ(host.next(), "ok\n");
+  unsigned ping = 0;
+  const std::string samples = next_ping(host, &ping);
+  EXPECT_EQ(samples, pattern(ping));
+  host.send("receivers", daemon.address(), udp_port);
+  EXPECT_TRUE(eventually([&] { return host.next(milliseconds(500)).empty(); }));
+}
+
+TEST(Transports, TheBeaconSaysAtOnceThatAClientCameOrWent) {
+  Daemon daemon(made_up());
+  UdpSocket host("127.0.0.1", beacon_port);
+  auto client = std::make_unique<Client>(daemon.address(), command_port);
+  std::string status = host.next(milliseconds(2000));  // one from the start may wait
+  if (status == "front free") status = host.next(milliseconds(2000));
+  EXPECT_EQ(status, "front busy");
+  client.reset();
+  EXPECT_EQ(host.next(milliseconds(2000)), "front free");
+}
+
+TEST(Transports, AMulticastGroupReceivesWithoutAskingForIt) {
+  UdpSocket member("0.0.0.0", group_port);
+  const std::string interface = own_address();
+  if (!member.join(text::format_ipv4(group_ip), interface)) GTEST_SKIP() << "no multicast on the loopback interface here";
+  Daemon daemon(made_up());
+  const auto next = [&](milliseconds timeout) {
+    std::string number;
+    do number = member.next(timeout);
+    while (!number.empty() && !member.sender.starts_with(daemon.address() + ":"));  // tests beside this one send there too
+    return number;
+  };
+  const std::string first = next(milliseconds(3000));
+  if (first.empty()) GTEST_SKIP() << "multicast does not come back from the loopback interface here";
+  EXPECT_EQ(std::stoul(next(patience)), std::stoul(first) + 1);
+}
+
+std::string http(const std::string& address, const std::string& method, const std::string& path, const std::string& body = {}) {
+  Client client(address, http_port);
+  client.send(method + " " + path + " HTTP/1.1\r\nHost: sonar\r\nConnection: close\r\nContent-Length: " +
+              std::to_string(body.size()) + "\r\n\r\n" + body);
+  return text_of(client.read_raw(std::size_t{1} << 20));
+}
+std::string body_of(const std::string& answer) { return answer.substr(std::min(answer.find("\r\n\r\n") + 4, answer.size())); }
+
+TEST(Transports, HttpReadsAndChangesTheDevice) {
+  Daemon daemon(made_up());
+  const std::string& at = daemon.address();
+  EXPECT_EQ(body_of(http(at, "GET", "/range")), "5");
+  const std::string changed = http(at, "PUT", "/range", "7");
+  EXPECT_THAT(changed, StartsWith("HTTP/1.1 204 "));
+  EXPECT_EQ(body_of(changed), "");
+  EXPECT_THAT(changed, ::testing::Not(HasSubstr("Content-Length")));
+  EXPECT_EQ(body_of(http(at, "GET", "/range?unit=m")), "7");
+  EXPECT_THAT(http(at, "PUT", "/range", "-1"), StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(http(at, "GET", "/none"), StartsWith("HTTP/1.1 404 "));
+  const std::string wrong = http(at, "DELETE", "/range");
+  EXPECT_THAT(wrong, StartsWith("HTTP/1.1 405 "));
+  EXPECT_THAT(wrong, HasSubstr("Allow: GET, HEAD, PUT"));
+  EXPECT_THAT(http(at, "PUT", "/range", std::string(2u << 20, 'x')), StartsWith("HTTP/1.1 413 "));
+
+  UdpSocket receiver;
+  EXPECT_THAT(http(at, "PUT", "/receivers", receiver.at()), StartsWith("HTTP/1.1 204 "));
+  unsigned ping = 0;
+  const std::string samples = next_ping(receiver, &ping);
+  EXPECT_EQ(samples, pattern(ping));
+  EXPECT_EQ(daemon.requests().back().settings.range_m, 7);
+}
+
+TEST(Transports, AStopFreesEveryPort) {
+  DaemonSetup setup = made_up();
+  Daemon daemon(setup);
+  UdpSocket receiver;
+  Client client(daemon.address(), command_port);
+  EXPECT_EQ(ask(client, "receivers " + receiver.at()), "ok\n");
+  next_ping(receiver);
+  EXPECT_EQ(daemon.stop(), 0);
+  setup.address = daemon.address();
+  Daemon again(setup);
+  UdpSocket host;
+  host.send("who", again.address(), udp_port);
+  EXPECT_EQ(host.next(), "front 5\n");
+}
+
+}  // namespace
+}  // namespace sonar::testing_daemon
