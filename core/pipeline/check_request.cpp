@@ -60,6 +60,7 @@ std::string why_invalid(const PingRequest& r) {
   const auto positive = [](auto x) { return x > 0 && std::isfinite(x); };
   if (!positive(s.range_bin_m) || !positive(s.pulse_width_m) || !positive(s.range_m) || !positive(s.device_sound_speed_mps))
     return "range, row spacing, pulse width and sound speed must be positive and finite";
+  if (!(s.range_start_m >= 0 && s.range_start_m < s.range_m)) return "range_start_m must be from 0 to below range_m";
   if (!(s.row_centre >= 0 && s.row_centre <= 1)) return "row_centre must be from 0 to 1";
   if (!std::isfinite(s.gain_db) || !std::isfinite(s.device_absorption_db_per_m)) return "gain and absorption must be finite";
   const Waveform& waveform = r.model->modes[static_cast<std::size_t>(s.mode)].waveform;

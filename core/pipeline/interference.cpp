@@ -82,7 +82,7 @@ std::vector<ReceivedPulse> receive_other_sonars(const PingContext& context, cons
     // Pulse number n of all time arrives at (n + phase) / rate + travel; the first that may reach into the record:
     const double phase = unit_uniform(draw.v[0]), pulse_s = static_cast<double>(other.pulse_s);
     const double edge_samples = edge_widths / per_sample;
-    const double earliest_s = -pulse_s - edge_samples / samples_per_s;
+    const double earliest_s = (plan.start_samples - edge_samples) / samples_per_s - pulse_s;
     const double first = std::ceil((fired_s + earliest_s - travel_s) * rate_hz - phase);
     for (int p = 0; p < most_pulses; ++p) {
       const double at_s = (first + p + phase) / rate_hz + travel_s - fired_s;  // after we fired

@@ -90,7 +90,8 @@ void lay_out_samples(PingPlan& p) {
   const double c_dev = static_cast<double>(s.device_sound_speed_mps);
   p.samples = s.range_bin_count * s.samples_per_row;
   p.sample_spacing_m = s.range_bin_m / s.samples_per_row;
-  p.sample_offset = 0.5 + (s.row_centre - 0.5) * s.samples_per_row;
+  p.start_samples = s.range_start_m / p.sample_spacing_m;
+  p.sample_offset = p.start_samples + (0.5 + (s.row_centre - 0.5) * s.samples_per_row);
   p.sample_time_s = 2 * p.sample_spacing_m / c_dev;
 
   const Waveform& waveform = p.mode.waveform;
@@ -110,9 +111,7 @@ void fill_row_gains(PingPlan& plan) {
   plan.row_gain.clear();
   const PingSettings& s = plan.settings;
   const auto tvg = [&](int row) {
-    return s.tvg ? tvg_db(plan.mode.receiver, (row + s.row_centre) * s.range_bin_m,
-                          static_cast<double>(s.device_absorption_db_per_m))
-                 : 0.0;
+    return s.tvg ? tvg_db(plan.mode.receiver, s.range_of_row(row), static_cast<double>(s.device_absorption_db_per_m)) : 0.0;
   };
   const double smallest = tvg(0);
   for (int row = 0; row < s.range_bin_count; ++row) {

@@ -103,6 +103,8 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
   if (!own_grid) s.range_m = std::min(s.range_m, static_cast<double>(mode.max_range_m));
   s.range_m = keys.optional("range_m").number_or(s.range_m, Range::between(1e-3, 1e5));
+  s.range_start_m = keys.optional("range_start_m").number_or(s.range_start_m, Range::between(0, s.range_m));
+  const double shown_m = s.range_m - s.range_start_m;
   s.beam_count = static_cast<int>(keys.optional("beams").integer_or(s.beam_count, 1, 2048));
   s.device_sound_speed_mps = static_cast<float>(
       keys.optional("device_sound_speed_mps").number_or(static_cast<double>(s.device_sound_speed_mps), Range::between(100, 1e4)));
@@ -116,14 +118,14 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   if (spacing.present())
     s.range_bin_m = spacing.number(a_length);
   else if (rows.present())
-    s.range_bin_m = s.range_m / static_cast<double>(std::max<std::int64_t>(rows.integer(1, 65535), 1));
+    s.range_bin_m = shown_m / static_cast<double>(std::max<std::int64_t>(rows.integer(1, 65535), 1));
   else if (own_grid)
     s.range_bin_m = c / (2 * native_sample_rate_hz(envelope_parameter_hz(c, static_cast<double>(s.pulse_width_m))));
   else
     s.range_bin_m = before.range_bin_m * s.range_m / before.range_m;
   if (!(s.range_bin_m > 0)) return;  // said already
   s.range_bin_count = static_cast<int>(
-      rows.integer_or(std::clamp<std::int64_t>(std::llround(std::ceil(s.range_m / s.range_bin_m - 1e-9)), 1, 65535), 1, 65535));
+      rows.integer_or(std::clamp<std::int64_t>(std::llround(std::ceil(shown_m / s.range_bin_m - 1e-9)), 1, 65535), 1, 65535));
   if (!pulse.present() && !own_grid)
     s.pulse_width_m = static_cast<float>(static_cast<double>(before.pulse_width_m) * s.range_bin_m / before.range_bin_m);
 
