@@ -14,7 +14,7 @@ SONAR_HD inline void point_weights(const PingView& p, std::uint32_t i) {
   const std::uint32_t point = i / beams;
   const auto points = static_cast<std::uint32_t>(p.point_count);
   const PulseInBeams& from = point < points ? p.points[point] : p.pulses[point - points];
-  p.point_weights[i] = p.pattern(from.sine - p.beam_sines[i % beams]);
+  p.point_weights[i] = p.beam_patterns[i % beams](from.sine - p.beam_sines[i % beams]);
 }
 
 /// Adds what points and other sonars are at sample `n` of beam `j`.

@@ -145,11 +145,11 @@ struct PingView {
   const float* pulse_rows;               // null where `spectral` serves
   const float* transmit;                 // [columns]
   const float* weights;
-  const BeamWeightRow* panels;  // [beams / 4, rounded up]
-  const double* beam_sines;     // [beams]
-  const double* column_u;       // [columns], in double
-  const float* noise_table;     // complex, table_samples of them
-  ReceivePattern pattern;
+  const BeamWeightRow* panels;          // [beams / 4, rounded up]
+  const double* beam_sines;             // [beams]
+  const ReceivePattern* beam_patterns;  // [beams]
+  const double* column_u;               // [columns], in double
+  const float* noise_table;             // complex, table_samples of them
   std::int32_t taps, pulse_steps, samples, per_row, rows, beams;
   SpectralView spectral;  // grids and folded are the ping's own
   // surfaces

@@ -36,7 +36,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.panels = memory_.put(rows);
   view_.beam_sines = memory_.put(p.beam_sine);
   view_.column_u = memory_.put(u);
-  view_.pattern = receive_pattern(p.mode.pattern);
+  view_.beam_patterns = memory_.put(p.beam_pattern);
   view_.taps = p.taps;
   view_.pulse_steps = p.pulse_steps;
   view_.samples = p.samples;

@@ -49,7 +49,7 @@ struct BeamWeights {
   std::vector<BeamPanel> panels;
   std::vector<float> weights;
   std::shared_ptr<const BeamTransformTables> transform;  // when set: the same as the panels, then of all columns, for less
-  double weight_energy = 1;                              // sum_k W_jk^2 of the middle beam
+  double weight_energy = 1;                              // sum_k W_jk^2 of a beam of the pattern's width
 };
 
 struct PingPlan {
@@ -65,6 +65,7 @@ struct PingPlan {
   BeamWeights beam_weights;
   std::vector<float> beam_azimuth_rad;
   std::vector<double> beam_sine;
+  std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
   int samples = 0;  // rows * samples_per_row

@@ -31,6 +31,11 @@ const char* name_of(Waveform::Shape shape) {
   return names[static_cast<int>(shape)];
 }
 
+const char* name_of(BeamSpacing spacing) {
+  constexpr const char* names[] = {"uniform_in_sine", "uniform_in_angle", "listed"};
+  return names[static_cast<int>(spacing)];
+}
+
 json json_of(const SonarModel& model, const FrequencyMode& mode) {
   const ReceiverModel& law = mode.receiver;
   return {{"profile", model.profile},
@@ -39,7 +44,7 @@ json json_of(const SonarModel& model, const FrequencyMode& mode) {
           {"centre_hz", mode.centre_hz},
           {"aperture_deg", deg(mode.horizontal_aperture_rad)},
           {"source_level_db", mode.source_level_db},
-          {"beam_spacing", mode.beam_spacing == BeamSpacing::uniform_in_sine ? "uniform_in_sine" : "uniform_in_angle"},
+          {"beam_spacing", name_of(mode.beam_spacing)},
           {"azimuth_width_deg", deg(mode.pattern.azimuth_width_rad)},
           {"azimuth_taper", name_of(mode.pattern.azimuth_taper)},
           {"elevation_width_deg", deg(mode.pattern.elevation_width_rad)},

@@ -58,6 +58,25 @@ void read_receiver(const Node& node, ReceiverModel& law) {
   set(keys.optional("leak_decay_db_per_m"), Range::between(0, 1e4), law.leak_decay_db_per_m);
 }
 
+/// A list of azimuths makes the spacing a listed one.
+void read_beams(const Node& azimuths, const Node& widths, FrequencyMode& mode) {
+  if (azimuths.present()) {
+    mode.beam_spacing = BeamSpacing::listed;
+    mode.beam_azimuths_rad.clear();
+    mode.beam_widths_rad.clear();
+    for (const Node& azimuth : azimuths.items(1, 2048)) {
+      const double rad = rad_from_deg(azimuth.number(Range::between(-85, 85)));
+      if (!mode.beam_azimuths_rad.empty() && rad >= mode.beam_azimuths_rad.back()) azimuth.fail("must be below the one before");
+      mode.beam_azimuths_rad.push_back(rad);
+    }
+  }
+  if (!widths.present()) return;
+  mode.beam_widths_rad.clear();
+  for (const Node& width : widths.items(1, 2048))
+    mode.beam_widths_rad.push_back(static_cast<float>(rad_from_deg(width.number(Range::between(0.01, 60)))));
+  if (mode.beam_widths_rad.size() != mode.beam_azimuths_rad.size()) widths.fail("must be as many as beam_azimuths_deg");
+}
+
 }  // namespace
 
 void read_model(Map keys, FrequencyMode& mode) {
@@ -68,6 +87,7 @@ void read_model(Map keys, FrequencyMode& mode) {
   mode.beam_spacing = keys.optional("beam_spacing")
                           .choice_or(mode.beam_spacing, {{"uniform_in_sine", BeamSpacing::uniform_in_sine},
                                                          {"uniform_in_angle", BeamSpacing::uniform_in_angle}});
+  read_beams(keys.optional("beam_azimuths_deg"), keys.optional("beam_widths_deg"), mode);
   set_deg(keys.optional("azimuth_width_deg"), Range::between(0.01, 60), mode.pattern.azimuth_width_rad);
   set_deg(keys.optional("elevation_width_deg"), Range::between(0.1, 120), mode.pattern.elevation_width_rad);
   mode.pattern.azimuth_taper = keys.optional("azimuth_taper")
@@ -105,7 +125,10 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   s.range_m = keys.optional("range_m").number_or(s.range_m, Range::between(1e-3, 1e5));
   s.range_start_m = keys.optional("range_start_m").number_or(s.range_start_m, Range::between(0, s.range_m));
   const double shown_m = s.range_m - s.range_start_m;
-  s.beam_count = static_cast<int>(keys.optional("beams").integer_or(s.beam_count, 1, 2048));
+  const int listed = static_cast<int>(mode.beam_azimuths_rad.size());
+  const bool is_listed = mode.beam_spacing == BeamSpacing::listed && listed > 0;
+  s.beam_count = static_cast<int>(
+      keys.optional("beams").integer_or(is_listed ? listed : s.beam_count, is_listed ? listed : 1, is_listed ? listed : 2048));
   s.device_sound_speed_mps = static_cast<float>(
       keys.optional("device_sound_speed_mps").number_or(static_cast<double>(s.device_sound_speed_mps), Range::between(100, 1e4)));
   set(keys.optional("device_absorption_db_per_m"), Range::between(0, 1000), s.device_absorption_db_per_m);
