@@ -187,10 +187,10 @@ struct PingView {
   float* crosstalk;            // complex [samples], null = none
   std::int32_t point_count, pulse_count;
   // samples
-  const float* row_power_factor;  // [rows]
-  float half_gamma;
+  const float* row_power_factor;                // [rows]
+  float half_gamma, per_octave, at_full_scale;  // the latter two of LevelLine
   std::uint32_t max_code;
-  std::int32_t bytes_a_sample, unused_too;
+  std::int32_t bytes_a_sample, logarithmic;
   std::uint8_t* codes;      // [rows][beams][bytes]
   float* pressure;          // [rows][beams], null = not wanted
   float* kept_beams;        // complex [samples][beams], null = not wanted

@@ -16,6 +16,7 @@ constexpr double tone_band_in_pulses = 20, other_band_in_pulses = 3;  // in 1 / 
 constexpr int most_fixed_rays = 100000;
 constexpr double sector_slack_rad = 1e-6;  // of azimuths in double beside an aperture in float
 constexpr double widest_beam_rad = 1.5, narrowest_width_rad = 1e-4;
+constexpr float widest_level_db = 300;
 
 /// Pulses and buffers that no picture needs and no memory holds.
 std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings& s) {
@@ -49,6 +50,18 @@ std::string why_beams_unlisted(const FrequencyMode& mode, int beam_count) {
     if (j > 0 && !(azimuth[j] < azimuth[j - 1])) return beam + " is not to starboard of the one before";
     if (!width.empty() && !(width[j] >= narrowest_width_rad && width[j] < pi)) return "the width of " + beam + " is impossible";
   }
+  return {};
+}
+
+std::string why_unusable(const SampleFormat& f) {
+  if (f.bits != 8 && f.bits != 16 && f.bits != 32) return "samples have 8, 16 or 32 bits";
+  if (!(f.gamma > 0 && std::isfinite(f.gamma))) return "gamma must be positive and finite";
+  if (f.max_code < 1 || f.max_code > 0xFFFFFFFFu >> (32 - f.bits))
+    return "max_code " + std::to_string(f.max_code) + " does not fit samples of " + std::to_string(f.bits) + " bits";
+  if (f.scale != SampleFormat::Scale::logarithmic) return {};
+  if (!(f.floor_db >= -widest_level_db && f.ceiling_db <= widest_level_db && f.floor_db < f.ceiling_db))
+    return "floor_db must be below ceiling_db, both from -300 to 300";
+  if (f.row_gains) return "logarithmic samples have no row gains";
   return {};
 }
 
@@ -88,11 +101,7 @@ std::string why_invalid(const PingRequest& r) {
   const Waveform& waveform = mode.waveform;
   const double sample_time_s = 2 * s.range_bin_m / s.samples_per_row / static_cast<double>(s.device_sound_speed_mps);
   if (std::string why = why_invalid(waveform, sample_time_s); !why.empty()) return why;
-  if (s.format.bits != 8 && s.format.bits != 16 && s.format.bits != 32) return "samples have 8, 16 or 32 bits";
-  if (!positive(s.format.gamma)) return "gamma must be positive and finite";
-  if (s.format.max_code < 1 || s.format.max_code > 0xFFFFFFFFu >> (32 - s.format.bits))
-    return "max_code " + std::to_string(s.format.max_code) + " does not fit samples of " + std::to_string(s.format.bits) +
-           " bits";
+  if (std::string why = why_unusable(s.format); !why.empty()) return why;
   if (r.switches.fixed_fan < 0 || r.switches.fixed_fan > most_fixed_rays)
     return "fixed_fan " + std::to_string(r.switches.fixed_fan) + " is not in 0..100000";
   if (std::string why = why_out_of_proportion(mode, s); !why.empty()) return why;

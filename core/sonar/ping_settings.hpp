@@ -6,11 +6,19 @@
 
 namespace sonar {
 
+/// How the amplitude v becomes a code; v is pressure times TVG and gain over full scale, so the linear scale saturates at v = 1
+/// (docs/acoustics.md, eq. 37, 40).
 struct SampleFormat {
+  enum class Scale {
+    linear,       // round(max_code v^gamma)
+    logarithmic,  // round(max_code (L - floor_db) / (ceiling_db - floor_db)), L = 20 log10 v: 0 dB is the linear full scale
+  };
   int bits = 8;                  // 8, 16 or 32
   std::uint32_t max_code = 254;  // saturation value
-  float gamma = 1;               // sample = max_code * (v / full scale)^gamma
-  bool row_gains = false;        // a power gain per row, see Ping::row_gain
+  float gamma = 1;               // linear only
+  bool row_gains = false;        // a power gain per row, see Ping::row_gain; linear only
+  Scale scale = Scale::linear;
+  float floor_db = 0, ceiling_db = 80;  // logarithmic: what codes 0 and max_code stand for [dB re full scale], -300 to 300
 
   bool operator==(const SampleFormat&) const = default;
 };

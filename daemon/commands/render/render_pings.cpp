@@ -34,7 +34,7 @@ PolarImage picture_of(const Ping& ping) {
     image.samples.push_back(static_cast<float>(code));
   }
   image.full_scale = static_cast<float>(s.format.max_code);
-  if (bytes > 1) {  // wide samples rarely come near their maximum
+  if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear) {  // wide samples rarely come near their maximum
     std::vector<float> sorted = image.samples;
     const auto place = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) * 999 / 1000);
     std::nth_element(sorted.begin(), place, sorted.end());

@@ -85,7 +85,10 @@ json json_of(const PingSettings& s) {
           {"bits", s.format.bits},
           {"max_code", s.format.max_code},
           {"gamma", s.format.gamma},
-          {"row_gains", s.format.row_gains}};
+          {"row_gains", s.format.row_gains},
+          {"scale", s.format.scale == SampleFormat::Scale::linear ? "linear" : "logarithmic"},
+          {"floor_db", s.format.floor_db},
+          {"ceiling_db", s.format.ceiling_db}};
 }
 
 json json_of(const Switches& switches) {

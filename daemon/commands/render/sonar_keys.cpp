@@ -163,6 +163,11 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   s.format.max_code = static_cast<std::uint32_t>(keys.optional("max_code").unsigned_integer_or(s.format.max_code, 0xFFFFFFFFu));
   set(keys.optional("gamma"), Range::between(0.01, 10), s.format.gamma);
   s.format.row_gains = keys.optional("row_gains").boolean_or(s.format.row_gains);
+  using Scale = SampleFormat::Scale;
+  s.format.scale =
+      keys.optional("scale").choice_or<Scale>(s.format.scale, {{"linear", Scale::linear}, {"logarithmic", Scale::logarithmic}});
+  set(keys.optional("floor_db"), Range::between(-300, 300), s.format.floor_db);
+  set(keys.optional("ceiling_db"), Range::between(-300, 300), s.format.ceiling_db);
 }
 
 }  // namespace sonar::render
