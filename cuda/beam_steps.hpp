@@ -14,7 +14,7 @@ SONAR_HD inline void point_weights(const PingView& p, std::uint32_t i) {
   const std::uint32_t point = i / beams;
   const auto points = static_cast<std::uint32_t>(p.point_count);
   const PulseInBeams& from = point < points ? p.points[point] : p.pulses[point - points];
-  p.point_weights[i] = p.pattern(from.sine - p.beam_sines[i % beams]);
+  p.point_weights[i] = p.beam_patterns[i % beams](from.sine - p.beam_sines[i % beams]);
 }
 
 /// Adds what points and other sonars are at sample `n` of beam `j`.
@@ -105,9 +105,11 @@ SONAR_HD inline void receive(const PingView& p, std::uint32_t i) {
   const float power = sum / static_cast<float>(p.per_row);
   if (p.pressure != nullptr) p.pressure[i] = std::sqrt(power);
   const auto max_code = static_cast<float>(p.max_code);
-  // Eq. 37, as codes_of (core/pipeline/simd/quantise.inl).
-  const float v = exp2_of(p.half_gamma * log2_of(larger(power * p.row_power_factor[row], 1e-30f)));
-  const float code = smaller(std::floor(v * max_code + 0.5f), max_code);
+  // Eq. 37 and 40, as codes_of and quantise_levels (core/pipeline/simd/quantise.inl).
+  const float octaves = log2_of(larger(power * p.row_power_factor[row], 1e-30f));
+  const float code = p.logarithmic != 0
+                         ? std::floor(smaller(larger(p.per_octave * octaves + (p.at_full_scale + 0.5f), 0.0f), max_code))
+                         : smaller(std::floor(exp2_of(p.half_gamma * octaves) * max_code + 0.5f), max_code);
   // 2^32 - 1 is no float: compare before the conversion can overflow.
   const std::uint32_t whole = code >= max_code ? p.max_code : static_cast<std::uint32_t>(code);
   std::uint8_t* out = p.codes + static_cast<std::int64_t>(i) * p.bytes_a_sample;

@@ -145,11 +145,11 @@ struct PingView {
   const float* pulse_rows;               // null where `spectral` serves
   const float* transmit;                 // [columns]
   const float* weights;
-  const BeamWeightRow* panels;  // [beams / 4, rounded up]
-  const double* beam_sines;     // [beams]
-  const double* column_u;       // [columns], in double
-  const float* noise_table;     // complex, table_samples of them
-  ReceivePattern pattern;
+  const BeamWeightRow* panels;          // [beams / 4, rounded up]
+  const double* beam_sines;             // [beams]
+  const ReceivePattern* beam_patterns;  // [beams]
+  const double* column_u;               // [columns], in double
+  const float* noise_table;             // complex, table_samples of them
   std::int32_t taps, pulse_steps, samples, per_row, rows, beams;
   SpectralView spectral;  // grids and folded are the ping's own
   // surfaces
@@ -187,10 +187,10 @@ struct PingView {
   float* crosstalk;            // complex [samples], null = none
   std::int32_t point_count, pulse_count;
   // samples
-  const float* row_power_factor;  // [rows]
-  float half_gamma;
+  const float* row_power_factor;                // [rows]
+  float half_gamma, per_octave, at_full_scale;  // the latter two of LevelLine
   std::uint32_t max_code;
-  std::int32_t bytes_a_sample, unused_too;
+  std::int32_t bytes_a_sample, logarithmic;
   std::uint8_t* codes;      // [rows][beams][bytes]
   float* pressure;          // [rows][beams], null = not wanted
   float* kept_beams;        // complex [samples][beams], null = not wanted

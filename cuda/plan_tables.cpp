@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/pulses/spectral_columns.hpp"
 #include "core/pipeline/volume.hpp"
 #include "cuda/fan_steps.hpp"
@@ -36,7 +37,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.panels = memory_.put(rows);
   view_.beam_sines = memory_.put(p.beam_sine);
   view_.column_u = memory_.put(u);
-  view_.pattern = receive_pattern(p.mode.pattern);
+  view_.beam_patterns = memory_.put(p.beam_pattern);
   view_.taps = p.taps;
   view_.pulse_steps = p.pulse_steps;
   view_.samples = p.samples;
@@ -45,6 +46,10 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.beams = p.settings.beam_count;
   view_.max_code = p.settings.format.max_code;
   view_.half_gamma = p.settings.format.gamma / 2;
+  const LevelLine line = level_line(p.settings.format);
+  view_.per_octave = static_cast<float>(line.per_octave);
+  view_.at_full_scale = static_cast<float>(line.at_full_scale);
+  view_.logarithmic = p.settings.format.scale == SampleFormat::Scale::logarithmic ? 1 : 0;
   view_.bytes_a_sample = p.settings.format.bits / 8;
   if (p.spectral) add_spectrum(*p.spectral);
   memory_.upload(lane);

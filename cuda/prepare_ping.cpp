@@ -202,6 +202,7 @@ bool PingPreparer::find_tiles(Making& m, SurfaceCells& cells, const std::vector<
   CellView in;
   in.sonar_in_world = m.scalars.seen_from;
   in.bodies_in_world = m.bodies;
+  in.min_range_m = static_cast<float>(m.scalars.min_range_m);
   in.max_range_m = static_cast<float>(m.scalars.max_range_m);
   in.max_sine = static_cast<float>(std::min(1.0, plan.columns.first_sine + plan.columns.spacing));
   in.max_elevation_rad = static_cast<float>(plan.widest_about_axis_rad());

@@ -8,15 +8,23 @@
 
 namespace sonar::paper {
 
+namespace {
+
+/// Delay over the record's length; the record begins where the picture does.
+double turns_of(double range_m, const Prepared& p, const PingScalars& s) {
+  return (range_m * s.samples_per_m - p.plan.start_samples) / p.plan.samples;
+}
+
+}  // namespace
+
 double elevation_pattern(const Prepared& p, double elevation_rad) {
   return p.elevation_per_sine > 0 ? sinc(p.elevation_per_sine * std::sin(elevation_rad)) : 1.0;
 }
 
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& p, const PingScalars& s,
               PaperEchoes& echoes) {
-  // Delay over the record's length.
-  const double turns = range_m * s.samples_per_m / p.plan.samples;
-  if (!(turns < 1)) return false;
+  const double turns = turns_of(range_m, p, s);
+  if (!(turns >= 0 && turns < 1)) return false;
   // Choi 2025, eq. 1: sqrt(cross-section) D(phi) e^{-2 a r} / r^2 times the source.
   const double amplitude =
       s.source_upa * std::sqrt(cross_section_m2) * pattern * two_way_transmission(range_m, s.absorption_np_per_m);
@@ -55,12 +63,12 @@ void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const
   // A full batch goes to the kernel: carrier, absorption and draw.
   const auto send = [&] {
     kernels.scatter_hits(arguments, n, re, im);
-    for (int i = 0; i < n; ++i)
-      echoes.push_back({static_cast<double>(range[i]) * s.samples_per_m / p.plan.samples, {re[i], im[i]}});
+    for (int i = 0; i < n; ++i) echoes.push_back({turns_of(static_cast<double>(range[i]), p, s), {re[i], im[i]}});
     n = 0;
   };
   for (const PaperHit& hit : hits) {
-    if (!(hit.range_m * s.samples_per_m < p.plan.samples)) continue;
+    const double turns = turns_of(hit.range_m, p, s);
+    if (!(turns >= 0 && turns < 1)) continue;
     // sqrt(printed_cross_section_m2) / r^2
     const bool audible = hit.range_m >= nearest_scatterer_m;
     const double amplitude =

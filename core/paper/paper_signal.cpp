@@ -17,7 +17,7 @@ constexpr int most_steps = 64;
 PaperSpectrum make_spectrum(const PingPlan& plan) {
   PaperSpectrum s;
   s.samples = plan.samples;
-  s.sample_offset = plan.sample_offset;
+  s.sample_offset = plan.sample_offset - plan.start_samples;
   const double record_s = plan.samples * 2 * plan.sample_spacing_m / static_cast<double>(plan.settings.device_sound_speed_mps);
   // Choi 2025, eq. 4: df = 1 / T, M = b T frequencies about the carrier.
   const double band = plan.envelope_hz * record_s;                  // b T, in units of df

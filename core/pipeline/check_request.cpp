@@ -14,6 +14,9 @@ constexpr double most_column_samples = 1 << 29;           // of all columns, 4 G
 constexpr double most_frequencies = 1 << 20;              // of a column by way of the spectrum
 constexpr double tone_band_in_pulses = 20, other_band_in_pulses = 3;  // in 1 / width, at least Pulse::band_hz
 constexpr int most_fixed_rays = 100000;
+constexpr double sector_slack_rad = 1e-6;  // of azimuths in double beside an aperture in float
+constexpr double widest_beam_rad = 1.5, narrowest_width_rad = 1e-4;
+constexpr float widest_level_db = 300;
 
 /// Pulses and buffers that no picture needs and no memory holds.
 std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings& s) {
@@ -29,6 +32,36 @@ std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings&
     return "an exact pulse so short on so many samples needs too much memory: choose fewer rows or a longer pulse";
   if (samples * make_columns(mode, s.beam_count).count > most_column_samples)
     return "so many beams, rows and samples a row need too much memory: choose fewer of them";
+  return {};
+}
+
+std::string why_beams_unlisted(const FrequencyMode& mode, int beam_count) {
+  if (mode.beam_spacing != BeamSpacing::listed) return {};
+  const std::vector<double>& azimuth = mode.beam_azimuths_rad;
+  const std::vector<float>& width = mode.beam_widths_rad;
+  if (static_cast<int>(azimuth.size()) != beam_count)
+    return "beam_count " + std::to_string(beam_count) + " is not the " + std::to_string(azimuth.size()) +
+           " beams that are listed";
+  if (!width.empty() && width.size() != azimuth.size()) return "beam widths must be as many as beams, or none";
+  const double edge_rad = static_cast<double>(mode.horizontal_aperture_rad) / 2 + sector_slack_rad;
+  for (std::size_t j = 0; j < azimuth.size(); ++j) {
+    const std::string beam = "listed beam " + std::to_string(j);
+    if (!(std::abs(azimuth[j]) <= std::min(edge_rad, widest_beam_rad))) return beam + " does not look into the sector";
+    if (j > 0 && !(azimuth[j] < azimuth[j - 1])) return beam + " is not to starboard of the one before";
+    if (!width.empty() && !(width[j] >= narrowest_width_rad && width[j] < pi)) return "the width of " + beam + " is impossible";
+  }
+  return {};
+}
+
+std::string why_unusable(const SampleFormat& f) {
+  if (f.bits != 8 && f.bits != 16 && f.bits != 32) return "samples have 8, 16 or 32 bits";
+  if (!(f.gamma > 0 && std::isfinite(f.gamma))) return "gamma must be positive and finite";
+  if (f.max_code < 1 || f.max_code > 0xFFFFFFFFu >> (32 - f.bits))
+    return "max_code " + std::to_string(f.max_code) + " does not fit samples of " + std::to_string(f.bits) + " bits";
+  if (f.scale != SampleFormat::Scale::logarithmic) return {};
+  if (!(f.floor_db >= -widest_level_db && f.ceiling_db <= widest_level_db && f.floor_db < f.ceiling_db))
+    return "floor_db must be below ceiling_db, both from -300 to 300";
+  if (f.row_gains) return "logarithmic samples have no row gains";
   return {};
 }
 
@@ -60,19 +93,18 @@ std::string why_invalid(const PingRequest& r) {
   const auto positive = [](auto x) { return x > 0 && std::isfinite(x); };
   if (!positive(s.range_bin_m) || !positive(s.pulse_width_m) || !positive(s.range_m) || !positive(s.device_sound_speed_mps))
     return "range, row spacing, pulse width and sound speed must be positive and finite";
+  if (!(s.range_start_m >= 0 && s.range_start_m < s.range_m)) return "range_start_m must be from 0 to below range_m";
   if (!(s.row_centre >= 0 && s.row_centre <= 1)) return "row_centre must be from 0 to 1";
   if (!std::isfinite(s.gain_db) || !std::isfinite(s.device_absorption_db_per_m)) return "gain and absorption must be finite";
-  const Waveform& waveform = r.model->modes[static_cast<std::size_t>(s.mode)].waveform;
+  const FrequencyMode& mode = r.model->modes[static_cast<std::size_t>(s.mode)];
+  if (std::string why = why_beams_unlisted(mode, s.beam_count); !why.empty()) return why;
+  const Waveform& waveform = mode.waveform;
   const double sample_time_s = 2 * s.range_bin_m / s.samples_per_row / static_cast<double>(s.device_sound_speed_mps);
   if (std::string why = why_invalid(waveform, sample_time_s); !why.empty()) return why;
-  if (s.format.bits != 8 && s.format.bits != 16 && s.format.bits != 32) return "samples have 8, 16 or 32 bits";
-  if (!positive(s.format.gamma)) return "gamma must be positive and finite";
-  if (s.format.max_code < 1 || s.format.max_code > 0xFFFFFFFFu >> (32 - s.format.bits))
-    return "max_code " + std::to_string(s.format.max_code) + " does not fit samples of " + std::to_string(s.format.bits) +
-           " bits";
+  if (std::string why = why_unusable(s.format); !why.empty()) return why;
   if (r.switches.fixed_fan < 0 || r.switches.fixed_fan > most_fixed_rays)
     return "fixed_fan " + std::to_string(r.switches.fixed_fan) + " is not in 0..100000";
-  if (std::string why = why_out_of_proportion(r.model->modes[static_cast<std::size_t>(s.mode)], s); !why.empty()) return why;
+  if (std::string why = why_out_of_proportion(mode, s); !why.empty()) return why;
   return why_impossible_motion(r);
 }
 

@@ -54,12 +54,12 @@ void add_points(std::span<const PointEcho> points, const PingPlan& plan, BeamSig
   if (here.empty()) return;
 
   // A point's weight is the pattern at its exact direction, W(u - u_j), not that of its nearest column.
-  const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
   std::vector<std::complex<double>> sum;
   for (int j = 0; j < out.beams; ++j) {
     sum.assign(static_cast<std::size_t>(out.samples), 0.0);
     for (const auto& [sine, pulse] : here) {
-      const double weight = pattern(sine - plan.beam_sine[static_cast<std::size_t>(j)]);
+      const auto beam = static_cast<std::size_t>(j);
+      const double weight = plan.beam_pattern[beam](sine - plan.beam_sine[beam]);
       const auto first = static_cast<std::size_t>(pulse.first_sample - out.first_sample);
       for (std::size_t i = 0; i < pulse.values.size(); ++i) sum[first + i] += weight * pulse.values[i];
     }

@@ -82,7 +82,7 @@ std::vector<ReceivedPulse> receive_other_sonars(const PingContext& context, cons
     // Pulse number n of all time arrives at (n + phase) / rate + travel; the first that may reach into the record:
     const double phase = unit_uniform(draw.v[0]), pulse_s = static_cast<double>(other.pulse_s);
     const double edge_samples = edge_widths / per_sample;
-    const double earliest_s = -pulse_s - edge_samples / samples_per_s;
+    const double earliest_s = (plan.start_samples - edge_samples) / samples_per_s - pulse_s;
     const double first = std::ceil((fired_s + earliest_s - travel_s) * rate_hz - phase);
     for (int p = 0; p < most_pulses; ++p) {
       const double at_s = (first + p + phase) / rate_hz + travel_s - fired_s;  // after we fired
@@ -126,13 +126,13 @@ SampledPulse tone_of(const ReceivedPulse& pulse, int from, int to) {
 }
 
 void add_pulses(std::span<const ReceivedPulse> pulses, const PingPlan& plan, BeamSignals& beams) {
-  const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
   for (const ReceivedPulse& pulse : pulses) {
     const auto [from, tone] = tone_of(pulse, beams.first_sample, beams.first_sample + beams.samples);
     if (tone.empty()) continue;
     for (int j = 0; j < beams.beams; ++j) {
       // W(u - u_j) with all side lobes (eq. 9).
-      const double weight = pattern(pulse.sine - plan.beam_sine[static_cast<std::size_t>(j)]);
+      const auto beam = static_cast<std::size_t>(j);
+      const double weight = plan.beam_pattern[beam](pulse.sine - plan.beam_sine[beam]);
       float* out = beams.beam(j) + 2 * (from - beams.first_sample);
       for (const std::complex<double>& t : tone) {
         out[0] += static_cast<float>(plan.expected_power ? weight * weight * std::norm(t) : weight * t.real());
@@ -149,11 +149,10 @@ Crosstalk::Crosstalk(const PingPlan& plan, const Switches& switches) {
   amplitude_ = amplitude_from_db(level_db);
   // Eq. 35: beam j becomes own s_j + e share sum_i s_i. For a lone echo the sum over beams is its amplitude over `share`.
   // What all beams together make of a lone echo amid the sector: sum_j W_j, or in power sum_j W_j^2.
-  const ReceivePattern pattern = receive_pattern(plan.mode.pattern);
   const double middle = plan.beam_sine[plan.beam_sine.size() / 2];
   double sum = 0, squares = 0;
-  for (const double sine : plan.beam_sine) {
-    const double w = pattern(middle - sine);
+  for (std::size_t j = 0; j < plan.beam_sine.size(); ++j) {
+    const double w = plan.beam_pattern[j](middle - plan.beam_sine[j]);
     sum += w;
     squares += w * w;
   }

@@ -23,8 +23,20 @@ constexpr double widest_fan_rad = 1.4;
 constexpr double level_fade = 1.15;  // cell levels cross-fade over 15 % of range
 
 double half_aperture_sine(const FrequencyMode& mode) { return std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2); }
-double beam_width_sine(const FrequencyMode& mode) {
-  return 2 * std::sin(static_cast<double>(mode.pattern.azimuth_width_rad) / 2);
+
+/// -3 dB widths in the sine of the narrowest and the widest beam.
+struct BeamWidths {
+  double narrowest, widest;
+};
+BeamWidths beam_width_sines(const FrequencyMode& mode) {
+  const double nominal = 2 * std::sin(static_cast<double>(mode.pattern.azimuth_width_rad) / 2);
+  if (!mode.has_own_widths()) return {nominal, nominal};
+  BeamWidths widths{2, 0};
+  for (std::size_t j = 0; j < mode.beam_widths_rad.size(); ++j) {
+    const double width = 2 * std::sin(static_cast<double>(mode.beam_widths_rad[j]) / 2) * std::cos(mode.beam_azimuths_rad[j]);
+    widths = {std::min(widths.narrowest, width), std::max(widths.widest, width)};
+  }
+  return widths;
 }
 
 Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pulse_width_m) {
@@ -90,7 +102,8 @@ void lay_out_samples(PingPlan& p) {
   const double c_dev = static_cast<double>(s.device_sound_speed_mps);
   p.samples = s.range_bin_count * s.samples_per_row;
   p.sample_spacing_m = s.range_bin_m / s.samples_per_row;
-  p.sample_offset = 0.5 + (s.row_centre - 0.5) * s.samples_per_row;
+  p.start_samples = s.range_start_m / p.sample_spacing_m;
+  p.sample_offset = p.start_samples + (0.5 + (s.row_centre - 0.5) * s.samples_per_row);
   p.sample_time_s = 2 * p.sample_spacing_m / c_dev;
 
   const Waveform& waveform = p.mode.waveform;
@@ -110,9 +123,7 @@ void fill_row_gains(PingPlan& plan) {
   plan.row_gain.clear();
   const PingSettings& s = plan.settings;
   const auto tvg = [&](int row) {
-    return s.tvg ? tvg_db(plan.mode.receiver, (row + s.row_centre) * s.range_bin_m,
-                          static_cast<double>(s.device_absorption_db_per_m))
-                 : 0.0;
+    return s.tvg ? tvg_db(plan.mode.receiver, s.range_of_row(row), static_cast<double>(s.device_absorption_db_per_m)) : 0.0;
   };
   const double smallest = tvg(0);
   for (int row = 0; row < s.range_bin_count; ++row) {
@@ -147,6 +158,10 @@ void lay_out_fixed_fan(PingPlan& p) {
 
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count) {
   std::vector<double> sines;
+  if (mode.beam_spacing == BeamSpacing::listed) {
+    for (const double azimuth : mode.beam_azimuths_rad) sines.push_back(std::sin(azimuth));
+    return sines;
+  }
   const double half = static_cast<double>(mode.horizontal_aperture_rad) / 2;
   for (int j = 0; j < beam_count; ++j) {
     if (mode.beam_spacing == BeamSpacing::uniform_in_sine)
@@ -158,11 +173,12 @@ std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count) {
 }
 
 Columns make_columns(const FrequencyMode& mode, int beam_count) {
-  const double top = half_aperture_sine(mode), width = beam_width_sine(mode);
+  const double top = half_aperture_sine(mode);
+  const auto [narrowest, width] = beam_width_sines(mode);
   // Beams lie on column centres where they are uniform in the sine, so that one row of weights serves them all.
   // The column spacing divides the beam spacing, and is at most 0.35 of a beam width (docs/acoustics.md, section 2).
   const double beam_spacing = 2 * top / std::max(beam_count - 1, 1);
-  const double per_beam = std::ceil(beam_spacing / (widest_column_in_beams * width) - 1e-9);
+  const double per_beam = std::ceil(beam_spacing / (widest_column_in_beams * narrowest) - 1e-9);
   Columns c;
   c.spacing = beam_spacing / std::max(per_beam, 1.0);
   const int margin = static_cast<int>(std::ceil(margin_in_beams * width / c.spacing));
@@ -178,31 +194,54 @@ Columns make_columns(const FrequencyMode& mode, int beam_count) {
   return c;
 }
 
-BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines,
-                              bool squared, const BeamWeightOptions& options) {
-  const ReceivePattern weight = receive_pattern(mode.pattern);
-  BeamWeights c;
-  // The smallest band whose dropped energy is below -40 dB.
+namespace {
+
+/// The smallest band of columns whose dropped energy is below the share.
+struct Band {
+  int half = 0;
+  double energy = 0, total = 0;  // sum_k W_jk^2 over the band, and over all columns
+};
+Band band_of(const ReceivePattern& weight, const Columns& columns, double dropped_energy) {
   // W at whole columns apart; its square is the energy that a column adds to a beam.
   std::vector<double> energy(static_cast<std::size_t>(columns.count));
-  double total = 0;
+  Band band;
   for (int h = 0; h < columns.count; ++h) {
     const double w = weight(h * columns.spacing);
-    total += energy[static_cast<std::size_t>(h)] = w * w * (h == 0 ? 1 : 2);
+    band.total += energy[static_cast<std::size_t>(h)] = w * w * (h == 0 ? 1 : 2);
   }
   double dropped = 0;
-  c.half_band = columns.count - 1;
-  while (c.half_band > 0 && dropped + energy[static_cast<std::size_t>(c.half_band)] < options.dropped_energy * total)
-    dropped += energy[static_cast<std::size_t>(c.half_band--)];
-  c.weight_energy = total - dropped;
+  band.half = columns.count - 1;
+  while (band.half > 0 && dropped + energy[static_cast<std::size_t>(band.half)] < dropped_energy * band.total)
+    dropped += energy[static_cast<std::size_t>(band.half--)];
+  band.energy = band.total - dropped;
+  return band;
+}
+
+}  // namespace
+
+BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines,
+                              bool squared, const BeamWeightOptions& options) {
+  const bool alike = !mode.has_own_widths();
+  const ReceivePattern nominal = receive_pattern(mode.pattern);
+  ReceivePattern widest = nominal;
+  std::vector<ReceivePattern> pattern(beam_sines.size(), nominal);
+  for (std::size_t j = 0; j < beam_sines.size() && !alike; ++j) {
+    pattern[j] = receive_pattern(mode, j);
+    if (j == 0 || pattern[j].aperture_wavelengths < widest.aperture_wavelengths) widest = pattern[j];
+  }
+  BeamWeights c;
+  const Band band = band_of(nominal, columns, options.dropped_energy);
+  // Beams with widths of their own share the band that the widest needs.
+  c.half_band = alike ? band.half : band_of(widest, columns, options.dropped_energy).half;
+  c.weight_energy = band.energy;
   // Powers are summed without cancelling: there a transform's rounding, relative to the loudest, would show in the shadows.
-  if (options.transform && !squared && !weight.unit && beam_sines.size() > 1) {
-    auto tables = std::make_shared<const BeamTransformTables>(weight, columns, beam_sines);
+  if (options.transform && !squared && alike && !nominal.unit && beam_sines.size() > 1) {
+    auto tables = std::make_shared<const BeamTransformTables>(nominal, columns, beam_sines);
     const double band_cost = static_cast<double>(beam_sines.size()) * std::min(2 * c.half_band + 1, columns.count);
     if (tables->cost() < band_cost) {
       c.transform = std::move(tables);
       c.half_band = columns.count - 1;
-      c.weight_energy = total;
+      c.weight_energy = band.total;
     }
   }
 
@@ -224,7 +263,8 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
       if (start < clipped_from) c.panels.back().weights += 4 * static_cast<std::size_t>(clipped_from - start);
       for (int k = start; k < stop; ++k)
         for (int j = first; j < first + 4; ++j) {
-          const double w = j <= last ? weight(columns.sine(k) - beam_sines[static_cast<std::size_t>(j)]) : 0.0;
+          const auto beam = static_cast<std::size_t>(j);
+          const double w = j <= last ? pattern[beam](columns.sine(k) - beam_sines[beam]) : 0.0;
           c.weights.push_back(static_cast<float>(squared ? w * w : w));
         }
     } else {
@@ -278,6 +318,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.columns = make_columns(mode, settings.beam_count);
   p.beam_sine = make_beam_sines(mode, settings.beam_count);
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
+  for (std::size_t j = 0; j < p.beam_sine.size(); ++j) p.beam_pattern.push_back(receive_pattern(mode, j));
   p.beam_weights = make_beam_weights(mode, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);
   p.fan = make_fan(mode, settings, p.pulse_width_m);
@@ -285,8 +326,9 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
   // The mean over speckle hides no chance in where cells lie: smaller cells leave a tenth of a decibel of it.
   const double cell_scale = p.expected_power ? 0.4 : 1.0;
-  p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * static_cast<double>(mode.pattern.azimuth_width_rad),
-                              settings.range_m * 1.1);
+  const double narrowest_rad =
+      mode.has_own_widths() ? beam_width_sines(mode).narrowest : static_cast<double>(mode.pattern.azimuth_width_rad);
+  p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * narrowest_rad, settings.range_m * 1.1);
   p.noise_filter = make_noise_filter(p.pulse_shape, p.sample_time_s);
   // sum_k W_jk^2 column powers make a beam's: NL (eq. 30) at its output.
   p.column_noise_upa = noise_rms_upa(mode, p.pulse_shape.noise_bandwidth_hz()) / std::sqrt(p.beam_weights.weight_energy);

@@ -49,7 +49,7 @@ struct BeamWeights {
   std::vector<BeamPanel> panels;
   std::vector<float> weights;
   std::shared_ptr<const BeamTransformTables> transform;  // when set: the same as the panels, then of all columns, for less
-  double weight_energy = 1;                              // sum_k W_jk^2 of the middle beam
+  double weight_energy = 1;                              // sum_k W_jk^2 of a beam of the pattern's width
 };
 
 struct PingPlan {
@@ -65,11 +65,13 @@ struct PingPlan {
   BeamWeights beam_weights;
   std::vector<float> beam_azimuth_rad;
   std::vector<double> beam_sine;
+  std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
   int samples = 0;  // rows * samples_per_row
   double sample_spacing_m = 0;
-  double sample_offset = 0.5;  // 1/2 puts the samples of row i between i and i + 1 spacings, see PingSettings::row_centre
+  double start_samples = 0;    // device range of the picture's near edge, in spacings
+  double sample_offset = 0.5;  // start_samples and where in its spacing a sample lies, see PingSettings::row_centre
   double sample_time_s = 0;    // 2 sample_spacing_m / the device's sound speed
   Pulse pulse_shape;
   double pulse_width_m = 0;       // -3 dB, in the device's metres: the settings', or a measured pulse's own

@@ -1,5 +1,6 @@
 #include "core/pipeline/ping_scalars.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/pipeline/arithmetic/scattering.hpp"
@@ -57,6 +58,11 @@ PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d
   if (s.doppler_m_per_mps != 0) s.max_range_m += std::abs(s.doppler_m_per_mps) * length(s.twist.velocity_mps);
   s.moves = request.switches.motion && (length(s.twist.velocity_mps) > 0 || length(s.twist.angular_rate_radps) > 0);
   if (s.moves) s.seen_at_s = request.settings.range_m / static_cast<double>(request.settings.device_sound_speed_mps);
+  // As far before the picture as a pulse reaches; the sonar moves between the echo's scattering and seen_at_s.
+  s.min_range_m =
+      (plan.sample_offset - plan.taps) / s.samples_per_m - std::abs(s.doppler_m_per_mps) * length(s.twist.velocity_mps);
+  if (s.moves) s.min_range_m -= std::abs(s.seen_at_s - s.min_range_m / s.sound_speed_mps) * length(s.twist.velocity_mps);
+  s.min_range_m = std::max(s.min_range_m, 0.0);
   s.seen_from = s.moves ? propagate(request.sonar_in_world, s.twist, s.seen_at_s) : request.sonar_in_world;
   s.world_from_sonar = rotation_from(s.seen_from.orientation);
   s.position_in_scene = to_float(s.seen_from.position_m - scene_origin);

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "core/pipeline/arithmetic/receiver.hpp"
+
 namespace sonar {
 namespace {
 
@@ -70,6 +72,9 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
   scratch.codes.resize(static_cast<std::size_t>(width));
   scratch.bytes.resize(static_cast<std::size_t>(width));
   const auto max_code = static_cast<float>(s.format.max_code);
+  const bool logarithmic = s.format.scale == SampleFormat::Scale::logarithmic;
+  const LevelLine line = level_line(s.format);
+  const auto per_octave = static_cast<float>(line.per_octave), at_full_scale = static_cast<float>(line.at_full_scale);
   for (int row = 0; row < rows; ++row) {
     const float* power = scratch.power.data() + static_cast<std::ptrdiff_t>(row) * width;
     const std::size_t at = static_cast<std::size_t>(first_row + row) * static_cast<std::size_t>(s.beam_count);
@@ -78,12 +83,15 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
     // Eq. 37: code = max_code (|s| / full scale)^gamma: power times (gain TVG / full scale)^2, to the power gamma / 2.
     const float gain = plan.row_power_factor[static_cast<std::size_t>(first_row + row)], half_gamma = s.format.gamma / 2;
     std::byte* out = ping.samples.data() + at * static_cast<std::size_t>(bytes);
-    if (bytes == 1) {
+    if (bytes == 1 && !logarithmic) {
       kernels.quantise_bytes(power, gain, half_gamma, max_code, scratch.bytes.data(), width);
       std::memcpy(out, scratch.bytes.data(), static_cast<std::size_t>(s.beam_count));
       continue;
     }
-    kernels.quantise(power, gain, half_gamma, max_code, scratch.codes.data(), width);
+    if (logarithmic)
+      kernels.quantise_levels(power, gain, per_octave, at_full_scale, max_code, scratch.codes.data(), width);
+    else
+      kernels.quantise(power, gain, half_gamma, max_code, scratch.codes.data(), width);
     for (int j = 0; j < s.beam_count; ++j) {
       // 2^32 - 1 is no float: compare before the conversion can overflow.
       const float code = scratch.codes[static_cast<std::size_t>(j)];

@@ -216,6 +216,7 @@ void PingSimulation::find_echo_sources() {
   CellView view;
   view.sonar_in_world = scalars_.seen_from;
   view.bodies_in_world = bodies_;
+  view.min_range_m = static_cast<float>(scalars_.min_range_m);
   view.max_range_m = static_cast<float>(scalars_.max_range_m);
   view.max_sine = static_cast<float>(std::min(1.0, plan_.columns.first_sine + plan_.columns.spacing));
   view.max_elevation_rad = static_cast<float>(plan_.widest_about_axis_rad());

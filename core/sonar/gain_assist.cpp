@@ -6,6 +6,13 @@
 
 namespace sonar {
 
+namespace {
+
+/// The rule of next_gain_db takes codes for a power of the amplitude.
+bool is_assisted(const PingSettings& s) { return s.gain_assist && s.format.scale == SampleFormat::Scale::linear; }
+
+}  // namespace
+
 double percentile_of_full_scale(const Ping& ping, double share) {
   const SampleFormat& format = ping.request.settings.format;
   const auto bytes = static_cast<std::size_t>(format.bits / 8);
@@ -35,7 +42,7 @@ double next_gain_db(double gain_db, double level, double gamma, double passed_s)
 }
 
 float GainAssist::gain_db(const PingSettings& settings, Time at) {
-  if (!settings.gain_assist) {
+  if (!is_assisted(settings)) {
     on_ = false;
     return settings.gain_db;
   }
@@ -52,7 +59,7 @@ float GainAssist::gain_db(const PingSettings& settings, Time at) {
 
 void GainAssist::look_at(const Ping& ping) {
   const PingSettings& made_with = ping.request.settings;
-  if (!on_ || !made_with.gain_assist || made_with.mode != mode_ || ping.request.blank) return;
+  if (!on_ || !is_assisted(made_with) || made_with.mode != mode_ || ping.request.blank) return;
   has_seen_ = true;
   level_ = percentile_of_full_scale(ping);
   gamma_ = static_cast<double>(made_with.format.gamma);

@@ -23,7 +23,8 @@ double next_gain_db(double gain_db, double level, double gamma, double passed_s)
 /// What a device remembers. Starts from the client's gain, and again whenever the mode changes or the assist was off.
 class GainAssist {
  public:
-  /// The gain [dB] of a ping fired at `at`; the client's own when settings.gain_assist is off.
+  /// The gain [dB] of a ping fired at `at`; the client's own when settings.gain_assist is off, or the samples
+  /// are logarithmic.
   float gain_db(const PingSettings& settings, Time at);
   /// Every ping that came out. Pings without the assist are not looked at.
   void look_at(const Ping& ping);

@@ -6,22 +6,33 @@
 
 namespace sonar {
 
+/// How the amplitude v becomes a code; v is pressure times TVG and gain over full scale, so the linear scale saturates at v = 1
+/// (docs/acoustics.md, eq. 37, 40).
 struct SampleFormat {
+  enum class Scale {
+    linear,       // round(max_code v^gamma)
+    logarithmic,  // round(max_code (L - floor_db) / (ceiling_db - floor_db)), L = 20 log10 v: 0 dB is the linear full scale
+  };
   int bits = 8;                  // 8, 16 or 32
   std::uint32_t max_code = 254;  // saturation value
-  float gamma = 1;               // sample = max_code * (v / full scale)^gamma
-  bool row_gains = false;        // a power gain per row, see Ping::row_gain
+  float gamma = 1;               // linear only
+  bool row_gains = false;        // a power gain per row, see Ping::row_gain; linear only
+  Scale scale = Scale::linear;
+  float floor_db = 0, ceiling_db = 80;  // logarithmic: what codes 0 and max_code stand for [dB re full scale], -300 to 300
 
   bool operator==(const SampleFormat&) const = default;
 };
 
+/// Rows in the device's metres (with its believed sound speed): row i covers range_start_m + [i, i + 1) range_bin_m. The picture
+/// ends at range_start_m + range_bin_count range_bin_m, which is range_m but for the vendor's rounding to whole rows.
 struct PingSettings {
   int mode = 0;  // index into SonarModel::modes
   int beam_count = 512;
   int range_bin_count = 437;      // rows
-  double range_m = 10;            // as used by the device, full scale
-  double range_bin_m = 0.0229;    // row spacing, in the device's metres (with its believed sound speed); packets carry it exactly
-  double row_centre = 0.5;        // where in row i its samples centre: (i + row_centre) range_bin_m; 0 near edge, 1 far edge
+  double range_m = 10;            // the far end, as used by the device, full scale
+  double range_start_m = 0;       // the near edge of row 0, below range_m; nearer echoes show by the tails of their pulses alone
+  double range_bin_m = 0.0229;    // row spacing; packets carry it exactly
+  double row_centre = 0.5;        // where in a row its samples centre, see range_of_row: 0 near edge, 1 far edge
   float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (docs/acoustics.md, section 4)
   int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples across it
   float rate_hz = 10;             // 0 = standby
@@ -33,6 +44,9 @@ struct PingSettings {
   bool triggered = false;                // one ping per request of the client
   bool transmit = true;                  // false: it receives noise only
   SampleFormat format;
+
+  /// Device range of a row's samples [m]; of places between rows, too.
+  double range_of_row(double row) const { return range_start_m + (row + row_centre) * range_bin_m; }
 
   bool operator==(const PingSettings&) const = default;
 };

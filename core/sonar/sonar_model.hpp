@@ -16,6 +16,7 @@ enum class ElevationWidthIs { one_way, two_way };
 enum class BeamSpacing {
   uniform_in_sine,   // beam azimuths asin(s), s linear over +-sin(half aperture): Oculus
   uniform_in_angle,  // BlueView
+  listed,            // FrequencyMode::beam_azimuths_rad
 };
 
 struct BeamPattern {
@@ -46,9 +47,17 @@ struct FrequencyMode {
   float max_range_m = 0;
   float source_level_db = 0;  // dB re 1 uPa rms at 1 m
   BeamSpacing beam_spacing = BeamSpacing::uniform_in_sine;
+  /// listed: where each beam looks, positive to port and strictly falling, within +- horizontal_aperture_rad / 2 (the sector that
+  /// the transmitter lights). PingSettings::beam_count is their number.
+  std::vector<double> beam_azimuths_rad;
+  /// listed: -3 dB width of each beam in azimuth, in its own direction; empty = pattern.azimuth_width_rad at broadside for all,
+  /// which widens as 1 / cos(azimuth). The noise level is that of a beam of the pattern's width.
+  std::vector<float> beam_widths_rad;
   BeamPattern pattern;
   Waveform waveform;
   ReceiverModel receiver;
+
+  bool has_own_widths() const { return beam_spacing == BeamSpacing::listed && !beam_widths_rad.empty(); }
 };
 
 struct SonarModel {

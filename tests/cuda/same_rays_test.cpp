@@ -36,7 +36,16 @@ std::vector<std::pair<std::string, PingRequest>> on_device_turns() {
   auto all = turns();
   const auto tone = with_wide_beams(p900(), Waveform::Shape::cw), sweep = with_wide_beams(oculus_high(), Waveform::Shape::lfm);
   for (auto& [what, request] : all) {
-    request.model = request.model->modes[0].waveform.exact ? tone : sweep;
+    const auto& wide = request.model->modes[0].waveform.exact ? tone : sweep;
+    if (what.starts_with("listed beams")) {
+      SonarModel own = *wide;
+      own.modes[0].beam_spacing = BeamSpacing::listed;
+      own.modes[0].beam_azimuths_rad = request.model->modes[0].beam_azimuths_rad;
+      for (const float width : request.model->modes[0].beam_widths_rad) own.modes[0].beam_widths_rad.push_back(3 * width);
+      request.model = std::make_shared<const SonarModel>(std::move(own));
+    } else {
+      request.model = wide;
+    }
     request.switches.multipath = what == "everything, high" || what == "everything, low";
   }
   std::erase_if(all, [](const auto& turn) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 #include "core/base/geometry.hpp"
 #include "core/base/host_device.hpp"
@@ -99,6 +100,16 @@ struct ReceivePattern {
 SONAR_HD inline ReceivePattern receive_pattern(const BeamPattern& pattern) {
   return {pattern.azimuth_taper == Taper::unit, taper_series(pattern.azimuth_taper),
           aperture_in_wavelengths(pattern.azimuth_taper, static_cast<double>(pattern.azimuth_width_rad))};
+}
+
+/// Of beam `j`, which in a list may have a width of its own: in sine it spans 2 sin(w / 2) cos(azimuth).
+inline ReceivePattern receive_pattern(const FrequencyMode& mode, std::size_t j) {
+  ReceivePattern pattern = receive_pattern(mode.pattern);
+  if (!mode.has_own_widths()) return pattern;
+  pattern.aperture_wavelengths =
+      aperture_in_wavelengths(mode.pattern.azimuth_taper, static_cast<double>(mode.beam_widths_rad[j])) /
+      std::cos(mode.beam_azimuths_rad[j]);
+  return pattern;
 }
 
 /// Integral of D^2 over u = what sum_k W_jk^2 du_k tends to: the width in sine space whose scatterers a beam collects.

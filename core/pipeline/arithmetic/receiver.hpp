@@ -52,9 +52,24 @@ SONAR_HD inline std::uint32_t row_power_gain(double row_tvg_db, double smallest_
   return gain >= 4294967295.0 ? 4294967295u : static_cast<std::uint32_t>(gain);
 }
 
-/// Sample code of v = amplitude over full scale (eq. 37): round(max_code v^gamma), held at max_code; NaN and negative give 0.
+/// Logarithmic codes as a straight line (eq. 40): code = per_octave log2(v^2) + at_full_scale, before rounding and clamping.
+struct LevelLine {
+  double per_octave = 0, at_full_scale = 0;
+};
+SONAR_HD inline LevelLine level_line(const SampleFormat& format) {
+  const double floor_db = static_cast<double>(format.floor_db), span_db = static_cast<double>(format.ceiling_db) - floor_db;
+  const double per_db = static_cast<double>(format.max_code) / span_db;
+  return {10 * std::log10(2.0) * per_db, -floor_db * per_db};
+}
+
+/// Sample code of v = amplitude over full scale (eq. 37 and 40), held at max_code; NaN and negative give 0.
 SONAR_HD inline std::uint32_t quantise(double v, const SampleFormat& format) {
   if (!(v > 0)) return 0;
+  if (format.scale == SampleFormat::Scale::logarithmic) {
+    const LevelLine line = level_line(format);
+    const double code = 2 * line.per_octave * std::log2(v) + line.at_full_scale + 0.5;
+    return !(code > 0) ? 0 : code >= static_cast<double>(format.max_code) ? format.max_code : static_cast<std::uint32_t>(code);
+  }
   if (v >= 1) return format.max_code;
   const double gamma = static_cast<double>(format.gamma);
   const double shaped = gamma == 1 ? v : std::pow(v, gamma);

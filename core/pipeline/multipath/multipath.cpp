@@ -23,6 +23,7 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
   CellView view;
   view.sonar_in_world = s.seen_from;
   view.bodies_in_world = bodies;
+  view.min_range_m = static_cast<float>(s.min_range_m);
   view.max_range_m = static_cast<float>(s.max_range_m);
   view.levels = plan.levels;
   view.seen_between = [&reach](Vec3d from_sonar_m, double radius_m) {

@@ -109,6 +109,9 @@ struct Kernels {
   void (*quantise)(const float* power, float gain, float half_gamma, float max_code, float* codes, int n);
   /// The same as bytes, max_code at most 255.
   void (*quantise_bytes)(const float* power, float gain, float half_gamma, float max_code, std::uint8_t* codes, int n);
+  /// Logarithmic codes, as float: per_octave log2(power[i] * gain) + at_full_scale, rounded, from 0 to max_code (LevelLine).
+  void (*quantise_levels)(const float* power, float gain, float per_octave, float at_full_scale, float max_code, float* codes,
+                          int n);
 };
 
 /// The kernels of a level; `automatic` takes the one that the environment variable SONARD_SIMD names, or the best this processor

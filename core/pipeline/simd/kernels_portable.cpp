@@ -14,6 +14,6 @@ constexpr int lanes = 4;
 extern const Kernels portable_kernels;
 const Kernels portable_kernels{"portable",           portable::scatter_tile,    portable::scatter_hits,    portable::spread,
                                portable::accumulate, portable::form_beam_panel, portable::transform_beams, portable::detect,
-                               portable::quantise,   portable::quantise_bytes};
+                               portable::quantise,   portable::quantise_bytes,  portable::quantise_levels};
 
 }  // namespace sonar::simd

@@ -28,6 +28,15 @@ void quantise(const float* power, float gain, float half_gamma, float max_code, 
   for (int i = 0; i < n; ++i) codes[i] = std::floor(codes[i]);
 }
 
+void quantise_levels(const float* power, float gain, float per_octave, float at_full_scale, float max_code, float* codes, int n) {
+  // docs/acoustics.md, eq. 40. Nothing is 1e-30 of full scale, -300 dB: no floor lies lower.
+  for (int i = 0; i < n; i += lanes) {
+    const Lanes code = per_octave * log2_of(larger(load(power + i) * gain, all(1e-30f))) + (at_full_scale + 0.5f);
+    store(codes + i, smaller(larger(code, all(0)), all(max_code)));
+  }
+  for (int i = 0; i < n; ++i) codes[i] = std::floor(codes[i]);
+}
+
 void quantise_bytes(const float* power, float gain, float half_gamma, float max_code, std::uint8_t* codes, int n) {
   for (int i = 0; i < n; i += lanes) {
     const LaneNumbers code = whole_part(codes_of(power + i, gain, half_gamma, max_code));

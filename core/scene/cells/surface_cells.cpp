@@ -207,6 +207,7 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const CellView& view, 
     if (std::abs(p.z) * fan_cosine_ - p.x * fan_sine_ > radius) return;
     if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
   }
+  if (seen.farthest_m < static_cast<double>(view.min_range_m)) return;
 
   node.last_visited = now_;
   bool finer = node.address.level < view.levels.front().level;

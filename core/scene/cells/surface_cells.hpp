@@ -57,7 +57,7 @@ struct DistanceSpan {
 struct CellView {
   Pose sonar_in_world;
   std::span<const Pose> bodies_in_world;
-  float max_range_m = 0;
+  float min_range_m = 0, max_range_m = 0;
   float max_sine = 1;             // |y / r| of the outermost column
   float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first

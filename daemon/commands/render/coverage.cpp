@@ -117,7 +117,7 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
   for (int j = 0; j < s.beam_count; ++j) {
     const double sine = std::sin(static_cast<double>(ping.beam_azimuth_rad[static_cast<std::size_t>(j)]));
     for (int row = 0; row < s.range_bin_count; ++row) {
-      const double r = expected.true_range_m((row + s.row_centre) * s.range_bin_m);
+      const double r = expected.true_range_m(s.range_of_row(row));
       if (!expected.holds(r, sine, 2 * pulse_m, beam_sine)) continue;
       const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(s.beam_count) + static_cast<std::size_t>(j);
       const double pressure = static_cast<double>(ping.pressure_upa[at]);

@@ -57,7 +57,7 @@ class Picture {
   }
 
  private:
-  double range_m(double row) const { return (row + s_.row_centre) * s_.range_bin_m; }
+  double range_m(double row) const { return s_.range_of_row(row); }
   double azimuth_rad(int beam) const { return static_cast<double>(ping_.beam_azimuth_rad[static_cast<std::size_t>(beam)]); }
   double sine(int beam) const { return std::sin(azimuth_rad(beam)); }
   double row_s() const { return 2 * s_.range_bin_m / static_cast<double>(s_.device_sound_speed_mps); }

@@ -25,6 +25,7 @@ PolarImage picture_of(const Ping& ping) {
   image.rows = static_cast<std::size_t>(s.range_bin_count);
   image.beams = static_cast<std::size_t>(s.beam_count);
   image.row_spacing_m = s.range_bin_m;
+  image.start_m = s.range_start_m;
   image.azimuth_rad.assign(ping.beam_azimuth_rad.begin(), ping.beam_azimuth_rad.end());
   const auto bytes = static_cast<std::size_t>(s.format.bits / 8);
   for (std::size_t i = 0; i < image.rows * image.beams; ++i) {
@@ -33,7 +34,7 @@ PolarImage picture_of(const Ping& ping) {
     image.samples.push_back(static_cast<float>(code));
   }
   image.full_scale = static_cast<float>(s.format.max_code);
-  if (bytes > 1) {  // wide samples rarely come near their maximum
+  if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear) {  // wide samples rarely come near their maximum
     std::vector<float> sorted = image.samples;
     const auto place = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) * 999 / 1000);
     std::nth_element(sorted.begin(), place, sorted.end());

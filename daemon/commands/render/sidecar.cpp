@@ -32,6 +32,11 @@ const char* name_of(Waveform::Shape shape) {
   return names[static_cast<int>(shape)];
 }
 
+const char* name_of(BeamSpacing spacing) {
+  constexpr const char* names[] = {"uniform_in_sine", "uniform_in_angle", "listed"};
+  return names[static_cast<int>(spacing)];
+}
+
 json json_of(const SonarModel& model, const FrequencyMode& mode) {
   const ReceiverModel& law = mode.receiver;
   return {{"profile", model.profile},
@@ -40,7 +45,7 @@ json json_of(const SonarModel& model, const FrequencyMode& mode) {
           {"centre_hz", mode.centre_hz},
           {"aperture_deg", deg(mode.horizontal_aperture_rad)},
           {"source_level_db", mode.source_level_db},
-          {"beam_spacing", mode.beam_spacing == BeamSpacing::uniform_in_sine ? "uniform_in_sine" : "uniform_in_angle"},
+          {"beam_spacing", name_of(mode.beam_spacing)},
           {"azimuth_width_deg", deg(mode.pattern.azimuth_width_rad)},
           {"azimuth_taper", name_of(mode.pattern.azimuth_taper)},
           {"elevation_width_deg", deg(mode.pattern.elevation_width_rad)},
@@ -68,6 +73,7 @@ json json_of(const PingSettings& s) {
           {"beams", s.beam_count},
           {"rows", s.range_bin_count},
           {"range_m", s.range_m},
+          {"range_start_m", s.range_start_m},
           {"row_spacing_m", s.range_bin_m},
           {"row_centre", s.row_centre},
           {"pulse_width_m", s.pulse_width_m},
@@ -80,7 +86,10 @@ json json_of(const PingSettings& s) {
           {"bits", s.format.bits},
           {"max_code", s.format.max_code},
           {"gamma", s.format.gamma},
-          {"row_gains", s.format.row_gains}};
+          {"row_gains", s.format.row_gains},
+          {"scale", s.format.scale == SampleFormat::Scale::linear ? "linear" : "logarithmic"},
+          {"floor_db", s.format.floor_db},
+          {"ceiling_db", s.format.ceiling_db}};
 }
 
 json json_of(const Switches& switches) {
@@ -152,7 +161,7 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
           {"sonar", json_of(*r.model, mode)},
           {"sonar_name", job.sonar().name},
           {"settings", json_of(s)},
-          {"row_0_m", s.row_centre * s.range_bin_m},
+          {"row_0_m", s.range_of_row(0)},
           {"row_spacing_m", s.range_bin_m},
           {"beam_azimuth_rad", ping.beam_azimuth_rad},
           {"row_gain", ping.row_gain},

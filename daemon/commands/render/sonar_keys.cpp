@@ -58,6 +58,25 @@ void read_receiver(const Node& node, ReceiverModel& law) {
   set(keys.optional("leak_decay_db_per_m"), Range::between(0, 1e4), law.leak_decay_db_per_m);
 }
 
+/// A list of azimuths makes the spacing a listed one.
+void read_beams(const Node& azimuths, const Node& widths, FrequencyMode& mode) {
+  if (azimuths.present()) {
+    mode.beam_spacing = BeamSpacing::listed;
+    mode.beam_azimuths_rad.clear();
+    mode.beam_widths_rad.clear();
+    for (const Node& azimuth : azimuths.items(1, 2048)) {
+      const double rad = rad_from_deg(azimuth.number(Range::between(-85, 85)));
+      if (!mode.beam_azimuths_rad.empty() && rad >= mode.beam_azimuths_rad.back()) azimuth.fail("must be below the one before");
+      mode.beam_azimuths_rad.push_back(rad);
+    }
+  }
+  if (!widths.present()) return;
+  mode.beam_widths_rad.clear();
+  for (const Node& width : widths.items(1, 2048))
+    mode.beam_widths_rad.push_back(static_cast<float>(rad_from_deg(width.number(Range::between(0.01, 60)))));
+  if (mode.beam_widths_rad.size() != mode.beam_azimuths_rad.size()) widths.fail("must be as many as beam_azimuths_deg");
+}
+
 }  // namespace
 
 void read_model(Map keys, FrequencyMode& mode) {
@@ -68,6 +87,7 @@ void read_model(Map keys, FrequencyMode& mode) {
   mode.beam_spacing = keys.optional("beam_spacing")
                           .choice_or(mode.beam_spacing, {{"uniform_in_sine", BeamSpacing::uniform_in_sine},
                                                          {"uniform_in_angle", BeamSpacing::uniform_in_angle}});
+  read_beams(keys.optional("beam_azimuths_deg"), keys.optional("beam_widths_deg"), mode);
   set_deg(keys.optional("azimuth_width_deg"), Range::between(0.01, 60), mode.pattern.azimuth_width_rad);
   set_deg(keys.optional("elevation_width_deg"), Range::between(0.1, 120), mode.pattern.elevation_width_rad);
   mode.pattern.azimuth_taper = keys.optional("azimuth_taper")
@@ -103,7 +123,12 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
   if (!own_grid) s.range_m = std::min(s.range_m, static_cast<double>(mode.max_range_m));
   s.range_m = keys.optional("range_m").number_or(s.range_m, Range::between(1e-3, 1e5));
-  s.beam_count = static_cast<int>(keys.optional("beams").integer_or(s.beam_count, 1, 2048));
+  s.range_start_m = keys.optional("range_start_m").number_or(s.range_start_m, Range::between(0, s.range_m));
+  const double shown_m = s.range_m - s.range_start_m;
+  const int listed = static_cast<int>(mode.beam_azimuths_rad.size());
+  const bool is_listed = mode.beam_spacing == BeamSpacing::listed && listed > 0;
+  s.beam_count = static_cast<int>(
+      keys.optional("beams").integer_or(is_listed ? listed : s.beam_count, is_listed ? listed : 1, is_listed ? listed : 2048));
   s.device_sound_speed_mps = static_cast<float>(
       keys.optional("device_sound_speed_mps").number_or(static_cast<double>(s.device_sound_speed_mps), Range::between(100, 1e4)));
   set(keys.optional("device_absorption_db_per_m"), Range::between(0, 1000), s.device_absorption_db_per_m);
@@ -116,14 +141,14 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   if (spacing.present())
     s.range_bin_m = spacing.number(a_length);
   else if (rows.present())
-    s.range_bin_m = s.range_m / static_cast<double>(std::max<std::int64_t>(rows.integer(1, 65535), 1));
+    s.range_bin_m = shown_m / static_cast<double>(std::max<std::int64_t>(rows.integer(1, 65535), 1));
   else if (own_grid)
     s.range_bin_m = c / (2 * native_sample_rate_hz(envelope_parameter_hz(c, static_cast<double>(s.pulse_width_m))));
   else
     s.range_bin_m = before.range_bin_m * s.range_m / before.range_m;
   if (!(s.range_bin_m > 0)) return;  // said already
   s.range_bin_count = static_cast<int>(
-      rows.integer_or(std::clamp<std::int64_t>(std::llround(std::ceil(s.range_m / s.range_bin_m - 1e-9)), 1, 65535), 1, 65535));
+      rows.integer_or(std::clamp<std::int64_t>(std::llround(std::ceil(shown_m / s.range_bin_m - 1e-9)), 1, 65535), 1, 65535));
   if (!pulse.present() && !own_grid)
     s.pulse_width_m = static_cast<float>(static_cast<double>(before.pulse_width_m) * s.range_bin_m / before.range_bin_m);
 
@@ -138,6 +163,11 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   s.format.max_code = static_cast<std::uint32_t>(keys.optional("max_code").unsigned_integer_or(s.format.max_code, 0xFFFFFFFFu));
   set(keys.optional("gamma"), Range::between(0.01, 10), s.format.gamma);
   s.format.row_gains = keys.optional("row_gains").boolean_or(s.format.row_gains);
+  using Scale = SampleFormat::Scale;
+  s.format.scale =
+      keys.optional("scale").choice_or<Scale>(s.format.scale, {{"linear", Scale::linear}, {"logarithmic", Scale::logarithmic}});
+  set(keys.optional("floor_db"), Range::between(-300, 300), s.format.floor_db);
+  set(keys.optional("ceiling_db"), Range::between(-300, 300), s.format.ceiling_db);
 }
 
 }  // namespace sonar::render

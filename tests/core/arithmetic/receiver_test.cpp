@@ -44,6 +44,27 @@ TEST(Receiver, RowGains) {
   EXPECT_EQ(row_power_gain(std::numeric_limits<double>::quiet_NaN(), -9), 1u);
 }
 
+TEST(Receiver, QuantisesLevels) {
+  const SampleFormat decibels{
+      .bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = -20, .ceiling_db = 60};
+  EXPECT_EQ(quantise(0, decibels), 0u);
+  EXPECT_EQ(quantise(std::numeric_limits<double>::quiet_NaN(), decibels), 0u);
+  EXPECT_EQ(quantise(std::numeric_limits<double>::infinity(), decibels), 255u);
+  EXPECT_EQ(quantise(0.1, decibels), 0u);
+  EXPECT_EQ(quantise(1000, decibels), 255u);
+  EXPECT_EQ(quantise(1, decibels), 64u) << "round(255 * 20 / 80): 0 dB is the linear full scale";
+  const double added = 255 * 20 * std::log10(2.0) / 80;
+  std::uint32_t last = 0;
+  for (double v = 0.01; v < 2000; v *= 1.01) {
+    const std::uint32_t code = quantise(v, decibels);
+    EXPECT_GE(code, last);
+    last = code;
+    if (v > 0.11 && v < 490) {
+      EXPECT_NEAR(quantise(2 * v, decibels) - code, added, 1) << v;
+    }
+  }
+}
+
 TEST(Receiver, Quantise) {
   const SampleFormat linear8{.bits = 8, .max_code = 254, .gamma = 1, .row_gains = false};
   EXPECT_EQ(quantise(0, linear8), 0u);

@@ -94,6 +94,22 @@ inline std::vector<std::pair<std::string, PingRequest>> turns() {
   both("flat beams", [](PingRequest& r) { r.switches.conical = false; });
   both("other seed", [](PingRequest& r) { r.seed = Seed{8}; });
   both("fewer beams and rows", [](PingRequest& r) { r.settings.beam_count = 33, r.settings.range_bin_count = 60; });
+  both("a window of range", [](PingRequest& r) {
+    r.settings.range_start_m = 30 * r.settings.range_bin_m;
+    r.settings.range_bin_count -= 30;
+  });
+  both("listed beams, logarithmic samples", [](PingRequest& r) {
+    SonarModel model = *r.model;
+    FrequencyMode& mode = model.modes[0];
+    mode.beam_spacing = BeamSpacing::listed;
+    for (int j = 0; j < r.settings.beam_count; ++j) {
+      const double x = 1 - (2.0 * j + 1) / r.settings.beam_count;
+      mode.beam_azimuths_rad.push_back(static_cast<double>(mode.horizontal_aperture_rad) / 2 * (0.7 * x + 0.3 * x * x * x));
+      mode.beam_widths_rad.push_back(mode.pattern.azimuth_width_rad * static_cast<float>(1 + x * x));
+    }
+    r.model = std::make_shared<const SonarModel>(std::move(model));
+    r.settings.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = -80, .ceiling_db = 0};
+  });
   both("somewhere else", [](PingRequest& r) {
     r.sonar_in_world = {{1, -0.6, -0.7}, quat_from_rpy({0.1, -0.05, 0.2})};
     r.bodies_in_world = {{{2.8, -0.3, -0.9}, quat_from_rpy({0, 0.4, 0})}};

@@ -99,9 +99,9 @@ double Sounding::envelope_hz() const {
   return envelope_parameter_hz(static_cast<double>(request.settings.device_sound_speed_mps),
                                static_cast<double>(request.settings.pulse_width_m));
 }
-double Sounding::range_of_row(double row) const { return (row + request.settings.row_centre) * request.settings.range_bin_m; }
+double Sounding::range_of_row(double row) const { return request.settings.range_of_row(row); }
 double Sounding::row_of_range(double range_m) const {
-  return range_m / request.settings.range_bin_m - request.settings.row_centre;
+  return (range_m - request.settings.range_start_m) / request.settings.range_bin_m - request.settings.row_centre;
 }
 
 double Sounding::pressure(int row, int beam) const {

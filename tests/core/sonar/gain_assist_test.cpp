@@ -61,6 +61,17 @@ double settled_gain_db(double scene, double gamma, float from_db, int pings, mil
   return gain;
 }
 
+TEST(GainAssist, IsOffForLogarithmicSamples) {
+  GainAssist assist;
+  Ping loud = picture(1, 254);
+  PingSettings& settings = loud.request.settings;
+  settings.format.scale = SampleFormat::Scale::logarithmic;
+  settings.gain_db = 40;
+  EXPECT_EQ(assist.gain_db(settings, Time{}), 40);
+  assist.look_at(loud);
+  EXPECT_EQ(assist.gain_db(settings, Time{} + milliseconds(500)), 40);
+}
+
 TEST(GainAssist, SettlesWhereTheLoudPartIsAtEightyPercent) {
   for (const double gamma : {1.0, 0.5})
     for (const float from_db : {0.0f, 30.0f, 90.0f}) {

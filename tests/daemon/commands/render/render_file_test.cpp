@@ -11,6 +11,7 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "daemon/commands/render/coverage.hpp"
+#include "daemon/commands/render/expectation.hpp"
 #include "daemon/commands/render/npy.hpp"
 #include "daemon/commands/render/render_job.hpp"
 #include "daemon/commands/render/resolution_cell.hpp"
@@ -99,6 +100,42 @@ sonar:
   EXPECT_FALSE(s.tvg);
   EXPECT_EQ(s.device_sound_speed_mps, 1480);
   EXPECT_FALSE(job.config.engine.switches.noise);
+}
+
+TEST(RenderFile, WindowsListedBeamsAndLevelsReachTheSonar) {
+  const std::string text = point +
+                           "sonar: {model: {beam_azimuths_deg: [20, 5, -10], beam_widths_deg: [2, 1, 3]},\n"
+                           "  ping: {range_m: 6, range_start_m: 4, rows: 100, bits: 8, max_code: 255, scale: logarithmic,\n"
+                           "         floor_db: -60, ceiling_db: 10}}\n";
+  const RenderInput input = parsed(text);
+  const RenderJob& job = input.jobs.at(0);
+  const PingSettings& s = job.settings;
+  EXPECT_EQ(job.mode().beam_spacing, BeamSpacing::listed);
+  EXPECT_EQ(s.beam_count, 3);
+  EXPECT_NEAR(job.mode().beam_azimuths_rad.at(1), rad_from_deg(5), 1e-12);
+  EXPECT_NEAR(static_cast<double>(job.mode().beam_widths_rad.at(2)), rad_from_deg(3), 1e-7);
+  EXPECT_NEAR(s.range_bin_m, 0.02, 1e-12);
+  EXPECT_EQ(s.range_bin_count, 100);
+  EXPECT_EQ(s.format.scale, SampleFormat::Scale::logarithmic);
+
+  Parallel pool(1);
+  PingRequest request = make_request(job, PingNumber{1}, Time{});
+  request.switches.keep_truth = request.switches.keep_pressure = true;
+  const auto engine = make_engine(job.scene, pool, {});
+  const Ping ping = engine->run({&request, 1}).at(0);
+  const auto about = sidecar(job, ping, "test", engine->statistics(), "");
+  EXPECT_NEAR(about.at("row_0_m").get<double>(), 4.01, 1e-9);
+  EXPECT_EQ(about.at("settings").at("range_start_m"), 4);
+  EXPECT_EQ(about.at("settings").at("scale"), "logarithmic");
+  EXPECT_EQ(about.at("sonar").at("beam_spacing"), "listed");
+  Expectation there;
+  there.measure = Measure::mean_level_db;
+  there.window = {.from_m = 4, .to_m = 4.1};
+  EXPECT_TRUE(measure(there, job, ping)) << "windows are in real ranges";
+
+  EXPECT_THAT(refusal(point + "sonar: {model: {beam_azimuths_deg: [20, 25]}}\n"), HasSubstr("must be below the one before"));
+  EXPECT_THAT(refusal(point + "sonar: {model: {beam_azimuths_deg: [20, 5]}, ping: {beams: 3}}\n"), HasSubstr("beams"));
+  EXPECT_THAT(refusal(point + "sonar: {ping: {range_m: 3, range_start_m: 3.5}}\n"), HasSubstr("range_start_m"));
 }
 
 TEST(RenderFile, AProfileStartsAsTheDeviceAndKeepsItsShares) {
