@@ -1,4 +1,4 @@
-// Command line of each command: adds its options to the parser and returns the function that executes it. command_line.cpp lists them.
+// Command line of each command: adds its options to the parser and returns the function that executes it. run() lists them.
 #pragma once
 
 #include <functional>

@@ -119,7 +119,7 @@ TEST(RenderFile, WindowsListedBeamsAndLevelsReachTheSonar) {
   EXPECT_EQ(s.format.scale, SampleFormat::Scale::logarithmic);
 
   Parallel pool(1);
-  PingRequest request = make_request(job, PingNumber{1}, Time{});
+  PingRequest request = make_request(job, world_of(job), PingNumber{1}, Time{});
   request.switches.keep_truth = request.switches.keep_pressure = true;
   const auto engine = make_engine(job.scene, pool, {});
   const Ping ping = engine->run({&request, 1}).at(0);
