@@ -58,6 +58,21 @@ PingSettings small_settings(int beams = 64) {
   return s;
 }
 
+// The record of a window begins with it: what lies outside is left out, its side lobes too.
+TEST(PaperWindow, ShowsAPointInItsRow) {
+  constexpr int skipped = 40;
+  for (const Mode mode : {Mode::paper, Mode::raster}) {
+    Comparison c(SceneMaker().add_point({3.01, 0, 0}, -10).add_point({1, 0, 0}, 20).make(), p900(), small_settings());
+    c.request.settings.range_start_m = skipped * c.request.settings.range_bin_m;
+    c.request.settings.range_bin_count -= skipped;
+    const Ping window = c.ping(mode);
+    const int row = static_cast<int>(loudest(window) / window.beam_azimuth_rad.size());
+    EXPECT_EQ(row, static_cast<int>(3.01 / c.request.settings.range_bin_m) - skipped) << "the nearer, louder one is left out";
+    Comparison whole(SceneMaker().add_point({3.01, 0, 0}, -10).make(), p900(), small_settings());
+    EXPECT_NEAR(at_row(window, row, 32) / at_row(whole.ping(mode), row + skipped, 32), 1, 0.01) << "nor has it a tail";
+  }
+}
+
 TEST(PaperOracles, Oracle09_SphereInPaperMode) {
   // sum mu cos^2 r^2 dOmega over the disc that a far sphere shows: (pi / 2) mu a^2; Lambert's own is (2 pi / 3) mu a^2.
   constexpr double radius = 0.1, distance = 100;
