@@ -33,6 +33,12 @@ class DelegatingVendor : public Vendor {
   std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const override {
     return of_.converse(port, device, now);
   }
+  ResourceReply on_http(const Port& port, const ResourceRequest& request, const DeviceState& device, Time now) const override {
+    return of_.on_http(port, request, device, now);
+  }
+  std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const override {
+    return of_.datagrams(port, ping, device);
+  }
   std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const override {
     return of_.frame(ping, device);
   }

@@ -15,6 +15,7 @@ def spoken(seconds):
 
 
 def main():
+    sys.stdin.reconfigure(errors="replace")  # a compiler quotes what it finds
     begin, tenth, open_line = time.monotonic(), -1, False
     for line in sys.stdin:
         step = STEP.match(line)
@@ -39,4 +40,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit(130)

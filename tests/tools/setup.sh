@@ -78,6 +78,7 @@ build() {
   local preset=$1
   shift
   NINJA_STATUS="[%f/%t] " cmake --build "build/$preset" --parallel "$(build_jobs)" ${1:+--target "$@"} </dev/null | tests/tools/build_progress.py
+  return "${PIPESTATUS[0]}"
 }
 
 # setup_and_build [targets...]: the release build; without targets everything in it, tests too.

@@ -123,7 +123,9 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
   if (!own_grid) s.range_m = std::min(s.range_m, static_cast<double>(mode.max_range_m));
   s.range_m = keys.optional("range_m").number_or(s.range_m, Range::between(1e-3, 1e5));
-  s.range_start_m = keys.optional("range_start_m").number_or(s.range_start_m, Range::between(0, s.range_m));
+  const Node start = keys.optional("range_start_m");
+  s.range_start_m = start.number_or(s.range_start_m, Range::between(0, s.range_m));
+  if (s.range_start_m >= s.range_m) start.fail("must be below range_m, where the picture ends");
   const double shown_m = s.range_m - s.range_start_m;
   const int listed = static_cast<int>(mode.beam_azimuths_rad.size());
   const bool is_listed = mode.beam_spacing == BeamSpacing::listed && listed > 0;

@@ -42,9 +42,11 @@ std::string sonar_lines(const Device& device) {
                      text::frequency_text(static_cast<double>(mode.centre_hz)) +
                      format("  %d beams  %g m  %g Hz\n", s.beam_count, s.range_m, static_cast<double>(s.rate_hz));
   const Endpoint data = device.data_endpoint();
-  text += "  data    tcp " + text_of(data);
+  text += data.port == 0 ? "  data    by datagrams" : "  data    tcp " + text_of(data);
+  const protocol::Port* const beacon = device.sonar().vendor().port(protocol::Port::Kind::udp_beacon);
   for (const udp::endpoint& to : device.status_destinations())
-    text += format("      status udp -> %s:%d (1 Hz)", to.address().to_string().c_str(), to.port());
+    text += format("      status udp -> %s:%d (%g Hz)", to.address().to_string().c_str(), to.port(),
+                   1e3 / static_cast<double>(beacon->period.count()));
   if (device.sonar().state().advertise_ip != device.config().bind_ip)
     text += "      advertised as " + text_of(device.sonar().state().advertise_ip);
   text += "\n";

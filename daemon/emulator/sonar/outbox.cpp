@@ -61,6 +61,12 @@ void Outbox::written() {
   writing_ = false;
 }
 
+void Outbox::not_written() {
+  assert(writing_);
+  if (writing_ping_) count_drop(DropReason::gone);
+  writing_ = false;
+}
+
 void Outbox::drop_waiting_pings(DropReason why) {
   count_drop(why, pings_.size());
   pings_.clear();

@@ -51,6 +51,8 @@ class Outbox {
   Message take();
   /// The message last taken has been written to its end.
   void written();
+  /// It could not be written, and others can: it is dropped.
+  void not_written();
   /// Leaves the message being written and the replies, which are small.
   void drop_waiting_pings(DropReason why = DropReason::stop);
   /// The connection is over: nothing more is written, and what was not is dropped, the message being written too.

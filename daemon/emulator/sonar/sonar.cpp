@@ -249,7 +249,12 @@ void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
 
 void Sonar::offer_datagrams(Connection& stream, const Ping& ping, PingQueued& queued, Actions& actions) {
   if (stream.finishing || connections_.receivers(stream).empty()) return;
-  auto datagrams = std::make_shared<const std::vector<protocol::Bytes>>(vendor_.datagrams(*stream.port, ping, state_));
+  std::shared_ptr<const std::vector<protocol::Bytes>> datagrams;
+  try {
+    datagrams = std::make_shared<const std::vector<protocol::Bytes>>(vendor_.datagrams(*stream.port, ping, state_));
+  } catch (const std::exception& e) {  // costs this ping, not the stream
+    return report_fault(e, actions);
+  }
   if (datagrams->empty()) return;
   queued.datagrams.push_back(datagrams);
   stream.outbox.push_ping({.bytes = nullptr,

@@ -48,6 +48,8 @@ class Sonar {
   /// So many bytes of it were taken; after the last one on_written().
   void on_sent(ConnectionId id, std::size_t bytes);
   void on_written(ConnectionId id, const Outbox::Message& message, Time now);
+  /// The message of a stream that was taken last had no receiver left.
+  void on_not_sent(ConnectionId id);
   /// The caller ends the connection after the message being written.
   void finish(ConnectionId id);
   /// The connection is closed; also one that waited. `why` is for the log.
@@ -177,7 +179,7 @@ class Sonar {
   Pacer pacer_;
   PingSettings settings_;
   GainAssist gain_assist_;
-  bool asked_ = false;  // a client that is still connected has sent settings
+  bool asked_ = false;  // settings were requested since the first client or receiver came
   bool transmits_ = true;
   bool stopping_ = false;
 

@@ -30,7 +30,7 @@ Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const
     Connection& oldest = *connections_.oldest_client();
     oldest.state = Connection::State::leaving;
     begin_finish(oldest, "another client took over", actions);
-    if (connections_.clients() == 0) use_initial_settings();
+    if (!connections_.has_audience()) use_initial_settings();
   }
   serve(connections_.add(id, role, std::move(peer), Connection::State::waiting, port), now, actions);
   return actions;
@@ -50,7 +50,7 @@ void Sonar::serve(Connection& connection, Time now, Actions& actions) {
 void Sonar::on_membership(Time now, Actions& actions) {
   const Connection* const oldest = connections_.oldest_client();
   state_.connected_client = oldest == nullptr ? protocol::Ipv4{} : oldest->peer.ip;
-  if (oldest == nullptr) use_initial_settings();
+  if (!connections_.has_audience()) use_initial_settings();
   update_pacer(now);
   const protocol::Port* const beacon = vendor_.port(protocol::Port::Kind::udp_beacon);
   if (beacon != nullptr && beacon->on_change) actions.emplace_back(Announce{});
@@ -127,19 +127,21 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
   Actions actions;
   Connection* const connection = connections_.find(id);
   if (connection == nullptr) return actions;
-  const bool was_client = connection->role == Role::client && connection->state == Connection::State::served;
+  const Role connection_role = connection->role;
+  const bool was_client = connection_role == Role::client && connection->state == Connection::State::served;
   connection->outbox.end(connection->finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection->peer.name, connection->role, connection->state != Connection::State::waiting,
                               connection->outbox.pings_written(), connection->outbox.pings_dropped(), why});
   if (connection->role != Role::observer) add_traffic(figures_, *connection);
   connections_.remove(id);
+  if (connection_role == Role::stream) update_pacer(now);
   if (!was_client) return actions;
   Connection* const next = stopping_ ? nullptr : connections_.longest_waiting();
   if (next == nullptr) {
     on_membership(now, actions);
     return actions;
   }
-  if (connections_.clients() == 0) use_initial_settings();
+  if (!connections_.has_audience()) use_initial_settings();
   serve(*next, now, actions);
   return actions;
 }
@@ -216,6 +218,10 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
   } else if (const auto* receivers = std::get_if<protocol::SetReceivers>(&event)) {
     set_receivers(from, *receivers, now);
   }
+}
+
+void Sonar::on_not_sent(ConnectionId id) {
+  if (Connection* const to = connections_.find(id)) to->outbox.not_written();
 }
 
 Outbox::Message Sonar::next_message(ConnectionId id) {

@@ -58,14 +58,20 @@ class ConnectionListener {
     const Sender sender{protocol_ + " tcp " + address + ":" + std::to_string(peer.port()), protocol_ + " " + address};
     const bool untrusted = services_.token.needed();
     ConnectionSlots<Connection>& slots = untrusted ? untrusted_ : slots_;
+    // Clients of sonars count among limits.clients; control has slots of its own alone.
+    Admission::Place place;
+    if (services_.purpose == Admission::Purpose::client) {
+      place = services_.admission.enter(socket);
+      if (!place) return close_politely(socket);
+    }
     if (!make_room(slots, sender)) return reject(std::move(socket), sender);
     end_when_silent(socket, services_.limits.dead_peer);
     socket.set_option(tcp::no_delay(true), ec);
     auto connection = make_(std::move(socket), sender);
     slots.add(connection);
     if (untrusted) connection->must_claim_slot([this, weak = std::weak_ptr(connection)] { return claim_slot(weak.lock()); });
-    run(connection, connection->read());
-    run(connection, connection->write());
+    run(connection, connection->read(), place);
+    run(connection, connection->write(), place);
   }
   bool make_room(ConnectionSlots<Connection>& slots, const Sender& sender) {
     const bool room = slots.make_room([this](const Connection& evicted) {
@@ -93,9 +99,9 @@ class ConnectionListener {
     run(connection, connection->write());
   }
   /// Starts one of the connection's coroutines. An exception ends this connection only.
-  void run(const std::shared_ptr<Connection>& connection, asio::awaitable<void> part) {
+  void run(const std::shared_ptr<Connection>& connection, asio::awaitable<void> part, Admission::Place place = {}) {
     ++running_;
-    asio::co_spawn(services_.io, std::move(part), [this, connection](std::exception_ptr fault) {
+    asio::co_spawn(services_.io, std::move(part), [this, connection, place = std::move(place)](std::exception_ptr fault) {
       --running_;
       if (fault) log_fault(services_, text_of(fault), connection->sender().id);
       if (fault) connection->close();

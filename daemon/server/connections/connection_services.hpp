@@ -20,7 +20,7 @@ struct ConnectionServices {
   const LimitConfig& limits;
   Admission& admission;
   Log& log;
-  std::string server;  // for the log: "control", or the name of a sonar
+  std::string server;  // for the log: "control", "sonar NAME"
   Admission::Purpose purpose = Admission::Purpose::control;
   Token token = {};  // without one every client is trusted
   LogLimiter refusals = {}, notices = {}, faults = {};

@@ -23,8 +23,8 @@ class Listener {
 
   /// Port 0: the system chooses one. After an error it does not listen.
   Result<void> open(Endpoint at);
-  /// `take` gets each connection, `fault` what an exception said. Does nothing when it does not listen. The handlers' owner must
-  /// live until the I/O loop has run once more after stop().
+  /// `take` gets each connection, `fault` what an exception said. Does nothing when it does not listen. It must live for
+  /// 100 ms after stop(): Admission may pause before it looks again.
   void start(Take take, Fault fault);
   void stop();
   bool is_open() const { return acceptor_.is_open(); }

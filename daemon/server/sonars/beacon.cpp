@@ -27,8 +27,8 @@ void Beacon::start() {
         if (!fault || stopping_) return;
         fault_(text_of(fault));
         timer_.expires_after(period_);
-        timer_.async_wait([this](const error_code& ec) {
-          if (!ec && !stopping_) start();
+        timer_.async_wait([this](const error_code&) {  // send_now() cancels it
+          if (!stopping_) start();
         });
       });
 }
@@ -43,6 +43,7 @@ void Beacon::stop() {
 asio::awaitable<void> Beacon::send() {
   while (!stopping_) {
     timer_.expires_after(period_);  // before the bytes are made: send_now() during a write counts
+    sent_at_ = std::chrono::steady_clock::now();
     const protocol::Bytes status = make_();
     for (const udp::endpoint& to : to_) {
       error_code ec;

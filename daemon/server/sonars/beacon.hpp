@@ -2,6 +2,7 @@
 // Device.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
 #include <string>
@@ -23,12 +24,13 @@ class Beacon {
 
   Result<void> open(const SonarConfig& sonar, const protocol::Port& port);
   void start();
-  /// Without waiting for the period to pass.
-  void send_now() { timer_.expires_at(std::chrono::steady_clock::now()); }
+  /// Without waiting for the period to pass, but not more often than every `shortest_pause`.
+  void send_now() { timer_.expires_at(std::max(std::chrono::steady_clock::now(), sent_at_ + shortest_pause)); }
   void stop();
   const std::vector<udp::endpoint>& destinations() const { return to_; }
 
  private:
+  static constexpr std::chrono::milliseconds shortest_pause{50};
   asio::awaitable<void> send();
 
   Log& log_;
@@ -38,6 +40,7 @@ class Beacon {
   udp::socket socket_;
   asio::steady_timer timer_;
   std::chrono::milliseconds period_{0};
+  std::chrono::steady_clock::time_point sent_at_{};
   std::vector<udp::endpoint> to_;
   bool stopping_ = false, failed_ = false;
 };

@@ -27,7 +27,12 @@ asio::awaitable<void> DatagramStream::send() {
   const auto self = shared_from_this();
   while (true) {
     if (const Outbox::Message ping = parent_.next_message(id_)) {
-      if (!co_await send_ping(ping)) co_return;
+      const auto receivers = parent_.receivers(id_);  // one list for the whole ping
+      if (receivers.empty()) {
+        parent_.on_not_sent(id_);
+        continue;
+      }
+      if (!co_await send_ping(ping, receivers)) co_return;
       parent_.on_written(id_, ping);
     } else if (finishing_) {
       co_return;
@@ -40,14 +45,14 @@ asio::awaitable<void> DatagramStream::send() {
 }
 
 /// False: the socket was closed before the ping was whole.
-asio::awaitable<bool> DatagramStream::send_ping(const Outbox::Message& ping) {
-  const auto receivers = parent_.receivers(id_);  // one list for the whole ping
+asio::awaitable<bool> DatagramStream::send_ping(const Outbox::Message& ping, const std::vector<Endpoint>& receivers) {
   for (std::size_t i = 0; i < ping.datagrams->size(); ++i) {
     const protocol::Bytes& datagram = (*ping.datagrams)[i];
     error_code ec;
     if (i > 0 && gap_.count() > 0) {
       pause_.expires_after(gap_);
       co_await pause_.async_wait(into(ec));
+      if (!socket_.is_open()) co_return false;
     }
     for (const Endpoint& to : receivers) {
       ec = {};

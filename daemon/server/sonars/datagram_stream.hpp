@@ -25,7 +25,7 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
 
  private:
   asio::awaitable<void> send();
-  asio::awaitable<bool> send_ping(const Outbox::Message& ping);
+  asio::awaitable<bool> send_ping(const Outbox::Message& ping, const std::vector<Endpoint>& receivers);
 
   SessionParent& parent_;
   udp::socket& socket_;

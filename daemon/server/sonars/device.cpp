@@ -184,6 +184,11 @@ void Device::on_written(ConnectionId to, const Outbox::Message& message) {
   parent_.on_change();
 }
 
+void Device::on_not_sent(ConnectionId stream) {
+  sonar_.on_not_sent(stream);
+  parent_.on_change();
+}
+
 std::optional<std::chrono::milliseconds> Device::longest_silence(ConnectionId of) const {
   const Connection* const connection = sonar_.connections().find(of);
   return connection == nullptr ? std::nullopt : connection->dialogue->longest_silence();
@@ -307,6 +312,7 @@ void Device::carry_out(const Finish& action) {
 
 void Device::carry_out(const Reset& action) {
   if (const SessionPointer session = session_of(action.connection)) return session->reset(action.why);
+  if (const StreamPointer stream = stream_of(action.connection)) return stream->finish(action.why);
   if (arrived_.erase(action.connection) > 0) perform(sonar_.on_closed(action.connection, action.why, network_.clock.now()));
 }
 

@@ -107,6 +107,7 @@ class Device final : public SessionParent {
   std::vector<Endpoint> receivers(ConnectionId stream) const override { return sonar_.receivers(stream); }
   void on_sent(ConnectionId to, std::size_t bytes) override { sonar_.on_sent(to, bytes); }
   void on_written(ConnectionId to, const Outbox::Message& message) override;
+  void on_not_sent(ConnectionId stream) override;
   std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const override;
   void on_finish(ConnectionId session) override { sonar_.finish(session); }
   void on_fault(const std::string& what) override;

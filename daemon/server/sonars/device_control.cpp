@@ -9,7 +9,7 @@ namespace {
 
 double ms(double seconds) { return 1e3 * seconds; }
 
-control::SonarFigures told(const DeviceFigures& f) {
+control::SonarFigures figures_of(const DeviceFigures& f) {
   control::SonarFigures out;
   out.pings = f.pings;
   out.refused = f.refused;
@@ -34,7 +34,7 @@ control::SonarStatus Device::status(Time now) const {
   control::SonarStatus s;
   s.name = config().name;
   s.profile = state.model->profile;
-  s.listens = text_of(data_endpoint());
+  if (!tcp_ports_.empty()) s.listens = text_of(data_endpoint());
   s.advertised = text_of(state.advertise_ip);
   for (const udp::endpoint& to : status_destinations())
     s.status_to.push_back(to.address().to_string() + ":" + std::to_string(to.port()));
@@ -55,14 +55,14 @@ control::SonarStatus Device::status(Time now) const {
     const double connected_s = session ? seconds(session->connected_for()) : 0;
     s.clients.push_back({c.peer.name, c.outbox.pings_written(), c.outbox.pings_dropped(), c.bytes_written, connected_s});
   }
-  s.figures = told(figures());
+  s.figures = figures_of(figures());
   return s;
 }
 
 std::string Device::problem() const {
-  const bool lost =
-      !stopping_ && std::any_of(tcp_ports_.begin(), tcp_ports_.end(), [](const TcpPort& p) { return !p.listener.is_open(); });
-  return lost ? "sonar " + config().name + " does not listen any more" : "";
+  const bool lost = std::any_of(tcp_ports_.begin(), tcp_ports_.end(), [](const TcpPort& p) { return !p.listener.is_open(); }) ||
+                    std::any_of(http_.begin(), http_.end(), [](const SonarHttp& http) { return !http.is_open(); });
+  return lost && !stopping_ ? "sonar " + config().name + " does not listen any more" : "";
 }
 
 RecordedSonar Device::recorded() const {

@@ -32,6 +32,8 @@ class SessionParent {
   virtual void on_sent(ConnectionId to, std::size_t bytes) = 0;
   /// A message has been handed to the kernel whole.
   virtual void on_written(ConnectionId to, const Outbox::Message& message) = 0;
+  /// The message of a stream that was taken last had no receiver left.
+  virtual void on_not_sent(ConnectionId stream) = 0;
   /// A peer that is silent for longer has gone. Nothing: it may be silent.
   virtual std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const = 0;
   /// It ends after the message being written.

@@ -21,6 +21,7 @@ class SonarHttp final : public HttpService {
   Result<void> open(Endpoint at) { return listener_.open(at); }
   void start() { listener_.start(); }
   void stop() { listener_.stop(); }
+  bool is_open() const { return listener_.is_open(); }
   bool gone() const { return listener_.gone(); }
 
   asio::awaitable<std::variant<HttpAnswer, HttpStream>> answer(const HttpRequest& request, HttpConnection& from) override;

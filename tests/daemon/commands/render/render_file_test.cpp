@@ -136,6 +136,8 @@ TEST(RenderFile, WindowsListedBeamsAndLevelsReachTheSonar) {
   EXPECT_THAT(refusal(point + "sonar: {model: {beam_azimuths_deg: [20, 25]}}\n"), HasSubstr("must be below the one before"));
   EXPECT_THAT(refusal(point + "sonar: {model: {beam_azimuths_deg: [20, 5]}, ping: {beams: 3}}\n"), HasSubstr("beams"));
   EXPECT_THAT(refusal(point + "sonar: {ping: {range_m: 3, range_start_m: 3.5}}\n"), HasSubstr("range_start_m"));
+  EXPECT_THAT(refusal(point + "sonar: {ping: {range_m: 3, range_start_m: 3, rows: 10, bits: 16}}\n"),
+              HasSubstr("must be below range_m"));
 }
 
 TEST(RenderFile, AProfileStartsAsTheDeviceAndKeepsItsShares) {

@@ -314,6 +314,47 @@ TEST(SonarInVirtualTime, ReceiversAreTheDevicesOwnAndThoseOfItsClients) {
   EXPECT_THAT(sonar.receivers(10), SizeIs(16)) << "a host cannot have the world sent to";
 }
 
+/// Makes nothing of its first ping but an exception.
+class FaultyDatagrams final : public protocol::DelegatingVendor {
+ public:
+  using DelegatingVendor::DelegatingVendor;
+  std::vector<protocol::Bytes> datagrams(const protocol::Port& port, const Ping& ping,
+                                         const protocol::DeviceState& device) const override {
+    if (static_cast<std::uint32_t>(ping.request.number) == 1) throw std::runtime_error("no such luck");
+    return DelegatingVendor::datagrams(port, ping, device);
+  }
+};
+
+TEST(SonarInVirtualTime, AnExceptionInThePingsOfAStreamCostsThatPing) {
+  VirtualTime time(yaml_of(oculus("front", "127.0.0.2")));
+  const FaultyDatagrams vendor(testing_daemon::made_up_vendor());
+  SonarConfig config = time.config.sonars[0];
+  config.profile = {&vendor, vendor.models().front()};
+  Sonar sonar({time.config, time.world}, config, 0, start);
+  sonar.open_stream(10, vendor.ports()[5], start);  // to the group
+  Time now = start;
+  const auto ping = [&] {
+    now = *sonar.next_tick();
+    for (Action& action : sonar.on_tick(now))
+      if (auto* compute = std::get_if<ComputePing>(&action)) {
+        auto made = std::make_shared<Ping>();
+        made->request = std::move(compute->request);
+        return sonar.on_ping({.ping = made}, now);
+      }
+    return Actions{};
+  };
+  const Actions faulty = ping();
+  ASSERT_TRUE(std::holds_alternative<Report>(faulty.front()));
+  EXPECT_EQ(std::get<Report>(faulty.front()).line.phrase, "internal fault: no such luck");
+  EXPECT_FALSE(sonar.next_message(10));
+  ping();
+  EXPECT_TRUE(sonar.next_message(10)) << "the stream goes on";
+  sonar.on_not_sent(10);
+  const DeviceFigures f = sonar.figures();
+  EXPECT_EQ(f.offered, 1u);
+  EXPECT_EQ(f.dropped, 1u);
+}
+
 /// A mistake in the code of one conversation.
 class FaultyDialogue final : public protocol::Dialogue {
  public:

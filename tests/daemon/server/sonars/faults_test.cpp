@@ -16,6 +16,7 @@ struct ThrowingParent final : SessionParent {
   Outbox::Message next_message(ConnectionId) override { return {}; }
   std::vector<Endpoint> receivers(ConnectionId) const override { return {}; }
   void on_sent(ConnectionId, std::size_t) override {}
+  void on_not_sent(ConnectionId) override {}
   std::optional<milliseconds> longest_silence(ConnectionId) const override { return std::nullopt; }
   void on_finish(ConnectionId) override {}
   void on_written(ConnectionId, const Outbox::Message&) override {}
