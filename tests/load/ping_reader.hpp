@@ -11,7 +11,7 @@ namespace sonar::load {
 
 using Steady = std::chrono::steady_clock;
 
-/// A connected TCP socket that sends and is closed when it goes; -1 when nobody listens.
+/// A connected TCP socket that sends and is closed when it goes; -1 when no program listens.
 class Socket {
  public:
   Socket(const std::string& address, std::uint16_t port, int receive_buffer = 0);

@@ -106,7 +106,7 @@ TEST(Load, OneThatNeverReads) {
     received += r->pings;
     garbled += r->garbled;
   }
-  // The pings that were still waiting when we stopped are nobody's fault; they are counted as such.
+  // The pings that were still waiting when we stopped have no cause but the stop; they are counted as such.
   const std::uint64_t at_stop = f.dropped_by[static_cast<std::size_t>(DropReason::stop)];
   EXPECT_LE(lost, at_stop);
   EXPECT_EQ(garbled, 0u);

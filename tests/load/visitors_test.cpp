@@ -57,7 +57,7 @@ TEST(Load, ConnectCommandDisconnect) {
     }
   };
   for (int i = 0; i < 200; ++i) cycle(i);
-  const auto nobody_left = [&](const ProcessFigures& was) {
+  const auto all_gone = [&](const ProcessFigures& was) {
     return eventually([&] { return figures_of_this_process().open_descriptors <= was.open_descriptors; });
   };
   const ProcessFigures idle = [&] {  // least of a second's looks: the last visitors are on their way out
@@ -73,7 +73,7 @@ TEST(Load, ConnectCommandDisconnect) {
     return least;
   }();
   for (int i = 0; i < cycles; ++i) cycle(i);
-  EXPECT_TRUE(nobody_left(idle));
+  EXPECT_TRUE(all_gone(idle));
   const ProcessFigures after = figures_of_this_process();
   const double grown_mib = (static_cast<double>(after.resident_bytes) - static_cast<double>(idle.resident_bytes)) / (1 << 20);
   EXPECT_EQ(after.open_descriptors, idle.open_descriptors);

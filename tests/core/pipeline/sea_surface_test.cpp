@@ -189,7 +189,7 @@ TEST(SeaSurface, OneAboveItReceivesNoise) {
   EXPECT_NE(without.from(1).samples, noise);
 }
 
-TEST(SeaSurface, NobodyLeavesTheWaterDuringAPing) {
+TEST(SeaSurface, ASonarStaysInTheWaterDuringAPing) {
   OverABed bed;
   const auto at_rest = bed.from(-0.001).samples;
   EXPECT_EQ(bed.from(-0.001, 5).samples, at_rest) << "5 m/s for 6.7 ms would be 33 mm";

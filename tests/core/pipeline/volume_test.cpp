@@ -124,7 +124,7 @@ TEST(Volume, EndsAtAWall) {
   }
 }
 
-TEST(Volume, IsDrawnAnewForEveryPingAndForNobodyElse) {
+TEST(Volume, IsDrawnAnewForEveryPingOnly) {
   const SceneMaker scene = SceneMaker().add(sphere(0.4, 3), -10, {5, 1, 0.4});
   Sounding s(in_water(scene, -60), silent(oculus_high()), default_rows(10, 400));
   const std::vector<float> first = s.ping().pressure_upa;

@@ -1,4 +1,4 @@
-// Text nobody wrote in good faith: bombs, wrong encodings, broken syntax, and every mutation of a good file.
+// Hostile text: bombs, wrong encodings, broken syntax, and every mutation of a good file.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -223,7 +223,7 @@ TEST(StrictYaml, NamedEntriesAcceptAnyKey) {
   EXPECT_FALSE(d.finish());
 }
 
-TEST(StrictYaml, MapsNobodyOpenedAreNotSearched) {
+TEST(StrictYaml, MapsThatWereNotOpenedAreNotSearched) {
   EXPECT_EQ(read("a: {b: 1}", [](Map m) { m.optional("a"); }), "ok");
 }
 

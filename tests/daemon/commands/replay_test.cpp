@@ -27,7 +27,7 @@ using Steady = std::chrono::steady_clock;
 constexpr milliseconds patience{20000};
 constexpr std::size_t everything = ~std::size_t{0};
 
-/// 127.192..127.223, from the process number and a counter: nobody else's.
+/// 127.192..127.223, from the process number and a counter: of this test alone.
 Ipv4 own_address() {
   static std::atomic<unsigned> count{0};
   const unsigned number = static_cast<unsigned>(::getpid()) * 16 + count++;
@@ -221,7 +221,7 @@ TEST(Replay, TheNextClientGetsItFromTheFront) {
     EXPECT_TRUE(std::equal(begin.begin(), begin.end(), expected.begin()));
     return;
   }
-  FAIL() << "nobody was served any more";
+  FAIL() << "no client was served any more";
 }
 
 TEST(Replay, StopsWithAClientThatDoesNotRead) {

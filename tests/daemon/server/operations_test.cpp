@@ -223,7 +223,7 @@ TEST(Health, IsFineAndFiguresAreText) {
   });
 }
 
-TEST(Events, TellWhoListensAndNobodyElse) {
+TEST(Events, ReachListenersOnly) {
   DaemonSetup setup;
   setup.more = "poses: {protobuf: off, json: off, stale_after_s: 0.2}\n";
   Daemon daemon(setup);
@@ -273,7 +273,7 @@ TEST(Events, TellWhoListensAndNobodyElse) {
   daemon.stop();
 }
 
-TEST(Stepped, BytesAreTheSameWhoeverLooksOn) {
+TEST(Stepped, BytesAreTheSameWithAnyObservers) {
   const auto digest = [](bool looked_at) {
     DaemonSetup setup;
     setup.more = "clock: stepped\n";

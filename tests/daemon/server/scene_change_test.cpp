@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using Code = OperationResult::Code;
 
-/// Holds whoever passes until it is opened.
+/// Blocks its callers until it is opened.
 class Gate {
  public:
   void pass() {
@@ -267,7 +267,7 @@ TEST(SceneChange, SteppedTimeStandsStillMeanwhile) {
   EXPECT_EQ(daemon.scenes().front()->objects.size(), 3u);
 }
 
-TEST(SceneChange, StoppingDoesNotWaitForAnswersThatNobodyReads) {
+TEST(SceneChange, StoppingDoesNotWaitForAnswersThatAreNotRead) {
   auto gate = std::make_shared<Gate>();
   DaemonSetup setup;
   setup.before_engine = [gate](const Scene&) { gate->pass(); };
@@ -277,7 +277,7 @@ TEST(SceneChange, StoppingDoesNotWaitForAnswersThatNobodyReads) {
   EXPECT_EQ(daemon.stop(), 0) << "run() returns while the engine is being built";
   EXPECT_TRUE(daemon.app().is_at_work());
   gate->open();
-  EXPECT_THROW(answer.get(), std::future_error) << "nobody was answered";
+  EXPECT_THROW(answer.get(), std::future_error) << "no answer was given";
 }
 
 }  // namespace

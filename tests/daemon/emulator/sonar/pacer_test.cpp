@@ -56,7 +56,7 @@ TEST(Pacer, ABusySimulationLosesTheTick) {
   EXPECT_TRUE(pacer.fire(t0 + milliseconds(200), false));
 }
 
-TEST(Pacer, TimeThatIsSkippedIsNobodysTick) {
+TEST(Pacer, TimeThatIsSkippedHasNoTicks) {
   Pacer pacer;
   pacer.configure(settings(10), t0);
   EXPECT_TRUE(pacer.fire(t0, false));
@@ -153,7 +153,7 @@ TEST(Pacer, EveryTickIsFiredOrSkippedForAReason) {
   pacer.trigger(t0 + milliseconds(750));
   pacer.trigger(t0 + milliseconds(751), true);  // joins: not one of its own
   pacer.trigger(t0 + milliseconds(752));
-  pacer.stop();  // and the one that waits has nobody left
+  pacer.stop();  // the one that waits has no client left
   EXPECT_EQ(pacer.ticks(), 10u);
   EXPECT_EQ(pacer.skipped().trigger, 2u);
   EXPECT_EQ(pacer.ticks(), 3u + pacer.skipped_ticks());

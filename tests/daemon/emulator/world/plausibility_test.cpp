@@ -85,7 +85,7 @@ TEST(Plausibility, AVehicleAboveTheWater) {
   EXPECT_THAT(at("xyz_m: [-7, 0, 0.0009]"), IsEmpty()) << "as near as pings take it for the surface";
 }
 
-TEST(Plausibility, APlaceThatNobodyGaveIsNotJudged) {
+TEST(Plausibility, APlaceThatWasNotGivenIsNotJudged) {
   const std::string up = "{frame: FLU, xyz_m: [0, 0, 0.2]}";
   EXPECT_THAT(notes(config_with("", up)), IsEmpty());
   EXPECT_THAT(notes(config_with(", trajectory: orbit", up)), ElementsAre(HasSubstr("is 0.2 m above")));

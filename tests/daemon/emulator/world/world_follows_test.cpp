@@ -49,7 +49,7 @@ TEST_F(Follows, TheSlowerOfTwoVehiclesLeads) {
   EXPECT_EQ(now, Time(seconds(100) + milliseconds(200)));
 }
 
-TEST_F(Follows, AVehicleThatFellSilentHoldsNobodyUp) {
+TEST_F(Follows, AVehicleThatFellSilentDelaysNoOther) {
   take("a", seconds(100));
   take("b", seconds(100));
   for (int i = 1; i <= 12; ++i) take("a", seconds(100) + i * milliseconds(100));

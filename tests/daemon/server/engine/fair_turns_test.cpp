@@ -1,4 +1,4 @@
-// Several sonars on one engine: a quick one is let in between, a greedy one waits, and nobody saves up turns by being silent.
+// Several sonars on one engine: a quick one is let in between, a greedy one waits, and silence saves up no turns.
 #include "daemon/server/engine/fair_turns.hpp"
 
 #include <gtest/gtest.h>

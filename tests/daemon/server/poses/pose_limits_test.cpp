@@ -36,7 +36,7 @@ struct PoseLimits : ::testing::Test {
   bool is_at_x(int x, std::size_t vehicle = 0, milliseconds timeout = patience) {
     return eventually([&] { return daemon->status().vehicles.at(vehicle).in_world.position_m.x == x; }, timeout);
   }
-  /// Comes again until it is let in: there may be nobody yet who has to go. `meanwhile` is done before each time.
+  /// Comes again until it is let in: there may be no connection yet that can be closed. `meanwhile` is done before each time.
   bool a_newcomer_moves_the_boat(const std::function<void()>& meanwhile = [] {}) {
     return eventually([&] {
       meanwhile();

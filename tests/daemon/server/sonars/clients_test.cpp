@@ -1,4 +1,4 @@
-// Several clients, slow ones, dead ones, and the end of the daemon: nobody disturbs anybody, nothing is cut.
+// Several clients, slow ones, dead ones, and the end of the daemon: none disturbs another, nothing is cut.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -265,7 +265,7 @@ TEST(Admission, WhoHangsUpWhileWaitingLosesThePlaceInTheQueue) {
   first.reset();
   const auto ping = stays.next_ping();
   ASSERT_TRUE(ping);
-  EXPECT_EQ(ping->head.fixed.fire.range, 3) << "nobody who had gone was asked";
+  EXPECT_EQ(ping->head.fixed.fire.range, 3) << "no client that had gone was asked";
 }
 
 TEST(Admission, TheLastFireWinsAmongSeveral) {

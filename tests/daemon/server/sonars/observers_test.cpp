@@ -58,7 +58,7 @@ TEST(Observers, ADriverThatComesWhileOneLooksOnIsTheDriver) {
   const auto first = observer.next();
   ASSERT_TRUE(first);
   EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*first));
-  EXPECT_THAT(daemon.requests(), IsEmpty()) << "nobody is pinged for";
+  EXPECT_THAT(daemon.requests(), IsEmpty()) << "there is no client to ping for";
   Client driver(daemon.address());
   driver.fire(fire_at(PingRate::hz40, 3));
   const auto ping = driver.next_ping();

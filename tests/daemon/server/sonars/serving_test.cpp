@@ -87,7 +87,7 @@ TEST(Serving, NetworkTriggerMeansOnePingPerFire) {
     ASSERT_TRUE(ping);
     EXPECT_EQ(ping->head.fixed.ping_id, i);
   }
-  EXPECT_FALSE(client.next_ping(milliseconds(300))) << "nobody asked for a fifth";
+  EXPECT_FALSE(client.next_ping(milliseconds(300))) << "no fifth was requested";
 }
 
 TEST(Serving, RepeatedFireMessagesDoNotRestartTheRhythm) {

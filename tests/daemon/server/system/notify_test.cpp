@@ -81,7 +81,7 @@ TEST_P(NotifyAt, TellsOfReadinessWhenTheListenersAreOpenAndOfTheEnd) {
 }
 INSTANTIATE_TEST_SUITE_P(PathAndAbstract, NotifyAt, ::testing::Values('/', '@'));
 
-TEST(Notify, SignsOfLifeComeWhileNobodyIsServedAndWhilePingsAreQuick) {
+TEST(Notify, SignsOfLifeComeWithoutClientsAndWhilePingsAreQuick) {
   const std::string name = own_name('@');
   Manager manager(name);
   DaemonSetup setup;

@@ -55,7 +55,7 @@ TEST(Signals, AHangupThatComesWithTheTerminationDoesNotKeepItAlive) {
   });
   const auto begin = Steady::now();
   EXPECT_EQ(daemon.wait(), 0);
-  EXPECT_LT(Steady::now() - begin, App::stop_limit) << "nobody is connected: there is nothing to wait for";
+  EXPECT_LT(Steady::now() - begin, App::stop_limit) << "no client is connected: there is nothing to wait for";
   EXPECT_THAT(daemon.log_text(), Not(HasSubstr("reload:")));
 }
 

@@ -138,7 +138,7 @@ TEST(Lockstep, NoMoreThanSomeThousandsMayWait) {
   EXPECT_EQ(time.step(1e-6), "");
 }
 
-TEST(Lockstep, ADaemonThatStopsOwesNobodyAnAnswer) {
+TEST(Lockstep, ADaemonThatStopsAnswersNoStep) {
   DaemonSetup setup = with_clock("lockstep");
   setup.engine_takes = milliseconds(20);
   Pinging p(std::move(setup));
@@ -203,7 +203,7 @@ TEST(Follow, TimeBeginsAtTheFirstPoseHoweverSoonThatIs) {
   EXPECT_EQ(requests[0].fired_at, Time(milliseconds(550)));
 }
 
-TEST(Follow, AVehicleThatJoinsFromBehindKeepsNobodyWaiting) {
+TEST(Follow, AVehicleThatJoinsFromBehindDelaysNoOther) {
   DaemonSetup setup = with_clock("follow");
   setup.engine_takes = milliseconds(30);
   setup.vehicle_lines = "  - {name: boat}\n";

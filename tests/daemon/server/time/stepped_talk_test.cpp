@@ -73,7 +73,7 @@ TEST(SteppedTalk, AHostIsSilentByTheWallsClockOnly) {
   const auto began = Steady::now();
   EXPECT_EQ(daemon.ask(Step{300}).code, Code::done);
   const auto status = daemon.status().sonars.at(0);
-  ASSERT_EQ(status.clients.size(), 1u) << "five minutes of nobody's life, some ms of ours";
+  ASSERT_EQ(status.clients.size(), 1u) << "five simulated minutes take some ms";
   EXPECT_GT(status.clients[0].bytes_written, 149u * 16u) << "every 2 s a keep-alive";
   EXPECT_TRUE(eventually([&] { return daemon.status().sonars.at(0).clients.empty(); }, patience + milliseconds(10000)));
   EXPECT_GT(Steady::now() - began, std::chrono::seconds(9));
@@ -110,7 +110,7 @@ TEST(SteppedTalk, TimeDoesNotPassForAHostWhosePingsWaitForAPose) {
   daemon.stop();
 }
 
-TEST(SteppedTalk, ASubscriptionTakesTheSonarAwayFromNobody) {
+TEST(SteppedTalk, ASubscriptionTakesTheSonarFromNoClient) {
   DaemonSetup setup = head("stepped");
   setup.profile = "blueview-m900-2250-130";
   setup.sonar_lines = "    clients: {max: 2}\n";
@@ -131,7 +131,7 @@ TEST(SteppedTalk, ASubscriptionTakesTheSonarAwayFromNobody) {
   reader.join();
 }
 
-TEST(SteppedTalk, NobodyIsOwedThePingOfAHostThatLeft) {
+TEST(SteppedTalk, ThePingOfAHostThatLeftIsNotPending) {
   DaemonSetup setup = head("lockstep");
   setup.profile = "blueview-m900-2250-130";
   Daemon daemon(setup);
