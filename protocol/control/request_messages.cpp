@@ -122,14 +122,14 @@ Result<StopRecording> from(const v1::StopRecording& m) {
   return StopRecording{*file};
 }
 
+Subscribe from(const v1::Subscribe& m) { return {m.pings(), m.clients(), m.poses(), m.scene()}; }
+
 Result<Request> with_op(const v1::Request& message) {
   Request request{message.id(), Unsupported{}};
   std::string refusal;
   const auto take = [&](auto op) {
-    if (op)
-      request.op = *std::move(op);
-    else
-      refusal = op.error().text;
+    if (!op) return void(refusal = op.error().text);
+    request.op = *std::move(op);
   };
   switch (message.op_case()) {
     case v1::Request::kHello:
@@ -148,8 +148,7 @@ Result<Request> with_op(const v1::Request& message) {
       take(from(message.environment()));
       break;
     case v1::Request::kSubscribe:
-      request.op = Subscribe{message.subscribe().pings(), message.subscribe().clients(), message.subscribe().poses(),
-                             message.subscribe().scene()};
+      request.op = from(message.subscribe());
       break;
     case v1::Request::kPose:
       take(with_checked_name(control::from(message.pose())));
