@@ -20,7 +20,7 @@ struct PingScalars {
   double absorption_np_per_m = 0;  // one way, true
   double source_upa = 1;           // amplitude at 1 m
   double max_range_m = 0;          // true range of the last sample that can still receive
-  double min_range_m = 0;          // what lies nearer than this to `seen_from` reaches no sample
+  double min_range_m = 0;          // true range from `seen_from`: nearer echoes end before the first sample
   double samples_per_m = 0;        // fractional sample of a true range r: r * samples_per_m - sample_offset
   double sample_offset = 0.5;      // PingPlan::sample_offset
   double turns_per_m = 0;          // carrier turns per metre of one-way range, 2 f / c

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Shows how far a build is: ninja's output on standard input, one line that grows on a terminal, else a line every tenth.
 
-usage: ninja ... | build_progress.py       everything but the steps, errors say, is printed as it comes
+usage: ninja ... | build_progress.py       lines that are not steps, such as errors, are printed as they come
 """
 import re
 import sys

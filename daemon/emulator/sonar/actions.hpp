@@ -44,7 +44,7 @@ struct Finish {
   ConnectionId connection = 0;
   std::string why;
 };
-/// At once, of a stream after the ping being sent; on_closed() follows.
+/// At once; on_closed() follows. Not of a stream.
 struct Reset {
   ConnectionId connection = 0;
   std::string why;

@@ -236,33 +236,35 @@ void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
   const auto bytes = vendor_.frame(*outcome.ping, state_);
   std::vector<std::pair<Connection*, protocol::Event>> events;
   PingQueued queued{outcome.ping, bytes, {}, outcome.seconds};
-  for (Connection& c : connections_.all())
-    guarded(c, actions, [&] {
-      if (c.role == Role::stream) return offer_datagrams(c, *outcome.ping, queued, actions);
-      if (bytes == nullptr) return;
-      for (protocol::Event& event : offer(c, bytes, outcome.ping->request, now, actions))
-        events.emplace_back(&c, std::move(event));
-    });
+  for (Connection& c : connections_.all()) {
+    if (c.role == Role::stream)
+      offer_datagrams(c, *outcome.ping, queued, actions);
+    else if (bytes != nullptr)
+      guarded(c, actions, [&] {
+        for (protocol::Event& event : offer(c, bytes, outcome.ping->request, now, actions))
+          events.emplace_back(&c, std::move(event));
+      });
+  }
   for (const auto& [from, event] : events) on_event(source_of(*from), event, now, actions);
   actions.emplace_back(std::move(queued));
 }
 
+/// An exception costs this ping, not the stream, which belongs to the device.
 void Sonar::offer_datagrams(Connection& stream, const Ping& ping, PingQueued& queued, Actions& actions) {
   if (stream.finishing || connections_.receivers(stream).empty()) return;
-  std::shared_ptr<const std::vector<protocol::Bytes>> datagrams;
   try {
-    datagrams = std::make_shared<const std::vector<protocol::Bytes>>(vendor_.datagrams(*stream.port, ping, state_));
-  } catch (const std::exception& e) {  // costs this ping, not the stream
-    return report_fault(e, actions);
+    const auto datagrams = std::make_shared<const std::vector<protocol::Bytes>>(vendor_.datagrams(*stream.port, ping, state_));
+    if (datagrams->empty()) return;
+    queued.datagrams.push_back(datagrams);
+    stream.outbox.push_ping({.bytes = nullptr,
+                             .ping = static_cast<std::uint32_t>(ping.request.number),
+                             .prefixes = {},
+                             .fired_at = ping.request.fired_at,
+                             .datagrams = datagrams});
+    actions.emplace_back(Wake{stream.id});
+  } catch (const std::exception& e) {
+    report_fault(e, actions);
   }
-  if (datagrams->empty()) return;
-  queued.datagrams.push_back(datagrams);
-  stream.outbox.push_ping({.bytes = nullptr,
-                           .ping = static_cast<std::uint32_t>(ping.request.number),
-                           .prefixes = {},
-                           .fired_at = ping.request.fired_at,
-                           .datagrams = std::move(datagrams)});
-  actions.emplace_back(Wake{stream.id});
 }
 
 /// Returns what the client requests next.

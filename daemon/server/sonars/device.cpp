@@ -38,7 +38,7 @@ Result<void> Device::open() {
 Result<void> Device::open(const protocol::Port& port) {
   using Kind = protocol::Port::Kind;
   const Ipv4 ip = config().bind_ip;
-  if (port.kind == Kind::tcp_stream)  // the rules for slots decide whom of the waiting clients `admission` counts
+  if (port.kind == Kind::tcp_stream)  // on_client_socket() asks `admission`, so that refusals are counted for this sonar
     return tcp_ports_.emplace_back(&port, Listener(network_.io, network_.admission, std::nullopt))
         .listener.open({ip, port.number});
   if (port.kind == Kind::udp_beacon) return beacon_.open(config(), port);
@@ -312,7 +312,6 @@ void Device::carry_out(const Finish& action) {
 
 void Device::carry_out(const Reset& action) {
   if (const SessionPointer session = session_of(action.connection)) return session->reset(action.why);
-  if (const StreamPointer stream = stream_of(action.connection)) return stream->finish(action.why);
   if (arrived_.erase(action.connection) > 0) perform(sonar_.on_closed(action.connection, action.why, network_.clock.now()));
 }
 

@@ -169,7 +169,7 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   return change;
 }
 
-// ---- what comes of the sonars
+// ---- pings and clients, passed on to the simulator, recordings and events
 
 void Fleet::compute(const Device& of, PingRequest request, Simulator::Done done) {
   request.switches.keep_truth = recordings_.wants_truth(of.config().name);

@@ -58,7 +58,7 @@ PingSettings small_settings(int beams = 64) {
   return s;
 }
 
-// The record of a window begins with it: what lies outside is left out, its side lobes too.
+// The record begins where the window does: echoes from outside the window are left out, with their side lobes.
 TEST(PaperWindow, ShowsAPointInItsRow) {
   constexpr int skipped = 40;
   for (const Mode mode : {Mode::paper, Mode::raster}) {
