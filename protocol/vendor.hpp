@@ -13,18 +13,21 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "core/base/result.hpp"
 #include "core/sonar/ping.hpp"
 #include "core/text/ipv4.hpp"
+#include "protocol/wire/wire.hpp"
 
 namespace sonar::protocol {
 
-using Bytes = std::vector<std::byte>;
-using BytesView = std::span<const std::byte>;
 using text::Ipv4;
+using wire::Bytes;
+using wire::BytesView;
+using wire::Field;
 
 struct Endpoint {
   Ipv4 ip{};
@@ -166,6 +169,58 @@ struct ResourceReply {
   std::vector<Event> events = {};
 };
 
+/// What a field of a message means, whatever a vendor calls it.
+enum class FieldName {
+  magic,
+  source_id,
+  destination_id,
+  message_type,
+  version,
+  payload_size,
+  ping_id,
+  ping_status,
+  frequency,
+  temperature,
+  pressure,
+  heading,
+  pitch,
+  roll,
+  sound_speed,
+  time,
+  sample_type,
+  range_resolution,
+  rows,
+  beams,
+  image_offset,
+  image_size,
+  message_size,
+  range,
+  ping_rate,
+  gain,
+  device_id,
+  part_number,
+  device_status,
+  firmware,
+  address,
+  netmask,
+  connected_address,
+  mac,
+};
+/// The same words, in that order.
+inline constexpr std::array<std::string_view, 34> field_names{
+    "magic",     "source_id",   "destination_id",    "message_type", "version",       "payload_size",
+    "ping_id",   "ping_status", "frequency",         "temperature",  "pressure",      "heading",
+    "pitch",     "roll",        "sound_speed",       "time",         "sample_type",   "range_resolution",
+    "rows",      "beams",       "image_offset",      "image_size",   "message_size",  "range",
+    "ping_rate", "gain",        "device_id",         "part_number",  "device_status", "firmware",
+    "address",   "netmask",     "connected_address", "mac"};
+static_assert(field_names.size() == static_cast<std::size_t>(FieldName::mac) + 1);
+
+/// The message that carries a ping, as a client receives it, prefix included; the beacon.
+enum class Part { ping, beacon };
+/// Of a ping: what every message begins with, the other fields, the table of the beams' directions, the samples.
+enum class Region { header, metadata, bearings, image };
+
 class Vendor {
  public:
   virtual ~Vendor() = default;
@@ -209,6 +264,18 @@ class Vendor {
   /// Of a port of kind udp_stream with receivers: the datagrams of a ping in order, at most 65,507 bytes each.
   virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
+    return {};
+  }
+  /// Where a message has this field; of an empty `message`: as in the vendor's layout with the most fields. Nothing: there is no
+  /// such field, or the message is too short.
+  virtual std::optional<Field> field(Part part, FieldName name, BytesView message) const {
+    static_cast<void>(part), static_cast<void>(name), static_cast<void>(message);
+    return {};
+  }
+  /// {offset, size} of a region. Nothing: the vendor has no such region, or the ping is too short. Of an empty `ping`: {0, 0}
+  /// when the vendor has such a region.
+  virtual std::optional<std::pair<std::size_t, std::size_t>> region(Region region, BytesView ping) const {
+    static_cast<void>(region), static_cast<void>(ping);
     return {};
   }
 };

@@ -52,6 +52,13 @@ class BlueViewVendor final : public protocol::Vendor {
     const SonarSettings settings = settings_from(ping.request.vendor_settings.get(), device);
     return std::make_shared<const protocol::Bytes>(encode_ping(ping, device, settings));
   }
+  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
+                                       protocol::BytesView message) const override {
+    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // it has no beacon
+  }
+  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
+    return locate(region, ping);
+  }
 };
 
 }  // namespace

@@ -12,22 +12,27 @@
 namespace sonar::blueview {
 namespace {
 
-constexpr std::uint8_t format_u16 = 1;
-enum class Compression : std::uint8_t { none = 0, deflate = 1 };
+/// A whole message but for the samples.
+struct PingMessage {
+  FrameHeader header;
+  PingHead ping;
+};
+template <class V, wire::Like<PingMessage> M>
+constexpr void fields(V& visit, M& m) {
+  visit("header", m.header);
+  visit("ping", m.ping);
+}
 
 double utc_seconds(Time t) { return std::chrono::duration<double>(t.time_since_epoch()).count(); }
 
-void put_nav(wire::Bytes& out, const PingRequest& request) {
-  const std::uint16_t present = nav_time | nav_depth | nav_pitch | nav_roll | nav_heading;
+void set_nav(PingHead& to, const PingRequest& request) {
   const Pose& vehicle = request.vehicle_in_world;
   const RollPitchYaw angles = rpy_from_quat(vehicle.orientation);
-  const Put write(out);
-  write("nav_fields", present);
-  write("time", utc_seconds(request.fired_at));
-  write("depth", static_cast<float>(depth_from_z(vehicle.position_m.z)));
-  write("pitch", static_cast<float>(-deg_from_rad(angles.pitch_rad)));  // about y to port, positive is bow down
-  write("roll", static_cast<float>(deg_from_rad(angles.roll_rad)));     // about x ahead, positive lifts port
-  write("heading", static_cast<float>(deg_from_rad(heading_rad(vehicle.orientation))));
+  to.nav_time_s = utc_seconds(request.fired_at);
+  to.depth_m = static_cast<float>(depth_from_z(vehicle.position_m.z));
+  to.pitch_deg = static_cast<float>(-deg_from_rad(angles.pitch_rad));  // about y to port, positive is bow down
+  to.roll_deg = static_cast<float>(deg_from_rad(angles.roll_rad));     // about x ahead, positive lifts port
+  to.heading_deg = static_cast<float>(deg_from_rad(heading_rad(vehicle.orientation)));
 }
 
 /// Rows from the start range on, turned so that a beam's samples lie side by side. Little-endian already.
@@ -57,32 +62,82 @@ wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, c
   const wire::Bytes samples = beam_major(ping, grid);
   wire::Bytes packed;
   if (text_option(device.options, option_name::compression) == "deflate") packed = deflated(samples);
-  const Compression compression = packed.empty() ? Compression::none : Compression::deflate;
-  const float half_deg = static_cast<float>(0.5 * deg_from_rad(static_cast<double>(ping.mode().horizontal_aperture_rad)));
-
   const wire::Bytes& body = packed.empty() ? samples : packed;
-  wire::Bytes out;
-  out.reserve(128 + body.size());
-  const Put write(out);
+  const float half_deg = static_cast<float>(0.5 * deg_from_rad(static_cast<double>(ping.mode().horizontal_aperture_rad)));
   const int base = text_option(device.options, option_name::heads_base) == "1" ? 1 : 0;
-  write("head", static_cast<std::int32_t>(index + base));
-  write("number", static_cast<std::uint32_t>(ping.request.number));
-  write("t_utc", utc_seconds(ping.request.fired_at));
-  write("tz", std::int32_t{0});
-  write("start", head.start_m);
-  write("stop", static_cast<float>(static_cast<double>(head.start_m) + grid.bins * grid.bin_m));
-  write("c", head.sound_speed_mps);
-  write("fov_min", -half_deg);
-  write("fov_max", half_deg);
-  write("bin_m", static_cast<float>(grid.bin_m));
-  write("beams", static_cast<std::uint16_t>(ping.request.settings.beam_count));
-  write("bins", static_cast<std::uint16_t>(grid.bins));
-  write("fmt", format_u16);
-  write("compression", compression);
-  put_nav(out, ping.request);
-  write("raw_len", static_cast<std::uint32_t>(samples.size()));
+
+  PingHead fixed;
+  fixed.head = static_cast<std::int32_t>(index + base);
+  fixed.number = static_cast<std::uint32_t>(ping.request.number);
+  fixed.utc_s = utc_seconds(ping.request.fired_at);
+  fixed.start_m = head.start_m;
+  fixed.stop_m = static_cast<float>(static_cast<double>(head.start_m) + grid.bins * grid.bin_m);
+  fixed.sound_speed_mps = head.sound_speed_mps;
+  fixed.fov_min_deg = -half_deg;
+  fixed.fov_max_deg = half_deg;
+  fixed.bin_m = static_cast<float>(grid.bin_m);
+  fixed.beams = static_cast<std::uint16_t>(ping.request.settings.beam_count);
+  fixed.bins = static_cast<std::uint16_t>(grid.bins);
+  fixed.compression = packed.empty() ? Compression::none : Compression::deflate;
+  set_nav(fixed, ping.request);
+  fixed.raw_length = static_cast<std::uint32_t>(samples.size());
+  wire::Bytes out;
+  out.reserve(wire::wire_size<PingHead>() + body.size());
+  wire::append(out, fixed);
   out.insert(out.end(), body.begin(), body.end());
   return out;
+}
+
+std::optional<protocol::Field> locate(protocol::FieldName name, wire::BytesView ping) {
+  using protocol::FieldName;
+  const auto named = [&](std::string_view link_name) { return wire::locate<PingMessage>(link_name, ping); };
+  switch (name) {
+    case FieldName::magic:
+      return named("header.magic");
+    case FieldName::message_type:
+      return named("header.type");
+    case FieldName::payload_size:
+      return named("header.payload_len");
+    case FieldName::source_id:
+      return named("ping.head");
+    case FieldName::ping_id:
+      return named("ping.number");
+    case FieldName::time:
+      return named("ping.t_utc");
+    case FieldName::range:
+      return named("ping.stop");
+    case FieldName::sound_speed:
+      return named("ping.c");
+    case FieldName::range_resolution:
+      return named("ping.bin_m");
+    case FieldName::beams:
+      return named("ping.beams");
+    case FieldName::rows:
+      return named("ping.bins");
+    case FieldName::sample_type:
+      return named("ping.fmt");
+    case FieldName::pitch:
+      return named("ping.pitch");
+    case FieldName::roll:
+      return named("ping.roll");
+    case FieldName::heading:
+      return named("ping.heading");
+    case FieldName::image_size:
+      return named("ping.raw_len");
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping) {
+  if (region == protocol::Region::bearings) return std::nullopt;  // beams are equally spaced between fov_min and fov_max
+  if (ping.empty()) return std::pair<std::size_t, std::size_t>{};
+  const std::size_t image_at = wire::wire_size<PingMessage>();
+  const std::size_t end = region == protocol::Region::header ? header_size : image_at;
+  if (ping.size() < end) return std::nullopt;
+  if (region == protocol::Region::header) return std::pair{std::size_t{0}, header_size};
+  if (region == protocol::Region::metadata) return std::pair{header_size, image_at - header_size};
+  return std::pair{image_at, ping.size() - image_at};
 }
 
 }  // namespace sonar::blueview

@@ -1,6 +1,7 @@
 // A Ping as the payload of PING_DATA: beam-major 16-bit samples, near to far, left to right, and where the vehicle was.
 #pragma once
 
+#include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"
 #include "protocol/vendor.hpp"
 
@@ -20,6 +21,54 @@ enum NavField : std::uint16_t {
   nav_course = 1 << 9,            // f32, degrees
   nav_text = 1 << 10,             // text
 };
+
+enum class Compression : std::uint8_t { none = 0, deflate = 1 };
+
+/// The payload before its samples, with the navigation data that the daemon knows.
+struct PingHead {
+  std::int32_t head = 0;
+  std::uint32_t number = 0;
+  double utc_s = 0;  // since 1970
+  std::int32_t time_zone = 0;
+  float start_m = 0, stop_m = 0;
+  std::int32_t sound_speed_mps = 0;
+  float fov_min_deg = 0, fov_max_deg = 0, bin_m = 0;
+  std::uint16_t beams = 0, bins = 0;
+  std::uint8_t format = 1;  // 16-bit samples without sign
+  Compression compression{};
+  std::uint16_t nav_fields = nav_time | nav_depth | nav_pitch | nav_roll | nav_heading;
+  double nav_time_s = 0;
+  float depth_m = 0, pitch_deg = 0, roll_deg = 0, heading_deg = 0;
+  std::uint32_t raw_length = 0;  // of the samples, uncompressed
+};
+template <class V, wire::Like<PingHead> M>
+constexpr void fields(V& visit, M& m) {
+  visit("head", m.head);
+  visit("number", m.number);
+  visit("t_utc", m.utc_s);
+  visit("tz", m.time_zone);
+  visit("start", m.start_m);
+  visit("stop", m.stop_m);
+  visit("c", m.sound_speed_mps);
+  visit("fov_min", m.fov_min_deg);
+  visit("fov_max", m.fov_max_deg);
+  visit("bin_m", m.bin_m);
+  visit("beams", m.beams);
+  visit("bins", m.bins);
+  visit("fmt", m.format);
+  visit("compression", m.compression);
+  visit("nav_fields", m.nav_fields);
+  visit("time", m.nav_time_s);
+  visit("depth", m.depth_m);
+  visit("pitch", m.pitch_deg);
+  visit("roll", m.roll_deg);
+  visit("heading", m.heading_deg);
+  visit("raw_len", m.raw_length);
+}
+
+/// As Vendor::field and Vendor::region, of the whole message.
+std::optional<protocol::Field> locate(protocol::FieldName name, wire::BytesView ping);
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping);
 
 /// `settings`: those the ping was made with.
 wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const SonarSettings& settings);

@@ -2,6 +2,7 @@
 
 #include "protocol/oculus/dialogue.hpp"
 #include "protocol/oculus/encode_ping.hpp"
+#include "protocol/oculus/locate.hpp"
 #include "protocol/oculus/models.hpp"
 #include "protocol/oculus/options.hpp"
 #include "protocol/oculus/replies.hpp"
@@ -49,6 +50,13 @@ class OculusVendor final : public protocol::Vendor {
   }
   std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
     return std::make_shared<const protocol::Bytes>(encode_ping(ping, device, fire_of(ping.request.vendor_settings.get())));
+  }
+  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
+                                       protocol::BytesView message) const override {
+    return locate(part, name, message);
+  }
+  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
+    return locate(region, ping);
   }
 };
 

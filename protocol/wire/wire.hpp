@@ -7,6 +7,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -225,6 +226,47 @@ class Namer : public Visitor<Namer> {
   std::string prefix_;
 };
 
+/// Where a message has a field; little-endian. `bytes`: neither an integer nor a floating-point number.
+struct Field {
+  enum class Type { integer, number, bytes } type{};
+  std::size_t offset = 0, size = 0;
+  bool operator==(const Field&) const = default;
+};
+
+/// Finds the first field of a name with dots, "fire.range". An array of bytes is one field, of another array it is the first
+/// element.
+class Locator : public Visitor<Locator> {
+ public:
+  explicit constexpr Locator(std::string_view wanted) : wanted_(wanted) {}
+  std::optional<Field> found;
+
+ private:
+  friend class Visitor<Locator>;
+  constexpr void find(std::string_view name, Field::Type type, std::size_t size) {
+    if (!found && name == wanted_) found = Field{type, offset_, size};
+  }
+  template <Scalar T>
+  constexpr void scalar(std::string_view name, const T&) {
+    find(name, std::is_floating_point_v<T> ? Field::Type::number : Field::Type::integer, sizeof(T));
+    offset_ += sizeof(T);
+  }
+  template <class A>
+  constexpr void array(std::string_view name, A& values) {
+    if constexpr (sizeof(typename std::remove_const_t<A>::value_type) == 1) find(name, Field::Type::bytes, values.size());
+    Visitor::array(name, values);
+  }
+  template <class M>
+  constexpr void nested(std::string_view name, M& message) {
+    const std::string_view outer = wanted_;
+    const bool inside = outer.size() > name.size() && outer.substr(0, name.size()) == name && outer[name.size()] == '.';
+    wanted_ = inside ? outer.substr(name.size() + 1) : std::string_view{};
+    fields(*this, message);
+    wanted_ = outer;
+  }
+  std::string_view wanted_;
+  std::size_t offset_ = 0;
+};
+
 /// Bytes a message takes on the wire; a constant.
 template <class M>
 constexpr std::size_t wire_size() {
@@ -232,6 +274,16 @@ constexpr std::size_t wire_size() {
   const M message{};
   fields(counter, message);
   return counter.bytes;
+}
+
+/// Nothing: no field has that name, or `message`, if it is not empty, ends before the field does.
+template <class M>
+constexpr std::optional<Field> locate(std::string_view name, BytesView message = {}) {
+  Locator locator(name);
+  const M layout{};
+  fields(locator, layout);
+  const std::optional<Field> found = locator.found;
+  return found && !message.empty() && found->offset + found->size > message.size() ? std::nullopt : found;
 }
 
 template <class M>

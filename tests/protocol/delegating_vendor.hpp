@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "protocol/vendor.hpp"
@@ -41,6 +42,12 @@ class DelegatingVendor : public Vendor {
   }
   std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const override {
     return of_.frame(ping, device);
+  }
+  std::optional<Field> field(Part part, FieldName name, BytesView message) const override {
+    return of_.field(part, name, message);
+  }
+  std::optional<std::pair<std::size_t, std::size_t>> region(Region region, BytesView ping) const override {
+    return of_.region(region, ping);
   }
 
  private:

@@ -58,6 +58,28 @@ TEST(Wire, WritesBothByteOrders) {
   EXPECT_EQ(sonar::wire::bytes_of(sample(), sonar::wire::Endian::big), big);
 }
 
+struct Envelope {
+  Outer first, second;
+};
+template <class V, sonar::wire::Like<Envelope> M>
+constexpr void fields(V& visit, M& m) {
+  visit("first", m.first);
+  visit("second", m.second);
+}
+
+TEST(Wire, LocatesFieldsByDottedNames) {
+  using sonar::wire::Field;
+  using sonar::wire::locate;
+  EXPECT_EQ(locate<Envelope>("first.colour"), (Field{Field::Type::integer, 0, 2}));
+  EXPECT_EQ(locate<Envelope>("second.colour"), (Field{Field::Type::integer, 24, 2}));
+  EXPECT_EQ(locate<Envelope>("second.pair.octets"), (Field{Field::Type::bytes, 28, 3})) << "of the first element";
+  EXPECT_EQ(locate<Envelope>("second.share"), (Field{Field::Type::number, 44, 4}));
+  for (const char* const none : {"", "second", "second.", "colour", "second.sharing", "secondxshare"})
+    EXPECT_FALSE(locate<Envelope>(none)) << none;
+  EXPECT_TRUE(locate<Outer>("share", little));
+  EXPECT_FALSE(locate<Outer>("share", BytesView(little).first(little.size() - 1)));
+}
+
 TEST(Wire, ReadsBothByteOrders) {
   for (const auto endian : {sonar::wire::Endian::little, sonar::wire::Endian::big}) {
     Outer outer;

@@ -187,6 +187,14 @@ class MadeUpVendor final : public protocol::Vendor {
     return all;
   }
 
+  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, BytesView ping) const override {
+    if (region != protocol::Region::header && region != protocol::Region::image) return {};
+    const auto line = static_cast<std::size_t>(std::find(ping.begin(), ping.end(), std::byte{'\n'}) - ping.begin());
+    const std::size_t image_at = std::min(line + 1, ping.size());
+    if (region == protocol::Region::header) return std::pair{std::size_t{0}, image_at};
+    return std::pair{image_at, ping.size() - image_at};
+  }
+
  private:
   std::vector<std::shared_ptr<const SonarModel>> models_;
 };

@@ -1,0 +1,16 @@
+// Where Oculus messages have the fields and regions of protocol/vendor.hpp; the offsets are those of messages.hpp.
+#pragma once
+
+#include <optional>
+#include <utility>
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::oculus {
+
+/// As Vendor::field; header.version selects the layout of a ping, and of an empty message it is version 2.
+std::optional<protocol::Field> locate(protocol::Part part, protocol::FieldName name, wire::BytesView message);
+/// As Vendor::region.
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping);
+
+}  // namespace sonar::oculus
