@@ -78,10 +78,12 @@ struct ChangeSettings {
   std::shared_ptr<const VendorSettings> vendor_settings;
   std::string summary;  // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
 };
-/// Settings override from the control protocol. Unset fields keep their value; all values must be finite.
+/// Settings override, from the control protocol or of a fault. Unset fields keep their value; all values must be finite.
 struct SettingsOverride {
   std::optional<double> range_m, rate_hz, gain_percent;  // rate 0 = standby; gain 0 to 100 of what a client can turn it
   std::optional<std::uint32_t> mode, beams;              // mode: index into SonarModel::modes
+  std::optional<std::uint32_t> sample_bits = {};
+  std::optional<bool> row_gains = {};
 };
 struct RequestPing {   // one ping now (network trigger, BlueView)
   bool joins = false;  // a ping that is under way already will do

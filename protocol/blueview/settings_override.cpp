@@ -66,6 +66,9 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
       return refused(device.model->name + " forms " + std::to_string(beams) + " beams with this head, not " +
                      std::to_string(*wanted.beams));
   }
+  if (wanted.sample_bits && *wanted.sample_bits != 16)
+    return refused("BlueView sonars send samples of 16 bits, not of " + std::to_string(*wanted.sample_bits));
+  if (wanted.row_gains && *wanted.row_gains) return refused("BlueView sonars send no row gains");
   return protocol::ChangeSettings{ping_settings(all, device), std::make_shared<SonarSettings>(all), describe(all, device)};
 }
 

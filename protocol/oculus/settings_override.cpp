@@ -62,6 +62,18 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
       return refused(model.name + " forms 256 or 512 beams, not " + std::to_string(*wanted.beams));
     set(asked, flag::beams_512, *wanted.beams == 512);
   }
+  if (wanted.sample_bits) {
+    const std::uint32_t bits = *wanted.sample_bits;
+    const bool extended = fire.version >= 2;
+    if (bits != 8 && bits != 16 && !(bits == 32 && extended))
+      return refused(model.name + " sends samples of 8 or 16 bits, and of 32 to a client with messages of version 2, not of " +
+                     std::to_string(bits));
+    set(asked, flag::samples_16_bit, bits == 16);
+    if (extended)
+      fire.extension.flags =
+          bits == 32 ? fire.extension.flags | flag::extended_32_bit : fire.extension.flags & ~flag::extended_32_bit;
+  }
+  if (wanted.row_gains) set(asked, flag::row_gains, *wanted.row_gains);
   // As a driver's would be: written, sent and read.
   const FireRequest received = parse_fire(make_fire(fire)).value_or(fire);
   return protocol::ChangeSettings{resolve(received, device).settings, std::make_shared<HeldFire>(received), describe(received)};

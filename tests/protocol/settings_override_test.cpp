@@ -18,6 +18,8 @@ struct Override : protocol::SettingsOverride {
   Override& gain(double percent) { return gain_percent = percent, *this; }
   Override& of_mode(std::uint32_t index) { return mode = index, *this; }
   Override& with_beams(std::uint32_t count) { return beams = count, *this; }
+  Override& bits(std::uint32_t count) { return sample_bits = count, *this; }
+  Override& gains_of_rows(bool on) { return row_gains = on, *this; }
 };
 Override set() { return {}; }
 
@@ -67,6 +69,33 @@ TEST(OculusOverride, ModesBeamsAndStandby) {
   EXPECT_TRUE(far) << "the range of the mode set with it";
 }
 
+TEST(OculusOverride, SampleBitsAndRowGainsAreFlags) {
+  protocol::DeviceState device = oculus_device();
+  const std::uint8_t before = oculus::fire_of(device.settings.get()).settings.flags;
+  const auto wide = oculus().apply_override(set().bits(16).gains_of_rows(true), device);
+  ASSERT_TRUE(wide);
+  EXPECT_EQ(oculus::fire_of(wide->vendor_settings.get()).settings.flags,
+            before | oculus::flag::samples_16_bit | oculus::flag::row_gains);
+  EXPECT_EQ(wide->settings.format.bits, 16);
+  EXPECT_TRUE(wide->settings.format.row_gains);
+  device.settings = wide->vendor_settings;
+  const auto narrow = oculus().apply_override(set().bits(8).gains_of_rows(false), device);
+  ASSERT_TRUE(narrow);
+  EXPECT_EQ(oculus::fire_of(narrow->vendor_settings.get()).settings.flags, before);
+  EXPECT_FALSE(oculus().apply_override(set().bits(32), device)) << "messages of version 0 cannot ask for it";
+
+  oculus::FireRequest held = oculus::fire_of(wide->vendor_settings.get());
+  held.version = 2;
+  device.settings = std::make_shared<oculus::HeldFire>(held);
+  const auto widest = oculus().apply_override(set().bits(32), device);
+  ASSERT_TRUE(widest);
+  EXPECT_EQ(widest->settings.format.bits, 32);
+  device.settings = widest->vendor_settings;
+  const auto back = oculus().apply_override(set().bits(16), device);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->settings.format.bits, 16);
+}
+
 TEST(OculusOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
   const protocol::DeviceState device = oculus_device();
   const auto why = [&](const protocol::SettingsOverride& asked) {
@@ -79,6 +108,7 @@ TEST(OculusOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
   EXPECT_THAT(why(set().with_beams(300)), HasSubstr("256 or 512"));
   EXPECT_THAT(why(set().gain(101)), HasSubstr("0 to 100"));
   EXPECT_THAT(why(set().rate(-1)), HasSubstr("0 (standby) or above"));
+  EXPECT_THAT(why(set().bits(24)), HasSubstr("8 or 16 bits"));
 }
 
 TEST(BlueViewOverride, IsWhatAHostWouldHaveSet) {
@@ -107,6 +137,9 @@ TEST(BlueViewOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
   EXPECT_THAT(why(set().rate(0)), HasSubstr("no standby"));
   EXPECT_THAT(why(set().of_mode(1)), HasSubstr("1 mode(s)"));
   EXPECT_THAT(why(set().with_beams(256)), HasSubstr("512 beams"));
+  EXPECT_THAT(why(set().bits(8)), HasSubstr("16 bits"));
+  EXPECT_THAT(why(set().gains_of_rows(true)), HasSubstr("no row gains"));
+  EXPECT_EQ(why(set().bits(16).gains_of_rows(false)), "") << "as it is";
 }
 
 }  // namespace
