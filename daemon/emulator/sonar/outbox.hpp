@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -26,12 +27,22 @@ inline constexpr std::size_t drop_reasons = 3;
 class Outbox {
  public:
   using Bytes = std::vector<std::byte>;
+  /// How a message is written when a fault shapes it. Its bytes stay as they are.
+  struct Shape {
+    struct Pause {
+      std::size_t before = 0;             // the byte of that index
+      std::chrono::nanoseconds length{};  // 0: written separately, without a pause
+    };
+    std::vector<Pause> pauses;                            // by increasing index
+    enum class End { none, fin, reset } end = End::none;  // of the connection, after the last byte
+  };
   struct Message {
     std::shared_ptr<const Bytes> bytes;
     std::uint32_t ping = 0;       // its number; 0 = a reply
     std::vector<Bytes> prefixes;  // of a ping: it is sent once for each, the prefix first; none = once, as it is
     Time fired_at{};              // of a ping
     std::shared_ptr<const std::vector<Bytes>> datagrams = nullptr;  // of a ping, in place of bytes
+    std::shared_ptr<const Shape> shape = nullptr;                   // of a message without prefixes and datagrams; may be empty
     explicit operator bool() const { return bytes != nullptr || datagrams != nullptr; }
     std::size_t size() const;  // bytes, without prefixes
   };
@@ -78,5 +89,8 @@ class Outbox {
   std::uint64_t pings_offered_ = 0, pings_written_ = 0;
   std::array<std::uint64_t, drop_reasons> dropped_{};
 };
+
+/// The type itself is nested: the scene loader has a sonar::Shape.
+using Shape = Outbox::Shape;
 
 }  // namespace sonar

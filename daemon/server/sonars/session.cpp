@@ -1,9 +1,12 @@
 #include "daemon/server/sonars/session.hpp"
 
+#include <linux/sockios.h>
 #include <netinet/tcp.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 
 #include <algorithm>
+#include <cassert>
 
 #include "daemon/server/system/listen.hpp"
 
@@ -13,6 +16,7 @@ namespace {
 // Bytes the kernel may hold that are not yet on the wire. More would only make a slow client's picture older.
 constexpr int unsent_limit_bytes = 256 * 1024;
 constexpr auto idle_watch = std::chrono::seconds(1);
+constexpr auto delivery_watch = std::chrono::milliseconds(1);
 
 std::string reason(const error_code& ec) {
   if (ec == asio::error::eof) return "closed by the client";
@@ -48,7 +52,8 @@ Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
       input_rate_(setup.limits.input_bytes_per_s),
       wake_reader_(socket_.get_executor()),
       wake_writer_(socket_.get_executor(), Steady::time_point::max()),
-      wake_watch_(socket_.get_executor()) {
+      wake_watch_(socket_.get_executor()),
+      pause_(socket_.get_executor()) {
   prepare(socket_, setup_.limits);
 }
 
@@ -97,6 +102,10 @@ asio::awaitable<void> Session::rest(Steady::duration pause) {
 void Session::wake() { wake_writer_.cancel(); }
 
 asio::awaitable<bool> Session::write_whole(const Outbox::Message& message) {
+  if (message.shape) {
+    assert(message.prefixes.empty());
+    co_return co_await write_shaped(*message.bytes, *message.shape);
+  }
   if (message.prefixes.empty()) co_return co_await write_bytes(*message.bytes);
   for (const protocol::Bytes& prefix : message.prefixes) {
     if (!co_await write_bytes(prefix)) co_return false;
@@ -124,6 +133,48 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
   co_return true;
 }
 
+asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Shape& shape) {
+  for (std::size_t done = 0; const Shape::Pause& pause : shape.pauses) {
+    const std::size_t count = std::clamp(pause.before, done, done + bytes.size()) - done;
+    if (!co_await write_bytes(bytes.first(count)) || !co_await pause_writing(pause.length)) co_return false;
+    bytes = bytes.subspan(count);
+    done += count;
+  }
+  if (!co_await write_bytes(bytes)) co_return false;
+  co_return shape.end != Shape::End::reset || co_await deliver();
+}
+
+/// The watch sees progress until its end. finish() and over() end it.
+asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
+  if (length.count() > 0 && !finishing_) {
+    progress_at_ = Steady::now() + length;
+    pause_.expires_at(progress_at_);
+    error_code ec;
+    co_await pause_.async_wait(into(ec));
+    progress_at_ = Steady::now();
+  }
+  co_return !over_;
+}
+
+/// A reset throws away what the client's kernel has not confirmed. The watch ends the session of a client that takes nothing.
+asio::awaitable<bool> Session::deliver() {
+  int unconfirmed = 0;
+  while (!over_ && ::ioctl(socket_.native_handle(), SIOCOUTQ, &unconfirmed) == 0 && unconfirmed > 0) {
+    pause_.expires_after(delivery_watch);
+    error_code ec;
+    co_await pause_.async_wait(into(ec));
+  }
+  co_return !over_;
+}
+
+void Session::end_by(Shape::End end) {
+  if (end == Shape::End::reset) return reset("a fault reset the connection");
+  finish("a fault ended the stream");
+  error_code ec;
+  socket_.shutdown(tcp::socket::shutdown_send, ec);
+  sent_fin_ = true;  // as in write()
+}
+
 asio::awaitable<void> Session::write() {
   const auto self = shared_from_this();
   while (!over_) {
@@ -135,6 +186,7 @@ asio::awaitable<void> Session::write() {
       if (!co_await write_whole(message)) co_return;
       writing_ = false;
       parent_.on_written(setup_.id, message);
+      if (message.shape && message.shape->end != Shape::End::none) co_return end_by(message.shape->end);
     } else if (finishing_) {
       socket_.shutdown(tcp::socket::shutdown_send, ec);
       sent_fin_ = true;  // the reader waits for the client's own FIN, the watch for the deadline
@@ -186,6 +238,7 @@ void Session::finish(std::string why) {
   wake_reader_.cancel();
   wake_writer_.cancel();
   wake_watch_.cancel();
+  pause_.cancel();
 }
 
 void Session::reset(std::string why) {
@@ -212,6 +265,7 @@ void Session::over(std::string why) {
   wake_reader_.cancel();
   wake_writer_.cancel();
   wake_watch_.cancel();
+  pause_.cancel();
   parent_.on_over(setup_.id, why);
 }
 

@@ -61,7 +61,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void start();
   /// There is something to write.
   void wake();
-  /// No more messages after the one being written; then FIN. Reset if the client does not take it in time.
+  /// No more messages after the one being written, without its pauses; then FIN. Reset if the client does not take it in time.
   void finish(std::string why);
   /// At once, without FIN.
   void reset(std::string why);
@@ -81,6 +81,10 @@ class Session : public std::enable_shared_from_this<Session> {
   asio::awaitable<void> watch();
   asio::awaitable<bool> write_whole(const Outbox::Message& message);
   asio::awaitable<bool> write_bytes(protocol::BytesView bytes);
+  asio::awaitable<bool> write_shaped(protocol::BytesView bytes, const Shape& shape);
+  asio::awaitable<bool> pause_writing(std::chrono::nanoseconds length);
+  asio::awaitable<bool> deliver();
+  void end_by(Shape::End end);
   Steady::time_point watch_until() const;
   bool is_silent(Steady::time_point now) const;
   void over(std::string why);
@@ -91,11 +95,11 @@ class Session : public std::enable_shared_from_this<Session> {
   Setup setup_;
   Sha256 digest_;
   InputRate input_rate_;
-  asio::steady_timer wake_reader_, wake_writer_, wake_watch_;
+  asio::steady_timer wake_reader_, wake_writer_, wake_watch_, pause_;
   std::array<std::byte, 8192> received_{};
   const Steady::time_point connected_at_ = Steady::now();
   Steady::time_point received_at_ = connected_at_;  // a byte came in
-  Steady::time_point progress_at_{};                // a byte went out, while writing
+  Steady::time_point progress_at_{};                // a byte went out, while writing; in a pause its end
   Steady::time_point finish_by_{};
   bool writing_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
   std::string why_;
