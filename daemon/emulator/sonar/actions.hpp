@@ -34,6 +34,17 @@ struct KeepWaiting {
 /// Close it without sending a byte. The Sonar has no record of it.
 struct TurnAway {
   ConnectionId connection = 0;
+  bool reset = false;  // RST in place of FIN
+};
+/// The ports of kind tcp_stream accept connections, or refuse them as a port does that no program listens at. Open from the
+/// start.
+struct Listen {
+  bool on = true;
+};
+/// Stop or go on reading what this client sends: its window fills.
+struct ReadFrom {
+  ConnectionId connection = 0;
+  bool on = true;
 };
 /// The outbox has something to write.
 struct Wake {
@@ -76,8 +87,8 @@ struct EngineFailed {
   Error why;
 };
 
-using Action = std::variant<ComputePing, Serve, KeepWaiting, TurnAway, Wake, Finish, Reset, Closed, Announce, PingQueued, Report,
-                            EngineFailed>;
+using Action = std::variant<ComputePing, Serve, KeepWaiting, TurnAway, Listen, ReadFrom, Wake, Finish, Reset, Closed, Announce,
+                            PingQueued, Report, EngineFailed>;
 using Actions = std::vector<Action>;
 
 /// What became of a PingRequest.

@@ -5,6 +5,11 @@
 #include "daemon/server/system/listen.hpp"
 
 namespace sonar {
+namespace {
+
+constexpr auto retry_period = std::chrono::milliseconds(50);
+
+}  // namespace
 
 Result<void> Listener::open(Endpoint at) {
   error_code ec;
@@ -26,6 +31,42 @@ void Listener::stop() {
   stopping_ = true;
   error_code ec;
   acceptor_.close(ec);
+  reopen_timer_.cancel();
+}
+
+void Listener::pause() {
+  if (at_.port == 0 || stopping_) return;
+  paused_ = true;
+  error_code ec;
+  acceptor_.close(ec);
+}
+
+void Listener::resume(Fault taken) {
+  if (!std::exchange(paused_, false) || stopping_) return;
+  taken_ = std::move(taken);
+  try_to_open();
+  reopen_timer_.cancel();
+}
+
+void Listener::try_to_open() {
+  const Result<void> opened = listen_tcp(acceptor_, at_);
+  if (opened) return;
+  error_code ec;
+  acceptor_.close(ec);
+  if (const Fault taken = std::exchange(taken_, nullptr)) taken(opened.error().text);
+}
+
+/// The one accept loop waits here while the port is closed.
+asio::awaitable<void> Listener::reopen() {
+  while (!stopping_ && !acceptor_.is_open()) {
+    if (paused_)
+      reopen_timer_.expires_at(never);
+    else
+      reopen_timer_.expires_after(retry_period);
+    error_code ec;
+    co_await reopen_timer_.async_wait(into(ec));
+    if (!ec && !stopping_ && !paused_ && !acceptor_.is_open()) try_to_open();
+  }
 }
 
 void Listener::keep_accepting() {
@@ -45,8 +86,11 @@ asio::awaitable<void> Listener::accept() {
       socket = co_await admission_.next_visitor(acceptor_, *purpose_);
     else
       socket = co_await admission_.accept(acceptor_);
-    if (!socket || stopping_) co_return;
-    take_(*std::move(socket));
+    if (stopping_) co_return;
+    if (socket)
+      take_(*std::move(socket));
+    else
+      co_await reopen();
   }
 }
 

@@ -19,7 +19,7 @@ class Listener {
   /// `purpose`: which of the spare descriptors may be used; nothing: the caller asks `admission` for a slot itself. `admission`
   /// outlives the listener.
   Listener(asio::io_context& io, Admission& admission, std::optional<Admission::Purpose> purpose)
-      : admission_(admission), purpose_(purpose), acceptor_(io) {}
+      : admission_(admission), purpose_(purpose), acceptor_(io), reopen_timer_(io) {}
 
   /// Port 0: the system chooses one. After an error it does not listen.
   Result<void> open(Endpoint at);
@@ -27,21 +27,30 @@ class Listener {
   /// 100 ms after stop(): Admission may pause before it looks again.
   void start(Take take, Fault fault);
   void stop();
-  bool is_open() const { return acceptor_.is_open(); }
+  /// Connections are refused as by a port that no program listens at.
+  void pause();
+  /// Accepts connections again, at the same address and port. While another program has that port it is tried again and again;
+  /// `taken` gets once why.
+  void resume(Fault taken);
+  /// Also while paused.
+  bool is_open() const { return acceptor_.is_open() || paused_; }
   /// With the port the system chose. Port 0 = never opened.
   Endpoint at() const { return at_; }
 
  private:
   void keep_accepting();
   asio::awaitable<void> accept();
+  asio::awaitable<void> reopen();
+  void try_to_open();
 
   Admission& admission_;
   std::optional<Admission::Purpose> purpose_;
   tcp::acceptor acceptor_;
+  asio::steady_timer reopen_timer_;
   Endpoint at_;
   Take take_;
-  Fault fault_;
-  bool stopping_ = false;
+  Fault fault_, taken_;
+  bool stopping_ = false, paused_ = false;
 };
 
 }  // namespace sonar

@@ -281,6 +281,13 @@ void Device::carry_out(const TurnAway& action) {
   auto arrived = arrived_.extract(action.connection);
   if (arrived.empty()) return;
   Arrived& from = arrived.mapped();
+  if (action.reset) {
+    report_visit(from.role, VisitLog::Kind::turned_away, "client turned away: reset", {});
+    error_code ec;
+    from.socket.set_option(asio::socket_base::linger(true, 0), ec);
+    from.socket.close(ec);  // its destructor would send FIN
+    return;
+  }
   if (from.role == Role::observer) {
     const std::string most = std::to_string(config().max_observers);
     report_visit(from.role, VisitLog::Kind::turned_away, "observer turned away: " + most + " look on already", {});
@@ -298,6 +305,20 @@ void Device::carry_out(const TurnAway& action) {
         --turning_away_;
         parent_.on_change();
       });
+}
+
+void Device::carry_out(const Listen& action) {
+  const auto taken = [this](const std::string& why) { network_.log.warning(why, {{"sonar", config().name}}); };
+  for (TcpPort& tcp : tcp_ports_) {
+    if (action.on)
+      tcp.listener.resume(taken);
+    else
+      tcp.listener.pause();
+  }
+}
+
+void Device::carry_out(const ReadFrom& action) {
+  if (const SessionPointer session = session_of(action.connection)) session->read_from_client(action.on);
 }
 
 void Device::carry_out(const Wake& action) {

@@ -78,6 +78,9 @@ class Device final : public SessionParent {
   void tick_sessions() { perform(sonar_.tick_conversations(network_.clock.now())); }
   void skip(std::chrono::nanoseconds by) { sonar_.skip(by); }
 
+  /// What the sonar asked for, in order.
+  void perform(Actions actions);
+
   bool gone() const;  // after stop(): nothing is left
   const Sonar& sonar() const { return sonar_; }
   const SonarConfig& config() const { return sonar_.config(); }
@@ -138,11 +141,12 @@ class Device final : public SessionParent {
   SessionPointer session_of(ConnectionId id) const;
   StreamPointer stream_of(ConnectionId id) const;
 
-  void perform(Actions actions);
   void carry_out(ComputePing& action);
   void carry_out(const Serve& action);
   void carry_out(const KeepWaiting& action);
   void carry_out(const TurnAway& action);
+  void carry_out(const Listen& action);
+  void carry_out(const ReadFrom& action);
   void carry_out(const Wake& action);
   void carry_out(const Finish& action);
   void carry_out(const Reset& action);

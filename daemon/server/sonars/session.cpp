@@ -85,18 +85,26 @@ asio::awaitable<void> Session::read() {
       over(finishing_ ? why_ : reason(ec));
       co_return;
     }
+    while (!reading_ && !finishing_ && !over_) co_await rest(never);
+    if (over_) co_return;
     received_at_ = Steady::now();
     parent_.on_bytes(setup_.id, std::span(received_).first(n));
     const auto pause = input_rate_.pause_after(n, Steady::now());
-    if (pause.count() > 0 && !finishing_) co_await rest(pause);
+    if (pause.count() > 0 && !finishing_) co_await rest(Steady::now() + pause);
   }
 }
 
 /// A client that sends too much waits; its FIN, too, is only read then. finish() and over() end the pause.
-asio::awaitable<void> Session::rest(Steady::duration pause) {
-  wake_reader_.expires_after(pause);
+asio::awaitable<void> Session::rest(Steady::time_point until) {
+  wake_reader_.expires_at(until);
   error_code ec;
   co_await wake_reader_.async_wait(into(ec));
+}
+
+void Session::read_from_client(bool on) {
+  if (std::exchange(reading_, on) || !on) return;
+  received_at_ = Steady::now();
+  wake_reader_.cancel();
 }
 
 void Session::wake() { wake_writer_.cancel(); }
@@ -226,7 +234,7 @@ asio::awaitable<void> Session::watch() {
 bool Session::is_silent(Steady::time_point now) const {
   const auto longest = parent_.longest_silence(setup_.id);
   error_code ec;
-  return longest && now - received_at_ > *longest && socket_.available(ec) == 0;
+  return longest && reading_ && now - received_at_ > *longest && socket_.available(ec) == 0;
 }
 
 void Session::finish(std::string why) {

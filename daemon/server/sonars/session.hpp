@@ -65,6 +65,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void finish(std::string why);
   /// At once, without FIN.
   void reset(std::string why);
+  /// Off: what the client sends is left to the kernels, until they are full.
+  void read_from_client(bool on);
   /// When the peer has hung up and every byte from it has been read: over.
   void end_if_closed();
 
@@ -76,7 +78,7 @@ class Session : public std::enable_shared_from_this<Session> {
   using Steady = std::chrono::steady_clock;
 
   asio::awaitable<void> read();
-  asio::awaitable<void> rest(Steady::duration pause);
+  asio::awaitable<void> rest(Steady::time_point until);
   asio::awaitable<void> write();
   asio::awaitable<void> watch();
   asio::awaitable<bool> write_whole(const Outbox::Message& message);
@@ -101,7 +103,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Steady::time_point received_at_ = connected_at_;  // a byte came in
   Steady::time_point progress_at_{};                // a byte went out, while writing; in a pause its end
   Steady::time_point finish_by_{};
-  bool writing_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
+  bool reading_ = true, writing_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
   std::string why_;
 };
 
