@@ -222,6 +222,7 @@ static_assert(field_names.size() == static_cast<std::size_t>(FieldName::mac) + 1
 enum class Part { ping, beacon };
 /// Of a ping: what every message begins with, the other fields, the table of the beams' directions, the samples.
 enum class Region { header, metadata, bearings, image };
+inline constexpr std::array<std::string_view, 4> region_names{"header", "metadata", "bearings", "image"};
 
 class Vendor {
  public:

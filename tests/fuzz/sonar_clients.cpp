@@ -173,10 +173,10 @@ void SonarClients::fire() {
 /// The next piece of what is being written; false when there is nothing.
 bool SonarClients::write_piece(Client& client, std::size_t& bytes) {
   if (!client.writing) {
-    client.writing = sonar_.next_message(client.id);
+    client.writing = sonar_.next_message(client.id, now_);
     client.part = client.done = 0;
     if (!client.writing) return false;
-    require(!sonar_.next_message(client.id));  // one at a time
+    require(!sonar_.next_message(client.id, now_));  // one at a time
   }
   // Prefix, bytes, prefix, bytes: even parts are prefixes.
   const auto& prefixes = client.writing.prefixes;

@@ -90,7 +90,8 @@ Connection& Connections::add(ConnectionId id, Role role, Peer peer, State state,
                                       .port = port,
                                       .dialogue = nullptr,
                                       .outbox = Outbox(config_.outbox),
-                                      .receivers = {}});
+                                      .receivers = {},
+                                      .held = {}});
 }
 
 void Connections::remove(ConnectionId id) {

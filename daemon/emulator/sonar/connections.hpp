@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <list>
 #include <memory>
 #include <optional>
@@ -37,6 +38,12 @@ struct Connection {
   Outbox outbox;
   /// Of a client: what it requested, one list for each stream it named. Of a stream: the device's own list, one.
   std::vector<protocol::SetReceivers> receivers;
+  struct Held {  // by a fault
+    Outbox::Message ping;
+    Time until{};
+    bool after_next = false;  // until the next ping has overtaken it
+  };
+  std::deque<Held> held;
   bool finishing = false;  // no more bytes are taken in, no more pings offered
   Time not_before{};       // earliest next call of dialogue->on_tick, in unskipped time
   std::uint64_t bytes_written = 0, bytes_read = 0;

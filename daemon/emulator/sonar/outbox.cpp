@@ -20,11 +20,12 @@ std::size_t Outbox::Message::size() const {
   return all;
 }
 
-void Outbox::push_ping(Message ping) {
+void Outbox::push(Message ping, bool limited) {
   const std::size_t size = ping.size();
   ++pings_offered_;
   const auto full = [&] {
-    return !pings_.empty() && (pings_.size() >= static_cast<std::size_t>(rules_.depth) || ping_bytes_ + size > most_ping_bytes);
+    return limited && !pings_.empty() &&
+           (pings_.size() >= static_cast<std::size_t>(rules_.depth) || ping_bytes_ + size > most_ping_bytes);
   };
   if (full() && rules_.when_full == WhenFull::drop_newest) {
     count_drop(DropReason::slow);
@@ -61,9 +62,9 @@ void Outbox::written() {
   writing_ = false;
 }
 
-void Outbox::not_written() {
+void Outbox::not_written(DropReason why) {
   assert(writing_);
-  if (writing_ping_) count_drop(DropReason::gone);
+  if (writing_ping_) count_drop(why);
   writing_ = false;
 }
 

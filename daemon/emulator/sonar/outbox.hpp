@@ -18,11 +18,12 @@ namespace sonar {
 
 /// Why a ping that was offered to a client never reached it whole.
 enum class DropReason {
-  slow,  // another ping took its place, or it found none
-  gone,  // the connection ended first
-  stop,  // we ended the conversation: only the message being written is still finished
+  slow,   // another ping took its place, or it found none
+  gone,   // the connection ended first
+  stop,   // we ended the conversation: only the message being written is still finished
+  fault,  // a fault on purpose
 };
-inline constexpr std::size_t drop_reasons = 3;
+inline constexpr std::size_t drop_reasons = 4;
 
 class Outbox {
  public:
@@ -57,13 +58,18 @@ class Outbox {
   void push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number, std::vector<Bytes> prefixes = {}, Time fired_at = {}) {
     push_ping({std::move(bytes), number, std::move(prefixes), fired_at});
   }
-  void push_ping(Message ping);
+  void push_ping(Message ping) { push(std::move(ping), true); }
+  /// One that a fault held back: beyond the depth, too.
+  void push_held(Message ping) { push(std::move(ping), false); }
   /// The next message to write, whole: replies before pings. Empty while one is being written, or when there is nothing.
   Message take();
   /// The message last taken has been written to its end.
   void written();
   /// It could not be written, and others can: it is dropped.
-  void not_written();
+  void not_written(DropReason why = DropReason::gone);
+  /// A ping that was offered and does not even wait.
+  void drop_offered(DropReason why) { ++pings_offered_, count_drop(why); }
+  void use(OutboxRules rules) { rules_ = rules; }
   /// Leaves the message being written and the replies, which are small.
   void drop_waiting_pings(DropReason why = DropReason::stop);
   /// The connection is over: nothing more is written, and what was not is dropped, the message being written too.
@@ -78,6 +84,7 @@ class Outbox {
   std::size_t pings_waiting() const { return pings_.size(); }
 
  private:
+  void push(Message ping, bool limited);
   void count_drop(DropReason why, std::uint64_t pings = 1) { dropped_[static_cast<std::size_t>(why)] += pings; }
 
   OutboxRules rules_;
@@ -89,8 +96,5 @@ class Outbox {
   std::uint64_t pings_offered_ = 0, pings_written_ = 0;
   std::array<std::uint64_t, drop_reasons> dropped_{};
 };
-
-/// The type itself is nested: the scene loader has a sonar::Shape.
-using Shape = Outbox::Shape;
 
 }  // namespace sonar

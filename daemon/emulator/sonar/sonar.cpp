@@ -19,6 +19,7 @@ Sonar::Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time 
       index_(index),
       state_(device_state(config_, around.config, now)),
       connections_(config_),
+      faults_({vendor_, connections_, config_.name, index, Seed(around.config.seed), around.journal}, now),
       skipped_(skipped) {
   update_depth(now);
   use_initial_settings();
@@ -53,7 +54,7 @@ void Sonar::change_settings(const protocol::ChangeSettings& change, const std::s
   }
   settings_ = change.settings;  // of a repeat too: the device's own sound speed follows its depth
   asked_ = true;
-  if (wants_pings()) pacer_.configure(settings_, now);
+  if (wants_pings()) update_pacer(now);
 }
 
 Result<Actions> Sonar::change(const protocol::SettingsOverride& wanted, const std::string& who, Time now) {
@@ -80,7 +81,7 @@ void Sonar::use_water(const Water& water, Time now) {
   state_.water = water;
   // The client's request stays; what the device derives from it, its sound speed say, follows the water.
   if (const auto same = vendor_.apply_override({}, state_)) settings_ = same->settings;
-  if (wants_pings()) pacer_.configure(settings_, now);
+  if (wants_pings()) update_pacer(now);
 }
 
 DeviceFigures Sonar::figures() const {
@@ -123,6 +124,9 @@ std::optional<Time> Sonar::next_tick() const {
   std::optional<Time> first = pacer_.next_tick();
   for (const Connection& c : connections_.all())
     if (const auto t = c.next_tick(); t && (!first || clock_time(*t) < *first)) first = clock_time(*t);
+  if (const auto t = faults_.next_tick(); t && (!first || *t < *first)) first = t;
+  for (const Connection& c : connections_.all())
+    if (!c.held.empty() && (!first || c.held.front().until < *first)) first = c.held.front().until;
   return first;
 }
 
@@ -140,6 +144,9 @@ Actions Sonar::tick_conversations(Time now) {
     guarded(c, actions, [&] { handle(c, c.dialogue->on_tick(at, pacer_.trigger_waits()), now, actions); });
     c.not_before = at + shortest_rhythm;
   }
+  faults_.on_tick(now);
+  for (Connection& c : connections_.all()) release_held(c, now, false, actions);
+  obey_faults(now, actions);
   return actions;
 }
 
@@ -166,9 +173,12 @@ bool Sonar::settled() const {
 
 // ---- pings
 
-protocol::Bytes Sonar::beacon(Time now) {
+std::vector<protocol::Bytes> Sonar::beacons(Time now) {
   update_depth(now);
-  return vendor_.beacon(state_, now);
+  std::vector<protocol::Bytes> datagrams;
+  if (protocol::Bytes status = vendor_.beacon(state_, now); !status.empty()) datagrams.push_back(std::move(status));
+  faults_.alter_beacons(datagrams, now);
+  return datagrams;
 }
 
 void Sonar::update_depth(Time now) { state_.depth_m = depth_from_z(pose_at(now).position_m.z); }
@@ -233,12 +243,14 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
 }
 
 void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
-  const auto bytes = vendor_.frame(*outcome.ping, state_);
+  faults_.begin_ping(static_cast<std::uint32_t>(outcome.ping->request.number), now);
+  const auto reported = faults_.altered(outcome.ping, state_, now);
+  const auto bytes = vendor_.frame(*reported, state_);
   std::vector<std::pair<Connection*, protocol::Event>> events;
   PingQueued queued{outcome.ping, bytes, {}, outcome.seconds};
   for (Connection& c : connections_.all()) {
     if (c.role == Role::stream)
-      offer_datagrams(c, *outcome.ping, queued, actions);
+      offer_datagrams(c, *reported, now, queued, actions);
     else if (bytes != nullptr)
       guarded(c, actions, [&] {
         for (protocol::Event& event : offer(c, bytes, outcome.ping->request, now, actions))
@@ -247,14 +259,17 @@ void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
   }
   for (const auto& [from, event] : events) on_event(source_of(*from), event, now, actions);
   actions.emplace_back(std::move(queued));
+  obey_faults(now, actions);
 }
 
 /// An exception costs this ping, not the stream, which belongs to the device.
-void Sonar::offer_datagrams(Connection& stream, const Ping& ping, PingQueued& queued, Actions& actions) {
-  if (stream.finishing || connections_.receivers(stream).empty()) return;
+void Sonar::offer_datagrams(Connection& stream, const Ping& ping, Time now, PingQueued& queued, Actions& actions) {
+  if (stream.finishing || receivers(stream.id).empty()) return;
   try {
-    const auto datagrams = std::make_shared<const std::vector<protocol::Bytes>>(vendor_.datagrams(*stream.port, ping, state_));
-    if (datagrams->empty()) return;
+    std::vector<protocol::Bytes> made = vendor_.datagrams(*stream.port, ping, state_);
+    faults_.alter_datagrams(made, stream, static_cast<std::uint32_t>(ping.request.number), now);
+    if (made.empty()) return;
+    const auto datagrams = std::make_shared<const std::vector<protocol::Bytes>>(std::move(made));
     queued.datagrams.push_back(datagrams);
     stream.outbox.push_ping({.bytes = nullptr,
                              .ping = static_cast<std::uint32_t>(ping.request.number),
@@ -274,9 +289,12 @@ std::vector<protocol::Event> Sonar::offer(Connection& to, const std::shared_ptr<
   protocol::Delivery delivery = to.dialogue->on_ping(ping.vendor_settings.get(), bytes->size(), unskipped(now));
   if (!delivery.prefixes.empty()) {
     const bool as_it_is = delivery.prefixes.size() == 1 && delivery.prefixes.front().empty();
-    to.outbox.push_ping(bytes, static_cast<std::uint32_t>(ping.number),
-                        as_it_is ? std::vector<protocol::Bytes>{} : std::move(delivery.prefixes), ping.fired_at);
-    actions.emplace_back(Wake{to.id});
+    deliver(to,
+            {.bytes = bytes,
+             .ping = static_cast<std::uint32_t>(ping.number),
+             .prefixes = as_it_is ? std::vector<protocol::Bytes>{} : std::move(delivery.prefixes),
+             .fired_at = ping.fired_at},
+            now, actions);
   }
   if (to.role == Role::observer) return {};
   return std::move(delivery.events);

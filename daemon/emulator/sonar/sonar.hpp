@@ -12,6 +12,7 @@
 
 #include "core/sonar/gain_assist.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/emulator/faults/faults.hpp"
 #include "daemon/emulator/sonar/actions.hpp"
 #include "daemon/emulator/sonar/connections.hpp"
 #include "daemon/emulator/sonar/metrics.hpp"
@@ -27,6 +28,7 @@ class Sonar {
   struct Surroundings {
     const Config& config;
     const World& world;
+    FaultJournal* journal = nullptr;  // of faults; may be null
   };
   /// `index` keys its noise; `skipped`: what stepped time has jumped over so far.
   Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time now, std::chrono::nanoseconds skipped = {});
@@ -44,7 +46,7 @@ class Sonar {
   std::vector<protocol::Endpoint> receivers(ConnectionId stream) const;
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
   /// The next message to write, whole; empty when there is none or one is being written.
-  Outbox::Message next_message(ConnectionId id);
+  Outbox::Message next_message(ConnectionId id, Time now);
   /// So many bytes of it were taken; after the last one on_written().
   void on_sent(ConnectionId id, std::size_t bytes);
   void on_written(ConnectionId id, const Outbox::Message& message, Time now);
@@ -62,8 +64,8 @@ class Sonar {
   // ---- pings and datagrams
 
   Actions on_ping(PingOutcome outcome, Time now);
-  /// The status broadcast; empty when the vendor has none.
-  protocol::Bytes beacon(Time now);
+  /// The datagrams of a status broadcast, in order; none when the vendor has no beacon.
+  std::vector<protocol::Bytes> beacons(Time now);
   struct Answers {
     std::vector<protocol::Bytes> datagrams;  // to send back, in order
     Actions actions;
@@ -108,6 +110,14 @@ class Sonar {
   void move(const SonarConfig& config, Time now);
   void use_water(const Water& water, Time now);
 
+  /// Why this sonar cannot have these faults, as a sentence: its vendor has no such thing, or another fault writes the same part.
+  std::string why_no_faults(const std::vector<Fault>& faults) const;
+  /// Those of `faults` that are for this sonar and take effect on it.
+  Actions add_faults(const std::vector<Fault>& faults, bool manual, Time now);
+  /// Empty `name` = all. False: there is none of that name.
+  bool end_faults(const std::string& name, Time now, Actions& actions);
+  const Faults& faults() const { return faults_; }
+
   const SonarConfig& config() const { return config_; }
   const protocol::Vendor& vendor() const { return vendor_; }
   const protocol::DeviceState& state() const { return state_; }
@@ -138,6 +148,13 @@ class Sonar {
   void on_event(const Source& from, const protocol::Event& event, Time now, Actions& actions);
   void set_receivers(const Source& from, protocol::SetReceivers wanted, Time now);
   void update_pacer(Time now);
+  // Faults (sonar_faults.cpp).
+  void obey_faults(Time now, Actions& actions);
+  void obey(const FaultOrder& order, Time now, Actions& actions);
+  void deliver(Connection& to, Outbox::Message ping, Time now, Actions& actions);
+  void release_held(Connection& to, Time now, bool all, Actions& actions);
+  void serve_waiting(Time now, Actions& actions);
+  void change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions);
   void serve(Connection& connection, Time now, Actions& actions);
   /// An exception is a mistake in sonard: it may cost this connection, never the others.
   template <class Call>
@@ -163,7 +180,7 @@ class Sonar {
   void queue_ping(const PingOutcome& outcome, Time now, Actions& actions);
   std::vector<protocol::Event> offer(Connection& to, const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,
                                      Time now, Actions& actions);
-  void offer_datagrams(Connection& stream, const Ping& ping, PingQueued& queued, Actions& actions);
+  void offer_datagrams(Connection& stream, const Ping& ping, Time now, PingQueued& queued, Actions& actions);
   void note_water(const PingRequest& computed, Time now, Actions& actions);
   void update_depth(Time now);
   void report(Report::Topic topic, LogLevel level, std::string phrase, std::vector<LogField> fields, Actions& actions) const;
@@ -174,6 +191,7 @@ class Sonar {
   std::uint32_t index_;
   protocol::DeviceState state_;
   Connections connections_;
+  Faults faults_;
   std::chrono::nanoseconds skipped_;
 
   Pacer pacer_;

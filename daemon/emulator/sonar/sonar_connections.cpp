@@ -15,10 +15,16 @@ constexpr std::size_t most_receivers = 16;  // of one list
 Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port) {
   Actions actions;
   if (port == nullptr) port = vendor_.port(protocol::Port::Kind::tcp_stream);
-  const Connections::Verdict verdict = stopping_ ? Connections::Verdict::turn_away : connections_.verdict(role);
+  Connections::Verdict verdict = stopping_ ? Connections::Verdict::turn_away : connections_.verdict(role);
+  const auto admission = role == Role::client && !stopping_ ? faults_.admission() : Faults::Admission::as_configured;
+  if (admission == Faults::Admission::wait) verdict = Connections::Verdict::wait;
+  if (admission == Faults::Admission::take_over && verdict != Connections::Verdict::serve && connections_.clients() > 0)
+    verdict = Connections::Verdict::take_over;
+  if (admission == Faults::Admission::turn_away || admission == Faults::Admission::reset)
+    verdict = Connections::Verdict::turn_away;
   if (verdict == Connections::Verdict::turn_away) {
     if (role == Role::client) ++figures_.refused_clients;
-    actions.emplace_back(TurnAway{id});
+    actions.emplace_back(TurnAway{id, admission == Faults::Admission::reset});
     return actions;
   }
   if (verdict == Connections::Verdict::wait) {
@@ -44,6 +50,8 @@ void Sonar::serve(Connection& connection, Time now, Actions& actions) {
   if (connection.role == Role::observer) return;
   connection.number = ++figures_.clients;
   on_membership(now, actions);
+  faults_.on_served(connection, now);
+  obey_faults(now, actions);
 }
 
 /// After a client came or went.
@@ -57,8 +65,10 @@ void Sonar::on_membership(Time now, Actions& actions) {
 }
 
 void Sonar::update_pacer(Time now) {
+  PingSettings paced = settings_;
+  if (const double factor = faults_.rate_factor(); factor != 1) paced.rate_hz *= static_cast<float>(factor);
   if (wants_pings())
-    pacer_.configure(settings_, now);
+    pacer_.configure(paced, now);
   else
     pacer_.stop();
 }
@@ -77,7 +87,10 @@ Actions Sonar::open_stream(ConnectionId id, const protocol::Port& port, Time now
 
 std::vector<protocol::Endpoint> Sonar::receivers(ConnectionId stream) const {
   const Connection* const connection = connections_.find(stream);
-  return connection == nullptr ? std::vector<protocol::Endpoint>{} : connections_.receivers(*connection);
+  if (connection == nullptr) return {};
+  std::vector<protocol::Endpoint> to = connections_.receivers(*connection);
+  if (faults_.leaves_group()) std::erase(to, connection->port->group);
+  return to;
 }
 
 void Sonar::set_receivers(const Source& from, protocol::SetReceivers wanted, Time now) {
@@ -129,6 +142,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
   if (connection == nullptr) return actions;
   const Role connection_role = connection->role;
   const bool was_client = connection_role == Role::client && connection->state == Connection::State::served;
+  for (Connection::Held& held : connection->held) connection->outbox.push_ping(std::move(held.ping));
   connection->outbox.end(connection->finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection->peer.name, connection->role, connection->state != Connection::State::waiting,
                               connection->outbox.pings_written(), connection->outbox.pings_dropped(), why});
@@ -136,7 +150,10 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
   connections_.remove(id);
   if (connection_role == Role::stream) update_pacer(now);
   if (!was_client) return actions;
-  Connection* const next = stopping_ ? nullptr : connections_.longest_waiting();
+  faults_.on(Occasion::disconnect, now);
+  obey_faults(now, actions);
+  const bool kept_waiting = faults_.admission() == Faults::Admission::wait;
+  Connection* const next = stopping_ || kept_waiting ? nullptr : connections_.longest_waiting();
   if (next == nullptr) {
     on_membership(now, actions);
     return actions;
@@ -208,7 +225,7 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
     report(Report::Topic::ignored, LogLevel::info, "request of an observer ignored: only clients change what a sonar does",
            {{"observer", from.name}}, actions);
   } else if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
-    change_settings(*change, from.name, now, actions);
+    change_as_requested(from, *change, now, actions);
   } else if (const auto* request = std::get_if<protocol::RequestPing>(&event)) {
     // The ping being computed will do only if it was fired with the settings that hold now.
     const bool served = request->joins && busy_ && busy_settings_ == state_.settings;
@@ -224,9 +241,14 @@ void Sonar::on_not_sent(ConnectionId id) {
   if (Connection* const to = connections_.find(id)) to->outbox.not_written();
 }
 
-Outbox::Message Sonar::next_message(ConnectionId id) {
+Outbox::Message Sonar::next_message(ConnectionId id, Time now) {
   Connection* const to = connections_.find(id);
-  return to == nullptr ? Outbox::Message{} : to->outbox.take();
+  if (to == nullptr) return {};
+  while (Outbox::Message message = to->outbox.take()) {
+    if (faults_.shape(*to, message, now)) return message;
+    to->outbox.not_written(DropReason::fault);
+  }
+  return {};
 }
 
 void Sonar::on_sent(ConnectionId id, std::size_t bytes) {

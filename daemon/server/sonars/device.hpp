@@ -106,7 +106,7 @@ class Device final : public SessionParent {
   void forget_who_left();
 
   void on_bytes(ConnectionId from, protocol::BytesView bytes) override;
-  Outbox::Message next_message(ConnectionId to) override { return sonar_.next_message(to); }
+  Outbox::Message next_message(ConnectionId to) override { return sonar_.next_message(to, network_.clock.now()); }
   std::vector<Endpoint> receivers(ConnectionId stream) const override { return sonar_.receivers(stream); }
   void on_sent(ConnectionId to, std::size_t bytes) override { sonar_.on_sent(to, bytes); }
   void on_written(ConnectionId to, const Outbox::Message& message) override;

@@ -141,15 +141,15 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
   co_return true;
 }
 
-asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Shape& shape) {
-  for (std::size_t done = 0; const Shape::Pause& pause : shape.pauses) {
+asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Outbox::Shape& shape) {
+  for (std::size_t done = 0; const Outbox::Shape::Pause& pause : shape.pauses) {
     const std::size_t count = std::clamp(pause.before, done, done + bytes.size()) - done;
     if (!co_await write_bytes(bytes.first(count)) || !co_await pause_writing(pause.length)) co_return false;
     bytes = bytes.subspan(count);
     done += count;
   }
   if (!co_await write_bytes(bytes)) co_return false;
-  co_return shape.end != Shape::End::reset || co_await deliver();
+  co_return shape.end != Outbox::Shape::End::reset || co_await deliver();
 }
 
 /// The watch sees progress until its end. finish() and over() end it.
@@ -175,8 +175,8 @@ asio::awaitable<bool> Session::deliver() {
   co_return !over_;
 }
 
-void Session::end_by(Shape::End end) {
-  if (end == Shape::End::reset) return reset("a fault reset the connection");
+void Session::end_by(Outbox::Shape::End end) {
+  if (end == Outbox::Shape::End::reset) return reset("a fault reset the connection");
   finish("a fault ended the stream");
   error_code ec;
   socket_.shutdown(tcp::socket::shutdown_send, ec);
@@ -194,7 +194,7 @@ asio::awaitable<void> Session::write() {
       if (!co_await write_whole(message)) co_return;
       writing_ = false;
       parent_.on_written(setup_.id, message);
-      if (message.shape && message.shape->end != Shape::End::none) co_return end_by(message.shape->end);
+      if (message.shape && message.shape->end != Outbox::Shape::End::none) co_return end_by(message.shape->end);
     } else if (finishing_) {
       socket_.shutdown(tcp::socket::shutdown_send, ec);
       sent_fin_ = true;  // the reader waits for the client's own FIN, the watch for the deadline

@@ -83,10 +83,10 @@ class Session : public std::enable_shared_from_this<Session> {
   asio::awaitable<void> watch();
   asio::awaitable<bool> write_whole(const Outbox::Message& message);
   asio::awaitable<bool> write_bytes(protocol::BytesView bytes);
-  asio::awaitable<bool> write_shaped(protocol::BytesView bytes, const Shape& shape);
+  asio::awaitable<bool> write_shaped(protocol::BytesView bytes, const Outbox::Shape& shape);
   asio::awaitable<bool> pause_writing(std::chrono::nanoseconds length);
   asio::awaitable<bool> deliver();
-  void end_by(Shape::End end);
+  void end_by(Outbox::Shape::End end);
   Steady::time_point watch_until() const;
   bool is_silent(Steady::time_point now) const;
   void over(std::string why);

@@ -3,190 +3,21 @@
 
 #include <gmock/gmock.h>
 
-#include <fstream>
-#include <list>
-#include <map>
-
-#include "daemon/emulator/reload_plan.hpp"
-#include "daemon/emulator/world/world_parts.hpp"
 #include "protocol/blueview/frames.hpp"
-#include "protocol/oculus/decode.hpp"
-#include "protocol/oculus/fire.hpp"
+#include "tests/daemon/emulator/sonar/virtual_time.hpp"
 #include "tests/daemon/server/sonars/made_up_vendor.hpp"
 #include "tests/protocol/delegating_vendor.hpp"
 
 namespace sonar {
 namespace {
 
+using namespace testing_emulator;
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-constexpr Time start = Time{} + std::chrono::hours(24 * 365 * 50);
-
-Config parsed(const std::string& yaml) {
-  std::ofstream(::testing::TempDir() + "/empty.yaml") << "name: empty\n";
-  const auto config = parse_config(yaml, "test.yaml", ::testing::TempDir());
-  if (!config) throw std::runtime_error(config.error().text);
-  return *config;
-}
-
-/// The caller of all sonars of a configuration: time passes from one event to the next, pings take no time, and clients read as
-/// much as their test lets them.
-class VirtualTime {
- public:
-  explicit VirtualTime(const std::string& yaml)
-      : config(parsed(yaml)), world(pose_rules(config), vehicles_of(config), {}, start) {
-    for (const SonarConfig& s : config.sonars) sonars.emplace_back(Sonar::Surroundings{config, world}, s, ++last_index, now);
-  }
-
-  struct Client {
-    Sonar* sonar = nullptr;
-    bool served = false, finished = false, closed = false, waits = false;
-    std::string why;
-    bool reads = true;
-    protocol::Bytes received;
-  };
-  Sonar& sonar(const std::string& name) {
-    return *std::find_if(sonars.begin(), sonars.end(), [&](const Sonar& s) { return s.config().name == name; });
-  }
-  ConnectionId connect(const std::string& name, Role role = Role::client) {
-    const ConnectionId id = ++last_id;
-    clients[id].sonar = &sonar(name);
-    perform(sonar(name), sonar(name).on_connect(id, role, {"client " + std::to_string(id), {127, 0, 0, 1}}, now));
-    return id;
-  }
-  void send(ConnectionId id, const protocol::Bytes& bytes) {
-    Sonar& to = *clients[id].sonar;
-    perform(to, to.on_bytes(id, bytes, now));
-  }
-  void close(ConnectionId id, const std::string& why = "closed by the client") {
-    Client& client = clients[id];
-    client.closed = true;
-    perform(*client.sonar, client.sonar->on_closed(id, why, now));
-  }
-  void run(std::chrono::nanoseconds time) {
-    const Time until = now + time;
-    while (Sonar* const sonar = first_due(until)) {
-      now = std::max(now, *sonar->next_tick());
-      perform(*sonar, sonar->on_tick(now));
-    }
-    now = until;
-  }
-  /// As Fleet does it, but for the listeners.
-  void reload(const std::string& yaml) {
-    const Config next = parsed(yaml);
-    for (auto it = sonars.begin(); it != sonars.end();) {
-      const auto s = it++;
-      const Fate fate = fate_of(s->config(), config, next);
-      if (fate == Fate::removed || fate == Fate::changed) {
-        perform(*s, s->stop("the configuration changed"));
-        retired.splice(retired.end(), sonars, s);
-      } else {
-        s->move(*sonar_named(next.sonars, s->config().name), now);
-      }
-    }
-    config = next;
-    for (const SonarConfig& s : config.sonars)
-      if (std::none_of(sonars.begin(), sonars.end(), [&](const Sonar& old) { return old.config().name == s.name; }))
-        sonars.emplace_back(Sonar::Surroundings{config, world}, s, ++last_index, now);
-  }
-
-  Config config;
-  World world;
-  Time now = start;
-  std::list<Sonar> sonars, retired;
-  std::map<ConnectionId, Client> clients;
-  std::vector<std::string> log;
-  std::uint64_t pings = 0;
-
- private:
-  Sonar* first_due(Time before) {
-    Sonar* first = nullptr;
-    for (Sonar& s : sonars)
-      if (const auto t = s.next_tick(); t && *t < before && (first == nullptr || *t < *first->next_tick())) first = &s;
-    return first;
-  }
-  void perform(Sonar& sonar, Actions actions) {
-    for (Action& action : actions) {
-      if (auto* compute = std::get_if<ComputePing>(&action)) {
-        ++pings;
-        perform(sonar, sonar.on_ping({.ping = computed(std::move(compute->request)), .seconds = 1e-3}, now));
-      } else if (const auto* serve = std::get_if<Serve>(&action)) {
-        clients[serve->connection].served = true;
-        clients[serve->connection].waits = false;
-      } else if (const auto* wait = std::get_if<KeepWaiting>(&action)) {
-        clients[wait->connection].waits = true;
-      } else if (const auto* away = std::get_if<TurnAway>(&action)) {
-        clients[away->connection].closed = true;
-      } else if (const auto* finish = std::get_if<Finish>(&action)) {
-        clients[finish->connection].finished = true;
-        clients[finish->connection].why = finish->why;
-      } else if (const auto* report = std::get_if<Report>(&action)) {
-        log.push_back(report->line.phrase);
-      }
-    }
-    for (auto& [id, client] : clients) read(id, client);
-  }
-  void read(ConnectionId id, Client& client) {
-    if (!client.reads || !client.served || client.closed) return;
-    while (const Outbox::Message message = client.sonar->next_message(id)) {
-      for (std::size_t copy = 0; copy < std::max<std::size_t>(1, message.prefixes.size()); ++copy) {
-        if (!message.prefixes.empty())
-          client.received.insert(client.received.end(), message.prefixes[copy].begin(), message.prefixes[copy].end());
-        client.received.insert(client.received.end(), message.bytes->begin(), message.bytes->end());
-      }
-      client.sonar->on_written(id, message, now);
-    }
-    if (client.finished) close(id, client.why);
-  }
-  static std::shared_ptr<const Ping> computed(PingRequest request) {
-    auto ping = std::make_shared<Ping>();
-    PingSettings& s = request.settings;
-    if (request.model->profile.starts_with("oculus")) s.range_bin_count = std::min(s.range_bin_count, 4);
-    const auto beams = static_cast<std::size_t>(s.beam_count), rows = static_cast<std::size_t>(s.range_bin_count);
-    ping->samples.resize(beams * rows * static_cast<std::size_t>(s.format.bits) / 8);
-    for (std::size_t b = 0; b < beams; ++b)
-      ping->beam_azimuth_rad.push_back(0.5f - static_cast<float>(b) / static_cast<float>(beams));
-    if (s.format.row_gains) ping->row_gain.assign(rows, 1);
-    ping->request = std::move(request);
-    return ping;
-  }
-
-  ConnectionId last_id = 0;
-  std::uint32_t last_index = 0;
-};
-
-std::string yaml_of(const std::string& sonars) {
-  return "world: {scene: empty.yaml}\nclock: stepped\nvehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, "
-         "-3]}}\nsonars:\n" +
-         sonars;
-}
-std::string oculus(const std::string& name, const std::string& address, const std::string& more = {}) {
-  return "  - name: " + name + "\n    profile: oculus-m1200d\n    bind_ip: " + address + "\n" + more;
-}
-const std::string head = "  - name: head\n    profile: blueview-p900-90\n    bind_ip: 127.0.0.3\n";
-
-protocol::Bytes fire(oculus::PingRate rate = oculus::PingRate::hz10) {
-  sonar::oculus::FireRequest request = sonar::oculus::stored_fire();
-  request.settings.ping_rate = rate;
-  request.settings.range = 10;
-  return sonar::oculus::make_fire(request);
-}
-
-std::vector<std::uint32_t> ping_numbers(const protocol::Bytes& received) {
-  sonar::oculus::Decoder decoder;
-  decoder.append(received);
-  std::vector<std::uint32_t> numbers;
-  while (const auto message = decoder.next())
-    if (const auto* ping = std::get_if<sonar::oculus::DecodedPing>(&*message)) numbers.push_back(ping->head.fixed.ping_id);
-  EXPECT_EQ(decoder.skipped_bytes(), 0u);
-  EXPECT_EQ(decoder.buffered_bytes(), 0u);
-  return numbers;
-}
-
 TEST(SonarInVirtualTime, TwoSonarsThreeClientsASlowReaderAReloadAndAThousandPings) {
-  VirtualTime time(yaml_of(oculus("front", "127.0.0.2", "    clients: {max: 2}\n") + head));
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 2}\n") + head));
   const ConnectionId quick = time.connect("front"), slow = time.connect("front"), host = time.connect("head");
   time.clients[slow].reads = false;
   time.send(quick, fire(oculus::PingRate::hz40));
@@ -205,7 +36,7 @@ TEST(SonarInVirtualTime, TwoSonarsThreeClientsASlowReaderAReloadAndAThousandPing
 
   time.run(std::chrono::seconds(15));
   const std::uint64_t before = time.pings;
-  time.reload(yaml_of(oculus("front", "127.0.0.2", "    clients: {max: 2}\n    mount: {frame: FLU, xyz_m: [1, 0, 0]}\n")));
+  time.reload(yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 2}\n    mount: {frame: FLU, xyz_m: [1, 0, 0]}\n")));
   EXPECT_TRUE(time.clients[host].closed);
   EXPECT_EQ(time.clients[host].why, "the configuration changed");
   EXPECT_FALSE(time.clients[quick].closed) << "a sonar that only moved keeps its clients";
@@ -226,8 +57,9 @@ TEST(SonarInVirtualTime, TwoSonarsThreeClientsASlowReaderAReloadAndAThousandPing
 }
 
 TEST(SonarInVirtualTime, AFullSonarTurnsAwayQueuesOrIsTakenOver) {
-  VirtualTime time(yaml_of(oculus("close", "127.0.0.2") + oculus("queue", "127.0.0.3", "    clients: {when_full: queue}\n") +
-                           oculus("take", "127.0.0.4", "    clients: {when_full: take_over}\n")));
+  VirtualTime time(yaml_of(oculus_sonar("close", "127.0.0.2") +
+                           oculus_sonar("queue", "127.0.0.3", "    clients: {when_full: queue}\n") +
+                           oculus_sonar("take", "127.0.0.4", "    clients: {when_full: take_over}\n")));
   const ConnectionId first = time.connect("close"), refused = time.connect("close");
   EXPECT_TRUE(time.clients[first].served);
   EXPECT_TRUE(time.clients[refused].closed);
@@ -247,7 +79,7 @@ TEST(SonarInVirtualTime, AFullSonarTurnsAwayQueuesOrIsTakenOver) {
 }
 
 TEST(SonarInVirtualTime, ObserversReceiveThePingsOfClientsAndChangeNothing) {
-  VirtualTime time(yaml_of(oculus("front", "127.0.0.2")));
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   const ConnectionId observer = time.connect("front", Role::observer);
   time.send(observer, fire());
   time.run(milliseconds(500));
@@ -261,7 +93,7 @@ TEST(SonarInVirtualTime, ObserversReceiveThePingsOfClientsAndChangeNothing) {
 }
 
 TEST(SonarInVirtualTime, APingWhoseClientLeftIsUnwanted) {
-  VirtualTime time(yaml_of(oculus("front", "127.0.0.2")));
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   Sonar& sonar = time.sonar("front");
   const ConnectionId client = time.connect("front");
   Actions actions = sonar.on_bytes(client, fire(), time.now);
@@ -282,7 +114,7 @@ TEST(SonarInVirtualTime, APingWhoseClientLeftIsUnwanted) {
 
 TEST(SonarInVirtualTime, ReceiversAreTheDevicesOwnAndThoseOfItsClients) {
   using testing_daemon::made_up_vendor;
-  VirtualTime time(yaml_of(oculus("front", "127.0.0.2", "    clients: {max: 2}\n")));
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 2}\n")));
   SonarConfig config = time.config.sonars[0];
   config.profile = {&made_up_vendor(), made_up_vendor().models().front()};
   Sonar sonar({time.config, time.world}, config, 0, start);
@@ -326,7 +158,7 @@ class FaultyDatagrams final : public protocol::DelegatingVendor {
 };
 
 TEST(SonarInVirtualTime, AnExceptionInThePingsOfAStreamCostsThatPing) {
-  VirtualTime time(yaml_of(oculus("front", "127.0.0.2")));
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   const FaultyDatagrams vendor(testing_daemon::made_up_vendor());
   SonarConfig config = time.config.sonars[0];
   config.profile = {&vendor, vendor.models().front()};
@@ -346,9 +178,9 @@ TEST(SonarInVirtualTime, AnExceptionInThePingsOfAStreamCostsThatPing) {
   const Actions faulty = ping();
   ASSERT_TRUE(std::holds_alternative<Report>(faulty.front()));
   EXPECT_EQ(std::get<Report>(faulty.front()).line.phrase, "internal fault: no such luck");
-  EXPECT_FALSE(sonar.next_message(10));
+  EXPECT_FALSE(sonar.next_message(10, start));
   ping();
-  EXPECT_TRUE(sonar.next_message(10)) << "the stream goes on";
+  EXPECT_TRUE(sonar.next_message(10, start)) << "the stream goes on";
   sonar.on_not_sent(10);
   const DeviceFigures f = sonar.figures();
   EXPECT_EQ(f.offered, 1u);
@@ -377,7 +209,7 @@ class FaultyVendor final : public protocol::DelegatingVendor {
 };
 
 TEST(SonarInVirtualTime, AnExceptionEndsTheConnectionItHappensIn) {
-  VirtualTime time(yaml_of(oculus("front", "127.0.0.2", "    clients: {max: 3}\n")));
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 3}\n")));
   const FaultyVendor vendor(*time.config.sonars[0].profile.vendor);
   SonarConfig config = time.config.sonars[0];
   config.profile.vendor = &vendor;

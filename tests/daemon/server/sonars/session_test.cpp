@@ -35,10 +35,10 @@ struct Parent final : SessionParent {
   void on_over(ConnectionId, const std::string& reason) override { why = reason; }
 };
 
-Outbox::Message shaped(const std::string& text, Shape shape) {
+Outbox::Message shaped(const std::string& text, Outbox::Shape shape) {
   Outbox::Message message;
   message.bytes = std::make_shared<const Outbox::Bytes>(bytes_of(text));
-  message.shape = std::make_shared<const Shape>(std::move(shape));
+  message.shape = std::make_shared<const Outbox::Shape>(std::move(shape));
   return message;
 }
 
@@ -125,7 +125,7 @@ TEST_F(SessionShapes, AFinishEndsThePause) {
 }
 
 TEST_F(SessionShapes, FinComesAfterTheLastByteAndNothingElse) {
-  start({shaped("abc", {{}, Shape::End::fin}), shaped("never", {})});
+  start({shaped("abc", {{}, Outbox::Shape::End::fin}), shaped("never", {})});
   EXPECT_EQ(joined(read_until_end_or(100)), "abc");
   EXPECT_TRUE(client.ended);
   EXPECT_FALSE(client.was_reset);
@@ -138,7 +138,7 @@ TEST_F(SessionShapes, FinComesAfterTheLastByteAndNothingElse) {
 
 TEST_F(SessionShapes, ResetComesAfterTheLastByte) {
   const std::string large(3u << 20, 'x');  // more than the kernels hold
-  start({shaped(large, {{{1, milliseconds(50)}}, Shape::End::reset}), shaped("never", {})});
+  start({shaped(large, {{{1, milliseconds(50)}}, Outbox::Shape::End::reset}), shaped("never", {})});
   EXPECT_EQ(joined(read_until_end_or(large.size() + 1)).size(), large.size());
   EXPECT_TRUE(client.was_reset);
   EXPECT_EQ(parent.written, 1);
@@ -146,7 +146,7 @@ TEST_F(SessionShapes, ResetComesAfterTheLastByte) {
 }
 
 TEST_F(SessionShapes, AnEmptyMessageEndsAtABoundary) {
-  start({shaped("abc", {}), shaped("", {{}, Shape::End::reset})});
+  start({shaped("abc", {}), shaped("", {{}, Outbox::Shape::End::reset})});
   EXPECT_EQ(joined(read_until_end_or(100)), "abc");
   EXPECT_TRUE(client.was_reset);
   EXPECT_EQ(parent.written, 2);

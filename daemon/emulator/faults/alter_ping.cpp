@@ -1,0 +1,113 @@
+#include "daemon/emulator/faults/alter_ping.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonar {
+namespace {
+
+/// The samples as codes, [rows][beams].
+class Image {
+ public:
+  explicit Image(Ping& ping)
+      : ping_(ping),
+        width_(static_cast<std::size_t>(ping.request.settings.format.bits) / 8),
+        beams_(ping.beam_azimuth_rad.size()),
+        rows_(beams_ == 0 ? 0 : ping.samples.size() / (width_ * beams_)) {}
+
+  std::size_t rows() const { return rows_; }
+  std::size_t beams() const { return beams_; }
+  std::uint32_t full() const { return ping_.request.settings.format.max_code; }
+  std::uint32_t get(std::size_t row, std::size_t beam) const {
+    std::uint32_t code = 0;
+    const std::size_t at = (row * beams_ + beam) * width_;
+    for (std::size_t i = 0; i < width_; ++i) code |= std::to_integer<std::uint32_t>(ping_.samples[at + i]) << (8 * i);
+    return code;
+  }
+  void set(std::size_t row, std::size_t beam, std::uint32_t code) {
+    const std::size_t at = (row * beams_ + beam) * width_;
+    for (std::size_t i = 0; i < width_; ++i) ping_.samples[at + i] = static_cast<std::byte>(code >> (8 * i));
+  }
+  template <class Code>
+  void fill(Code code) {
+    for (std::size_t row = 0; row < rows_; ++row)
+      for (std::size_t beam = 0; beam < beams_; ++beam) set(row, beam, code(row, beam));
+  }
+
+ private:
+  Ping& ping_;
+  std::size_t width_, beams_, rows_;
+};
+
+std::uint32_t scaled(std::uint32_t code, double factor, std::uint32_t most) {
+  return static_cast<std::uint32_t>(std::clamp(static_cast<double>(code) * factor, 0.0, static_cast<double>(most)));
+}
+
+}  // namespace
+
+void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, std::uint64_t begun, Ping& ping) {
+  Image image(ping);
+  const std::size_t from = static_cast<std::size_t>(fault.number("fraction") * static_cast<double>(image.rows()));
+  const double share = fault.number("share");
+  // The same beams in every ping: draws of the fault, not of the ping.
+  FaultDraws of_fault = draws;
+  of_fault.ping = 0;
+  const auto chosen_beam = [&](std::size_t beam) {
+    return share >= 1 || of_fault.uniform(static_cast<std::uint32_t>(beam)) < share;
+  };
+  const auto draw = [&](std::size_t row, std::size_t beam) {
+    return draws.bits(static_cast<std::uint32_t>(row * image.beams() + beam));
+  };
+  using E = FaultEffect;
+  switch (fault.kind->effect) {
+    case E::stuck:
+      if (kept == nullptr || kept->samples.size() != ping.samples.size()) return;
+      ping.samples = kept->samples;
+      ping.row_gain = kept->row_gain;
+      return;
+    case E::intermittent: {
+      const auto on = static_cast<std::uint64_t>(fault.number("on")), off = static_cast<std::uint64_t>(fault.number("off"));
+      if (begun % (on + off) < off) std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
+      return;
+    }
+    case E::blank:
+      return std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
+    case E::saturate:
+      return image.fill([&](std::size_t row, std::size_t beam) {
+        return uniform_open(draw(row, beam)) < static_cast<float>(share) ? image.full() : image.get(row, beam);
+      });
+    case E::noise:
+      return image.fill([&](std::size_t row, std::size_t beam) {
+        return static_cast<std::uint32_t>(draw(row, beam) % (std::uint64_t{image.full()} + 1));
+      });
+    case E::dead_beams:
+      return image.fill([&](std::size_t row, std::size_t beam) { return chosen_beam(beam) ? 0 : image.get(row, beam); });
+    case E::spokes:
+      return image.fill([&](std::size_t row, std::size_t beam) {
+        return draws.uniform(static_cast<std::uint32_t>(beam)) < share ? image.full() : image.get(row, beam);
+      });
+    case E::gain_step:
+      return image.fill([&](std::size_t row, std::size_t beam) {
+        return row < from ? image.get(row, beam) : scaled(image.get(row, beam), fault.number("factor"), image.full());
+      });
+    case E::missing_rows:
+      return image.fill([&](std::size_t row, std::size_t beam) { return row < from ? image.get(row, beam) : 0; });
+    case E::mirror: {
+      Ping before = ping;
+      const Image old(before);
+      return image.fill([&](std::size_t row, std::size_t beam) { return old.get(row, image.beams() - 1 - beam); });
+    }
+    case E::scale_range: {
+      Ping before = ping;
+      const Image old(before);
+      return image.fill([&](std::size_t row, std::size_t beam) {
+        const auto source = static_cast<std::size_t>((static_cast<double>(row) + 0.5) / fault.number("factor"));
+        return source < old.rows() ? old.get(source, beam) : 0;
+      });
+    }
+    default:
+      return;
+  }
+}
+
+}  // namespace sonar

@@ -1,0 +1,13 @@
+// What faults of the stage payload do to the samples of a ping. Pure functions.
+#pragma once
+
+#include "core/sonar/ping.hpp"
+#include "daemon/emulator/faults/draws.hpp"
+#include "daemon/emulator/faults/fault.hpp"
+
+namespace sonar {
+
+/// `kept`: the ping that `stuck` repeats, or null. `begun`: pings since the fault began, 0 for the first.
+void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, std::uint64_t begun, Ping& ping);
+
+}  // namespace sonar

@@ -1,0 +1,86 @@
+// A fault: one way in which an emulated sonar misbehaves on purpose, when, for how long and towards whom. FaultRecord is what a
+// user writes (configuration, HTTP, control stream, sonarctl, Python); check_fault() turns it into a Fault or says what is wrong.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/text/ipv4.hpp"
+#include "daemon/emulator/faults/kinds.hpp"
+
+namespace sonar {
+
+/// What a fault waits for.
+enum class Occasion { connect, config, status, disconnect };
+inline constexpr std::array<std::string_view, 4> occasion_names = {"connect", "config", "status", "disconnect"};
+
+struct FaultRecord {
+  std::string name;  // unique among the faults of the daemon; empty = made from `what`
+  std::string what;  // code or name of a kind, or of a trouble: "L05", "silent-open", "power-cycle"
+  std::map<std::string, std::string> with;
+  std::string sonar;   // empty = all
+  std::string client;  // "" or all, newest, oldest, an ordinal counted from 1, an address, a prefix 10.0.0.0/8
+  struct At {          // one of them; none = at once
+    std::optional<std::uint64_t> ping, every;
+    std::uint64_t phase = 0;  // of every
+    std::optional<double> time_s, probability;
+    std::string on;  // an Occasion
+    bool operator==(const At&) const = default;
+  } at;
+  struct For {  // each optional; see Span
+    std::optional<double> seconds;
+    std::optional<std::uint64_t> pings, count;
+    bool operator==(const For&) const = default;
+  } lasts;
+  bool operator==(const FaultRecord&) const = default;
+};
+
+/// How long a fault acts each time it begins, and how often it begins.
+struct Span {
+  std::chrono::nanoseconds time{0};  // 0 = not limited by time
+  std::uint64_t pings = 0;           // 0 = not limited by pings
+  std::uint64_t count = 0;           // 0 = as often as its trigger says
+};
+
+/// Which clients of a sonar.
+struct ClientChoice {
+  enum class Kind { all, newest, oldest, number, prefix } kind = Kind::all;
+  std::uint64_t number = 0;
+  text::Ipv4 address{};
+  int prefix_bits = 32;
+};
+
+/// A record that has been checked: of one kind, all parameters present.
+struct Fault {
+  std::string name, what;  // as the user wrote it
+  const FaultKind* kind = nullptr;
+  std::map<std::string, double> numbers;
+  std::map<std::string, std::string> words;
+  std::string sonar;
+  ClientChoice client;
+  FaultRecord::At at;
+  std::optional<Occasion> on;
+  Span span;
+
+  double number(const std::string& parameter) const;
+  const std::string& word(const std::string& parameter) const;
+  /// "bytes 16, fill zero": as the journal shows them.
+  std::map<std::string, std::string> used() const;
+};
+
+inline constexpr std::chrono::seconds longest_manual_fault{600};
+inline constexpr std::size_t most_faults = 256;
+
+/// The faults that a record stands for: one, or the several of a trouble, their names then NAME.1, NAME.2, ... Errors (usage)
+/// name the record, the wrong part and what is possible. `manual`: given to a running daemon; it gets an end.
+Result<std::vector<Fault>> check_fault(const FaultRecord& record, bool manual);
+/// Two faults that would write the same part of the same message: a sentence, or empty.
+std::string conflict_of(const Fault& a, const Fault& b);
+
+}  // namespace sonar

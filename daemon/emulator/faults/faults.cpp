@@ -1,0 +1,440 @@
+// When faults begin and end, and what that means for the device.
+#include "daemon/emulator/faults/faults.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/emulator/faults/draws.hpp"
+
+namespace sonar {
+namespace {
+
+using std::chrono::nanoseconds;
+
+constexpr std::size_t most_hits = 64;  // pings remembered: more than an outbox holds
+constexpr std::size_t most_over = 64;  // faults listed after their end
+constexpr std::size_t most_late_requests = 64;
+
+nanoseconds from_seconds(double seconds) { return nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9))); }
+
+/// FNV-1a, so that a fault draws the same numbers in every run.
+std::uint32_t key_of_name(const std::string& name) {
+  std::uint32_t hash = 2166136261u;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619u;
+  return hash;
+}
+
+nanoseconds length_of_power_cycle(const Fault& fault) {
+  return from_seconds(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
+}
+
+protocol::SettingsOverride override_of(const Fault& fault) {
+  protocol::SettingsOverride wanted;
+  const std::string& what = fault.word("what");
+  const double value = fault.number("value");
+  if (what == "sample-bits") wanted.sample_bits = static_cast<std::uint32_t>(value);
+  if (what == "row-gains") wanted.row_gains = true;
+  if (what == "beams") wanted.beams = static_cast<std::uint32_t>(value);
+  if (what == "range") wanted.range_m = value;
+  if (what == "mode") wanted.mode = static_cast<std::uint32_t>(value);
+  if (what == "rate") wanted.rate_hz = value;
+  if (what == "largest") wanted.beams = 512, wanted.sample_bits = 32;
+  return wanted;
+}
+
+}  // namespace
+
+// ---- the list
+
+void Faults::add(Fault fault, bool manual, Time now) {
+  const auto place =
+      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.fault.kind->stage > fault.kind->stage; });
+  Entry& entry = *entries_.emplace(place);
+  entry.key = key_of_name(fault.name);
+  entry.fault = std::move(fault);
+  entry.manual = manual;
+  if (manual) entry.expires = now + longest_manual_fault;
+  const FaultRecord::At& at = entry.fault.at;
+  const bool waits = at.ping || at.every || at.time_s || at.probability || entry.fault.on;
+  if (!waits && !entry.fault.kind->per_ping()) begin(entry, now);
+  if (!waits && (entry.fault.kind->effect == Effect::power_cycle || entry.fault.kind->effect == Effect::forget_settings ||
+                 entry.fault.kind->effect == Effect::clock_restart))
+    begin(entry, now);
+}
+
+bool Faults::remove(const std::string& name, Time now) {
+  bool found = false;
+  for (Entry& e : entries_) {
+    // The parts of a trouble are NAME.1, NAME.2, ...
+    if (e.over || (e.fault.name != name && !e.fault.name.starts_with(name + "."))) continue;
+    found = true;
+    finish(e, now);
+  }
+  return found;
+}
+
+void Faults::clear(Time now) {
+  for (Entry& e : entries_) finish(e, now);
+}
+
+/// It meets no more pings, those that wait in outboxes neither.
+void Faults::finish(Entry& e, Time now) {
+  end(e, now);
+  e.over = true;
+  e.hits.clear();
+  if (e.fault.kind->effect == Effect::swap) orders_.emplace_back(ReleaseHeld{});
+}
+
+std::vector<Faults::Listed> Faults::list() const {
+  std::vector<Listed> all;
+  for (const Entry& e : entries_)
+    all.push_back({&e.fault, e.active, e.over, e.injections, e.active ? std::min(e.until, e.expires) : e.expires});
+  return all;
+}
+
+bool Faults::any(Effect effect) const {
+  return std::any_of(entries_.begin(), entries_.end(),
+                     [&](const Entry& e) { return e.active && e.fault.kind->effect == effect; });
+}
+Faults::Entry* Faults::active(Effect effect) {
+  for (Entry& e : entries_)
+    if (e.active && e.fault.kind->effect == effect) return &e;
+  return nullptr;
+}
+
+// ---- triggers
+
+bool Faults::fires(const Entry& e, std::uint32_t ping) const {
+  const FaultRecord::At& at = e.fault.at;
+  if (at.ping) return e.begun == 0 && ping >= *at.ping;
+  if (at.every) return ping % *at.every == at.phase % *at.every;
+  if (at.probability) return FaultDraws{around_.seed, e.key, around_.index, ping, 0}.uniform(~std::uint32_t{0}) < *at.probability;
+  return !at.time_s && !e.fault.on && e.begun == 0;  // at once
+}
+
+void Faults::begin(Entry& e, Time now) {
+  if (e.active || e.over) return;
+  e.active = true;
+  ++e.begun;
+  e.since = now;
+  e.until = e.fault.span.time.count() > 0 ? now + e.fault.span.time : Time::max();
+  e.pings_left = e.fault.span.pings;
+  e.first_number.reset();
+  e.kept = nullptr;
+  e.kept_time.reset();
+  note(e, FaultEntry::What::began, now);
+  begin_effect(e, now);
+}
+
+void Faults::end(Entry& e, Time now) {
+  if (!e.active) return;
+  e.active = false;
+  e.until = e.step = Time::max();
+  end_effect(e);
+  note(e, FaultEntry::What::ended, now);
+  if (e.fault.span.count != 0 && e.begun >= e.fault.span.count) e.over = true;
+}
+
+void Faults::begin_effect(Entry& e, Time now) {
+  switch (e.fault.kind->effect) {
+    case Effect::close_ports:
+      orders_.emplace_back(SetListening{false});
+      if (e.fault.word("close-existing") == "yes") orders_.emplace_back(EndClients{});
+      return;
+    case Effect::power_cycle:
+      e.until = now + length_of_power_cycle(e.fault);
+      orders_.emplace_back(SetListening{false});
+      orders_.emplace_back(EndClients{e.fault.word("how") == "reset"});
+      orders_.emplace_back(RestartDevice{});
+      if (const double gap = e.fault.number("gap-s"); gap < 0)
+        e.step = now + std::max(nanoseconds(0), from_seconds(e.fault.number("boot-s") + gap));
+      return;
+    case Effect::flap:
+      e.down = false;
+      e.step = now;
+      return step(e, now);
+    case Effect::change_settings:
+      orders_.emplace_back(OverrideSettings{override_of(e.fault)});
+      return;
+    case Effect::forget_settings:
+      orders_.emplace_back(ForgetSettings{});
+      return;
+    case Effect::clock_restart:
+      orders_.emplace_back(RestartDevice{true});
+      return;
+    case Effect::change_rate:
+    case Effect::heat:
+      orders_.emplace_back(ChangePace{});
+      return;
+    case Effect::stop_reading:
+      orders_.emplace_back(ReadClients{false});
+      return;
+    case Effect::outbox_policy:
+      orders_.emplace_back(DropNewestPings{true});
+      return;
+    default:
+      return;
+  }
+}
+
+/// The device is as it would be without this fault.
+void Faults::end_effect(Entry& e) {
+  switch (e.fault.kind->effect) {
+    case Effect::close_ports:
+    case Effect::power_cycle:
+    case Effect::flap:
+      if (!any(Effect::close_ports) && !any(Effect::power_cycle)) orders_.emplace_back(SetListening{true});
+      return;
+    case Effect::change_rate:
+    case Effect::heat:
+      orders_.emplace_back(ChangePace{});
+      return;
+    case Effect::stop_reading:
+      orders_.emplace_back(ReadClients{true});
+      return;
+    case Effect::outbox_policy:
+      orders_.emplace_back(DropNewestPings{false});
+      return;
+    case Effect::leave_waiting:
+      orders_.emplace_back(ServeWaiting{});
+      return;
+    case Effect::delay_requests:
+      for (auto& [at, request] : e.late) orders_.emplace_back(std::move(request));
+      e.late.clear();
+      return;
+    case Effect::end_after:
+      e.ends.clear();
+      return;
+    case Effect::burst:
+    case Effect::delay:
+    case Effect::jitter:
+    case Effect::coalesce:
+      orders_.emplace_back(ReleaseHeld{});
+      return;
+    default:
+      return;
+  }
+}
+
+// ---- time
+
+void Faults::on_tick(Time now) {
+  for (Entry& e : entries_) {
+    const auto& at = e.fault.at;
+    if (!e.over && !e.active && at.time_s && e.begun == 0 && now - start_ >= from_seconds(*at.time_s)) begin(e, now);
+    if (e.active && e.step <= now) step(e, now);
+    while (!e.late.empty() && e.late.front().first <= now) {
+      orders_.emplace_back(std::move(e.late.front().second));
+      e.late.erase(e.late.begin());
+    }
+    while (!e.ends.empty() && e.ends.front().first <= now) {
+      orders_.emplace_back(EndClients{e.fault.word("how") == "reset", e.ends.front().second});
+      note(e, FaultEntry::What::injected, now);
+      e.ends.erase(e.ends.begin());
+    }
+    if (e.active && e.until <= now) end(e, now);
+    if (!e.over && e.expires <= now) finish(e, now);
+  }
+  std::size_t over =
+      static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.over; }));
+  for (auto it = entries_.begin(); it != entries_.end() && over > most_over;) {
+    const auto one = it++;
+    if (!one->over) continue;
+    entries_.erase(one);
+    --over;
+  }
+}
+
+std::optional<Time> Faults::next_tick() const {
+  Time next = Time::max();
+  for (const Entry& e : entries_) {
+    if (e.over) continue;
+    next = std::min(next, e.expires);
+    if (e.active) next = std::min({next, e.until, e.step});
+    if (!e.late.empty()) next = std::min(next, e.late.front().first);
+    if (!e.ends.empty()) next = std::min(next, e.ends.front().first);
+    if (!e.active && e.begun == 0 && e.fault.at.time_s) next = std::min(next, start_ + from_seconds(*e.fault.at.time_s));
+  }
+  return next == Time::max() ? std::nullopt : std::optional(next);
+}
+
+void Faults::on(Occasion occasion, Time now) {
+  for (Entry& e : entries_)
+    if (e.fault.on == occasion && (e.fault.span.count == 0 || e.begun < e.fault.span.count)) begin(e, now);
+}
+
+void Faults::step(Entry& e, Time now) {
+  if (e.fault.kind->effect == Effect::power_cycle) {  // TCP before the first status message
+    orders_.emplace_back(SetListening{true});
+    e.step = Time::max();
+    return;
+  }
+  e.down = !e.down;
+  orders_.emplace_back(SetListening{!e.down});
+  if (e.down) orders_.emplace_back(EndClients{true});
+  if (e.down) note(e, FaultEntry::What::injected, now);
+  e.step = now + from_seconds(e.fault.number(e.down ? "down-s" : "up-s"));
+}
+
+// ---- pings
+
+void Faults::begin_ping(std::uint32_t number, Time now) {
+  if (entries_.empty()) return;
+  on_tick(now);
+  for (Entry& e : entries_) {
+    const bool may_begin = !e.over && !e.active && (e.fault.span.count == 0 || e.begun < e.fault.span.count);
+    if (may_begin && fires(e, number)) begin(e, now);
+    if (!e.active) continue;
+    e.hits.push_back(number);
+    if (e.hits.size() > most_hits) e.hits.pop_front();
+    if (!e.first_number) e.first_number = number;
+    count_ping(e, now);
+  }
+}
+
+/// Status faults count status messages.
+void Faults::count_ping(Entry& e, Time now) {
+  if (e.fault.span.pings == 0 || e.fault.kind->stage == FaultStage::status || --e.pings_left > 0) return;
+  if (e.fault.kind->effect != Effect::power_cycle) end(e, now);
+}
+
+bool Faults::met(const Entry& e, std::uint32_t ping) const {
+  return std::find(e.hits.begin(), e.hits.end(), ping) != e.hits.end();
+}
+
+double Faults::rate_factor() const {
+  double factor = 1;
+  for (const Entry& e : entries_)
+    if (e.active && (e.fault.kind->effect == Effect::change_rate || e.fault.kind->effect == Effect::heat))
+      factor *= e.fault.number("factor");
+  return factor;
+}
+
+bool Faults::leaves_group() const { return any(Effect::leave_group); }
+
+Faults::Hold Faults::hold(const Connection& to, std::uint32_t ping, Time now) {
+  for (Entry& e : entries_) {
+    if (!met(e, ping) || !chosen(e.fault, to)) continue;
+    const FaultDraws draws{around_.seed, e.key, around_.index, ping, static_cast<std::uint32_t>(to.number)};
+    const auto late = [&](double ms) { return Hold{Hold::Kind::until, now + from_seconds(ms * 1e-3), 0}; };
+    Hold hold;
+    switch (e.fault.kind->effect) {
+      case Effect::burst:
+        hold = {Hold::Kind::until, e.until, 0};
+        break;
+      case Effect::delay:
+        hold = late(e.fault.number("ms") + draws.uniform(0) * e.fault.number("jitter-ms"));
+        break;
+      case Effect::jitter:
+        hold = late(draws.uniform(0) * e.fault.number("ms"));
+        break;
+      case Effect::swap:
+        hold = {Hold::Kind::after_next, {}, 0};
+        break;
+      case Effect::coalesce:
+        hold = {Hold::Kind::collect, {}, static_cast<std::size_t>(e.fault.number("pings"))};
+        break;
+      default:
+        continue;
+    }
+    FaultEntry more;
+    more.client = to.peer.name;
+    more.client_number = to.number;
+    more.ping = ping;
+    note(e, FaultEntry::What::injected, now, std::move(more));
+    return hold;
+  }
+  return {};
+}
+
+// ---- clients
+
+bool Faults::chosen(const Fault& fault, const Connection& client) const {
+  if (client.role == Role::observer) return false;
+  using Kind = ClientChoice::Kind;
+  const ClientChoice& choice = fault.client;
+  if (choice.kind == Kind::all || client.role == Role::stream) return true;
+  if (choice.kind == Kind::number) return client.number == choice.number;
+  if (choice.kind == Kind::prefix) {
+    const std::uint32_t mask = choice.prefix_bits == 0 ? 0 : ~std::uint32_t{0} << (32 - choice.prefix_bits);
+    return ((text::number_from_ipv4(client.peer.ip) ^ text::number_from_ipv4(choice.address)) & mask) == 0;
+  }
+  return std::none_of(around_.connections.all().begin(), around_.connections.all().end(), [&](const Connection& other) {
+    const bool counts = other.role == Role::client && other.state == Connection::State::served;
+    return counts && (choice.kind == Kind::newest ? other.number > client.number : other.number < client.number);
+  });
+}
+
+Faults::Admission Faults::admission() const {
+  for (const Entry& e : entries_) {
+    if (!e.active) continue;
+    if (e.fault.kind->effect == Effect::leave_waiting) return Admission::wait;
+    if (e.fault.kind->effect == Effect::take_over) return Admission::take_over;
+    if (e.fault.kind->effect == Effect::turn_away)
+      return e.fault.word("how") == "reset" ? Admission::reset : Admission::turn_away;
+  }
+  return Admission::as_configured;
+}
+
+void Faults::on_served(const Connection& client, Time now) {
+  if (entries_.empty()) return;
+  on(Occasion::connect, now);
+  for (Entry& e : entries_)
+    if (e.active && e.fault.kind->effect == Effect::end_after)
+      e.ends.emplace_back(now + from_seconds(e.fault.number("seconds")), client.id);
+  if (any(Effect::stop_reading)) orders_.emplace_back(ReadClients{false});
+  if (any(Effect::outbox_policy)) orders_.emplace_back(DropNewestPings{true});
+}
+
+Faults::Request Faults::on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
+                                   Time now) {
+  on(Occasion::config, now);
+  for (Entry& e : entries_) {
+    if (!e.active) continue;
+    FaultEntry more;
+    more.client = who;
+    switch (e.fault.kind->effect) {
+      case Effect::ignore_requests:
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        return Request::ignore;
+      case Effect::delay_requests:
+        if (e.late.size() < most_late_requests)
+          e.late.emplace_back(now + from_seconds(e.fault.number("seconds")), ApplyRequest{change, who});
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        return Request::ignore;
+      case Effect::clamp_requests: {
+        if (change.settings.range_m <= e.fault.number("range-m")) break;
+        protocol::DeviceState with = state;
+        with.settings = change.vendor_settings;
+        protocol::SettingsOverride limit;
+        limit.range_m = e.fault.number("range-m");
+        auto limited = around_.vendor.apply_override(limit, with);
+        if (!limited) break;
+        change = *std::move(limited);
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        break;
+      }
+      case Effect::end_on_request:
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        return e.fault.word("how") == "reset" ? Request::reset : Request::end;
+      default:
+        break;
+    }
+  }
+  return Request::apply;
+}
+
+void Faults::note(Entry& e, FaultEntry::What what, Time now, FaultEntry more) {
+  if (what == FaultEntry::What::injected) ++e.injections;
+  if (around_.journal == nullptr) return;
+  more.what = what;
+  more.fault = e.fault.name;
+  more.asked = e.fault.what;
+  more.kind = e.fault.kind;
+  more.sonar = around_.sonar;
+  more.with = e.fault.used();
+  more.at = now;
+  around_.journal->write(more);
+}
+
+}  // namespace sonar

@@ -1,0 +1,161 @@
+// The faults of one emulated sonar. The Sonar calls it at every place where a fault may act; with no fault each call is a look at
+// an empty list. No sockets, no clock: what has to be done to ports and connections comes back as orders. Everything random is
+// drawn from (seed, fault, sonar, ping, client), so the same plan gives the same bytes.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/sonar/ping.hpp"
+#include "daemon/emulator/faults/fault.hpp"
+#include "daemon/emulator/faults/journal.hpp"
+#include "daemon/emulator/sonar/connections.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+/// What a fault has the sonar do, at once.
+struct SetListening {
+  bool on = true;
+};
+struct EndClients {
+  bool reset = false;
+  std::optional<ConnectionId> only = {};
+};
+struct ForgetSettings {};
+struct RestartDevice {
+  bool clock_only = false;
+};
+struct OverrideSettings {
+  protocol::SettingsOverride wanted;
+};
+struct ApplyRequest {  // of a client, late
+  protocol::ChangeSettings change;
+  std::string who;
+};
+struct ChangePace {};  // rate_factor() is another
+struct ReadClients {
+  bool on = true;
+};
+struct DropNewestPings {  // for clients that read slowly
+  bool on = true;
+};
+struct ReleaseHeld {};
+struct ServeWaiting {};
+using FaultOrder = std::variant<SetListening, EndClients, ForgetSettings, RestartDevice, OverrideSettings, ApplyRequest,
+                                ChangePace, ReadClients, DropNewestPings, ReleaseHeld, ServeWaiting>;
+
+class Faults {
+ public:
+  /// All outlive it. `index` and `seed` key what is random.
+  struct Around {
+    const protocol::Vendor& vendor;
+    const Connections& connections;
+    const std::string& sonar;
+    std::uint32_t index = 0;
+    Seed seed{};
+    FaultJournal* journal = nullptr;
+  };
+  Faults(Around around, Time now) : around_(around), start_(now) {}
+
+  // ---- what there is
+  /// `manual` ones end after longest_manual_fault.
+  void add(Fault fault, bool manual, Time now);
+  /// False: there is none of that name.
+  bool remove(const std::string& name, Time now);
+  void clear(Time now);
+  struct Listed {
+    const Fault* fault;
+    bool active, over;
+    std::uint64_t injections;
+    Time expires;  // Time::max() = with its trigger
+  };
+  std::vector<Listed> list() const;
+  std::vector<FaultOrder> take_orders() { return std::exchange(orders_, {}); }
+
+  // ---- time
+  void on_tick(Time now);
+  std::optional<Time> next_tick() const;
+  bool has_orders() const { return !orders_.empty(); }
+  void on(Occasion occasion, Time now);
+
+  // ---- pings
+  /// Before anything is made of a ping: triggers, and which faults this ping meets.
+  void begin_ping(std::uint32_t number, Time now);
+  /// The ping as the device reports it: its samples and stamps.
+  std::shared_ptr<const Ping> altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state, Time now);
+  void alter_datagrams(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
+  bool leaves_group() const;
+  /// A message that a client is about to be sent. False: it is not sent.
+  bool shape(const Connection& to, Outbox::Message& message, Time now);
+  /// Whether a ping waits before it goes into a client's outbox.
+  struct Hold {
+    enum class Kind { pass, until, after_next, collect } kind = Kind::pass;
+    Time until{};
+    std::size_t collect = 0;
+  };
+  Hold hold(const Connection& to, std::uint32_t ping, Time now);
+  /// Of the rate that holds; 0 = no pings.
+  double rate_factor() const;
+
+  // ---- clients
+  enum class Admission { as_configured, wait, take_over, turn_away, reset };
+  Admission admission() const;
+  void on_served(const Connection& client, Time now);
+  enum class Request { apply, ignore, end, reset };
+  /// A client requested settings. `change` may be limited. `ignore`: the sonar does not apply it (it may come back as an order).
+  Request on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state, Time now);
+
+  // ---- status messages
+  void alter_beacons(std::vector<protocol::Bytes>& beacons, Time now);
+
+ private:
+  struct Entry {
+    Fault fault;
+    bool manual = false;
+    std::uint32_t key = 0;
+    bool active = false, over = false;
+    std::uint64_t begun = 0, injections = 0, pings_left = 0;
+    Time expires = Time::max(), since{}, until = Time::max(), step = Time::max();
+    bool down = false;               // of a port or link that goes up and down
+    std::deque<std::uint32_t> hits;  // pings it meets, the latest few
+    std::optional<std::uint32_t> first_number;
+    std::shared_ptr<const Ping> kept;
+    std::optional<Time> kept_time;
+    protocol::Bytes before;                           // of splice and older_part
+    std::vector<std::pair<Time, ConnectionId>> ends;  // of end_after
+    std::vector<std::pair<Time, ApplyRequest>> late;  // of delay_requests
+  };
+  using Effect = FaultEffect;
+
+  bool any(Effect effect) const;
+  Entry* active(Effect effect);
+  const Entry* active(Effect effect) const { return const_cast<Faults*>(this)->active(effect); }
+  bool met(const Entry& entry, std::uint32_t ping) const;
+  bool chosen(const Fault& fault, const Connection& client) const;
+  bool fires(const Entry& entry, std::uint32_t ping) const;
+  void begin(Entry& entry, Time now);
+  void begin_effect(Entry& entry, Time now);
+  void end(Entry& entry, Time now);
+  void end_effect(Entry& entry);
+  void finish(Entry& entry, Time now);
+  void step(Entry& entry, Time now);
+  void count_ping(Entry& entry, Time now);
+  void note(Entry& entry, FaultEntry::What what, Time now, FaultEntry more = {});
+  void note_message(Entry& entry, const Connection& to, std::uint32_t ping, const protocol::Bytes& before,
+                    const protocol::Bytes& after, Time now, std::optional<std::size_t> place = {});
+  std::uint32_t draw(const Entry& entry, std::uint32_t a, std::uint32_t b, std::uint32_t c) const;
+
+  Around around_;
+  Time start_;
+  std::list<Entry> entries_;  // in the order of stages, then as they were added
+  std::vector<FaultOrder> orders_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,166 @@
+// What faults do to pings, to the messages of clients and to status messages.
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/emulator/faults/alter_message.hpp"
+#include "daemon/emulator/faults/alter_ping.hpp"
+#include "daemon/emulator/faults/draws.hpp"
+#include "daemon/emulator/faults/faults.hpp"
+
+namespace sonar {
+namespace {
+
+using protocol::Bytes;
+
+/// A message as one run of bytes: each prefix with the bytes that all clients share.
+Bytes whole(const Outbox::Message& message) {
+  Bytes all;
+  if (message.prefixes.empty()) return *message.bytes;
+  for (const Bytes& prefix : message.prefixes) {
+    all.insert(all.end(), prefix.begin(), prefix.end());
+    all.insert(all.end(), message.bytes->begin(), message.bytes->end());
+  }
+  return all;
+}
+
+/// The time that a device's 32-bit counter is about to wrap.
+Time before_wrap(const std::string& unit, Time powered_up_at) {
+  constexpr double counts = 4294967296.0, before_s = 2;
+  const double unit_s = unit == "milliseconds" ? 1e-3 : 1e-6;
+  return powered_up_at + std::chrono::nanoseconds(std::llround((counts * unit_s - before_s) * 1e9));
+}
+
+}  // namespace
+
+std::shared_ptr<const Ping> Faults::altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state,
+                                            Time now) {
+  const auto number = static_cast<std::uint32_t>(ping->request.number);
+  std::shared_ptr<Ping> changed;
+  for (Entry& e : entries_) {
+    const FaultStage stage = e.fault.kind->stage;
+    const bool clock = stage == FaultStage::time && e.fault.kind->effect != Effect::clock_restart;
+    if ((stage != FaultStage::payload && !clock) || !met(e, number)) continue;
+    if (!changed) changed = std::make_shared<Ping>(*ping);
+    Time& fired_at = changed->request.fired_at;
+    const std::string& unit = e.fault.word("unit");
+    if (!e.kept_time) e.kept_time = fired_at;
+    if (!e.kept) e.kept = ping;
+    const auto seconds_on = [](double s) { return std::chrono::nanoseconds(std::llround(s * 1e9)); };
+    if (e.fault.kind->effect == Effect::clock_freeze)
+      fired_at = *e.kept_time;
+    else if (e.fault.kind->effect == Effect::clock_drift)
+      fired_at += seconds_on(seconds(fired_at - *e.kept_time) * e.fault.number("ppm") * 1e-6);
+    else if (clock && !unit.empty())
+      fired_at = before_wrap(unit, state.powered_up_at) + (fired_at - *e.kept_time);
+    else if (clock)
+      fired_at += seconds_on(e.fault.number("seconds"));
+    else
+      alter_ping(e.fault, {around_.seed, e.key, around_.index, number, 0}, e.kept.get(), number - e.first_number.value_or(number),
+                 *changed);
+    FaultEntry more;
+    more.ping = number;
+    note(e, FaultEntry::What::injected, now, std::move(more));
+  }
+  return changed ? changed : ping;
+}
+
+bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
+  if (entries_.empty() || to.role == Role::observer) return true;
+  for (Entry& e : entries_) {
+    const bool silent = e.active && (e.fault.kind->effect == Effect::withhold ||
+                                     (e.fault.kind->effect == Effect::withhold_pings && message.ping != 0));
+    if (!silent || !chosen(e.fault, to)) continue;
+    note_message(e, to, message.ping, {}, {}, now, 0);
+    return false;
+  }
+  if (message.ping == 0 || message.bytes == nullptr) return true;
+
+  std::optional<MessageEdit> edit;
+  for (Entry& e : entries_) {
+    const FaultStage stage = e.fault.kind->stage;
+    const bool of_message = stage == FaultStage::framing || stage == FaultStage::stream || stage == FaultStage::link;
+    const bool joins = e.fault.kind->effect == Effect::join_late;
+    const bool splices = e.fault.kind->effect == Effect::splice;
+    if (!of_message || !chosen(e.fault, to)) continue;
+    const Bytes earlier = splices && !e.over ? std::exchange(e.before, whole(message)) : Bytes{};
+    if (!(joins ? e.active : met(e, message.ping)) || (joins && to.outbox.pings_written() > 0)) continue;
+    if (!edit) edit = MessageEdit{whole(message), {}, Outbox::Shape::End::none, false};
+    const Bytes before = edit->bytes;
+    const FaultDraws draws{around_.seed, e.key, around_.index, message.ping, static_cast<std::uint32_t>(to.number)};
+    const Touch touch = alter_message(e.fault, {around_.vendor, draws, e.first_number.value_or(message.ping), &earlier}, *edit);
+    if (touch.acted) note_message(e, to, message.ping, before, edit->bytes, now, touch.place);
+    if (edit->dropped) return false;
+    if (edit->end != Outbox::Shape::End::none) break;  // nothing is sent after it
+  }
+  if (!edit) return true;
+  message.bytes = std::make_shared<const Bytes>(std::move(edit->bytes));
+  message.prefixes.clear();
+  if (!edit->pauses.empty() || edit->end != Outbox::Shape::End::none) {
+    std::sort(edit->pauses.begin(), edit->pauses.end(), [](const auto& a, const auto& b) { return a.before < b.before; });
+    message.shape = std::make_shared<const Outbox::Shape>(Outbox::Shape{std::move(edit->pauses), edit->end});
+  }
+  return true;
+}
+
+void Faults::note_message(Entry& e, const Connection& to, std::uint32_t ping, const Bytes& before, const Bytes& after, Time now,
+                          std::optional<std::size_t> place) {
+  const auto differs = std::mismatch(before.begin(), before.end(), after.begin(), after.end()).first - before.begin();
+  FaultEntry more;
+  more.client = to.peer.name;
+  more.client_number = to.number;
+  more.ping = ping;
+  more.offset = static_cast<std::int64_t>(to.bytes_written + place.value_or(static_cast<std::size_t>(differs)));
+  more.bytes_before = before.size();
+  more.bytes_after = after.size();
+  note(e, FaultEntry::What::injected, now, std::move(more));
+}
+
+void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
+  for (Entry& e : entries_) {
+    if (e.fault.kind->stage != FaultStage::datagrams || datagrams.empty() || (e.over && e.hits.empty())) continue;
+    const bool older = e.fault.kind->effect == Effect::older_part;
+    const Bytes first = datagrams.front();
+    if (met(e, ping)) {
+      const FaultDraws draws{around_.seed, e.key, around_.index, ping, 0};
+      const std::size_t part = draws.below(datagrams.size(), 0);
+      const auto at = datagrams.begin() + static_cast<std::ptrdiff_t>(part);
+      const std::size_t before = datagrams.size();
+      if (e.fault.kind->effect == Effect::lose_part) datagrams.erase(at);
+      if (e.fault.kind->effect == Effect::lose_last_part) datagrams.pop_back();
+      if (e.fault.kind->effect == Effect::repeat_part) datagrams.insert(at, Bytes(*at));
+      if (e.fault.kind->effect == Effect::reorder_parts) std::rotate(datagrams.begin(), datagrams.begin() + 1, datagrams.end());
+      if (older && !e.before.empty()) datagrams.front() = e.before;
+      FaultEntry more;
+      more.client = stream.peer.name;
+      more.ping = ping;
+      more.bytes_before = before;
+      more.bytes_after = datagrams.size();
+      note(e, FaultEntry::What::injected, now, std::move(more));
+    }
+    if (older) e.before = first;
+  }
+}
+
+void Faults::alter_beacons(std::vector<Bytes>& beacons, Time now) {
+  if (entries_.empty() || beacons.empty()) return;
+  on(Occasion::status, now);
+  on_tick(now);
+  const std::size_t size = beacons.front().size();
+  for (Entry& e : entries_) {
+    if (!e.active) continue;
+    const Effect effect = e.fault.kind->effect;
+    const bool off = (effect == Effect::power_cycle && seconds(now - e.since) < e.fault.number("boot-s")) ||
+                     (effect == Effect::withhold && e.fault.word("keep-status") == "no");
+    if (off) beacons.clear();
+    if (e.fault.kind->stage != FaultStage::status && effect != Effect::heat) continue;
+    sonar::alter_beacons(e.fault, around_.vendor,
+                         {around_.seed, e.key, around_.index, static_cast<std::uint32_t>(e.injections), 0}, beacons);
+    FaultEntry more;
+    more.bytes_before = size;
+    more.bytes_after = beacons.empty() ? 0 : beacons.front().size();
+    note(e, FaultEntry::What::injected, now, std::move(more));
+    if (e.fault.span.pings > 0 && effect != Effect::heat && --e.pings_left == 0) end(e, now);
+  }
+}
+
+}  // namespace sonar

@@ -1,0 +1,36 @@
+// What a fault did, as it did it: the truth against which a driver's reaction is judged.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "core/base/units.hpp"
+#include "daemon/emulator/faults/kinds.hpp"
+
+namespace sonar {
+
+struct FaultEntry {
+  enum class What { began, injected, ended } what{};
+  std::string fault, asked;  // its name; code or trouble as the user wrote it
+  const FaultKind* kind = nullptr;
+  std::string sonar;
+  std::string client;               // peer; empty = the device
+  std::uint64_t client_number = 0;  // counted from 1 over the life of the sonar
+  std::uint32_t ping = 0;           // 0 = none
+  /// First byte of this client's stream that differs from the undisturbed stream, or where the stream was paused or ended; -1 =
+  /// not at a byte of a stream.
+  std::int64_t offset = -1;
+  std::uint64_t bytes_before = 0, bytes_after = 0;  // size of the message
+  std::map<std::string, std::string> with;          // the parameters used
+  Time at{};
+};
+inline constexpr std::array<std::string_view, 3> fault_entry_names = {"began", "injected", "ended"};
+
+class FaultJournal {
+ public:
+  virtual ~FaultJournal() = default;
+  virtual void write(const FaultEntry& entry) = 0;
+};
+
+}  // namespace sonar

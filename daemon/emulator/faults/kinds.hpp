@@ -1,0 +1,155 @@
+// The catalogue of faults as one table: what each kind does, its parameters with limits and defaults, and what of a vendor it
+// needs. Codes and names are stable: users write them. Sources: public issue threads and measurements of open drivers.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+/// Where a fault acts; several active ones act in this order.
+enum class FaultStage { payload, device, time, framing, stream, link, clients, status, datagrams };
+inline constexpr std::array<std::string_view, 9> fault_stage_names = {"payload", "device",  "time",   "framing",  "stream",
+                                                                      "link",    "clients", "status", "datagrams"};
+
+/// What the engine does for a kind (faults.cpp).
+enum class FaultEffect {
+  // link and clients
+  close_ports,
+  end,
+  withhold,
+  withhold_pings,
+  leave_waiting,
+  turn_away,
+  take_over,
+  power_cycle,
+  flap,
+  thin_link,
+  delay,
+  stop_reading,
+  end_on_request,
+  end_after,
+  // shape of the stream
+  slices,
+  split_header,
+  coalesce,
+  burst,
+  pause,
+  // bytes of a message that carries a ping
+  insert,
+  insert_message,
+  false_sync,
+  set_field,
+  add_to_field,
+  cut_row,
+  duplicate,
+  drop,
+  swap,
+  flip,
+  splice,
+  header_only,
+  join_late,
+  bearings,
+  renumber,
+  // settings and state
+  ignore_requests,
+  delay_requests,
+  clamp_requests,
+  forget_settings,
+  change_rate,
+  change_settings,
+  outbox_policy,
+  beacon_field,
+  heat,
+  stop_pings,
+  // status messages
+  no_beacon,
+  beacon_size,
+  beacon_address,
+  second_beacon,
+  foreign_datagrams,
+  // device clock
+  clock_offset,
+  clock_freeze,
+  clock_drift,
+  clock_restart,
+  jitter,
+  // samples
+  stuck,
+  blank,
+  saturate,
+  noise,
+  dead_beams,
+  spokes,
+  gain_step,
+  drop_samples,
+  mirror,
+  missing_rows,
+  scale_range,
+  intermittent,
+  shift_rows,
+  // datagrams of a ping
+  lose_part,
+  reorder_parts,
+  repeat_part,
+  lose_last_part,
+  older_part,
+  leave_group,
+  // not from inside the daemon
+  harness,
+};
+
+struct FaultParameter {
+  std::string_view name;
+  std::string_view value;          // default
+  double lowest = 0, highest = 0;  // of a number, inclusive
+  std::string_view words = {};     // "a b c": one of these words instead of a number
+};
+
+struct FaultKind {
+  std::string_view code, name;  // "L05", "silent-open"
+  int tier = 1;
+  FaultStage stage{};
+  FaultEffect effect{};
+  std::string_view sentence;     // what the sonar does
+  std::string_view good_driver;  // what a correct driver does about it
+  double default_s = 0;          // how long it acts; 0 = per ping
+  std::optional<protocol::FieldName> field = {};
+  std::array<FaultParameter, 4> parameters = {};  // unused ones have no name
+  std::string_view touches = {};                  // the part of a message or device that it writes; two writers conflict
+
+  /// Decided ping by ping; else it acts while it lasts.
+  bool per_ping() const { return default_s == 0; }
+  std::span<const FaultParameter> given() const;
+};
+
+std::span<const FaultKind> fault_kinds();
+/// By code or name, upper or lower case; null.
+const FaultKind* find_fault_kind(std::string_view code_or_name);
+
+/// Empty when it takes effect on sonars of this vendor; else why not.
+std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& vendor);
+
+/// A trouble: several kinds under the name by which people know it. `severity` (1 to 3) chooses the parameters.
+struct Trouble {
+  struct Part {
+    std::string_view code;
+    std::array<std::string_view, 3> with;  // for each severity: "seconds=0.5 bytes=16"
+  };
+  std::string_view name, sentence;
+  double default_s = 10;
+  std::array<Part, 4> parts = {};  // unused ones have no code
+};
+std::span<const Trouble> troubles();
+
+/// The table of kinds by vendors, as text: "takes effect" or why not.
+std::string support_table();
+
+}  // namespace sonar
