@@ -221,6 +221,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   config.engine = read_engine(root.optional("engine"));
   config.limits = read_limits(root.optional("limits"));
   config.recording = read_recording(root.optional("recording"), directory);
+  config.faults = read_faults(root.optional("faults"), config.sonars, directory);
   const Node clock = root.optional("clock");
   config.clock = read_enum(clock, config.clock, clock_modes);
   config.clock_place = clock.present() ? clock.location() + ": " + clock.path() : name + ": clock";

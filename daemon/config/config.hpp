@@ -19,6 +19,7 @@
 #include "core/sonar/water.hpp"
 #include "daemon/config/addresses.hpp"
 #include "daemon/config/clock_mode.hpp"
+#include "daemon/config/faults/fault.hpp"
 #include "daemon/config/log_options.hpp"
 #include "daemon/config/outbox_rules.hpp"
 #include "daemon/config/scene_file.hpp"
@@ -114,6 +115,13 @@ struct LimitConfig {
 struct RecordingConfig {
   std::filesystem::path folder;  // an existing one; empty = recording is off
 };
+/// Faults on purpose (docs/faults.md).
+struct FaultConfig {
+  bool armed = false;             // else every request for a fault is refused
+  std::filesystem::path journal;  // JSON lines are appended to it; empty = none
+  std::vector<FaultRecord> plan;  // checked
+  bool operator==(const FaultConfig&) const = default;
+};
 inline constexpr int most_fixed_rays = 100000;  // a column
 /// What computes the pings (docs/cuda.md).
 enum class EngineDevice { cpu, cuda, automatic };
@@ -141,6 +149,7 @@ struct Config {
   ControlConfig control;
   LimitConfig limits;
   RecordingConfig recording;
+  FaultConfig faults;
   EngineConfig engine;
   ClockMode clock = ClockMode::realtime;
   std::string clock_place;  // file:line:col: clock, for errors found with the command line

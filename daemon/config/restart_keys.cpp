@@ -39,12 +39,13 @@ class Keeper {
   }
   void all(const Config& now, Config& next) {
     const auto& [source, scene, seed, origin, water, allow_hot, vehicles, objects, sonars, of_poses, of_control, of_limits,
-                 recording, of_engine, clock, clock_place, of_log] = now;
+                 recording, faults, of_engine, clock, clock_place, of_log] = now;
     poses(of_poses, next.poses);
     keep("world.origin", origin, next.origin);
     control(of_control, next.control);
     limits(of_limits, next.limits);
     engine(of_engine, next.engine);
+    keep("faults", faults, next.faults);
     keep("clock", clock, next.clock);
     log(of_log, next.log);
   }

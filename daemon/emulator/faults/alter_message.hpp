@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "daemon/emulator/faults/draws.hpp"
-#include "daemon/emulator/faults/fault.hpp"
+#include "daemon/config/faults/fault.hpp"
 #include "daemon/emulator/sonar/outbox.hpp"
 #include "protocol/vendor.hpp"
 

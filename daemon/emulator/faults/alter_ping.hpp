@@ -3,7 +3,7 @@
 
 #include "core/sonar/ping.hpp"
 #include "daemon/emulator/faults/draws.hpp"
-#include "daemon/emulator/faults/fault.hpp"
+#include "daemon/config/faults/fault.hpp"
 
 namespace sonar {
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/sonar/ping.hpp"
-#include "daemon/emulator/faults/fault.hpp"
+#include "daemon/config/faults/fault.hpp"
 #include "daemon/emulator/faults/journal.hpp"
 #include "daemon/emulator/sonar/connections.hpp"
 #include "protocol/vendor.hpp"

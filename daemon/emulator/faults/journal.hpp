@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/base/units.hpp"
-#include "daemon/emulator/faults/kinds.hpp"
+#include "daemon/config/faults/kinds.hpp"
 
 namespace sonar {
 

@@ -1,4 +1,4 @@
-#include "daemon/emulator/faults/fault.hpp"
+#include "daemon/config/faults/fault.hpp"
 
 #include <algorithm>
 #include <charconv>

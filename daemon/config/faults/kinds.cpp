@@ -1,4 +1,4 @@
-#include "daemon/emulator/faults/kinds.hpp"
+#include "daemon/config/faults/kinds.hpp"
 
 #include <algorithm>
 

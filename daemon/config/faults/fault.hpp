@@ -12,7 +12,7 @@
 
 #include "core/base/result.hpp"
 #include "core/text/ipv4.hpp"
-#include "daemon/emulator/faults/kinds.hpp"
+#include "daemon/config/faults/kinds.hpp"
 
 namespace sonar {
 
