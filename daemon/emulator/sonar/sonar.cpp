@@ -166,9 +166,11 @@ bool Sonar::settled() const {
 
 // ---- pings
 
-protocol::Bytes Sonar::beacon(Time now) {
+std::vector<protocol::Bytes> Sonar::beacons(Time now) {
   update_depth(now);
-  return vendor_.beacon(state_, now);
+  std::vector<protocol::Bytes> datagrams;
+  if (protocol::Bytes status = vendor_.beacon(state_, now); !status.empty()) datagrams.push_back(std::move(status));
+  return datagrams;
 }
 
 void Sonar::update_depth(Time now) { state_.depth_m = depth_from_z(pose_at(now).position_m.z); }

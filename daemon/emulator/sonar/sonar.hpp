@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/sonar/gain_assist.hpp"
 #include "daemon/config/config.hpp"
@@ -62,8 +63,8 @@ class Sonar {
   // ---- pings and datagrams
 
   Actions on_ping(PingOutcome outcome, Time now);
-  /// The status broadcast; empty when the vendor has none.
-  protocol::Bytes beacon(Time now);
+  /// The status broadcast: datagrams to send in order; none when the vendor has none.
+  std::vector<protocol::Bytes> beacons(Time now);
   struct Answers {
     std::vector<protocol::Bytes> datagrams;  // to send back, in order
     Actions actions;
