@@ -44,15 +44,15 @@ asio::awaitable<void> Beacon::send() {
   while (!stopping_) {
     timer_.expires_after(period_);  // before the bytes are made: send_now() during a write counts
     sent_at_ = std::chrono::steady_clock::now();
-    const protocol::Bytes status = make_();
-    for (const udp::endpoint& to : to_) {
-      error_code ec;
-      if (status.empty() || stopping_) break;
-      co_await socket_.async_send_to(asio::buffer(status), to, into(ec));
-      if (stopping_) co_return;
-      if (ec && !std::exchange(failed_, true))
-        log_.warning("cannot send status: " + ec.message(), {{"sonar", sonar_}, {"to", to.address().to_string()}});
-    }
+    const std::vector<protocol::Bytes> datagrams = make_();
+    for (const protocol::Bytes& status : datagrams)
+      for (const udp::endpoint& to : to_) {
+        error_code ec;
+        co_await socket_.async_send_to(asio::buffer(status), to, into(ec));
+        if (stopping_) co_return;
+        if (ec && !std::exchange(failed_, true))
+          log_.warning("cannot send status: " + ec.message(), {{"sonar", sonar_}, {"to", to.address().to_string()}});
+      }
     error_code ec;
     co_await timer_.async_wait(into(ec));
   }

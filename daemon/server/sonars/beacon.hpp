@@ -17,8 +17,8 @@ namespace sonar {
 
 class Beacon {
  public:
-  /// `make` returns the bytes as of now, or none; `fault` gets what an exception said. `log` outlives the beacon.
-  Beacon(asio::io_context& io, Log& log, std::string sonar, std::function<protocol::Bytes()> make,
+  /// `make` returns the datagrams as of now, in order, or none; `fault` gets what an exception said. `log` outlives the beacon.
+  Beacon(asio::io_context& io, Log& log, std::string sonar, std::function<std::vector<protocol::Bytes>()> make,
          std::function<void(const std::string&)> fault)
       : log_(log), sonar_(std::move(sonar)), make_(std::move(make)), fault_(std::move(fault)), socket_(io), timer_(io) {}
 
@@ -35,7 +35,7 @@ class Beacon {
 
   Log& log_;
   std::string sonar_;
-  std::function<protocol::Bytes()> make_;
+  std::function<std::vector<protocol::Bytes>()> make_;
   std::function<void(const std::string&)> fault_;
   udp::socket socket_;
   asio::steady_timer timer_;

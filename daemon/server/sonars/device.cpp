@@ -20,7 +20,7 @@ Device::Device(DeviceNetwork& network, Sonar::Surroundings around, const SonarCo
       sonar_(around, config, index, network.clock.now(), network.clock.skipped()),
       observer_listener_(network.io, network.admission, Admission::Purpose::client),
       beacon_(
-          network.io, network.log, config.name, [this] { return sonar_.beacon(network_.clock.now()); },
+          network.io, network.log, config.name, [this] { return sonar_.beacons(network_.clock.now()); },
           [this](const std::string& fault) { on_fault(fault); }),
       timer_(network.io),
       visits_(network.io, network.log, config.name) {}

@@ -284,5 +284,31 @@ TEST(Transports, AStopFreesEveryPort) {
   EXPECT_EQ(host.next(), "front 5\n");
 }
 
+TEST(Beacon, SendsItsDatagramsInOrder) {
+  asio::io_context io;
+  Log log{LogOptions{}};
+  UdpSocket host;
+  SonarConfig sonar;
+  sonar.bind_ip = {127, 0, 0, 1};
+  sonar.status_to = {{{127, 0, 0, 1}, host.port()}};
+  int rounds = 0;
+  const auto make = [&]() -> std::vector<protocol::Bytes> {
+    ++rounds;
+    if (rounds == 2) return {};
+    return {bytes_of("first " + std::to_string(rounds)), bytes_of("second " + std::to_string(rounds))};
+  };
+  Beacon beacon(io, log, "front", make, [](const std::string& fault) { ADD_FAILURE() << fault; });
+  protocol::Port port;
+  port.number = beacon_port;
+  port.period = milliseconds(100);
+  ASSERT_TRUE(beacon.open(sonar, port));
+  beacon.start();
+  while (rounds < 3) io.run_one();
+  io.run_for(milliseconds(20));
+  for (const char* const expected : {"first 1", "second 1", "first 3", "second 3"}) EXPECT_EQ(host.next(), expected);
+  beacon.stop();
+  io.run_for(milliseconds(200));
+}
+
 }  // namespace
 }  // namespace sonar::testing_daemon
