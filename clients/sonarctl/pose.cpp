@@ -106,7 +106,7 @@ Result<Send> confirmed_sender(const Endpoint& to, const std::filesystem::path& t
   if (!opened) return tl::unexpected(opened.error());
   const auto client = std::make_shared<ControlClient>(std::move(*opened));
   return Send([client](const PoseSample& sample) -> Result<void> {
-    const Result<control::Response> answer = client->request(sample);
+    const auto answer = client->request(sample);
     if (!answer) return tl::unexpected(answer.error());
     return {};
   });

@@ -10,6 +10,7 @@
 #include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/record_files.hpp"
 #include "clients/sonarctl/source.hpp"
+#include "protocol/control/answers.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "protocol/recording/message_splitter.hpp"
 #include "protocol/recording/recording.hpp"
@@ -59,12 +60,12 @@ Result<Steering> ask_sonard(const ControlOptions& options, const Endpoint& devic
   if (!client) return tl::unexpected(client.error());
   const auto status = client->status();
   if (!status) return tl::unexpected(status.error());
-  for (const control::SonarStatus& sonar : status->sonars) {
-    if (sonar.listens != text_from(device) && sonar.advertised != device.host) continue;
+  for (const v1::SonarStatus& sonar : (*status)->sonars()) {
+    if (sonar.listens() != text_from(device) && sonar.advertised() != device.host) continue;
     control::Subscribe subscription;
     subscription.pings = true;
     if (auto answer = client->request(subscription); !answer) return tl::unexpected(answer.error());
-    return Steering{std::move(*client), sonar.name};
+    return Steering{std::move(*client), sonar.name()};
   }
   return failure(ErrorKind::usage, "the sonard at " + text_from(client->at()) + " serves no sonar at " + text_from(device));
 }
@@ -163,10 +164,10 @@ class Recorder {
         return {};
       }
       if (!*event) return {};
-      const auto* ping = std::get_if<control::PingEvent>(&(**event).what);
-      if (ping == nullptr || ping->sonar != steering_->sonar) continue;
-      const Time fired(std::chrono::nanoseconds(ping->fired_at_ns));
-      if (Result<void> written = files_.write_pose(stamps_.now(), fired, ping->sonar_in_world); !written) return written;
+      if (!(*event)->has_ping() || (*event)->ping().sonar() != steering_->sonar) continue;
+      const v1::PingEvent& ping = (*event)->ping();
+      const Time fired(std::chrono::nanoseconds(ping.fired_at_ns()));
+      if (Result<void> written = files_.write_pose(stamps_.now(), fired, control::pose_of(ping)); !written) return written;
     }
     return {};
   }

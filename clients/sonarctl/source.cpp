@@ -5,6 +5,7 @@
 
 #include "clients/sonarctl/control/control_client.hpp"
 #include "core/text/format.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar::clients {
 
@@ -34,17 +35,17 @@ Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& devic
   const auto status = control->status();
   if (!status) return tl::unexpected(status.error());
   const std::string port = std::string(":").append(std::to_string(device.port));
-  for (const control::SonarStatus& s : status->sonars) {
-    if (s.listens != text_from(device) && s.advertised + port != text_from(device) &&
-        s.listens != std::string("0.0.0.0").append(port))
+  for (const v1::SonarStatus& s : (*status)->sonars()) {
+    if (s.listens() != text_from(device) && s.advertised() + port != text_from(device) &&
+        s.listens() != std::string("0.0.0.0").append(port))
       continue;
-    if (s.observers.empty()) return failure(ErrorKind::unavailable, "this sonar accepts no observers (observers.max is 0)");
-    auto at = parse_endpoint(s.observers, device);
+    if (s.observers().empty()) return failure(ErrorKind::unavailable, "this sonar accepts no observers (observers.max is 0)");
+    auto at = parse_endpoint(s.observers(), device);
     if (at) at->host = device.host;
     return at;
   }
-  for (const control::SonarStatus& s : status->sonars)
-    if (s.advertised == device.host && s.profile.starts_with("blueview"))
+  for (const v1::SonarStatus& s : (*status)->sonars())
+    if (s.advertised() == device.host && s.profile().starts_with("blueview"))
       return failure(ErrorKind::usage, heads_have_no_observers);
   return failure(ErrorKind::unavailable, "the sonard at " + text_from(control->at()) + " serves no sonar at " +
                                              text_from(device) + "; --control names another");

@@ -54,7 +54,8 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       scene_operations_(config_, changes_, pose_intake_, events_, log_, options_.load_scene),
       sonar_operations_(config_, fleet_, recordings_, log_),
       time_operations_(stepped_time_, pose_intake_, fleet_, [this] { on_change(); }),
-      status_report_(config_, clock_, world_, changes_, fleet_, [this](control::DaemonStatus& s) { add_status(s); }),
+      status_report_(config_, clock_, world_, changes_, fleet_, simulator_, recordings_, plausibility_, mavlink_server_,
+                     control_),
       monitoring_(config_.limits, simulator_, changes_, world_, admission_, fleet_),
       operations_(scene_operations_, sonar_operations_, time_operations_, status_report_, monitoring_),
       control_(io_, config_.control, config_.limits, admission_, operations_, events_, pose_intake_, log_),
@@ -205,25 +206,15 @@ void App::take_over(Config next) {
   if (!listed.empty()) log_.warning("reload: these need a restart and stay as they were: " + listed);
   for (const std::string& note : notes_of_options(config_)) log_.info("reload: " + note);
   log_.info("reloaded: " + change.summary, {{"scene", scene().name}});
-  if (events_.has_listeners()) events_.publish({control::SceneEvent{config_.scene.name(), "reloaded: " + change.summary}});
+  events_.publish_scene(config_.scene.name(), "reloaded: " + change.summary);
   on_change();
-}
-
-void App::add_status(control::DaemonStatus& status) const {
-  const auto address = [](Endpoint at) { return at.port == 0 ? std::string() : text_of(at); };  // empty = no listener
-  status.engine = simulator_.engine_description();
-  status.control = address(control_.stream());
-  status.http = address(control_.http());
-  status.recordings = recordings_.status();
-  status.notes = plausibility_.all();
-  for (control::Note& note : mavlink_server_.notes()) status.notes.push_back(std::move(note));
 }
 
 asio::awaitable<void> App::housekeeping() {
   while (!stopping_) {
     for (const World::Stale& stale : world_.newly_stale(clock_.now())) {
       log_.warning(stale.sentence);
-      if (events_.has_listeners()) events_.publish({control::PoseEvent{stale.vehicle, true, stale.sentence}});
+      events_.publish_pose(stale.vehicle, true, stale.sentence);
     }
     const std::string slow_load = monitoring_.slow_load();
     if (!slow_load.empty() && !slow_load_logged_) log_.warning(slow_load);

@@ -84,7 +84,6 @@ class App {
   void wait_for_signal();
   Reload::Steps reload_steps();
   void take_over(Config next);  // of a reload
-  void add_status(control::DaemonStatus& status) const;
   std::string status_line() const;
   asio::awaitable<void> housekeeping();
 

@@ -1,9 +1,11 @@
-// The control protocol's messages as plain structs, and their conversion from and to protobuf. No other layer sees protobuf. The
-// daemon decodes requests; tools and tests encode them.
+// Bytes and JSON of the control protocol. Requests are plain structs: the daemon decodes them; tools and tests encode them.
+// Answers and events are protobuf's classes (protocol/control/answers.hpp), which this header only names: they take a second to
+// compile.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +15,13 @@
 #include "core/base/result.hpp"
 #include "protocol/control/operations.hpp"
 #include "protocol/control/pose_sample.hpp"
+
+namespace google::protobuf {
+class Message;
+}
+namespace sonar::v1 {
+class Response;
+}
 
 namespace sonar::control {
 
@@ -36,14 +45,8 @@ struct Request {
                SetTrajectory, Step, StartRecording, StopRecording, Subscribe>
       op;
 };
-enum class StatusCode { ok, refused, unsupported, failed, unauthenticated };
-struct Response {
-  std::uint64_t id = 0;
-  StatusCode code = StatusCode::ok;
-  std::string text;
-  bool hello = false;                                                    // carries our Hello
-  std::variant<std::monostate, DaemonStatus, Event, Stepped> body = {};  // of GetStatus; what was subscribed to; of Step
-};
+/// Numbers of v1::Status::Code.
+enum class StatusCode { ok = 1, refused, unsupported, failed, unauthenticated };
 
 /// One datagram: a PoseUpdate. Refused with one sentence when malformed (see checked()).
 Result<PoseSample> decode_pose_datagram(BytesView datagram);
@@ -55,12 +58,14 @@ struct RefusedRequest {  // its id is known, for the Response
 };
 /// One message of the stream, without its length. A message that is not protobuf has id 0.
 tl::expected<Request, RefusedRequest> decode_request(BytesView message);
-Bytes encode_response(const Response& response);
+/// Bytes of texts that are no UTF-8 are sent as '?'.
+Bytes encode_response(v1::Response response);
 
 /// For senders. The sample's pose is sent as ENU_FLU, or turned into NED_FRD depending on `sent_in`.
 Bytes encode_pose_datagram(const PoseSample& sample);
 Bytes encode_request(const Request& request);
-Result<Response> decode_response(BytesView message);
+/// bad_data: not a Response, numbers that are NaN or infinite, orientations of another norm than 1, an event of an unknown kind.
+Result<std::shared_ptr<const v1::Response>> decode_response(BytesView message);
 
 // ---- the same in protobuf's JSON mapping, for HTTP and for people
 
@@ -70,10 +75,7 @@ Result<Response> decode_response(BytesView message);
 Result<Request> request_from_json(std::string_view op, std::string_view json, std::string_view name = {});
 /// One line, no newline; names as in control.proto, numbers that are 0 and empty lists too. 64-bit numbers are strings, as
 /// protobuf's mapping has it.
-std::string json_of(const Response& response);
-std::string json_of(const DaemonStatus& status);
-std::string json_of(const Stepped& stepped);
-std::string json_of(const Event& event);
+std::string json_of(const google::protobuf::Message& message);
 std::string json_of(StatusCode code, const std::string& text);  // {"code":"REFUSED","text":"..."}
 
 }  // namespace sonar::control

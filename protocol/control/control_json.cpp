@@ -96,16 +96,6 @@ bool set_name(Message& message, const std::string& name) {
   return given.empty() || given == name;
 }
 
-std::string json_from(Message& message) {
-  repair_texts(message);
-  google::protobuf::util::JsonPrintOptions options;
-  options.always_print_primitive_fields = true;
-  options.preserve_proto_field_names = true;
-  std::string out;
-  if (!google::protobuf::util::MessageToJsonString(message, &out, options).ok()) return "{}";  // never: we made it
-  return out;
-}
-
 }  // namespace
 
 Result<Request> request_from_json(std::string_view op, std::string_view json, std::string_view name) {
@@ -130,30 +120,17 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
   return *std::move(request);
 }
 
-std::string json_of(const Response& response) {
-  v1::Response message;
-  fill(message, response);
-  return json_from(message);
+std::string json_of(const Message& message) {
+  const std::unique_ptr<Message> repaired(message.New());
+  repaired->CopyFrom(message);
+  repair_texts(*repaired);
+  google::protobuf::util::JsonPrintOptions options;
+  options.always_print_primitive_fields = true;
+  options.preserve_proto_field_names = true;
+  std::string out;
+  if (!google::protobuf::util::MessageToJsonString(*repaired, &out, options).ok()) return "{}";  // never: we made it
+  return out;
 }
-std::string json_of(const DaemonStatus& status) {
-  v1::DaemonStatus message;
-  fill(message, status);
-  return json_from(message);
-}
-std::string json_of(const Stepped& stepped) {
-  v1::Stepped message;
-  fill(message, stepped);
-  return json_from(message);
-}
-std::string json_of(const Event& event) {
-  v1::Event message;
-  fill(message, event);
-  return json_from(message);
-}
-std::string json_of(StatusCode code, const std::string& text) {
-  v1::Status message;
-  fill(message, code, text);
-  return json_from(message);
-}
+std::string json_of(StatusCode code, const std::string& text) { return json_of(status_of(code, text)); }
 
 }  // namespace sonar::control

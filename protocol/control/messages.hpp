@@ -1,5 +1,5 @@
-// Converts between protoc's classes of control.proto and plain structs. Included by files of this folder only; control.cpp and
-// control_json.cpp add bytes and text.
+// Converts requests between protoc's classes of control.proto and plain structs. Included by files of this folder only;
+// control.cpp and control_json.cpp add bytes and text.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -7,8 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "control.pb.h"
-#include "protocol/control/control.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar::control {
 
@@ -33,25 +32,9 @@ void fill(v1::PoseUpdate& out, const PoseSample& sample);
 void fill(v1::ObjectUpdate& out, const PoseSample& sample);
 void fill(v1::Placement& out, const Pose& in_world);
 void fill(v1::Mount& out, const Pose& in_vehicle);
-void fill(v1::Vec3& out, Vec3d v);
-void fill(v1::Quat& out, Quatd q);
-/// Numbers that have been checked; an orientation that is not given is level.
-Pose pose_from(const v1::Vec3& position, const v1::Quat& orientation);
 
 // ---- requests (request_messages.cpp)
 tl::expected<Request, RefusedRequest> from(const v1::Request& message);
 void fill(v1::Request& out, const Request& request);
-
-// ---- answers and events (status_messages.cpp, event_messages.cpp)
-void fill(v1::Environment& out, const SetEnvironment& environment);
-SetEnvironment from(const v1::Environment& message);
-void fill(v1::DaemonStatus& out, const DaemonStatus& status);
-DaemonStatus from(const v1::DaemonStatus& message);
-void fill(v1::Stepped& out, const Stepped& stepped);
-void fill(v1::Event& out, const Event& event);
-Result<Event> from(const v1::Event& message);
-void fill(v1::Status& out, StatusCode code, const std::string& text);
-void fill(v1::Response& out, const Response& response);
-Result<Response> from(const v1::Response& message);
 
 }  // namespace sonar::control

@@ -50,7 +50,14 @@ Result<SetSonar> from(const v1::SetSonar& m) {
   return set;
 }
 
-Result<SetEnvironment> from(const v1::SetEnvironment& m) { return control::from(m.environment()); }
+SetEnvironment from(const v1::Environment& m) {
+  SetEnvironment set;
+  if (m.has_temperature_c()) set.temperature_c = m.temperature_c().value();
+  if (m.has_salinity_psu()) set.salinity_psu = m.salinity_psu().value();
+  if (m.has_ph()) set.ph = m.ph().value();
+  if (m.has_sound_speed_mps()) set.sound_speed_mps = m.sound_speed_mps().value();
+  return set;
+}
 
 Result<LoadScene> from(const v1::LoadScene& m) {
   const auto path = checked_text(m.path(), "path", true, longest_path);
@@ -145,7 +152,7 @@ Result<Request> with_op(const v1::Request& message) {
       take(from(message.sonar()));
       break;
     case v1::Request::kEnvironment:
-      take(from(message.environment()));
+      request.op = from(message.environment().environment());
       break;
     case v1::Request::kSubscribe:
       request.op = from(message.subscribe());
@@ -210,7 +217,13 @@ struct FillRequest {
     if (op.transmit) m.mutable_transmit()->set_value(*op.transmit);
     if (op.mount) fill(*m.mutable_mount(), *op.mount);
   }
-  void operator()(const SetEnvironment& op) const { fill(*out.mutable_environment()->mutable_environment(), op); }
+  void operator()(const SetEnvironment& op) const {
+    v1::Environment& m = *out.mutable_environment()->mutable_environment();
+    if (op.temperature_c) m.mutable_temperature_c()->set_value(*op.temperature_c);
+    if (op.salinity_psu) m.mutable_salinity_psu()->set_value(*op.salinity_psu);
+    if (op.ph) m.mutable_ph()->set_value(*op.ph);
+    if (op.sound_speed_mps) m.mutable_sound_speed_mps()->set_value(*op.sound_speed_mps);
+  }
   void operator()(const LoadScene& op) const { out.mutable_load()->set_path(op.path); }
   void operator()(const AddObject& op) const {
     v1::AddObject& m = *out.mutable_add_object();

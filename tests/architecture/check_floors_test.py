@@ -53,6 +53,7 @@ class Planted(unittest.TestCase):
                 ("core/pipeline/a.cpp", "fftw3.h"), ("daemon/config/config.cpp", "yaml-cpp/yaml.h"),
                 ("core/scene/scene.cpp", "assimp/scene.h"), ("protocol/oculus/a.cpp", "spdlog/spdlog.h"),
                 ("daemon/a.cpp", "google/protobuf/message.h"), ("daemon/server/sonars/session.cpp", "boost/asio.hpp"),
+                ("daemon/emulator/world/world.hpp", "protocol/control/answers.hpp"), ("daemon/server/app.cpp", "protocol/control/answers.hpp"),
                 ("core/base/a.cpp", "boost/container/small_vector.hpp"), ("core/base/parallel.cpp", "tbb/parallel_for.h"),
                 ("core/pipeline/a.cpp", "cuda_runtime.h"), ("core/base/a.hpp", "Eigen/Dense")]:
             with self.subTest(name=name, header=header):

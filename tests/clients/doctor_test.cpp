@@ -4,6 +4,7 @@
 
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "clients/sonarctl/doctor/proc_net.hpp"
+#include "tests/protocol/control/message_from.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -35,16 +36,23 @@ SonarFacts healthy_sonar(const std::string& host) {
   return sonar;
 }
 
-control::DaemonStatus daemon_of(const std::string& host) {
-  control::DaemonStatus status;
-  status.version = "0.1.0", status.clock = "realtime", status.engine = "embree, avx2";
-  control::SonarStatus sonar;
-  sonar.name = "front", sonar.listens = host + ":52100", sonar.advertised = host;
-  sonar.status_to = {"192.0.2.255:52102"};
-  sonar.rate_hz = 10;
-  status.sonars.push_back(sonar);
-  status.vehicles.push_back({"rov", "demo orbit", false, {}});
-  return status;
+std::shared_ptr<const v1::DaemonStatus> daemon_of(const std::string& host) {
+  return std::make_shared<v1::DaemonStatus>(control::message_from<v1::DaemonStatus>(
+      R"(version: "0.1.0" clock: "realtime" engine: "embree, avx2" vehicles { name: "rov" source: "demo orbit" }
+         sonars { name: "front" status_to: "192.0.2.255:52102" rate_hz: 10 listens: ")" +
+      host + R"(:52100" advertised: ")" + host + R"(" })"));
+}
+/// The status of the daemon, to be changed.
+v1::DaemonStatus& daemon_in(Facts& facts) {
+  const auto copy = std::make_shared<v1::DaemonStatus>(*facts.control.status);
+  facts.control.status = copy;
+  return *copy;
+}
+/// Makes the daemon report the first sonar, to be changed.
+v1::SonarStatus& report(Facts& facts) {
+  const auto reported = std::make_shared<v1::SonarStatus>(facts.control.status->sonars(0));
+  facts.sonars[0].reported = reported;
+  return *reported;
 }
 
 Facts healthy() {
@@ -115,7 +123,7 @@ TEST(Doctor, KnowsWhyNoStatusComes) {
   facts.status.received.clear();
   expect(line(facts, "status"), Level::fail, "no status from 127.0.0.2 on udp 52102 within 2.5 s",
          "a firewall may drop udp 52102");
-  facts.sonars[0].reported = facts.control.status->sonars[0];
+  report(facts);
   expect(line(facts, "status"), Level::fail, "no status", "it is sent to 192.0.2.255:52102");
   facts.status.error = "Address already in use";
   facts.status.holders = {{"0.0.0.0:52102", 4711, "oculus_node"}};
@@ -146,9 +154,9 @@ TEST(Doctor, LeavesABusySonarAlone) {
   facts.sonars[0].stream = {};
   facts.sonars[0].clients = {"127.0.0.1:41022"};
   expect(line(facts, "ping"), Level::ok, "127.0.0.2 is busy: 127.0.0.1:41022 is connected; not connecting (--take", "");
-  facts.sonars[0].reported = facts.control.status->sonars[0];
-  facts.sonars[0].reported->figures.served = 120;
-  facts.sonars[0].reported->figures.latency_ms_p99 = 33;
+  v1::SonarFigures& figures = *report(facts).mutable_figures();
+  figures.set_served(120);
+  figures.set_latency_ms_p99(33);
   expect(line(facts, "ping"), Level::ok, "it reports 120 pings served, 0 dropped, latency 0 ms p50, 33 ms p99", "");
   EXPECT_FALSE(any_failed(run_checks(facts)));
 }
@@ -196,12 +204,11 @@ TEST(Doctor, KnowsWhyNoPingComes) {
   expect(line(facts, "ping"), Level::fail, "no ping came", "standby");
   sonar.stream.asked = true;
   expect(line(facts, "ping"), Level::fail, "no ping came", "overloaded");
-  facts.control.status->clock = "lockstep";
+  daemon_in(facts).set_clock("lockstep");
   expect(line(facts, "ping"), Level::warn, "with clock: lockstep time stops until a client requests a step", "sonarctl step");
-  facts.control.status->clock = "follow";
+  daemon_in(facts).set_clock("follow");
   expect(line(facts, "ping"), Level::warn, "with clock: follow time stops until the next pose comes", "sender of poses");
-  sonar.reported = facts.control.status->sonars[0];
-  sonar.reported->figures.refused = 7;
+  report(facts).mutable_figures()->set_refused(7);
   expect(line(facts, "ping"), Level::fail, "the engine refused 7 of them", "log");
   sonar.stream.outcome = Outcome::closed_without_a_byte;
   expect(line(facts, "ping"), Level::warn, "closed the connection without a byte", "clients.max");
@@ -226,8 +233,9 @@ TEST(Doctor, MeasuresTheRate) {
   expect(line(facts, "rate"), Level::warn, "4 pings missing", "outbox");
   s.missing = 0, s.latency_p50_ms.reset(), s.spread_p99_ms = 7.0;
   expect(line(facts, "rate"), Level::ok, "images come 7 ms later than the earliest, p99", "");
-  facts.sonars[0].reported = facts.control.status->sonars[0];
-  facts.sonars[0].reported->figures.latency_ms_p50 = 25, facts.sonars[0].reported->figures.latency_ms_p99 = 31;
+  v1::SonarFigures& figures = *report(facts).mutable_figures();
+  figures.set_latency_ms_p50(25);
+  figures.set_latency_ms_p99(31);
   expect(line(facts, "rate"), Level::ok, "image latency 25 ms p50, 31 ms p99", "");
   s.asked = false, s.rate_hz = 3;
   expect(line(facts, "rate"), Level::warn, "rate 3.0 Hz (asked 10)", "fewer beams");
@@ -250,11 +258,13 @@ TEST(Doctor, SaysWhatComputingAllows) {
   // A sonar with another client, by the statistics of the daemon.
   sonar.stream = {};
   sonar.clients = {"127.0.0.1:41022"};
-  sonar.reported = facts.control.status->sonars[0];
-  sonar.reported->pinging = true, sonar.reported->rate_hz = 40;
-  sonar.reported->figures.simulation_ms = 24;
+  v1::SonarStatus& reported = report(facts);
+  reported.set_pinging(true);
+  reported.set_rate_hz(40);
+  reported.mutable_figures()->set_simulation_ms(24);
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("computing")));
-  sonar.reported->figures.simulation_ms = 52, sonar.reported->figures.skipped_ticks = 77;
+  reported.mutable_figures()->set_simulation_ms(52);
+  reported.mutable_figures()->set_skipped_ticks(77);
   expect(line(facts, "rate"), Level::warn,
          "rate 40 Hz requested by 127.0.0.1:41022, computing takes 52 ms per ping: 19 Hz at most here, 77 ticks skipped",
          "fewer beams");
@@ -279,9 +289,10 @@ TEST(Doctor, ExpectsControlWhereADaemonIs) {
 
 TEST(Doctor, SaysWhatTheDaemonNotedAndNotThatAllIsWellWithThoseVehicles) {
   Facts facts = healthy();
-  facts.control.status->vehicles.push_back({"boat", "initial pose", false, {}});
-  facts.control.status->notes = {{"boat", "mavlink udpin:127.0.0.1:14551: no poses yet", "see the streams"},
-                                 {"", "wreck is long", "scale"}};
+  daemon_in(facts).MergeFrom(control::message_from<v1::DaemonStatus>(
+      R"(vehicles { name: "boat" source: "initial pose" }
+         notes { vehicle: "boat" text: "mavlink udpin:127.0.0.1:14551: no poses yet" cure: "see the streams" }
+         notes { text: "wreck is long" cure: "scale" })"));
   const std::string text = text_from(run_checks(facts));
   EXPECT_THAT(text, HasSubstr("warn  mavlink udpin:127.0.0.1:14551: no poses yet; see the streams\n"));
   EXPECT_THAT(text, HasSubstr("warn  wreck is long; scale\n"));
@@ -292,10 +303,12 @@ TEST(Doctor, SaysWhatTheDaemonNotedAndNotThatAllIsWellWithThoseVehicles) {
 
 TEST(Doctor, LooksAtPosesHttpAndClocks) {
   Facts facts = healthy();
-  facts.control.status->vehicles[0] = {"rov", "json 127.0.0.1", true, {}};
+  v1::DaemonStatus& status = daemon_in(facts);
+  status.mutable_vehicles(0)->set_source("json 127.0.0.1");
+  status.mutable_vehicles(0)->set_stale(true);
   expect(line(facts, "poses"), Level::warn, "poses of rov have stopped, the last came from json 127.0.0.1", "on_stale");
-  facts.control.status->vehicles[0].stale = false;
-  facts.control.status->poses.refused = 3;
+  status.mutable_vehicles(0)->set_stale(false);
+  status.mutable_poses()->set_refused(3);
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("warn  3 messages were refused as poses, 0 accepted"));
   facts.http.code = 0;
   expect(line(facts, "http"), Level::warn, "does not answer", "--http");
@@ -329,9 +342,8 @@ TEST(Doctor, ChecksEverySonarAndTellsThemApart) {
 
 TEST(Doctor, FindsBlueViewHeads) {
   Facts facts = healthy();
-  control::SonarStatus head = facts.control.status->sonars[0];
-  head.name = "bow", head.listens = "127.0.0.4:14750", head.advertised = "127.0.0.4";
-  facts.control.status->sonars.push_back(head);
+  daemon_in(facts).MergeFrom(control::message_from<v1::DaemonStatus>(
+      R"(sonars { name: "bow" listens: "127.0.0.4:14750" advertised: "127.0.0.4" rate_hz: 10 })"));
   expect(line(facts, "blueview"), Level::warn, "BlueView sonar bow at 127.0.0.4:14750 does not answer discovery", "udp 14751");
   facts.address_given = true;  // 127.0.0.2: the other one was not asked
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("does not answer discovery")));
@@ -346,9 +358,11 @@ Facts healthy_head() {
   SonarFacts& sonar = facts.sonars[0];
   sonar.at.port = 14750, sonar.blueview = true;
   sonar.stream.rows = 315, sonar.stream.bits = 16, sonar.stream.asked_hz = 0;
-  control::SonarStatus& reported = facts.control.status->sonars[0];
-  reported.profile = "blueview-p900-90", reported.listens = "127.0.0.2:14750", reported.rate_hz = 15;
-  sonar.reported = reported;
+  v1::SonarStatus& head = *daemon_in(facts).mutable_sonars(0);
+  head.set_profile("blueview-p900-90");
+  head.set_listens("127.0.0.2:14750");
+  head.set_rate_hz(15);
+  report(facts);
   facts.heads = {{"127.0.0.2:14750", "BlueView P900-90", "7001"}};
   facts.kernel_ports.reserved = "";
   return facts;

@@ -8,6 +8,7 @@
 #include "clients/sonarctl/control/status_text.hpp"
 #include "clients/sonarctl/terminal.hpp"
 #include "clients/sonarctl/view_caption.hpp"
+#include "tests/protocol/control/message_from.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -59,23 +60,26 @@ TEST(ViewCaption, TellRateAndGaps) {
 }
 
 TEST(StatusText, NamesEverything) {
-  control::DaemonStatus status;
-  status.version = "0.1.0", status.config = "a.yaml", status.scene = "demo:harbour", status.clock = "realtime";
-  status.engine = "embree", status.seed = 1, status.uptime_s = 3725, status.resident_mb = 120;
-  status.environment = {12, 30, 8, 0};
-  control::SonarStatus sonar;
-  sonar.name = "front", sonar.profile = "oculus-m1200d", sonar.listens = "0.0.0.0:52100", sonar.advertised = "10.0.0.5";
-  sonar.status_to = {"10.0.0.255:52102"}, sonar.pinging = true, sonar.range_m = 10, sonar.rate_hz = 0, sonar.frequency_hz = 2.1e6;
-  sonar.beams = 512, sonar.rows = 437, sonar.transmits = false;
-  sonar.in_world = {{-6, 0, -3}, quat_from_rpy({0, rad_from_deg(10), 0})};
-  sonar.clients.push_back({"10.0.0.9:4000", 12, 1, 2500000, 130});
-  status.sonars.push_back(sonar);
-  status.vehicles.push_back({"rov", "json 127.0.0.1", true, {}});
-  status.vehicles.push_back(
-      {"auv", "trajectory dive.tum", false, {}, control::TrajectoryStatus{"dive.tum", 12.34, 60, 2.5, true, true}});
-  status.vehicles.push_back(
-      {"boat", "trajectory way.csv", false, {}, control::TrajectoryStatus{"way.csv", 60, 60, 1, false, false}});
-  status.objects.push_back({"wall", "concrete", true, false, 12, {}});
+  const auto status = control::message_from<v1::DaemonStatus>(R"(
+      version: "0.1.0" config: "a.yaml" scene: "demo:harbour" clock: "realtime" engine: "embree" seed: 1 uptime_s: 3725
+      resident_mb: 120
+      environment { temperature_c { value: 12 } salinity_psu { value: 30 } ph { value: 8 } sound_speed_mps { value: 0 } }
+      sonars {
+        name: "front" profile: "oculus-m1200d" listens: "0.0.0.0:52100" advertised: "10.0.0.5" status_to: "10.0.0.255:52102"
+        pinging: true range_m: 10 frequency_hz: 2.1e6 beams: 512 rows: 437
+        position { x: -6 z: -3 } orientation { w: 0.9961946980917455 y: 0.08715574274765817 }  # 10 degrees bow down
+        clients { address: "10.0.0.9:4000" pings_written: 12 pings_dropped: 1 bytes_written: 2500000 connected_s: 130 }
+      }
+      vehicles { name: "rov" source: "json 127.0.0.1" stale: true }
+      vehicles {
+        name: "auv" source: "trajectory dive.tum"
+        trajectory { file: "dive.tum" position_s: 12.34 duration_s: 60 speed: 2.5 paused: true loop: true }
+      }
+      vehicles {
+        name: "boat" source: "trajectory way.csv"
+        trajectory { file: "way.csv" position_s: 60 duration_s: 60 speed: 1 }
+      }
+      objects { name: "wall" material: "concrete" moving: true triangles: 12 })");
   const std::string text = text_from(status);
   for (const char* part :
        {"sonard 0.1.0  up 62 min  120 MB\n", "config    a.yaml\n", "scene     demo:harbour  seed 1  clock realtime\n",
@@ -90,14 +94,15 @@ TEST(StatusText, NamesEverything) {
 }
 
 TEST(StatusText, TellsEvents) {
-  EXPECT_EQ(text_from(control::Event{control::ClientEvent{"front", "10.0.0.9:4000", true, ""}, 0}),
+  const auto told = [](const std::string& event) { return text_from(control::message_from<v1::Event>(event)); };
+  EXPECT_EQ(told(R"(client { sonar: "front" client: "10.0.0.9:4000" connected: true })"),
             "client 10.0.0.9:4000 connected to front");
-  EXPECT_EQ(text_from(control::Event{control::ClientEvent{"front", "10.0.0.9:4000", false, "end of file"}, 2}),
+  EXPECT_EQ(told(R"(client { sonar: "front" client: "10.0.0.9:4000" why: "end of file" } unsent: 2)"),
             "client 10.0.0.9:4000 left front: end of file  (2 events before this one were not sent: too slow a reader)");
-  EXPECT_EQ(text_from(control::Event{control::PoseEvent{"rov", true, "no pose for 1 s"}, 0}), "pose rov stale: no pose for 1 s");
-  EXPECT_EQ(text_from(control::Event{control::SceneEvent{"demo", "loaded"}, 0}), "scene demo: loaded");
-  EXPECT_THAT(text_from(control::Event{control::PingEvent{"front", 5, 0, {}, 10, 512, 437, 1, 20.04}, 0}),
-              "ping 5  front  10 m  512 beams x 437 rows  20.0 ms  1 client");
+  EXPECT_EQ(told(R"(pose { vehicle: "rov" stale: true text: "no pose for 1 s" })"), "pose rov stale: no pose for 1 s");
+  EXPECT_EQ(told(R"(scene { scene: "demo" text: "loaded" })"), "scene demo: loaded");
+  EXPECT_EQ(told(R"(ping { sonar: "front" number: 5 range_m: 10 beams: 512 rows: 437 clients: 1 simulation_ms: 20.04 })"),
+            "ping 5  front  10 m  512 beams x 437 rows  20.0 ms  1 client");
 }
 
 TEST(LoadScene, NamesFilesOfThisComputerInFull) {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "protocol/control/control.hpp"
+#include "protocol/control/answers.hpp"
 #include "protocol/control/delimited.hpp"
 #include "tests/fuzz/byte_script.hpp"
 
@@ -15,18 +15,17 @@ using fuzz::require;
 
 void answer(std::span<const std::byte> message) {
   const auto request = control::decode_request(message);
-  control::Response response;
-  response.id = request ? request->id : request.error().id;
-  response.code = request ? control::StatusCode::ok : control::StatusCode::refused;
   if (!request) {
     require(!request.error().why.empty());
-    response.text = request.error().why;
   } else if (const auto* sample = std::get_if<control::PoseSample>(&request->op)) {
     require(is_finite(sample->pose.position_m) && is_finite(sample->pose.orientation));
     require(std::abs(norm_squared(sample->pose.orientation) - 1) < 1e-9);
   }
+  const v1::Response response = request
+                                    ? control::response_of(request->id, control::StatusCode::ok)
+                                    : control::response_of(request.error().id, control::StatusCode::refused, request.error().why);
   const auto back = control::decode_response(control::encode_response(response));
-  require(back && back->id == response.id && back->code == response.code);
+  require(back && (*back)->id() == response.id() && (*back)->status().code() == response.status().code());
 }
 
 /// The messages that come out, and whether the stream ended in an error.

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "protocol/control/answers.hpp"
+
 namespace sonar::clients {
 namespace {
 
@@ -32,22 +34,24 @@ bool starts_as_http(std::span<const std::byte> received) {
   return received.size() >= http.size() && std::memcmp(received.data(), http.data(), http.size()) == 0;
 }
 
-Result<void> judge(const control::Response& answer) {
-  switch (answer.code) {
-    case control::StatusCode::ok:
+Result<void> judge(const v1::Status& answer) {
+  switch (answer.code()) {
+    case v1::Status::OK:
       return {};
-    case control::StatusCode::refused:
-    case control::StatusCode::unauthenticated:
-      return failure(ErrorKind::bad_data, "sonard refused: " + answer.text);
-    case control::StatusCode::unsupported:
+    case v1::Status::REFUSED:
+    case v1::Status::UNAUTHENTICATED:
+      return failure(ErrorKind::bad_data, "sonard refused: " + answer.text());
+    case v1::Status::FAILED:
+      return failure(ErrorKind::bad_data, "sonard failed: " + answer.text());
+    default:  // UNSUPPORTED, and codes of later versions
       return failure(ErrorKind::unavailable, "this sonard does not know the request" +
-                                                 (answer.text.empty() ? "" : " (" + answer.text + ")") +
+                                                 (answer.text().empty() ? "" : " (" + answer.text() + ")") +
                                                  ": is it of another version? sonard --version and sonarctl --version tell");
-    case control::StatusCode::failed:
-      break;
   }
-  return failure(ErrorKind::bad_data, "sonard failed: " + answer.text);
 }
+
+/// The event is kept as long as the Response that carries it.
+std::shared_ptr<const v1::Event> event_of(const ControlClient::Response& response) { return {response, &response->event()}; }
 
 }  // namespace
 
@@ -63,7 +67,7 @@ Result<ControlClient> ControlClient::open(const ControlOptions& options, bool* t
   if (!socket) return tl::unexpected(socket.error());
   ControlClient client(std::move(*socket), *at);
   const auto met = client.request(control::Hello{control::protocol_version, "sonarctl", *token}, greeting_patience);
-  if (!met && token->empty() && client.last_code_ == control::StatusCode::unauthenticated) {
+  if (!met && token->empty() && client.unauthenticated_) {
     if (token_required != nullptr) *token_required = true;
     return failure(met.error().kind, "sonard at " + text_from(*at) +
                                          " requires a token: give --token-file FILE, the file that its control.token_file names");
@@ -72,48 +76,47 @@ Result<ControlClient> ControlClient::open(const ControlOptions& options, bool* t
   return client;
 }
 
-Result<control::Response> ControlClient::request(Operation operation, std::chrono::milliseconds patience) {
+Result<ControlClient::Response> ControlClient::request(Operation operation, std::chrono::milliseconds patience) {
   const std::uint64_t id = ++last_id_;
   const auto message = control::encode_request({id, std::move(operation)});
   if (Result<void> sent = write_all(socket_, control::delimited(message)); !sent) return tl::unexpected(sent.error());
   const auto deadline = Clock::now() + patience;
   for (;;) {
-    Result<std::optional<control::Response>> answer = next_message(deadline, false);
+    const Result<Response> answer = next_message(deadline, false);
     if (!answer) return tl::unexpected(answer.error());
     if (!*answer && last_id_ == 1)  // the greeting
       return tl::unexpected(no_control_stream("no greeting within " + std::to_string(patience.count() / 1000) + " s"));
     if (!*answer)
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " did not answer within " +
                                                  std::to_string(patience.count() / 1000) + " s: is it busy, or stopped?");
-    control::Response& response = **answer;
-    if (const auto* event = std::get_if<control::Event>(&response.body); event != nullptr && response.id == 0) {
-      events_.push_back(*event);
+    const v1::Response& response = **answer;
+    if (response.has_event() && response.id() == 0) {
+      events_.push_back(event_of(*answer));
       continue;
     }
-    if (response.id != id && response.id != 0) continue;  // answer to an earlier, abandoned request
-    last_code_ = response.code;
-    if (const Result<void> sound = judge(response); !sound) return tl::unexpected(sound.error());
-    if (response.id == id) return std::move(response);
+    if (response.id() != id && response.id() != 0) continue;  // answer to an earlier, abandoned request
+    unauthenticated_ = response.status().code() == v1::Status::UNAUTHENTICATED;
+    if (const Result<void> sound = judge(response.status()); !sound) return tl::unexpected(sound.error());
+    if (response.id() == id) return *answer;
   }
 }
 
-Result<control::DaemonStatus> ControlClient::status(std::chrono::milliseconds patience) {
-  Result<control::Response> answer = request(control::GetStatus{}, patience);
+Result<std::shared_ptr<const v1::DaemonStatus>> ControlClient::status(std::chrono::milliseconds patience) {
+  const Result<Response> answer = request(control::GetStatus{}, patience);
   if (!answer) return tl::unexpected(answer.error());
-  auto* status = std::get_if<control::DaemonStatus>(&answer->body);
-  if (status == nullptr) return failure(ErrorKind::bad_data, "sonard answered the status request without a status");
-  return std::move(*status);
+  if (!(*answer)->has_daemon()) return failure(ErrorKind::bad_data, "sonard answered the status request without a status");
+  return std::shared_ptr<const v1::DaemonStatus>(*answer, &(*answer)->daemon());
 }
 
-Result<std::optional<control::Event>> ControlClient::next_event(std::chrono::milliseconds patience) {
+Result<std::shared_ptr<const v1::Event>> ControlClient::next_event(std::chrono::milliseconds patience) {
   const auto deadline = Clock::now() + patience;
   while (events_.empty()) {
-    const Result<std::optional<control::Response>> message = next_message(deadline, true);
+    const Result<Response> message = next_message(deadline, true);
     if (!message) return tl::unexpected(message.error());
-    if (!*message) return std::optional<control::Event>{};
-    if (const auto* event = std::get_if<control::Event>(&(*message)->body)) events_.push_back(*event);
+    if (!*message) return nullptr;
+    if ((*message)->has_event()) events_.push_back(event_of(*message));
   }
-  std::optional<control::Event> first = std::move(events_.front());
+  auto first = std::move(events_.front());
   events_.pop_front();
   return first;
 }
@@ -125,15 +128,15 @@ Error ControlClient::no_control_stream(const std::string& why) const {
                                    " unless configured otherwise; sonard's banner names it: --control HOST:PORT"};
 }
 
-/// nullopt at the end of the time or, with `until_signal`, after a signal.
-Result<std::optional<control::Response>> ControlClient::next_message(Clock::time_point deadline, bool until_signal) {
+/// Null at the end of the time or, with `until_signal`, after a signal.
+Result<ControlClient::Response> ControlClient::next_message(Clock::time_point deadline, bool until_signal) {
   for (;;) {
     auto message = parser_.next();
     if (!message) return tl::unexpected(no_control_stream(message.error().text));
     if (*message) {
-      Result<control::Response> response = control::decode_response(**message);
+      auto response = control::decode_response(**message);
       if (!response) return tl::unexpected(no_control_stream(response.error().text));
-      return std::optional<control::Response>(std::move(*response));
+      return response;
     }
     std::array<std::byte, 16384> chunk;
     const Read read = read_some(socket_, chunk, left_until(deadline));
@@ -142,8 +145,7 @@ Result<std::optional<control::Response>> ControlClient::next_message(Clock::time
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " closed the control stream" +
                                                  (read.error.empty() ? "" : ": " + read.error) +
                                                  "; see its log (a token, a stop)");
-    if (read.what == Wait::timed_out || (read.what == Wait::interrupted && until_signal))
-      return std::optional<control::Response>{};
+    if (read.what == Wait::timed_out || (read.what == Wait::interrupted && until_signal)) return nullptr;
     if (read.what != Wait::data) continue;
     const auto received = std::span<const std::byte>(chunk).first(read.size);
     if (!received_ && starts_as_http(received)) return tl::unexpected(no_control_stream("it speaks HTTP"));

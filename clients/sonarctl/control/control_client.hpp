@@ -4,12 +4,17 @@
 
 #include <deque>
 #include <filesystem>
-#include <optional>
+#include <memory>
 #include <string>
 
 #include "clients/sonarctl/net.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
+
+namespace sonar::v1 {  // of control.pb.h
+class DaemonStatus;
+class Event;
+}  // namespace sonar::v1
 
 namespace sonar::clients {
 
@@ -24,6 +29,7 @@ struct ControlOptions {
 class ControlClient {
  public:
   using Operation = decltype(control::Request::op);
+  using Response = std::shared_ptr<const v1::Response>;
   static constexpr std::chrono::milliseconds usual_patience{10000};
   /// sonard greets at once even when busy; a longer silence means another service.
   static constexpr std::chrono::milliseconds greeting_patience{2000};
@@ -33,25 +39,25 @@ class ControlClient {
   static Result<ControlClient> open(const ControlOptions& options, bool* token_required = nullptr);
 
   /// The answer to one request; a refusal is an error with sonard's text. Events that arrive meanwhile are kept.
-  Result<control::Response> request(Operation operation, std::chrono::milliseconds patience = usual_patience);
-  Result<control::DaemonStatus> status(std::chrono::milliseconds patience = usual_patience);
-  /// The next subscribed event; nullopt after `patience` or a signal.
-  Result<std::optional<control::Event>> next_event(std::chrono::milliseconds patience);
+  Result<Response> request(Operation operation, std::chrono::milliseconds patience = usual_patience);
+  Result<std::shared_ptr<const v1::DaemonStatus>> status(std::chrono::milliseconds patience = usual_patience);
+  /// The next subscribed event; null after `patience` or a signal.
+  Result<std::shared_ptr<const v1::Event>> next_event(std::chrono::milliseconds patience);
 
   const Endpoint& at() const { return at_; }
 
  private:
   ControlClient(Socket socket, Endpoint at) : socket_(std::move(socket)), at_(std::move(at)) {}
-  Result<std::optional<control::Response>> next_message(std::chrono::steady_clock::time_point deadline, bool until_signal);
+  Result<Response> next_message(std::chrono::steady_clock::time_point deadline, bool until_signal);
   Error no_control_stream(const std::string& why) const;
 
   Socket socket_;
   Endpoint at_;
   control::DelimitedParser parser_;
   bool received_ = false;  // a byte
-  std::deque<control::Event> events_;
+  std::deque<std::shared_ptr<const v1::Event>> events_;
   std::uint64_t last_id_ = 0;
-  control::StatusCode last_code_ = control::StatusCode::ok;  // of the last answer
+  bool unauthenticated_ = false;  // says the last answer
 };
 
 }  // namespace sonar::clients

@@ -7,6 +7,7 @@
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/control/status_text.hpp"
 #include "clients/sonarctl/terminal.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -33,10 +34,10 @@ void wait_s(double seconds) {
 Result<void> watch(ControlClient& client, const StatusOptions& options) {
   const LiveScreen screen(!options.json && terminal_facts().is_terminal);
   while (interrupted == 0) {
-    const Result<control::DaemonStatus> status = client.status();
+    const auto status = client.status();
     if (!status) return tl::unexpected(status.error());
-    const bool read = options.json ? std::puts(control::json_of(*status).c_str()) >= 0 && std::fflush(stdout) == 0
-                                   : screen.show(lines_of(text_from(*status), terminal_size().lines - 1));
+    const bool read = options.json ? std::puts(control::json_of(**status).c_str()) >= 0 && std::fflush(stdout) == 0
+                                   : screen.show(lines_of(text_from(**status), terminal_size().lines - 1));
     if (!read) break;  // output closed
     wait_s(options.period_s);
   }
@@ -49,9 +50,9 @@ Result<void> print_status(const StatusOptions& options) {
   auto client = ControlClient::open(options.control);
   if (!client) return tl::unexpected(client.error());
   if (options.watch) return watch(*client, options);
-  const Result<control::DaemonStatus> status = client->status();
+  const auto status = client->status();
   if (!status) return tl::unexpected(status.error());
-  std::fputs(options.json ? (control::json_of(*status) + "\n").c_str() : text_from(*status).c_str(), stdout);
+  std::fputs(options.json ? (control::json_of(**status) + "\n").c_str() : text_from(**status).c_str(), stdout);
   return {};
 }
 
@@ -89,13 +90,13 @@ Result<void> step_time(const StepOptions& options) {
   for (std::uint64_t n = 0; n < options.count && interrupted == 0; ++n) {
     const auto answer = client->request(control::Step{options.dt_s}, step_patience);
     if (!answer) return tl::unexpected(answer.error());
-    const auto* stepped = std::get_if<control::Stepped>(&answer->body);
-    if (stepped == nullptr) return failure(ErrorKind::bad_data, "sonard answered a step without the time");
+    if (!(*answer)->has_stepped()) return failure(ErrorKind::bad_data, "sonard answered a step without the time");
+    const v1::Stepped& stepped = (*answer)->stepped();
     if (options.json)
-      std::puts(control::json_of(*stepped).c_str());
+      std::puts(control::json_of(stepped).c_str());
     else
-      std::printf("%.9f s  %" PRIu64 " ping%s\n", 1e-9 * static_cast<double>(stepped->now_ns), stepped->pings,
-                  stepped->pings == 1 ? "" : "s");
+      std::printf("%.9f s  %" PRIu64 " ping%s\n", 1e-9 * static_cast<double>(stepped.now_ns()), stepped.pings(),
+                  stepped.pings() == 1 ? "" : "s");
     if (std::fflush(stdout) != 0) break;  // output closed
   }
   return {};
@@ -119,9 +120,9 @@ Result<void> load_scene(const ControlOptions& control, const std::string& path) 
 Result<void> list_objects(const ControlOptions& control) {
   auto client = ControlClient::open(control);
   if (!client) return tl::unexpected(client.error());
-  const Result<control::DaemonStatus> status = client->status();
+  const auto status = client->status();
   if (!status) return tl::unexpected(status.error());
-  for (const control::ObjectStatus& object : status->objects) std::puts(text_from(object).c_str());
+  for (const v1::ObjectStatus& object : (*status)->objects()) std::puts(text_from(object).c_str());
   return {};
 }
 

@@ -3,15 +3,21 @@
 
 #include <string>
 
-#include "protocol/control/operations.hpp"
+#include "core/base/geometry.hpp"
+
+namespace sonar::v1 {  // of control.pb.h
+class DaemonStatus;
+class Event;
+class ObjectStatus;
+}  // namespace sonar::v1
 
 namespace sonar::clients {
 
 /// Several lines, each with its newline.
-std::string text_from(const control::DaemonStatus& status);
+std::string text_from(const v1::DaemonStatus& status);
 /// One line without newline.
-std::string text_from(const control::ObjectStatus& object);
-std::string text_from(const control::Event& event);
+std::string text_from(const v1::ObjectStatus& object);
+std::string text_from(const v1::Event& event);
 /// "-6.00 0.00 -3.00 m, heading 90, pitch -15, roll 0 deg": east, north, up; compass; bow up; starboard down.
 std::string place_text(const Pose& body_in_world);
 

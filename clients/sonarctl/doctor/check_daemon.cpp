@@ -3,15 +3,16 @@
 
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "core/text/format.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
 
 constexpr double largest_clock_difference_s = 0.5;  // stamps of WALL poses are refused from about one second on
 
-bool serves(const control::DaemonStatus& status, const SonarFacts& sonar) {
-  return std::any_of(status.sonars.begin(), status.sonars.end(), [&sonar](const control::SonarStatus& s) {
-    return s.advertised == sonar.at.host || s.listens == text_from(sonar.at);
+bool serves(const v1::DaemonStatus& status, const SonarFacts& sonar) {
+  return std::any_of(status.sonars().begin(), status.sonars().end(), [&sonar](const v1::SonarStatus& s) {
+    return s.advertised() == sonar.at.host || s.listens() == text_from(sonar.at);
   });
 }
 
@@ -33,37 +34,37 @@ void check_control(const Facts& facts, std::vector<Finding>& findings) {
                           "without it poses, clients and engine were not checked"});
     return;
   }
-  const control::DaemonStatus& status = *control.status;
+  const v1::DaemonStatus& status = *control.status;
   findings.push_back({Level::ok, "control",
-                      at + " answers: sonard " + status.version + ", " + std::to_string(status.sonars.size()) +
-                          (status.sonars.size() == 1 ? " sonar, " : " sonars, ") + status.clock + " clock",
+                      at + " answers: sonard " + status.version() + ", " + std::to_string(status.sonars_size()) +
+                          (status.sonars_size() == 1 ? " sonar, " : " sonars, ") + status.clock() + " clock",
                       ""});
   for (const SonarFacts& sonar : facts.sonars)
     if (!serves(status, sonar))
       findings.push_back({Level::warn, "control", "that sonard does not serve " + sonar.at.host,
                           "give the control stream of the sonard that does with --control"});
-  if (!status.engine.empty()) findings.push_back({Level::ok, "engine", "trace backend: " + status.engine, ""});
+  if (!status.engine().empty()) findings.push_back({Level::ok, "engine", "trace backend: " + status.engine(), ""});
 }
 
 /// True when the daemon reports faults of the vehicle's poses.
-bool has_notes(const control::DaemonStatus& status, const std::string& vehicle) {
-  return std::any_of(status.notes.begin(), status.notes.end(),
-                     [&vehicle](const control::Note& note) { return note.vehicle == vehicle; });
+bool has_notes(const v1::DaemonStatus& status, const std::string& vehicle) {
+  return std::any_of(status.notes().begin(), status.notes().end(),
+                     [&vehicle](const v1::Note& note) { return note.vehicle() == vehicle; });
 }
 
-void check_poses(const control::DaemonStatus& status, std::vector<Finding>& findings) {
-  for (const control::VehicleStatus& v : status.vehicles) {
-    if (v.stale)
-      findings.push_back({Level::warn, "poses", "poses of " + v.name + " have stopped, the last came from " + v.source,
+void check_poses(const v1::DaemonStatus& status, std::vector<Finding>& findings) {
+  for (const v1::VehicleStatus& v : status.vehicles()) {
+    if (v.stale())
+      findings.push_back({Level::warn, "poses", "poses of " + v.name() + " have stopped, the last came from " + v.source(),
                           "start the sender again, or choose poses.on_stale for the time without poses"});
-    else if (!has_notes(status, v.name))
-      findings.push_back({Level::ok, "poses", "poses of " + v.name + ": " + v.source, ""});
+    else if (!has_notes(status, v.name()))
+      findings.push_back({Level::ok, "poses", "poses of " + v.name() + ": " + v.source(), ""});
   }
-  for (const control::Note& note : status.notes) findings.push_back({Level::warn, "note", note.text, note.cure});
-  if (status.poses.refused > 0)
+  for (const v1::Note& note : status.notes()) findings.push_back({Level::warn, "note", note.text(), note.cure()});
+  if (status.poses().refused() > 0)
     findings.push_back({Level::warn, "poses",
-                        std::to_string(status.poses.refused) + " messages were refused as poses, " +
-                            std::to_string(status.poses.accepted) + " accepted",
+                        std::to_string(status.poses().refused()) + " messages were refused as poses, " +
+                            std::to_string(status.poses().accepted()) + " accepted",
                         "see sonard's log for the reason: not JSON, the frame, a quaternion's norm, a name, the clock"});
 }
 
@@ -88,9 +89,9 @@ void check_http(const Facts& facts, std::vector<Finding>& findings) {
 }
 
 /// When one address was given, the other sonars were not examined.
-bool was_examined(const Facts& facts, const control::SonarStatus& sonar) {
+bool was_examined(const Facts& facts, const v1::SonarStatus& sonar) {
   return !facts.address_given || std::any_of(facts.sonars.begin(), facts.sonars.end(),
-                                             [&sonar](const SonarFacts& s) { return s.at.host == sonar.advertised; });
+                                             [&sonar](const SonarFacts& s) { return s.at.host == sonar.advertised(); });
 }
 
 void check_heads(const Facts& facts, std::vector<Finding>& findings) {
@@ -98,14 +99,14 @@ void check_heads(const Facts& facts, std::vector<Finding>& findings) {
     findings.push_back({Level::ok, "blueview",
                         "BlueView head " + head.model + " (" + head.serial + ") answers discovery at tcp " + head.at, ""});
   if (!facts.control.status) return;
-  for (const control::SonarStatus& sonar : facts.control.status->sonars) {
-    if (!sonar.listens.ends_with(":14750") || !was_examined(facts, sonar)) continue;
+  for (const v1::SonarStatus& sonar : facts.control.status->sonars()) {
+    if (!sonar.listens().ends_with(":14750") || !was_examined(facts, sonar)) continue;
     const auto answered = [&sonar](const BlueViewHead& head) {
-      return head.at == sonar.advertised + ":14750" || head.at == sonar.listens;
+      return head.at == sonar.advertised() + ":14750" || head.at == sonar.listens();
     };
     if (std::none_of(facts.heads.begin(), facts.heads.end(), answered))
       findings.push_back({Level::warn, "blueview",
-                          "BlueView sonar " + sonar.name + " at " + sonar.listens + " does not answer discovery on udp 14751",
+                          "BlueView sonar " + sonar.name() + " at " + sonar.listens() + " does not answer discovery on udp 14751",
                           "hosts that are given its address need no discovery; else see whether a firewall drops udp 14751"});
   }
 }

@@ -2,6 +2,7 @@
 
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "core/text/format.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -12,7 +13,7 @@ using text::format;
 constexpr double fastest_hz = 40;  // that an Oculus can be asked for
 constexpr const char* less_to_compute = "fewer beams, less range, more threads (engine.threads), or less else on this computer";
 
-std::string joined(const std::vector<std::string>& words) {
+std::string joined(const auto& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
   return text;
@@ -91,7 +92,7 @@ class SonarChecks {
     std::string cure =
         "a firewall may drop udp " + port + " (nft list ruleset; ufw status), or status_to of the sonar must name this computer";
     if (sonar_.reported)
-      cure = "it is sent to " + joined(sonar_.reported->status_to) + ": does that reach this computer? See status_to; " +
+      cure = "it is sent to " + joined(sonar_.reported->status_to()) + ": does that reach this computer? See status_to; " +
              (is_loopback(sonar_.at.host) ? "127.255.255.255 reaches every listener here" : "a firewall may drop udp " + port);
     add(Level::fail, "status", text, cure);
   }
@@ -145,9 +146,9 @@ class SonarChecks {
     if (!sonar_.listeners.empty() && sonar_.listeners.front().pid != 0 && sonar_.listeners.front().program != "sonard")
       return add(Level::fail, "ping", text + ": " + text_of(sonar_.listeners.front()) + " has the port, not sonard",
                  "stop it, or give the sonar's own address");
-    if (sonar_.reported && sonar_.reported->figures.refused > 0)
+    if (sonar_.reported && sonar_.reported->figures().refused() > 0)
       return add(Level::fail, "ping",
-                 text + ": the engine refused " + std::to_string(sonar_.reported->figures.refused) + " of them",
+                 text + ": the engine refused " + std::to_string(sonar_.reported->figures().refused()) + " of them",
                  "see the reason in sonard's log");
     if (clock() == "lockstep" || clock() == "follow")
       return add(Level::warn, "ping",
@@ -160,7 +161,7 @@ class SonarChecks {
   }
 
   /// The clock mode that the daemon reports: "realtime", "stepped", ...; empty without a daemon.
-  std::string clock() const { return facts_.control.status ? facts_.control.status->clock : std::string(); }
+  std::string clock() const { return facts_.control.status ? facts_.control.status->clock() : std::string(); }
 
   /// Names an address where a sonar does listen.
   std::string where_else() const {
@@ -189,9 +190,10 @@ class SonarChecks {
 
   std::string stats_of_daemon() const {
     if (!sonar_.reported) return " (--take connects anyway)";
-    const control::SonarFigures& f = sonar_.reported->figures;
-    return "; it reports " + std::to_string(f.served) + " pings served, " + std::to_string(f.dropped) + " dropped, latency " +
-           format("%.0f", f.latency_ms_p50) + " ms p50, " + format("%.0f", f.latency_ms_p99) + " ms p99 (--take connects anyway)";
+    const v1::SonarFigures& f = sonar_.reported->figures();
+    return "; it reports " + std::to_string(f.served()) + " pings served, " + std::to_string(f.dropped()) + " dropped, latency " +
+           format("%.0f", f.latency_ms_p50()) + " ms p50, " + format("%.0f", f.latency_ms_p99()) +
+           " ms p99 (--take connects anyway)";
   }
 
   std::string latency_text() const {
@@ -200,8 +202,8 @@ class SonarChecks {
       return ", image latency " + format("%.0f", p50) + " ms p50, " + format("%.0f", p99) + " ms p99";
     };
     if (s.latency_p50_ms) return both(*s.latency_p50_ms, s.latency_p99_ms.value_or(*s.latency_p50_ms));
-    if (sonar_.reported && sonar_.reported->figures.latency_ms_p99 > 0)
-      return both(sonar_.reported->figures.latency_ms_p50, sonar_.reported->figures.latency_ms_p99);
+    if (sonar_.reported && sonar_.reported->figures().latency_ms_p99() > 0)
+      return both(sonar_.reported->figures().latency_ms_p50(), sonar_.reported->figures().latency_ms_p99());
     if (s.spread_p99_ms) return ", images come " + format("%.0f", *s.spread_p99_ms) + " ms later than the earliest, p99";
     return {};
   }
@@ -209,7 +211,7 @@ class SonarChecks {
   /// Computing time of one ping: median of those just received, else the mean since the start of the daemon; 0 = unknown.
   double computing_ms() const {
     if (sonar_.stream.computing_ms) return *sonar_.stream.computing_ms;
-    return sonar_.reported ? sonar_.reported->figures.simulation_ms : 0;
+    return sonar_.reported ? sonar_.reported->figures().simulation_ms() : 0;
   }
   bool too_slow_for(double rate_hz) const { return computing_ms() * rate_hz > 1000; }
   std::string computing_text() const {
@@ -219,10 +221,11 @@ class SonarChecks {
 
   /// The rate that another, connected client requested.
   void check_rate_of_others() {
-    if (!sonar_.reported || !sonar_.reported->pinging || clock() != "realtime" || !too_slow_for(sonar_.reported->rate_hz)) return;
+    if (!sonar_.reported || !sonar_.reported->pinging() || clock() != "realtime" || !too_slow_for(sonar_.reported->rate_hz()))
+      return;
     add(Level::warn, "rate",
-        "rate " + format("%g", sonar_.reported->rate_hz) + " Hz requested by " + joined(sonar_.clients) + ", " +
-            computing_text() + ", " + std::to_string(sonar_.reported->figures.skipped_ticks) + " ticks skipped",
+        "rate " + format("%g", sonar_.reported->rate_hz()) + " Hz requested by " + joined(sonar_.clients) + ", " +
+            computing_text() + ", " + std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",
         less_to_compute);
   }
 
@@ -236,7 +239,7 @@ class SonarChecks {
                  format("%.1f", s.rate_hz) +
                      " pings per second of this computer's clock; the daemon uses another (clock: " + clock() + ")",
                  "");
-    const double expected_hz = s.asked && !sonar_.blueview ? s.asked_hz : sonar_.reported ? sonar_.reported->rate_hz : 0;
+    const double expected_hz = s.asked && !sonar_.blueview ? s.asked_hz : sonar_.reported ? sonar_.reported->rate_hz() : 0;
     std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
     if (expected_hz > 0) text += (sonar_.blueview ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
     text += latency_text();

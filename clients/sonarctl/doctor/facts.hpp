@@ -2,12 +2,17 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "clients/sonarctl/net.hpp"
-#include "protocol/control/operations.hpp"
+
+namespace sonar::v1 {  // of control.pb.h
+class DaemonStatus;
+class SonarStatus;
+}  // namespace sonar::v1
 
 namespace sonar::clients::doctor {
 
@@ -56,20 +61,20 @@ struct SonarFacts {
   std::string name;        // from the control stream; empty = not known
   std::string unresolved;  // why its name has no address
   bool on_this_host = false;
-  bool out_of_time = false;                      // not examined, for lack of time
-  std::vector<std::string> clients;              // connected already, before us
-  std::vector<PortHolder> listeners;             // of its port, on this computer
-  std::optional<control::SonarStatus> reported;  // after the pings
+  bool out_of_time = false;                         // not examined, for lack of time
+  std::vector<std::string> clients;                 // connected already, before us
+  std::vector<PortHolder> listeners;                // of its port, on this computer
+  std::shared_ptr<const v1::SonarStatus> reported;  // after the pings; null = the daemon does not know it
   StreamFacts stream;
 };
 
 struct ControlFacts {
   Endpoint at;
-  bool given = false;           // by the user: then no answer is an error
-  std::string error;            // why there is no status
-  bool token_required = false;  // the reason, and none was given
-  std::optional<control::DaemonStatus> status;
-  std::optional<double> clock_ahead_s;  // the daemon's clock against ours, other computers only
+  bool given = false;                              // by the user: then no answer is an error
+  std::string error;                               // why there is no status
+  bool token_required = false;                     // the reason, and none was given
+  std::shared_ptr<const v1::DaemonStatus> status;  // null = there is none
+  std::optional<double> clock_ahead_s;             // the daemon's clock against ours, other computers only
 };
 struct HttpFacts {
   enum class Place {

@@ -6,6 +6,7 @@
 #include "clients/sonarctl/doctor/proc_net.hpp"
 #include "clients/sonarctl/doctor/watch_pings.hpp"
 #include "protocol/blueview/frames.hpp"
+#include "protocol/control/answers.hpp"
 #include "protocol/oculus/messages.hpp"
 
 namespace sonar::clients::doctor {
@@ -69,7 +70,7 @@ class Gathering {
       return;
     }
     facts_.control.status = std::move(*status);
-    if (facts_.control.status->clock == "realtime" &&
+    if (facts_.control.status->clock() == "realtime" &&
         client->request(control::Subscribe{true, false, false, false}, until(short_patience)))
       control_.emplace(std::move(*client));
   }
@@ -77,12 +78,12 @@ class Gathering {
   /// At the address given by the user, else that reported by the daemon, else the default.
   void ask_http(Endpoint at) {
     const bool given = !questions_.http.empty();
-    const std::optional<control::DaemonStatus>& status = facts_.control.status;
-    if (!given && status && !status->control.empty()) {  // older versions report neither
-      at = parse_endpoint(status->http, usual_http).value_or(usual_http);
+    const auto& status = facts_.control.status;
+    if (!given && status && !status->control().empty()) {  // older versions report neither
+      at = parse_endpoint(status->http(), usual_http).value_or(usual_http);
       if (at.host == "0.0.0.0") at.host = facts_.control.at.host;
       facts_.http.at = at;
-      if (status->http.empty()) facts_.http.place = HttpFacts::Place::not_served;
+      if (status->http().empty()) facts_.http.place = HttpFacts::Place::not_served;
       const auto daemon = ipv4_of(facts_.control.at.host);
       const bool another_computer = daemon && !is_on_this_host(*daemon);
       if (at.host.starts_with("127.") && another_computer) facts_.http.place = HttpFacts::Place::only_over_there;
@@ -108,7 +109,7 @@ class Gathering {
       return add_sonar(with_port(given), "");
     }
     if (facts_.control.status)
-      for (const control::SonarStatus& s : facts_.control.status->sonars) add_sonar({s.advertised, port_of(s)}, s.name);
+      for (const v1::SonarStatus& s : facts_.control.status->sonars()) add_sonar({s.advertised(), port_of(s)}, s.name());
     if (facts_.sonars.empty()) {
       status_.listen("", no_later_than(start_ + first_status));
       for (const ReceivedStatus& received : status_.facts().received) add_sonar({received.advertised, oculus::tcp_port}, "");
@@ -118,20 +119,20 @@ class Gathering {
     if (facts_.sonars.empty()) add_sonar(with_port(given), "");
   }
 
-  static std::uint16_t port_of(const control::SonarStatus& s) {
+  static std::uint16_t port_of(const v1::SonarStatus& s) {
     const std::uint16_t usual = is_blueview(s) ? blueview::tcp_port : oculus::tcp_port;
-    return parse_endpoint(s.listens, {"", usual}).value_or(Endpoint{"", usual}).port;
+    return parse_endpoint(s.listens(), {"", usual}).value_or(Endpoint{"", usual}).port;
   }
-  static bool is_blueview(const control::SonarStatus& s) { return s.profile.starts_with("blueview-"); }
-  static bool is_at(const control::SonarStatus& s, const std::string& host) {
-    return s.advertised == host || s.listens.starts_with(host + ":");
+  static bool is_blueview(const v1::SonarStatus& s) { return s.profile().starts_with("blueview-"); }
+  static bool is_at(const v1::SonarStatus& s, const std::string& host) {
+    return s.advertised() == host || s.listens().starts_with(host + ":");
   }
 
   /// Without a port: that of the sonar known at this address.
   Endpoint with_port(const Endpoint& given) const {
     if (given.port != 0) return given;
     if (facts_.control.status)
-      for (const control::SonarStatus& s : facts_.control.status->sonars)
+      for (const v1::SonarStatus& s : facts_.control.status->sonars())
         if (is_at(s, given.host)) return {given.host, port_of(s)};
     for (const BlueViewHead& head : facts_.heads)
       if (head.at.starts_with(given.host + ":")) return *parse_endpoint(head.at, {});
@@ -139,7 +140,7 @@ class Gathering {
   }
   bool is_blueview(const Endpoint& at) const {
     if (facts_.control.status)
-      for (const control::SonarStatus& s : facts_.control.status->sonars)
+      for (const v1::SonarStatus& s : facts_.control.status->sonars())
         if (is_at(s, at.host) && port_of(s) == at.port) return is_blueview(s);
     return at.port == blueview::tcp_port || std::any_of(facts_.heads.begin(), facts_.heads.end(),
                                                         [&at](const BlueViewHead& head) { return head.at == text_from(at); });
@@ -153,18 +154,19 @@ class Gathering {
     facts_.sonars.push_back(std::move(sonar));
   }
 
-  const control::SonarStatus* reported_by(const SonarFacts& sonar, const control::DaemonStatus& status) const {
-    for (const control::SonarStatus& s : status.sonars)
-      if (is_at(s, sonar.at.host) && port_of(s) == sonar.at.port) return &s;
+  /// Null = the daemon serves none there.
+  static std::shared_ptr<const v1::SonarStatus> reported_by(const SonarFacts& sonar,
+                                                            const std::shared_ptr<const v1::DaemonStatus>& status) {
+    for (const v1::SonarStatus& s : status->sonars())
+      if (is_at(s, sonar.at.host) && port_of(s) == sonar.at.port) return {status, &s};
     return nullptr;
   }
 
   void note_clients(SonarFacts& sonar, const std::vector<SocketLine>& sockets) {
-    const control::SonarStatus* reported = facts_.control.status ? reported_by(sonar, *facts_.control.status) : nullptr;
-    if (reported != nullptr) {
-      sonar.reported = *reported;
-      if (sonar.name.empty()) sonar.name = reported->name;
-      for (const control::ClientStatus& client : reported->clients) sonar.clients.push_back(client.address);
+    if (facts_.control.status) sonar.reported = reported_by(sonar, facts_.control.status);
+    if (sonar.reported) {
+      if (sonar.name.empty()) sonar.name = sonar.reported->name();
+      for (const v1::ClientStatus& client : sonar.reported->clients()) sonar.clients.push_back(client.address());
       return;
     }
     // Without a daemon: the connections of this computer's kernel, else the client named by the status message.
@@ -204,8 +206,8 @@ class Gathering {
   void update_stats(SonarFacts& sonar) {
     if (!control_) return;
     const auto status = control_->status(until(short_patience));
-    const control::SonarStatus* reported = status ? reported_by(sonar, *status) : nullptr;
-    if (reported != nullptr) sonar.reported = *reported;
+    if (!status) return;
+    if (auto reported = reported_by(sonar, *status)) sonar.reported = std::move(reported);
   }
 
   void listen_to_all() {

@@ -7,6 +7,7 @@
 #include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -63,12 +64,12 @@ class Watch {
     for (int i = 0; i < 1000; ++i) {
       const auto event = control.next_event(i == 0 ? 50ms : 0ms);
       if (!event || !*event) break;
-      const auto* ping = std::get_if<control::PingEvent>(&(*event)->what);
-      if (ping == nullptr || ping->sonar != sonar) continue;
-      const auto arrived = arrived_unix_s_.find(ping->number);
+      const v1::PingEvent& ping = (*event)->ping();
+      if (!(*event)->has_ping() || ping.sonar() != sonar) continue;
+      const auto arrived = arrived_unix_s_.find(ping.number());
       if (arrived == arrived_unix_s_.end()) continue;
-      daemon_times.delays_s.push_back(arrived->second - static_cast<double>(ping->fired_at_ns) * 1e-9);
-      daemon_times.computing_ms.push_back(ping->simulation_ms);
+      daemon_times.delays_s.push_back(arrived->second - static_cast<double>(ping.fired_at_ns()) * 1e-9);
+      daemon_times.computing_ms.push_back(ping.simulation_ms());
     }
     return daemon_times;
   }

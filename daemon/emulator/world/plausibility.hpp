@@ -11,11 +11,16 @@
 
 #include "core/scene/extent.hpp"
 #include "daemon/config/config.hpp"
-#include "protocol/control/operations.hpp"
+#include "protocol/control/pose_sample.hpp"
 
 namespace sonar {
 
-using control::Note;
+/// Something that was probably not meant, or a step that is still missing.
+struct Note {
+  std::string vehicle;  // the note's subject; empty = the scene or a sonar
+  std::string text;     // a sentence
+  std::string cure;     // what to change
+};
 
 /// "the sonar of rov is 3.0 m above the water's surface (z = 0); ENU_FLU counts z upwards ..."
 std::string text_of(const Note& note);

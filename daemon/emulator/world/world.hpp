@@ -79,13 +79,13 @@ class World {
 
   /// Pauses, resumes, seeks a trajectory or changes its speed, from `now` on. Empty, or one sentence why not.
   std::string steer(const control::SetTrajectory& asked, Time now);
-  /// What of a trajectory is shown; nothing where none is played.
-  std::optional<control::TrajectoryStatus> vehicle_plays(std::size_t vehicle, Time now) const {
-    return plays(vehicles_[vehicle], now);
-  }
-  std::optional<control::TrajectoryStatus> object_plays(std::size_t object, Time now) const {
-    return plays(objects_[object], now);
-  }
+  /// The trajectory that a body follows; valid until the World changes.
+  struct Played {
+    const std::string& file;
+    const motion::Playback& playback;
+  };
+  std::optional<Played> vehicle_plays(std::size_t vehicle) const { return plays(vehicles_[vehicle]); }
+  std::optional<Played> object_plays(std::size_t object) const { return plays(objects_[object]); }
 
   Pose vehicle_at(std::size_t vehicle, Time t) const { return pose_at(vehicles_[vehicle], t); }
   /// How it moves then, as vehicle_at() carries it on; at rest where that is faster than anything that carries a sonar.
@@ -156,7 +156,10 @@ class World {
   Pose orbit(const Pose& initial, Time t) const;
   /// Of a body that follows its trajectory; moving as fast as it is played.
   static motion::Moment played(const Track& track, Time t);
-  static std::optional<control::TrajectoryStatus> plays(const Track& track, Time now);
+  static std::optional<Played> plays(const Track& track) {
+    if (!track.body.plan || !track.history.empty()) return std::nullopt;
+    return Played{track.body.plan.file, track.playback};
+  }
 
   PoseRules rules_;
   std::vector<Track> vehicles_, objects_;

@@ -13,18 +13,6 @@ motion::Moment World::played(const Track& track, Time t) {
   return moment;
 }
 
-std::optional<control::TrajectoryStatus> World::plays(const Track& track, Time now) {
-  if (!track.body.plan || !track.history.empty()) return std::nullopt;
-  control::TrajectoryStatus status;
-  status.file = track.body.plan.file;
-  status.position_s = seconds(track.playback.place(now).at);
-  status.duration_s = seconds(track.playback.duration());
-  status.speed = track.playback.rules().speed.factor();
-  status.paused = track.playback.paused();
-  status.loop = track.playback.rules().loop;
-  return status;
-}
-
 std::string World::steer(const control::SetTrajectory& asked, Time now) {
   std::string refusal;
   Track* const track = find(asked.of, asked.name, refusal);

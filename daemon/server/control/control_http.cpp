@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "daemon/server/control/event_queue.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar {
 namespace {
@@ -12,8 +12,8 @@ using control::StatusCode;
 HttpAnswer answer_from(const OperationResult& result) {
   if (result.code == OperationResult::Code::refused) return answer_of(400, StatusCode::refused, result.text);
   if (result.code == OperationResult::Code::failed) return answer_of(409, StatusCode::failed, result.text);
-  if (const auto* status = std::get_if<control::DaemonStatus>(&result.body)) return {200, control::json_of(*status) + "\n"};
-  if (const auto* stepped = std::get_if<control::Stepped>(&result.body)) return {200, control::json_of(*stepped) + "\n"};
+  if (result.status) return {200, control::json_of(*result.status) + "\n"};
+  if (result.stepped) return {200, control::json_of(*result.stepped) + "\n"};
   return answer_of(200, StatusCode::ok, result.text);
 }
 
@@ -64,7 +64,7 @@ HttpStream ControlHttp::stream_of(const control::Subscribe& wanted) {
   HttpStream stream;
   stream.type = "application/x-ndjson";
   stream.subscribe = [&events = targets_.events, queue](std::function<void()> wake) {
-    return events.listen([queue, wake = std::move(wake)](const control::Event& event) {
+    return events.listen([queue, wake = std::move(wake)](const v1::Event& event) {
       if (queue->offer(event)) wake();
     });
   };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "daemon/server/connections/shared_rate.hpp"
+#include "daemon/server/events.hpp"
 #include "daemon/server/operations.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 

@@ -4,11 +4,12 @@
 #include <utility>
 
 #include "daemon/server/control/http_rules.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar {
 namespace {
 
-using control::Response;
+using control::response_of;
 using control::StatusCode;
 
 constexpr std::size_t longest_before_hello = 4096;  // less than a message may have later
@@ -26,10 +27,17 @@ bool is_unasked(std::uint64_t id, const auto& operation) {
   return id == 0 && std::holds_alternative<control::PoseSample>(operation);
 }
 
-Response response_of(std::uint64_t id, OperationResult result) {
-  Response response{id, code_of(result.code), std::move(result.text), false};
-  if (auto* status = std::get_if<control::DaemonStatus>(&result.body)) response.body = std::move(*status);
-  if (const auto* stepped = std::get_if<control::Stepped>(&result.body)) response.body = *stepped;
+v1::Response response_to(std::uint64_t id, const OperationResult& result) {
+  v1::Response response = response_of(id, code_of(result.code), result.text);
+  if (result.status) *response.mutable_daemon() = *result.status;
+  if (result.stepped) *response.mutable_stepped() = *result.stepped;
+  return response;
+}
+
+v1::Response greeting(std::uint64_t id, StatusCode code, const std::string& text) {
+  v1::Response response = response_of(id, code, text);
+  response.mutable_hello()->set_protocol_version(control::protocol_version);
+  response.mutable_hello()->set_name("sonard");
   return response;
 }
 
@@ -126,7 +134,7 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
       targets_.poses.refuse(request.error().why, sender_);
     else
       log_refusal(services_, request.error().why, sender_.id);
-    answer({request.error().id, StatusCode::refused, request.error().why, false});
+    answer(response_of(request.error().id, StatusCode::refused, request.error().why));
     return greeted_ && request.error().is_protobuf;
   }
   if (const auto* hello = std::get_if<control::Hello>(&request->op)) return greet(request->id, *hello);
@@ -137,7 +145,7 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
 
 bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
   if (hello.protocol_version != control::protocol_version) {
-    answer({id, StatusCode::refused, "protocol_version must be " + std::to_string(control::protocol_version), true});
+    answer(greeting(id, StatusCode::refused, "protocol_version must be " + std::to_string(control::protocol_version)));
     return false;
   }
   if (!services_.token.matches(hello.token))
@@ -145,20 +153,20 @@ bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
                           hello.token.empty() ? "token required: send the token of control.token_file in the Hello"
                                               : "the token in the Hello is not that of control.token_file");
   if (claim_slot_ && !claim_slot_()) {
-    answer({id, StatusCode::failed, "all connection slots are in use; try again, or close another client", false});
+    answer(response_of(id, StatusCode::failed, "all connection slots are in use; try again, or close another client"));
     return false;
   }
   claim_slot_ = nullptr;
   greeted_ = true;
   greeting_->none();
   services_.log.debug("control client", {{"from", sender_.id}, {"name", hello.name.substr(0, 64)}});
-  answer({id, StatusCode::ok, "", true});
+  answer(greeting(id, StatusCode::ok, ""));
   return true;
 }
 
 bool StreamConnection::refuse_and_end(std::uint64_t id, StatusCode code, const std::string& why) {
   log_refusal(services_, why, sender_.id);
-  answer({id, code, why, false});
+  answer(response_of(id, code, why));
   return false;
 }
 
@@ -168,11 +176,11 @@ bool StreamConnection::accept_greeted(const control::Request& request) {
         using Op = std::decay_t<decltype(op)>;
         if constexpr (std::is_same_v<Op, control::Subscribe>) {
           subscribe(op);
-          answer({request.id, StatusCode::ok, "", false});
+          answer(response_of(request.id, StatusCode::ok));
         } else if constexpr (std::is_constructible_v<control::Operation, Op>) {
           perform(request.id, op);
         } else {
-          answer({request.id, StatusCode::unsupported, "this version does not support the request", false});
+          answer(response_of(request.id, StatusCode::unsupported, "this version does not support the request"));
         }
       },
       request.op);
@@ -189,7 +197,7 @@ void StreamConnection::perform(std::uint64_t id, const control::Operation& opera
     if (!unasked) --self->in_progress_;
     self->wake_reader_.cancel();
     const bool silent = unasked && result.code == OperationResult::Code::done;
-    if (!silent) self->answer(response_of(id, std::move(result)));
+    if (!silent) self->answer(response_to(id, result));
   });
 }
 
@@ -198,7 +206,7 @@ void StreamConnection::subscribe(const control::Subscribe& wanted) {
   if (!events_.subscribes_any()) {
     subscription_.reset();
   } else if (!subscription_) {
-    subscription_ = targets_.events.listen([weak = weak_from_this()](const control::Event& event) {
+    subscription_ = targets_.events.listen([weak = weak_from_this()](const v1::Event& event) {
       if (const auto self = weak.lock(); self && self->events_.offer(event)) self->wake_writer_.cancel();
     });
   }
@@ -206,7 +214,7 @@ void StreamConnection::subscribe(const control::Subscribe& wanted) {
 
 // ---- answers and events
 
-void StreamConnection::answer(const Response& response) {
+void StreamConnection::answer(const v1::Response& response) {
   answers_.push_back(control::delimited(control::encode_response(response)));
   wake_writer_.cancel();
 }
@@ -219,8 +227,9 @@ asio::awaitable<void> StreamConnection::write() {
       if (!co_await write_whole(std::move(bytes))) break;
       wake_reader_.cancel();
     } else if (auto event = events_.next()) {
-      const Response response{0, StatusCode::ok, "", false, *std::move(event)};
-      if (!co_await write_whole(control::delimited(control::encode_response(response)))) break;
+      v1::Response response = response_of(0, StatusCode::ok);
+      *response.mutable_event() = std::move(*event);
+      if (!co_await write_whole(control::delimited(control::encode_response(std::move(response))))) break;
     } else if (ending_ && in_progress_ == 0) {
       error_code ec;
       socket_.shutdown(tcp::socket::shutdown_send, ec);

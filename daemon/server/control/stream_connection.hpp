@@ -11,7 +11,6 @@
 #include "daemon/server/connections/connection_services.hpp"
 #include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/control/control_targets.hpp"
-#include "daemon/server/control/event_queue.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 
@@ -50,7 +49,7 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   bool accept_greeted(const control::Request& request);
   void perform(std::uint64_t id, const control::Operation& operation);
   void subscribe(const control::Subscribe& wanted);
-  void answer(const control::Response& response);
+  void answer(const v1::Response& response);
   bool refuse_and_end(std::uint64_t id, control::StatusCode code, const std::string& why);
   asio::awaitable<bool> write_whole(control::Bytes bytes);
 

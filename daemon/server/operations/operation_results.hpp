@@ -9,8 +9,8 @@
 
 namespace sonar {
 
-inline OperationResult refused(std::string text) { return {OperationResult::Code::refused, std::move(text), {}}; }
-inline OperationResult failed(std::string text) { return {OperationResult::Code::failed, std::move(text), {}}; }
+inline OperationResult refused(std::string text) { return {OperationResult::Code::refused, std::move(text)}; }
+inline OperationResult failed(std::string text) { return {OperationResult::Code::failed, std::move(text)}; }
 /// Empty = done.
 inline OperationResult done_or_refused(std::string why) { return why.empty() ? OperationResult{} : refused(std::move(why)); }
 /// Mistakes in the request are refused; all else has failed.

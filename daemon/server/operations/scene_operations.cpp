@@ -19,7 +19,7 @@ bool is_the_worlds(const Scene& scene, const control::SetObject& asked) {
 
 void SceneOperations::log_change(const std::string& what, const Sender& sender) {
   log_.info("scene: " + what, {{"scene", changes_.scene()->name}, {"client", sender.id}});
-  if (events_.has_listeners()) events_.publish({control::SceneEvent{config_.scene.name(), what}});
+  events_.publish_scene(config_.scene.name(), what);
 }
 
 void SceneOperations::edit(Edit edit, const std::string& what, const Sender& sender, Operations::Done done) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "daemon/config/config.hpp"
+#include "daemon/server/events.hpp"
 #include "daemon/server/operations.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/scene_changes.hpp"

@@ -1,51 +1,104 @@
 #include "daemon/server/operations/status_report.hpp"
 
 #include "daemon/server/system/process_figures.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar {
 namespace {
 
-std::vector<control::ObjectStatus> objects_of(const Scene& scene, const World& world, Time now) {
-  std::vector<control::ObjectStatus> all;
+/// Of a vehicle or an object.
+template <class Body>
+void set_trajectory(Body& out, const std::optional<World::Played>& played, Time now) {
+  if (!played) return;
+  const motion::Playback& playback = played->playback;
+  v1::TrajectoryStatus& t = *out.mutable_trajectory();
+  t.set_file(played->file);
+  t.set_position_s(seconds(playback.place(now).at));
+  t.set_duration_s(seconds(playback.duration()));
+  t.set_speed(playback.rules().speed.factor());
+  t.set_paused(playback.paused());
+  t.set_loop(playback.rules().loop);
+}
+
+void add_vehicles(v1::DaemonStatus& out, const Config& config, const World& world, Time now) {
+  for (std::size_t i = 0; i < config.vehicles.size(); ++i) {
+    v1::VehicleStatus& v = *out.add_vehicles();
+    v.set_name(config.vehicles[i].name);
+    v.set_source(std::string(world.source_of(i)));
+    v.set_stale(world.is_stale(i, now));
+    control::set_pose(v, world.vehicle_at(i, now));
+    set_trajectory(v, world.vehicle_plays(i), now);
+  }
+}
+
+void add_objects(v1::DaemonStatus& out, const Scene& scene, const World& world, Time now) {
   const std::vector<Pose> bodies = world.objects_at(now);
   for (const Object& o : scene.objects) {
     if (o.name.empty()) continue;  // the place of one that was removed
-    control::ObjectStatus object;
-    object.name = o.name;
-    object.moving = body_named(scene, o.name) >= 0;
-    object.visible = o.visible && (o.body < 0 || !world.is_hidden(static_cast<std::size_t>(o.body)));
-    object.triangles = static_cast<std::uint32_t>(o.mesh->triangles.size());
-    if (!o.mesh->material.empty()) object.material = scene.materials.at(o.mesh->material.front()).name;
-    object.in_world = scene.in_world(o, bodies);
-    if (o.body >= 0) object.trajectory = world.object_plays(static_cast<std::size_t>(o.body), now);
-    all.push_back(std::move(object));
+    v1::ObjectStatus& object = *out.add_objects();
+    object.set_name(o.name);
+    object.set_moving(body_named(scene, o.name) >= 0);
+    object.set_visible(o.visible && (o.body < 0 || !world.is_hidden(static_cast<std::size_t>(o.body))));
+    object.set_triangles(static_cast<std::uint32_t>(o.mesh->triangles.size()));
+    if (!o.mesh->material.empty()) object.set_material(scene.materials.at(o.mesh->material.front()).name);
+    control::set_pose(object, scene.in_world(o, bodies));
+    if (o.body >= 0) set_trajectory(object, world.object_plays(static_cast<std::size_t>(o.body)), now);
   }
-  return all;
 }
+
+void fill(v1::PoseFigures& out, const PoseCounters& counters) {
+  out.set_accepted(counters.accepted);
+  out.set_refused(counters.refused);
+  out.set_late(counters.late);
+  out.set_replaced(counters.replaced);
+  out.set_over_rate(counters.over_rate);
+}
+
+void fill(v1::Environment& out, const Water& water) {
+  out.mutable_temperature_c()->set_value(water.temperature_c);
+  out.mutable_salinity_psu()->set_value(water.salinity_psu);
+  out.mutable_ph()->set_value(water.ph);
+  out.mutable_sound_speed_mps()->set_value(water.sound_speed_mps);
+}
+
+void add_notes(v1::DaemonStatus& out, const std::vector<Note>& notes) {
+  for (const Note& n : notes) {
+    v1::Note& note = *out.add_notes();
+    note.set_vehicle(n.vehicle);
+    note.set_text(n.text);
+    note.set_cure(n.cure);
+  }
+}
+
+/// Empty = no listener.
+std::string address(Endpoint at) { return at.port == 0 ? std::string() : text_of(at); }
 
 }  // namespace
 
-control::DaemonStatus StatusReport::status() const {
+std::shared_ptr<const v1::DaemonStatus> StatusReport::status() const {
   const Time now = clock_.now();
-  control::DaemonStatus s;
-  s.version = SONARD_VERSION;
-  s.config = config_.source;
-  s.scene = config_.scene.name();
-  s.clock = name_of(config_.clock);
-  s.now_ns = now.time_since_epoch().count();
-  s.seed = config_.seed;
-  s.uptime_s = seconds(std::chrono::steady_clock::now() - started_);
-  s.resident_mb = static_cast<double>(figures_of_this_process().resident_bytes) / 1e6;
-  for (const Device& d : fleet_.devices()) s.sonars.push_back(d.status(now));
-  for (std::size_t v = 0; v < config_.vehicles.size(); ++v)
-    s.vehicles.push_back({config_.vehicles[v].name, std::string(world_.source_of(v)), world_.is_stale(v, now),
-                          world_.vehicle_at(v, now), world_.vehicle_plays(v, now)});
-  s.objects = objects_of(*changes_.scene(), world_, now);
-  const PoseCounters& p = world_.counters();
-  s.poses = {p.accepted, p.refused, p.late, p.replaced, p.over_rate};
-  s.environment = {config_.water.temperature_c, config_.water.salinity_psu, config_.water.ph, config_.water.sound_speed_mps};
-  add_server_(s);
-  return s;
+  const auto status = std::make_shared<v1::DaemonStatus>();
+  v1::DaemonStatus& s = *status;
+  s.set_version(SONARD_VERSION);
+  s.set_config(config_.source);
+  s.set_scene(config_.scene.name());
+  s.set_clock(std::string(name_of(config_.clock)));
+  s.set_now_ns(now.time_since_epoch().count());
+  s.set_seed(config_.seed);
+  s.set_uptime_s(seconds(std::chrono::steady_clock::now() - started_));
+  s.set_resident_mb(static_cast<double>(figures_of_this_process().resident_bytes) / 1e6);
+  for (const Device& d : fleet_.devices()) *s.add_sonars() = d.status(now);
+  add_vehicles(s, config_, world_, now);
+  add_objects(s, *changes_.scene(), world_, now);
+  fill(*s.mutable_poses(), world_.counters());
+  fill(*s.mutable_environment(), config_.water);
+  s.set_engine(simulator_.engine_description());
+  s.set_control(address(control_.stream()));
+  s.set_http(address(control_.http()));
+  for (v1::RecordingStatus& recording : recordings_.status()) *s.add_recordings() = std::move(recording);
+  add_notes(s, plausibility_.all());
+  add_notes(s, mavlink_.notes());
+  return status;
 }
 
 }  // namespace sonar

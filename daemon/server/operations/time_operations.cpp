@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/server/operations/operation_results.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar {
 
@@ -23,7 +24,10 @@ void TimeOperations::step(const control::Step& asked, Operations::Done done) {
     const std::uint64_t before = std::exchange(pings_reported_, pings_made());
     // A sonar that a reload took away took its pings along.
     const std::uint64_t pings = pings_reported_ - std::min(before, pings_reported_);
-    done({OperationResult::Code::done, {}, control::Stepped{then.time_since_epoch().count(), pings}});
+    const auto stepped = std::make_shared<v1::Stepped>();
+    stepped->set_now_ns(then.time_since_epoch().count());
+    stepped->set_pings(pings);
+    done({.stepped = stepped});
   });
   on_change_();
 }

@@ -71,8 +71,8 @@ std::vector<std::string> MavlinkServer::endpoints() const {
   for (const Link& l : links_) all.push_back(text_of(l.config));
   return all;
 }
-std::vector<control::Note> MavlinkServer::notes() const {
-  std::vector<control::Note> all;
+std::vector<Note> MavlinkServer::notes() const {
+  std::vector<Note> all;
   for (const Link& l : links_)
     if (const std::string error = l.poses.health_error(wire_time()); !error.empty())
       all.push_back({l.config.vehicle, l.name + ": " + error,

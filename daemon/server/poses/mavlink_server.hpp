@@ -27,7 +27,7 @@ class MavlinkServer {
   /// "udpin:127.0.0.1:14551", with the port the system chose for 0.
   std::vector<std::string> endpoints() const;
   /// Of the links that bring no poses: what is missing.
-  std::vector<control::Note> notes() const;
+  std::vector<Note> notes() const;
   /// Of a listening link, in the order of the configuration.
   Endpoint listens_at(std::size_t link) const;
 

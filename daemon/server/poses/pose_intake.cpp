@@ -29,8 +29,7 @@ std::string PoseIntake::take(control::PoseSample sample, const Sender& sender) {
   map_wall(sample.stamp);
   const PoseOutcome outcome = world_.accept(sample, sender, clock_.now());
   if (!outcome.refusal.empty() && outcome.verdict != PoseVerdict::late) log_refusal(outcome.refusal, sender);
-  if (!outcome.notice.empty() && events_ != nullptr && events_->has_listeners())
-    events_->publish({control::PoseEvent{outcome.body, false, outcome.notice}});
+  if (!outcome.notice.empty() && events_ != nullptr) events_->publish_pose(outcome.body, false, outcome.notice);
   if (!outcome.notice.empty()) log_limited(log_, notices_, LogLevel::info, outcome.notice);
   if (plausibility_ != nullptr && outcome.verdict == PoseVerdict::accepted && sample.of == control::PoseSample::Of::vehicle)
     for (const Note& note : plausibility_->use(sample)) log_.warning(text_of(note), {{"from", sender.id}});

@@ -7,14 +7,28 @@
 #include <new>
 #include <utility>
 
+#include "protocol/control/answers.hpp"
+
 namespace sonar {
 namespace {
 
-std::vector<LogField> fields_of(const control::RecordingStatus& status) {
-  return {{"sonar", status.sonar}, {"file", status.file}, {"pings", status.pings}, {"bytes", status.bytes}};
+std::vector<LogField> fields_of(const v1::RecordingStatus& status) {
+  return {{"sonar", status.sonar()}, {"file", status.file()}, {"pings", status.pings()}, {"bytes", status.bytes()}};
 }
 
 }  // namespace
+
+struct Recordings::Recording {
+  enum class State { opening, running, ending, ended } state = State::opening;
+  std::string name;  // in the folder
+  RecordingFile::Kind kind{};
+  v1::RecordingStatus status;
+  std::size_t waiting_bytes = 0;
+  bool failed = false;    // and the log says so
+  std::string ends_with;  // the sonar stopped while it was opened: why
+  std::vector<Done> at_end;
+  std::shared_ptr<Work> work = std::make_shared<Work>();
+};
 
 Recordings::Recordings(asio::io_context& io, const Config& config, Log& log, int nice_by, std::function<void()> on_change,
                        std::size_t most_waiting_bytes)
@@ -62,7 +76,7 @@ void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar
   const Pointer recording = *begun;
   on_thread(
       recording->work,
-      [file = std::filesystem::path(recording->status.file), kind = recording->kind,
+      [file = std::filesystem::path(recording->status.file()), kind = recording->kind,
        sonar = std::move(sonar)](Work& work) -> Result<void> {
         auto made = RecordingFile::create(file, kind, sonar);
         if (!made) return tl::make_unexpected(made.error());
@@ -74,7 +88,8 @@ void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar
           recordings_.remove(recording);
         } else {
           recording->state = Recording::State::running;
-          log_.info("recording begun", {{"sonar", recording->status.sonar}, {"file", recording->status.file}, {"client", who}});
+          log_.info("recording begun",
+                    {{"sonar", recording->status.sonar()}, {"file", recording->status.file()}, {"client", who}});
           if (finishing_) return end(recording, "sonard stops");
         }
         if (!finishing_) done(outcome.result);
@@ -95,9 +110,9 @@ Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& ask
   auto recording = std::make_shared<Recording>();
   recording->name = asked.file;
   recording->kind = *kind;
-  recording->status.sonar = sonar.name;
-  recording->status.file = (config_.recording.folder / asked.file).string();
-  recording->status.running = true;
+  recording->status.set_sonar(sonar.name);
+  recording->status.set_file((config_.recording.folder / asked.file).string());
+  recording->status.set_running(true);
   recordings_.push_back(recording);
   return recording;
 }
@@ -135,7 +150,7 @@ void Recordings::stop(const control::StopRecording& asked, Done done) {
 
 void Recordings::end_of(const std::string& sonar, const std::string& why) {
   for (const Pointer& r : recordings_) {
-    if (r->status.sonar != sonar) continue;
+    if (r->status.sonar() != sonar) continue;
     if (r->state == Recording::State::opening) r->ends_with = why;
     end(r, why);
   }
@@ -153,12 +168,12 @@ void Recordings::finish() {
 
 bool Recordings::takes(const std::string& sonar) const {
   return std::any_of(recordings_.begin(), recordings_.end(),
-                     [&](const Pointer& r) { return r->state == Recording::State::running && r->status.sonar == sonar; });
+                     [&](const Pointer& r) { return r->state == Recording::State::running && r->status.sonar() == sonar; });
 }
 
 bool Recordings::wants_truth(const std::string& sonar) const {
   return std::any_of(recordings_.begin(), recordings_.end(), [&](const Pointer& r) {
-    return r->state == Recording::State::running && r->status.sonar == sonar && r->kind == RecordingFile::Kind::mcap;
+    return r->state == Recording::State::running && r->status.sonar() == sonar && r->kind == RecordingFile::Kind::mcap;
   });
 }
 
@@ -171,7 +186,7 @@ void Recordings::use_scene(const Scene& scene) {
 
 void Recordings::take(const std::string& sonar, RecordedPing ping) {
   for (const Pointer& r : recordings_)
-    if (r->state == Recording::State::running && r->status.sonar == sonar) write(r, ping);
+    if (r->state == Recording::State::running && r->status.sonar() == sonar) write(r, ping);
 }
 
 bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
@@ -196,9 +211,9 @@ void Recordings::write(const Pointer& recording, RecordedPing ping) {
       recording->work, [ping = std::move(ping)](Work& work) { return work.failed ? Result<void>{} : work.file->write(ping); },
       [this, recording, size](const Outcome& outcome) {
         recording->waiting_bytes -= size;
-        recording->status.pings = outcome.figures.pings;
-        recording->status.messages = outcome.figures.messages;
-        recording->status.bytes = outcome.figures.bytes;
+        recording->status.set_pings(outcome.figures.pings);
+        recording->status.set_messages(outcome.figures.messages);
+        recording->status.set_bytes(outcome.figures.bytes);
         if (!outcome.result) fail(recording, outcome.result.error().text);
       });
 }
@@ -209,7 +224,7 @@ void Recordings::fail(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running && !(recording->state == Recording::State::ending && !recording->failed))
     return;
   recording->failed = true;
-  recording->status.why = why;
+  recording->status.set_why(why);
   log_.error("recording stopped: " + why, fields_of(recording->status));
   end(recording, why);
 }
@@ -218,8 +233,8 @@ void Recordings::fail(const Pointer& recording, const std::string& why) {
 void Recordings::end(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running) return;
   recording->state = Recording::State::ending;
-  recording->status.running = false;
-  recording->status.why = why;
+  recording->status.set_running(false);
+  recording->status.set_why(why);
   on_thread(
       recording->work, [](Work& work) { return work.file->close(); },
       [this, recording](const Outcome& outcome) { ended(recording, outcome); });
@@ -228,16 +243,16 @@ void Recordings::end(const Pointer& recording, const std::string& why) {
 void Recordings::ended(const Pointer& recording, const Outcome& outcome) {
   if (!outcome.result) fail(recording, outcome.result.error().text);
   recording->state = Recording::State::ended;
-  recording->status.bytes = outcome.figures.bytes;
-  if (!recording->failed) log_.info("recording ended: " + recording->status.why, fields_of(recording->status));
+  recording->status.set_bytes(outcome.figures.bytes);
+  if (!recording->failed) log_.info("recording ended: " + recording->status.why(), fields_of(recording->status));
   const Result<void> result =
-      recording->failed ? failure(ErrorKind::io, "the recording stopped before: " + recording->status.why) : Result<void>{};
+      recording->failed ? failure(ErrorKind::io, "the recording stopped before: " + recording->status.why()) : Result<void>{};
   for (const Done& done : std::exchange(recording->at_end, {})) done(result);
   on_change_();
 }
 
-std::vector<control::RecordingStatus> Recordings::status() const {
-  std::vector<control::RecordingStatus> all;
+std::vector<v1::RecordingStatus> Recordings::status() const {
+  std::vector<v1::RecordingStatus> all;
   for (const Pointer& r : recordings_) all.push_back(r->status);
   return all;
 }

@@ -21,6 +21,10 @@
 
 namespace sonar {
 
+namespace v1 {  // of control.pb.h
+class RecordingStatus;
+}  // namespace v1
+
 class Recordings {
  public:
   static constexpr std::size_t most_at_once = 4, most_remembered = 8;
@@ -56,7 +60,7 @@ class Recordings {
   const std::shared_ptr<const SceneNames>& names() const { return names_; }
 
   /// Those that run, and the last that have ended, oldest first.
-  std::vector<control::RecordingStatus> status() const;
+  std::vector<v1::RecordingStatus> status() const;
   /// Nothing is open and nothing is being written.
   bool idle() const { return under_way_ == 0 && running() == 0; }
 
@@ -65,17 +69,7 @@ class Recordings {
     std::unique_ptr<RecordingFile> file;
     bool failed = false;
   };
-  struct Recording {
-    enum class State { opening, running, ending, ended } state = State::opening;
-    std::string name;  // in the folder
-    RecordingFile::Kind kind{};
-    control::RecordingStatus status;
-    std::size_t waiting_bytes = 0;
-    bool failed = false;    // and the log says so
-    std::string ends_with;  // the sonar stopped while it was opened: why
-    std::vector<Done> at_end;
-    std::shared_ptr<Work> work = std::make_shared<Work>();
-  };
+  struct Recording;
   using Pointer = std::shared_ptr<Recording>;
   struct Outcome {
     Result<void> result;

@@ -29,6 +29,10 @@
 
 namespace sonar {
 
+namespace v1 {  // of control.pb.h
+class SonarStatus;
+}  // namespace v1
+
 class Device;
 
 /// What a device needs of the daemon beside the network; outlives it.
@@ -91,7 +95,7 @@ class Device final : public SessionParent {
   std::vector<udp::endpoint> status_destinations() const { return beacon_.destinations(); }
 
   // Control (device_control.cpp).
-  control::SonarStatus status(Time now) const;
+  v1::SonarStatus status(Time now) const;
   /// As recordings name it.
   RecordedSonar recorded() const;
   /// Empty when all is well.

@@ -3,59 +3,62 @@
 
 #include "core/text/ipv4.hpp"
 #include "daemon/server/sonars/device.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar {
 namespace {
 
 double ms(double seconds) { return 1e3 * seconds; }
 
-control::SonarFigures figures_of(const DeviceFigures& f) {
-  control::SonarFigures out;
-  out.pings = f.pings;
-  out.refused = f.refused;
-  out.served = f.served;
-  out.dropped = f.dropped;
-  out.skipped_ticks = f.skipped_ticks;
-  out.clients = f.clients;
-  out.refused_clients = f.refused_clients;
-  out.simulation_ms = f.pings > 0 ? ms(f.simulation_s) / static_cast<double>(f.pings) : 0;
-  out.latency_ms_p50 = ms(f.latency.quantile_s(0.5));
-  out.latency_ms_p99 = ms(f.latency.quantile_s(0.99));
-  out.late_ms_p99 = ms(f.lateness.quantile_s(0.99));
-  return out;
+void fill(v1::SonarFigures& out, const DeviceFigures& f) {
+  out.set_pings(f.pings);
+  out.set_refused(f.refused);
+  out.set_served(f.served);
+  out.set_dropped(f.dropped);
+  out.set_skipped_ticks(f.skipped_ticks);
+  out.set_clients(f.clients);
+  out.set_refused_clients(f.refused_clients);
+  out.set_simulation_ms(f.pings > 0 ? ms(f.simulation_s) / static_cast<double>(f.pings) : 0);
+  out.set_latency_ms_p50(ms(f.latency.quantile_s(0.5)));
+  out.set_latency_ms_p99(ms(f.latency.quantile_s(0.99)));
+  out.set_late_ms_p99(ms(f.lateness.quantile_s(0.99)));
 }
 
 }  // namespace
 
-control::SonarStatus Device::status(Time now) const {
+v1::SonarStatus Device::status(Time now) const {
   const protocol::DeviceState& state = sonar_.state();
   const PingSettings& settings = sonar_.settings();
   const FrequencyMode& mode = state.model->modes[static_cast<std::size_t>(settings.mode)];
-  control::SonarStatus s;
-  s.name = config().name;
-  s.profile = state.model->profile;
-  if (!tcp_ports_.empty()) s.listens = text_of(data_endpoint());
-  s.advertised = text_of(state.advertise_ip);
+  v1::SonarStatus s;
+  s.set_name(config().name);
+  s.set_profile(state.model->profile);
+  if (!tcp_ports_.empty()) s.set_listens(text_of(data_endpoint()));
+  s.set_advertised(text_of(state.advertise_ip));
   for (const udp::endpoint& to : status_destinations())
-    s.status_to.push_back(to.address().to_string() + ":" + std::to_string(to.port()));
-  s.pinging = sonar_.wants_pings() && settings.rate_hz > 0;
-  s.transmits = sonar_.transmits();
-  s.range_m = settings.range_m;
-  s.rate_hz = static_cast<double>(settings.rate_hz);
-  s.gain_db = static_cast<double>(settings.gain_db);
-  s.frequency_hz = static_cast<double>(mode.centre_hz);
-  s.beams = static_cast<std::uint32_t>(settings.beam_count);
-  s.rows = static_cast<std::uint32_t>(settings.range_bin_count);
-  s.in_world = sonar_.pose_at(now);
-  if (observer_listener_.at().port != 0) s.observers = text_of(observer_listener_.at());
-  s.observing = static_cast<std::uint32_t>(sonar_.connections().observers());
+    s.add_status_to(to.address().to_string() + ":" + std::to_string(to.port()));
+  s.set_pinging(sonar_.wants_pings() && settings.rate_hz > 0);
+  s.set_transmits(sonar_.transmits());
+  s.set_range_m(settings.range_m);
+  s.set_rate_hz(static_cast<double>(settings.rate_hz));
+  s.set_gain_db(static_cast<double>(settings.gain_db));
+  s.set_frequency_hz(static_cast<double>(mode.centre_hz));
+  s.set_beams(static_cast<std::uint32_t>(settings.beam_count));
+  s.set_rows(static_cast<std::uint32_t>(settings.range_bin_count));
+  control::set_pose(s, sonar_.pose_at(now));
+  if (observer_listener_.at().port != 0) s.set_observers(text_of(observer_listener_.at()));
+  s.set_observing(static_cast<std::uint32_t>(sonar_.connections().observers()));
   for (const Connection& c : sonar_.connections().all()) {
     if (c.role != Role::client || c.state != Connection::State::served) continue;
     const SessionPointer session = session_of(c.id);
-    const double connected_s = session ? seconds(session->connected_for()) : 0;
-    s.clients.push_back({c.peer.name, c.outbox.pings_written(), c.outbox.pings_dropped(), c.bytes_written, connected_s});
+    v1::ClientStatus& client = *s.add_clients();
+    client.set_address(c.peer.name);
+    client.set_pings_written(c.outbox.pings_written());
+    client.set_pings_dropped(c.outbox.pings_dropped());
+    client.set_bytes_written(c.bytes_written);
+    client.set_connected_s(session ? seconds(session->connected_for()) : 0);
   }
-  s.figures = figures_of(figures());
+  fill(*s.mutable_figures(), figures());
   return s;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "daemon/emulator/reload_plan.hpp"
+#include "protocol/control/answers.hpp"
 
 namespace sonar {
 namespace {
@@ -185,21 +186,22 @@ void Fleet::on_ping_queued(const Device& of, const PingQueued& queued) {
                             computed_names_[of.sonar().index()]});
   if (!events_.has_listeners()) return;
   const PingRequest& r = queued.ping->request;
-  control::PingEvent e;
-  e.sonar = name;
-  e.number = static_cast<std::uint32_t>(r.number);
-  e.fired_at_ns = r.fired_at.time_since_epoch().count();
-  e.sonar_in_world = r.sonar_in_world;
-  e.range_m = r.settings.range_m;
-  e.beams = static_cast<std::uint32_t>(r.settings.beam_count);
-  e.rows = static_cast<std::uint32_t>(r.settings.range_bin_count);
-  e.clients = static_cast<std::uint32_t>(of.sonar().connections().clients());
-  e.simulation_ms = 1e3 * queued.simulation_s;
-  events_.publish({e});
+  v1::Event event;
+  v1::PingEvent& e = *event.mutable_ping();
+  e.set_sonar(name);
+  e.set_number(static_cast<std::uint32_t>(r.number));
+  e.set_fired_at_ns(r.fired_at.time_since_epoch().count());
+  control::set_pose(e, r.sonar_in_world);
+  e.set_range_m(r.settings.range_m);
+  e.set_beams(static_cast<std::uint32_t>(r.settings.beam_count));
+  e.set_rows(static_cast<std::uint32_t>(r.settings.range_bin_count));
+  e.set_clients(static_cast<std::uint32_t>(of.sonar().connections().clients()));
+  e.set_simulation_ms(1e3 * queued.simulation_s);
+  events_.publish(event);
 }
 
 void Fleet::on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) {
-  if (events_.has_listeners()) events_.publish({control::ClientEvent{of.config().name, peer, connected, why}});
+  events_.publish_client(of.config().name, peer, connected, why);
 }
 
 }  // namespace sonar

@@ -1,4 +1,5 @@
 #include "tests/daemon/server/loopback.hpp"
+#include "protocol/control/answers.hpp"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -169,6 +170,8 @@ std::future<OperationResult> Daemon::ask_later(const control::Operation& operati
   });
   return future;
 }
+
+v1::DaemonStatus Daemon::status() { return *ask(control::GetStatus{}).status; }
 
 OperationResult Daemon::ask(const control::Operation& operation) {
   auto answer = ask_later(operation);

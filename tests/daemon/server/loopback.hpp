@@ -92,7 +92,7 @@ class Daemon {
   /// On the I/O thread, and waits for the answer.
   OperationResult ask(const control::Operation& operation);
   std::future<OperationResult> ask_later(const control::Operation& operation);
-  control::DaemonStatus status() { return std::get<control::DaemonStatus>(ask(control::GetStatus{}).body); }
+  v1::DaemonStatus status();
   /// On the I/O thread, and waits for it.
   void on_io_thread(const std::function<void()>& work);
   /// With setup.config_file: what a reload will read.

@@ -2,12 +2,14 @@
 // what it was asked.
 #include <gmock/gmock.h>
 
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
 namespace {
 
 using oculus::PingRate;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using Code = OperationResult::Code;
@@ -44,44 +46,44 @@ TEST(Status, SaysWhatThereIsAndWhatItDoes) {
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40, 3));
   for (int i = 0; i < 2; ++i) ASSERT_TRUE(sees_range(client, 3));  // the first is on the books when the second is written
-  const control::DaemonStatus s = daemon.status();
-  EXPECT_FALSE(s.version.empty());
-  EXPECT_EQ(s.config, "test.yaml");
-  EXPECT_THAT(s.scene, HasSubstr("scene.yaml"));
-  EXPECT_EQ(s.clock, "realtime");
-  EXPECT_EQ(s.engine, "fake");
-  EXPECT_GT(s.uptime_s, 0);
-  EXPECT_GT(s.resident_mb, 1);
-  ASSERT_EQ(s.sonars.size(), 1u);
-  const control::SonarStatus& sonar = s.sonars[0];
-  EXPECT_EQ(sonar.name, "front");
-  EXPECT_EQ(sonar.profile, "oculus-m1200d");
-  EXPECT_EQ(sonar.listens, daemon.address() + ":52100");
-  EXPECT_EQ(sonar.advertised, daemon.address());
-  EXPECT_EQ(sonar.status_to, std::vector<std::string>{daemon.address() + ":9"});
-  EXPECT_TRUE(sonar.pinging);
-  EXPECT_TRUE(sonar.transmits);
-  EXPECT_EQ(sonar.range_m, 3);
-  EXPECT_NEAR(sonar.rate_hz, 40, 1e-3);
-  EXPECT_EQ(sonar.beams, 256u);
-  EXPECT_GT(sonar.rows, 0u);
-  EXPECT_NEAR(sonar.frequency_hz, 2.1e6, 1e5);
-  EXPECT_EQ(sonar.in_world.position_m.z, -3);
-  ASSERT_EQ(sonar.clients.size(), 1u);
-  EXPECT_GT(sonar.clients[0].pings_written, 0u);
-  EXPECT_GT(sonar.clients[0].bytes_written, 0u);
-  EXPECT_GT(sonar.figures.pings, 0u);
-  EXPECT_EQ(sonar.figures.clients, 1u);
-  ASSERT_EQ(s.vehicles.size(), 1u);
-  EXPECT_EQ(s.vehicles[0].source, "initial pose");
-  ASSERT_EQ(s.objects.size(), 3u);
-  EXPECT_EQ(s.objects[0].name, "floor");
-  EXPECT_EQ(s.objects[0].material, "mud");
-  EXPECT_EQ(s.objects[0].triangles, 2u);
-  EXPECT_FALSE(s.objects[1].moving);
-  EXPECT_TRUE(s.objects[2].moving);
-  EXPECT_EQ(s.objects[2].in_world.position_m.x, 5);
-  EXPECT_EQ(s.environment.temperature_c, 12);
+  const v1::DaemonStatus s = daemon.status();
+  EXPECT_FALSE(s.version().empty());
+  EXPECT_EQ(s.config(), "test.yaml");
+  EXPECT_THAT(s.scene(), HasSubstr("scene.yaml"));
+  EXPECT_EQ(s.clock(), "realtime");
+  EXPECT_EQ(s.engine(), "fake");
+  EXPECT_GT(s.uptime_s(), 0);
+  EXPECT_GT(s.resident_mb(), 1);
+  ASSERT_EQ(s.sonars_size(), 1);
+  const v1::SonarStatus& sonar = s.sonars(0);
+  EXPECT_EQ(sonar.name(), "front");
+  EXPECT_EQ(sonar.profile(), "oculus-m1200d");
+  EXPECT_EQ(sonar.listens(), daemon.address() + ":52100");
+  EXPECT_EQ(sonar.advertised(), daemon.address());
+  EXPECT_THAT(sonar.status_to(), ElementsAre(daemon.address() + ":9"));
+  EXPECT_TRUE(sonar.pinging());
+  EXPECT_TRUE(sonar.transmits());
+  EXPECT_EQ(sonar.range_m(), 3);
+  EXPECT_NEAR(sonar.rate_hz(), 40, 1e-3);
+  EXPECT_EQ(sonar.beams(), 256u);
+  EXPECT_GT(sonar.rows(), 0u);
+  EXPECT_NEAR(sonar.frequency_hz(), 2.1e6, 1e5);
+  EXPECT_EQ(sonar.position().z(), -3);
+  ASSERT_EQ(sonar.clients_size(), 1);
+  EXPECT_GT(sonar.clients(0).pings_written(), 0u);
+  EXPECT_GT(sonar.clients(0).bytes_written(), 0u);
+  EXPECT_GT(sonar.figures().pings(), 0u);
+  EXPECT_EQ(sonar.figures().clients(), 1u);
+  ASSERT_EQ(s.vehicles_size(), 1);
+  EXPECT_EQ(s.vehicles(0).source(), "initial pose");
+  ASSERT_EQ(s.objects_size(), 3);
+  EXPECT_EQ(s.objects(0).name(), "floor");
+  EXPECT_EQ(s.objects(0).material(), "mud");
+  EXPECT_EQ(s.objects(0).triangles(), 2u);
+  EXPECT_FALSE(s.objects(1).moving());
+  EXPECT_TRUE(s.objects(2).moving());
+  EXPECT_EQ(s.objects(2).position().x(), 5);
+  EXPECT_EQ(s.environment().temperature_c().value(), 12);
 }
 
 TEST(SetSonar, IsSeenInTheNextPingAndEchoedAsAFireMessage) {
@@ -127,7 +129,7 @@ TEST(SetSonar, SilentWhateverClientsAskUntilItMayTransmitAgain) {
   client.fire(fire_at(PingRate::hz40, 4));
   ASSERT_TRUE(sees_range(client, 4));
   for (const PingRequest& r : daemon.requests()) EXPECT_TRUE(r.blank);
-  EXPECT_FALSE(daemon.status().sonars[0].transmits);
+  EXPECT_FALSE(daemon.status().sonars(0).transmits());
   ASSERT_EQ(daemon.ask(set_transmit(true)).code, Code::done);
   const std::size_t by_now = daemon.requests().size();
   EXPECT_TRUE(eventually([&] { return daemon.requests().size() > by_now + 1; }));
@@ -151,7 +153,7 @@ TEST(SetSonar, MovesItOnItsVehicle) {
 
 TEST(SetSonar, WhatCannotBeIsRefusedWithWhatCanAndNothingChanges) {
   Daemon daemon;
-  const auto before = daemon.status().sonars[0];
+  const auto before = daemon.status().sonars(0);
   control::SetSonar wrong = set_range(300);
   wrong.mount = Pose{{1, 2, 3}, {}};
   wrong.transmit = false;
@@ -163,10 +165,10 @@ TEST(SetSonar, WhatCannotBeIsRefusedWithWhatCanAndNothingChanges) {
   const OperationResult unknown = daemon.ask(stranger);
   EXPECT_EQ(unknown.code, Code::refused);
   EXPECT_THAT(unknown.text, HasSubstr("no sonar is called \"rear\"; there are: front"));
-  const auto after = daemon.status().sonars[0];
-  EXPECT_EQ(after.range_m, before.range_m);
-  EXPECT_EQ(after.in_world.position_m.x, before.in_world.position_m.x);
-  EXPECT_TRUE(after.transmits);
+  const auto after = daemon.status().sonars(0);
+  EXPECT_EQ(after.range_m(), before.range_m());
+  EXPECT_EQ(after.position().x(), before.position().x());
+  EXPECT_TRUE(after.transmits());
 }
 
 TEST(SetEnvironment, IsTheWaterOfTheNextPing) {
@@ -183,7 +185,7 @@ TEST(SetEnvironment, IsTheWaterOfTheNextPing) {
   EXPECT_EQ(last.water.temperature_c, 25);
   EXPECT_EQ(last.water.salinity_psu, 30) << "what is not given stays";
   EXPECT_GT(last.settings.device_sound_speed_mps, speed_before + 20) << "the device's own sound speed follows its thermometer";
-  EXPECT_EQ(daemon.status().environment.temperature_c, 25);
+  EXPECT_EQ(daemon.status().environment().temperature_c().value(), 25);
 }
 
 TEST(SetEnvironment, HoldsTheRulesOfTheConfiguration) {
@@ -196,7 +198,7 @@ TEST(SetEnvironment, HoldsTheRulesOfTheConfiguration) {
   control::SetEnvironment slow;
   slow.sound_speed_mps = 300;
   EXPECT_THAT(daemon.ask(slow).text, HasSubstr("from 1000 to 2000"));
-  EXPECT_EQ(daemon.status().environment.temperature_c, 12);
+  EXPECT_EQ(daemon.status().environment().temperature_c().value(), 12);
 }
 
 TEST(PosesByControl, AreTakenAsAnyOthers) {
@@ -205,10 +207,10 @@ TEST(PosesByControl, AreTakenAsAnyOthers) {
   sample.name = "rov";
   sample.pose.position_m = {1, 2, -4};
   EXPECT_EQ(daemon.ask(sample).code, Code::done);
-  const control::DaemonStatus s = daemon.status();
-  EXPECT_EQ(s.vehicles[0].in_world.position_m.z, -4);
-  EXPECT_EQ(s.vehicles[0].source, "control");
-  EXPECT_EQ(s.poses.accepted, 1u);
+  const v1::DaemonStatus s = daemon.status();
+  EXPECT_EQ(s.vehicles(0).position().z(), -4);
+  EXPECT_EQ(s.vehicles(0).source(), "control");
+  EXPECT_EQ(s.poses().accepted(), 1u);
   sample.name = "rev";
   const OperationResult unknown = daemon.ask(sample);
   EXPECT_EQ(unknown.code, Code::refused);
@@ -227,11 +229,11 @@ TEST(Events, ReachListenersOnly) {
   DaemonSetup setup;
   setup.more = "poses: {protobuf: off, json: off, stale_after_s: 0.2}\n";
   Daemon daemon(setup);
-  std::vector<control::Event> told;  // on the I/O thread
+  std::vector<v1::Event> told;  // on the I/O thread
   Events::Token token;
   daemon.on_io_thread([&] {
     EXPECT_FALSE(daemon.app().events().has_listeners());
-    token = daemon.app().events().listen([&](const control::Event& e) { told.push_back(e); });
+    token = daemon.app().events().listen([&](const v1::Event& e) { told.push_back(e); });
     EXPECT_TRUE(daemon.app().events().has_listeners());
   });
   {
@@ -248,26 +250,14 @@ TEST(Events, ReachListenersOnly) {
       return found;
     });
   };
-  EXPECT_TRUE(has([](const control::Event& e) {
-    const auto* c = std::get_if<control::ClientEvent>(&e.what);
-    return c != nullptr && c->connected && c->sonar == "front";
+  EXPECT_TRUE(has([](const v1::Event& e) { return e.client().connected() && e.client().sonar() == "front"; }));
+  EXPECT_TRUE(has([](const v1::Event& e) { return e.has_client() && !e.client().connected() && !e.client().why().empty(); }));
+  EXPECT_TRUE(has([](const v1::Event& e) {
+    const v1::PingEvent& p = e.ping();
+    return p.number() > 0 && p.range_m() == 3 && p.beams() == 256 && p.clients() == 1;
   }));
-  EXPECT_TRUE(has([](const control::Event& e) {
-    const auto* c = std::get_if<control::ClientEvent>(&e.what);
-    return c != nullptr && !c->connected && !c->why.empty();
-  }));
-  EXPECT_TRUE(has([](const control::Event& e) {
-    const auto* p = std::get_if<control::PingEvent>(&e.what);
-    return p != nullptr && p->number > 0 && p->range_m == 3 && p->beams == 256 && p->clients == 1;
-  }));
-  EXPECT_TRUE(has([](const control::Event& e) {
-    const auto* p = std::get_if<control::PoseEvent>(&e.what);
-    return p != nullptr && !p->stale && p->vehicle == "rov";
-  }));
-  EXPECT_TRUE(has([](const control::Event& e) {
-    const auto* p = std::get_if<control::PoseEvent>(&e.what);
-    return p != nullptr && p->stale;
-  }));
+  EXPECT_TRUE(has([](const v1::Event& e) { return e.pose().vehicle() == "rov" && !e.pose().stale(); }));
+  EXPECT_TRUE(has([](const v1::Event& e) { return e.pose().stale(); }));
   daemon.on_io_thread([&] { token.reset(); });
   ASSERT_EQ(daemon.ask(sample).code, Code::done);  // the list is swept when there is something to tell
   daemon.stop();
@@ -283,7 +273,7 @@ TEST(Stepped, BytesAreTheSameWithAnyObservers) {
     Daemon daemon(setup);
     std::uint64_t told = 0;
     Events::Token token;
-    if (looked_at) daemon.on_io_thread([&] { token = daemon.app().events().listen([&](const control::Event&) { ++told; }); });
+    if (looked_at) daemon.on_io_thread([&] { token = daemon.app().events().listen([&](const v1::Event&) { ++told; }); });
     Client client(daemon.address());
     client.fire(fire_at(PingRate::hz40));
     std::vector<std::future<OperationResult>> answers;

@@ -10,6 +10,7 @@
 
 #include "core/base/memory_left.hpp"
 #include "daemon/config/restart_keys.hpp"
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -124,11 +125,11 @@ TEST(Reload, NotesAreOfTheNewConfigurationInTheNewScene) {
   yaml.replace(yaml.find(place), place.size(), "xyz_m: [0, 0, -103]");
   daemon.write_config(yaml);
   ASSERT_TRUE(reload(daemon, "reloaded:"));
-  EXPECT_THAT(daemon.status().notes, IsEmpty());
+  EXPECT_THAT(daemon.status().notes(), IsEmpty());
   EXPECT_THAT(daemon.log_text(), Not(HasSubstr("from everything in the scene")));
   daemon.write_config(yaml_of(setup));
   ASSERT_TRUE(reload(daemon, "reloaded:", 2));
-  EXPECT_EQ(daemon.status().notes.size(), 1u);
+  EXPECT_EQ(daemon.status().notes_size(), 1);
   EXPECT_THAT(daemon.log_text(), HasSubstr("m from everything in the scene")) << "now it is so";
 }
 
@@ -222,7 +223,7 @@ TEST(Reload, ASceneThatCannotBeLoadedKeepsEverything) {
   setup.sonar_lines = sonar("left", own_address(), 7002);
   daemon.write_config(yaml_of(setup));
   ASSERT_TRUE(reload(daemon, "no such mesh; the configuration stays as it was"));
-  EXPECT_EQ(daemon.status().sonars.size(), 1u);
+  EXPECT_EQ(daemon.status().sonars_size(), 1);
 }
 
 TEST(Reload, ASonarThatCannotBeOpenedStaysAsItWas) {
@@ -295,7 +296,7 @@ TEST(Reload, WaterMountsVehiclesAndSeedAreTakenOver) {
   EXPECT_EQ(last.water.temperature_c, 4);
   EXPECT_EQ(last.sonar_in_world.position_m.z, -2) << "of the rov, which is the second vehicle now";
   EXPECT_EQ(static_cast<std::uint64_t>(last.seed), 99u);
-  EXPECT_EQ(daemon.status().vehicles.size(), 2u);
+  EXPECT_EQ(daemon.status().vehicles_size(), 2);
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
 }
 
@@ -310,10 +311,10 @@ TEST(Reload, WhatControlChangedIsAsTheFileSaysAgain) {
   ASSERT_EQ(daemon.ask(cold).code, OperationResult::Code::done);
   ASSERT_EQ(daemon.ask(control::AddObject{"buoy", "box", {}, {}, false}).code, OperationResult::Code::done);
   ASSERT_TRUE(reload(daemon, "reloaded: front moved"));
-  const control::DaemonStatus s = daemon.status();
-  EXPECT_EQ(s.sonars[0].in_world.position_m.z, -3);
-  EXPECT_EQ(s.environment.temperature_c, 12);
-  EXPECT_EQ(s.objects.size(), 2u);
+  const v1::DaemonStatus s = daemon.status();
+  EXPECT_EQ(s.sonars(0).position().z(), -3);
+  EXPECT_EQ(s.environment().temperature_c().value(), 12);
+  EXPECT_EQ(s.objects_size(), 2);
 }
 
 TEST(Reload, TheSameSceneIsNotBuiltAgain) {
@@ -330,7 +331,7 @@ TEST(Reload, WhatNeedsARestartIsNamedInOneWarning) {
   setup.more += "clock: stepped\nengine: {threads: 7}\nlog: {level: error}\n";
   daemon.write_config(yaml_of(setup));
   ASSERT_TRUE(reload(daemon, "these need a restart and stay as they were: engine.threads, clock, log"));
-  EXPECT_EQ(daemon.status().clock, "realtime");
+  EXPECT_EQ(daemon.status().clock(), "realtime");
   ASSERT_TRUE(reload(daemon, "these need a restart", 2)) << "as long as the file says so";
 }
 
@@ -355,7 +356,7 @@ TEST(Reload, ManyInARowLeaveNothingBehind) {
     EXPECT_TRUE(of_left.read_to_end());
   }
   ASSERT_TRUE(client.next_ping());
-  EXPECT_EQ(daemon.status().sonars.size(), 1u);
+  EXPECT_EQ(daemon.status().sonars_size(), 1);
   EXPECT_EQ(daemon.stop(), 0);
   EXPECT_THAT(daemon.log_text(), Not(HasSubstr("internal fault")));
 }

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -43,7 +44,7 @@ class Gate {
 };
 
 control::AddObject added(const std::string& name, bool moving = false) { return {name, "box", {}, Pose{{1, 2, -3}, {}}, moving}; }
-std::size_t objects_in(const control::DaemonStatus& status) { return status.objects.size(); }
+int objects_in(const v1::DaemonStatus& status) { return status.objects_size(); }
 
 TEST(SceneChange, PingsGoOnWithTheOldSceneUntilTheNewOneIsReady) {
   auto gate = std::make_shared<Gate>();
@@ -57,11 +58,11 @@ TEST(SceneChange, PingsGoOnWithTheOldSceneUntilTheNewOneIsReady) {
   ASSERT_TRUE(eventually([&] { return gate->arrived() == 1; }));
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(client.next_ping()) << "while the scene is being built";
   EXPECT_EQ(daemon.scenes().back()->objects.size(), 2u);
-  EXPECT_EQ(objects_in(daemon.status()), 2u);
+  EXPECT_EQ(objects_in(daemon.status()), 2);
   EXPECT_NE(answer.wait_for(milliseconds(0)), std::future_status::ready);
   gate->open();
   EXPECT_EQ(answer.get().code, Code::done);
-  EXPECT_EQ(objects_in(daemon.status()), 3u);
+  EXPECT_EQ(objects_in(daemon.status()), 3);
   const std::size_t by_now = daemon.scenes().size() + 1;  // one may be on its way to the engine
   ASSERT_TRUE(eventually([&] { return daemon.scenes().size() > by_now; }));
   EXPECT_EQ(daemon.scenes().back()->objects.size(), 3u);
@@ -136,10 +137,10 @@ TEST(SceneChange, ChangesQueueInOrder) {
   const OperationResult again = wrong.get();
   EXPECT_EQ(again.code, Code::refused);
   EXPECT_THAT(again.text, HasSubstr("no object \"one\""));
-  const auto objects = daemon.status().objects;
-  ASSERT_EQ(objects.size(), 3u);
-  EXPECT_EQ(objects[2].name, "two");
-  EXPECT_EQ(objects[2].in_world.position_m.x, 7);
+  const auto objects = daemon.status().objects();
+  ASSERT_EQ(objects.size(), 3);
+  EXPECT_EQ(objects[2].name(), "two");
+  EXPECT_EQ(objects[2].position().x(), 7);
 }
 
 TEST(SceneChange, WhoIsAnsweredMayAskAgainAtOnce) {
@@ -160,7 +161,7 @@ TEST(SceneChange, WhoIsAnsweredMayAskAgainAtOnce) {
     return answered == 3;
   }));
   EXPECT_EQ(answers, (std::vector<Code>{Code::done, Code::done, Code::done}));
-  EXPECT_EQ(daemon.status().objects.size(), 3u);
+  EXPECT_EQ(daemon.status().objects_size(), 3);
 }
 
 TEST(SceneChange, AFailureChangesNothing) {
@@ -182,8 +183,8 @@ TEST(SceneChange, AFailureChangesNothing) {
   const OperationResult no_memory = daemon.ask(added("buoy"));
   EXPECT_EQ(no_memory.code, Code::failed);
   EXPECT_THAT(no_memory.text, HasSubstr("not enough memory"));
-  EXPECT_EQ(objects_in(daemon.status()), 2u);
-  EXPECT_THAT(daemon.status().scene, HasSubstr("scene.yaml"));
+  EXPECT_EQ(objects_in(daemon.status()), 2);
+  EXPECT_THAT(daemon.status().scene(), HasSubstr("scene.yaml"));
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
   for (const ScenePointer& scene : daemon.scenes()) EXPECT_EQ(scene->objects.size(), 2u);
 }
@@ -222,7 +223,7 @@ TEST(SceneChange, ALoadedSceneKeepsThePosesOfBodiesItAlsoHas) {
   Daemon daemon(setup);
   ASSERT_EQ(daemon.ask(control::SetObject{"crate", {}, Pose{{4, 4, -4}, {}}}).code, Code::done);
   ASSERT_EQ(daemon.ask(control::LoadScene{"demo.yaml"}).code, Code::done);
-  EXPECT_THAT(daemon.status().scene, HasSubstr("demo.yaml"));
+  EXPECT_THAT(daemon.status().scene(), HasSubstr("demo.yaml"));
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
   ASSERT_TRUE(client.next_ping());
@@ -238,14 +239,14 @@ TEST(SceneChange, MovingObjectsAreMovedAndHiddenWithoutASceneOfTheirOwn) {
   setup.before_engine = [](const Scene&) { ADD_FAILURE() << "an engine was built"; };
   Daemon daemon(setup);
   ASSERT_EQ(daemon.ask(control::SetObject{"crate", {}, Pose{{2, 0, -3}, {}}}).code, Code::done);
-  EXPECT_EQ(daemon.status().objects[2].in_world.position_m.x, 2);
+  EXPECT_EQ(daemon.status().objects(2).position().x(), 2);
   ASSERT_EQ(daemon.ask(control::SetObject{"crate", false, {}}).code, Code::done);
-  EXPECT_FALSE(daemon.status().objects[2].visible);
+  EXPECT_FALSE(daemon.status().objects(2).visible());
   ASSERT_EQ(daemon.ask(control::SetObject{"crate", {}, Pose{{3, 0, -3}, {}}}).code, Code::done);
-  EXPECT_FALSE(daemon.status().objects[2].visible) << "a pose alone does not show it";
+  EXPECT_FALSE(daemon.status().objects(2).visible()) << "a pose alone does not show it";
   ASSERT_EQ(daemon.ask(control::SetObject{"crate", true, {}}).code, Code::done);
-  EXPECT_TRUE(daemon.status().objects[2].visible);
-  EXPECT_EQ(daemon.status().objects[2].in_world.position_m.x, 3);
+  EXPECT_TRUE(daemon.status().objects(2).visible());
+  EXPECT_EQ(daemon.status().objects(2).position().x(), 3);
 }
 
 TEST(SceneChange, SteppedTimeStandsStillMeanwhile) {

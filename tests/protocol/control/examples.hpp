@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "protocol/control/control.hpp"
+#include "tests/protocol/control/message_from.hpp"
 
 namespace sonar::control {
 
@@ -47,70 +47,52 @@ inline std::vector<Request> every_request() {
           {16, StopRecording{"run-1.mcap"}}};
 }
 
-inline DaemonStatus full_status() {
-  const Pose tilted{{1.5, -2.25, 3}, {0.6, 0, 0.8, 0}};  // of norm 1 to the last bit
-  DaemonStatus s;
-  s.version = "0.1";
-  s.config = "lab.yaml";
-  s.scene = "harbour";
-  s.clock = "realtime";
-  s.engine = "fake";
-  s.seed = 0xffff'ffff'ffff'ffff;
-  s.uptime_s = 1.5;
-  s.resident_mb = 80;
-  SonarStatus sonar;
-  sonar.name = "front";
-  sonar.profile = "oculus-m1200d";
-  sonar.listens = "127.0.0.2:52100";
-  sonar.advertised = "127.0.0.3";
-  sonar.observers = "127.0.0.3:41003";
-  sonar.observing = 2;
-  sonar.status_to = {"127.255.255.255:52102", "10.0.0.7:52102"};
-  sonar.pinging = true;
-  sonar.transmits = false;
-  sonar.range_m = 10;
-  sonar.rate_hz = 11;
-  sonar.gain_db = -12;
-  sonar.frequency_hz = 2.1e6;
-  sonar.beams = 512;
-  sonar.rows = 437;
-  sonar.in_world = tilted;
-  sonar.clients = {{"127.0.0.1:40000", 1, 2, 3, 4.5}, {"127.0.0.1:40001", 5, 6, 7, 8.5}};
-  sonar.figures = {1, 2, 3, 4, 5, 6, 7, 8.5, 9.5, 10.5, 11.5};
-  s.sonars = {sonar};
-  s.vehicles = {{"rov", "demo orbit", true, tilted},
-                {"auv", "trajectory dive.tum", false, tilted, TrajectoryStatus{"dive.tum", 1.5, 60, 2.5, true, true}}};
-  s.objects = {{"crate", "steel", true, false, 12, tilted}};
-  s.poses = {21, 22, 23, 24, 25};
-  s.environment = {12, 30, 8, 0};
-  s.control = "127.0.0.4:14770";
-  s.http = "127.0.0.5:8088";
-  s.now_ns = 1234567890123456780;
-  s.recordings = {{"front", "recordings/run-1.mcap", true, 31, 32, 33, ""},
-                  {"front", "recordings/run-0.pcap", false, 34, 35, 36, "the disk is full"}};
-  s.notes = {{"rov", "the sonar of rov is 3 m above the water", "say the frame"}, {"", "wreck is 1200 m long", "set scale"}};
-  return s;
+inline v1::DaemonStatus full_status() {
+  const std::string tilted = " position { x: 1.5 y: -2.25 z: 3 } orientation { w: 0.6 y: 0.8 } ";  // of norm 1 to the last bit
+  return message_from<v1::DaemonStatus>(
+      R"(version: "0.1" config: "lab.yaml" scene: "harbour" clock: "realtime" engine: "fake" seed: 0xffffffffffffffff
+         uptime_s: 1.5 resident_mb: 80 control: "127.0.0.4:14770" http: "127.0.0.5:8088" now_ns: 1234567890123456780
+         poses { accepted: 21 refused: 22 late: 23 replaced: 24 over_rate: 25 }
+         environment { temperature_c { value: 12 } salinity_psu { value: 30 } ph { value: 8 } sound_speed_mps { value: 0 } }
+         sonars {
+           name: "front" profile: "oculus-m1200d" listens: "127.0.0.2:52100" advertised: "127.0.0.3"
+           observers: "127.0.0.3:41003" observing: 2 status_to: "127.255.255.255:52102" status_to: "10.0.0.7:52102"
+           pinging: true range_m: 10 rate_hz: 11 gain_db: -12 frequency_hz: 2.1e6 beams: 512 rows: 437
+           clients { address: "127.0.0.1:40000" pings_written: 1 pings_dropped: 2 bytes_written: 3 connected_s: 4.5 }
+           clients { address: "127.0.0.1:40001" pings_written: 5 pings_dropped: 6 bytes_written: 7 connected_s: 8.5 }
+           figures {
+             pings: 1 refused: 2 served: 3 dropped: 4 skipped_ticks: 5 clients: 6 refused_clients: 7
+             simulation_ms: 8.5 latency_ms_p50: 9.5 latency_ms_p99: 10.5 late_ms_p99: 11.5
+           })" +
+      tilted + R"(}
+         vehicles { name: "rov" source: "demo orbit" stale: true)" +
+      tilted + R"(}
+         vehicles {
+           name: "auv" source: "trajectory dive.tum"
+           trajectory { file: "dive.tum" position_s: 1.5 duration_s: 60 speed: 2.5 paused: true loop: true })" +
+      tilted + R"(}
+         objects { name: "crate" material: "steel" moving: true triangles: 12)" +
+      tilted + R"(}
+         recordings { sonar: "front" file: "recordings/run-1.mcap" running: true pings: 31 messages: 32 bytes: 33 }
+         recordings { sonar: "front" file: "recordings/run-0.pcap" pings: 34 messages: 35 bytes: 36 why: "the disk is full" }
+         notes { vehicle: "rov" text: "the sonar of rov is 3 m above the water" cure: "say the frame" }
+         notes { text: "wreck is 1200 m long" cure: "set scale" })");
 }
 
-inline std::vector<Event> every_event() {
-  PingEvent ping;
-  ping.sonar = "front";
-  ping.number = 7;
-  ping.fired_at_ns = 1234567890123456789;
-  ping.sonar_in_world = {{1, 2, -3}, {0.8, 0, 0, 0.6}};
-  ping.range_m = 10;
-  ping.beams = 512;
-  ping.rows = 437;
-  ping.clients = 2;
-  ping.simulation_ms = 21.5;
-  return {{ping, 9},
-          {ClientEvent{"front", "127.0.0.1:4711", false, "it closed the connection"}, 0},
-          {PoseEvent{"rov", true, "no pose for rov for 1 s"}, 1},
-          {SceneEvent{"harbour", "loaded"}, 0}};
+inline std::vector<v1::Event> every_event() {
+  return {message_from<v1::Event>(R"(ping {
+                                       sonar: "front" number: 7 fired_at_ns: 1234567890123456789
+                                       position { x: 1 y: 2 z: -3 } orientation { w: 0.8 z: 0.6 }
+                                       range_m: 10 beams: 512 rows: 437 clients: 2 simulation_ms: 21.5
+                                     }
+                                     unsent: 9)"),
+          message_from<v1::Event>(R"(client { sonar: "front" client: "127.0.0.1:4711" why: "it closed the connection" })"),
+          message_from<v1::Event>(R"(pose { vehicle: "rov" stale: true text: "no pose for rov for 1 s" } unsent: 1)"),
+          message_from<v1::Event>(R"(scene { scene: "harbour" text: "loaded" })")};
 }
 
 /// What a request is, whatever the road it came by: its bytes.
 inline bool same(const Request& a, const Request& b) { return encode_request(a) == encode_request(b); }
-inline bool same(const Response& a, const Response& b) { return encode_response(a) == encode_response(b); }
+inline bool same(const v1::Response& a, const v1::Response& b) { return encode_response(a) == encode_response(b); }
 
 }  // namespace sonar::control

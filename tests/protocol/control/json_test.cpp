@@ -115,13 +115,13 @@ TEST(ControlJson, WritesTheNamesOfTheProtoAndNumbersThatAreZero) {
   EXPECT_EQ(status["sonars"][0]["transmits"], false);
   EXPECT_EQ(status["environment"]["sound_speed_mps"], 0.0);
   EXPECT_EQ(status["vehicles"][0]["position"]["y"], -2.25);
-  EXPECT_TRUE(json::parse(json_of(DaemonStatus{}))["sonars"].empty());
-  const json answer = json::parse(json_of(Response{7, StatusCode::refused, "no \"such\" sonar", false}));
+  EXPECT_TRUE(json::parse(json_of(v1::DaemonStatus()))["sonars"].empty());
+  const json answer = json::parse(json_of(response_of(7, StatusCode::refused, "no \"such\" sonar")));
   EXPECT_EQ(answer["id"], "7");
   EXPECT_EQ(answer["status"]["code"], "REFUSED");
   EXPECT_EQ(answer["status"]["text"], "no \"such\" sonar");
   EXPECT_EQ(json_of(StatusCode::ok, ""), R"({"code":"OK","text":""})");
-  for (const Event& event : every_event()) {
+  for (const v1::Event& event : every_event()) {
     const std::string text = json_of(event);
     EXPECT_EQ(text.find('\n'), std::string::npos);
     EXPECT_TRUE(json::parse(text).contains("unsent"));

@@ -11,91 +11,93 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(ControlResponses, AStatusArrivesWhole) {
-  const Response sent{5, StatusCode::ok, "", false, full_status()};
-  const auto got = decode_response(encode_response(sent));
-  ASSERT_TRUE(got) << got.error().text;
-  EXPECT_TRUE(same(*got, sent)) << json_of(*got);
-  const auto& status = std::get<DaemonStatus>(got->body);
-  EXPECT_EQ(status.seed, 0xffff'ffff'ffff'ffff);
-  EXPECT_EQ(status.sonars.at(0).clients.at(1).pings_dropped, 6u);
-  EXPECT_EQ(status.sonars.at(0).figures.late_ms_p99, 11.5);
-  EXPECT_EQ(status.sonars.at(0).status_to.at(1), "10.0.0.7:52102");
-  EXPECT_FALSE(status.sonars.at(0).transmits);
-  EXPECT_EQ(status.vehicles.at(0).source, "demo orbit");
-  EXPECT_FALSE(status.vehicles.at(0).trajectory);
-  ASSERT_TRUE(status.vehicles.at(1).trajectory);
-  EXPECT_EQ(status.vehicles.at(1).trajectory->file, "dive.tum");
-  EXPECT_EQ(status.vehicles.at(1).trajectory->position_s, 1.5);
-  EXPECT_TRUE(status.vehicles.at(1).trajectory->paused && status.vehicles.at(1).trajectory->loop);
-  EXPECT_FALSE(status.objects.at(0).visible);
-  EXPECT_EQ(status.poses.over_rate, 25u);
-  EXPECT_EQ(status.environment.sound_speed_mps, 0.0);
-  EXPECT_EQ(status.now_ns, 1234567890123456780);
-  EXPECT_EQ(status.notes.at(0).vehicle, "rov");
-  EXPECT_EQ(status.notes.at(1).text, "wreck is 1200 m long");
-  EXPECT_EQ(status.notes.at(1).cure, "set scale");
+v1::Response response_with(std::uint64_t id, const v1::DaemonStatus& status) {
+  v1::Response response = response_of(id, StatusCode::ok);
+  *response.mutable_daemon() = status;
+  return response;
+}
+v1::Response response_with(const v1::Event& event) {
+  v1::Response response = response_of(0, StatusCode::ok);
+  *response.mutable_event() = event;
+  return response;
 }
 
-TEST(ControlResponses, AStepArrivesWhole) {
-  const Response sent{6, StatusCode::ok, "", false, Stepped{1234567890123456789, 3}};
+TEST(ControlResponses, AStatusArrivesWhole) {
+  const v1::Response sent = response_with(5, full_status());
   const auto got = decode_response(encode_response(sent));
   ASSERT_TRUE(got) << got.error().text;
-  EXPECT_TRUE(same(*got, sent)) << json_of(*got);
-  EXPECT_EQ(json_of(std::get<Stepped>(got->body)), R"({"now_ns":"1234567890123456789","pings":"3"})");
+  EXPECT_TRUE(same(**got, sent)) << json_of(**got);
+  const Pose seen = pose_of((*got)->daemon().sonars(0));
+  EXPECT_EQ(seen.position_m.y, -2.25);
+  EXPECT_EQ(seen.orientation.y, 0.8);
+}
+
+TEST(ControlResponses, AnOrientationThatIsNotGivenIsLevel) {
+  const Pose level = pose_of(v1::SonarStatus());
+  EXPECT_EQ(level.orientation.w, 1);
+  EXPECT_EQ(level.orientation.x, 0);
+}
+
+TEST(ControlResponses, AStepIsReadAsJson) {
+  v1::Stepped stepped;
+  stepped.set_now_ns(1234567890123456789);
+  stepped.set_pings(3);
+  EXPECT_EQ(json_of(stepped), R"({"now_ns":"1234567890123456789","pings":"3"})");
 }
 
 TEST(ControlResponses, EveryEventArrivesWhole) {
-  for (const Event& event : every_event()) {
-    const Response sent{0, StatusCode::ok, "", false, event};
+  for (const v1::Event& event : every_event()) {
+    const v1::Response sent = response_with(event);
     const auto got = decode_response(encode_response(sent));
     ASSERT_TRUE(got) << got.error().text;
-    EXPECT_TRUE(same(*got, sent)) << json_of(*got);
-    EXPECT_EQ(std::get<Event>(got->body).what.index(), event.what.index());
-    EXPECT_EQ(std::get<Event>(got->body).unsent, event.unsent);
+    EXPECT_TRUE(same(**got, sent)) << json_of(**got);
   }
+  EXPECT_FALSE(decode_response(encode_response(response_with(v1::Event())))) << "of a later version";
 }
 
 TEST(ControlResponses, EveryCodeArrives) {
-  for (const StatusCode code : {StatusCode::ok, StatusCode::refused, StatusCode::unsupported, StatusCode::failed}) {
-    const auto got = decode_response(encode_response({1, code, "why", false}));
+  for (const auto& [code, number] :
+       {std::pair{StatusCode::ok, v1::Status::OK}, std::pair{StatusCode::refused, v1::Status::REFUSED},
+        std::pair{StatusCode::unsupported, v1::Status::UNSUPPORTED}, std::pair{StatusCode::failed, v1::Status::FAILED},
+        std::pair{StatusCode::unauthenticated, v1::Status::UNAUTHENTICATED}}) {
+    const auto got = decode_response(encode_response(response_of(1, code, "why")));
     ASSERT_TRUE(got);
-    EXPECT_EQ(got->code, code);
-    EXPECT_EQ(got->text, "why");
+    EXPECT_EQ((*got)->status().code(), number);
+    EXPECT_EQ((*got)->status().text(), "why");
   }
 }
 
 TEST(ControlResponses, TextsThatAreNoUtf8AreRepairedNotLost) {
   testing::internal::CaptureStderr();
   const std::string broken = "caf\xe9 \xf0\x9f\x90\x9f \xed\xa0\x80";  // Latin-1, a fish, half a surrogate
-  const auto got = decode_response(encode_response({1, StatusCode::failed, broken, false}));
+  const auto got = decode_response(encode_response(response_of(1, StatusCode::failed, broken)));
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   ASSERT_TRUE(got) << got.error().text;
-  EXPECT_EQ(got->text, "caf? \xf0\x9f\x90\x9f ???");
+  EXPECT_EQ((*got)->status().text(), "caf? \xf0\x9f\x90\x9f ???");
 }
 
 TEST(ControlResponses, NumbersThatAreNoneAreRefusedByTheClient) {
-  DaemonStatus status = full_status();
-  status.sonars[0].in_world.position_m.y = std::numeric_limits<double>::quiet_NaN();
-  const auto unreal = decode_response(encode_response({1, StatusCode::ok, "", false, status}));
+  v1::DaemonStatus status = full_status();
+  status.mutable_sonars(0)->mutable_position()->set_y(std::numeric_limits<double>::quiet_NaN());
+  const auto unreal = decode_response(encode_response(response_with(1, status)));
   ASSERT_FALSE(unreal);
   EXPECT_EQ(unreal.error().text, "daemon.sonars[0].position.y is NaN or infinite");
   status = full_status();
-  status.objects[0].in_world.orientation = {3, 0, 0, 0};
-  const auto stretched = decode_response(encode_response({1, StatusCode::ok, "", false, status}));
+  status.mutable_objects(0)->mutable_orientation()->set_w(3);
+  const auto stretched = decode_response(encode_response(response_with(1, status)));
   ASSERT_FALSE(stretched);
   EXPECT_EQ(stretched.error().text, "daemon.objects[0].orientation is not a quaternion of norm 1");
 }
 
 TEST(ControlResponses, TruncationsAreReadOrRefusedNeverFatal) {
-  std::vector<Bytes> wholes = {encode_response({5, StatusCode::ok, "", false, full_status()})};
-  for (const Event& event : every_event()) wholes.push_back(encode_response({0, StatusCode::ok, "", false, event}));
+  std::vector<Bytes> wholes = {encode_response(response_with(5, full_status()))};
+  for (const v1::Event& event : every_event()) wholes.push_back(encode_response(response_with(event)));
   int refused = 0;
   for (const Bytes& whole : wholes) {
     for (std::size_t n = 0; n < whole.size(); ++n) {
       const auto got = decode_response(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)));
       if (got) {
-        EXPECT_TRUE(decode_response(encode_response(*got)));
+        EXPECT_TRUE(decode_response(encode_response(**got)));
         continue;
       }
       ++refused;

@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "core/scene/files/load_scene.hpp"
+#include "protocol/control/answers.hpp"
 #include "protocol/mavlink/frames.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
@@ -51,9 +52,11 @@ Object box(const std::string& name, Vec3 size_m, Vec3d at_m) {
   return Object{.name = name, .mesh = mesh, .in_world = {at_m, {}}};
 }
 
-std::vector<std::string> texts_of(const std::vector<Note>& notes) {
+Note note_from(const v1::Note& note) { return {note.vehicle(), note.text(), note.cure()}; }
+const Note& note_from(const Note& note) { return note; }
+std::vector<std::string> texts_of(const auto& notes) {
   std::vector<std::string> texts;
-  for (const Note& n : notes) texts.push_back(text_of(n));
+  for (const auto& n : notes) texts.push_back(text_of(note_from(n)));
   return texts;
 }
 std::vector<std::string> notes(const Config& config, const Scene& scene = bed_scene()) {
@@ -265,9 +268,9 @@ TEST(Plausibility, ATrajectoryIsJudgedAgainWhenTheSceneChanges) {
 
 struct RunningNotes : ::testing::Test {
   void send(const std::string& pose) {
-    const std::uint64_t before = daemon.status().poses.accepted;
+    const std::uint64_t before = daemon.status().poses().accepted();
     send_udp(daemon.address(), daemon.app().poses().json().port, bytes_of(pose));
-    ASSERT_TRUE(eventually([&] { return daemon.status().poses.accepted > before; }));
+    ASSERT_TRUE(eventually([&] { return daemon.status().poses().accepted() > before; }));
   }
   std::size_t times_logged(const std::string& words) {
     const std::string log = daemon.log_text();
@@ -279,30 +282,30 @@ struct RunningNotes : ::testing::Test {
 };
 
 TEST_F(RunningNotes, APoseAboveTheWaterIsLoggedOnceAndInTheStatusWhileItHolds) {
-  EXPECT_THAT(daemon.status().notes, IsEmpty());
+  EXPECT_THAT(daemon.status().notes(), IsEmpty());
   for (int i = 0; i < 5; ++i) send(R"({"position":[0,0,-3],"attitude":[0,0,0]})");  // ENU's z, with NED's frame
   EXPECT_EQ(times_logged("the sonar of rov is 3.0 m above the water's surface"), 1u);
-  const auto notes = daemon.status().notes;
-  ASSERT_EQ(notes.size(), 1u);
-  EXPECT_EQ(notes[0].vehicle, "rov");
-  EXPECT_THAT(notes[0].cure, HasSubstr("say the frame that was sent"));
+  const auto notes = daemon.status().notes();
+  ASSERT_EQ(notes.size(), 1);
+  EXPECT_EQ(notes[0].vehicle(), "rov");
+  EXPECT_THAT(notes[0].cure(), HasSubstr("say the frame that was sent"));
   send(R"({"position":[0,0,3],"attitude":[0,0,0]})");
-  EXPECT_THAT(daemon.status().notes, IsEmpty());
+  EXPECT_THAT(daemon.status().notes(), IsEmpty());
   send(R"({"position":[0,0,-4],"attitude":[0,0,0]})");
   EXPECT_EQ(times_logged("above the water's surface"), 1u) << "once";
-  EXPECT_EQ(daemon.status().notes.size(), 1u);
+  EXPECT_EQ(daemon.status().notes_size(), 1);
 }
 
 TEST_F(RunningNotes, DegreesSentAsRadians) {
   send(R"({"position":[0,0,3],"attitude":[0,0,7.1]})");  // a heading that is counted on after a whole turn
-  EXPECT_THAT(daemon.status().notes, IsEmpty());
+  EXPECT_THAT(daemon.status().notes(), IsEmpty());
   send(R"({"position":[0,0,3],"attitude":[0,-10,-90]})");
   EXPECT_THAT(
-      texts_of(daemon.status().notes),
+      texts_of(daemon.status().notes()),
       ElementsAre("the attitude of rov has an angle of 90 rad; angles are radians there: were degrees sent? Multiply them by "
                   "0.0174533"));
   send(R"({"position":[0,0,3],"quaternion":[0,0.9848077530122081,0.17364817766693033,0]})");
-  EXPECT_THAT(texts_of(daemon.status().notes), ElementsAre(HasSubstr("rov is upside down, 180 deg from upright")));
+  EXPECT_THAT(texts_of(daemon.status().notes()), ElementsAre(HasSubstr("rov is upside down, 180 deg from upright")));
 }
 
 TEST(StartNotes, OfTheConfigurationAreLoggedAtTheStartAndGiveWayToPoses) {
@@ -311,9 +314,9 @@ TEST(StartNotes, OfTheConfigurationAreLoggedAtTheStartAndGiveWayToPoses) {
   Daemon daemon(setup);
   EXPECT_THAT(daemon.log_text(),
               AllOf(HasSubstr("sonar front is mounted upside down on rov"), HasSubstr("1.0 m above the water")));
-  EXPECT_EQ(daemon.status().notes.size(), 2u);
+  EXPECT_EQ(daemon.status().notes_size(), 2);
   send_udp(daemon.address(), daemon.app().poses().json().port, bytes_of(R"({"position":[0,0,6],"attitude":[0,0,0]})"));
-  EXPECT_TRUE(eventually([&] { return daemon.status().notes.size() == 1; })) << "where it started counts no more";
+  EXPECT_TRUE(eventually([&] { return daemon.status().notes_size() == 1; })) << "where it started counts no more";
 }
 
 TEST(MavlinkNotes, ALinkWithoutUsablePosesIsInTheStatusUntilTheyCome) {
@@ -321,21 +324,21 @@ TEST(MavlinkNotes, ALinkWithoutUsablePosesIsInTheStatusUntilTheyCome) {
   setup.more = "poses: {protobuf: off, json: off, mavlink: 'udpin:" + setup.address + ":0'}\n";
   Daemon daemon(setup);
   const auto note = [&] {
-    const auto notes = daemon.status().notes;
-    return notes.empty() ? control::Note{} : notes.front();
+    const auto notes = daemon.status().notes();
+    return notes.empty() ? v1::Note() : notes[0];
   };
-  EXPECT_EQ(note().vehicle, "rov");
-  EXPECT_THAT(note().text, HasSubstr("no poses yet: no message received"));
+  EXPECT_EQ(note().vehicle(), "rov");
+  EXPECT_THAT(note().text(), HasSubstr("no poses yet: no message received"));
   const std::uint16_t port = daemon.app().mavlink().listens_at(0).port;
   mavlink::Identity autopilot{1, 1, 0};
   mavlink::Attitude attitude;
   attitude.boot_ms = 1000;
   send_udp(daemon.address(), port, framed(attitude, autopilot));
-  EXPECT_TRUE(eventually([&] { return note().text.find("a position is missing (LOCAL_POSITION_NED") != std::string::npos; }));
+  EXPECT_TRUE(eventually([&] { return note().text().find("a position is missing (LOCAL_POSITION_NED") != std::string::npos; }));
   mavlink::LocalPositionNed place;
   place.boot_ms = 1000, place.down_m = 3;
   send_udp(daemon.address(), port, framed(place, autopilot));
-  EXPECT_TRUE(eventually([&] { return daemon.status().notes.empty(); }));
+  EXPECT_TRUE(eventually([&] { return daemon.status().notes().empty(); }));
 }
 
 }  // namespace

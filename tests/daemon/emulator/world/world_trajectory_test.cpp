@@ -53,7 +53,7 @@ TEST(WorldTrajectory, GivesWayToTheFirstPose) {
   pose.pose.position_m = {-5, 0, 0};
   EXPECT_THAT(w.accept(pose, {"a", "json 127.0.0.1"}, t0 + seconds(1)).notice, HasSubstr("trajectory east.tum -> json"));
   EXPECT_EQ(x_at(w, 1), -5);
-  EXPECT_FALSE(w.vehicle_plays(0, t0 + seconds(1)));
+  EXPECT_FALSE(w.vehicle_plays(0));
   EXPECT_THAT(w.steer(asked(true), t0 + seconds(2)), HasSubstr("moved by poses from json 127.0.0.1"));
   EXPECT_EQ(x_at(w, 30), -5) << "and does not come back";
 }
@@ -63,17 +63,17 @@ TEST(WorldTrajectory, IsSteered) {
   EXPECT_EQ(w.steer(asked(true), t0 + seconds(3)), "");
   EXPECT_EQ(x_at(w, 8), 3);
   EXPECT_EQ(speed_at(w, 8), 0);
-  EXPECT_TRUE(w.vehicle_plays(0, t0 + seconds(8))->paused);
+  EXPECT_TRUE(w.vehicle_plays(0)->playback.paused());
   EXPECT_EQ(w.steer(asked(true), t0 + seconds(9)), "") << "again is no mistake";
   EXPECT_EQ(w.steer(asked(false, 6, 2), t0 + seconds(10)), "");
   EXPECT_EQ(x_at(w, 11), 8);
-  const auto status = w.vehicle_plays(0, t0 + seconds(11));
-  ASSERT_TRUE(status);
-  EXPECT_EQ(status->file, "east.tum");
-  EXPECT_EQ(status->position_s, 8);
-  EXPECT_EQ(status->duration_s, 10);
-  EXPECT_EQ(status->speed, 2);
-  EXPECT_FALSE(status->paused || status->loop);
+  const auto played = w.vehicle_plays(0);
+  ASSERT_TRUE(played);
+  EXPECT_EQ(played->file, "east.tum");
+  EXPECT_EQ(played->playback.place(t0 + seconds(11)).at, seconds(8));
+  EXPECT_EQ(played->playback.duration(), seconds(10));
+  EXPECT_EQ(played->playback.rules().speed.factor(), 2);
+  EXPECT_FALSE(played->playback.paused() || played->playback.rules().loop);
 }
 
 TEST(WorldTrajectory, RefusesWithASentence) {
@@ -90,7 +90,7 @@ TEST(WorldTrajectory, RefusesWithASentence) {
   EXPECT_THAT(w.steer(other, t0), HasSubstr("no moving object"));
   World still({}, {{"rov", {}, false}}, {}, t0);
   EXPECT_THAT(still.steer(asked(true), t0), HasSubstr("rov follows no trajectory"));
-  EXPECT_FALSE(still.vehicle_plays(0, t0));
+  EXPECT_FALSE(still.vehicle_plays(0));
 }
 
 TEST(WorldTrajectory, GoesOnOverAConfigurationThatDoesNotTouchIt) {
@@ -112,8 +112,8 @@ TEST(WorldTrajectory, ObjectsFollowThemToo) {
   EXPECT_EQ(w.objects_at(t0 + seconds(4)).at(1).position_m.x, 4);
   EXPECT_EQ(w.steer({PoseSample::Of::object, "buoy", true, 7, {}}, t0 + seconds(5)), "");
   EXPECT_EQ(w.object_at(1, t0 + seconds(9)).position_m.x, 7);
-  EXPECT_EQ(w.object_plays(1, t0 + seconds(9))->position_s, 7);
-  EXPECT_FALSE(w.object_plays(0, t0));
+  EXPECT_EQ(w.object_plays(1)->playback.place(t0 + seconds(9)).at, seconds(7));
+  EXPECT_FALSE(w.object_plays(0));
   w.hide(1, true);
   EXPECT_GT(w.object_at(1, t0).position_m.z, 1000);
 }

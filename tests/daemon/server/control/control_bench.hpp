@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "daemon/server/control/control_server.hpp"
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -21,15 +22,15 @@ class FakeOperations final : public Operations {
     ++asked;
     last_sender = sender;
     if (std::holds_alternative<control::GetStatus>(operation)) {
-      control::DaemonStatus status;
-      status.version = "fake";
-      done({OperationResult::Code::done, "", status});
+      const auto status = std::make_shared<v1::DaemonStatus>();
+      status->set_version("fake");
+      done({.status = status});
     } else if (const auto* load = std::get_if<control::LoadScene>(&operation)) {
       if (load->path == "later") return later.push_back(std::move(done));
       if (load->path == "throw") throw std::runtime_error("no such luck");
-      done({OperationResult::Code::failed, "no such scene: " + load->path, {}});
+      done({OperationResult::Code::failed, "no such scene: " + load->path});
     } else if (const auto* sonar = std::get_if<control::SetSonar>(&operation); sonar != nullptr && sonar->sonar == "unknown") {
-      done({OperationResult::Code::refused, "there is no sonar \"unknown\"", {}});
+      done({OperationResult::Code::refused, "there is no sonar \"unknown\""});
     } else {
       done({});
     }
@@ -105,11 +106,11 @@ class ControlBench {
   std::thread thread_;
 };
 
-inline control::Event ping_event(std::uint32_t number) {
-  control::PingEvent ping;
-  ping.sonar = "front";
-  ping.number = number;
-  return {ping, 0};
+inline v1::Event ping_event(std::uint32_t number) {
+  v1::Event event;
+  event.mutable_ping()->set_sonar("front");
+  event.mutable_ping()->set_number(number);
+  return event;
 }
 
 /// A file with a token, for as long as it lives.

@@ -105,7 +105,7 @@ TEST(ControlHttp, OperationsAnswerWithTheirStatus) {
   bench.on_io([&] { EXPECT_EQ(bench.world.counters().refused, 1u); });
   client.send("POST", "/api/v1/load", R"({"path":"later"})");
   EXPECT_TRUE(eventually([&] { return bench.operations.asked == 4; }));
-  bench.on_io([&] { bench.operations.later.at(0)({OperationResult::Code::done, "loaded", {}}); });
+  bench.on_io([&] { bench.operations.later.at(0)({OperationResult::Code::done, "loaded"}); });
   EXPECT_EQ(client.next().document()["text"], "loaded");
 }
 
@@ -135,7 +135,7 @@ TEST(ControlHttp, EventsAreLinesOfJson) {
     return heard;
   }));
   bench.on_io([&] {
-    bench.events.publish({control::SceneEvent{"s", "not asked for"}, 0});
+    bench.events.publish_scene("s", "not asked for");
     for (std::uint32_t i = 0; i < 3; ++i) bench.events.publish(ping_event(i));
   });
   for (int i = 0; i < 3; ++i) {

@@ -3,14 +3,12 @@
 
 #include <list>
 
-#include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 #include "tests/daemon/server/control/control_bench.hpp"
 
 namespace sonar::testing_daemon {
 namespace {
 
-using control::StatusCode;
 using ::testing::HasSubstr;
 
 struct StreamClient {
@@ -22,24 +20,24 @@ struct StreamClient {
     send({1, control::Hello{1, "test", token}});
     const auto answer = next();
     ASSERT_TRUE(answer);
-    ASSERT_EQ(answer->code, StatusCode::ok) << answer->text;
-    ASSERT_TRUE(answer->hello);
+    ASSERT_EQ(answer->status().code(), v1::Status::OK) << answer->status().text();
+    ASSERT_TRUE(answer->has_hello());
   }
   /// Nothing at the deadline or the end of the stream.
-  std::optional<control::Response> next(milliseconds timeout = patience) {
+  std::shared_ptr<const v1::Response> next(milliseconds timeout = patience) {
     const auto deadline = Steady::now() + timeout;
     while (true) {
       const auto message = parser.next();
-      if (!message) return std::nullopt;
+      if (!message) return nullptr;
       if (*message) {
         auto response = control::decode_response(**message);
         EXPECT_TRUE(response) << response.error().text;
-        return response ? std::optional(*std::move(response)) : std::nullopt;
+        return response.value_or(nullptr);
       }
       const auto left = std::chrono::duration_cast<milliseconds>(deadline - Steady::now());
-      if (left.count() <= 0) return std::nullopt;
+      if (left.count() <= 0) return nullptr;
       const auto raw = tcp.read_raw(1, left);
-      if (raw.empty() && tcp.ended) return std::nullopt;
+      if (raw.empty() && tcp.ended) return nullptr;
       parser.feed(raw);
     }
   }
@@ -53,27 +51,27 @@ TEST(ControlStream, AnswersByIdWhenTheyAreReady) {
   client.send({3, control::GetStatus{}});
   const auto status = client.next();
   ASSERT_TRUE(status);
-  EXPECT_EQ(status->id, 3u);
-  EXPECT_EQ(std::get<control::DaemonStatus>(status->body).version, "fake");
+  EXPECT_EQ(status->id(), 3u);
+  EXPECT_EQ(status->daemon().version(), "fake");
   bench.on_io([&] { bench.operations.later.at(0)({}); });
   const auto load = client.next();
   ASSERT_TRUE(load);
-  EXPECT_EQ(load->id, 2u);
-  EXPECT_EQ(load->code, StatusCode::ok);
+  EXPECT_EQ(load->id(), 2u);
+  EXPECT_EQ(load->status().code(), v1::Status::OK);
   control::SetSonar unknown;
   unknown.sonar = "unknown";
   client.send({4, unknown});
   const auto refused = client.next();
-  EXPECT_EQ(refused->code, StatusCode::refused);
-  EXPECT_EQ(refused->text, "there is no sonar \"unknown\"");
+  EXPECT_EQ(refused->status().code(), v1::Status::REFUSED);
+  EXPECT_EQ(refused->status().text(), "there is no sonar \"unknown\"");
   client.send({5, control::LoadScene{"x.yaml"}});
-  EXPECT_EQ(client.next()->code, StatusCode::failed);
+  EXPECT_EQ(client.next()->status().code(), v1::Status::FAILED);
   client.send({6, control::Unsupported{}});
-  EXPECT_EQ(client.next()->code, StatusCode::unsupported);
+  EXPECT_EQ(client.next()->status().code(), v1::Status::UNSUPPORTED);
   client.send({7, control::RemoveObject{}});
   const auto malformed = client.next();
-  EXPECT_EQ(malformed->id, 7u);
-  EXPECT_THAT(malformed->text, HasSubstr("object is missing"));
+  EXPECT_EQ(malformed->id(), 7u);
+  EXPECT_THAT(malformed->status().text(), HasSubstr("object is missing"));
 }
 
 TEST(ControlStream, PosesWithoutAnIdAreTakenInSilence) {
@@ -84,13 +82,13 @@ TEST(ControlStream, PosesWithoutAnIdAreTakenInSilence) {
   client.send({9, control::PoseSample{}});
   const auto answer = client.next();
   ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->id, 9u);
+  EXPECT_EQ(answer->id(), 9u);
   EXPECT_EQ(bench.operations.asked, 2);
   bench.on_io([&] { EXPECT_THAT(bench.operations.last_sender.id, HasSubstr("protobuf tcp 127.")); });
   control::PoseSample broken;
   broken.pose.position_m.x = std::numeric_limits<double>::quiet_NaN();
   client.send({10, broken});
-  EXPECT_EQ(client.next()->code, StatusCode::refused);
+  EXPECT_EQ(client.next()->status().code(), v1::Status::REFUSED);
   EXPECT_THAT(bench.log_text(), HasSubstr("pose refused: position has a NaN"));
   bench.on_io([&] { EXPECT_EQ(bench.world.counters().refused, 1u); });
 }
@@ -131,15 +129,15 @@ TEST(ControlStream, WithoutTheTokenNoRequestIsServed) {
     untrusted.send({5, control::Hello{1, "test", shown}});
     const auto answer = untrusted.next();
     ASSERT_TRUE(answer);
-    EXPECT_EQ(answer->code, StatusCode::unauthenticated);
-    EXPECT_THAT(answer->text, HasSubstr("token"));
-    EXPECT_FALSE(answer->hello);
+    EXPECT_EQ(answer->status().code(), v1::Status::UNAUTHENTICATED);
+    EXPECT_THAT(answer->status().text(), HasSubstr("token"));
+    EXPECT_FALSE(answer->has_hello());
     EXPECT_TRUE(untrusted.tcp.read_to_end());
   }
   StreamClient friendly(bench);
   friendly.greet(TokenFile::text);
   friendly.send({2, control::GetStatus{}});
-  EXPECT_EQ(friendly.next()->code, StatusCode::ok);
+  EXPECT_EQ(friendly.next()->status().code(), v1::Status::OK);
   EXPECT_EQ(bench.operations.asked, 1);
   EXPECT_THAT(bench.log_text(), HasSubstr("token"));
   EXPECT_EQ(bench.log_text().find("0123456789"), std::string::npos) << "no secret in the log, be it ours or theirs";
@@ -150,27 +148,27 @@ TEST(ControlStream, EventsComeToThoseWhoAskedAndLossIsTold) {
   StreamClient client(bench);
   client.greet();
   client.send({2, control::Subscribe{true, false, false, false}});
-  ASSERT_EQ(client.next()->id, 2u);
+  ASSERT_EQ(client.next()->id(), 2u);
   bench.on_io([&] {
     EXPECT_TRUE(bench.events.has_listeners());
-    bench.events.publish({control::SceneEvent{"s", "not asked for"}, 0});
+    bench.events.publish_scene("s", "not asked for");
     for (std::uint32_t i = 0; i < 100; ++i) bench.events.publish(ping_event(i));  // more than wait for one
   });
   for (std::uint32_t i = 0; i < EventQueue::deepest; ++i) {
     const auto event = client.next();
     ASSERT_TRUE(event);
-    EXPECT_EQ(event->id, 0u);
-    EXPECT_EQ(std::get<control::PingEvent>(std::get<control::Event>(event->body).what).number, i);
+    EXPECT_EQ(event->id(), 0u);
+    EXPECT_EQ(event->event().ping().number(), i);
   }
   bench.on_io([&] { bench.events.publish(ping_event(100)); });
   const auto after = client.next();
   ASSERT_TRUE(after);
-  EXPECT_EQ(std::get<control::Event>(after->body).unsent, 100 - EventQueue::deepest);
+  EXPECT_EQ(after->event().unsent(), 100 - EventQueue::deepest);
   client.send({3, control::Subscribe{}});
-  ASSERT_EQ(client.next()->id, 3u);
+  ASSERT_EQ(client.next()->id(), 3u);
   bench.on_io([&] { bench.events.publish(ping_event(101)); });
   client.send({4, control::GetStatus{}});
-  EXPECT_EQ(client.next()->id, 4u) << "nothing is told after that";
+  EXPECT_EQ(client.next()->id(), 4u) << "nothing is told after that";
 }
 
 TEST(ControlStream, AClientThatReadsNothingIsReadNoFurtherAndClosed) {
@@ -210,7 +208,7 @@ TEST(ControlStream, HalfClosedClientsGetTheirLateAnswers) {
   client.tcp.finish_sending();
   EXPECT_TRUE(eventually([&] { return bench.operations.asked == 1; }));
   bench.on_io([&] { bench.operations.later.at(0)({}); });
-  EXPECT_EQ(client.next()->id, 2u);
+  EXPECT_EQ(client.next()->id(), 2u);
   EXPECT_TRUE(client.tcp.read_to_end());
 }
 
@@ -255,13 +253,13 @@ TEST(ControlStream, BytesThatAreNoProtobufEndTheConnection) {
   StreamClient client(bench);
   client.greet();
   client.send({2, control::RemoveObject{}});
-  EXPECT_EQ(client.next()->code, StatusCode::refused) << "wrong, but protobuf: it costs the answer only";
+  EXPECT_EQ(client.next()->status().code(), v1::Status::REFUSED) << "wrong, but protobuf: it costs the answer only";
   client.tcp.send(control::delimited(bytes_of("\xff\xff\xff")));
   client.send({3, control::GetStatus{}});
   const auto last = client.next();
   ASSERT_TRUE(last);
-  EXPECT_EQ(last->code, StatusCode::refused);
-  EXPECT_EQ(last->text, "message is not a Request");
+  EXPECT_EQ(last->status().code(), v1::Status::REFUSED);
+  EXPECT_EQ(last->status().text(), "message is not a Request");
   EXPECT_FALSE(client.next());
   EXPECT_TRUE(client.tcp.ended);
   EXPECT_EQ(bench.operations.asked, 0) << "nothing after them counts";
@@ -320,16 +318,16 @@ TEST(ControlStream, WithoutAPlaceTheTokenIsAnsweredThatItIsFull) {
     const auto in = [&busy] {
       busy.send({1, control::Hello{1, "test", TokenFile::text}});
       const auto answer = busy.next();
-      return answer && answer->hello;
+      return answer && answer->has_hello();
     };
     if (!in()) continue;  // the last one has the place still
     StreamClient late(bench);
     late.send({1, control::Hello{1, "test", TokenFile::text}});
     const auto answer = late.next();
     ASSERT_TRUE(answer);
-    if (answer->code == StatusCode::ok) continue;
-    EXPECT_EQ(answer->code, StatusCode::failed);
-    EXPECT_THAT(answer->text, HasSubstr("all connection slots are in use"));
+    if (answer->status().code() == v1::Status::OK) continue;
+    EXPECT_EQ(answer->status().code(), v1::Status::FAILED);
+    EXPECT_THAT(answer->status().text(), HasSubstr("all connection slots are in use"));
     EXPECT_TRUE(late.tcp.read_to_end());
     return;
   }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "protocol/control/answers.hpp"
 #include "protocol/mavlink/frames.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
@@ -117,7 +118,7 @@ TEST_F(Mavlink, AListeningLinkMovesTheSonarAndAnswersWithHeartbeats) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("pose source of rov changed: initial pose -> " + source +
                                            "; fields: position attitude velocity rates (NED/FRD)"));
   EXPECT_TRUE(eventually([&] { return daemon.log_text().find(": system 1 (ArduPilot) sends HEARTBEAT") != std::string::npos; }));
-  EXPECT_EQ(daemon.status().vehicles.at(0).source, source);
+  EXPECT_EQ(daemon.status().vehicles().at(0).source(), source);
 }
 
 TEST_F(Mavlink, ADiallingLinkSpeaksFirst) {
@@ -145,8 +146,8 @@ TEST_F(Mavlink, NonsenseIsCountedAndChangesNothing) {
   mavlink::Bytes damaged = framed(odometry_at(11, 1), vehicle.who);
   damaged[30] ^= std::byte{1};
   vehicle.send(daemon.address(), port, damaged);
-  EXPECT_TRUE(eventually([&] { return daemon.status().poses.refused == 2; }));
-  EXPECT_EQ(daemon.status().poses.accepted, 0u);
+  EXPECT_TRUE(eventually([&] { return daemon.status().poses().refused() == 2; }));
+  EXPECT_EQ(daemon.status().poses().accepted(), 0u);
   EXPECT_THAT(daemon.log_text(), HasSubstr("pose refused: 64 bytes are not MAVLink"));
   EXPECT_THAT(daemon.log_text(), HasSubstr("wrong checksum"));
 }
@@ -158,7 +159,7 @@ TEST_F(Mavlink, OnlyThoseWhomTheConfigurationNamesAreHeard) {
   Vehicle vehicle(daemon.address());
   vehicle.send(daemon.address(), daemon.app().mavlink().listens_at(0).port, framed(odometry_at(11, 1), vehicle.who));
   EXPECT_TRUE(eventually([&] { return daemon.log_text().find("address is not in poses.allow_from") != std::string::npos; }));
-  EXPECT_EQ(daemon.status().poses.accepted, 0u);
+  EXPECT_EQ(daemon.status().poses().accepted(), 0u);
 }
 
 TEST_F(Mavlink, AnEndpointThatIsTakenIsOneSentence) {

@@ -3,6 +3,7 @@
 
 #include <list>
 
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -30,11 +31,11 @@ struct PoseLimits : ::testing::Test {
     return text;
   }
   std::uint64_t heard() {
-    const control::PoseFigures p = daemon->status().poses;
-    return p.accepted + p.refused + p.late + p.replaced + p.over_rate;
+    const v1::PoseFigures p = daemon->status().poses();
+    return p.accepted() + p.refused() + p.late() + p.replaced() + p.over_rate();
   }
-  bool is_at_x(int x, std::size_t vehicle = 0, milliseconds timeout = patience) {
-    return eventually([&] { return daemon->status().vehicles.at(vehicle).in_world.position_m.x == x; }, timeout);
+  bool is_at_x(int x, int vehicle = 0, milliseconds timeout = patience) {
+    return eventually([&] { return daemon->status().vehicles().at(vehicle).position().x() == x; }, timeout);
   }
   /// Comes again until it is let in: there may be no connection yet that can be closed. `meanwhile` is done before each time.
   bool a_newcomer_moves_the_boat(const std::function<void()>& meanwhile = [] {}) {
@@ -132,12 +133,12 @@ TEST_F(PoseLimits, JsonThatIsNotQuiteIsRefusedAndTheConnectionGoesOn) {
   EXPECT_TRUE(is_at_x(400));
   friendly.send("{\"imu\":\"" + std::string(6000, 'x') + "\"}\n" + seven.substr(0, 6 * nan.size()) + line_at_x(500));
   EXPECT_TRUE(is_at_x(500)) << "a long line is one of them";
-  EXPECT_EQ(daemon->status().poses.refused, 14u);
+  EXPECT_EQ(daemon->status().poses().refused(), 14u);
   friendly.send(seven + nan + line_at_x(600));
   friendly.read_to_end();
   EXPECT_TRUE(friendly.ended) << "eight in a row";
-  EXPECT_EQ(daemon->status().poses.refused, 22u);
-  EXPECT_EQ(daemon->status().poses.accepted, 3u);
+  EXPECT_EQ(daemon->status().poses().refused(), 22u);
+  EXPECT_EQ(daemon->status().poses().accepted(), 3u);
 }
 
 TEST_F(PoseLimits, APageOfTheWebMovesNothing) {
@@ -154,8 +155,8 @@ TEST_F(PoseLimits, APageOfTheWebMovesNothing) {
     EXPECT_EQ(stranger.bytes_read, 0u);
   }
   EXPECT_THAT(daemon->log_text(), HasSubstr("pose connection closed: not JSON"));
-  EXPECT_EQ(daemon->status().poses.accepted, 1u) << "the line before the nonsense of the third";
-  EXPECT_EQ(daemon->status().poses.refused, 3u);
+  EXPECT_EQ(daemon->status().poses().accepted(), 1u) << "the line before the nonsense of the third";
+  EXPECT_EQ(daemon->status().poses().refused(), 3u);
   Client friendly(daemon->address(), port);
   friendly.send("{\"no\":\"pose\"}\n" + line_at_x(7));
   EXPECT_TRUE(is_at_x(7)) << "JSON that is no pose is refused, and costs the connection nothing";
@@ -165,7 +166,7 @@ TEST_F(PoseLimits, ABadLineOfADatagramCostsTheOthersNothing) {
   begin("");
   send_udp(daemon->address(), port, bytes_of(line_at_x(1) + "nonsense\n{\"position\":NaN}\n" + line_at_x(2)));
   EXPECT_TRUE(is_at_x(2));
-  EXPECT_EQ(daemon->status().poses.refused, 2u);
+  EXPECT_EQ(daemon->status().poses().refused(), 2u);
 }
 
 TEST_F(PoseLimits, ADatagramHasSoManyLines) {

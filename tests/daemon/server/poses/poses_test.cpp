@@ -6,7 +6,7 @@
 #include <list>
 
 #include "daemon/server/system/listen.hpp"
-#include "protocol/control/control.hpp"
+#include "protocol/control/answers.hpp"
 #include "protocol/control/delimited.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
@@ -98,18 +98,18 @@ TEST_F(Poses, ControlStreamGreetsAndAnswers) {
   sender.send(control::delimited(control::encode_request({4, unknown})));
 
   control::DelimitedParser parser;
-  std::vector<control::Response> answers;
+  std::vector<v1::Response> answers;
   while (answers.size() < 4) {
     const auto raw = sender.read_raw(1);
     ASSERT_FALSE(raw.empty());
     parser.feed(raw);
-    for (auto m = parser.next(); m && *m; m = parser.next()) answers.push_back(*control::decode_response(**m));
+    for (auto m = parser.next(); m && *m; m = parser.next()) answers.push_back(**control::decode_response(**m));
   }
-  EXPECT_TRUE(answers[0].hello);
-  EXPECT_EQ(answers[1].code, control::StatusCode::ok);
-  EXPECT_EQ(answers[2].id, 3u);
-  EXPECT_EQ(answers[3].code, control::StatusCode::refused);
-  EXPECT_THAT(answers[3].text, HasSubstr("submarine"));
+  EXPECT_TRUE(answers[0].has_hello());
+  EXPECT_EQ(answers[1].status().code(), v1::Status::OK);
+  EXPECT_EQ(answers[2].id(), 3u);
+  EXPECT_EQ(answers[3].status().code(), v1::Status::REFUSED);
+  EXPECT_THAT(answers[3].status().text(), HasSubstr("submarine"));
 }
 
 TEST_F(Poses, ControlStreamNeedsAHelloFirstAndTheRightVersion) {

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "daemon/server/recording/recordings.hpp"
+#include "protocol/control/answers.hpp"
 #include "protocol/recording/recording.hpp"
 #include "tests/daemon/server/loopback.hpp"
 #include "tests/small_disk.hpp"
@@ -173,12 +174,12 @@ TEST(Recordings, ADiskThatDoesNotKeepUpEndsTheRecordingAndSaysSoOnce) {
   q.run();
   EXPECT_TRUE(q.recordings->idle());
   const auto status = q.recordings->status().at(0);
-  EXPECT_FALSE(status.running);
-  EXPECT_EQ(status.pings, 1u);
-  EXPECT_THAT(status.why, HasSubstr("written too slowly"));
+  EXPECT_FALSE(status.running());
+  EXPECT_EQ(status.pings(), 1u);
+  EXPECT_THAT(status.why(), HasSubstr("written too slowly"));
   ASSERT_EQ(q.lines.size(), 2u);
   EXPECT_THAT(q.lines[1], HasSubstr("recording stopped: its file is written too slowly"));
-  EXPECT_EQ(messages_in(status.file), 1u);
+  EXPECT_EQ(messages_in(status.file()), 1u);
 }
 
 TEST(Recordings, TheOneThatLetsMostWaitEndsFirst) {
@@ -197,8 +198,8 @@ TEST(Recordings, TheOneThatLetsMostWaitEndsFirst) {
   q.run();
   q.recordings->stop({}, [](const Result<void>& r) { EXPECT_TRUE(r); });
   q.run();
-  EXPECT_EQ(messages_in(q.recordings->status().at(0).file), 2u);
-  EXPECT_EQ(messages_in(q.recordings->status().at(1).file), 2u);
+  EXPECT_EQ(messages_in(q.recordings->status().at(0).file()), 2u);
+  EXPECT_EQ(messages_in(q.recordings->status().at(1).file()), 2u);
 }
 
 TEST(Recordings, FewAtATimeAndOnlyWhereTheConfigurationSays) {
@@ -227,7 +228,7 @@ TEST(Recordings, FewAtATimeAndOnlyWhereTheConfigurationSays) {
   }
   EXPECT_EQ(std::count(answers.begin(), answers.end(), "ok"), 12);
   EXPECT_EQ(q.recordings->status().size(), Recordings::most_remembered);
-  EXPECT_EQ(q.recordings->status().back().why, "asked to stop");
+  EXPECT_EQ(q.recordings->status().back().why(), "asked to stop");
   answers.clear();
   q.config.recording.folder.clear();
   start("6.raw");
@@ -292,16 +293,16 @@ TEST(RecordedDaemon, IsToldInTheStatusAndStopsWhenAsked) {
   client.fire(fire_at(PingRate::hz40));
   EXPECT_TRUE(eventually([&] {
     client.next_ping(milliseconds(100));
-    return daemon.status().recordings.at(0).pings >= 3;
+    return daemon.status().recordings().at(0).pings() >= 3;
   }));
-  EXPECT_TRUE(daemon.status().recordings.at(0).running);
+  EXPECT_TRUE(daemon.status().recordings().at(0).running());
   EXPECT_EQ(daemon.ask(control::StopRecording{"run.mcap"}).code, OperationResult::Code::done);
-  const auto told = daemon.status().recordings.at(0);
-  EXPECT_FALSE(told.running);
-  EXPECT_EQ(told.why, "asked to stop");
-  EXPECT_EQ(told.file, folder.path + "/run.mcap");
-  EXPECT_EQ(messages_in(told.file), told.pings) << "complete when the stop was answered";
-  EXPECT_EQ(std::filesystem::file_size(told.file), told.bytes);
+  const auto told = daemon.status().recordings().at(0);
+  EXPECT_FALSE(told.running());
+  EXPECT_EQ(told.why(), "asked to stop");
+  EXPECT_EQ(told.file(), folder.path + "/run.mcap");
+  EXPECT_EQ(messages_in(told.file()), told.pings()) << "complete when the stop was answered";
+  EXPECT_EQ(std::filesystem::file_size(told.file()), told.bytes());
   EXPECT_TRUE(client.next_ping());
   EXPECT_EQ(daemon.stop(), 0);
 }
@@ -321,21 +322,21 @@ TEST(RecordedDaemon, AFullDiskEndsTheRecordingAndNothingElse) {
       EXPECT_EQ(ping->head.fixed.ping_id, last + 1);
     }
     if (ping) last = ping->head.fixed.ping_id;
-    return !daemon.status().recordings.at(0).running;
+    return !daemon.status().recordings().at(0).running();
   }));
   EXPECT_TRUE(client.next_ping());
   EXPECT_TRUE(eventually([&] { return daemon.ask(control::StopRecording{}).text == "nothing is being recorded"; }));
-  const auto told = daemon.status().recordings.at(0);
-  EXPECT_THAT(told.why, HasSubstr("File too large"));
+  const auto told = daemon.status().recordings().at(0);
+  EXPECT_THAT(told.why(), HasSubstr("File too large"));
   EXPECT_EQ(daemon.stop(), 0);
   const std::string log = daemon.log_text();
-  const auto first = log.find("recording stopped: cannot write on to " + told.file);
+  const auto first = log.find("recording stopped: cannot write on to " + told.file());
   EXPECT_NE(first, std::string::npos) << log;
   EXPECT_EQ(log.find("recording stopped", first + 1), std::string::npos) << log;
   EXPECT_EQ(log.find("recording ended"), std::string::npos) << log;
-  const std::uint64_t kept = messages_in(told.file);
+  const std::uint64_t kept = messages_in(told.file());
   EXPECT_GT(kept, 0u);
-  EXPECT_LT(kept, told.pings);
+  EXPECT_LT(kept, told.pings());
 }
 
 TEST(RecordedDaemon, ASonarThatAReloadTakesAwayIsRecordedNoMore) {
@@ -354,9 +355,9 @@ TEST(RecordedDaemon, ASonarThatAReloadTakesAwayIsRecordedNoMore) {
   setup.sonar_lines = also("aft");
   daemon.write_config(yaml_of(setup));
   ASSERT_EQ(kill(getpid(), SIGHUP), 0);
-  ASSERT_TRUE(eventually([&] { return !daemon.status().recordings.at(0).running; }));
-  EXPECT_EQ(daemon.status().recordings.at(0).why, "the configuration changed");
-  EXPECT_TRUE(daemon.status().recordings.at(1).running);
+  ASSERT_TRUE(eventually([&] { return !daemon.status().recordings().at(0).running(); }));
+  EXPECT_EQ(daemon.status().recordings().at(0).why(), "the configuration changed");
+  EXPECT_TRUE(daemon.status().recordings().at(1).running());
   EXPECT_EQ(daemon.stop(), 0);
   EXPECT_EQ(messages_in(folder.path + "/rear.mcap"), 0u) << "whole, if empty";
 }
@@ -372,7 +373,7 @@ TEST(RecordedDaemon, AReloadThatFailsLeavesTheRecordingOfWhatGoesOn) {
   daemon.write_config(yaml_of(setup));
   ASSERT_EQ(kill(getpid(), SIGHUP), 0);
   ASSERT_TRUE(eventually([&] { return daemon.log_text().find("front as before") != std::string::npos; })) << daemon.log_text();
-  EXPECT_TRUE(daemon.status().recordings.at(0).running);
+  EXPECT_TRUE(daemon.status().recordings().at(0).running());
   EXPECT_EQ(daemon.stop(), 0);
 }
 

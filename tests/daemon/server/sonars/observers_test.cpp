@@ -3,6 +3,7 @@
 
 #include <list>
 
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -13,7 +14,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 std::uint16_t observer_port(Daemon& daemon) {
-  const std::string at = daemon.status().sonars.at(0).observers;
+  const std::string at = daemon.status().sonars().at(0).observers();
   EXPECT_THAT(at, HasSubstr(daemon.address() + ":"));
   return static_cast<std::uint16_t>(std::stoi(at.substr(at.find(':') + 1)));
 }
@@ -34,10 +35,10 @@ TEST(Observers, GetTheDriversPingsAndChangeNothing) {
     ASSERT_TRUE(driver.next_ping());
   }
   EXPECT_TRUE(eventually([&] { return daemon.log_text().find("request of an observer ignored") != std::string::npos; }));
-  const control::SonarStatus status = daemon.status().sonars.at(0);
-  EXPECT_EQ(status.range_m, 2);
-  EXPECT_EQ(status.observing, 1u);
-  EXPECT_EQ(status.clients.size(), 1u);
+  const v1::SonarStatus status = daemon.status().sonars().at(0);
+  EXPECT_EQ(status.range_m(), 2);
+  EXPECT_EQ(status.observing(), 1u);
+  EXPECT_EQ(status.clients_size(), 1);
   Client second(daemon.address());
   second.fire(fire_at(PingRate::hz40));
   EXPECT_TRUE(second.read_to_end()) << "the driver's place is taken as before";
@@ -69,7 +70,7 @@ TEST(Observers, ADriverThatComesWhileOneLooksOnIsTheDriver) {
   ASSERT_TRUE(seen);
   EXPECT_EQ(seen->head.fixed.fire.range, 3);
   driver.close();
-  EXPECT_TRUE(eventually([&] { return !daemon.status().sonars.at(0).pinging; }));
+  EXPECT_TRUE(eventually([&] { return !daemon.status().sonars().at(0).pinging(); }));
 }
 
 TEST(Observers, HaveSoManyPlacesOrNone) {
@@ -86,7 +87,7 @@ TEST(Observers, HaveSoManyPlacesOrNone) {
   setup.address = own_address();
   setup.sonar_lines = "    observers: {max: 0}\n";
   Daemon daemon(setup);
-  EXPECT_EQ(daemon.status().sonars.at(0).observers, "");
+  EXPECT_EQ(daemon.status().sonars().at(0).observers(), "");
 }
 
 TEST(Observers, TakeNoPlaceOfAClient) {

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "daemon/config/addresses.hpp"
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 #include "tests/daemon/server/sonars/made_up_vendor.hpp"
 
@@ -180,7 +181,7 @@ TEST(Transports, TwoTcpPortsHaveConversationsOfTheirOwn) {
   EXPECT_EQ(received.substr(at, size), pattern(ping));
   EXPECT_THAT(received.substr(at + size), StartsWith(head + std::to_string(ping + 1)));
   EXPECT_EQ(ask(commands, "range 3"), "ok\n") << "no ping came between";
-  EXPECT_EQ(daemon.status().sonars.front().listens, daemon.address() + ":15000");
+  EXPECT_EQ(daemon.status().sonars(0).listens(), daemon.address() + ":15000");
 }
 
 TEST(Transports, DatagramsAreAnsweredAndSetTheDevicesOwnReceivers) {

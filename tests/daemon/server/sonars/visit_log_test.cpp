@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -67,7 +68,7 @@ TEST(VisitLog, TheEndSaysWhatIsUnsaid) {
 TEST(VisitLog, AClientThatReconnectsIsSeenToGo) {
   Daemon daemon;
   for (int i = 0; i < 12; ++i) {
-    const auto clients = [&] { return daemon.status().sonars.at(0).clients.size(); };
+    const auto clients = [&] { return daemon.status().sonars().at(0).clients().size(); };
     Client client(daemon.address());
     ASSERT_TRUE(eventually([&] { return clients() == 1; }));
     client.close();

@@ -2,7 +2,7 @@
 // out.
 #include <gmock/gmock.h>
 
-#include "protocol/control/control.hpp"
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -11,7 +11,6 @@ namespace {
 using control::ClockDomain;
 using control::PoseSample;
 using control::Step;
-using control::Stepped;
 using oculus::PingRate;
 using std::chrono::nanoseconds;
 using ::testing::ElementsAre;
@@ -29,7 +28,7 @@ DaemonSetup with_clock(const std::string& mode, const std::string& more = "") {
 struct Pinging {
   explicit Pinging(DaemonSetup setup) : daemon(std::move(setup)), client(daemon.address()) {
     client.fire(fire_at(PingRate::hz40));
-    EXPECT_TRUE(eventually([&] { return daemon.status().sonars.at(0).pinging; }));
+    EXPECT_TRUE(eventually([&] { return daemon.status().sonars().at(0).pinging(); }));
     reader = std::thread([this] {
       while (auto ping = client.next_ping(patience)) received.push_back(std::move(*ping));
       client.close();
@@ -41,10 +40,10 @@ struct Pinging {
     if (reader.joinable()) reader.join();
     return code;
   }
-  Stepped step(double dt_s) {
+  v1::Stepped step(double dt_s) {
     const OperationResult done = daemon.ask(Step{dt_s});
     EXPECT_EQ(done.code, Code::done) << done.text;
-    return std::get<Stepped>(done.body);
+    return *done.stepped;
   }
   static PoseSample sample(double x, nanoseconds stamp, const std::string& vehicle = "") {
     PoseSample s;
@@ -76,18 +75,18 @@ TEST(Lockstep, TimeStandsUntilAStepAndTheAnswerComesWhenThePingsAreOut) {
   Pinging p(with_clock("lockstep"));
   std::this_thread::sleep_for(milliseconds(50));
   EXPECT_TRUE(p.daemon.requests().empty());
-  EXPECT_EQ(p.daemon.status().clock, "lockstep");
+  EXPECT_EQ(p.daemon.status().clock(), "lockstep");
 
-  const Stepped first = p.step(0.05);  // pings at 0 and 25 ms; that at 50 ms belongs to the next step
-  EXPECT_EQ(first.now_ns, 50'000'000);
-  EXPECT_EQ(first.pings, 2u);
+  const v1::Stepped first = p.step(0.05);  // pings at 0 and 25 ms; that at 50 ms belongs to the next step
+  EXPECT_EQ(first.now_ns(), 50'000'000);
+  EXPECT_EQ(first.pings(), 2u);
   EXPECT_THAT(p.times_ms(), ElementsAre(0, 25));
-  EXPECT_EQ(p.daemon.status().sonars.at(0).clients.at(0).pings_written, 2u) << "they are out";
-  EXPECT_EQ(p.daemon.status().now_ns, 50'000'000);
-  EXPECT_EQ(p.step(0.01).pings, 1u);
-  const Stepped none = p.step(0.01);
-  EXPECT_EQ(none.pings, 0u);
-  EXPECT_EQ(none.now_ns, 70'000'000);
+  EXPECT_EQ(p.daemon.status().sonars().at(0).clients().at(0).pings_written(), 2u) << "they are out";
+  EXPECT_EQ(p.daemon.status().now_ns(), 50'000'000);
+  EXPECT_EQ(p.step(0.01).pings(), 1u);
+  const v1::Stepped none = p.step(0.01);
+  EXPECT_EQ(none.pings(), 0u);
+  EXPECT_EQ(none.now_ns(), 70'000'000);
   EXPECT_THAT(p.times_ms(), ElementsAre(0, 25, 50));
 }
 
@@ -98,9 +97,9 @@ TEST(Lockstep, StepsThatWaitAreDoneOneAfterTheOther) {
   std::vector<std::future<OperationResult>> steps;
   for (int i = 0; i < 8; ++i) steps.push_back(p.daemon.ask_later(Step{0.025}));
   for (int i = 0; i < 8; ++i) {
-    const auto done = std::get<Stepped>(steps[static_cast<std::size_t>(i)].get().body);
-    EXPECT_EQ(done.now_ns, (i + 1) * 25'000'000);
-    EXPECT_EQ(done.pings, 1u);
+    const v1::Stepped done = *steps[static_cast<std::size_t>(i)].get().stepped;
+    EXPECT_EQ(done.now_ns(), (i + 1) * 25'000'000);
+    EXPECT_EQ(done.pings(), 1u);
   }
   EXPECT_EQ(p.daemon.requests().size(), 8u);
 }
@@ -154,7 +153,7 @@ TEST(Follow, TimeIsThePosesAndPingsLieBetweenThem) {
 
   const nanoseconds start = std::chrono::hours(400000);  // UNIX time, about
   ASSERT_EQ(p.pose(0, start).code, Code::done);
-  EXPECT_EQ(p.daemon.status().now_ns, start.count());
+  EXPECT_EQ(p.daemon.status().now_ns(), start.count());
   EXPECT_EQ(p.daemon.requests().size(), 1u) << "due at the first stamp, to the nanosecond, and out when that is answered";
   ASSERT_EQ(p.pose(0.1, start + milliseconds(100)).code, Code::done);
   const auto requests = p.daemon.requests();
@@ -163,7 +162,7 @@ TEST(Follow, TimeIsThePosesAndPingsLieBetweenThem) {
     EXPECT_EQ(requests[static_cast<std::size_t>(i)].fired_at, Time(start + i * milliseconds(25)));
     EXPECT_NEAR(requests[static_cast<std::size_t>(i)].vehicle_in_world.position_m.x, 0.025 * i, 1e-12) << "between two poses";
   }
-  EXPECT_EQ(p.daemon.status().sonars.at(0).figures.skipped_ticks, 0u) << "before the first pose nothing was due";
+  EXPECT_EQ(p.daemon.status().sonars().at(0).figures().skipped_ticks(), 0u) << "before the first pose nothing was due";
   p.stop();
   ASSERT_EQ(p.received.size(), 5u);
   EXPECT_NEAR(p.received.front().head.fixed.ping_start_time_s, 0, 1e-6) << "the device was powered up when its time began";
@@ -191,7 +190,7 @@ TEST(Follow, AJumpAheadSkipsTheTimeBetween) {
   ASSERT_EQ(requests.size(), 2u) << "the next is due as long after the jump as it was before it";
   p.pose(9, std::chrono::seconds(3600) + milliseconds(25));
   EXPECT_EQ(p.daemon.requests().back().fired_at, Time(std::chrono::seconds(3600) + milliseconds(25)));
-  EXPECT_EQ(p.daemon.status().sonars.at(0).figures.skipped_ticks, 0u);
+  EXPECT_EQ(p.daemon.status().sonars().at(0).figures().skipped_ticks(), 0u);
   EXPECT_THAT(p.daemon.log_text(), HasSubstr("time follows the poses: it jumps ahead by 3599.975"));
 }
 
@@ -221,7 +220,7 @@ TEST(Follow, WhoWaitsForTheAnswerGetsEveryPingHoweverFarApartThePosesAre) {
   p.pose(0, milliseconds(0));
   p.pose(3, std::chrono::seconds(3));
   EXPECT_EQ(p.daemon.requests().size(), 121u);
-  EXPECT_EQ(p.daemon.status().sonars.at(0).figures.skipped_ticks, 0u);
+  EXPECT_EQ(p.daemon.status().sonars().at(0).figures().skipped_ticks(), 0u);
 }
 
 TEST(Follow, StampsThatDoNotGoOnAreToldOf) {
@@ -249,10 +248,10 @@ TEST(Follow, ASimulatorThatDoesNotWaitLosesTicksAsInRealTime) {
   const std::uint16_t port = p.daemon.app().poses().protobuf().port;
   for (int i = 0; i <= 100; ++i)  // five seconds at once: 201 ticks
     send_udp("127.0.0.1", port, control::encode_pose_datagram(p.sample(0.01 * i, i * milliseconds(50))));
-  ASSERT_TRUE(eventually([&] { return p.daemon.status().now_ns == 5'000'000'000; }));
+  ASSERT_TRUE(eventually([&] { return p.daemon.status().now_ns() == 5'000'000'000; }));
   ASSERT_TRUE(eventually([&] {
-    const auto figures = p.daemon.status().sonars.at(0).figures;
-    return figures.pings + figures.skipped_ticks == 201;
+    const auto figures = p.daemon.status().sonars().at(0).figures();
+    return figures.pings() + figures.skipped_ticks() == 201;
   })) << "every tick is accounted for";
   const auto requests = p.daemon.requests();
   EXPECT_LT(requests.size(), 100u);

@@ -2,6 +2,7 @@
 // is still there is judged by the wall's clock.
 #include <gmock/gmock.h>
 
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 #include "tests/protocol/blueview/blueview_testing.hpp"
 
@@ -10,7 +11,6 @@ namespace {
 
 using blueview::FrameType;
 using control::Step;
-using control::Stepped;
 using oculus::PingRate;
 using std::chrono::nanoseconds;
 using ::testing::ElementsAre;
@@ -48,13 +48,14 @@ std::vector<double> times_ms(Daemon& daemon) {
 TEST(SteppedTalk, ASubscriptionGetsEveryPingOfAStep) {
   Daemon daemon(head("lockstep"));
   Host host(daemon, 100);
-  EXPECT_TRUE(eventually([&] { return daemon.status().sonars.at(0).clients.at(0).bytes_written > 60; })) << "it is agreed to";
-  const auto stepped = std::get<Stepped>(daemon.ask(Step{0.5}).body);
-  EXPECT_EQ(stepped.pings, 5u);
-  EXPECT_EQ(stepped.now_ns, 500'000'000);
+  EXPECT_TRUE(eventually([&] { return daemon.status().sonars().at(0).clients().at(0).bytes_written() > 60; }))
+      << "it is agreed to";
+  const v1::Stepped stepped = *daemon.ask(Step{0.5}).stepped;
+  EXPECT_EQ(stepped.pings(), 5u);
+  EXPECT_EQ(stepped.now_ns(), 500'000'000);
   EXPECT_THAT(times_ms(daemon), ElementsAre(0, 100, 200, 300, 400));
-  EXPECT_EQ(std::get<Stepped>(daemon.ask(Step{0.25}).body).pings, 3u) << "that at its end belongs to the next step";
-  EXPECT_EQ(daemon.status().sonars.at(0).clients.at(0).pings_written, 8u);
+  EXPECT_EQ(daemon.ask(Step{0.25}).stepped->pings(), 3u) << "that at its end belongs to the next step";
+  EXPECT_EQ(daemon.status().sonars().at(0).clients().at(0).pings_written(), 8u);
   daemon.stop();
 }
 
@@ -72,10 +73,10 @@ TEST(SteppedTalk, AHostIsSilentByTheWallsClockOnly) {
   Host host(daemon);
   const auto began = Steady::now();
   EXPECT_EQ(daemon.ask(Step{300}).code, Code::done);
-  const auto status = daemon.status().sonars.at(0);
-  ASSERT_EQ(status.clients.size(), 1u) << "five simulated minutes take some ms";
-  EXPECT_GT(status.clients[0].bytes_written, 149u * 16u) << "every 2 s a keep-alive";
-  EXPECT_TRUE(eventually([&] { return daemon.status().sonars.at(0).clients.empty(); }, patience + milliseconds(10000)));
+  const auto status = daemon.status().sonars().at(0);
+  ASSERT_EQ(status.clients_size(), 1) << "five simulated minutes take some ms";
+  EXPECT_GT(status.clients(0).bytes_written(), 149u * 16u) << "every 2 s a keep-alive";
+  EXPECT_TRUE(eventually([&] { return daemon.status().sonars().at(0).clients().empty(); }, patience + milliseconds(10000)));
   EXPECT_GT(Steady::now() - began, std::chrono::seconds(9));
   EXPECT_THAT(daemon.log_text(), HasSubstr("client gone: silent for 10 s"));
   daemon.stop();
@@ -87,13 +88,13 @@ TEST(SteppedTalk, AHostIsSilentByTheWallsClockOnly) {
 TEST(SteppedTalk, BeforeTheFirstPoseThereIsNoTimeToPass) {
   Daemon daemon(head("follow"));
   Host host(daemon, 100);
-  EXPECT_TRUE(eventually([&] { return daemon.status().sonars.at(0).clients.at(0).bytes_written > 60; }));
-  EXPECT_EQ(daemon.status().now_ns, 0);
+  EXPECT_TRUE(eventually([&] { return daemon.status().sonars().at(0).clients().at(0).bytes_written() > 60; }));
+  EXPECT_EQ(daemon.status().now_ns(), 0);
   control::PoseSample pose;
   pose.stamp = {control::ClockDomain::sim, 5'000'000'000};
   EXPECT_EQ(daemon.ask(pose).code, Code::done);
-  EXPECT_EQ(daemon.status().now_ns, 5'000'000'000);
-  EXPECT_EQ(daemon.status().sonars.at(0).figures.skipped_ticks, 0u);
+  EXPECT_EQ(daemon.status().now_ns(), 5'000'000'000);
+  EXPECT_EQ(daemon.status().sonars().at(0).figures().skipped_ticks(), 0u);
   daemon.stop();
 }
 
@@ -106,7 +107,7 @@ TEST(SteppedTalk, TimeDoesNotPassForAHostWhosePingsWaitForAPose) {
   EXPECT_TRUE(eventually([&] { return daemon.requests().size() == 6; })) << "up to stale_after_s";
   std::this_thread::sleep_for(milliseconds(100));
   EXPECT_EQ(daemon.requests().size(), 6u);
-  EXPECT_LE(daemon.status().now_ns, 1'200'000'000);
+  EXPECT_LE(daemon.status().now_ns(), 1'200'000'000);
   daemon.stop();
 }
 
@@ -135,7 +136,7 @@ TEST(SteppedTalk, ThePingOfAHostThatLeftIsNotPending) {
   DaemonSetup setup = head("lockstep");
   setup.profile = "blueview-m900-2250-130";
   Daemon daemon(setup);
-  const auto clients = [&] { return daemon.status().sonars.at(0).clients.size(); };
+  const auto clients = [&] { return daemon.status().sonars().at(0).clients().size(); };
   {
     Client leaves(daemon.address(), blueview::tcp_port);
     leaves.send(bv::hello());
@@ -147,8 +148,8 @@ TEST(SteppedTalk, ThePingOfAHostThatLeftIsNotPending) {
   subscriber.send(bv::hello());
   subscriber.send(bv::two_numbers(FrameType::subscribe, 2, 1, 100));
   std::thread reader([&] { subscriber.read_to_end(); });
-  EXPECT_TRUE(eventually([&] { return clients() == 1 && daemon.status().sonars.at(0).clients.at(0).bytes_written > 60; }));
-  EXPECT_EQ(std::get<Stepped>(daemon.ask(Step{0.5}).body).pings, 5u);
+  EXPECT_TRUE(eventually([&] { return clients() == 1 && daemon.status().sonars().at(0).clients().at(0).bytes_written() > 60; }));
+  EXPECT_EQ(daemon.ask(Step{0.5}).stepped->pings(), 5u);
   daemon.stop();
   reader.join();
 }

@@ -1,0 +1,32 @@
+// Status, events and answers are the classes that protoc makes of control.proto: the daemon fills them, clients read them. They
+// take a second to compile: only the files named in tests/architecture/check_floors.py include this header.
+#pragma once
+
+#include <string>
+
+#include "control.pb.h"
+#include "core/base/geometry.hpp"
+#include "protocol/control/control.hpp"
+
+namespace sonar::control {
+
+v1::Status status_of(StatusCode code, const std::string& text);
+v1::Response response_of(std::uint64_t id, StatusCode code, const std::string& text = {});
+
+void fill(v1::Vec3& out, Vec3d v);
+void fill(v1::Quat& out, Quatd q);
+/// Numbers that have been checked; an orientation that is not given is level.
+Pose pose_from(const v1::Vec3& position, const v1::Quat& orientation);
+
+/// Of messages with a position and an orientation in the world, ENU and FLU, metres.
+template <class Message>
+void set_pose(Message& out, const Pose& in_world) {
+  fill(*out.mutable_position(), in_world.position_m);
+  fill(*out.mutable_orientation(), in_world.orientation);
+}
+template <class Message>
+Pose pose_of(const Message& message) {
+  return pose_from(message.position(), message.orientation());
+}
+
+}  // namespace sonar::control
