@@ -45,6 +45,8 @@ void add_run_options(CLI::App& app, RunCommand& run) {
       ->envname("SONARD_OFFSET");
   app.add_option("--clients", run.clients, "clients that each sonar serves at a time, instead of its clients.max")
       ->check(whole_number(1, 16));
+  app.add_flag("--faults", run.faults, "arm faults on purpose: without it every request for one is refused (docs/faults.md)");
+  app.add_option("--fault-journal", run.fault_journal, "file that what faults did is appended to, as JSON lines");
   app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings")->check(whole_number());
   app.add_flag("--digest", run.digest, "print the SHA-256 of every client's byte stream at the end");
   app.add_option("--log-format", run.log_format, "text or json (default text)")
@@ -211,6 +213,12 @@ Result<void> override_config(Config& config, const RunCommand& command) {
       return failure(r.error().kind, "--offset: " + r.error().text);
   if (!command.bind.empty())
     if (const auto r = rebind(config, command.bind); !r) return failure(r.error().kind, "--bind: " + r.error().text);
+  config.faults.armed = config.faults.armed || command.faults;
+  if (!command.fault_journal.empty()) config.faults.journal = command.fault_journal;
+  if (!config.faults.plan.empty() && !config.faults.armed)
+    return failure(ErrorKind::config, config.source +
+                                          ": faults.plan: faults act only when they are armed: add armed: true, or start "
+                                          "with sonard run --faults");
   return check_time_can_pass(config);
 }
 

@@ -24,6 +24,8 @@ struct RunCommand {
   // Empty = as the configuration says.
   std::string clock, log_format, log_level, bind;
   std::optional<int> clients;
+  bool faults = false;
+  std::string fault_journal;
   int offset = 0;
   EngineOptionsGiven engine;
 };

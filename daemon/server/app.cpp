@@ -43,7 +43,8 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
           world_, clock_, log_, [this] { on_change(); }, &events_, &plausibility_),
       pose_server_(io_, config_.poses, config_.limits, admission_, pose_intake_, log_),
       mavlink_server_(io_, config_, pose_intake_, log_),
-      fleet_({io_, clock_, admission_, log_, options_.digest}, config_, world_, simulator_, recordings_, events_,
+      fault_log_(events_),
+      fleet_({io_, clock_, admission_, log_, options_.digest}, config_, world_, simulator_, recordings_, events_, fault_log_,
              {[this] { on_change(); },
               [this](const Error& why) {
                 log_.error(why.text);
@@ -57,7 +58,8 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       status_report_(config_, clock_, world_, changes_, fleet_, simulator_, recordings_, plausibility_, mavlink_server_,
                      control_),
       monitoring_(config_.limits, simulator_, changes_, world_, admission_, fleet_),
-      operations_(scene_operations_, sonar_operations_, time_operations_, status_report_, monitoring_),
+      fault_operations_(config_, fleet_, fault_log_, clock_, log_),
+      operations_(scene_operations_, sonar_operations_, time_operations_, status_report_, monitoring_, fault_operations_),
       control_(io_, config_.control, config_.limits, admission_, operations_, events_, pose_intake_, log_),
       signals_(io_),
       housekeeping_timer_(io_),
@@ -81,6 +83,8 @@ Result<void> App::open() {
     signals_.add(SIGTERM);
     signals_.add(SIGHUP);  // else it would end us at once, without a word to the clients
   }
+  if (!config_.faults.journal.empty())
+    if (auto r = fault_log_.open(config_.faults.journal); !r) return r;
   if (auto r = fleet_.open(config_); !r) return r;
   if (auto r = pose_server_.open(); !r) return r;
   if (auto r = mavlink_server_.open(); !r) return r;
@@ -93,6 +97,7 @@ int App::run() {
   mavlink_server_.start();
   control_.start();
   fleet_.start();
+  fault_operations_.begin_plan();
   asio::co_spawn(
       io_, [this] { return housekeeping(); }, asio::detached);
   notify_.ready(status_line());

@@ -17,6 +17,7 @@
 #include "daemon/server/control/control_server.hpp"
 #include "daemon/server/engine/simulator.hpp"
 #include "daemon/server/engine/start_engine.hpp"
+#include "daemon/server/faults/fault_log.hpp"
 #include "daemon/server/operations/app_operations.hpp"
 #include "daemon/server/poses/mavlink_server.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
@@ -103,6 +104,7 @@ class App {
   PoseIntake pose_intake_;
   PoseServer pose_server_;
   MavlinkServer mavlink_server_;
+  FaultLog fault_log_;
   Fleet fleet_;
   Stepper stepper_;
   SceneOperations scene_operations_;
@@ -110,6 +112,7 @@ class App {
   TimeOperations time_operations_;
   StatusReport status_report_;
   Monitoring monitoring_;
+  FaultOperations fault_operations_;
   AppOperations operations_;
   ControlServer control_;
   asio::signal_set signals_;

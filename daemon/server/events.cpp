@@ -78,6 +78,8 @@ bool EventQueue::subscribes_to(const v1::Event& event) const {
       return wanted_.poses;
     case v1::Event::kScene:
       return wanted_.scene;
+    case v1::Event::kFault:
+      return wanted_.faults;
     case v1::Event::WHAT_NOT_SET:
       break;
   }

@@ -43,7 +43,7 @@ class EventQueue {
   static constexpr std::size_t deepest = 64;
 
   void subscribe(const control::Subscribe& wanted) { wanted_ = wanted; }
-  bool subscribes_any() const { return wanted_.pings || wanted_.clients || wanted_.poses || wanted_.scene; }
+  bool subscribes_any() const { return wanted_.pings || wanted_.clients || wanted_.poses || wanted_.scene || wanted_.faults; }
   /// True when it was queued.
   bool offer(const v1::Event& event);
   /// Null = there is none.

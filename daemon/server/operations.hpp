@@ -13,6 +13,7 @@ namespace sonar {
 
 namespace v1 {  // of control.pb.h
 class DaemonStatus;
+class FaultReport;
 class Stepped;
 }  // namespace v1
 
@@ -22,6 +23,7 @@ struct OperationResult {
   std::string text = {};                                // one sentence when it was not done
   std::shared_ptr<const v1::DaemonStatus> status = {};  // of GetStatus that was done
   std::shared_ptr<const v1::Stepped> stepped = {};      // of Step
+  std::shared_ptr<const v1::FaultReport> faults = {};  // of GetFaults
 };
 
 class Operations {

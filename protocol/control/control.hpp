@@ -42,7 +42,7 @@ struct Unsupported {  // a request this version does not know
 struct Request {
   std::uint64_t id = 0;
   std::variant<Unsupported, Hello, PoseSample, GetStatus, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
-               SetTrajectory, Step, StartRecording, StopRecording, Subscribe>
+               SetTrajectory, Step, StartRecording, StopRecording, AddFault, EndFaults, GetFaults, Subscribe>
       op;
 };
 /// Numbers of v1::Status::Code.

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "core/base/geometry.hpp"
+#include "protocol/control/fault_record.hpp"
 #include "protocol/control/pose_sample.hpp"
 
 namespace sonar::control {
@@ -61,12 +62,22 @@ struct StartRecording {
 struct StopRecording {
   std::string file;  // empty = all
 };
+struct AddFault {
+  FaultRecord fault;
+};
+struct EndFaults {
+  std::string name;  // empty = all
+};
+struct GetFaults {
+  bool kinds = false;               // also the catalogue
+  std::uint64_t journal_after = 0;  // also the journal's entries after this one
+};
 struct Subscribe {
-  bool pings = false, clients = false, poses = false, scene = false;
+  bool pings = false, clients = false, poses = false, scene = false, faults = false;
 };
 
 /// Requests that the daemon executes; Hello and Subscribe are handled by the connection.
 using Operation = std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
-                               SetTrajectory, Step, StartRecording, StopRecording>;
+                               SetTrajectory, Step, StartRecording, StopRecording, AddFault, EndFaults, GetFaults>;
 
 }  // namespace sonar::control

@@ -1,5 +1,9 @@
 // Requests between protobuf and plain structs: what a name, a number, a choice may be.
+#include <google/protobuf/struct.pb.h>
+
 #include <algorithm>
+
+#include "core/text/format.hpp"
 
 #include "protocol/control/messages.hpp"
 #include "protocol/control/refused.hpp"
@@ -129,7 +133,49 @@ Result<StopRecording> from(const v1::StopRecording& m) {
   return StopRecording{*file};
 }
 
-Subscribe from(const v1::Subscribe& m) { return {m.pings(), m.clients(), m.poses(), m.scene()}; }
+Subscribe from(const v1::Subscribe& m) { return {m.pings(), m.clients(), m.poses(), m.scene(), m.faults()}; }
+
+/// Of a parameter; JSON and protobuf give numbers, words and truth values.
+Result<std::string> text_from(const std::string& key, const google::protobuf::Value& value) {
+  if (value.kind_case() == google::protobuf::Value::kStringValue) return checked_text(value.string_value(), key.c_str(), false);
+  if (value.kind_case() == google::protobuf::Value::kBoolValue) return std::string(value.bool_value() ? "yes" : "no");
+  if (value.kind_case() == google::protobuf::Value::kNumberValue) return text::format("%.12g", value.number_value());
+  return refused("with." + key + " must be a number or a word");
+}
+
+Result<AddFault> from(const v1::Fault& f) {
+  FaultRecord record;
+  for (const auto& [key, text, needed, to] :
+       {std::tuple{"name", &f.name(), false, &record.name}, std::tuple{"do", &f.do_(), true, &record.what},
+        std::tuple{"sonar", &f.sonar(), false, &record.sonar}, std::tuple{"client", &f.client(), false, &record.client},
+        std::tuple{"at.on", &f.at().on(), false, &record.at.on}}) {
+    const auto good = checked_text(*text, key, needed);
+    if (!good) return tl::make_unexpected(good.error());
+    *to = *good;
+  }
+  for (const auto& [key, value] : f.with()) {
+    const auto name = checked_text(key, "a parameter of with", true);
+    if (!name) return tl::make_unexpected(name.error());
+    const auto text = text_from(key, value);
+    if (!text) return tl::make_unexpected(text.error());
+    record.with[key] = *text;
+  }
+  if (f.at().has_ping()) record.at.ping = f.at().ping().value();
+  if (f.at().has_every()) record.at.every = f.at().every().value();
+  record.at.phase = f.at().phase();
+  if (f.at().has_time_s()) record.at.time_s = f.at().time_s().value();
+  if (f.at().has_probability()) record.at.probability = f.at().probability().value();
+  if (f.for_().has_seconds()) record.lasts.seconds = f.for_().seconds().value();
+  if (f.for_().has_pings()) record.lasts.pings = f.for_().pings().value();
+  if (f.for_().has_count()) record.lasts.count = f.for_().count().value();
+  return AddFault{std::move(record)};
+}
+
+Result<EndFaults> from(const v1::EndFaults& m) {
+  const auto name = checked_text(m.name(), "name", false);
+  if (!name) return tl::make_unexpected(name.error());
+  return EndFaults{*name};
+}
 
 Result<Request> with_op(const v1::Request& message) {
   Request request{message.id(), Unsupported{}};
@@ -183,6 +229,15 @@ Result<Request> with_op(const v1::Request& message) {
       break;
     case v1::Request::kStopRecording:
       take(from(message.stop_recording()));
+      break;
+    case v1::Request::kAddFault:
+      take(from(message.add_fault()));
+      break;
+    case v1::Request::kEndFaults:
+      take(from(message.end_faults()));
+      break;
+    case v1::Request::kFaults:
+      request.op = GetFaults{message.faults().kinds(), message.faults().journal_after()};
       break;
     case v1::Request::OP_NOT_SET:
       break;
@@ -253,12 +308,37 @@ struct FillRequest {
     out.mutable_start_recording()->set_sonar(op.sonar);
   }
   void operator()(const StopRecording& op) const { out.mutable_stop_recording()->set_file(op.file); }
+  void operator()(const AddFault& op) const {
+    v1::Fault& m = *out.mutable_add_fault();
+    m.set_name(op.fault.name);
+    m.set_do_(op.fault.what);
+    for (const auto& [key, value] : op.fault.with) (*m.mutable_with())[key].set_string_value(value);
+    m.set_sonar(op.fault.sonar);
+    m.set_client(op.fault.client);
+    const FaultRecord::At& at = op.fault.at;
+    if (at.ping) m.mutable_at()->mutable_ping()->set_value(*at.ping);
+    if (at.every) m.mutable_at()->mutable_every()->set_value(*at.every);
+    if (at.phase != 0) m.mutable_at()->set_phase(at.phase);
+    if (at.time_s) m.mutable_at()->mutable_time_s()->set_value(*at.time_s);
+    if (at.probability) m.mutable_at()->mutable_probability()->set_value(*at.probability);
+    if (!at.on.empty()) m.mutable_at()->set_on(at.on);
+    const FaultRecord::For& lasts = op.fault.lasts;
+    if (lasts.seconds) m.mutable_for_()->mutable_seconds()->set_value(*lasts.seconds);
+    if (lasts.pings) m.mutable_for_()->mutable_pings()->set_value(*lasts.pings);
+    if (lasts.count) m.mutable_for_()->mutable_count()->set_value(*lasts.count);
+  }
+  void operator()(const EndFaults& op) const { out.mutable_end_faults()->set_name(op.name); }
+  void operator()(const GetFaults& op) const {
+    out.mutable_faults()->set_kinds(op.kinds);
+    out.mutable_faults()->set_journal_after(op.journal_after);
+  }
   void operator()(const Subscribe& op) const {
     v1::Subscribe& m = *out.mutable_subscribe();
     m.set_pings(op.pings);
     m.set_clients(op.clients);
     m.set_poses(op.poses);
     m.set_scene(op.scene);
+    m.set_faults(op.faults);
   }
 };
 

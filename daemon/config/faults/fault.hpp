@@ -1,5 +1,5 @@
-// A fault: one way in which an emulated sonar misbehaves on purpose, when, for how long and towards whom. FaultRecord is what a
-// user writes (configuration, HTTP, control stream, sonarctl, Python); check_fault() turns it into a Fault or says what is wrong.
+// A fault: one way in which an emulated sonar misbehaves on purpose, when, for how long and towards whom. check_fault() makes it
+// from what a user wrote, or says what is wrong.
 #pragma once
 
 #include <chrono>
@@ -13,6 +13,7 @@
 #include "core/base/result.hpp"
 #include "core/text/ipv4.hpp"
 #include "daemon/config/faults/kinds.hpp"
+#include "protocol/control/fault_record.hpp"
 
 namespace sonar {
 
@@ -20,26 +21,7 @@ namespace sonar {
 enum class Occasion { connect, config, status, disconnect };
 inline constexpr std::array<std::string_view, 4> occasion_names = {"connect", "config", "status", "disconnect"};
 
-struct FaultRecord {
-  std::string name;  // unique among the faults of the daemon; empty = made from `what`
-  std::string what;  // code or name of a kind, or of a trouble: "L05", "silent-open", "power-cycle"
-  std::map<std::string, std::string> with;
-  std::string sonar;   // empty = all
-  std::string client;  // "" or all, newest, oldest, an ordinal counted from 1, an address, a prefix 10.0.0.0/8
-  struct At {          // one of them; none = at once
-    std::optional<std::uint64_t> ping, every;
-    std::uint64_t phase = 0;  // of every
-    std::optional<double> time_s, probability;
-    std::string on;  // an Occasion
-    bool operator==(const At&) const = default;
-  } at;
-  struct For {  // each optional; see Span
-    std::optional<double> seconds;
-    std::optional<std::uint64_t> pings, count;
-    bool operator==(const For&) const = default;
-  } lasts;
-  bool operator==(const FaultRecord&) const = default;
-};
+using control::FaultRecord;
 
 /// How long a fault acts each time it begins, and how often it begins.
 struct Span {

@@ -1,5 +1,7 @@
 #include "daemon/server/control/http_router.hpp"
 
+#include "core/text/decimal.hpp"
+
 namespace sonar {
 namespace {
 
@@ -12,7 +14,7 @@ HttpAnswer refused(unsigned status, const std::string& text) {
 
 HttpAnswer wrong_method(const Route& route) {
   HttpAnswer answer = refused(405, "method not allowed; use " + std::string(route.method));
-  answer.allow = route.method == "GET" ? "GET, HEAD" : "POST";
+  answer.allow = route.method == "GET" ? "GET, HEAD" : std::string(route.method);
   return answer;
 }
 
@@ -54,7 +56,7 @@ RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy
   if (auto answer = reject_host_or_origin(request, policy)) return {*std::move(answer)};
   const auto target = parse_target(request.target);
   if (!target) return {refused(400, "the target is not a path")};
-  const Route route = route_of(*target);
+  const Route route = route_of(*target, request.method);
   const bool authorised = policy.token.matches(bearer_token(request.authorization));
   if (!authorised && route.kind != Kind::health)
     return {refused(401, "token required: send Authorization: Bearer TOKEN, with the token of control.token_file")};
@@ -70,6 +72,15 @@ RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy
       return {MetricsAction{}};
     case Kind::status:
       return {OperationAction{control::GetStatus{}}};
+    case Kind::faults: {
+      control::GetFaults wanted;
+      wanted.kinds = route.op == "kinds";
+      for (const auto& [key, value] : target->query)
+        if (key == "after") wanted.journal_after = text::parse_unsigned(value).value_or(0);
+      return {OperationAction{wanted}};
+    }
+    case Kind::end_fault:
+      return {OperationAction{control::EndFaults{route.name}}};
     case Kind::events: {
       auto wanted = subscription_of(*target);
       if (!wanted) return {refused(400, wanted.error().text)};
@@ -96,13 +107,14 @@ std::string help_text(const std::string& address) {
          url +
          "/api/v1/status\n"
          "  curl -sN '" +
-         url + "/api/v1/events?pings=1&clients=1&poses=1&scene=1'\n" + post + "sonars/NAME" + json +
+         url + "/api/v1/events?pings=1&clients=1&poses=1&scene=1&faults=1'\n" + post + "sonars/NAME" + json +
          "'{\"range_m\":5,\"gain_percent\":60}'\n" + post + "environment" + json + "'{\"environment\":{\"temperature_c\":4}}'\n" +
          post + "pose" + json + "'{\"frame\":\"NED_FRD\",\"position\":{\"x\":0,\"y\":0,\"z\":3},\"orientation\":{\"w\":1}}'\n" +
          post + "objects/NAME" + json + "'{\"visible\":false}'\n" + post + "load" + json +
          "'{\"path\":\"demo.yaml\"}'\n\n"
          "POST to /api/v1/ also: sonar, object, add_object, remove_object, set_object, set_trajectory, step, start_recording,\n"
-         "stop_recording.\n";
+         "stop_recording. Faults, with sonard --faults: GET and POST faults, GET faults/kinds and faults/journal, POST\n"
+         "faults/reset, DELETE faults/NAME.\n";
 }
 
 }  // namespace sonar

@@ -99,42 +99,58 @@ bool is_json(std::string_view content_type) {
   return same_word(type, "application/json");
 }
 
-Route route_of(const Target& target) {
-  using Kind = Route::Kind;
+namespace {
+
+/// Below /api/v1/faults, shaped like Toxiproxy's.
+Route fault_route(const std::vector<std::string>& s, std::string_view method) {
+  if (s.size() == 3)
+    return method == "POST" ? Route{Route::Kind::operation, "POST", "add_fault"} : Route{Route::Kind::faults, "GET", "faults"};
+  if (s.size() != 4) return {};
+  if (s[3] == "kinds" || s[3] == "journal") return {Route::Kind::faults, "GET", s[3]};
+  if (s[3] == "reset") return {Route::Kind::operation, "POST", "end_faults"};
+  return {Route::Kind::end_fault, "DELETE", "end_faults", s[3]};
+}
+
+}  // namespace
+
+Route route_of(const Target& target, std::string_view method) {
   const auto& s = target.segments;
-  if (s.empty()) return {Kind::help, "GET", ""};
-  if (s.size() == 1 && s[0] == "healthz") return {Kind::health, "GET", ""};
-  if (s.size() == 1 && s[0] == "metrics") return {Kind::metrics, "GET", ""};
+  if (s.empty()) return {Route::Kind::help, "GET", ""};
+  if (s.size() == 1 && s[0] == "healthz") return {Route::Kind::health, "GET", ""};
+  if (s.size() == 1 && s[0] == "metrics") return {Route::Kind::metrics, "GET", ""};
   if (s.size() < 3 || s[0] != "api" || s[1] != "v1") return {};
-  if (s.size() == 4 && s[2] == "sonars" && !s[3].empty()) return {Kind::operation, "POST", "sonar", s[3]};
-  if (s.size() == 4 && s[2] == "objects" && !s[3].empty()) return {Kind::operation, "POST", "set_object", s[3]};
+  if (s[2] == "faults") return fault_route(s, method);
+  if (s.size() == 4 && s[2] == "sonars" && !s[3].empty()) return {Route::Kind::operation, "POST", "sonar", s[3]};
+  if (s.size() == 4 && s[2] == "objects" && !s[3].empty()) return {Route::Kind::operation, "POST", "set_object", s[3]};
   if (s.size() != 3) return {};
-  if (s[2] == "status") return {Kind::status, "GET", "status"};
-  if (s[2] == "events") return {Kind::events, "GET", ""};
+  if (s[2] == "status") return {Route::Kind::status, "GET", "status"};
+  if (s[2] == "events") return {Route::Kind::events, "GET", ""};
   constexpr std::array<std::string_view, 12> operations = {
       "sonar",         "environment", "load",           "pose", "object",          "add_object",
       "remove_object", "set_object",  "set_trajectory", "step", "start_recording", "stop_recording"};
-  if (std::find(operations.begin(), operations.end(), s[2]) != operations.end()) return {Kind::operation, "POST", s[2]};
+  if (std::find(operations.begin(), operations.end(), s[2]) != operations.end()) return {Route::Kind::operation, "POST", s[2]};
   return {};
 }
 
 Result<control::Subscribe> subscription_of(const Target& target) {
   control::Subscribe wanted;
-  if (target.query.empty()) return control::Subscribe{true, true, true, true};
+  if (target.query.empty()) return control::Subscribe{true, true, true, true, true};
   for (const auto& [key, value] : target.query) {
     bool* kind = key == "pings"     ? &wanted.pings
                  : key == "clients" ? &wanted.clients
                  : key == "poses"   ? &wanted.poses
                  : key == "scene"   ? &wanted.scene
+                 : key == "faults"  ? &wanted.faults
                                     : nullptr;
     if (kind == nullptr)
-      return failure(ErrorKind::bad_data, '"' + key.substr(0, 64) + "\": unknown; events are pings, clients, poses, scene");
+      return failure(ErrorKind::bad_data,
+                     '"' + key.substr(0, 64) + "\": unknown; events are pings, clients, poses, scene, faults");
     if (value != "1" && value != "0" && value != "true" && value != "false")
       return failure(ErrorKind::bad_data, key + " must be 1 or 0");
     *kind = value == "1" || value == "true";
   }
-  if (!wanted.pings && !wanted.clients && !wanted.poses && !wanted.scene)
-    return failure(ErrorKind::bad_data, "no events asked for: pings=1, clients=1, poses=1, scene=1");
+  if (!wanted.pings && !wanted.clients && !wanted.poses && !wanted.scene && !wanted.faults)
+    return failure(ErrorKind::bad_data, "no events asked for: pings=1, clients=1, poses=1, scene=1, faults=1");
   return wanted;
 }
 

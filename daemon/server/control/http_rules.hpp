@@ -36,13 +36,13 @@ bool begins_http_request(std::string_view bytes);
 inline constexpr std::size_t longest_http_method = 8;  // "OPTIONS "
 
 struct Route {
-  enum class Kind { unknown, help, health, metrics, status, events, operation };
+  enum class Kind { unknown, help, health, metrics, status, events, operation, faults, end_fault };
   Kind kind = Kind::unknown;
   std::string_view method;  // the allowed one
-  std::string op;           // of an operation: the member of Request.op
-  std::string name = {};    // of the sonar or object, when the path has it
+  std::string op;           // of an operation: the member of Request.op; of faults: "faults", "kinds" or "journal"
+  std::string name = {};    // of the sonar, object or fault, when the path has it
 };
-Route route_of(const Target& target);
+Route route_of(const Target& target, std::string_view method);
 
 /// ?pings=1&clients=0...; an empty query = all kinds. The error is a sentence.
 Result<control::Subscribe> subscription_of(const Target& target);

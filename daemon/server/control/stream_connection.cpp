@@ -30,6 +30,7 @@ bool is_unasked(std::uint64_t id, const auto& operation) {
 v1::Response response_to(std::uint64_t id, const OperationResult& result) {
   v1::Response response = response_of(id, code_of(result.code), result.text);
   if (result.status) *response.mutable_daemon() = *result.status;
+  if (result.faults) *response.mutable_faults() = *result.faults;
   if (result.stepped) *response.mutable_stepped() = *result.stepped;
   return response;
 }

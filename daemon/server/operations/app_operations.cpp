@@ -24,7 +24,10 @@ void AppOperations::perform(const control::Operation& operation, const Sender& s
                         [&](const control::LoadScene& asked) { scene_.load(asked, sender, std::move(done)); },
                         [&](const control::AddObject& asked) { scene_.add(asked, sender, std::move(done)); },
                         [&](const control::RemoveObject& asked) { scene_.remove(asked, sender, std::move(done)); },
-                        [&](const control::SetObject& asked) { scene_.set(asked, sender, std::move(done)); }},
+                        [&](const control::SetObject& asked) { scene_.set(asked, sender, std::move(done)); },
+                        [&](const control::AddFault& asked) { done(faults_.add(asked, sender)); },
+                        [&](const control::EndFaults& asked) { done(faults_.end(asked, sender)); },
+                        [&](const control::GetFaults& asked) { done(faults_.report(asked)); }},
              operation);
 }
 

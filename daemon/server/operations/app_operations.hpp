@@ -3,6 +3,7 @@
 #pragma once
 
 #include "daemon/server/operations.hpp"
+#include "daemon/server/operations/fault_operations.hpp"
 #include "daemon/server/operations/monitoring.hpp"
 #include "daemon/server/operations/scene_operations.hpp"
 #include "daemon/server/operations/sonar_operations.hpp"
@@ -14,8 +15,8 @@ namespace sonar {
 class AppOperations final : public Operations {
  public:
   AppOperations(SceneOperations& scene, SonarOperations& sonars, TimeOperations& time, const StatusReport& status,
-                const Monitoring& monitoring)
-      : scene_(scene), sonars_(sonars), time_(time), status_(status), monitoring_(monitoring) {}
+                const Monitoring& monitoring, FaultOperations& faults)
+      : scene_(scene), sonars_(sonars), time_(time), status_(status), monitoring_(monitoring), faults_(faults) {}
 
   void perform(const control::Operation& operation, const Sender& sender, Done done) override;
   std::string metrics() const override { return monitoring_.metrics(); }
@@ -27,6 +28,7 @@ class AppOperations final : public Operations {
   TimeOperations& time_;
   const StatusReport& status_;
   const Monitoring& monitoring_;
+  FaultOperations& faults_;
 };
 
 }  // namespace sonar

@@ -105,6 +105,11 @@ class Device final : public SessionParent {
   /// Vehicle and mount, of a configuration that is otherwise the same.
   void use_place(const SonarConfig& config) { sonar_.move(config, network_.clock.now()); }
   void use_water(const Water& water);
+  void add_faults(const std::vector<Fault>& faults, bool manual) {
+    perform(sonar_.add_faults(faults, manual, network_.clock.now()));
+  }
+  /// Empty = all. False: there is none of that name.
+  bool end_faults(const std::string& name);
   /// Closes connections whose peer has hung up. Now and then, and before a slot is given or refused: the listener may be ready
   /// before the reader of the one that left.
   void forget_who_left();

@@ -99,4 +99,11 @@ void Device::use_water(const Water& water) {
   perform({});
 }
 
+bool Device::end_faults(const std::string& name) {
+  Actions actions;
+  const bool found = sonar_.end_faults(name, network_.clock.now(), actions);
+  perform(std::move(actions));
+  return found;
+}
+
 }  // namespace sonar

@@ -24,9 +24,9 @@ class Fleet final : public DeviceParent {
   };
   /// All of it outlives the fleet.
   Fleet(DeviceNetwork network, const Config& config, const World& world, Simulator& simulator, Recordings& recordings,
-        Events& events, Handlers handlers)
+        Events& events, FaultJournal& faults, Handlers handlers)
       : network_(network),
-        around_{config, world},
+        around_{config, world, &faults},
         simulator_(simulator),
         recordings_(recordings),
         events_(events),

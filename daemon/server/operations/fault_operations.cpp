@@ -1,0 +1,119 @@
+#include "daemon/server/operations/fault_operations.hpp"
+
+#include <algorithm>
+
+#include "core/text/nearest.hpp"
+#include "daemon/server/operations/operation_results.hpp"
+#include "protocol/control/answers.hpp"
+
+namespace sonar {
+namespace {
+
+void fill(v1::FaultKind& out, const FaultKind& kind) {
+  out.set_code(std::string(kind.code));
+  out.set_name(std::string(kind.name));
+  out.set_tier(static_cast<std::uint32_t>(kind.tier));
+  out.set_stage(std::string(fault_stage_names[static_cast<std::size_t>(kind.stage)]));
+  out.set_sentence(std::string(kind.sentence));
+  out.set_good_driver(std::string(kind.good_driver));
+  out.set_default_s(kind.default_s);
+  for (const FaultParameter& p : kind.given()) {
+    v1::FaultParameter& parameter = *out.add_parameters();
+    parameter.set_name(std::string(p.name));
+    parameter.set_value(std::string(p.value));
+    parameter.set_lowest(p.lowest);
+    parameter.set_highest(p.highest);
+    for (std::string_view rest = p.words; !rest.empty();) {
+      const std::size_t end = std::min(rest.find(' '), rest.size());
+      parameter.add_words(std::string(rest.substr(0, end)));
+      rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+  }
+  for (const protocol::Vendor* vendor : protocol::vendors())
+    if (const std::string why = why_without_effect(kind, *vendor); !why.empty())
+      (*out.mutable_without_effect())[std::string(vendor->name())] = why;
+}
+
+void fill(v1::FaultStatus& out, const Faults::Listed& listed, const std::string& sonar, Time now) {
+  out.set_name(listed.fault->name);
+  out.set_do_(listed.fault->what);
+  out.set_code(std::string(listed.fault->kind->code));
+  out.set_sonar(sonar);
+  out.set_state(listed.over ? "over" : listed.active ? "active" : "waiting");
+  out.set_injections(listed.injections);
+  if (!listed.over && listed.expires != Time::max()) out.set_expires_s(seconds(listed.expires - now));
+}
+
+}  // namespace
+
+OperationResult FaultOperations::add(const control::AddFault& asked, const Sender& sender) {
+  if (!config_.faults.armed)
+    return refused("faults are not armed: start the daemon with sonard run --faults, or with faults: {armed: true}");
+  OperationResult result = add(asked.fault, true);
+  if (result.code == OperationResult::Code::done) log_.warning("fault requested: " + asked.fault.what, {{"client", sender.id}});
+  return result;
+}
+
+/// All sonars are asked first: nothing is half applied.
+OperationResult FaultOperations::add(const control::FaultRecord& record, bool manual) {
+  const auto faults = check_fault(record, manual);
+  if (!faults) return result_of(faults.error());
+  std::vector<Device*> takers;
+  std::vector<std::string_view> names;
+  std::string why;
+  for (Device& device : fleet_.devices()) {
+    names.push_back(device.config().name);
+    if (!record.sonar.empty() && device.config().name != record.sonar) continue;
+    std::string why_not = device.sonar().why_no_faults(*faults);
+    if (why_not.empty())
+      takers.push_back(&device);
+    else if (record.sonar.empty() && why_not.find("has no effect") != std::string::npos)
+      why = std::move(why_not);  // of a product that has no such thing; others may
+    else
+      return refused(std::move(why_not));
+  }
+  if (takers.empty() && !why.empty()) return refused(std::move(why));
+  if (takers.empty())
+    return refused("no sonar is called \"" + record.sonar.substr(0, 64) + '"' + text::suggestion(record.sonar, names, "sonars"));
+  for (Device* device : takers) device->add_faults(*faults, manual);
+  return {};
+}
+
+OperationResult FaultOperations::end(const control::EndFaults& asked, const Sender& sender) {
+  bool found = asked.name.empty();
+  for (Device& device : fleet_.devices()) found = device.end_faults(asked.name) || found;
+  if (!found) return refused("there is no fault \"" + asked.name.substr(0, 64) + "\" that waits or acts");
+  log_.info("faults ended on request", {{"client", sender.id}});
+  return {};
+}
+
+OperationResult FaultOperations::report(const control::GetFaults& asked) const {
+  auto report = std::make_shared<v1::FaultReport>();
+  report->set_armed(config_.faults.armed);
+  for (const Device& device : fleet_.devices())
+    for (const Faults::Listed& listed : device.sonar().faults().list())
+      fill(*report->add_faults(), listed, device.config().name, clock_.now());
+  for (const auto& entry : journal_.entries())
+    if (entry->seq() > asked.journal_after) *report->add_journal() = *entry;
+  if (asked.kinds) {
+    for (const FaultKind& kind : fault_kinds()) fill(*report->add_kinds(), kind);
+    for (const Trouble& trouble : troubles()) {
+      v1::Trouble& out = *report->add_troubles();
+      out.set_name(std::string(trouble.name));
+      out.set_sentence(std::string(trouble.sentence));
+      for (const Trouble::Part& part : trouble.parts)
+        if (!part.code.empty()) out.add_codes(std::string(part.code));
+    }
+  }
+  OperationResult result;
+  result.faults = std::move(report);
+  return result;
+}
+
+void FaultOperations::begin_plan() {
+  for (const control::FaultRecord& record : config_.faults.plan)
+    if (const OperationResult result = add(record, false); result.code != OperationResult::Code::done)
+      log_.error("fault of the plan refused: " + result.text);
+}
+
+}  // namespace sonar

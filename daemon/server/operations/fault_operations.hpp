@@ -1,0 +1,32 @@
+// Requests for faults: adding, ending, listing them; the plan of the configuration; MAVLink's failure injection.
+#pragma once
+
+#include "daemon/server/faults/fault_log.hpp"
+#include "daemon/server/operations.hpp"
+#include "daemon/server/sonars/fleet.hpp"
+#include "daemon/server/system/log.hpp"
+
+namespace sonar {
+
+class FaultOperations {
+ public:
+  FaultOperations(const Config& config, Fleet& fleet, const FaultLog& journal, const Clock& clock, Log& log)
+      : config_(config), fleet_(fleet), journal_(journal), clock_(clock), log_(log) {}
+
+  OperationResult add(const control::AddFault& asked, const Sender& sender);
+  OperationResult end(const control::EndFaults& asked, const Sender& sender);
+  OperationResult report(const control::GetFaults& asked) const;
+  /// The plan of the configuration, which has been checked.
+  void begin_plan();
+
+ private:
+  OperationResult add(const control::FaultRecord& record, bool manual);
+
+  const Config& config_;
+  Fleet& fleet_;
+  const FaultLog& journal_;
+  const Clock& clock_;
+  Log& log_;
+};
+
+}  // namespace sonar
