@@ -23,6 +23,12 @@ bool contains_pose(std::uint32_t id) { return id != Heartbeat::id && id != Syste
 
 Stamp boot_stamp(std::int64_t at_ms) { return {ClockDomain::sim, at_ms * 1'000'000}; }
 
+/// A parameter of a command that counts something. Nothing: it is no whole number, or a large one.
+std::optional<std::uint32_t> whole_number(float value) {
+  if (!(value >= 0 && value <= 65535) || value != std::floor(value)) return std::nullopt;
+  return static_cast<std::uint32_t>(value);
+}
+
 std::string fields_of(const RawPose& raw) {
   return std::string("position attitude") + (raw.velocity_mps ? " velocity" : "") + (raw.angular_velocity_radps ? " rates" : "");
 }
@@ -39,7 +45,7 @@ std::string_view name_of(Source source) {
   return names[index_of(source)];
 }
 
-MavlinkPoses::MavlinkPoses(Settings settings) : settings_(std::move(settings)) {
+MavlinkPoses::MavlinkPoses(Settings settings, InjectFailure inject) : settings_(std::move(settings)), inject_(std::move(inject)) {
   self_.component = own_component;
   if (settings_.system_id != 0) self_.system = settings_.system_id;
 }
@@ -112,6 +118,10 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   }
   FrameReader frames(datagram);
   while (const auto frame = frames.next()) {
+    if (frame->id == CommandLong::id) {  // of a ground station, as a rule
+      on_command(message_in<CommandLong>(*frame), *frame, out);
+      continue;
+    }
     if (!is_from_vehicle(*frame, now)) {
       note_ignored(*frame);
       continue;
@@ -122,6 +132,24 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   }
   add_counts(frames.counts(), out);
   return out;
+}
+
+/// Obeys one command only, addressed to this very component: others of the system have failures of their own.
+void MavlinkPoses::on_command(const CommandLong& command, const Frame& frame, Reaction& out) {
+  const bool is_ours = command.target_system == self_.system && command.target_component == own_component;
+  if (!is_ours || command.command != CommandLong::inject_failure) return;
+  const auto unit = whole_number(command.param1), type = whole_number(command.param2), instance = whole_number(command.param3);
+  CommandAck ack;
+  ack.command = command.command;
+  ack.target_system = frame.system;
+  ack.target_component = frame.component;
+  if (!inject_)
+    ack.result = MavResult::unsupported;
+  else if (!unit || !type || *type > static_cast<std::uint32_t>(FailureType::intermittent) || !instance)
+    ack.result = MavResult::denied;
+  else
+    ack.result = inject_(*unit, static_cast<FailureType>(*type), *instance);
+  out.replies.push_back(framed(ack, self_));
 }
 
 void MavlinkPoses::add_counts(const FrameCounts& now, Reaction& out) {

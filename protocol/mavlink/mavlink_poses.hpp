@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -30,6 +31,20 @@ struct Settings {
   bool needs_time = false;         // messages without a time stamp are not used
 };
 
+/// FAILURE_TYPE of common.xml.
+enum class FailureType : std::uint8_t {
+  ok = 0,  // the unit works again
+  off = 1,
+  stuck = 2,
+  garbage = 3,
+  wrong = 4,
+  slow = 5,
+  delayed = 6,
+  intermittent = 7,
+};
+/// Carries out MAV_CMD_INJECT_FAILURE. `unit`: FAILURE_UNIT of common.xml; `instance`: 0 = all.
+using InjectFailure = std::function<MavResult(std::uint32_t unit, FailureType type, std::uint32_t instance)>;
+
 struct SourcedPose {
   control::PoseSample sample;
   std::string source;  // "system 1 ODOMETRY"
@@ -38,7 +53,7 @@ struct Reaction {
   std::vector<SourcedPose> poses;
   std::vector<std::string> refusals;  // errors of messages
   std::vector<std::string> notices;   // worth a line in the log
-  std::vector<Bytes> replies;         // datagrams for the sender
+  std::vector<Bytes> replies;         // datagrams: of on_datagram() for its sender, of on_tick() for the vehicle
   bool from_vehicle = false;          // the datagram held a frame of the selected system
 };
 
@@ -51,7 +66,8 @@ class MavlinkPoses {
   static constexpr std::chrono::nanoseconds system_silence = std::chrono::seconds(5);
   static constexpr std::chrono::nanoseconds source_silence = std::chrono::seconds(1);
 
-  explicit MavlinkPoses(Settings settings);
+  /// Without `inject` the command to inject a failure is answered as unsupported.
+  explicit MavlinkPoses(Settings settings, InjectFailure inject = {});
   /// `now` never runs backwards, whatever its origin.
   Reaction on_datagram(BytesView datagram, Time now);
   /// Call several times a second. Sends heartbeats and requests, and reports the system found and the missing parts of a pose:
@@ -83,6 +99,7 @@ class MavlinkPoses {
   void select_vehicle(std::uint8_t system, Time now);
   void clear_histories();
   void on_frame(const Frame& frame, Moment at);
+  void on_command(const CommandLong& command, const Frame& frame, Reaction& out);
   void handle(const Heartbeat& m, const Frame& frame);
   void handle(const AttitudeReading& reading, Moment at);
   void handle(const LocalPositionNed& m, Moment at);
@@ -113,6 +130,7 @@ class MavlinkPoses {
   void request_messages(Reaction& out);
 
   Settings settings_;
+  InjectFailure inject_;
   Identity self_;
   FrameCounts counts_;
   std::optional<std::uint8_t> system_;

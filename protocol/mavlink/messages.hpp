@@ -1,4 +1,4 @@
-// The MAVLink messages that carry poses, in wire order: base fields sorted by size, extensions as they were added.
+// The MAVLink messages that carry poses, and commands, in wire order: base fields sorted by size, extensions as they were added.
 // Each row's number, CRC_EXTRA and lengths are those of minimal.xml, standard.xml and common.xml of the MAVLink project; a test
 // computes CRC_EXTRA and lengths from the fields below. protocol/mavlink/frames.hpp reads and writes them.
 #pragma once
@@ -125,11 +125,11 @@ constexpr void extensions(V& visit, M& m) {
   visit("time_usec", m.time_us);
 }
 
-/// Only written, never read.
 struct CommandLong {
   static constexpr std::uint32_t id = 76;
   static constexpr std::uint8_t crc_extra = 152;
   static constexpr std::string_view name = "COMMAND_LONG";
+  static constexpr std::uint16_t inject_failure = 420;  // MAV_CMD_INJECT_FAILURE: unit, type, instance
   float param1 = 0, param2 = 0, param3 = 0, param4 = 0, param5 = 0, param6 = 0, param7 = 0;
   std::uint16_t command = 0;
   std::uint8_t target_system = 0, target_component = 0, confirmation = 0;
@@ -140,6 +140,30 @@ constexpr void fields(V& visit, M& m) {
   visit("param5", m.param5), visit("param6", m.param6), visit("param7", m.param7);
   visit("command", m.command), visit("target_system", m.target_system);
   visit("target_component", m.target_component), visit("confirmation", m.confirmation);
+}
+
+/// MAV_RESULT of common.xml.
+enum class MavResult : std::uint8_t { accepted = 0, temporarily_rejected = 1, denied = 2, unsupported = 3, failed = 4 };
+
+/// Only written, never read.
+struct CommandAck {
+  static constexpr std::uint32_t id = 77;
+  static constexpr std::uint8_t crc_extra = 143;
+  static constexpr std::string_view name = "COMMAND_ACK";
+  std::uint16_t command = 0;
+  MavResult result{};
+  std::uint8_t progress = 0;
+  std::int32_t result_param2 = 0;
+  std::uint8_t target_system = 0, target_component = 0;  // of the sender of the command
+};
+template <class V, wire::Like<CommandAck> M>
+constexpr void fields(V& visit, M& m) {
+  visit("command", m.command), visit("result", m.result);
+}
+template <class V, wire::Like<CommandAck> M>
+constexpr void extensions(V& visit, M& m) {
+  visit("progress", m.progress), visit("result_param2", m.result_param2);
+  visit("target_system", m.target_system), visit("target_component", m.target_component);
 }
 
 struct VisionPositionEstimate {

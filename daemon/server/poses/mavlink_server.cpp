@@ -30,7 +30,7 @@ MavlinkServer::MavlinkServer(asio::io_context& io, const Config& config, PoseInt
 Result<void> MavlinkServer::open() {
   for (const MavlinkConfig& wanted : config_.poses.mavlink) {
     Link& link = links_.emplace_back(Link{wanted,
-                                          mavlink::MavlinkPoses(settings_of(wanted, config_)),
+                                          mavlink::MavlinkPoses(settings_of(wanted, config_), inject_),
                                           udp::socket(io_),
                                           asio::steady_timer(io_),
                                           std::nullopt,
@@ -133,19 +133,20 @@ void MavlinkServer::on_datagram(Link& link, mavlink::BytesView bytes, const udp:
   }
   const mavlink::Reaction reaction = link.poses.on_datagram(bytes, wire_time());
   if (reaction.from_vehicle && !link.config.dials) link.peer = from;
-  act_on(link, reaction, sender);
+  act_on(link, reaction, sender, from);
 }
 
 asio::awaitable<void> MavlinkServer::tick(Link& link) {
   while (!stopping_) {
-    act_on(link, link.poses.on_tick(wire_time()), link.name);
+    act_on(link, link.poses.on_tick(wire_time()), link.name, link.peer);
     error_code ec;
     link.timer.expires_after(tick_period);
     co_await link.timer.async_wait(into(ec));
   }
 }
 
-void MavlinkServer::act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from) {
+void MavlinkServer::act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from,
+                           const std::optional<udp::endpoint>& to) {
   for (const std::string& why : reaction.refusals) intake_.refuse(why, {from, from});
   for (const mavlink::SourcedPose& pose : reaction.poses) {
     const std::string source = link.name + " " + pose.source;  // a router may send from any port: the link is the sender
@@ -153,8 +154,8 @@ void MavlinkServer::act_on(Link& link, const mavlink::Reaction& reaction, const 
   }
   for (const std::string& notice : reaction.notices) log_limited(log_, link.notices, LogLevel::info, link.name + ": " + notice);
   error_code ignored;
-  if (link.peer)
-    for (const mavlink::Bytes& reply : reaction.replies) link.socket.send_to(asio::buffer(reply), *link.peer, 0, ignored);
+  if (to)
+    for (const mavlink::Bytes& reply : reaction.replies) link.socket.send_to(asio::buffer(reply), *to, 0, ignored);
 }
 
 }  // namespace sonar

@@ -5,6 +5,7 @@
 #include <list>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/config/config.hpp"
@@ -20,6 +21,8 @@ class MavlinkServer {
   /// Links and origin are those of `config` as it is now; who may send follows it.
   MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log);
 
+  /// Before open(): what the command to inject a failure does, on every link. Without it the command is answered as unsupported.
+  void inject_failures_with(mavlink::InjectFailure inject) { inject_ = std::move(inject); }
   Result<void> open();
   void start();
   void stop();
@@ -47,7 +50,7 @@ class MavlinkServer {
   asio::awaitable<void> receive(Link& link);
   asio::awaitable<void> tick(Link& link);
   void on_datagram(Link& link, mavlink::BytesView bytes, const udp::endpoint& from);
-  void act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from);
+  void act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from, const std::optional<udp::endpoint>& to);
   bool is_allowed(const Link& link, const asio::ip::address& from) const;
   void log_fault(const std::exception_ptr& fault, const Link& link);
 
@@ -55,6 +58,7 @@ class MavlinkServer {
   const Config& config_;
   PoseIntake& intake_;
   Log& log_;
+  mavlink::InjectFailure inject_;
   LogLimiter faults_;
   std::list<Link> links_;
   bool stopping_ = false;

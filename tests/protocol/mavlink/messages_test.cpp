@@ -20,6 +20,7 @@ struct Listed : wire::Visitor<Listed> {
 
   template <class T>
   static std::string type_name() {
+    if constexpr (std::is_enum_v<T>) return type_name<std::underlying_type_t<T>>();
     if constexpr (std::is_same_v<T, float>) return "float";
     return std::string(std::is_signed_v<T> ? "int" : "uint").append(std::to_string(8 * sizeof(T))).append("_t");
   }
@@ -72,6 +73,7 @@ TEST(MavlinkMessages, CrcExtraAndLengthsFollowFromTheFields) {
   expect_by_the_rule<GlobalPositionInt>(28, 28);
   expect_by_the_rule<GpsGlobalOrigin>(12, 20);
   expect_by_the_rule<CommandLong>(33, 33);
+  expect_by_the_rule<CommandAck>(3, 10);
   expect_by_the_rule<VisionPositionEstimate>(32, 117);
   expect_by_the_rule<SimState>(84, 92);
   expect_by_the_rule<AttPosMocap>(36, 120);
@@ -79,15 +81,15 @@ TEST(MavlinkMessages, CrcExtraAndLengthsFollowFromTheFields) {
 }
 
 TEST(MavlinkMessages, TheTableHasThemByNumber) {
-  const std::vector<std::pair<std::uint32_t, int>> wanted{{0, 50},  {2, 137},   {30, 39},  {31, 246},  {32, 185}, {33, 104},
-                                                          {49, 39}, {102, 158}, {108, 32}, {138, 109}, {331, 91}};
+  const std::vector<std::pair<std::uint32_t, int>> wanted{{0, 50},  {2, 137},  {30, 39},   {31, 246}, {32, 185},  {33, 104},
+                                                          {49, 39}, {76, 152}, {102, 158}, {108, 32}, {138, 109}, {331, 91}};
   ASSERT_EQ(known_messages().size(), wanted.size());
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     EXPECT_EQ(known_messages()[i].id, wanted[i].first);
     EXPECT_EQ(known_messages()[i].crc_extra, wanted[i].second);
     EXPECT_EQ(find_message(wanted[i].first), &known_messages()[i]);
   }
-  EXPECT_EQ(find_message(76), nullptr) << "we write commands, and obey none";
+  EXPECT_EQ(find_message(77), nullptr) << "we write answers to commands, and read none";
 }
 
 }  // namespace

@@ -48,11 +48,18 @@ class Vehicle {
       from_port = ntohs(from.sin_port);
       bytes.resize(static_cast<std::size_t>(n));
       mavlink::FrameReader frames(bytes);
-      while (auto frame = frames.next())
+      while (auto frame = frames.next()) {
         if (frame->id == id) return frame;
-      if (frames.counts().unknown > 0) ++commands;
+        if (frame->id == mavlink::CommandLong::id) ++commands;
+      }
     }
     return std::nullopt;
+  }
+  mavlink::Bytes next_datagram() {
+    mavlink::Bytes bytes(2048);
+    const ssize_t n = ::recv(socket_, bytes.data(), bytes.size(), 0);
+    bytes.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
+    return bytes;
   }
   std::uint16_t port = 0, from_port = 0;
   int commands = 0;
@@ -136,6 +143,24 @@ TEST_F(Mavlink, ADiallingLinkSpeaksFirst) {
   stranger.send("127.0.0.1", port, framed(odometry_at(500, 2'000'000), stranger.who));
   EXPECT_TRUE(eventually([&] { return daemon.log_text().find("not the one that was dialled") != std::string::npos; }));
   EXPECT_TRUE(asked_from(daemon, client, 12));
+}
+
+TEST_F(Mavlink, ACommandToInjectAFailureIsAnsweredToItsSender) {
+  Daemon daemon(with_link("udpin:HERE:0"));
+  const std::uint16_t port = daemon.app().mavlink().listens_at(0).port;
+  Vehicle vehicle(daemon.address()), ground(daemon.address());
+  vehicle.send(daemon.address(), port, framed(odometry_at(1, 1'000'000), vehicle.who));
+  ASSERT_TRUE(vehicle.next(mavlink::Heartbeat::id));
+  mavlink::CommandLong command;
+  command.param1 = 7, command.param2 = 1;
+  command.command = mavlink::CommandLong::inject_failure, command.target_system = 1, command.target_component = 193;
+  mavlink::Identity station{255, 190, 0};
+  ground.send(daemon.address(), port, framed(command, station));
+  const mavlink::Bytes ack = ground.next_datagram();
+  ASSERT_GT(ack.size(), 12u);
+  EXPECT_EQ(ack[7], static_cast<std::byte>(mavlink::CommandAck::id));
+  EXPECT_EQ(ack[12], static_cast<std::byte>(mavlink::MavResult::unsupported));
+  ASSERT_TRUE(vehicle.next(mavlink::Heartbeat::id)) << "the vehicle is still the peer";
 }
 
 TEST_F(Mavlink, NonsenseIsCountedAndChangesNothing) {
