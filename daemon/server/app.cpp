@@ -57,7 +57,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       time_operations_(stepped_time_, pose_intake_, fleet_, [this] { on_change(); }),
       status_report_(config_, clock_, world_, changes_, fleet_, simulator_, recordings_, plausibility_, mavlink_server_,
                      control_),
-      monitoring_(config_.limits, simulator_, changes_, world_, admission_, fleet_),
+      monitoring_(config_.limits, simulator_, changes_, world_, admission_, fleet_, fault_log_),
       fault_operations_(config_, fleet_, fault_log_, clock_, log_),
       operations_(scene_operations_, sonar_operations_, time_operations_, status_report_, monitoring_, fault_operations_),
       control_(io_, config_.control, config_.limits, admission_, operations_, events_, pose_intake_, log_),

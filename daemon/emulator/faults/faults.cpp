@@ -83,6 +83,7 @@ void Faults::finish(Entry& e, Time now) {
   e.over = true;
   e.hits.clear();
   if (e.fault.kind->effect == Effect::swap) orders_.emplace_back(ReleaseHeld{});
+  if (e.fault.kind->stage == FaultStage::stream || e.fault.kind->effect == Effect::thin_link) orders_.emplace_back(StopShaping{});
 }
 
 std::vector<Faults::Listed> Faults::list() const {
@@ -90,6 +91,10 @@ std::vector<Faults::Listed> Faults::list() const {
   for (const Entry& e : entries_)
     all.push_back({&e.fault, e.active, e.over, e.injections, e.active ? std::min(e.until, e.expires) : e.expires});
   return all;
+}
+
+std::size_t Faults::active_count() const {
+  return static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.active; }));
 }
 
 bool Faults::any(Effect effect) const {

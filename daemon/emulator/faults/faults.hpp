@@ -47,9 +47,10 @@ struct DropNewestPings {  // for clients that read slowly
   bool on = true;
 };
 struct ReleaseHeld {};
+struct StopShaping {};  // of the message that is being written
 struct ServeWaiting {};
 using FaultOrder = std::variant<SetListening, EndClients, ForgetSettings, RestartDevice, OverrideSettings, ApplyRequest,
-                                ChangePace, ReadClients, DropNewestPings, ReleaseHeld, ServeWaiting>;
+                                ChangePace, ReadClients, DropNewestPings, ReleaseHeld, StopShaping, ServeWaiting>;
 
 class Faults {
  public:
@@ -77,6 +78,7 @@ class Faults {
     Time expires;  // Time::max() = with its trigger
   };
   std::vector<Listed> list() const;
+  std::size_t active_count() const;
   std::vector<FaultOrder> take_orders() { return std::exchange(orders_, {}); }
 
   // ---- time

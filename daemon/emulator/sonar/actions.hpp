@@ -46,6 +46,10 @@ struct ReadFrom {
   ConnectionId connection = 0;
   bool on = true;
 };
+/// Write the rest of a message that a fault shaped without its pauses.
+struct EndPauses {
+  ConnectionId connection = 0;
+};
 /// The outbox has something to write.
 struct Wake {
   ConnectionId connection = 0;
@@ -87,8 +91,8 @@ struct EngineFailed {
   Error why;
 };
 
-using Action = std::variant<ComputePing, Serve, KeepWaiting, TurnAway, Listen, ReadFrom, Wake, Finish, Reset, Closed, Announce,
-                            PingQueued, Report, EngineFailed>;
+using Action = std::variant<ComputePing, Serve, KeepWaiting, TurnAway, Listen, ReadFrom, EndPauses, Wake, Finish, Reset, Closed,
+                            Announce, PingQueued, Report, EngineFailed>;
 using Actions = std::vector<Action>;
 
 /// What became of a PingRequest.

@@ -107,6 +107,9 @@ void Sonar::obey(const FaultOrder& order, Time now, Actions& actions) {
       if (is_client(c)) c.outbox.use(rules->on ? OutboxRules{1, WhenFull::drop_newest} : config_.outbox);
   } else if (std::holds_alternative<ReleaseHeld>(order)) {
     for (Connection& c : connections_.all()) release_held(c, now, true, actions);
+  } else if (std::holds_alternative<StopShaping>(order)) {
+    for (const Connection& c : connections_.all())
+      if (is_client(c)) actions.emplace_back(EndPauses{c.id});
   } else if (std::holds_alternative<ServeWaiting>(order)) {
     serve_waiting(now, actions);
   }

@@ -121,15 +121,19 @@ std::vector<ReasonFamily> reason_families() {
   const auto drop = [](DropReason why) {
     return [why](const DeviceFigures& f) { return f.dropped_by[static_cast<std::size_t>(why)]; };
   };
-  return {{"sonard_pings_dropped_total",
-           "Pings not written whole to a client they were offered to: it was too slow, it went, we ended the connection.",
-           {{"slow", drop(DropReason::slow)}, {"gone", drop(DropReason::gone)}, {"stop", drop(DropReason::stop)}}},
-          {"sonard_ticks_skipped_total",
-           "Ticks that no ping came of: taken up too late, simulation busy, surplus trigger, poses stale.",
-           {{"late", [](const DeviceFigures& f) { return f.skipped.late; }},
-            {"busy", [](const DeviceFigures& f) { return f.skipped.busy; }},
-            {"trigger", [](const DeviceFigures& f) { return f.skipped.trigger; }},
-            {"stale", [](const DeviceFigures& f) { return f.skipped_stale; }}}}};
+  return {
+      {"sonard_pings_dropped_total",
+       "Pings not written whole to a client they were offered to: it was too slow, it went, we ended the connection, a fault.",
+       {{"slow", drop(DropReason::slow)},
+        {"gone", drop(DropReason::gone)},
+        {"stop", drop(DropReason::stop)},
+        {"fault", drop(DropReason::fault)}}},
+      {"sonard_ticks_skipped_total",
+       "Ticks that no ping came of: taken up too late, simulation busy, surplus trigger, poses stale.",
+       {{"late", [](const DeviceFigures& f) { return f.skipped.late; }},
+        {"busy", [](const DeviceFigures& f) { return f.skipped.busy; }},
+        {"trigger", [](const DeviceFigures& f) { return f.skipped.trigger; }},
+        {"stale", [](const DeviceFigures& f) { return f.skipped_stale; }}}}};
 }
 
 struct TimeFamily {
@@ -173,6 +177,13 @@ void write_poses(PrometheusText& text, const PoseCounters& poses) {
   text.sample({}, static_cast<double>(poses.stale));
 }
 
+void write_faults(PrometheusText& text, const DaemonFigures& figures) {
+  text.family("sonard_faults_active", Type::gauge, "Faults on purpose that act now.");
+  for (const auto& [sonar, count] : figures.active_faults) text.sample({{"sonar", sonar}}, static_cast<double>(count));
+  text.family("sonard_fault_injections_total", Type::counter, "What faults on purpose did, by kind.");
+  for (const auto& [code, count] : figures.fault_injections) text.sample({{"kind", code}}, static_cast<double>(count));
+}
+
 void write_process(PrometheusText& text, const DaemonFigures& figures) {
   const auto one = [&text](const char* name, Type type, const char* help, double value) {
     text.family(name, type, help);
@@ -200,6 +211,7 @@ std::string metrics_text(const DaemonFigures& figures) {
   PrometheusText text;
   write_sonars(text, figures);
   write_poses(text, figures.poses);
+  write_faults(text, figures);
   write_process(text, figures);
   return text.take();
 }

@@ -37,6 +37,8 @@ struct DaemonFigures {
   PoseCounters poses;
   std::uint64_t clients_now = 0, turned_away_for_places = 0, turned_away_for_descriptors = 0;  // of all sonars
   ProcessFigures process;
+  std::vector<std::pair<std::string, std::uint64_t>> active_faults;          // by sonar
+  std::vector<std::pair<std::string_view, std::uint64_t>> fault_injections;  // by code, since the start
 };
 std::string metrics_text(const DaemonFigures& figures);
 

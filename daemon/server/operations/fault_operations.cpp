@@ -46,6 +46,14 @@ void fill(v1::FaultStatus& out, const Faults::Listed& listed, const std::string&
 
 }  // namespace
 
+std::vector<v1::FaultStatus> fault_statuses(const Fleet& fleet, Time now, bool over_too) {
+  std::vector<v1::FaultStatus> all;
+  for (const Device& device : fleet.devices())
+    for (const Faults::Listed& listed : device.sonar().faults().list())
+      if (over_too || !listed.over) fill(all.emplace_back(), listed, device.config().name, now);
+  return all;
+}
+
 OperationResult FaultOperations::add(const control::AddFault& asked, const Sender& sender) {
   if (!config_.faults.armed)
     return refused("faults are not armed: start the daemon with sonard run --faults, or with faults: {armed: true}");
@@ -90,9 +98,7 @@ OperationResult FaultOperations::end(const control::EndFaults& asked, const Send
 OperationResult FaultOperations::report(const control::GetFaults& asked) const {
   auto report = std::make_shared<v1::FaultReport>();
   report->set_armed(config_.faults.armed);
-  for (const Device& device : fleet_.devices())
-    for (const Faults::Listed& listed : device.sonar().faults().list())
-      fill(*report->add_faults(), listed, device.config().name, clock_.now());
+  for (v1::FaultStatus& status : fault_statuses(fleet_, clock_.now(), true)) *report->add_faults() = std::move(status);
   for (const auto& entry : journal_.entries())
     if (entry->seq() > asked.journal_after) *report->add_journal() = *entry;
   if (asked.kinds) {

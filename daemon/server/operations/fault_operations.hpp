@@ -8,6 +8,12 @@
 
 namespace sonar {
 
+namespace v1 {
+class FaultStatus;
+}
+/// Of all sonars; `over_too`: the last that have ended as well.
+std::vector<v1::FaultStatus> fault_statuses(const Fleet& fleet, Time now, bool over_too);
+
 class FaultOperations {
  public:
   FaultOperations(const Config& config, Fleet& fleet, const FaultLog& journal, const Clock& clock, Log& log)

@@ -18,6 +18,8 @@ std::string Monitoring::metrics() const {
   f.version = SONARD_VERSION;
   f.uptime_s = seconds(std::chrono::steady_clock::now() - started_);
   for (const Device& d : fleet_.devices()) f.sonars.emplace_back(d.config().name, d.figures());
+  for (const Device& d : fleet_.devices()) f.active_faults.emplace_back(d.config().name, d.sonar().faults().active_count());
+  f.fault_injections.assign(faults_.injections().begin(), faults_.injections().end());
   f.poses = world_.counters();
   f.clients_now = admission_.now();
   f.turned_away_for_places = admission_.refused_for_places();

@@ -8,6 +8,7 @@
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/connections/admission.hpp"
 #include "daemon/server/engine/simulator.hpp"
+#include "daemon/server/faults/fault_log.hpp"
 #include "daemon/server/scene_changes.hpp"
 #include "daemon/server/sonars/fleet.hpp"
 
@@ -16,8 +17,14 @@ namespace sonar {
 class Monitoring {
  public:
   Monitoring(const LimitConfig& limits, const Simulator& simulator, const SceneChanges& changes, const World& world,
-             const Admission& admission, const Fleet& fleet)
-      : limits_(limits), simulator_(simulator), changes_(changes), world_(world), admission_(admission), fleet_(fleet) {}
+             const Admission& admission, const Fleet& fleet, const FaultLog& faults)
+      : limits_(limits),
+        simulator_(simulator),
+        changes_(changes),
+        world_(world),
+        admission_(admission),
+        fleet_(fleet),
+        faults_(faults) {}
 
   /// As Operations has them.
   std::string metrics() const;
@@ -32,6 +39,7 @@ class Monitoring {
   const World& world_;
   const Admission& admission_;
   const Fleet& fleet_;
+  const FaultLog& faults_;
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
 };
 

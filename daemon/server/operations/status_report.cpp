@@ -1,5 +1,6 @@
 #include "daemon/server/operations/status_report.hpp"
 
+#include "daemon/server/operations/fault_operations.hpp"
 #include "daemon/server/system/process_figures.hpp"
 #include "protocol/control/answers.hpp"
 
@@ -98,6 +99,8 @@ std::shared_ptr<const v1::DaemonStatus> StatusReport::status() const {
   for (v1::RecordingStatus& recording : recordings_.status()) *s.add_recordings() = std::move(recording);
   add_notes(s, plausibility_.all());
   add_notes(s, mavlink_.notes());
+  s.set_faults_armed(config_.faults.armed);
+  for (v1::FaultStatus& fault : fault_statuses(fleet_, now, false)) *s.add_faults() = std::move(fault);
   return status;
 }
 

@@ -321,6 +321,10 @@ void Device::carry_out(const ReadFrom& action) {
   if (const SessionPointer session = session_of(action.connection)) session->read_from_client(action.on);
 }
 
+void Device::carry_out(const EndPauses& action) {
+  if (const SessionPointer session = session_of(action.connection)) session->end_pauses();
+}
+
 void Device::carry_out(const Wake& action) {
   if (const SessionPointer session = session_of(action.connection)) return session->wake();
   if (const StreamPointer stream = stream_of(action.connection)) stream->wake();

@@ -156,6 +156,7 @@ class Device final : public SessionParent {
   void carry_out(const TurnAway& action);
   void carry_out(const Listen& action);
   void carry_out(const ReadFrom& action);
+  void carry_out(const EndPauses& action);
   void carry_out(const Wake& action);
   void carry_out(const Finish& action);
   void carry_out(const Reset& action);

@@ -154,7 +154,7 @@ asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Out
 
 /// The watch sees progress until its end. finish() and over() end it.
 asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
-  if (length.count() > 0 && !finishing_) {
+  if (length.count() > 0 && !finishing_ && !hurries_) {
     progress_at_ = Steady::now() + length;
     pause_.expires_at(progress_at_);
     error_code ec;
@@ -162,6 +162,11 @@ asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
     progress_at_ = Steady::now();
   }
   co_return !over_;
+}
+
+void Session::end_pauses() {
+  hurries_ = writing_;
+  pause_.cancel();
 }
 
 /// A reset throws away what the client's kernel has not confirmed. The watch ends the session of a client that takes nothing.
@@ -192,7 +197,7 @@ asio::awaitable<void> Session::write() {
       writing_ = true;
       progress_at_ = Steady::now();
       if (!co_await write_whole(message)) co_return;
-      writing_ = false;
+      writing_ = hurries_ = false;
       parent_.on_written(setup_.id, message);
       if (message.shape && message.shape->end != Outbox::Shape::End::none) co_return end_by(message.shape->end);
     } else if (finishing_) {

@@ -66,6 +66,8 @@ class Session : public std::enable_shared_from_this<Session> {
   /// At once, without FIN.
   void reset(std::string why);
   /// Off: what the client sends is left to the kernels, until they are full.
+  /// The rest of the message that is being written comes without pauses.
+  void end_pauses();
   void read_from_client(bool on);
   /// When the peer has hung up and every byte from it has been read: over.
   void end_if_closed();
@@ -103,7 +105,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Steady::time_point received_at_ = connected_at_;  // a byte came in
   Steady::time_point progress_at_{};                // a byte went out, while writing; in a pause its end
   Steady::time_point finish_by_{};
-  bool reading_ = true, writing_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
+  bool reading_ = true, writing_ = false, hurries_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
   std::string why_;
 };
 

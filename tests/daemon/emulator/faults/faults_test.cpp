@@ -345,6 +345,35 @@ TEST(Faults, HeldPingsComeInOrderAndAreCounted) {
   EXPECT_EQ(order[3], 3u);
 }
 
+TEST(Faults, AThousandOfEveryKindLeaveNothing) {
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 4}\n")));
+  for (const std::string& code : codes_of_oculus()) {
+    for (int i = 0; i < 1000; ++i) {
+      time.add_fault("front", record(code));
+      if (i % 100 == 0) {
+        const ConnectionId client = time.connect("front");
+        time.send(client, fire());
+        time.run(milliseconds(250));
+        time.end_faults("front");
+        if (!time.clients[client].closed) time.close(client);
+        time.clients.clear();
+      }
+      time.end_faults("front");
+    }
+    ASSERT_LE(time.sonar("front").faults().list().size(), 70u) << code;
+    ASSERT_EQ(time.sonar("front").faults().active_count(), 0u) << code;
+    ASSERT_TRUE(time.listens("front")) << code;
+    ASSERT_TRUE(time.sonar("front").connections().empty()) << code;
+    time.log.clear();
+  }
+  const DeviceFigures f = time.sonar("front").figures();
+  EXPECT_EQ(f.offered, f.sent + f.dropped + f.waiting);
+  const ConnectionId client = time.connect("front");
+  time.send(client, fire());
+  time.run(seconds(1));
+  EXPECT_THAT(ping_numbers(time.clients[client].received), ::testing::SizeIs(::testing::Ge(9)));
+}
+
 TEST(Faults, EndByThemselvesAfterTenMinutes) {
   FaultRecord fault = record("F16");
   fault.at.every = 1000000;
