@@ -108,7 +108,6 @@ class App {
   SceneOperations scene_operations_;
   SonarOperations sonar_operations_;
   TimeOperations time_operations_;
-  StatusReport status_report_;
   Monitoring monitoring_;
   AppOperations operations_;
   ControlServer control_;
