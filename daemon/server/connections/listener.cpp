@@ -19,23 +19,19 @@ Result<void> Listener::open(Endpoint at) {
 void Listener::start(Take take, Fault fault) {
   take_ = std::move(take);
   fault_ = std::move(fault);
-  if (acceptor_.is_open()) keep_accepting();
+  if (!acceptor_.is_open()) return;
+  keep_running(
+      acceptor_.get_executor(), [this] { return accept(); },
+      [this](const std::string& text) {
+        if (!stopping_) fault_(text);
+        return !stopping_;
+      });
 }
 
 void Listener::stop() {
   stopping_ = true;
   error_code ec;
   acceptor_.close(ec);
-}
-
-void Listener::keep_accepting() {
-  asio::co_spawn(
-      acceptor_.get_executor(), [this] { return accept(); },
-      [this](std::exception_ptr fault) {
-        if (!fault || stopping_) return;
-        fault_(text_of(fault));
-        keep_accepting();
-      });
 }
 
 asio::awaitable<void> Listener::accept() {

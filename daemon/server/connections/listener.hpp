@@ -32,7 +32,6 @@ class Listener {
   Endpoint at() const { return at_; }
 
  private:
-  void keep_accepting();
   asio::awaitable<void> accept();
 
   Admission& admission_;
