@@ -110,7 +110,6 @@ class App {
   SceneOperations scene_operations_;
   SonarOperations sonar_operations_;
   TimeOperations time_operations_;
-  StatusReport status_report_;
   Monitoring monitoring_;
   FaultOperations fault_operations_;
   AppOperations operations_;

@@ -47,6 +47,7 @@ protocol::SettingsOverride override_of(const Fault& fault) {
 // ---- the list
 
 void Faults::add(Fault fault, bool manual, Time now) {
+  forget_old();
   const auto place =
       std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.fault.kind->stage > fault.kind->stage; });
   Entry& entry = *entries_.emplace(place);
@@ -60,6 +61,18 @@ void Faults::add(Fault fault, bool manual, Time now) {
   if (!waits && (entry.fault.kind->effect == Effect::power_cycle || entry.fault.kind->effect == Effect::forget_settings ||
                  entry.fault.kind->effect == Effect::clock_restart))
     begin(entry, now);
+}
+
+/// Of those that are over, the last few are listed.
+void Faults::forget_old() {
+  std::size_t over =
+      static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.over; }));
+  for (auto it = entries_.begin(); it != entries_.end() && over > most_over;) {
+    const auto one = it++;
+    if (!one->over) continue;
+    entries_.erase(one);
+    --over;
+  }
 }
 
 bool Faults::remove(const std::string& name, Time now) {
@@ -239,14 +252,6 @@ void Faults::on_tick(Time now) {
     }
     if (e.active && e.until <= now) end(e, now);
     if (!e.over && e.expires <= now) finish(e, now);
-  }
-  std::size_t over =
-      static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.over; }));
-  for (auto it = entries_.begin(); it != entries_.end() && over > most_over;) {
-    const auto one = it++;
-    if (!one->over) continue;
-    entries_.erase(one);
-    --over;
   }
 }
 

@@ -147,6 +147,7 @@ class Faults {
   void end(Entry& entry, Time now);
   void end_effect(Entry& entry);
   void finish(Entry& entry, Time now);
+  void forget_old();
   void step(Entry& entry, Time now);
   void count_ping(Entry& entry, Time now);
   void note(Entry& entry, FaultEntry::What what, Time now, FaultEntry more = {});

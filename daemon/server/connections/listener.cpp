@@ -24,7 +24,13 @@ Result<void> Listener::open(Endpoint at) {
 void Listener::start(Take take, Fault fault) {
   take_ = std::move(take);
   fault_ = std::move(fault);
-  if (acceptor_.is_open()) keep_accepting();
+  if (!acceptor_.is_open()) return;
+  keep_running(
+      acceptor_.get_executor(), [this] { return accept(); },
+      [this](const std::string& text) {
+        if (!stopping_) fault_(text);
+        return !stopping_;
+      });
 }
 
 void Listener::stop() {
@@ -67,16 +73,6 @@ asio::awaitable<void> Listener::reopen() {
     co_await reopen_timer_.async_wait(into(ec));
     if (!ec && !stopping_ && !paused_ && !acceptor_.is_open()) try_to_open();
   }
-}
-
-void Listener::keep_accepting() {
-  asio::co_spawn(
-      acceptor_.get_executor(), [this] { return accept(); },
-      [this](std::exception_ptr fault) {
-        if (!fault || stopping_) return;
-        fault_(text_of(fault));
-        keep_accepting();
-      });
 }
 
 asio::awaitable<void> Listener::accept() {

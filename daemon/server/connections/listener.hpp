@@ -38,7 +38,6 @@ class Listener {
   Endpoint at() const { return at_; }
 
  private:
-  void keep_accepting();
   asio::awaitable<void> accept();
   asio::awaitable<void> reopen();
   void try_to_open();

@@ -13,7 +13,7 @@ struct Overloaded : F... {
 }  // namespace
 
 void AppOperations::perform(const control::Operation& operation, const Sender& sender, Done done) {
-  std::visit(Overloaded{[&](const control::GetStatus&) { done({.status = status_.status()}); },
+  std::visit(Overloaded{[&](const control::GetStatus&) { done({.status = monitoring_.status()}); },
                         [&](const control::PoseSample& asked) { time_.take(asked, sender, std::move(done)); },
                         [&](const control::Step& asked) { time_.step(asked, std::move(done)); },
                         [&](const control::SetTrajectory& asked) { done(time_.steer(asked, sender)); },

@@ -7,16 +7,15 @@
 #include "daemon/server/operations/monitoring.hpp"
 #include "daemon/server/operations/scene_operations.hpp"
 #include "daemon/server/operations/sonar_operations.hpp"
-#include "daemon/server/operations/status_report.hpp"
 #include "daemon/server/operations/time_operations.hpp"
 
 namespace sonar {
 
 class AppOperations final : public Operations {
  public:
-  AppOperations(SceneOperations& scene, SonarOperations& sonars, TimeOperations& time, const StatusReport& status,
-                const Monitoring& monitoring, FaultOperations& faults)
-      : scene_(scene), sonars_(sonars), time_(time), status_(status), monitoring_(monitoring), faults_(faults) {}
+  AppOperations(SceneOperations& scene, SonarOperations& sonars, TimeOperations& time, const Monitoring& monitoring,
+                FaultOperations& faults)
+      : scene_(scene), sonars_(sonars), time_(time), monitoring_(monitoring), faults_(faults) {}
 
   void perform(const control::Operation& operation, const Sender& sender, Done done) override;
   std::string metrics() const override { return monitoring_.metrics(); }
@@ -26,7 +25,6 @@ class AppOperations final : public Operations {
   SceneOperations& scene_;
   SonarOperations& sonars_;
   TimeOperations& time_;
-  const StatusReport& status_;
   const Monitoring& monitoring_;
   FaultOperations& faults_;
 };

@@ -1,31 +1,46 @@
-// What monitoring reads: figures for /metrics, and what is wrong for /healthz and the log.
+// What the daemon tells of itself: the answer to GetStatus, figures for /metrics, and what is wrong for /healthz and the log.
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <string>
 
 #include "daemon/config/config.hpp"
+#include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/connections/admission.hpp"
+#include "daemon/server/control/control_server.hpp"
 #include "daemon/server/engine/simulator.hpp"
 #include "daemon/server/faults/fault_log.hpp"
+#include "daemon/server/poses/mavlink_server.hpp"
+#include "daemon/server/recording/recordings.hpp"
 #include "daemon/server/scene_changes.hpp"
 #include "daemon/server/sonars/fleet.hpp"
+#include "daemon/server/time/clock.hpp"
 
 namespace sonar {
 
+/// The parts of the daemon that are reported on; they outlive Monitoring.
+struct Monitored {
+  const Config& config;
+  const Clock& clock;
+  const World& world;
+  const SceneChanges& changes;
+  const Fleet& fleet;
+  const Simulator& simulator;
+  const Admission& admission;
+  const Recordings& recordings;
+  const Plausibility& plausibility;
+  const MavlinkServer& mavlink;
+  const ControlServer& control;
+  const FaultLog& faults;
+};
+
 class Monitoring {
  public:
-  Monitoring(const LimitConfig& limits, const Simulator& simulator, const SceneChanges& changes, const World& world,
-             const Admission& admission, const Fleet& fleet, const FaultLog& faults)
-      : limits_(limits),
-        simulator_(simulator),
-        changes_(changes),
-        world_(world),
-        admission_(admission),
-        fleet_(fleet),
-        faults_(faults) {}
+  explicit Monitoring(const Monitored& parts) : of_(parts) {}
 
+  std::shared_ptr<const v1::DaemonStatus> status() const;
   /// As Operations has them.
   std::string metrics() const;
   std::string problem() const;
@@ -33,13 +48,9 @@ class Monitoring {
   std::string slow_load() const;
 
  private:
-  const LimitConfig& limits_;
-  const Simulator& simulator_;
-  const SceneChanges& changes_;
-  const World& world_;
-  const Admission& admission_;
-  const Fleet& fleet_;
-  const FaultLog& faults_;
+  double uptime_s() const { return seconds(std::chrono::steady_clock::now() - started_); }
+
+  Monitored of_;
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
 };
 

@@ -52,8 +52,14 @@ Result<void> MavlinkServer::open() {
 
 void MavlinkServer::start() {
   for (Link& l : links_) {
-    keep_receiving(l);
-    keep_ticking(l);
+    const auto survives = [this, &l](const std::string& fault) {
+      if (!stopping_) log_fault(log_, faults_, fault, {"at", l.name});
+      return !stopping_;
+    };
+    keep_running(
+        io_.get_executor(), [this, &l] { return receive(l); }, survives);
+    keep_running(
+        io_.get_executor(), [this, &l] { return tick(l); }, survives);
   }
 }
 
@@ -81,30 +87,6 @@ std::vector<Note> MavlinkServer::notes() const {
 }
 Endpoint MavlinkServer::listens_at(std::size_t link) const {
   return link < links_.size() ? std::next(links_.begin(), static_cast<std::ptrdiff_t>(link))->config.at : Endpoint{};
-}
-
-void MavlinkServer::log_fault(const std::exception_ptr& fault, const Link& link) {
-  sonar::log_fault(log_, faults_, text_of(fault), {"at", link.name});
-}
-
-/// A link outlives whatever one datagram does to us.
-void MavlinkServer::keep_receiving(Link& link) {
-  asio::co_spawn(
-      io_, [this, &link] { return receive(link); },
-      [this, &link](std::exception_ptr fault) {
-        if (!fault || stopping_) return;
-        log_fault(fault, link);
-        keep_receiving(link);
-      });
-}
-void MavlinkServer::keep_ticking(Link& link) {
-  asio::co_spawn(
-      io_, [this, &link] { return tick(link); },
-      [this, &link](std::exception_ptr fault) {
-        if (!fault || stopping_) return;
-        log_fault(fault, link);
-        keep_ticking(link);
-      });
 }
 
 /// Accepts answers of the dialled peer, and unsolicited packets only from addresses that the configuration permits.

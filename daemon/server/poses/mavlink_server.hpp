@@ -45,14 +45,11 @@ class MavlinkServer {
     LogLimiter notices = {};
   };
 
-  void keep_receiving(Link& link);
-  void keep_ticking(Link& link);
   asio::awaitable<void> receive(Link& link);
   asio::awaitable<void> tick(Link& link);
   void on_datagram(Link& link, mavlink::BytesView bytes, const udp::endpoint& from);
   void act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from, const std::optional<udp::endpoint>& to);
   bool is_allowed(const Link& link, const asio::ip::address& from) const;
-  void log_fault(const std::exception_ptr& fault, const Link& link);
 
   asio::io_context& io_;
   const Config& config_;

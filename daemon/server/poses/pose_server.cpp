@@ -64,7 +64,12 @@ Result<void> PoseServer::open() {
 
 void PoseServer::start() {
   for (Port& port : ports_) {
-    keep_receiving(port);
+    keep_running(
+        io_.get_executor(), [this, &port] { return receive(port); },
+        [this](const std::string& fault) {
+          if (!stopping_) log_fault(fault, "pose datagrams");
+          return !stopping_;
+        });
     port.lines.start([this](tcp::socket socket) { admit(std::move(socket)); },
                      [this](const std::string& fault) { log_fault(fault, "pose connections"); });
   }
@@ -72,17 +77,6 @@ void PoseServer::start() {
 
 void PoseServer::log_fault(const std::string& fault, const std::string& at) {
   sonar::log_fault(log_, faults_, fault, {"at", at});
-}
-
-/// A listener outlives whatever one message does to us.
-void PoseServer::keep_receiving(Port& port) {
-  asio::co_spawn(
-      io_, [this, &port] { return receive(port); },
-      [this, &port](std::exception_ptr fault) {
-        if (!fault || stopping_) return;
-        log_fault(text_of(fault), "pose datagrams");
-        keep_receiving(port);
-      });
 }
 
 void PoseServer::stop() {

@@ -70,7 +70,6 @@ class PoseServer {
   using ConnectionPointer = std::shared_ptr<Connection>;
 
   Result<Endpoint> open(Port& port, Endpoint at);
-  void keep_receiving(Port& port);
   void log_fault(const std::string& fault, const std::string& at);
   asio::awaitable<void> receive(Port& port);
   asio::awaitable<void> read_lines(ConnectionPointer connection);

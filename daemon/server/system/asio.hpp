@@ -33,4 +33,13 @@ inline std::string text_of(const std::exception_ptr& fault) {
   }
 }
 
+/// Runs the coroutine that `loop` returns, and again after a fault for as long as `survives`, which is given its text, returns
+/// true: a listener outlives whatever one message does to it.
+template <class Loop, class Survives>
+void keep_running(const asio::any_io_executor& executor, Loop loop, Survives survives) {
+  asio::co_spawn(executor, loop, [executor, loop, survives](const std::exception_ptr& fault) {
+    if (fault && survives(text_of(fault))) keep_running(executor, loop, survives);
+  });
+}
+
 }  // namespace sonar
