@@ -56,9 +56,9 @@ TEST(UnarmedFaults, AreRefusedWithWhatToDo) {
 TEST_F(InjectedFaults, TheConnectionEndsAtTheByteInTheJournal) {
   for (const std::string how : {"fin", "reset"}) {
     SCOPED_TRACE(how);
-    Client driver(daemon.address());
     client.close();
-    ASSERT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 1; }));
+    ASSERT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 0; }));
+    Client driver(daemon.address());
     driver.fire(fire_at(oculus::PingRate::hz40));
     ASSERT_TRUE(driver.next_ping());
     ASSERT_TRUE(done(daemon.ask(fault("L03", {{"fraction", "0.5"}, {"how", how}}))));

@@ -1,0 +1,92 @@
+// What faults do about clients: which of them they are for, who is admitted, what becomes of requests.
+#include <cmath>
+
+#include "daemon/emulator/faults/faults.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::size_t most_late_requests = 64;
+
+std::chrono::nanoseconds after_seconds(double seconds) {
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9)));
+}
+
+}  // namespace
+
+bool Faults::chosen(const Fault& fault, const Connection& client) const {
+  if (client.role == Role::observer) return false;
+  using Kind = ClientChoice::Kind;
+  const ClientChoice& choice = fault.client;
+  if (choice.kind == Kind::all || client.role == Role::stream) return true;
+  if (choice.kind == Kind::number) return client.number == choice.number;
+  if (choice.kind == Kind::prefix) {
+    const std::uint32_t mask = choice.prefix_bits == 0 ? 0 : ~std::uint32_t{0} << (32 - choice.prefix_bits);
+    return ((text::number_from_ipv4(client.peer.ip) ^ text::number_from_ipv4(choice.address)) & mask) == 0;
+  }
+  return std::none_of(around_.connections.all().begin(), around_.connections.all().end(), [&](const Connection& other) {
+    const bool counts = other.role == Role::client && other.state == Connection::State::served;
+    return counts && (choice.kind == Kind::newest ? other.number > client.number : other.number < client.number);
+  });
+}
+
+Faults::Admission Faults::admission() const {
+  for (const Entry& e : entries_) {
+    if (!e.active) continue;
+    if (e.fault.kind->effect == Effect::leave_waiting) return Admission::wait;
+    if (e.fault.kind->effect == Effect::take_over) return Admission::take_over;
+    if (e.fault.kind->effect == Effect::turn_away)
+      return e.fault.word("how") == "reset" ? Admission::reset : Admission::turn_away;
+  }
+  return Admission::as_configured;
+}
+
+void Faults::on_served(const Connection& client, Time now) {
+  if (entries_.empty()) return;
+  on(Occasion::connect, now);
+  for (Entry& e : entries_)
+    if (e.active && e.fault.kind->effect == Effect::end_after)
+      e.ends.emplace_back(now + after_seconds(e.fault.number("seconds")), client.id);
+  if (any(Effect::stop_reading)) orders_.emplace_back(ReadClients{false});
+  if (any(Effect::outbox_policy)) orders_.emplace_back(DropNewestPings{true});
+}
+
+Faults::Request Faults::on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
+                                   Time now) {
+  on(Occasion::config, now);
+  for (Entry& e : entries_) {
+    if (!e.active) continue;
+    FaultEntry more;
+    more.client = who;
+    switch (e.fault.kind->effect) {
+      case Effect::ignore_requests:
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        return Request::ignore;
+      case Effect::delay_requests:
+        if (e.late.size() < most_late_requests)
+          e.late.emplace_back(now + after_seconds(e.fault.number("seconds")), ApplyRequest{change, who});
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        return Request::ignore;
+      case Effect::clamp_requests: {
+        if (change.settings.range_m <= e.fault.number("range-m")) break;
+        protocol::DeviceState with = state;
+        with.settings = change.vendor_settings;
+        protocol::SettingsOverride limit;
+        limit.range_m = e.fault.number("range-m");
+        auto limited = around_.vendor.apply_override(limit, with);
+        if (!limited) break;
+        change = *std::move(limited);
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        break;
+      }
+      case Effect::end_on_request:
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        return e.fault.word("how") == "reset" ? Request::reset : Request::end;
+      default:
+        break;
+    }
+  }
+  return Request::apply;
+}
+
+}  // namespace sonar
