@@ -2,8 +2,8 @@
 #include <google/protobuf/struct.pb.h>
 
 #include <algorithm>
-
-#include "core/text/format.hpp"
+#include <array>
+#include <charconv>
 
 #include "protocol/control/messages.hpp"
 #include "protocol/control/refused.hpp"
@@ -139,7 +139,11 @@ Subscribe from(const v1::Subscribe& m) { return {m.pings(), m.clients(), m.poses
 Result<std::string> text_from(const std::string& key, const google::protobuf::Value& value) {
   if (value.kind_case() == google::protobuf::Value::kStringValue) return checked_text(value.string_value(), key.c_str(), false);
   if (value.kind_case() == google::protobuf::Value::kBoolValue) return std::string(value.bool_value() ? "yes" : "no");
-  if (value.kind_case() == google::protobuf::Value::kNumberValue) return text::format("%.12g", value.number_value());
+  if (value.kind_case() == google::protobuf::Value::kNumberValue) {
+    std::array<char, 32> digits;
+    const auto end = std::to_chars(digits.begin(), digits.end(), value.number_value(), std::chars_format::general, 12).ptr;
+    return std::string(digits.begin(), end);
+  }
   return refused("with." + key + " must be a number or a word");
 }
 
