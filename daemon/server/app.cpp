@@ -67,6 +67,9 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       notify_(
           io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_),
       reload_(io_, changes_, log_, reload_steps()) {
+  mavlink_server_.inject_failures_with([this](std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
+    return fault_operations_.inject(unit, type, instance);
+  });
   recordings_.use_scene(*changes_.scene());
   log_new_notes();
 }
