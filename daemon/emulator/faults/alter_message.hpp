@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/emulator/faults/draws.hpp"
 #include "daemon/config/faults/fault.hpp"
+#include "daemon/emulator/faults/draws.hpp"
 #include "daemon/emulator/sonar/outbox.hpp"
 #include "protocol/vendor.hpp"
 

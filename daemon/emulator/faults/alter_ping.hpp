@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/sonar/ping.hpp"
-#include "daemon/emulator/faults/draws.hpp"
 #include "daemon/config/faults/fault.hpp"
+#include "daemon/emulator/faults/draws.hpp"
 
 namespace sonar {
 

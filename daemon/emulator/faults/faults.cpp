@@ -13,9 +13,6 @@ using std::chrono::nanoseconds;
 
 constexpr std::size_t most_hits = 64;  // pings remembered: more than an outbox holds
 constexpr std::size_t most_over = 64;  // faults listed after their end
-constexpr std::size_t most_late_requests = 64;
-
-nanoseconds from_seconds(double seconds) { return nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9))); }
 
 /// FNV-1a, so that a fault draws the same numbers in every run.
 std::uint32_t key_of_name(const std::string& name) {
@@ -25,7 +22,7 @@ std::uint32_t key_of_name(const std::string& name) {
 }
 
 nanoseconds length_of_power_cycle(const Fault& fault) {
-  return from_seconds(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
+  return nanoseconds_from(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
 }
 
 protocol::SettingsOverride override_of(const Fault& fault) {
@@ -147,7 +144,7 @@ void Faults::begin_effect(Entry& e, Time now) {
       orders_.emplace_back(EndClients{e.fault.word("how") == "reset"});
       orders_.emplace_back(RestartDevice{});
       if (const double gap = e.fault.number("gap-s"); gap < 0)
-        e.step = now + std::max(nanoseconds(0), from_seconds(e.fault.number("boot-s") + gap));
+        e.step = now + std::max(nanoseconds(0), nanoseconds_from(e.fault.number("boot-s") + gap));
       return;
     case Effect::flap:
       e.down = false;
@@ -221,7 +218,7 @@ void Faults::end_effect(Entry& e) {
 void Faults::on_tick(Time now) {
   for (Entry& e : entries_) {
     const auto& at = e.fault.at;
-    if (!e.over && !e.active && at.time_s && e.begun == 0 && now - start_ >= from_seconds(*at.time_s)) begin(e, now);
+    if (!e.over && !e.active && at.time_s && e.begun == 0 && now - start_ >= nanoseconds_from(*at.time_s)) begin(e, now);
     if (e.active && e.step <= now) step(e, now);
     while (!e.late.empty() && e.late.front().first <= now) {
       orders_.emplace_back(std::move(e.late.front().second));
@@ -253,7 +250,7 @@ std::optional<Time> Faults::next_tick() const {
     if (e.active) next = std::min({next, e.until, e.step});
     if (!e.late.empty()) next = std::min(next, e.late.front().first);
     if (!e.ends.empty()) next = std::min(next, e.ends.front().first);
-    if (!e.active && e.begun == 0 && e.fault.at.time_s) next = std::min(next, start_ + from_seconds(*e.fault.at.time_s));
+    if (!e.active && e.begun == 0 && e.fault.at.time_s) next = std::min(next, start_ + nanoseconds_from(*e.fault.at.time_s));
   }
   return next == Time::max() ? std::nullopt : std::optional(next);
 }
@@ -273,7 +270,7 @@ void Faults::step(Entry& e, Time now) {
   orders_.emplace_back(SetListening{!e.down});
   if (e.down) orders_.emplace_back(EndClients{true});
   if (e.down) note(e, FaultEntry::What::injected, now);
-  e.step = now + from_seconds(e.fault.number(e.down ? "down-s" : "up-s"));
+  e.step = now + nanoseconds_from(e.fault.number(e.down ? "down-s" : "up-s"));
 }
 
 // ---- pings
@@ -316,7 +313,7 @@ Faults::Hold Faults::hold(const Connection& to, std::uint32_t ping, Time now) {
   for (Entry& e : entries_) {
     if (!met(e, ping) || !chosen(e.fault, to)) continue;
     const FaultDraws draws{around_.seed, e.key, around_.index, ping, static_cast<std::uint32_t>(to.number)};
-    const auto late = [&](double ms) { return Hold{Hold::Kind::until, now + from_seconds(ms * 1e-3), 0}; };
+    const auto late = [&](double ms) { return Hold{Hold::Kind::until, now + nanoseconds_from(ms * 1e-3), 0}; };
     Hold hold;
     switch (e.fault.kind->effect) {
       case Effect::burst:
@@ -381,60 +378,9 @@ void Faults::on_served(const Connection& client, Time now) {
   on(Occasion::connect, now);
   for (Entry& e : entries_)
     if (e.active && e.fault.kind->effect == Effect::end_after)
-      e.ends.emplace_back(now + from_seconds(e.fault.number("seconds")), client.id);
+      e.ends.emplace_back(now + nanoseconds_from(e.fault.number("seconds")), client.id);
   if (any(Effect::stop_reading)) orders_.emplace_back(ReadClients{false});
   if (any(Effect::outbox_policy)) orders_.emplace_back(DropNewestPings{true});
-}
-
-Faults::Request Faults::on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
-                                   Time now) {
-  on(Occasion::config, now);
-  for (Entry& e : entries_) {
-    if (!e.active) continue;
-    FaultEntry more;
-    more.client = who;
-    switch (e.fault.kind->effect) {
-      case Effect::ignore_requests:
-        note(e, FaultEntry::What::injected, now, std::move(more));
-        return Request::ignore;
-      case Effect::delay_requests:
-        if (e.late.size() < most_late_requests)
-          e.late.emplace_back(now + from_seconds(e.fault.number("seconds")), ApplyRequest{change, who});
-        note(e, FaultEntry::What::injected, now, std::move(more));
-        return Request::ignore;
-      case Effect::clamp_requests: {
-        if (change.settings.range_m <= e.fault.number("range-m")) break;
-        protocol::DeviceState with = state;
-        with.settings = change.vendor_settings;
-        protocol::SettingsOverride limit;
-        limit.range_m = e.fault.number("range-m");
-        auto limited = around_.vendor.apply_override(limit, with);
-        if (!limited) break;
-        change = *std::move(limited);
-        note(e, FaultEntry::What::injected, now, std::move(more));
-        break;
-      }
-      case Effect::end_on_request:
-        note(e, FaultEntry::What::injected, now, std::move(more));
-        return e.fault.word("how") == "reset" ? Request::reset : Request::end;
-      default:
-        break;
-    }
-  }
-  return Request::apply;
-}
-
-void Faults::note(Entry& e, FaultEntry::What what, Time now, FaultEntry more) {
-  if (what == FaultEntry::What::injected) ++e.injections;
-  if (around_.journal == nullptr) return;
-  more.what = what;
-  more.fault = e.fault.name;
-  more.asked = e.fault.what;
-  more.kind = e.fault.kind;
-  more.sonar = around_.sonar;
-  more.with = e.fault.used();
-  more.at = now;
-  around_.journal->write(more);
 }
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-// What faults do to pings, to the messages of clients and to status messages.
+// What faults do to pings, to the messages of clients, to their requests and to status messages.
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +11,8 @@ namespace sonar {
 namespace {
 
 using protocol::Bytes;
+
+constexpr std::size_t most_late_requests = 64;
 
 /// A message as one run of bytes: each prefix with the bytes that all clients share.
 Bytes whole(const Outbox::Message& message) {
@@ -161,6 +163,57 @@ void Faults::alter_beacons(std::vector<Bytes>& beacons, Time now) {
     note(e, FaultEntry::What::injected, now, std::move(more));
     if (e.fault.span.pings > 0 && effect != Effect::heat && --e.pings_left == 0) end(e, now);
   }
+}
+
+Faults::Request Faults::on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
+                                   Time now) {
+  on(Occasion::config, now);
+  for (Entry& e : entries_) {
+    if (!e.active) continue;
+    FaultEntry more;
+    more.client = who;
+    switch (e.fault.kind->effect) {
+      case Effect::ignore_requests:
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        return Request::ignore;
+      case Effect::delay_requests:
+        if (e.late.size() < most_late_requests)
+          e.late.emplace_back(now + nanoseconds_from(e.fault.number("seconds")), ApplyRequest{change, who});
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        return Request::ignore;
+      case Effect::clamp_requests: {
+        if (change.settings.range_m <= e.fault.number("range-m")) break;
+        protocol::DeviceState with = state;
+        with.settings = change.vendor_settings;
+        protocol::SettingsOverride limit;
+        limit.range_m = e.fault.number("range-m");
+        auto limited = around_.vendor.apply_override(limit, with);
+        if (!limited) break;
+        change = *std::move(limited);
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        break;
+      }
+      case Effect::end_on_request:
+        note(e, FaultEntry::What::injected, now, std::move(more));
+        return e.fault.word("how") == "reset" ? Request::reset : Request::end;
+      default:
+        break;
+    }
+  }
+  return Request::apply;
+}
+
+void Faults::note(Entry& e, FaultEntry::What what, Time now, FaultEntry more) {
+  if (what == FaultEntry::What::injected) ++e.injections;
+  if (around_.journal == nullptr) return;
+  more.what = what;
+  more.fault = e.fault.name;
+  more.asked = e.fault.what;
+  more.kind = e.fault.kind;
+  more.sonar = around_.sonar;
+  more.with = e.fault.used();
+  more.at = now;
+  around_.journal->write(more);
 }
 
 }  // namespace sonar

@@ -35,7 +35,8 @@ std::string table_of_troubles() {
 
 TEST(FaultDocs, TablesAreThoseOfTheCode) {
   EXPECT_EQ(table_of("support"), support_table()) << "docs/faults.md: the table of support must be\n" << support_table();
-  EXPECT_EQ(table_of("troubles"), table_of_troubles()) << "docs/faults.md: the table of troubles must be\n" << table_of_troubles();
+  EXPECT_EQ(table_of("troubles"), table_of_troubles()) << "docs/faults.md: the table of troubles must be\n"
+                                                       << table_of_troubles();
 }
 
 }  // namespace
