@@ -43,7 +43,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
           world_, clock_, log_, [this] { on_change(); }, &events_, &plausibility_),
       pose_server_(io_, config_.poses, config_.limits, admission_, pose_intake_, log_),
       mavlink_server_(io_, config_, pose_intake_, log_),
-      fault_log_(events_),
+      fault_log_(events_, recordings_),
       fleet_({io_, clock_, admission_, log_, options_.digest}, config_, world_, simulator_, recordings_, events_, fault_log_,
              {[this] { on_change(); },
               [this](const Error& why) {

@@ -1,11 +1,14 @@
-"""sonarctl fault beside a running daemon: what is added acts on a connection, is listed, written down, and ends."""
+"""sonarctl fault beside a running daemon: what is added acts on a connection, is listed, written down, recorded, and ends."""
 import json
+import pathlib
 import signal
 import socket
 import subprocess
+import tempfile
 import time
 import unittest
 
+import mcap_checker
 from running_sonard import SONARCTL, Sonard, free_address, run
 
 
@@ -100,6 +103,25 @@ class Faults(unittest.TestCase):
         self.assertEqual((entry["event"], entry["kind"], entry["sonar"]), ("began", "L05", "front"))
         self.assertEqual(follow.returncode, 0)
         self.assertIn("fault followed (L05) began  front", self.does("journal"))
+
+
+class Recorded(unittest.TestCase):
+    def test_a_recording_has_the_journal_of_its_sonar(self):
+        with tempfile.TemporaryDirectory() as folder, Sonard(more=f"recording: {{folder: {folder}}}", arguments=("--faults",)) as daemon:
+            def ctl(*words):
+                result = run(SONARCTL, *words, "--control", f"{daemon.address}:14770")
+                self.assertEqual(result.returncode, 0, result.stderr)
+                return result.stdout
+
+            ctl("recording", "start", "run.mcap")
+            ctl("fault", "add", "F01", "--with", "bytes=3", "--at", "ping=3", "--name", "junk")
+            daemon.ctl("listen", "--seconds", "3", "--quiet")
+            ctl("recording", "stop")
+            checked = mcap_checker.check(pathlib.Path(folder, "run.mcap").read_bytes())
+            entries = [json.loads(data) for topic, _, data in checked.messages if topic == "/faults"]
+            journal = [json.loads(line) for line in ctl("fault", "journal", "--json").splitlines()]
+        self.assertEqual(entries, journal)
+        self.assertEqual([(e["event"], e["fault"]) for e in entries if e["event"] == "injected"], [("injected", "junk")])
 
 
 class NotArmed(unittest.TestCase):
