@@ -32,7 +32,7 @@ int run(int argc, char** argv) {
       {"view", add_view(app)},           {"stats", add_stats(app)},   {"record", add_record(app)},
       {"pose", add_pose(app)},           {"events", add_events(app)}, {"set", add_set(app)},
       {"step", add_step(app)},           {"load", add_load(app)},     {"object", add_object(app)},
-      {"recording", add_recording(app)}, {"scene", add_scene(app)}};
+      {"recording", add_recording(app)}, {"fault", add_fault(app)},   {"scene", add_scene(app)}};
   const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
   try {
     app.parse(argc, argv);

@@ -28,6 +28,7 @@ Run add_step(CLI::App& app);
 Run add_load(CLI::App& app);
 Run add_object(CLI::App& app);
 Run add_recording(CLI::App& app);
+Run add_fault(CLI::App& app);
 
 /// Runs the command that the arguments name; the exit code of the program.
 int run(int argc, char** argv);

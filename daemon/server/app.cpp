@@ -43,7 +43,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
           world_, clock_, log_, [this] { on_change(); }, &events_, &plausibility_),
       pose_server_(io_, config_.poses, config_.limits, admission_, pose_intake_, log_),
       mavlink_server_(io_, config_, pose_intake_, log_),
-      fault_log_(events_),
+      fault_log_(events_, recordings_),
       fleet_({io_, clock_, admission_, log_, options_.digest}, config_, world_, simulator_, recordings_, events_, fault_log_,
              {[this] { on_change(); },
               [this](const Error& why) {
@@ -66,6 +66,9 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       notify_(
           io_, options_.service_manager, [this] { return simulator_.under_way_for(); }, log_),
       reload_(io_, changes_, log_, reload_steps()) {
+  mavlink_server_.inject_failures_with([this](std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
+    return fault_operations_.inject(unit, type, instance);
+  });
   recordings_.use_scene(*changes_.scene());
   log_new_notes();
 }

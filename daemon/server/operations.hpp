@@ -23,7 +23,7 @@ struct OperationResult {
   std::string text = {};                                // one sentence when it was not done
   std::shared_ptr<const v1::DaemonStatus> status = {};  // of GetStatus that was done
   std::shared_ptr<const v1::Stepped> stepped = {};      // of Step
-  std::shared_ptr<const v1::FaultReport> faults = {};  // of GetFaults
+  std::shared_ptr<const v1::FaultReport> faults = {};   // of GetFaults
 };
 
 class Operations {

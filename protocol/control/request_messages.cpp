@@ -2,7 +2,8 @@
 #include <google/protobuf/struct.pb.h>
 
 #include <algorithm>
-#include <cstdio>
+#include <array>
+#include <charconv>
 
 #include "protocol/control/messages.hpp"
 #include "protocol/control/refused.hpp"
@@ -139,9 +140,9 @@ Result<std::string> text_from(const std::string& key, const google::protobuf::Va
   if (value.kind_case() == google::protobuf::Value::kStringValue) return checked_text(value.string_value(), key.c_str(), false);
   if (value.kind_case() == google::protobuf::Value::kBoolValue) return std::string(value.bool_value() ? "yes" : "no");
   if (value.kind_case() == google::protobuf::Value::kNumberValue) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.12g", value.number_value());
-    return std::string(text);
+    std::array<char, 32> digits;
+    const auto end = std::to_chars(digits.begin(), digits.end(), value.number_value(), std::chars_format::general, 12).ptr;
+    return std::string(digits.begin(), end);
   }
   return refused("with." + key + " must be a number or a word");
 }

@@ -42,6 +42,8 @@ enum class FailureType : std::uint8_t {
   delayed = 6,
   intermittent = 7,
 };
+/// FAILURE_UNIT of common.xml that fits a sonar: FAILURE_UNIT_SENSOR_DISTANCE_SENSOR.
+inline constexpr std::uint32_t distance_sensor = 7;
 /// Carries out MAV_CMD_INJECT_FAILURE. `unit`: FAILURE_UNIT of common.xml; `instance`: 0 = all.
 using InjectFailure = std::function<MavResult(std::uint32_t unit, FailureType type, std::uint32_t instance)>;
 

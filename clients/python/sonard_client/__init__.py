@@ -4,6 +4,7 @@
 """
 from .control import Control, ControlError, Events
 from .daemon import Daemon, DaemonFailed
+from .faults import Fault
 from .layouts import FireSettings
 from .oculus import OculusClient
 from .ping import Peak, Ping
@@ -12,5 +13,5 @@ from .status import SonarFound, discover
 from .stream import Message, MessageReader
 
 __version__ = "0.1.0"
-__all__ = ["Control", "ControlError", "Daemon", "DaemonFailed", "Events", "FireSettings", "Message", "MessageReader",
+__all__ = ["Control", "ControlError", "Daemon", "DaemonFailed", "Events", "Fault", "FireSettings", "Message", "MessageReader",
            "OculusClient", "Peak", "Ping", "PoseSender", "SonarFound", "discover"]

@@ -5,9 +5,10 @@ import errno
 import http.client
 import json
 import socket
-from typing import Any, Dict, Iterator, Optional, Sequence, Union
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Union
 from urllib.parse import quote, urlencode
 
+from .faults import Fault
 from .pose_messages import FRAMES
 from .rotations import orientation, three
 
@@ -17,7 +18,9 @@ _FIRST_REPLY_S = 2.0  # sonard replies to /healthz at once; a longer silence mea
 
 # 64-bit fields of control.proto: strings in protobuf's JSON mapping, converted to int here.
 _WIDE = {"seed", "pings", "refused", "served", "dropped", "skipped_ticks", "clients", "refused_clients", "pings_written",
-         "pings_dropped", "bytes_written", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "now_ns", "unsent", "messages", "bytes"}
+         "pings_dropped", "bytes_written", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "now_ns", "unsent", "messages", "bytes",
+         "seq", "utc_ns", "mono_ns", "time_ns", "client_number", "offset", "bytes_before", "bytes_after", "injections"}
+_LATEST = 2 ** 64 - 1
 
 
 class ControlError(Exception):
@@ -32,8 +35,8 @@ class Events(Iterator[Json]):
     """for event in control.events(pings=True): ...   Also a context manager. close() ends the subscription."""
 
     def __init__(self, connection: http.client.HTTPConnection, reply: http.client.HTTPResponse,
-                 timeout: Optional[float]) -> None:
-        self._connection, self._reply, self._timeout = connection, reply, timeout
+                 sock: Optional[socket.socket], timeout: Optional[float]) -> None:
+        self._connection, self._reply, self._socket, self._timeout = connection, reply, sock, timeout
 
     def __next__(self) -> Json:
         try:
@@ -41,12 +44,20 @@ class Events(Iterator[Json]):
         except socket.timeout:
             self.close()
             raise TimeoutError(f"no event within {self._timeout:g} s") from None
-        except http.client.HTTPException:  # connection lost within a chunk
+        except (http.client.HTTPException, ConnectionError):  # lost within a chunk
             line = b""
         if not line:
             self.close()
             raise StopIteration
         return dict(_read_json(line))
+
+    def interrupt(self) -> None:
+        """From another thread: the iteration ends."""
+        try:
+            if self._socket is not None:
+                self._socket.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass  # it has ended
 
     def close(self) -> None:
         self._reply.close()
@@ -89,23 +100,24 @@ class Control:
         return {name: float(value) for name, value in pairs}
 
     def events(self, pings: bool = False, clients: bool = False, poses: bool = False, scene: bool = False,
-               timeout: Optional[float] = None) -> Events:
-        """Subscribes to events of the given kinds, or of all kinds; each event has one of the keys ping, client, pose, scene.
+               faults: bool = False, timeout: Optional[float] = None) -> Events:
+        """Subscribes to events of the given kinds, or of all kinds; each event has one of the keys ping, client, pose, scene, fault.
         The iteration ends when the daemon stops. Raises TimeoutError after `timeout` seconds without an event; None waits
         without limit."""
-        wanted = {"pings": pings, "clients": clients, "poses": poses, "scene": scene}
+        wanted = {"pings": pings, "clients": clients, "poses": poses, "scene": scene, "faults": faults}
         query = urlencode({kind: 1 for kind, yes in wanted.items() if yes})
         self._check_server()
         connection = http.client.HTTPConnection(self.host, self.port, timeout=timeout)
         try:
             connection.request("GET", "/api/v1/events" + ("?" + query if query else ""), headers=self._headers)
+            sock = connection.sock  # getresponse() may give it away
             reply = connection.getresponse()
             if reply.status != 200:
                 raise _error(reply.status, reply.read().decode(errors="replace"))
         except BaseException:
             connection.close()
             raise
-        return Events(connection, reply, timeout)
+        return Events(connection, reply, sock, timeout)
 
     # ---- sonars and water
     def set_sonar(self, sonar: str = "", range_m: Optional[float] = None, rate_hz: Optional[float] = None,
@@ -185,6 +197,41 @@ class Control:
         """Stops one recording, or all. Returns when the files are complete."""
         self._post("stop_recording", _given(file=file or None))
 
+    # ---- faults on purpose, of a daemon that runs with --faults
+    def fault(self, what: str, **record: Any) -> Fault:
+        """with control.fault("L05", seconds=6) as fault: ...       Arguments as add_fault()."""
+        return Fault(self, what, record)
+
+    def add_fault(self, what: str, name: str = "", sonar: str = "", client: str = "", at: Optional[Mapping[str, Any]] = None,
+                  seconds: Optional[float] = None, pings: Optional[int] = None, count: Optional[int] = None,
+                  parameters: Optional[Mapping[str, Any]] = None) -> None:
+        """what: code or name of a kind, or a trouble. at: {"ping": 200}, {"every": 50, "phase": 3}, {"time_s": 4.0},
+        {"probability": 0.01} or {"on": "connect"}; None = now. parameters: {"bytes": 16, "fill": "zero"}."""
+        lasts = _given(seconds=seconds, pings=pings, count=count)
+        record = _given(name=name or None, sonar=sonar or None, client=client or None, at=at, **{"with": parameters})
+        self._post("faults", dict(record, **{"do": what, "for": lasts}))
+
+    def end_fault(self, name: str) -> None:
+        """Raises ControlError if none of this name waits or acts."""
+        self._request_ok("DELETE", "/api/v1/faults/" + quote(name, safe=""))
+
+    def reset_faults(self) -> None:
+        """Ends all faults."""
+        self._post("faults/reset", {})
+
+    def faults(self) -> List[Json]:
+        """name, do, code, sonar, state ("waiting", "active", "over"), injections, expires_s."""
+        return list(_read_json(self._get(f"/api/v1/faults?after={_LATEST}"))["faults"])
+
+    def fault_kinds(self) -> Json:
+        """The catalogue: {"kinds": [...], "troubles": [...]}."""
+        report = _read_json(self._get(f"/api/v1/faults/kinds?after={_LATEST}"))
+        return {"kinds": report["kinds"], "troubles": report["troubles"]}
+
+    def fault_journal(self, after: int = 0) -> List[Json]:
+        """Entries of the journal after the number `after`, at most the latest 1000."""
+        return list(_read_json(self._get(f"/api/v1/faults/journal?after={after}"))["journal"])
+
     # ---- time
     def step(self, dt_s: float, timeout: float = 330.0) -> Json:
         """With clock: lockstep, advances the daemon's time by dt_s. Returns when every client has taken the pings due in it:
@@ -230,7 +277,10 @@ class Control:
             connection.close()
 
     def _get(self, path: str) -> str:
-        status, text = self._request("GET", path)
+        return self._request_ok("GET", path)
+
+    def _request_ok(self, method: str, path: str) -> str:
+        status, text = self._request(method, path)
         if status != 200:
             raise _error(status, text)
         return text

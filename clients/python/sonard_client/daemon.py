@@ -31,13 +31,13 @@ class Daemon:
     sonars: [{name: front, profile: oculus-m1200d, bind_ip: ADDRESS, status_to: [ADDRESS]}]
     """) as sonard: OculusClient(sonard.address)
 
-    ADDRESS is replaced by a random loopback address (sonard.address), so that several daemons can run at a time.'''
+    ADDRESS is replaced by a random loopback address (sonard.address), so that several daemons can run at a time. None: the demo.'''
 
-    def __init__(self, config: Union[str, "os.PathLike[str]"], program: str = "sonard", arguments: Sequence[str] = (),
+    def __init__(self, config: Union[str, "os.PathLike[str]", None], program: str = "sonard", arguments: Sequence[str] = (),
                  timeout_s: float = 60.0) -> None:
         is_text = isinstance(config, str) and "\n" in config
         self._text = str(config) if is_text else ""
-        self._path = None if is_text else pathlib.Path(config)
+        self._path = None if is_text or config is None else pathlib.Path(config)
         self._program, self._arguments, self._timeout_s = program, [str(a) for a in arguments], timeout_s
         self._folder: Optional["tempfile.TemporaryDirectory[str]"] = None
         self._process: Optional["subprocess.Popen[bytes]"] = None
@@ -79,9 +79,10 @@ class Daemon:
         return self.process.wait(timeout_s)
 
     def _start(self) -> None:
-        if self._path is None:
+        if self._text:
             self.address = free_address()
-        self._launch([self._program, "run", str(self.write_config()), *self._arguments])
+        config = str(self.write_config()) if self._text or self._path else "--demo"
+        self._launch([self._program, "run", config, *self._arguments])
 
     def write_config(self) -> pathlib.Path:
         """Writes the configuration for `address`, if it was given as text, and returns its path."""

@@ -16,6 +16,8 @@ ANSWERS = {
     "/metrics": (200, '# HELP a b\n# TYPE a counter\nsonard_pings_total{sonar="front left"} 12\nsonard_late_seconds 1e-3\n\n'),
     "/api/v1/status": (200, '{"seed":"18446744073709551615","sonars":[{"clients":[],"figures":{"pings":"7","clients":"1"}}]}'),
     "/api/v1/sonar": (400, '{"code":"REFUSED","text":"no sonar is called \\"rear\\"; there are: front"}'),
+    "/api/v1/faults/journal?after=6":
+        (200, '{"journal":[{"seq":"7","utc_ns":"1152921504606846976","offset":"-1","bytes_before":"10","with":{}}]}'),
     "/api/v1/load": (502, "<html>a proxy</html>"),
 }
 
@@ -45,7 +47,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.wfile.write(b"0\r\n\r\n")
         self.close_connection = True
 
-    do_GET = do_POST = answer
+    do_GET = do_POST = do_DELETE = answer
 
     def log_message(self, *_):
         """No output."""
@@ -128,6 +130,19 @@ class Requests(unittest.TestCase):
         self.assertEqual(self.last(), ("POST", "/api/v1/start_recording", {"file": "run.mcap", "sonar": "front"}))
         self.control.stop_recording()
         self.assertEqual(self.last(), ("POST", "/api/v1/stop_recording", {}))
+
+    def test_faults(self):
+        self.control.add_fault("F01", at={"every": 50}, count=3, seconds=2, client="newest", parameters={"bytes": 1, "fill": "zero"})
+        self.assertEqual(self.last(), ("POST", "/api/v1/faults", {
+            "do": "F01", "at": {"every": 50}, "for": {"seconds": 2, "count": 3}, "client": "newest",
+            "with": {"bytes": 1, "fill": "zero"}}))
+        self.control.end_fault("a name/..")
+        self.assertEqual(self.last(), ("DELETE", "/api/v1/faults/a%20name%2F..", None))
+        self.control.reset_faults()
+        self.assertEqual(self.last(), ("POST", "/api/v1/faults/reset", {}))
+        entry = {"seq": 7, "utc_ns": 2 ** 60, "offset": -1, "bytes_before": 10, "with": {}}
+        self.assertEqual(self.control.fault_journal(after=6), [entry])
+        self.assertEqual(self.last()[1], "/api/v1/faults/journal?after=6")
 
     def test_refusals_carry_the_message(self):
         with self.assertRaisesRegex(ControlError, "no sonar is called") as caught:

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "clients/sonarctl/control/fault_text.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 
@@ -135,6 +136,7 @@ std::string text_from(const v1::Event& event) {
   std::string text = event.has_ping()     ? event_text(event.ping())
                      : event.has_client() ? event_text(event.client())
                      : event.has_pose()   ? event_text(event.pose())
+                     : event.has_fault()  ? text_from(event.fault())
                                           : event_text(event.scene());
   if (event.unsent() > 0)
     text += format("  (%llu events before this one were not sent: too slow a reader)", wide(event.unsent()));

@@ -204,7 +204,7 @@ Run add_events(CLI::App& app) {
   CLI::App& command = *app.add_subcommand("events", "print the events of a running sonard");
   command.footer(
       "examples:\n"
-      "  sonarctl events                              clients, poses and scenes\n"
+      "  sonarctl events                              clients, poses, scenes and faults\n"
       "  sonarctl events --pings --count 10 --json");
   const auto options = std::make_shared<EventsOptions>();
   add_control_options(command, options->control);
@@ -212,12 +212,14 @@ Run add_events(CLI::App& app) {
   command.add_flag("--clients", options->wanted.clients, "clients that connect and disconnect");
   command.add_flag("--poses", options->wanted.poses, "poses that stop, resume or change their source");
   command.add_flag("--scene", options->wanted.scene, "scenes loaded and changed");
+  command.add_flag("--faults", options->wanted.faults, "faults that begin, act and end");
   command.add_option("--count", options->count, "stop after this number of events")->check(whole_number());
   command.add_option("--seconds", options->seconds, "stop after this time")->check(number(0));
   command.add_flag("--json", options->json, "one JSON object per line");
   return [options] {
     control::Subscribe& wanted = options->wanted;
-    if (!wanted.pings && !wanted.clients && !wanted.poses && !wanted.scene) wanted.clients = wanted.poses = wanted.scene = true;
+    if (!wanted.pings && !wanted.clients && !wanted.poses && !wanted.scene && !wanted.faults)
+      wanted.clients = wanted.poses = wanted.scene = wanted.faults = true;
     return print_events(*options);
   };
 }

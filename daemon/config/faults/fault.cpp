@@ -93,7 +93,7 @@ class Check {
         given.emplace(pair.substr(0, sign), pair.substr(sign + 1));
       }
       all.push_back(of_kind(*find_fault_kind(part.code), given, trouble.default_s));
-      all.back().name += "." + std::to_string(all.size());
+      all.back().name = (record_.name.empty() ? std::string(trouble.name) : record_.name) + "." + std::to_string(all.size());
     }
     return all;
   }

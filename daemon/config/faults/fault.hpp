@@ -59,8 +59,9 @@ struct Fault {
 inline constexpr std::chrono::seconds longest_manual_fault{600};
 inline constexpr std::size_t most_faults = 256;
 
-/// The faults that a record stands for: one, or the several of a trouble, their names then NAME.1, NAME.2, ... Errors (usage)
-/// name the record, the wrong part and what is possible. `manual`: given to a running daemon; it gets an end.
+/// The faults that a record stands for: one, or the several of a trouble, their names then NAME.1, NAME.2, ..., where NAME is
+/// that of the record, else the trouble's. Errors (usage) name the record, the wrong part and what is possible. `manual`: given
+/// to a running daemon; it gets an end.
 Result<std::vector<Fault>> check_fault(const FaultRecord& record, bool manual);
 /// Two faults that would write the same part of the same message: a sentence, or empty.
 std::string conflict_of(const Fault& a, const Fault& b);

@@ -14,8 +14,6 @@ using std::chrono::nanoseconds;
 constexpr std::size_t most_hits = 64;  // pings remembered: more than an outbox holds
 constexpr std::size_t most_over = 64;  // faults listed after their end
 
-nanoseconds from_seconds(double seconds) { return nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9))); }
-
 /// FNV-1a, so that a fault draws the same numbers in every run.
 std::uint32_t key_of_name(const std::string& name) {
   std::uint32_t hash = 2166136261u;
@@ -24,7 +22,7 @@ std::uint32_t key_of_name(const std::string& name) {
 }
 
 nanoseconds length_of_power_cycle(const Fault& fault) {
-  return from_seconds(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
+  return nanoseconds_from(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
 }
 
 protocol::SettingsOverride override_of(const Fault& fault) {
@@ -164,7 +162,7 @@ void Faults::begin_effect(Entry& e, Time now) {
       orders_.emplace_back(EndClients{e.fault.word("how") == "reset"});
       orders_.emplace_back(RestartDevice{});
       if (const double gap = e.fault.number("gap-s"); gap < 0)
-        e.step = now + std::max(nanoseconds(0), from_seconds(e.fault.number("boot-s") + gap));
+        e.step = now + std::max(nanoseconds(0), nanoseconds_from(e.fault.number("boot-s") + gap));
       return;
     case Effect::flap:
       e.down = false;
@@ -238,7 +236,7 @@ void Faults::end_effect(Entry& e) {
 void Faults::on_tick(Time now) {
   for (Entry& e : entries_) {
     const auto& at = e.fault.at;
-    if (!e.over && !e.active && at.time_s && e.begun == 0 && now - start_ >= from_seconds(*at.time_s)) begin(e, now);
+    if (!e.over && !e.active && at.time_s && e.begun == 0 && now - start_ >= nanoseconds_from(*at.time_s)) begin(e, now);
     if (e.active && e.step <= now) step(e, now);
     while (!e.late.empty() && e.late.front().first <= now) {
       orders_.emplace_back(std::move(e.late.front().second));
@@ -262,7 +260,7 @@ std::optional<Time> Faults::next_tick() const {
     if (e.active) next = std::min({next, e.until, e.step});
     if (!e.late.empty()) next = std::min(next, e.late.front().first);
     if (!e.ends.empty()) next = std::min(next, e.ends.front().first);
-    if (!e.active && e.begun == 0 && e.fault.at.time_s) next = std::min(next, start_ + from_seconds(*e.fault.at.time_s));
+    if (!e.active && e.begun == 0 && e.fault.at.time_s) next = std::min(next, start_ + nanoseconds_from(*e.fault.at.time_s));
   }
   return next == Time::max() ? std::nullopt : std::optional(next);
 }
@@ -282,7 +280,7 @@ void Faults::step(Entry& e, Time now) {
   orders_.emplace_back(SetListening{!e.down});
   if (e.down) orders_.emplace_back(EndClients{true});
   if (e.down) note(e, FaultEntry::What::injected, now);
-  e.step = now + from_seconds(e.fault.number(e.down ? "down-s" : "up-s"));
+  e.step = now + nanoseconds_from(e.fault.number(e.down ? "down-s" : "up-s"));
 }
 
 // ---- pings
@@ -325,7 +323,7 @@ Faults::Hold Faults::hold(const Connection& to, std::uint32_t ping, Time now) {
   for (Entry& e : entries_) {
     if (!met(e, ping) || !chosen(e.fault, to)) continue;
     const FaultDraws draws{around_.seed, e.key, around_.index, ping, static_cast<std::uint32_t>(to.number)};
-    const auto late = [&](double ms) { return Hold{Hold::Kind::until, now + from_seconds(ms * 1e-3), 0}; };
+    const auto late = [&](double ms) { return Hold{Hold::Kind::until, now + nanoseconds_from(ms * 1e-3), 0}; };
     Hold hold;
     switch (e.fault.kind->effect) {
       case Effect::burst:

@@ -1,16 +1,10 @@
 // What faults do about clients: which of them they are for, who is admitted, what becomes of requests.
-#include <cmath>
-
 #include "daemon/emulator/faults/faults.hpp"
 
 namespace sonar {
 namespace {
 
 constexpr std::size_t most_late_requests = 64;
-
-std::chrono::nanoseconds after_seconds(double seconds) {
-  return std::chrono::nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9)));
-}
 
 }  // namespace
 
@@ -46,7 +40,7 @@ void Faults::on_served(const Connection& client, Time now) {
   on(Occasion::connect, now);
   for (Entry& e : entries_)
     if (e.active && e.fault.kind->effect == Effect::end_after)
-      e.ends.emplace_back(now + after_seconds(e.fault.number("seconds")), client.id);
+      e.ends.emplace_back(now + nanoseconds_from(e.fault.number("seconds")), client.id);
   if (any(Effect::stop_reading)) orders_.emplace_back(ReadClients{false});
   if (any(Effect::outbox_policy)) orders_.emplace_back(DropNewestPings{true});
 }
@@ -64,7 +58,7 @@ Faults::Request Faults::on_request(protocol::ChangeSettings& change, const std::
         return Request::ignore;
       case Effect::delay_requests:
         if (e.late.size() < most_late_requests)
-          e.late.emplace_back(now + after_seconds(e.fault.number("seconds")), ApplyRequest{change, who});
+          e.late.emplace_back(now + nanoseconds_from(e.fault.number("seconds")), ApplyRequest{change, who});
         note(e, FaultEntry::What::injected, now, std::move(more));
         return Request::ignore;
       case Effect::clamp_requests: {

@@ -1,4 +1,4 @@
-// What faults do to pings, to the messages of clients and to status messages.
+// What faults do to pings, to the messages of clients, to their requests and to status messages.
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +11,8 @@ namespace sonar {
 namespace {
 
 using protocol::Bytes;
+
+constexpr std::size_t most_late_requests = 64;
 
 /// A message as one run of bytes: each prefix with the bytes that all clients share.
 Bytes whole(const Outbox::Message& message) {

@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-FaultLog::FaultLog(Events& events) : events_(events) {}
+FaultLog::FaultLog(Events& events, Recordings& recordings) : events_(events), recordings_(recordings) {}
 FaultLog::~FaultLog() = default;
 
 Result<void> FaultLog::open(const std::filesystem::path& file) {
@@ -41,7 +41,11 @@ void FaultLog::write(const FaultEntry& entry) {
   for (const auto& [name, value] : entry.with) (*message->mutable_with())[name] = value;
 
   if (entry.what == FaultEntry::What::injected) ++injections_[entry.kind->code];
-  if (file_) std::fputs((control::json_of(*message) + "\n").c_str(), file_.get());
+  if (const bool recorded = recordings_.takes(entry.sonar); file_ || recorded) {
+    const std::string json = control::json_of(*message);
+    if (file_) std::fputs((json + "\n").c_str(), file_.get());
+    if (recorded) recordings_.take_fault(entry.sonar, entry.at, json);
+  }
   if (events_.has_listeners()) {
     v1::Event event;
     *event.mutable_fault() = *message;

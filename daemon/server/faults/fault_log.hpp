@@ -1,5 +1,5 @@
-// The journal of faults: what each did, as JSON lines in a file, as events, as counters, and the last entries in memory.
-// Owned by App; I/O thread only.
+// The journal of faults: what each did, as JSON lines in a file, in recordings, as events, as counters, and the last entries in
+// memory. Owned by App; I/O thread only.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,7 @@
 #include "core/base/result.hpp"
 #include "daemon/emulator/faults/journal.hpp"
 #include "daemon/server/events.hpp"
+#include "daemon/server/recording/recordings.hpp"
 
 namespace sonar {
 
@@ -24,7 +25,7 @@ class FaultLog final : public FaultJournal {
  public:
   static constexpr std::size_t most_remembered = 1000;
 
-  explicit FaultLog(Events& events);
+  FaultLog(Events& events, Recordings& recordings);
   ~FaultLog() override;
   FaultLog(const FaultLog&) = delete;
   FaultLog& operator=(const FaultLog&) = delete;
@@ -44,6 +45,7 @@ class FaultLog final : public FaultJournal {
   };
 
   Events& events_;
+  Recordings& recordings_;
   std::unique_ptr<std::FILE, Close> file_;
   std::deque<std::shared_ptr<const v1::FaultEntry>> entries_;
   std::map<std::string_view, std::uint64_t> injections_;

@@ -1,6 +1,7 @@
 #include "daemon/server/operations/fault_operations.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "core/text/nearest.hpp"
 #include "daemon/server/operations/operation_results.hpp"
@@ -8,6 +9,10 @@
 
 namespace sonar {
 namespace {
+
+constexpr const char* name_by_mavlink = "mavlink";
+constexpr std::array<std::string_view, 8> kinds_of_failures = {"",    "L05", "P01", "P04",
+                                                               "P12", "T11", "T10", "P13"};  // by FailureType
 
 void fill(v1::FaultKind& out, const FaultKind& kind) {
   out.set_code(std::string(kind.code));
@@ -114,6 +119,34 @@ OperationResult FaultOperations::report(const control::GetFaults& asked) const {
   OperationResult result;
   result.faults = std::move(report);
   return result;
+}
+
+mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
+  using enum mavlink::MavResult;
+  if (unit != mavlink::distance_sensor) return unsupported;
+  if (!config_.faults.armed || instance > fleet_.devices().size()) return denied;
+  std::vector<Device*> chosen;
+  std::uint32_t number = 0;
+  for (Device& device : fleet_.devices())
+    if (++number == instance || instance == 0) chosen.push_back(&device);
+
+  control::FaultRecord record;
+  record.name = name_by_mavlink;
+  record.what = kinds_of_failures[static_cast<std::size_t>(type)];
+  record.sonar = instance == 0 ? std::string() : chosen.front()->config().name;
+  record.lasts.seconds = static_cast<double>(longest_manual_fault.count());
+  const FaultKind* const kind = find_fault_kind(record.what);  // null: the sonars work again
+  const auto has_it = [&](const Device* device) { return why_without_effect(*kind, *device->config().profile.vendor).empty(); };
+  if (kind != nullptr && std::none_of(chosen.begin(), chosen.end(), has_it)) return unsupported;
+
+  for (Device* device : chosen) device->end_faults(record.name);
+  const OperationResult result = kind == nullptr ? OperationResult{} : add(record, true);
+  if (result.code != OperationResult::Code::done) {
+    log_.warning("failure refused: " + result.text, {{"client", name_by_mavlink}});
+    return denied;
+  }
+  if (kind != nullptr) log_.warning("fault requested: " + record.what, {{"client", name_by_mavlink}});
+  return accepted;
 }
 
 void FaultOperations::begin_plan() {

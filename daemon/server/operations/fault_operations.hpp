@@ -5,6 +5,7 @@
 #include "daemon/server/operations.hpp"
 #include "daemon/server/sonars/fleet.hpp"
 #include "daemon/server/system/log.hpp"
+#include "protocol/mavlink/mavlink_poses.hpp"
 
 namespace sonar {
 
@@ -22,6 +23,10 @@ class FaultOperations {
   OperationResult add(const control::AddFault& asked, const Sender& sender);
   OperationResult end(const control::EndFaults& asked, const Sender& sender);
   OperationResult report(const control::GetFaults& asked) const;
+  /// MAVLink's command to inject a failure, on the sonars as distance sensors 1, 2, ... of the configuration; 0 = all. A failure
+  /// replaces the one before and ends after longest_manual_fault at the latest. unsupported: another unit, or without effect;
+  /// denied: not armed, no such sonar, or a conflict with another fault.
+  mavlink::MavResult inject(std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance);
   /// The plan of the configuration, which has been checked.
   void begin_plan();
 

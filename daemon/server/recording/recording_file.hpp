@@ -52,6 +52,10 @@ class RecordingFile {
 
   /// A status message goes before it when the last one is a second old. After an error (io) only close() makes sense.
   Result<void> write(const RecordedPing& ping);
+  /// A FaultEntry of control.proto, in JSON; files other than MCAP leave it out. io.
+  Result<void> write_fault(Time at, const std::string& json) {
+    return mcap_ == nullptr ? Result<void>{} : mcap_->write_fault(at, json);
+  }
   /// Finishes the file, after an error too, as far as that goes. io.
   Result<void> close() { return writer_->close(); }
 

@@ -186,7 +186,14 @@ void Recordings::use_scene(const Scene& scene) {
 
 void Recordings::take(const std::string& sonar, RecordedPing ping) {
   for (const Pointer& r : recordings_)
-    if (r->state == Recording::State::running && r->status.sonar() == sonar) write(r, ping);
+    if (r->state == Recording::State::running && r->status.sonar() == sonar)
+      write(r, ping.size(), [ping](RecordingFile& file) { return file.write(ping); });
+}
+
+void Recordings::take_fault(const std::string& sonar, Time at, const std::string& json) {
+  for (const Pointer& r : recordings_)
+    if (r->state == Recording::State::running && r->status.sonar() == sonar)
+      write(r, json.size(), [at, json](RecordingFile& file) { return file.write_fault(at, json); });
 }
 
 bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
@@ -203,12 +210,12 @@ bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
   return is_running(recording);
 }
 
-void Recordings::write(const Pointer& recording, RecordedPing ping) {
-  const std::size_t size = ping.size();
+template <class Job>
+void Recordings::write(const Pointer& recording, std::size_t size, Job job) {
   if (!has_room_for(recording, size)) return;
   recording->waiting_bytes += size;
   on_thread(
-      recording->work, [ping = std::move(ping)](Work& work) { return work.failed ? Result<void>{} : work.file->write(ping); },
+      recording->work, [job = std::move(job)](Work& work) { return work.failed ? Result<void>{} : job(*work.file); },
       [this, recording, size](const Outcome& outcome) {
         recording->waiting_bytes -= size;
         recording->status.set_pings(outcome.figures.pings);

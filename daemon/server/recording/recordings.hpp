@@ -54,6 +54,9 @@ class Recordings {
   bool wants_truth(const std::string& sonar) const;
   void take(const std::string& sonar, RecordedPing ping);
 
+  /// An entry of the journal of faults, in JSON; kept in MCAP only.
+  void take_fault(const std::string& sonar, Time at, const std::string& json);
+
   /// Before anything is taken, and whenever another scene is put to use.
   void use_scene(const Scene& scene);
   /// Of the scene that pings are made in from now on.
@@ -82,7 +85,9 @@ class Recordings {
   /// Whether this recording may let so many bytes more wait; the one that lets most wait ends when there is no room.
   bool has_room_for(const Pointer& recording, std::size_t bytes);
   Result<Pointer> begin(const control::StartRecording& asked, const RecordedSonar& sonar);
-  void write(const Pointer& recording, RecordedPing ping);
+  /// `job` writes so many bytes, now or when the thread comes to it.
+  template <class Job>
+  void write(const Pointer& recording, std::size_t bytes, Job job);
   void end(const Pointer& recording, const std::string& why);
   void fail(const Pointer& recording, const std::string& why);
   void ended(const Pointer& recording, const Outcome& outcome);

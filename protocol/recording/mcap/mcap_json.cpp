@@ -179,4 +179,25 @@ JsonSchema truth_schema() {
        {"bodies", array(object({{"name", type("string")}, {"pose", pose()}}))}});
 }
 
+JsonSchema fault_schema() {
+  const auto text = type("string");  // 64-bit numbers, too, as in protobuf's JSON
+  return schema("sonard.FaultEntry", "What a fault on purpose did: FaultEntry of control.proto",
+                {{"seq", text},
+                 {"utc_ns", text},
+                 {"mono_ns", text},
+                 {"time_ns", text},
+                 {"event", text},
+                 {"fault", text},
+                 {"do", text},
+                 {"kind", text},
+                 {"sonar", text},
+                 {"client", text},
+                 {"client_number", text},
+                 {"ping", type("integer")},
+                 {"offset", text},
+                 {"bytes_before", text},
+                 {"bytes_after", text},
+                 {"with", type("object")}});
+}
+
 }  // namespace sonar::recording::mcap

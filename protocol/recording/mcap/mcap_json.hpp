@@ -19,6 +19,7 @@ struct JsonSchema {
 JsonSchema image_schema();  // foxglove.RawImage
 JsonSchema pose_schema();   // foxglove.PoseInFrame
 JsonSchema truth_schema();  // sonard.PingTruth
+JsonSchema fault_schema();  // sonard.FaultEntry
 
 /// Samples as sent: one row per range (row 0 nearest), one column per beam (column 0 most to port); mono8, 16UC1 or, for 24 and
 /// 32 bits, 32FC1.

@@ -56,9 +56,10 @@ McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::str
   device_ = vendor_channel("device", "device", "tcp");
   client_ = vendor_channel("client", "client", "tcp");
   status_ = vendor_channel("status", "device", "udp");
-  image_ = json_channel("image", mcap::image_schema());
-  pose_ = json_channel("pose", mcap::pose_schema());
-  truth_ = json_channel("truth", mcap::truth_schema());
+  image_ = json_channel("/" + sonar_ + "/image", mcap::image_schema());
+  pose_ = json_channel("/" + sonar_ + "/pose", mcap::pose_schema());
+  truth_ = json_channel("/" + sonar_ + "/truth", mcap::truth_schema());
+  faults_ = json_channel("/faults", mcap::fault_schema());
 }
 
 std::uint16_t McapSession::vendor_channel(const char* topic, const char* from, const char* carrier) {
@@ -69,10 +70,10 @@ std::uint16_t McapSession::vendor_channel(const char* topic, const char* from, c
   return writer_.add_channel(std::move(channel));
 }
 
-std::uint16_t McapSession::json_channel(const char* topic, const mcap::JsonSchema& schema) {
+std::uint16_t McapSession::json_channel(const std::string& topic, const mcap::JsonSchema& schema) {
   mcap::Channel channel;
   channel.schema = writer_.add_schema(schema.name, "jsonschema", schema.text);
-  channel.topic = std::string("/") + sonar_ + "/" + topic;
+  channel.topic = topic;
   channel.message_encoding = "json";
   return writer_.add_channel(std::move(channel));
 }

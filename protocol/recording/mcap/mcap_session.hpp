@@ -11,7 +11,8 @@
 
 namespace sonar::recording {
 
-/// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose, /NAME/truth in JSON.
+/// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose, /NAME/truth and
+/// /faults in JSON.
 class McapSession final : public RecordingWriter {
  public:
   /// `vendor`: vendor of the messages; only pings of "oculus" are converted to images automatically.
@@ -23,16 +24,18 @@ class McapSession final : public RecordingWriter {
   /// Image of a ping of another vendor than Oculus.
   Result<void> write_image(Time at, const Ping& ping);
   Result<void> write_truth(Time at, const mcap::PingTruth& truth);
+  /// `json`: a FaultEntry of control.proto.
+  Result<void> write_fault(Time at, const std::string& json) { return write_json(faults_, at, json); }
   Result<void> close() override { return writer_.close(); }
 
  private:
   std::uint16_t vendor_channel(const char* topic, const char* from, const char* carrier);
-  std::uint16_t json_channel(const char* topic, const mcap::JsonSchema& schema);
+  std::uint16_t json_channel(const std::string& topic, const mcap::JsonSchema& schema);
   Result<void> write_json(std::uint16_t channel, Time at, const std::string& text);
 
   mcap::Writer writer_;
   std::string sonar_, vendor_;
-  std::uint16_t device_, client_, status_, image_, pose_, truth_;
+  std::uint16_t device_, client_, status_, image_, pose_, truth_, faults_;
 };
 
 /// The vendor's bytes of one sonar: the named one, or the first. bad_data: not an MCAP file.

@@ -88,6 +88,7 @@ TEST(FaultKinds, TheirDefaultsAndTheTroublesAreValid) {
       const auto faults = check_fault(record(std::string(trouble.name), {{"severity", severity}}), true);
       ASSERT_TRUE(faults) << faults.error().text;
       EXPECT_EQ(faults->front().what, trouble.name);
+      EXPECT_EQ(faults->front().name, std::string(trouble.name) + ".1");
     }
 }
 

@@ -152,15 +152,58 @@ TEST_F(Mavlink, ACommandToInjectAFailureIsAnsweredToItsSender) {
   vehicle.send(daemon.address(), port, framed(odometry_at(1, 1'000'000), vehicle.who));
   ASSERT_TRUE(vehicle.next(mavlink::Heartbeat::id));
   mavlink::CommandLong command;
-  command.param1 = 7, command.param2 = 1;
+  command.param1 = mavlink::distance_sensor, command.param2 = 1;
   command.command = mavlink::CommandLong::inject_failure, command.target_system = 1, command.target_component = 193;
   mavlink::Identity station{255, 190, 0};
   ground.send(daemon.address(), port, framed(command, station));
   const mavlink::Bytes ack = ground.next_datagram();
   ASSERT_GT(ack.size(), 12u);
   EXPECT_EQ(ack[7], static_cast<std::byte>(mavlink::CommandAck::id));
-  EXPECT_EQ(ack[12], static_cast<std::byte>(mavlink::MavResult::unsupported));
+  EXPECT_EQ(ack[12], static_cast<std::byte>(mavlink::MavResult::denied)) << "not armed";
   ASSERT_TRUE(vehicle.next(mavlink::Heartbeat::id)) << "the vehicle is still the peer";
+}
+
+TEST_F(Mavlink, AFailureIsAFaultOfTheSonarsUntilAllIsWell) {
+  using enum mavlink::FailureType;
+  using enum mavlink::MavResult;
+  DaemonSetup setup = with_link("udpin:HERE:0");
+  setup.edit_config = [](Config& config) { config.faults.armed = true; };
+  Daemon daemon(setup);
+  const std::uint16_t port = daemon.app().mavlink().listens_at(0).port;
+  Vehicle vehicle(daemon.address()), ground(daemon.address());
+  vehicle.send(daemon.address(), port, framed(odometry_at(1, 1'000'000), vehicle.who));
+  ASSERT_TRUE(vehicle.next(mavlink::Heartbeat::id));
+  mavlink::Identity station{255, 190, 0};
+  const auto inject = [&](std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
+    mavlink::CommandLong command;
+    command.param1 = static_cast<float>(unit), command.param2 = static_cast<float>(type),
+    command.param3 = static_cast<float>(instance);
+    command.command = mavlink::CommandLong::inject_failure, command.target_system = 1, command.target_component = 193;
+    ground.send(daemon.address(), port, framed(command, station));
+    const mavlink::Bytes ack = ground.next_datagram();
+    return ack.size() > 12 ? static_cast<mavlink::MavResult>(ack[12]) : failed;
+  };
+  const auto acting = [&] {
+    std::string codes;
+    const auto report = daemon.ask(control::GetFaults{}).faults;
+    for (const v1::FaultStatus& fault : report->faults())
+      if (fault.state() != "over") codes += fault.code() + " " + fault.name() + " " + fault.sonar() + ";";
+    return codes;
+  };
+  const std::string sonar = daemon.app().devices().front().config().name;
+  const std::pair<mavlink::FailureType, std::string> kinds[] = {
+      {off, "L05"}, {stuck, "P01"}, {garbage, "P04"}, {wrong, "P12"}, {slow, "T11"}, {delayed, "T10"}, {intermittent, "P13"}};
+  for (const auto& [type, code] : kinds)
+    for (const std::uint32_t instance : {0u, 1u}) {
+      EXPECT_EQ(inject(mavlink::distance_sensor, type, instance), accepted) << code;
+      EXPECT_EQ(acting(), code + " mavlink " + sonar + ";") << "it replaces the one before";
+    }
+  EXPECT_EQ(inject(4, off, 0), unsupported) << "no GPS receiver";
+  EXPECT_EQ(inject(mavlink::distance_sensor, off, 2), denied) << "there is one sonar";
+  EXPECT_EQ(acting(), "P13 mavlink " + sonar + ";");
+  EXPECT_EQ(inject(mavlink::distance_sensor, ok, 0), accepted);
+  EXPECT_EQ(acting(), "");
+  EXPECT_EQ(inject(mavlink::distance_sensor, ok, 1), accepted) << "also when all is well";
 }
 
 TEST_F(Mavlink, NonsenseIsCountedAndChangesNothing) {
