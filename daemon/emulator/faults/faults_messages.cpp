@@ -12,8 +12,6 @@ namespace {
 
 using protocol::Bytes;
 
-constexpr std::size_t most_late_requests = 64;
-
 /// A message as one run of bytes: each prefix with the bytes that all clients share.
 Bytes whole(const Outbox::Message& message) {
   Bytes all;

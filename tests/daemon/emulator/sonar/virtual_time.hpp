@@ -189,7 +189,8 @@ class VirtualTime {
 };
 
 inline std::string yaml_of(const std::string& sonars, int seed = 1) {
-  return "world: {scene: empty.yaml, seed: " + std::to_string(seed) + "}\nclock: stepped\nvehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, "
+  return "world: {scene: empty.yaml, seed: " + std::to_string(seed) +
+         "}\nclock: stepped\nvehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, "
          "-3]}}\nsonars:\n" +
          sonars;
 }
