@@ -44,7 +44,7 @@ TEST(HttpRules, OriginsThatMayAsk) {
     EXPECT_FALSE(origin_allowed(bad, reached, names)) << bad;
 }
 
-Route route(const char* target) { return route_of(*parse_target(target)); }
+Route route(const char* target, const char* method = "GET") { return route_of(*parse_target(target), method); }
 
 TEST(HttpRules, Routes) {
   EXPECT_EQ(route("/").kind, Kind::help);
@@ -66,6 +66,23 @@ TEST(HttpRules, Routes) {
   for (const char* none : {"/api", "/api/v1", "/api/v2/status", "/api/v1/hello", "/api/v1/subscribe", "/api/v1/sonars",
                            "/api/v1/status/x", "/etc/passwd", "/api/v1/sonars/a/b"})
     EXPECT_EQ(route(none).kind, Kind::unknown) << none;
+}
+
+TEST(HttpRules, RoutesOfFaults) {
+  EXPECT_EQ(route("/api/v1/faults").kind, Kind::faults);
+  EXPECT_EQ(route("/api/v1/faults", "POST").op, "add_fault");
+  for (const char* list : {"kinds", "journal"}) {
+    const Route r = route(("/api/v1/faults/" + std::string(list)).c_str());
+    EXPECT_EQ(r.kind, Kind::faults);
+    EXPECT_EQ(r.op, list);
+    EXPECT_EQ(r.method, "GET");
+  }
+  EXPECT_EQ(route("/api/v1/faults/reset").op, "end_faults");
+  EXPECT_EQ(route("/api/v1/faults/reset").method, "POST");
+  const Route one = route("/api/v1/faults/slow%20net");
+  EXPECT_EQ(one.kind, Kind::end_fault);
+  EXPECT_EQ(one.method, "DELETE");
+  EXPECT_EQ(one.name, "slow net");
 }
 
 TEST(HttpRules, ARequestIsKnownByItsFirstBytes) {
