@@ -1,0 +1,312 @@
+"""Runs a driver against sonard with one fault at a time and writes a report: docs/judge.md
+
+    sonarctl judge --driver 'mydriver --ip {ip}' --tap json --out report
+    sonarctl judge --list
+    sonarctl judge merge report-a report-b --out matrix
+The same as python3 -m sonard_client.judge.
+"""
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import os
+import pathlib
+import platform
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Dict, List, Optional, Sequence
+
+from .. import lab, layouts
+from . import report
+from .cases import CASES, Case, listing, select, torture
+
+USAGE, UNAVAILABLE, NOT_HELD = 64, 69, 1
+_PACKAGE = str(pathlib.Path(__file__).resolve().parents[2])
+_BLUEVIEW_PORT = 14750
+
+
+class NotJudged(RuntimeError):
+    """The run stops: the driver does not work without a fault, or sonard cannot be started."""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="sonarctl judge", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--driver", metavar="TEXT", help="starts the driver; {ip}, {port} and {id} are filled in")
+    parser.add_argument("--tap", metavar="TEXT", default="none",
+                        help="json: the driver prints a JSON line a ping; ros1:TOPIC; none (the default)")
+    parser.add_argument("--profile", metavar="TEXT", default="oculus-m1200d", help="product")
+    parser.add_argument("--case", metavar="TEXT", action="append", default=[],
+                        help="number (L05.2), code (L05), family (L) or name; repeatable")
+    parser.add_argument("--strict", action="store_true", help="SHOULDs count too")
+    parser.add_argument("--repeat", type=int, default=1, metavar="INT", help="runs of each case; disagreement is FLAKY")
+    parser.add_argument("--jobs", type=int, default=1, metavar="INT", help="cases at a time")
+    parser.add_argument("--torture", action="store_true",
+                        help="cut, reset and pause at every point of a ping, instead of the cases")
+    parser.add_argument("--shallow", type=int, metavar="INT", help="with --torture: only so many points, chosen by the seed")
+    parser.add_argument("--seed", type=int, default=1, metavar="INT", help="of the scene, the faults and --shallow")
+    parser.add_argument("--out", metavar="TEXT", help="folder for the report; must be new or empty")
+    parser.add_argument("--name", metavar="TEXT", help="of the driver in the report; default: its program")
+    parser.add_argument("--driver-version", default="", metavar="TEXT", help="for the report")
+    parser.add_argument("--sonard", metavar="TEXT", default=os.environ.get("SONARD", "sonard"), help="the program")
+    parser.add_argument("--no-namespaces", action="store_true",
+                        help="on loopback addresses, without the cases that need namespaces")
+    parser.add_argument("--list", action="store_true", help="print the cases, run nothing")
+    return parser
+
+
+def _merge_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="sonarctl judge merge", description="Makes one matrix of several reports.")
+    parser.add_argument("reports", nargs="+", metavar="REPORT", help="folders with index.json")
+    parser.add_argument("--out", required=True, metavar="FOLDER")
+    return parser
+
+
+def driver_name(words: Sequence[str]) -> str:
+    """The program of a command line; behind an interpreter or launcher its script."""
+    launchers = {"env", "sh", "bash", "python", "python3", "roslaunch", "rosrun", "ros2", "nice", "timeout"}
+    names = [pathlib.Path(word).name for word in words if not word.startswith("-") and "{" not in word]
+    return next((name for name in names if name not in launchers), names[0] if names else "driver")
+
+
+def _new_folder(name: str) -> pathlib.Path:
+    out = pathlib.Path(name)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise ValueError(f"--out {name}: the folder exists and is not empty")
+    out.mkdir(parents=True, exist_ok=True)
+    return out
+
+
+def _check(options: argparse.Namespace) -> None:
+    if not options.driver:
+        raise ValueError("--driver is missing: the command that starts the driver, as 'mydriver --ip {ip}'")
+    if not options.out:
+        raise ValueError("--out is missing: the folder for the report")
+    if "{ip}" not in options.driver:
+        raise ValueError("--driver has no {ip}: the judge chooses the sonar's address")
+    for name, low in (("repeat", 1), ("jobs", 1), ("seed", 0)):
+        if getattr(options, name) < low:
+            raise ValueError(f"--{name} is {getattr(options, name)}: it must be at least {low}")
+    if options.shallow is not None and not options.torture:
+        raise ValueError("--shallow belongs to --torture")
+    kind, _, topic = options.tap.partition(":")
+    if kind not in ("json", "none", "ros1"):
+        raise ValueError(f"--tap {options.tap}: it must be json, ros1:TOPIC or none")
+    if kind == "ros1" and not topic:
+        raise ValueError("--tap ros1 needs the topic: --tap ros1:/sonar/ping")
+    if kind == "ros1" and importlib.util.find_spec("rospy") is None:
+        raise NotJudged("--tap ros1 needs rospy, which this Python does not have: source ROS's setup.bash first")
+
+
+class Judge:
+    """One run over the chosen cases."""
+
+    def __init__(self, options: argparse.Namespace, out: pathlib.Path) -> None:
+        self.options, self.out = options, out
+        found = shutil.which(options.sonard)
+        if found is None:
+            raise NotJudged(f"{options.sonard}: not found; --sonard names the program")
+        self.sonard = os.path.abspath(found)
+        self.sonard_version = self._first_line("--version")
+        self.fault_engine = "--faults" in self._text("--help")
+        self.ping_bytes = 0
+        self.lacking = "namespaces (--no-namespaces)" if options.no_namespaces else lab.missing()
+        self.kinds: Dict[str, Dict[str, Any]] = {}
+        self.command = options.driver
+        if options.tap.startswith("ros1:"):
+            adapter = [sys.executable, "-m", "sonard_client.judge.ros1_tap", options.tap.partition(":")[2], "--"]
+            self.command = shlex.join(adapter) + " " + options.driver
+        self._running: "set[subprocess.Popen[str]]" = set()
+        self._stopping = False
+        self._print, self._done, self._slots = threading.Lock(), 0, list(range(options.jobs, 0, -1))
+        # Several judges on one computer: their loopback addresses and ports must differ.
+        self._first_offset = 1 + os.getpid() % 9 * 10
+
+    def _text(self, *arguments: str) -> str:
+        return subprocess.run([self.sonard, *arguments], capture_output=True, text=True, timeout=30, check=False).stdout
+
+    def _first_line(self, *arguments: str) -> str:
+        return (self._text(*arguments).strip().splitlines() or ["unknown"])[0]
+
+    # ---- one run
+    def spec(self, case: Optional[Case], slot: int) -> Dict[str, Any]:
+        o = self.options
+        described = None
+        if case is not None:
+            described = {**vars(case), "given": dict(case.given), "must": dict(case.must), "should": dict(case.should)}
+        return {"case": described, "driver": self.command, "tap": "json" if o.tap != "none" else "none", "profile": o.profile,
+                "sonard": self.sonard, "seed": o.seed, "space": "loopback" if self.lacking else "lab",
+                "offset": self._first_offset + slot,
+                "port": _BLUEVIEW_PORT if o.profile.startswith("blueview") else layouts.DATA_PORT,
+                "fault_engine": self.fault_engine, "ping_bytes": self.ping_bytes}
+
+    def run_one(self, case: Optional[Case], folder: pathlib.Path) -> Dict[str, Any]:
+        folder.mkdir(parents=True, exist_ok=True)
+        with self._print:
+            slot = self._slots.pop()
+        try:
+            (folder / "spec.json").write_text(json.dumps(self.spec(case, slot), indent=1) + "\n", encoding="utf-8")
+            path = os.pathsep.join(filter(None, (_PACKAGE, os.environ.get("PYTHONPATH", ""))))
+            command = [sys.executable, "-m", "sonard_client.judge.run_case", str(folder.resolve())]
+            limit_s = 90 + (case.limit + case.until().get("seconds", 20) if case else 30)
+            if not self.lacking:
+                command = [*lab.unshare_prefix(), *command]
+            with subprocess.Popen(command, env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.DEVNULL,
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as runner:
+                self._running.add(runner)
+                try:
+                    _, said = runner.communicate(timeout=limit_s)
+                except subprocess.TimeoutExpired:
+                    runner.terminate()
+                    _, said = runner.communicate(timeout=30)
+                self._running.discard(runner)
+            (folder / "spec.json").unlink()
+            try:
+                return dict(json.loads((folder / "case.json").read_text(encoding="utf-8")))
+            except (OSError, ValueError):
+                why = (said.strip().splitlines() or [f"exit code {runner.returncode}"])[-1]
+                return {"ran": False, "why": f"the judge failed: {why}", "text": said[-4000:]}
+        finally:
+            with self._print:
+                self._slots.append(slot)
+
+    def stop(self) -> None:
+        """Ends the running cases; those that wait do not begin."""
+        self._stopping = True
+        for runner in list(self._running):
+            runner.terminate()
+
+    # ---- all of them
+    def nominal(self) -> None:
+        with tempfile.TemporaryDirectory(prefix="judge-") as folder:
+            result = self.run_one(None, pathlib.Path(folder))
+            log = pathlib.Path(folder) / "driver.log"
+            if not result.get("ran"):
+                raise NotJudged(result.get("text") or result["why"])
+            if not result["works"]:
+                shutil.copyfile(log, self.out / "driver.log")
+                raise NotJudged("The driver does not take 20 consecutive pings from a sonar without any fault, "
+                                f"so it is not judged.\n{result['why']}\nIts whole output: {self.out / 'driver.log'}")
+        self.ping_bytes = int(result["ping_bytes"])
+        self.kinds = {kind["code"]: kind for kind in result["kinds"].get("kinds", ())}
+
+    def not_run(self, case: Case) -> str:
+        """Why a case cannot run here; empty if it can."""
+        vendor = self.options.profile.partition("-")[0]
+        if case.kind == "N00":
+            return ""
+        if case.family == "G" and vendor in ("oculus", "blueview"):
+            return f"{vendor} sonars do not send pings as datagrams"
+        if case.needs_lab:
+            lacking = self.lacking or lab.fault_missing(case.kind)
+            return f"needs {lacking}" if lacking else ""
+        if "byte" in case.given and not self.ping_bytes:
+            return "needs the right to read packets: namespaces or root"
+        if not self.fault_engine:
+            return "this sonard has no faults (sonard run --faults)"
+        if not self.kinds:
+            return ""
+        kind = self.kinds.get(case.kind)
+        if kind is None:
+            return f"this sonard does not know {case.kind}"
+        if kind.get("without_effect", {}).get(vendor):
+            return f"{case.kind} {kind['without_effect'][vendor]}"
+        unknown = sorted(set(case.given) - {"byte"} - {p["name"] for p in kind.get("parameters", ())})
+        return f"{case.kind} of this sonard has no parameter {', '.join(unknown)}" if unknown else ""
+
+    def row(self, case: Case, total: int) -> Dict[str, Any]:
+        folder = self.out / "cases" / case.number
+        why = "stopped" if self._stopping else self.not_run(case)
+        runs: List[Dict[str, Any]] = []
+        if why:
+            runs.append({"ran": False, "why": why})
+        else:
+            for number in range(self.options.repeat):
+                runs.append(self.run_one(case, folder / f"run-{number + 1}" if number else folder))
+        o = self.options
+        repeat = f"sonarctl judge --driver {shlex.quote(o.driver)} --tap {o.tap} --profile {o.profile} --seed {o.seed}" + (
+            " --torture" if ".T" in case.number else "") + f" --case {case.number} --out report-{case.number}"
+        described = {"number": case.number, "kind": case.kind, "name": case.name, "sentence": case.sentence,
+                     "with": dict(case.given), "at": case.at, "duration": case.duration, "limit": case.limit,
+                     "expectation": case.expectation, "measured": case.measured, "repeat": repeat,
+                     "folder": f"cases/{case.number}"}
+        found = report.combine(described, runs, o.strict, o.tap != "none")
+        with self._print:
+            self._done += 1
+            words = ", ".join(w for w in report.pages.verdict_words(found) if w)
+            reasons = "" if found["result"].startswith("PASS") and found["should_holds"] else "; ".join(report.reasons(found))
+            print(f"[{self._done:>3}/{total}] {case.number:<8} {found['result']:<11} {words:<22} {reasons}".rstrip(), flush=True)
+        return found
+
+    def column(self, cases: Sequence[Case]) -> Dict[str, Any]:
+        o, began = self.options, time.monotonic()
+        date = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
+        with ThreadPoolExecutor(o.jobs) as pool:
+            try:
+                rows = list(pool.map(lambda case: self.row(case, len(cases)), cases))
+            except BaseException:
+                self.stop()
+                raise
+        name = o.name or driver_name(shlex.split(o.driver))
+        return {"name": name, "command": o.driver, "version": o.driver_version, "tap": o.tap, "profile": o.profile,
+                "sonard": self.sonard_version, "seed": o.seed, "repeat": o.repeat,
+                "machine": f"{platform.system()} {platform.release()}, {platform.machine()}, {os.cpu_count()} cores, "
+                           f"{'namespaces' if not self.lacking else 'loopback'}",
+                "counts": report.counts(rows), "cases": rows,
+                "wall_clock": {"date": date, "seconds": round(time.monotonic() - began, 1)}}
+
+
+def _judge(options: argparse.Namespace) -> int:
+    cases = torture(options.seed, options.shallow) if options.torture else CASES
+    cases = select(options.case, cases)
+    if options.list:
+        print(listing(cases))
+        return 0
+    _check(options)
+    out = _new_folder(options.out)
+    judge = Judge(options, out)
+    if judge.lacking:
+        print(f"judge: no {judge.lacking}: on loopback addresses, without {sum(c.needs_lab for c in cases)} cases",
+              file=sys.stderr)
+    judge.nominal()
+    column = judge.column(cases)
+    report.write(out, [column], options.strict)
+    print(report.summary(column))
+    print(f"report: {out / 'index.html'}")
+    if all(row["result"] == "NOT RUN" for row in column["cases"]):
+        return UNAVAILABLE
+    return 0 if report.passed(column) else NOT_HELD
+
+
+def main(arguments: Optional[List[str]] = None) -> int:
+    given = sys.argv[1:] if arguments is None else arguments
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        if given[:1] == ["merge"]:
+            options = _merge_parser().parse_args(given[1:])
+            columns = report.merge([pathlib.Path(folder) for folder in options.reports], _new_folder(options.out))
+            print("\n".join(report.summary(column) for column in columns))
+            return 0
+        return _judge(_parser().parse_args(given))
+    except SystemExit as end:  # of the parser, which has said why
+        return USAGE if end.code else 0
+    except ValueError as why:
+        print(f"judge: {why}", file=sys.stderr)
+        return USAGE
+    except (NotJudged, OSError) as why:
+        print(f"judge: {why}", file=sys.stderr)
+        return UNAVAILABLE
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

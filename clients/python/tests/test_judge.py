@@ -1,0 +1,517 @@
+"""The judge without a daemon: the truth of a stream, verdicts, cases, captures, reports."""
+import contextlib
+import io
+import json
+import pathlib
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import xml.etree.ElementTree
+import zlib
+from html.parser import HTMLParser
+
+from common import ROOT, made_ping
+
+from sonard_client.judge import __main__ as judge_main
+from sonard_client.judge import cases, driver, report, wire
+from sonard_client.judge.truth import TruePing, TruthReader
+from sonard_client.judge.verdicts import Observation, back_at, colour, judge, sort_published
+from sonard_client.judge.wire import Seen
+
+CRC = 0x1000  # of made pings: CRC + number
+
+
+def set_in(message, at, form, value):
+    changed = bytearray(message)
+    struct.pack_into(form, changed, at, value)
+    return bytes(changed)
+
+
+def numbers(*pieces):
+    reader = TruthReader()
+    return [ping.number for piece in pieces for ping in reader.feed(piece)]
+
+
+class Truth(unittest.TestCase):
+    """What a driver may publish. Offsets of fields: docs/protocols/oculus.md, version 0."""
+
+    def setUp(self):
+        self.a, self.b, self.c = (made_ping(rows=12, beams=16, number=n) for n in (7, 8, 9))
+
+    def test_every_split_gives_the_same_pings(self):
+        stream = self.a + bytes(16) + self.b
+        for size in (1, 7, 16, 701, len(stream)):
+            self.assertEqual(numbers(*(stream[at:at + size] for at in range(0, len(stream), size))), [7, 8])
+
+    def test_samples_and_place(self):
+        for gains in (None, [5] * 3):
+            for version in (0, 2):
+                message = made_ping(version=version, gains=gains)
+                (ping,) = TruthReader().feed(b"?" + message)
+                samples = b"".join(bytes(16 * row + beam for beam in range(4)) for row in range(3))
+                self.assertIn(zlib.crc32(samples), ping.crcs)
+                self.assertEqual((ping.begin, ping.end, ping.rows, ping.beams), (1, 1 + len(message), 3, 4))
+
+    def test_wrong_lengths_do_not_hide_true_samples(self):
+        for at, form, value in ((10, "<I", 0), (10, "<I", 0xFFFFFFF0), (10, "<I", len(self.b) - 100)):
+            self.assertEqual(numbers(self.a, set_in(self.b, at, form, value), self.c), [7, 8, 9])
+
+    def test_impossible_dimensions_are_no_pings(self):
+        rows, beams, offset = 106, 108, 110
+        for at, form, value in ((rows, "<H", 65535), (rows, "<H", 0), (beams, "<H", 1), (offset, "<I", 0),
+                                (offset, "<I", 1 << 31)):
+            self.assertEqual(numbers(self.a, set_in(self.b, at, form, value), self.c), [7, 9])
+
+    def test_a_ping_without_its_last_row_is_not_glued_to_the_next(self):
+        self.assertEqual(numbers(self.a, self.b[:-16], self.c), [7, 9])
+
+    def test_a_missing_row_that_the_lengths_admit_may_be_published(self):
+        short = self.b[:-16]
+        for at, form, value in ((10, "<I", len(short) - 16), (118, "<I", len(short))):
+            short = set_in(short, at, form, value)
+        self.assertEqual(numbers(self.a, short, self.c), [7, 8, 9])
+
+    def test_garbage_and_false_headers(self):
+        for garbage in (b"\0", b"S", b"SO", b"SO" + b"\xff" * 14, b"SO" * 500):
+            self.assertEqual(numbers(self.a, garbage, self.b), [7, 8])
+
+    def test_an_image_may_contain_the_magic(self):
+        samples = [[0x53, 0x4F] * 8] * 12
+        self.assertEqual(numbers(made_ping(rows=12, beams=16, samples=samples, number=5), self.a), [5, 7])
+
+
+def published(*items):
+    """(time, number) or (time, number, crc)."""
+    return [driver.Published(i[0], i[1], i[2] if len(i) > 2 else CRC + i[1], None, None) for i in items]
+
+
+def true(*items):
+    return [Seen(TruePing(n, frozenset({CRC + n}), 3, 4, 0, 100, 0.0), t, 1) for t, n in items]
+
+
+TICKS = [(n / 10, n) for n in range(1, 61)]  # six seconds, ten pings a second; the fault is from 2 to 4 s
+
+
+def observed(shown=TICKS, wire_pings=TICKS, **more):
+    given = dict(began=2.0, ended=4.0, watched_until=6.4, tapped=True, published=published(*shown), true_pings=true(*wire_pings),
+                 delivered=true(*wire_pings))
+    return Observation(**{**given, **more})
+
+
+def verdict(seen, must=None, should=None, notice=False):
+    return judge(seen, must or {}, should or {}, notice)
+
+
+class Verdicts(unittest.TestCase):
+    def words(self, *arguments, **more):
+        return verdict(observed(*arguments, **more)).words()
+
+    def test_nothing_happens(self):
+        found = verdict(observed())
+        self.assertEqual(found.words(), ("CLEAN", "NONE NEEDED"))
+        self.assertTrue(found.must_holds and found.should_holds)
+        self.assertEqual(colour(found), "good")
+
+    def test_an_outage_and_its_length(self):
+        kept = [(t, n) for t, n in TICKS if not 2 <= t < 4.5]
+        found = verdict(observed(kept, kept, connections=[(0.0, 4.0, "device FIN"), (4.4, None, "")]))
+        self.assertEqual(found.words(), ("CLEAN", "0.5 s"))
+        kept = [(t, n) for t, n in TICKS if t < 2] + [(t + 5, n + 50) for t, n in TICKS]
+        found = verdict(observed(kept, kept, watched_until=12.0))
+        self.assertEqual(found.words()[1], "1.1 s")
+
+    def test_lost_pings_are_those_the_driver_received_but_did_not_publish(self):
+        kept = [(t, n) for t, n in TICKS if n not in (25, 26)]
+        self.assertEqual(self.words(kept)[0], "LOST 2")
+        self.assertEqual(self.words(kept, touched=[25])[0], "LOST 1")
+        self.assertEqual(self.words(kept, touched=[25, 26])[0], "CLEAN")
+        before_and_not_yet = [(t, n) for t, n in TICKS if n not in (3, 60)]
+        self.assertEqual(self.words(before_and_not_yet)[0], "CLEAN")
+        self.assertFalse(verdict(observed(kept)).should_holds)
+        self.assertTrue(verdict(observed(kept)).must_holds)
+
+    def test_false_beats_stale_beats_lost(self):
+        lost = [(t, n) for t, n in TICKS if n != 25]
+        stale = lost + [(5.0, 30)]
+        false = stale + [(5.1, 31, 99)]
+        self.assertEqual([self.words(shown)[0] for shown in (lost, stale, false)], ["LOST 1", "STALE 1", "FALSE 1"])
+        found = verdict(observed(false))
+        self.assertEqual(found.first_false, {"mono": 5.1, "id": 31, "crc32": "00000063"})
+        self.assertFalse(found.must_holds)
+        self.assertEqual((colour(found), colour(verdict(observed(stale)))), ("worst", "bad"))
+
+    def test_other_sizes_than_sent_are_false(self):
+        shown = [*published(*TICKS[:-1]), driver.Published(6.0, 60, CRC + 60, 65535, 4)]
+        self.assertEqual(len(sort_published(shown, true(*TICKS))[2]), 1)
+
+    def test_equal_images_with_other_numbers_are_not_repeated(self):
+        stuck = [Seen(TruePing(n, frozenset({5}), 3, 4, 0, 9, 0.0), n / 10, 1) for n in range(1, 9)]
+        with_number = [driver.Published(n / 10, n, 5, None, None) for n in range(1, 9)]
+        without = [driver.Published(n / 10, None, 5, None, None) for n in range(1, 9)]
+        for shown in (with_number, without):
+            self.assertEqual([len(part) for part in sort_published(shown, stuck)], [8, 0, 0])
+        self.assertEqual([len(part) for part in sort_published([*without, without[0]], stuck)], [8, 1, 0])
+
+    def test_a_numbers_restart_is_no_repetition(self):
+        again = [Seen(TruePing(n, frozenset({0x2000 + n}), 3, 4, 0, 9, 0.0), 3 + n / 10, 1) for n in range(1, 9)]
+        shown = published(*TICKS[:20], *((3 + n / 10, n, 0x2000 + n) for n in range(1, 9)))
+        self.assertEqual([len(part) for part in sort_published(shown, true(*TICKS) + again)], [28, 0, 0])
+
+    def test_the_same_pings_after_a_reboot_are_new_once(self):
+        again = [Seen(one.ping, one.mono + 3, 2) for one in true(*TICKS[:8])]
+        shown = published(*TICKS[:20], *((3 + n / 10, n) for n in range(1, 9)))
+        self.assertEqual([len(part) for part in sort_published(shown, true(*TICKS) + again)], [28, 0, 0])
+        self.assertEqual([len(part) for part in sort_published([*shown, shown[3]], true(*TICKS) + again)], [28, 1, 0])
+
+    def test_ends(self):
+        before = [(t, n) for t, n in TICKS if t < 2]
+        self.assertEqual(self.words(before, exit_code=-6, exit_time=2.1)[1], "CRASH")
+        self.assertEqual(self.words(before, exit_code=1, exit_time=2.1)[1], "CRASH")
+        self.assertEqual(self.words(before, before)[1], "NEVER")
+        self.assertEqual(self.words(before, before, restarted_well=True)[1], "OPERATOR")
+        self.assertEqual(self.words(before, before, exit_code=0, exit_time=2.1, restarted_well=True)[1], "OPERATOR")
+        self.assertFalse(verdict(observed(before, before)).must_holds)
+
+    def test_back_needs_three_pings_together(self):
+        self.assertIsNone(back_at([4.1, 4.2], 4))
+        self.assertIsNone(back_at([4.1, 6.0, 9.0, 14.0], 4))
+        self.assertEqual(back_at([3.9, 4.1, 8.0, 8.1, 8.2], 4), 8.0)
+
+    def test_limits_of_should_and_must(self):
+        samples = [driver.Sample(1.0, 20.0, 5, 0.1), driver.Sample(3.0, 120.0, 5, 0.2), driver.Sample(6.0, 30.0, 9, 0.3)]
+        found = verdict(observed(samples=samples, log_lines_s=40.0))
+        self.assertEqual([c["what"] for c in found.should if not c["holds"]],
+                         ["takes at most 32 MiB more memory", "writes at most 10 log lines a second"])
+        found = verdict(observed(samples=samples), must={"descriptors": 2, "rss_mib": 256})
+        self.assertEqual([c["what"] for c in found.must if not c["holds"]], ["leaves at most 2 more descriptors open"])
+        self.assertNotIn("rss_mib", str(found.should))
+        found = verdict(observed(samples=samples), should={"rss_mib": None})
+        self.assertNotIn("memory", str(found.should))
+
+    def test_noticing(self):
+        kept = [(t, n) for t, n in TICKS if not 2 <= t < 4]
+        for more, holds in (({}, False), ({"log_times": [3.5]}, True), ({"state_times": [1.0, 4.5]}, False),
+                            ({"connections": [(0.0, 3.9, "driver FIN")]}, True),
+                            ({"connections": [(0.0, 3.9, "device FIN")]}, False)):
+            found = verdict(observed(kept, kept, **more), notice=True)
+            self.assertEqual([c["holds"] for c in found.should if "notices" in c["what"]], [holds], more)
+
+    def test_without_a_tap_data_are_unseen(self):
+        found = verdict(observed([], tapped=False))
+        self.assertEqual(found.words(), ("UNSEEN", "NONE NEEDED"))
+        self.assertTrue(found.must_holds)
+        found = verdict(observed(truth_known=False, true_pings=[], delivered=[]))  # a tap, but no right to read packets
+        self.assertEqual(found.words(), ("UNSEEN", "NONE NEEDED"))
+
+
+class Tap(unittest.TestCase):
+    def test_lines(self):
+        self.assertEqual(driver.tap_line(b'{"id": 8, "crc32": "0a1b2c3d"}', 1.0),
+                         driver.Published(1.0, 8, 0x0A1B2C3D, None, None))
+        self.assertEqual(driver.tap_line(b'{"crc32": 5, "rows": 3, "beams": 4, "x": []}', 1.0),
+                         driver.Published(1.0, None, 5, 3, 4))
+        self.assertEqual(driver.tap_line(b'{"state": "lost"}', 1.0), driver.State(1.0, "lost"))
+        for line in (b"", b"hello", b"{", b'{"id": 8}', b'{"id": 8, "crc32": "xyz"}', b'{"id": 8, "crc32": null}', b"{\xff}"):
+            self.assertIsNone(driver.tap_line(line, 1.0))
+
+    def test_command_line(self):
+        self.assertEqual(driver.expand("a --x='{ip}:{port}' {id} {other}", "127.0.0.2", 52100, 7),
+                         ["a", "--x=127.0.0.2:52100", "7", "{other}"])
+
+    def test_a_drivers_output_and_end(self):
+        program = ("import sys\nprint('{\"id\": 1, \"crc32\": 2}')\nprint('words')\n"
+                   "for i in range(50): print(i, file=sys.stderr)\nsys.exit(3)")
+        with tempfile.TemporaryDirectory() as folder:
+            log = pathlib.Path(folder) / "log"
+            one = driver.Driver([sys.executable, "-c", program], [], log, tap=True)
+            one.start()
+            deadline = time.monotonic() + 20
+            while one.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.01)
+            one.stop()
+            self.assertEqual(one.exited[1], 3)
+            self.assertEqual([p.number for p in one.published], [1])
+            self.assertEqual(one.lines_per_s(0), 51 / 5)
+            self.assertEqual(len(log.read_text().splitlines()), 51)
+            self.assertGreater(one.peak_mib, 1)
+
+
+class Table(unittest.TestCase):
+    def test_numbers_names_and_records(self):
+        found = [c.number for c in cases.CASES]
+        self.assertEqual(len(found), len(set(found)))
+        for case in cases.CASES:
+            self.assertRegex(case.number, r"^[A-Z]\d\d\.\d+$")
+            self.assertTrue(case.sentence.endswith("."), case.number)
+            record = case.record()
+            self.assertLessEqual(set(record), {"name", "do", "with", "at", "for"})
+            self.assertEqual(len(record["for"]), 1)
+
+    def test_tier_1_is_complete(self):
+        """All kinds of the first release, less those that a later look moved to tier 3."""
+        tiers = {"L": "1-7 10 13 14 17 18", "S": "1-4 6 7", "F": "1-8 10-16 19 20 22 24", "D": "1-8 11-19 21 22 26-28",
+                 "U": "1-8 12 13", "T": "1-6 8 10-12", "M": "1-6 8-10", "P": "1-6 9 11-13", "B": "1 2 4-6 8-10 12 13 15",
+                 "G": "1-7"}
+        have = {c.kind for c in cases.CASES}
+        for family, text in tiers.items():
+            for part in text.split():
+                first, _, last = part.partition("-")
+                for number in range(int(first), int(last or first) + 1):
+                    self.assertIn(f"{family}{number:02}", have)
+
+    def test_every_measured_row_is_a_case(self):
+        measured = {c.number for c in cases.CASES if c.measured}
+        self.assertEqual({n.partition(".")[0] for n in measured}, set(
+            "N00 S01 L01 L02 L04 L05 L10 F01 F06 F05 F20 F10 F14 U03 U04 U02 D19 D08".split()))
+
+    def test_selection(self):
+        def chosen(*words):
+            return [c.number for c in cases.select(words)]
+        self.assertEqual(chosen("L05.2"), ["L05.2"])
+        self.assertEqual(chosen("l05"), chosen("silent-open"))
+        self.assertEqual(chosen("T01", "T02", "T08"), chosen("clock-step"))
+        self.assertEqual({n[0] for n in chosen("L", "F")}, {"L", "F"})
+        self.assertEqual(len(cases.select([])), len(cases.CASES))
+        with self.assertRaisesRegex(ValueError, "L99"):
+            chosen("L99")
+
+    def test_torture(self):
+        whole = cases.torture(1)
+        self.assertEqual(len(whole), len({c.number for c in whole}))
+        self.assertEqual({c.kind for c in whole}, {"L03", "L04", "S06"})
+        self.assertEqual(cases.torture(1, 25), cases.torture(1, 25))
+        self.assertNotEqual(cases.torture(1, 25), cases.torture(2, 25))
+        self.assertEqual(len(cases.torture(1, 25)), 25)
+
+
+class Packets(unittest.TestCase):
+    """A connection as packets, with a repeated, an overtaken and an acknowledged one."""
+
+    def setUp(self):
+        self.connection = wire.Connection(1, "10.0.0.1:4000", 0.0)
+        self.connection.from_device(0.1, 999, wire._SYN | wire._ACK, b"")
+
+    def send(self, at, data):
+        self.connection.from_device(1.0, (1000 + at) % (1 << 32), wire._ACK, data)
+
+    def test_order_and_repetition(self):
+        stream = made_ping(number=1) + made_ping(number=2)
+        half = len(stream) // 2
+        self.send(half, stream[half:])
+        self.assertEqual(self.connection.sent, 0)
+        self.send(0, stream[:half])
+        self.send(0, stream[:half])
+        self.send(100, stream[100:half + 50])
+        self.assertEqual(bytes(self.connection.stream), stream)
+        self.assertEqual([s.ping.number for s in self.connection.pings], [1, 2])
+
+    def test_what_was_acknowledged(self):
+        self.send(0, bytes(500))
+        for ack, acked in ((1000, 0), (1300, 300), (1200, 300), (9999, 500)):
+            self.connection.from_driver(1.0, 1, ack, wire._ACK, 100, b"")
+            self.assertEqual(self.connection.acked, acked)
+
+    def test_settings_ends_and_zero_windows(self):
+        fire = b"SO" + bytes(4) + b"\x15\0" + bytes(45)
+        self.connection.from_driver(1.0, 5, 1000, wire._ACK, 100, fire)
+        self.connection.from_driver(1.1, 5, 1000, wire._ACK, 100, fire)  # sent again by TCP, not by the driver
+        self.connection.from_driver(1.2, 58, 1000, wire._ACK, 0, b"")
+        self.connection.from_driver(1.3, 58, 1000, wire._ACK | wire._FIN, 100, b"")
+        self.connection.from_device(1.4, 1000, wire._RST, b"")
+        self.assertEqual((len(self.connection.fires), self.connection.zero_windows), (1, 1))
+        self.assertEqual((self.connection.ended, self.connection.ended_by), (1.3, "driver FIN"))
+
+    def test_pcapng(self):
+        written = wire.pcapng([(1_700_000_000_123_456_789, b"\1" * 61)], "a case")
+        kinds, at = [], 0
+        while at < len(written):
+            kind, size = struct.unpack_from("<II", written, at)
+            self.assertEqual(struct.unpack_from("<I", written, at + size - 4)[0], size)
+            kinds.append(kind)
+            at += size
+        self.assertEqual(kinds, [0x0A0D0D0A, 1, 6])
+
+    def test_hex(self):
+        lines = wire.hex_around(bytes(range(256)), 100)
+        self.assertEqual([line[0] for line in lines].count(">"), 1)
+        self.assertIn("00000060", next(line for line in lines if line[0] == ">"))
+
+
+class Page(HTMLParser):
+    """Fails on tags that are not closed in order."""
+    OPEN = {"meta", "input", "br"}
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.scopes = [], []
+        self.feed(text)
+        self.close()
+        assert not self.tags, self.tags
+
+    def handle_starttag(self, tag, attrs):
+        if tag == "th":
+            self.scopes.append(dict(attrs).get("scope"))
+        if tag not in self.OPEN:
+            self.tags.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.tags.pop() == tag, tag
+
+
+def run_of(data="CLEAN", recovery="NONE NEEDED", must=True, should=True, shade="good"):
+    checks = {"must": [{"what": "survives <all>", "holds": must, "value": "alive"}],
+              "should": [{"what": "is quick", "holds": should, "value": 4.5}]}
+    process = {"ending": "alive", "peak_mib": 1, "cpu_s": 0, "log_lines_s": 0, "descriptors": [3, 3]}
+    clock = dict(checks, data=data, recovery=recovery, watched_s=2.5, timeline=[[0.5, "begins"]],
+                 journal=[{"kind": "L05", "ping": 3}],
+                 hex=["> 00"], connections=[], process=process, pings_on_wire=3, pings_acknowledged=3, pings_published=3,
+                 capture="", packets_missed=0)
+    return {"ran": True, "data": data, "recovery": recovery, "must_holds": must, "should_holds": should, "colour": shade,
+            "tapped": True, "wall_clock": clock}
+
+
+GOOD, SLOW = run_of(), run_of("LOST", "BACK", should=False, shade="fair")
+DEAD = run_of("FALSE", "CRASH", must=False, should=False, shade="worst")
+NOT_RUN = {"ran": False, "why": "needs namespaces"}
+
+
+def row_of(number, *runs, strict=False, expectation="MUST; SHOULD"):
+    case = {"number": number, "kind": number[:3], "name": "silent-open", "sentence": f"Sentence & {number}.", "with": {"a": "1"},
+            "at": "ping 10", "duration": "2 s", "limit": 15.0, "expectation": expectation, "measured": False,
+            "folder": f"cases/{number}", "repeat": "sonarctl judge ..."}
+    return report.combine(case, runs, strict, tapped=True)
+
+
+def column_of(rows, name="mine"):
+    return {"name": name, "command": "mine {ip}", "version": "", "tap": "json", "profile": "oculus-m1200d", "sonard": "sonard 1",
+            "seed": 1, "repeat": 1, "machine": "Linux", "counts": report.counts(rows), "cases": rows,
+            "wall_clock": {"date": "2026-01-01", "seconds": 9.0}}
+
+
+class Reports(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def written(self, rows, name="mine", place="report"):
+        out = self.folder / place
+        for row in rows:
+            if row["result"] != "NOT RUN":
+                (out / row["folder"]).mkdir(parents=True)
+                (out / row["folder"] / "case.json").write_text(json.dumps(GOOD))
+                (out / row["folder"] / "driver.log").write_text("1.0 <b>last words</b>\n")
+        out.mkdir(exist_ok=True)
+        report.write(out, [column_of(rows, name)], False)
+        return out
+
+    def test_results(self):
+        self.assertEqual(row_of("L05.1", GOOD)["result"], "PASS")
+        self.assertEqual(row_of("L05.1", SLOW)["result"], "PASS")
+        self.assertEqual(row_of("L05.1", SLOW, strict=True)["result"], "FAIL")
+        self.assertEqual(row_of("L05.1", DEAD)["result"], "FAIL")
+        self.assertEqual(row_of("L05.1", DEAD, expectation="INFO")["result"], "INFO")
+        self.assertEqual(row_of("L05.1", NOT_RUN)["result"], "NOT RUN")
+        self.assertEqual(row_of("L05.1", dict(GOOD, tapped=False))["result"], "PASS (wire)")
+
+    def test_disagreeing_runs_are_flaky_and_show_the_worst(self):
+        row = row_of("L05.1", GOOD, DEAD, GOOD)
+        self.assertEqual((row["result"], row["shown"]), ("FLAKY", 1))
+        self.assertEqual(row_of("L05.1", GOOD, GOOD)["result"], "PASS")
+        self.assertFalse(report.passed(column_of([row])))
+
+    def test_summary(self):
+        rows = [row_of("L05.1", GOOD), row_of("L05.2", SLOW), row_of("L05.3", DEAD), row_of("L05.4", GOOD, DEAD),
+                row_of("L06.1", NOT_RUN), row_of("M02.1", DEAD, expectation="INFO")]
+        self.assertEqual(report.summary(column_of(rows)), "mine: 2 of 4 MUST, 1 of 4 SHOULD, 1 flaky, 1 not run")
+        self.assertFalse(report.passed(column_of(rows)))
+        self.assertTrue(report.passed(column_of(rows[:2] + rows[4:])))
+
+    def test_junit(self):
+        rows = [row_of("L05.1", GOOD), row_of("L05.2", SLOW), row_of("L05.3", DEAD), row_of("L06.1", NOT_RUN)]
+        suite = xml.etree.ElementTree.fromstring(report.junit([column_of(rows)], False)).find("testsuite")
+        self.assertEqual((suite.get("tests"), suite.get("failures"), suite.get("skipped")), ("4", "1", "1"))
+        self.assertIn("survives", suite.findall("testcase")[2].find("failure").get("message"))
+
+    def test_pages_are_well_formed_escaped_and_self_contained(self):
+        rows = [row_of("L05.1", GOOD), row_of("L05.3", DEAD), row_of("L06.1", NOT_RUN), row_of("S01.1", GOOD, DEAD)]
+        out = self.written(rows)
+        for path in (out / "index.html", out / "cases/L05.3/index.html"):
+            text = path.read_text()
+            page = Page(text)
+            self.assertNotIn(None, page.scopes)
+            self.assertNotRegex(text, r'(src|href)="(https?:)?//')
+        self.assertIn("Sentence &amp; L05.1.", (out / "index.html").read_text())
+        self.assertIn("&lt;b&gt;last words", (out / "cases/L05.3/index.html").read_text())
+        links = re.findall(r'href="(cases/[^"]+)"', (out / "index.html").read_text())
+        self.assertEqual(len(links), 3)
+        self.assertTrue(all((out / link).is_file() for link in links))
+
+    def test_merge(self):
+        a = self.written([row_of("L05.1", GOOD), row_of("L05.3", GOOD)], place="a")
+        b = self.written([row_of("L05.1", DEAD), row_of("F01.1", GOOD)], place="b")
+        with contextlib.redirect_stdout(io.StringIO()) as said:
+            self.assertEqual(judge_main.main(["merge", str(a), str(b), "--out", str(self.folder / "m")]), 0)
+        self.assertEqual(said.getvalue(),
+                         "mine: 2 of 2 MUST, 2 of 2 SHOULD, 0 flaky\nmine #2: 1 of 2 MUST, 1 of 2 SHOULD, 0 flaky\n")
+        text = (self.folder / "m/index.html").read_text()
+        Page(text)
+        for link in re.findall(r'href="(driver-[^"]+)"', text):
+            self.assertTrue((self.folder / "m" / link).is_file(), link)
+        self.assertEqual(text.count("not in this report"), 2)
+
+    def test_without_wall_clock(self):
+        index = json.loads((self.written([row_of("L05.1", GOOD)]) / "index.json").read_text())
+        self.assertEqual((index["schema"], index["version"]), ("sonard-judge", 1))
+        self.assertNotIn("watched_s", json.dumps(report.without_wall_clock(index)))
+        self.assertIn('"data": "CLEAN"', json.dumps(report.without_wall_clock(index)))
+
+    def test_other_folders_are_refused(self):
+        (self.folder / "index.json").write_text('{"schema": "other"}')
+        for place in (self.folder, self.folder / "none"):
+            with self.assertRaisesRegex(ValueError, "judge"):
+                report.read(place)
+
+
+class CommandLine(unittest.TestCase):
+    def said(self, *arguments):
+        with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+            code = judge_main.main(list(arguments))
+        return code, out.getvalue() + err.getvalue()
+
+    def test_list(self):
+        code, text = self.said("--list", "--case", "silent-open", "--case", "N")
+        self.assertEqual(code, 0)
+        self.assertIn("5 cases of 2 kinds", text)
+        self.assertIn("L05.2", text)
+
+    def test_wrong_use(self):
+        with tempfile.TemporaryDirectory() as folder:
+            right = ["--driver", "x {ip}", "--out", folder + "/new"]
+            for arguments, word in ((["--out", folder], "--driver"), (["--driver", "x {ip}"], "--out"),
+                                    (["--driver", "x", "--out", folder + "/new"], "{ip}"), (right + ["--case", "Q77"], "Q77"),
+                                    (right + ["--tap", "yaml"], "--tap"), (right + ["--repeat", "0"], "--repeat"),
+                                    (right + ["--shallow", "5"], "--torture"), (right + ["--tap", "ros1"], "topic"),
+                                    (["merge", folder, "--out", folder + "/new"], "no report")):
+                code, text = self.said(*arguments)
+                self.assertEqual((code, word in text), (64, True), text)
+            self.assertEqual(self.said(*right, "--sonard", "/nowhere/sonard"),
+                             (69, "judge: /nowhere/sonard: not found; --sonard names the program\n"))
+
+    def test_name_of_a_driver(self):
+        for words, name in ((["/usr/bin/mydriver", "{ip}"], "mydriver"), (["python3", "-u", "a/drv.py", "{ip}"], "drv.py"),
+                            (["ros2", "launch"], "launch"), (["sh"], "sh"), (["{ip}"], "driver")):
+            self.assertEqual(judge_main.driver_name(words), name)
+
+    def test_the_drivers_of_the_proof_say_how_they_are_used(self):
+        done = subprocess.run([sys.executable, ROOT / "tests/judge/planted_driver.py", "127.0.0.2"],
+                              capture_output=True, text=True, check=False)
+        self.assertIn("ignores-fin", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

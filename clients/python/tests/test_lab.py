@@ -1,0 +1,51 @@
+"""The laboratory of two namespaces: requests as text, and with namespaces (skipped where there are none) a pulled cable."""
+import os
+import subprocess
+import sys
+import unittest
+
+from common import PACKAGE, ROOT, SONARD
+
+from sonard_client import lab
+
+
+class Requests(unittest.TestCase):
+    def test_codes_names_and_parameters(self):
+        self.assertEqual(lab.read_request("L06:seconds=5"), ("L06", {"seconds": "5", "after": "5"}))
+        self.assertEqual(lab.read_request("mtu-hole seconds=2 bytes=600"),
+                         ("L16", {"seconds": "2", "after": "5", "bytes": "600"}))
+        self.assertEqual(lab.read_request("l17:side=host,after=1")[1]["side"], "host")
+
+    def test_wrong_ones_are_refused_with_what_is_known(self):
+        for text, known in (("L05", "L06 vanished-peer"), ("L06:second=5", "seconds"), ("L17:side=left", "device or host"),
+                            ("L06:seconds=-1", "between 0"), ("L06:seconds=soon", "soon")):
+            with self.subTest(text), self.assertRaisesRegex(ValueError, known):
+                lab.read_request(text)
+
+    def test_every_fault_is_checked(self):
+        self.assertEqual(len(lab.check()), 1 + len(lab.FAULTS))
+
+
+@unittest.skipIf(lab.missing(), lab.missing())
+class Namespaces(unittest.TestCase):
+    def run_lab(self, *arguments):
+        return subprocess.run([sys.executable, "-m", "sonard_client.lab", "--sonard", str(SONARD), *arguments], timeout=60,
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              env={**os.environ, "PYTHONPATH": str(PACKAGE)})
+
+    def test_the_command_sees_the_sonar_and_its_result_is_returned(self):
+        program = "import os, socket, sys; socket.create_connection((os.environ['SONARD_IP'], 52100), 5); sys.exit(7)"
+        done = self.run_lab("--", sys.executable, "-c", program)
+        self.assertEqual(done.returncode, 7, done.stderr)
+
+    @unittest.skipIf(lab.fault_missing("L16"), "needs nft")
+    def test_a_vanished_peer_is_silent_and_returns(self):
+        driver = str(ROOT / "docs/driver-test/tiny_driver.py")  # notices 3 s of silence and connects again
+        done = self.run_lab("--do", "L06:seconds=4,after=2", "--", "timeout", "9", sys.executable, "-u", driver, lab.DEVICE)
+        self.assertEqual(done.stderr.count("timed out; reconnecting"), 1, done.stderr)
+        self.assertIn("L06 ended", done.stderr)
+        self.assertGreater(done.stdout.count('"number"'), 30, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
