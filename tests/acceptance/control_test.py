@@ -27,7 +27,7 @@ def examples():
 def parse(example):
     """(method, host, path, headers, body) of a curl command, by the few options that the page uses."""
     words = shlex.split(example)[1:]
-    url, headers, body = None, {}, None
+    method, url, headers, body = None, None, {}, None
     while words:
         word = words.pop(0)
         if word in ("-s", "-sN"):
@@ -35,6 +35,8 @@ def parse(example):
         if word == "-H":
             name, value = words.pop(0).split(": ", 1)
             headers[name] = value
+        elif word == "-X":
+            method = words.pop(0)
         elif word == "-d":
             body = words.pop(0)
         elif url is None and word.startswith("http://"):
@@ -42,7 +44,7 @@ def parse(example):
         else:
             raise AssertionError(f"{word}: not an option that this test knows")
     host, _, path = url.partition("/")
-    return "POST" if body is not None else "GET", host, "/" + path, headers, body
+    return method or ("GET" if body is None else "POST"), host, "/" + path, headers, body
 
 
 def ask(host, method, path, headers=None, body=None):
@@ -64,7 +66,7 @@ class Page(unittest.TestCase):
     """The examples, all on one daemon, in the order in which they stand."""
 
     def run_examples(self, run_one):
-        daemon = Sonard(profile="oculus-m1200d", trajectory="way.csv", more="recording: {folder: .}", arguments=["--clock", "lockstep"])
+        daemon = Sonard(profile="oculus-m1200d", trajectory="way.csv", more="recording: {folder: .}", arguments=["--clock", "lockstep", "--faults"])
         (pathlib.Path(daemon.folder.name) / "way.csv").write_text("# frame: ENU_FLU\nt,x,y,z\n0,-7,0,-3\n100,-5,0,-3\n", encoding="utf-8")
         with daemon:
             host = f"{daemon.address}:8088"
@@ -80,6 +82,8 @@ class Page(unittest.TestCase):
             self.assertEqual(json.loads(text)["sonars"][0]["name"], "front")
         elif path == "/api/v1/step":
             self.assertEqual(json.loads(text), {"now_ns": "100000000", "pings": "0"})
+        elif path in ("/api/v1/faults/kinds", "/api/v1/faults/journal?after=0"):
+            self.assertIn("silent-open", text)
         elif path.startswith("/api/"):
             self.assertEqual(json.loads(text)["code"], "OK")
         else:

@@ -1,8 +1,10 @@
 """Two network namespaces joined by a veth pair: sonard in one, a driver in the other, network faults between them.
 
-    python3 -m sonard_client.lab -- mydriver --ip 10.77.0.2              SONARD_IP is set too
-    python3 -m sonard_client.lab --do L06:seconds=5,after=10 -- mydriver
-Lines on standard input apply faults while the command runs: `L06 seconds=5`, `end L06`, `list`.
+examples:
+    sonarctl lab -- mydriver --ip 10.77.0.2              SONARD_IP is set too
+    sonarctl lab --do L06:seconds=5,after=10 -- mydriver
+The same as python3 -m sonard_client.lab. Lines on standard input apply faults while the command runs: `L06 seconds=5`,
+`end L06`, `list`.
 
 A process cannot fake a pulled cable: its kernel keeps acknowledging. Here the packets themselves are dropped. Needs root or
 user namespaces, and the programs unshare, nsenter, ip; most faults also nft, one tc. What is missing is named.
@@ -246,7 +248,7 @@ def lab_config(profile: str, address: str = DEVICE, more: Optional[Dict[str, obj
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python3 -m sonard_client.lab", description=__doc__,
+    parser = argparse.ArgumentParser(prog="sonarctl lab", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--keep", action="store_true", help="when the command ends, keep the laboratory until Ctrl-C")
     parser.add_argument("--do", action="append", default=[], metavar="TEXT", help="L06:seconds=5,after=10; repeatable")

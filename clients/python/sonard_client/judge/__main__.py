@@ -1,5 +1,6 @@
 """Runs a driver against sonard with one fault at a time and writes a report: docs/judge.md
 
+examples:
     sonarctl judge --driver 'mydriver --ip {ip}' --tap json --out report
     sonarctl judge --list
     sonarctl judge merge report-a report-b --out matrix
