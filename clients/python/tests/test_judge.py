@@ -493,7 +493,7 @@ class CommandLine(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             right = ["--driver", "x {ip}", "--out", folder + "/new"]
             for arguments, word in ((["--out", folder], "--driver"), (["--driver", "x {ip}"], "--out"),
-                                    (["--driver", "x", "--out", folder + "/new"], "{ip}"), (right + ["--case", "Q77"], "Q77"),
+                                    (["--driver", "x", "--no-namespaces", "--out", folder + "/new"], "{ip}"), (right + ["--case", "Q77"], "Q77"),
                                     (right + ["--tap", "yaml"], "--tap"), (right + ["--repeat", "0"], "--repeat"),
                                     (right + ["--shallow", "5"], "--torture"), (right + ["--tap", "ros1"], "topic"),
                                     (["merge", folder, "--out", folder + "/new"], "no report")):

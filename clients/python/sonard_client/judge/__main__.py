@@ -91,8 +91,8 @@ def _check(options: argparse.Namespace) -> None:
         raise ValueError("--driver is missing: the command that starts the driver, as 'mydriver --ip {ip}'")
     if not options.out:
         raise ValueError("--out is missing: the folder for the report")
-    if "{ip}" not in options.driver:
-        raise ValueError("--driver has no {ip}: the judge chooses the sonar's address")
+    if options.no_namespaces and "{ip}" not in options.driver:
+        raise ValueError("--driver has no {ip}: without namespaces the judge chooses a loopback address for the sonar")
     for name, low in (("repeat", 1), ("jobs", 1), ("seed", 0)):
         if getattr(options, name) < low:
             raise ValueError(f"--{name} is {getattr(options, name)}: it must be at least {low}")
