@@ -216,9 +216,9 @@ Result<void> override_config(Config& config, const RunCommand& command) {
   config.faults.armed = config.faults.armed || command.faults;
   if (!command.fault_journal.empty()) config.faults.journal = command.fault_journal;
   if (!config.faults.plan.empty() && !config.faults.armed)
-    return failure(ErrorKind::config, config.source +
-                                          ": faults.plan: faults act only when they are armed: add armed: true, or start "
-                                          "with sonard run --faults");
+    return failure(ErrorKind::config, config.faults.plan_place +
+                                          ": faults act only when they are armed: add armed: true, or "
+                                          "start with sonard run --faults");
   return check_time_can_pass(config);
 }
 

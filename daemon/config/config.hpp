@@ -120,6 +120,7 @@ struct FaultConfig {
   bool armed = false;             // else every request for a fault is refused
   std::filesystem::path journal;  // JSON lines are appended to it; empty = none
   std::vector<FaultRecord> plan;  // checked
+  std::string plan_place;         // file:line:col: faults.plan, for errors found with the command line
   bool operator==(const FaultConfig&) const = default;
 };
 inline constexpr int most_fixed_rays = 100000;  // a column

@@ -82,6 +82,7 @@ FaultConfig read_faults(const Node& node, const std::vector<SonarConfig>& sonars
     config.journal = (directory / journal.text()).lexically_normal();
   std::vector<Fault> all;
   const Node plan = map.optional("plan");
+  if (plan.present()) config.plan_place = plan.location() + ": " + plan.path();
   for (const Node& item : plan.items(0, most_faults)) {
     FaultRecord record = read_record(item);
     if (record.name.empty()) record.name = "plan-" + std::to_string(config.plan.size() + 1);

@@ -206,6 +206,7 @@ void App::take_over(Config next) {
   const Fleet::Change change = fleet_.take_over(before, config_);
   if (other_water)
     for (Device& d : fleet_.devices()) d.use_water(config_.water);
+  for (const Device* opened : change.opened) fault_operations_.begin_plan(opened);
 
   for (const std::string& error : change.errors) log_.error("reload: " + error);
   std::string listed;

@@ -93,6 +93,8 @@ class Check {
         given.emplace(pair.substr(0, sign), pair.substr(sign + 1));
       }
       all.push_back(of_kind(*find_fault_kind(part.code), given, trouble.default_s));
+      all.back().delay = nanoseconds(static_cast<std::int64_t>(part.after * static_cast<double>(all.back().span.time.count())));
+      all.back().span.time -= all.back().delay;
       all.back().name = (record_.name.empty() ? std::string(trouble.name) : record_.name) + "." + std::to_string(all.size());
     }
     return all;

@@ -49,6 +49,7 @@ struct Fault {
   FaultRecord::At at;
   std::optional<Occasion> on;
   Span span;
+  std::chrono::nanoseconds delay{0};  // from the trigger to its beginning: of a later part of a trouble
 
   double number(const std::string& parameter) const;
   const std::string& word(const std::string& parameter) const;

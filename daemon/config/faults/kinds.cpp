@@ -315,7 +315,7 @@ constexpr Trouble trouble_table[] = {
     {"other-firmware", "The firmware is another: version, part number, unknown messages.", 60,
      {{{"D20", {"", "", ""}}, {"D21", {"", "", ""}}, {"F12", {"bytes=0", "bytes=32", "bytes=4096"}}}}},
     {"overheating", "The device gets hot, slows down, and stops.", 30,
-     {{{"D16", {"factor=0.8", "factor=0.5", "factor=0.2"}}, {"D18", {"", "", ""}}}}},
+     {{{"D16", {"factor=0.8", "factor=0.5", "factor=0.2"}}, {"D17", {"", "", ""}, 0.5}}}},
     {"clock-step", "The clock of the device steps.", 30, {{{"T01", {"seconds=1", "seconds=3600", "seconds=100000000"}}}}},
     {"electrical-noise", "Interference in the image, and damaged bytes.", 20,
      {{{"P06", {"share=0.02", "share=0.05", "share=0.2"}}, {"F01", {"bytes=1", "bytes=16", "bytes=256 fill=random"}}, {"F19", {"bits=1", "bits=16", "bits=256"}}}}},

@@ -142,6 +142,7 @@ struct Trouble {
   struct Part {
     std::string_view code;
     std::array<std::string_view, 3> with;  // for each severity: "seconds=0.5 bytes=16"
+    double after = 0;                      // begins when this share of the duration has passed
   };
   std::string_view name, sentence;
   double default_s = 10;

@@ -129,6 +129,9 @@ bool Faults::fires(const Entry& e, std::uint32_t ping) const {
 
 void Faults::begin(Entry& e, Time now) {
   if (e.active || e.over) return;
+  if (!e.begins) e.begins = now + e.fault.delay;
+  if (now < *e.begins) return;
+  e.begins.reset();
   e.active = true;
   ++e.begun;
   e.since = now;
@@ -237,6 +240,7 @@ void Faults::on_tick(Time now) {
   for (Entry& e : entries_) {
     const auto& at = e.fault.at;
     if (!e.over && !e.active && at.time_s && e.begun == 0 && now - start_ >= nanoseconds_from(*at.time_s)) begin(e, now);
+    if (e.begins && *e.begins <= now) begin(e, now);
     if (e.active && e.step <= now) step(e, now);
     while (!e.late.empty() && e.late.front().first <= now) {
       orders_.emplace_back(std::move(e.late.front().second));
@@ -258,6 +262,7 @@ std::optional<Time> Faults::next_tick() const {
     if (e.over) continue;
     next = std::min(next, e.expires);
     if (e.active) next = std::min({next, e.until, e.step});
+    if (e.begins) next = std::min(next, *e.begins);
     if (!e.late.empty()) next = std::min(next, e.late.front().first);
     if (!e.ends.empty()) next = std::min(next, e.ends.front().first);
     if (!e.active && e.begun == 0 && e.fault.at.time_s) next = std::min(next, start_ + nanoseconds_from(*e.fault.at.time_s));

@@ -124,6 +124,7 @@ class Faults {
     std::uint32_t key = 0;
     bool active = false, over = false;
     std::uint64_t begun = 0, injections = 0, pings_left = 0;
+    std::optional<Time> begins;  // later, by its delay
     Time expires = Time::max(), since{}, until = Time::max(), step = Time::max();
     bool down = false;               // of a port or link that goes up and down
     std::deque<std::uint32_t> hits;  // pings it meets, the latest few

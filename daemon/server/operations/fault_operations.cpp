@@ -68,7 +68,7 @@ OperationResult FaultOperations::add(const control::AddFault& asked, const Sende
 }
 
 /// All sonars are asked first: nothing is half applied.
-OperationResult FaultOperations::add(const control::FaultRecord& record, bool manual) {
+OperationResult FaultOperations::add(const control::FaultRecord& record, bool manual, const Device* only) {
   const auto faults = check_fault(record, manual);
   if (!faults) return result_of(faults.error());
   std::vector<Device*> takers;
@@ -76,6 +76,7 @@ OperationResult FaultOperations::add(const control::FaultRecord& record, bool ma
   std::string why;
   for (Device& device : fleet_.devices()) {
     names.push_back(device.config().name);
+    if (only != nullptr && only != &device) continue;
     if (!record.sonar.empty() && device.config().name != record.sonar) continue;
     std::string why_not = device.sonar().why_no_faults(*faults);
     if (why_not.empty())
@@ -149,9 +150,11 @@ mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureT
   return accepted;
 }
 
-void FaultOperations::begin_plan() {
+void FaultOperations::begin_plan(const Device* only) {
   for (const control::FaultRecord& record : config_.faults.plan)
-    if (const OperationResult result = add(record, false); result.code != OperationResult::Code::done)
+    if (only != nullptr && !record.sonar.empty() && record.sonar != only->config().name)
+      continue;
+    else if (const OperationResult result = add(record, false, only); result.code != OperationResult::Code::done)
       log_.error("fault of the plan refused: " + result.text);
 }
 

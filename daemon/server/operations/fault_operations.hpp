@@ -28,10 +28,10 @@ class FaultOperations {
   /// denied: not armed, no such sonar, or a conflict with another fault.
   mavlink::MavResult inject(std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance);
   /// The plan of the configuration, which has been checked.
-  void begin_plan();
+  void begin_plan(const Device* only = nullptr);  // null: on all sonars
 
  private:
-  OperationResult add(const control::FaultRecord& record, bool manual);
+  OperationResult add(const control::FaultRecord& record, bool manual, const Device* only = nullptr);
 
   const Config& config_;
   Fleet& fleet_;

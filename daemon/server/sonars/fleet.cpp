@@ -84,14 +84,15 @@ void Fleet::sweep() {
   }
 }
 
-bool Fleet::add(const SonarConfig& sonar, std::uint32_t index, std::vector<std::string>& errors) {
+bool Fleet::add(const SonarConfig& sonar, std::uint32_t index, Change& change) {
   devices_.emplace_back(network_, around_, sonar, index, *this);
   const auto opened = devices_.back().open();
   if (opened) {
     devices_.back().start();
+    change.opened.push_back(&devices_.back());
     return true;
   }
-  errors.push_back("sonar " + sonar.name + ": " + opened.error().text);
+  change.errors.push_back("sonar " + sonar.name + ": " + opened.error().text);
   retire(std::prev(devices_.end()));  // what it had begun may still be under way
   return false;
 }
@@ -146,7 +147,7 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
     fates[o.sonar->name] = changed ? "changed" : "added";
     if (is_held(o.sonar->bind_ip)) {
       after.push_back(o);
-    } else if (add(*o.sonar, o.index, change.errors)) {
+    } else if (add(*o.sonar, o.index, change)) {
       if (changed) retire(o.before);
     } else {
       fates[o.sonar->name] = changed ? "as before" : "missing";
@@ -156,7 +157,7 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   for (const Opening& o : after)
     if (o.before != devices_.end()) retire(o.before);
   for (const Opening& o : after)
-    if (!add(*o.sonar, o.index, change.errors)) fates[o.sonar->name] = "missing";
+    if (!add(*o.sonar, o.index, change)) fates[o.sonar->name] = "missing";
 
   for (const SonarConfig& sonar : next.sonars) {  // the configuration's order
     const auto device =

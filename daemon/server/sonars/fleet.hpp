@@ -39,6 +39,7 @@ class Fleet final : public DeviceParent {
 
   struct Change {
     std::string summary;              // "front untouched, left changed, right added"
+    std::vector<const Device*> opened;
     std::vector<std::string> errors;  // sonars that could not be opened; the one before stays where it can
   };
   /// Stops, starts and keeps sonars as `next` says, whose vehicles the World must know by now.
@@ -71,7 +72,7 @@ class Fleet final : public DeviceParent {
   void stay(std::list<Device>::iterator device, const Config& now, const Config& next);
   std::uint32_t free_index(std::size_t wanted, const std::vector<Opening>& given) const;
   void retire(std::list<Device>::iterator device);
-  bool add(const SonarConfig& sonar, std::uint32_t index, std::vector<std::string>& errors);
+  bool add(const SonarConfig& sonar, std::uint32_t index, Change& change);
 
   void compute(const Device& of, PingRequest request, Simulator::Done done) override;
   void on_ping_queued(const Device& of, const PingQueued& ping) override;

@@ -54,6 +54,13 @@ TEST(CommandLine, ItsClockIsJudgedInPlaceOfTheFiles) {
   EXPECT_TRUE(deaf_with("lockstep", {"run", "x.yaml", "--clock", "realtime"}));
 }
 
+TEST(CommandLine, APlanOfFaultsNeedsArming) {
+  const std::string plan = "realtime\nfaults: {plan: [{do: L05}]}";
+  EXPECT_THAT(deaf_with(plan, {"run", "x.yaml"}).error().text,
+              ::testing::StartsWith("test.yaml:6:16: faults.plan: faults act only when they are armed: add armed: true, or start"));
+  EXPECT_TRUE(deaf_with(plan, {"run", "x.yaml", "--faults"}));
+}
+
 TEST(CommandLine, SwitchesOfTheModelReachTheEngine) {
   const Switches given = overridden({"run", "x.yaml", "--expected-power", "--fixed-fan", "16"}).engine.switches;
   Switches expected;

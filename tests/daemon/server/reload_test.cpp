@@ -47,6 +47,21 @@ std::size_t times(const std::string& text, const std::string& words) {
   return eventually([&] { return times(daemon.log_text(), words) >= nth; });
 }
 
+TEST(Reload, ASonarThatIsOpenedAnewGetsThePlanOfFaults) {
+  DaemonSetup setup = with_file();
+  setup.more = "faults: {armed: true, plan: [{name: late, do: L05, at: {time_s: 900}}]}\n";
+  Daemon daemon(setup);
+  EXPECT_EQ(daemon.status().faults_size(), 1);
+  const std::string second = own_address();
+  setup.sonar_lines = sonar("rear", second, 77);
+  daemon.write_config(yaml_of(setup));
+  ASSERT_TRUE(reload(daemon, "reloaded:"));
+  const auto status = daemon.status();
+  ASSERT_EQ(status.faults_size(), 2) << "one each";
+  EXPECT_EQ(status.faults(1).sonar(), "rear");
+  EXPECT_EQ(status.faults(1).name(), "late");
+}
+
 TEST(Reload, AStormOfHangupsIsReadTwice) {
   std::promise<void> let_go;
   DaemonSetup setup = with_file();
