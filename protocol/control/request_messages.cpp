@@ -181,73 +181,56 @@ Result<EndFaults> from(const v1::EndFaults& m) {
   return EndFaults{*name};
 }
 
-Result<Request> with_op(const v1::Request& message) {
-  Request request{message.id(), Unsupported{}};
-  std::string refusal;
-  const auto take = [&](auto op) {
-    if (!op) return void(refusal = op.error().text);
-    request.op = *std::move(op);
-  };
+using Operation = decltype(Request::op);
+
+template <class Op>
+Result<Operation> checked(Result<Op> op) {
+  if (!op) return tl::make_unexpected(op.error());
+  return Operation{*std::move(op)};
+}
+
+Result<Operation> operation_of(const v1::Request& message) {
   switch (message.op_case()) {
     case v1::Request::kHello:
-      request.op = Hello{message.hello().protocol_version(), message.hello().name(), message.hello().token()};
-      break;
+      return Hello{message.hello().protocol_version(), message.hello().name(), message.hello().token()};
     case v1::Request::kStatus:
-      request.op = GetStatus{};
-      break;
+      return GetStatus{};
     case v1::Request::kLoad:
-      take(from(message.load()));
-      break;
+      return checked(from(message.load()));
     case v1::Request::kSonar:
-      take(from(message.sonar()));
-      break;
+      return checked(from(message.sonar()));
     case v1::Request::kEnvironment:
-      request.op = from(message.environment().environment());
-      break;
+      return from(message.environment().environment());
     case v1::Request::kSubscribe:
-      request.op = from(message.subscribe());
-      break;
+      return from(message.subscribe());
     case v1::Request::kPose:
-      take(with_checked_name(control::from(message.pose())));
-      break;
+      return checked(with_checked_name(control::from(message.pose())));
     case v1::Request::kObject:
-      take(with_checked_name(control::from(message.object())));
-      break;
+      return checked(with_checked_name(control::from(message.object())));
     case v1::Request::kAddObject:
-      take(from(message.add_object()));
-      break;
+      return checked(from(message.add_object()));
     case v1::Request::kRemoveObject:
-      take(from(message.remove_object()));
-      break;
+      return checked(from(message.remove_object()));
     case v1::Request::kSetObject:
-      take(from(message.set_object()));
-      break;
+      return checked(from(message.set_object()));
     case v1::Request::kSetTrajectory:
-      take(from(message.set_trajectory()));
-      break;
+      return checked(from(message.set_trajectory()));
     case v1::Request::kStep:
-      request.op = Step{message.step().dt_s()};
-      break;
+      return Step{message.step().dt_s()};
     case v1::Request::kStartRecording:
-      take(from(message.start_recording()));
-      break;
+      return checked(from(message.start_recording()));
     case v1::Request::kStopRecording:
-      take(from(message.stop_recording()));
-      break;
+      return checked(from(message.stop_recording()));
     case v1::Request::kAddFault:
-      take(from(message.add_fault()));
-      break;
+      return checked(from(message.add_fault()));
     case v1::Request::kEndFaults:
-      take(from(message.end_faults()));
-      break;
+      return checked(from(message.end_faults()));
     case v1::Request::kFaults:
-      request.op = GetFaults{message.faults().kinds(), message.faults().journal_after()};
-      break;
+      return GetFaults{message.faults().kinds(), message.faults().journal_after()};
     case v1::Request::OP_NOT_SET:
       break;
   }
-  if (!refusal.empty()) return refused(std::move(refusal));
-  return request;
+  return Unsupported{};
 }
 
 struct FillRequest {
@@ -352,10 +335,10 @@ tl::expected<Request, RefusedRequest> from(const v1::Request& message) {
   const auto refused_here = [&](std::string why) {
     return tl::unexpected(RefusedRequest{message.id(), std::move(why), message.has_pose() || message.has_object()});
   };
-  auto request = with_op(message);
-  if (!request) return refused_here(request.error().text);
+  auto op = operation_of(message);
+  if (!op) return refused_here(op.error().text);
   if (const auto where = first_unreal_number(message)) return refused_here(*where + " is NaN or infinite");
-  return *std::move(request);
+  return Request{message.id(), *std::move(op)};
 }
 
 void fill(v1::Request& out, const Request& request) {

@@ -7,71 +7,68 @@
 namespace sonar::oculus {
 namespace {
 
-const std::array<protocol::Option, 21>& table() {
-  static const std::array<protocol::Option, 21> rows{{
-      {option_name::before_first_fire,
-       {"dummies", "pings"},
-       "dummies",
-       "what a client gets before its first fire message; pings use the stored configuration and version 0"},
-      {option_name::gain_echo,
-       {"auto", "verbatim", "mapped"},
-       "auto",
-       "gain in the echo: auto = 40 + 0.6 g in mode 2 with flag bit 4 clear, mapped = in mode 2 always, verbatim = never"},
-      {option_name::gain_assist,
-       {"off", "flag_set", "flag_clear"},
-       "off",
-       "which state of flag bit 4 leaves the gain to the device; its echo is then the gain used, which no client expects"},
-      {option_name::pulse,
-       {"rows", "native"},
-       "rows",
-       "pulse width: rows = 0.9 row spacings, native = 2.5 mm at every range and the mean power of a row"},
-      {option_name::ping_start_time_unit,
-       {"nanoseconds", "microseconds"},
-       "nanoseconds",
-       "unit of the free-running 32-bit counter in version-1 pings"},
-      {option_name::honour_network_speed,
-       {"false", "true"},
-       "false",
-       "true lowers the ping rate to the Mbit/s the client asked for"},
-      {option_name::reply_version,
-       {"mirror", "0", "1", "2"},
-       "mirror",
-       "version of ping results: that of the fire message, or always this one"},
-      {option_name::out_of_range,
-       {"clamp", "ignore"},
-       "clamp",
-       "settings outside the model's limits: use the nearest valid ones, or ignore the whole message"},
-      {option_name::user_config_write,
-       {"silent", "reply"},
-       "silent",
-       "answer to a written user configuration: none, or the stored values"},
-      {option_name::status_bit7, {"clear", "set"}, "clear", "bit 7 (\"main\" connection) of the status word"},
-      {option_name::row_rate_hz, {}, "262237.76223776224", "sample rate behind the row law, 37.5 MHz / 143 in the capture"},
-      {option_name::row_origin,
-       {"middle", "near_edge", "far_edge"},
-       "middle",
-       "range of row i, in resolutions: i + 0.5, i, or i + 1"},
-      {option_name::dummy_period_ms, {}, "1000", "silence after which a dummy message is sent"},
-      {option_name::boot_text,
-       {"if_silent", "off", "on"},
-       "if_silent",
-       "a log message (0x80) to a client that connects: after 2 s without a fire message or a ping, never, or at once"},
-      {option_name::lf_aperture_deg, {}, "product", "horizontal aperture of the low frequency, degrees", 5, 170},
-      {option_name::hf_aperture_deg, {}, "product", "the same of the high frequency", 5, 170},
-      {option_name::lf_azimuth_width_deg, {}, "product", "-3 dB width of a low-frequency beam in azimuth, degrees", 0.1, 10},
-      {option_name::hf_azimuth_width_deg, {}, "product", "the same of the high frequency", 0.1, 10},
-      {option_name::lf_elevation_width_deg, {}, "product", "-3 dB width in elevation of the low frequency, degrees", 1, 60},
-      {option_name::hf_elevation_width_deg, {}, "product", "the same of the high frequency", 1, 60},
-      {option_name::elevation_width_is,
-       {"two_way", "one_way"},
-       "two_way",
-       "which pattern the elevation width belongs to: transmit times receive, or one of them"},
-  }};
-  return rows;
-}
+const std::array<protocol::Option, 21> table{{
+    {option_name::before_first_fire,
+     {"dummies", "pings"},
+     "dummies",
+     "what a client gets before its first fire message; pings use the stored configuration and version 0"},
+    {option_name::gain_echo,
+     {"auto", "verbatim", "mapped"},
+     "auto",
+     "gain in the echo: auto = 40 + 0.6 g in mode 2 with flag bit 4 clear, mapped = in mode 2 always, verbatim = never"},
+    {option_name::gain_assist,
+     {"off", "flag_set", "flag_clear"},
+     "off",
+     "which state of flag bit 4 leaves the gain to the device; its echo is then the gain used, which no client expects"},
+    {option_name::pulse,
+     {"rows", "native"},
+     "rows",
+     "pulse width: rows = 0.9 row spacings, native = 2.5 mm at every range and the mean power of a row"},
+    {option_name::ping_start_time_unit,
+     {"nanoseconds", "microseconds"},
+     "nanoseconds",
+     "unit of the free-running 32-bit counter in version-1 pings"},
+    {option_name::honour_network_speed,
+     {"false", "true"},
+     "false",
+     "true lowers the ping rate to the Mbit/s the client asked for"},
+    {option_name::reply_version,
+     {"mirror", "0", "1", "2"},
+     "mirror",
+     "version of ping results: that of the fire message, or always this one"},
+    {option_name::out_of_range,
+     {"clamp", "ignore"},
+     "clamp",
+     "settings outside the model's limits: use the nearest valid ones, or ignore the whole message"},
+    {option_name::user_config_write,
+     {"silent", "reply"},
+     "silent",
+     "answer to a written user configuration: none, or the stored values"},
+    {option_name::status_bit7, {"clear", "set"}, "clear", "bit 7 (\"main\" connection) of the status word"},
+    {option_name::row_rate_hz, {}, "262237.76223776224", "sample rate behind the row law, 37.5 MHz / 143 in the capture"},
+    {option_name::row_origin,
+     {"middle", "near_edge", "far_edge"},
+     "middle",
+     "range of row i, in resolutions: i + 0.5, i, or i + 1"},
+    {option_name::dummy_period_ms, {}, "1000", "silence after which a dummy message is sent"},
+    {option_name::boot_text,
+     {"if_silent", "off", "on"},
+     "if_silent",
+     "a log message (0x80) to a client that connects: after 2 s without a fire message or a ping, never, or at once"},
+    {option_name::lf_aperture_deg, {}, "product", "horizontal aperture of the low frequency, degrees", 5, 170},
+    {option_name::hf_aperture_deg, {}, "product", "the same of the high frequency", 5, 170},
+    {option_name::lf_azimuth_width_deg, {}, "product", "-3 dB width of a low-frequency beam in azimuth, degrees", 0.1, 10},
+    {option_name::hf_azimuth_width_deg, {}, "product", "the same of the high frequency", 0.1, 10},
+    {option_name::lf_elevation_width_deg, {}, "product", "-3 dB width in elevation of the low frequency, degrees", 1, 60},
+    {option_name::hf_elevation_width_deg, {}, "product", "the same of the high frequency", 1, 60},
+    {option_name::elevation_width_is,
+     {"two_way", "one_way"},
+     "two_way",
+     "which pattern the elevation width belongs to: transmit times receive, or one of them"},
+}};
 
 std::string_view default_of(std::string_view name) {
-  for (const protocol::Option& option : table())
+  for (const protocol::Option& option : table)
     if (option.name == name) return option.default_value;
   return {};
 }
@@ -83,7 +80,7 @@ bool parse_number(std::string_view text, double& value) {
 
 }  // namespace
 
-std::span<const protocol::Option> options() { return table(); }
+std::span<const protocol::Option> options() { return table; }
 
 std::string_view text_option(const protocol::OptionValues& values, std::string_view name) {
   const auto found = values.find(std::string(name));
@@ -102,9 +99,9 @@ std::optional<double> given_number(const protocol::OptionValues& values, std::st
   return parse_number(text_option(values, name), value) ? std::optional(value) : std::nullopt;
 }
 
-std::string options_table() {
+std::string options_table {
   std::string text;
-  for (const protocol::Option& option : table()) {
+  for (const protocol::Option& option : table) {
     std::string values = option.allowed.empty() ? protocol::numbers_of(option) : std::string();
     for (const std::string_view& value : option.allowed) values.append(values.empty() ? "" : ", ").append(value);
     text.append("| `").append(option.name).append("` | ").append(values).append(" | ").append(option.default_value);

@@ -25,6 +25,15 @@ inline Lanes area_of(const CellTile& t, int i, Lanes weight_re, Lanes weight_im)
   return choose(below(all(0), weight2), 1.0f / (magnitude(along) * CellTile::normal_unit), all(0));
 }
 
+/// The weights of the cells that are kept; in expected-power mode their areas.
+inline __attribute__((always_inline)) void pack_weights(const CellTile& t, int i, LaneMask keep, bool expected_power, int m,
+                                                        Chunk& c) {
+  const Lanes re = counts(t.column(CellTile::weight_re) + i), im = counts(t.column(CellTile::weight_im) + i);
+  if (expected_power) return pack(c.weight_re + m, keep, area_of(t, i, re, im));
+  pack(c.weight_re + m, keep, re);
+  pack(c.weight_im + m, keep, im);
+}
+
 /// Where the cells are: range, column, elevation, cosine of incidence; which lie in the group's window; and which of them the
 /// depth map shows: a cell no farther than what the rays saw along its direction. Returns how many there are.
 template <bool conical>
@@ -32,7 +41,6 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
   const CellTile& t = *s.tile;
   const std::int16_t *tx = t.column(CellTile::x), *ty = t.column(CellTile::y), *tz = t.column(CellTile::z);
   const std::int16_t *nx = t.column(CellTile::normal_x), *ny = t.column(CellTile::normal_y), *nz = t.column(CellTile::normal_z);
-  const std::int16_t *wr = t.column(CellTile::weight_re), *wi = t.column(CellTile::weight_im);
   const float unit = t.position_unit_m;
   const float qx0 = s.from_sonar_object[0], qy0 = s.from_sonar_object[1], qz0 = s.from_sonar_object[2];
   const float px0 = s.from_sonar[0], py0 = s.from_sonar[1], pz0 = s.from_sonar[2];
@@ -74,19 +82,13 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
 
     // r cos(alpha): normal times the vector from sonar to cell, object axes.
     const Lanes along = counts(nx + i) * (qx0 + dx) + counts(ny + i) * (qy0 + dy) + counts(nz + i) * (qz0 + dz);
-    const Lanes weight_re = counts(wr + i), weight_im = counts(wi + i);
     pack(c.range + m, keep, r);
     pack(c.offset + m, keep, quotient(e, r0 + r));
     pack(c.cosine + m, keep, magnitude(along) * (CellTile::normal_unit * inverse_r));
     const Lanes z2 = z * z, h2 = conical ? x * x : x * x + y * y;
     pack(c.sine2 + m, keep, quotient(z2, h2 + z2));
     pack(c.column + m, keep, column);
-    if (g.expected_power) {
-      pack(c.weight_re + m, keep, area_of(t, i, weight_re, weight_im));
-    } else {
-      pack(c.weight_re + m, keep, weight_re);
-      pack(c.weight_im + m, keep, weight_im);
-    }
+    pack_weights(t, i, keep, g.expected_power, m, c);
     m += count_of(keep);
   }
   return m;
@@ -129,8 +131,8 @@ inline void power_of_cells(const TileSeen& s, const GroupView& g, int n, const C
     const Lanes r = load(c.range + i);
     Lanes loss;
     for (int l = 0; l < lanes; ++l) loss[l] = std::exp(-g.decay_per_m * c.offset[i + l]);
-    const Lanes amplitude = s.area_amplitude * load(c.cosine + i) * elevation_pattern(g.elevation, load(c.sine2 + i)) * loss *
-                            reciprocal(r * r);
+    const Lanes amplitude =
+        s.area_amplitude * load(c.cosine + i) * elevation_pattern(g.elevation, load(c.sine2 + i)) * loss * reciprocal(r * r);
     store(out.re + i, amplitude * amplitude * level_weight(s, r) * load(c.weight_re + i));
     store(out.im + i, Lanes{});
     store(out.sample + i, r * g.samples_per_m - (g.sample_offset - s.sample_shift));

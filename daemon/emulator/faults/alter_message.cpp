@@ -225,6 +225,32 @@ Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
   return bytes;
 }
 
+/// What changes when and in which pieces the bytes are written.
+Touch alter_pace(const Fault& fault, MessageEdit& m) {
+  const Bytes& bytes = m.bytes;
+  using E = FaultEffect;
+  switch (fault.kind->effect) {
+    case E::slices:
+      return slice(m, static_cast<std::size_t>(fault.number("bytes")), 0);
+    case E::split_header: {
+      const auto at = std::min(static_cast<std::size_t>(fault.number("offset")), bytes.size());
+      m.pauses.push_back({at, std::chrono::nanoseconds(std::llround(fault.number("ms") * 1e6))});
+      return {true, at};
+    }
+    case E::pause: {
+      const std::size_t at = at_fraction(fault, bytes);
+      m.pauses.push_back({at, std::chrono::nanoseconds(std::llround(fault.number("seconds") * 1e9))});
+      return {true, at};
+    }
+    case E::thin_link:
+      return thin(fault, m);
+    case E::end:
+      return end_inside(fault, m);
+    default:
+      return {false};
+  }
+}
+
 }  // namespace
 
 Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m) {
@@ -273,24 +299,8 @@ Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m)
       return change_bearings(fault, c, bytes);
     case E::renumber:
       return renumber(fault, c, bytes);
-    case E::slices:
-      return slice(m, static_cast<std::size_t>(fault.number("bytes")), 0);
-    case E::split_header: {
-      const auto at = std::min(static_cast<std::size_t>(fault.number("offset")), bytes.size());
-      m.pauses.push_back({at, std::chrono::nanoseconds(std::llround(fault.number("ms") * 1e6))});
-      return {true, at};
-    }
-    case E::pause: {
-      const std::size_t at = at_fraction(fault, bytes);
-      m.pauses.push_back({at, std::chrono::nanoseconds(std::llround(fault.number("seconds") * 1e9))});
-      return {true, at};
-    }
-    case E::thin_link:
-      return thin(fault, m);
-    case E::end:
-      return end_inside(fault, m);
     default:
-      return {false};
+      return alter_pace(fault, m);
   }
 }
 

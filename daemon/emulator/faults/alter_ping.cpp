@@ -43,11 +43,39 @@ std::uint32_t scaled(std::uint32_t code, double factor, std::uint32_t most) {
   return static_cast<std::uint32_t>(std::clamp(static_cast<double>(code) * factor, 0.0, static_cast<double>(most)));
 }
 
+/// What moves, scales or removes rows and beams.
+void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
+  const std::size_t from = static_cast<std::size_t>(fault.number("fraction") * static_cast<double>(image.rows()));
+  using E = FaultEffect;
+  switch (fault.kind->effect) {
+    case E::gain_step:
+      return image.fill([&](std::size_t row, std::size_t beam) {
+        return row < from ? image.get(row, beam) : scaled(image.get(row, beam), fault.number("factor"), image.full());
+      });
+    case E::missing_rows:
+      return image.fill([&](std::size_t row, std::size_t beam) { return row < from ? image.get(row, beam) : 0; });
+    case E::mirror: {
+      Ping before = ping;
+      const Image old(before);
+      return image.fill([&](std::size_t row, std::size_t beam) { return old.get(row, image.beams() - 1 - beam); });
+    }
+    case E::scale_range: {
+      Ping before = ping;
+      const Image old(before);
+      return image.fill([&](std::size_t row, std::size_t beam) {
+        const auto source = static_cast<std::size_t>((static_cast<double>(row) + 0.5) / fault.number("factor"));
+        return source < old.rows() ? old.get(source, beam) : 0;
+      });
+    }
+    default:
+      return;
+  }
+}
+
 }  // namespace
 
 void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, std::uint64_t begun, Ping& ping) {
   Image image(ping);
-  const std::size_t from = static_cast<std::size_t>(fault.number("fraction") * static_cast<double>(image.rows()));
   const double share = fault.number("share");
   // The same beams in every ping: draws of the fault, not of the ping.
   FaultDraws of_fault = draws;
@@ -86,27 +114,8 @@ void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, s
       return image.fill([&](std::size_t row, std::size_t beam) {
         return draws.uniform(static_cast<std::uint32_t>(beam)) < share ? image.full() : image.get(row, beam);
       });
-    case E::gain_step:
-      return image.fill([&](std::size_t row, std::size_t beam) {
-        return row < from ? image.get(row, beam) : scaled(image.get(row, beam), fault.number("factor"), image.full());
-      });
-    case E::missing_rows:
-      return image.fill([&](std::size_t row, std::size_t beam) { return row < from ? image.get(row, beam) : 0; });
-    case E::mirror: {
-      Ping before = ping;
-      const Image old(before);
-      return image.fill([&](std::size_t row, std::size_t beam) { return old.get(row, image.beams() - 1 - beam); });
-    }
-    case E::scale_range: {
-      Ping before = ping;
-      const Image old(before);
-      return image.fill([&](std::size_t row, std::size_t beam) {
-        const auto source = static_cast<std::size_t>((static_cast<double>(row) + 0.5) / fault.number("factor"));
-        return source < old.rows() ? old.get(source, beam) : 0;
-      });
-    }
     default:
-      return;
+      return alter_rows(fault, image, ping);
   }
 }
 
