@@ -7,7 +7,7 @@
 namespace sonar::oculus {
 namespace {
 
-const std::array<protocol::Option, 21> table{{
+const std::array<protocol::Option, 21> option_rows{{
     {option_name::before_first_fire,
      {"dummies", "pings"},
      "dummies",
@@ -68,7 +68,7 @@ const std::array<protocol::Option, 21> table{{
 }};
 
 std::string_view default_of(std::string_view name) {
-  for (const protocol::Option& option : table)
+  for (const protocol::Option& option : option_rows)
     if (option.name == name) return option.default_value;
   return {};
 }
@@ -80,7 +80,7 @@ bool parse_number(std::string_view text, double& value) {
 
 }  // namespace
 
-std::span<const protocol::Option> options() { return table; }
+std::span<const protocol::Option> options() { return option_rows; }
 
 std::string_view text_option(const protocol::OptionValues& values, std::string_view name) {
   const auto found = values.find(std::string(name));
@@ -99,9 +99,9 @@ std::optional<double> given_number(const protocol::OptionValues& values, std::st
   return parse_number(text_option(values, name), value) ? std::optional(value) : std::nullopt;
 }
 
-std::string options_table {
+std::string options_table() {
   std::string text;
-  for (const protocol::Option& option : table) {
+  for (const protocol::Option& option : option_rows) {
     std::string values = option.allowed.empty() ? protocol::numbers_of(option) : std::string();
     for (const std::string_view& value : option.allowed) values.append(values.empty() ? "" : ", ").append(value);
     text.append("| `").append(option.name).append("` | ").append(values).append(" | ").append(option.default_value);

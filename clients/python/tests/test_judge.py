@@ -455,7 +455,8 @@ class Reports(unittest.TestCase):
         a = self.written([row_of("L05.1", GOOD), row_of("L05.3", GOOD)], place="a")
         b = self.written([row_of("L05.1", DEAD), row_of("F01.1", GOOD)], place="b")
         with contextlib.redirect_stdout(io.StringIO()) as said:
-            self.assertEqual(judge_main.main(["merge", str(a), str(b), "--out", str(self.folder / "m")]), 0)
+            self.assertEqual(judge_main.main(["merge", str(a), str(b), "--out", str(self.folder / "m"), "--page",
+                                              str(self.folder / "page.md")]), 0)
         self.assertEqual(said.getvalue(),
                          "mine: 2 of 2 MUST, 2 of 2 SHOULD, 0 flaky\nmine #2: 1 of 2 MUST, 1 of 2 SHOULD, 0 flaky\n")
         text = (self.folder / "m/index.html").read_text()
@@ -463,6 +464,11 @@ class Reports(unittest.TestCase):
         for link in re.findall(r'href="(driver-[^"]+)"', text):
             self.assertTrue((self.folder / "m" / link).is_file(), link)
         self.assertEqual(text.count("not in this report"), 2)
+        page = (self.folder / "page.md").read_text()
+        self.assertRegex(page, r"\n\| mine #2 \| .* \| json \| 1 of 2 \| 1 of 2 \| ")
+        self.assertRegex(page, r"\n\| L Link and connection \| 2 of 2 \| 0 of 1 \|\n")
+        self.assertRegex(page, r"\n\| L05.1 Sentence & L05.1. \| CLEAN, .* \| \*\*.*\*\*")
+        self.assertNotIn("L05.3 ", page, "it holds")
 
     def test_without_wall_clock(self):
         index = json.loads((self.written([row_of("L05.1", GOOD)]) / "index.json").read_text())

@@ -26,7 +26,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Dict, List, Optional, Sequence
 
 from .. import lab, layouts
-from . import report
+from . import markdown, report
 from .cases import CASES, Case, listing, select, torture
 
 USAGE, UNAVAILABLE, NOT_HELD = 64, 69, 1
@@ -68,6 +68,7 @@ def _merge_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="sonarctl judge merge", description="Makes one matrix of several reports.")
     parser.add_argument("reports", nargs="+", metavar="REPORT", help="folders with index.json")
     parser.add_argument("--out", required=True, metavar="FOLDER")
+    parser.add_argument("--page", type=pathlib.Path, metavar="FILE", help="also a page of Markdown")
     return parser
 
 
@@ -295,6 +296,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
             options = _merge_parser().parse_args(given[1:])
             columns = report.merge([pathlib.Path(folder) for folder in options.reports], _new_folder(options.out))
             print("\n".join(report.summary(column) for column in columns))
+            if options.page:
+                options.page.write_text(markdown.page(columns), encoding="utf-8")
             return 0
         return _judge(_parser().parse_args(given))
     except SystemExit as end:  # of the parser, which has said why
