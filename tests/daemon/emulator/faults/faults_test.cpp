@@ -288,6 +288,24 @@ TEST(Faults, EveryAndProbabilityAndCount) {
   EXPECT_NEAR(static_cast<double>(half.journal.injected().size()), 150, 40);
 }
 
+TEST(Faults, AnOverheatingDeviceSlowsDownThenStopsThenPingsAgain) {
+  FaultRecord trouble = at_ping("overheating", 10);
+  trouble.lasts.seconds = 4;
+  Played run(trouble, 1, milliseconds(900));
+  const auto pings_in = [&](milliseconds time) {
+    const std::size_t before = ping_numbers(run.bytes()).size();
+    run.time.run(time);
+    return ping_numbers(run.bytes()).size() - before;
+  };
+  pings_in(milliseconds(200));
+  EXPECT_NEAR(static_cast<double>(pings_in(milliseconds(1600))), 8, 1) << "hot: 5 of 10 Hz";
+  pings_in(milliseconds(300));
+  EXPECT_EQ(pings_in(milliseconds(1500)), 0u) << "too hot";
+  pings_in(milliseconds(700));
+  EXPECT_NEAR(static_cast<double>(pings_in(milliseconds(1000))), 10, 1) << "cool again";
+  EXPECT_EQ(run.time.sonar("front").faults().active_count(), 0u);
+}
+
 TEST(Faults, APowerCycleForgetsWhatADeviceForgets) {
   FaultRecord fault = at_ping("power-cycle", 8, {});
   fault.what = "L10";
