@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Judges drivers one after the other and writes a page that compares them.
-# usage: tests/judge/judge_drivers.sh PAGE.md FOLDER NAME VERSION TAP COMMAND [NAME VERSION TAP COMMAND]...
+# usage: tests/judge/judge_drivers.sh PAGE FOLDER NAME VERSION TAP COMMAND [NAME VERSION TAP COMMAND]...
 #   FOLDER gets a report each and the matrix; it must be new. TAP: json, ros1:TOPIC or none. COMMAND starts the driver (docs/judge.md).
 #   SONARCTL=PROGRAM  instead of build/release/clients/sonarctl
 set -u -o pipefail

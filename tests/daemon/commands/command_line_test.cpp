@@ -56,8 +56,9 @@ TEST(CommandLine, ItsClockIsJudgedInPlaceOfTheFiles) {
 
 TEST(CommandLine, APlanOfFaultsNeedsArming) {
   const std::string plan = "realtime\nfaults: {plan: [{do: L05}]}";
-  EXPECT_THAT(deaf_with(plan, {"run", "x.yaml"}).error().text,
-              ::testing::StartsWith("test.yaml:6:16: faults.plan: faults act only when they are armed: add armed: true, or start"));
+  EXPECT_THAT(
+      deaf_with(plan, {"run", "x.yaml"}).error().text,
+      ::testing::StartsWith("test.yaml:6:16: faults.plan: faults act only when they are armed: add armed: true, or start"));
   EXPECT_TRUE(deaf_with(plan, {"run", "x.yaml", "--faults"}));
 }
 

@@ -6,7 +6,7 @@ from typing import Any, Dict, List, Sequence
 from .cases import FAMILIES
 
 Json = Dict[str, Any]
-_MADE_BY = "tests/judge/judge_drivers.sh PAGE.md FOLDER NAME VERSION TAP COMMAND [NAME VERSION TAP COMMAND]..."
+_MADE_BY = "tests/judge/judge_drivers.sh PAGE FOLDER NAME VERSION TAP COMMAND [NAME VERSION TAP COMMAND]..."
 _HEAD = """# Drivers under faults
 
 What `sonarctl judge` measured with drivers as their authors publish them, compiled unchanged; a few lines around each library print
