@@ -66,7 +66,7 @@ std::string why_not(const std::vector<Fault>& faults, const std::vector<SonarCon
       if ((!name.empty() && sonar.name != name) || sonar.profile.vendor == nullptr) continue;
       const std::string without = why_without_effect(*fault.kind, *sonar.profile.vendor);
       if (without.empty()) return {};
-      why = std::string(fault.kind->code) + " has no effect on the sonar " + sonar.name + ", which " + without;
+      why = std::string(fault.kind->code) + " has no effect on the sonar " + sonar.name + " (" + without + ")";
     }
   return why;
 }

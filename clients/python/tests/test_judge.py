@@ -367,7 +367,7 @@ def run_of(data="CLEAN", recovery="NONE NEEDED", must=True, should=True, shade="
               "should": [{"what": "is quick", "holds": should, "value": 4.5}]}
     process = {"ending": "alive", "peak_mib": 1, "cpu_s": 0, "log_lines_s": 0, "descriptors": [3, 3]}
     clock = dict(checks, data=data, recovery=recovery, watched_s=2.5, timeline=[[0.5, "begins"]],
-                 journal=[{"kind": "L05", "ping": 3}],
+                 journal=[{"kind": "L05", "ping": n, "with": {"fill": "zero", "bytes": "1"}} for n in (3, 4, 8)],
                  hex=["> 00"], connections=[], process=process, pings_on_wire=3, pings_acknowledged=3, pings_published=3,
                  capture="", packets_missed=0)
     return {"ran": True, "data": data, "recovery": recovery, "must_holds": must, "should_holds": should, "colour": shade,
@@ -382,7 +382,7 @@ NOT_RUN = {"ran": False, "why": "needs namespaces"}
 def row_of(number, *runs, strict=False, expectation="MUST; SHOULD"):
     case = {"number": number, "kind": number[:3], "name": "silent-open", "sentence": f"Sentence & {number}.", "with": {"a": "1"},
             "at": "ping 10", "duration": "2 s", "limit": 15.0, "expectation": expectation, "measured": False,
-            "folder": f"cases/{number}", "repeat": "sonarctl judge ..."}
+            "folder": f"cases/{number}", "repeat": "sonarctl judge ...", "good_driver": "notices & goes on"}
     return report.combine(case, runs, strict, tapped=True)
 
 
@@ -446,6 +446,10 @@ class Reports(unittest.TestCase):
             self.assertNotIn(None, page.scopes)
             self.assertNotRegex(text, r'(src|href)="(https?:)?//')
         self.assertIn("Sentence &amp; L05.1.", (out / "index.html").read_text())
+        text = (out / "cases/L05.3/index.html").read_text()
+        self.assertIn("notices &amp; goes on", text)
+        self.assertIn("<strong>NONE NEEDED</strong><small>pings never stopped</small>", text)
+        self.assertIn("kind=L05 ping=3 with=bytes=1 fill=zero, and 2 more, the last of ping 8", text)
         self.assertIn("&lt;b&gt;last words", (out / "cases/L05.3/index.html").read_text())
         links = re.findall(r'href="(cases/[^"]+)"', (out / "index.html").read_text())
         self.assertEqual(len(links), 3)
@@ -456,7 +460,7 @@ class Reports(unittest.TestCase):
         b = self.written([row_of("L05.1", DEAD), row_of("F01.1", GOOD)], place="b")
         with contextlib.redirect_stdout(io.StringIO()) as said:
             self.assertEqual(judge_main.main(["merge", str(a), str(b), "--out", str(self.folder / "m"), "--page",
-                                              str(self.folder / "page.md")]), 0)
+                                              str(self.folder / "page")]), 0)
         self.assertEqual(said.getvalue(),
                          "mine: 2 of 2 MUST, 2 of 2 SHOULD, 0 flaky\nmine #2: 1 of 2 MUST, 1 of 2 SHOULD, 0 flaky\n")
         text = (self.folder / "m/index.html").read_text()
@@ -464,7 +468,7 @@ class Reports(unittest.TestCase):
         for link in re.findall(r'href="(driver-[^"]+)"', text):
             self.assertTrue((self.folder / "m" / link).is_file(), link)
         self.assertEqual(text.count("not in this report"), 2)
-        page = (self.folder / "page.md").read_text()
+        page = (self.folder / "page").read_text()
         self.assertRegex(page, r"\n\| mine #2 \| .* \| json \| 1 of 2 \| 1 of 2 \| ")
         self.assertRegex(page, r"\n\| L Link and connection \| 2 of 2 \| 0 of 1 \|\n")
         self.assertRegex(page, r"\n\| L05.1 Sentence & L05.1. \| CLEAN, .* \| \*\*.*\*\*")

@@ -50,13 +50,14 @@ std::string text_from(const v1::FaultEntry& e) {
 
 std::string fault_list_text(const v1::FaultReport& report) {
   if (!report.armed()) return "faults are not armed: sonard run --faults, or faults: {armed: true}\n";
-  std::string text;
+  if (report.faults().empty()) return "no faults\n";
+  std::string text = format("%-16s %-4s %-16s %-12s %-8s\n", "NAME", "KIND", "ASKED AS", "SONAR", "STATE");
   for (const v1::FaultStatus& f : report.faults()) {
     text += format("%-16s %-4s %-16s %-12s %-8s %6" PRIu64 " injection%s", f.name().c_str(), f.code().c_str(), f.do_().c_str(),
                    f.sonar().c_str(), f.state().c_str(), f.injections(), f.injections() == 1 ? "" : "s");
     text += (f.expires_s() > 0 ? format("  ends in %.1f s", f.expires_s()) : std::string()) + "\n";
   }
-  return text.empty() ? "no faults\n" : text;
+  return text;
 }
 
 std::string fault_kinds_text(const v1::FaultReport& report) {

@@ -352,7 +352,7 @@ std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& ve
   using Port = protocol::Port::Kind;
   if (kind.effect == E::harness) return "needs two network namespaces: sonarctl lab";
   const bool blueview_only = kind.code.front() == 'B';
-  if (blueview_only && vendor.name() != "blueview") return "is a fault of the BlueView link";
+  if (blueview_only && vendor.name() != "blueview") return "only the BlueView link has it";
   if (kind.stage == S::datagrams) return vendor.port(Port::udp_stream) ? "" : "sends no datagrams of pings";
   const bool of_beacon = kind.stage == S::status || kind.effect == E::heat;
   if (of_beacon && vendor.port(Port::udp_beacon) == nullptr) return "has no status message";

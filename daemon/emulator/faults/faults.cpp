@@ -75,8 +75,9 @@ void Faults::forget_old() {
 bool Faults::remove(const std::string& name, Time now) {
   bool found = false;
   for (Entry& e : entries_) {
-    // The parts of a trouble are NAME.1, NAME.2, ...
-    if (e.over || (e.fault.name != name && !e.fault.name.starts_with(name + "."))) continue;
+    // The parts of a trouble are NAME.1, NAME.2, ...; a fault without a name of its own has its code, and ends by its word, too.
+    const bool by_word = e.fault.name == e.fault.kind->code && e.fault.what == name;
+    if (e.over || (e.fault.name != name && !by_word && !e.fault.name.starts_with(name + "."))) continue;
     found = true;
     finish(e, now);
   }

@@ -29,8 +29,8 @@ std::string Sonar::why_no_faults(const std::vector<Fault>& faults) const {
     const std::string without = why_without_effect(*fault.kind, vendor_);
     if (without.empty()) any = true;
     if (why.empty() && !without.empty())
-      why = "fault " + fault.name + ": " + std::string(fault.kind->code) + " has no effect on the sonar " + config_.name +
-            ", which " + without;
+      why = "fault " + fault.name + ": " + std::string(fault.kind->code) + " has no effect on the sonar " + config_.name + " (" +
+            without + ")";
     for (const Faults::Listed& other : faults_.list()) {
       if (other.over) continue;
       if (other.fault->name == fault.name)

@@ -38,7 +38,7 @@ class Fleet final : public DeviceParent {
   void stop();
 
   struct Change {
-    std::string summary;              // "front untouched, left changed, right added"
+    std::string summary;  // "front untouched, left changed, right added"
     std::vector<const Device*> opened;
     std::vector<std::string> errors;  // sonars that could not be opened; the one before stays where it can
   };

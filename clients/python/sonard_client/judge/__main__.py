@@ -238,7 +238,7 @@ class Judge:
             " --torture" if ".T" in case.number else "") + f" --case {case.number} --out report-{case.number}"
         described = {"number": case.number, "kind": case.kind, "name": case.name, "sentence": case.sentence,
                      "with": dict(case.given), "at": case.at, "duration": case.duration, "limit": case.limit,
-                     "expectation": case.expectation, "measured": case.measured, "repeat": repeat,
+                     "good_driver": self.kinds.get(case.kind, {}).get("good_driver", ""), "expectation": case.expectation, "measured": case.measured, "repeat": repeat,
                      "folder": f"cases/{case.number}"}
         found = report.combine(described, runs, o.strict, o.tap != "none")
         with self._print:

@@ -6,12 +6,10 @@ from typing import Any, Dict, List, Sequence
 from .cases import FAMILIES
 
 Json = Dict[str, Any]
-_MADE_BY = "tests/judge/judge_drivers.sh PAGE FOLDER NAME VERSION TAP COMMAND [NAME VERSION TAP COMMAND]..."
 _HEAD = """# Drivers under faults
 
-What `sonarctl judge` measured with drivers as their authors publish them, compiled unchanged; a few lines around each library print
-what it hands to its user. A case that does not hold says how this version answers a fault on purpose, not how good the driver is at
-sea; a later version may differ. How to read the verdicts: [judge.md](judge.md#verdicts).
+What `sonarctl judge` measured. A case that does not hold says how this version of a driver answers a fault on purpose, not how good
+the driver is at sea; a later version may differ. How to read the verdicts: docs/judge.md, "Verdicts".
 """
 
 
@@ -51,6 +49,6 @@ def page(columns: Sequence[Json]) -> str:
         if any(row and row["result"] in ("FAIL", "FLAKY") for row in cells):
             rows.append([f"{number} {case['sentence']}", *map(_cell, cells)])
     first = columns[0]
-    return (f"{_HEAD}\n{drivers}\nProfile {first['profile']}, {first['sonard']}, seed {first['seed']}; {first['machine']}. The page is "
-            f"made by\n\n    {_MADE_BY}\n\n{families}\n## Cases that a driver does not hold\n\nA MUST that does not hold is **bold**.\n\n"
+    return (f"{_HEAD}\n{drivers}\nProfile {first['profile']}, {first['sonard']}, seed {first['seed']}; {first['machine']}.\n\n{families}"
+            "\n## Cases that a driver does not hold\n\nA MUST that does not hold is **bold**.\n\n"
             + _table(["case", *names], rows))

@@ -1,7 +1,8 @@
 """What a case leaves: the content of case.json, with its time line."""
 from __future__ import annotations
 
-from typing import Any, Dict, List, Tuple
+import itertools
+from typing import Any, Dict, List, Sequence, Tuple
 
 from .cases import Case
 from .scene import Scene, mono
@@ -34,7 +35,7 @@ def result_of(scene: Scene, case: Case, seen: Observation, verdict: Verdict) -> 
                              "zero_windows": c.zero_windows, "ended_by": c.ended_by if _over(c, seen) else "",
                              "ended_s": round((c.ended or 0) - scene.started, 3) if _over(c, seen) else None}
                             for c in connections],
-            "timeline": timeline(scene, seen, connections), "journal": scene.journal.records[:200],
+            "timeline": timeline(scene, seen, connections), "journal": scene.journal.records[:2000],
             "hex": _hex(scene, connections), "packets": capture_packets,
             "packets_missed": scene.capture.lost_packets if scene.capture else 0,
             "capture": "" if capture_packets else "no capture: reading packets needs namespaces or root",
@@ -53,9 +54,9 @@ def timeline(scene: Scene, seen: Observation, connections: List[Connection]) -> 
         moments.extend((t, f"settings sent on connection {c.number}") for t in c.fires[:3])
         if c.ended is not None and c.ended <= seen.watched_until:
             moments.append((c.ended, f"connection {c.number} ends: {c.ended_by}"))
-    for record in scene.journal.records[:40]:
+    for record, more in in_brief(scene.journal.records):
         moments.append((mono(record), f"fault {record.get('kind', '')} {record.get('event', '')}" +
-                        (f", ping {record['ping']}" if record.get("ping") else "")))
+                        (f", ping {record['ping']}" if record.get("ping") else "") + more))
     if seen.published:
         moments.append((seen.published[0].mono, f"first ping published: {seen.published[0].number}"))
     times = scene.ping_times()
@@ -65,6 +66,17 @@ def timeline(scene: Scene, seen: Observation, connections: List[Connection]) -> 
     if seen.exit_time is not None:
         moments.append((seen.exit_time, f"driver ended with {seen.exit_code}"))
     return [(round(t - scene.started, 3), what) for t, what in sorted(moments)][:200]
+
+
+def in_brief(records: Sequence[Dict[str, Any]]) -> List[Tuple[Dict[str, Any], str]]:
+    """Records of the journal; of those that only repeat for ping after ping the first, with what follows it."""
+    def alike(record: Dict[str, Any]) -> Tuple[Any, ...]:
+        return tuple(str(record.get(key)) for key in ("event", "fault", "kind", "sonar", "client"))
+    found: List[Tuple[Dict[str, Any], str]] = []
+    for _, series in itertools.groupby(records, alike):
+        same = list(series)
+        found.append((same[0], f", and {len(same) - 1} more, the last of ping {same[-1].get('ping', '')}" if len(same) > 1 else ""))
+    return found
 
 
 def _hex(scene: Scene, connections: List[Connection]) -> List[str]:

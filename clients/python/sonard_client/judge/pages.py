@@ -7,6 +7,7 @@ import pathlib
 from typing import Any, Callable, Dict, List, Sequence
 
 from .cases import FAMILIES
+from .outcome import in_brief
 
 Json = Dict[str, Any]
 COLOURS = ("none", "good", "fair", "flaky", "bad", "worst")  # from the best to the worst
@@ -15,6 +16,11 @@ _MEANINGS = {"good": "every MUST and SHOULD holds", "fair": "every MUST holds, a
              "bad": "a MUST does not hold", "worst": "crashes, or publishes false data", "none": "not run"}
 _DATA = {"CLEAN": "good", "LOST": "fair", "STALE": "bad", "FALSE": "worst"}
 _RECOVERY = {"NONE NEEDED": "good", "BACK": "good", "OPERATOR": "bad", "NEVER": "bad", "CRASH": "worst"}
+_WORDS = {"CLEAN": "all that arrived whole was published once", "LOST": "pings that arrived whole were not published",
+          "STALE": "pings were published a second time as new", "FALSE": "published pings differ from what was measured",
+          "UNSEEN": "no tap", "NONE NEEDED": "pings never stopped", "BACK": "from the fault's end to three pings in a row",
+          "OPERATOR": "came back only after the judge started the driver again", "NEVER": "did not come back, started again neither",
+          "CRASH": "ended by a signal or with an exit code"}
 _JOURNAL_LEFT_OUT = ("seq", "mono_ns", "utc_ns", "time_ns", "do", "fault", "sonar")
 LOG_LINES = 40
 
@@ -204,6 +210,16 @@ def _checks(run: Json) -> str:
             f'<th scope="col">Result</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>')
 
 
+def _value(value: object) -> str:
+    return " ".join(f"{k}={value[k]}" for k in sorted(value)) if isinstance(value, dict) else str(value)
+
+
+def _verdict(kind: str, colours: Dict[str, str], verdict: str, words: str) -> str:
+    meaning = _WORDS.get(verdict, "")
+    return (f'<div class="{colours.get(verdict, "none")}"><small>{kind}</small><strong>{_e(words)}</strong>'
+            f'{f"<small>{meaning}</small>" if meaning else ""}</div>')
+
+
 def _run_part(row: Json, number: int, folder: pathlib.Path) -> str:
     place = f"run-{number + 1}/" if number else ""
     try:
@@ -215,7 +231,8 @@ def _run_part(row: Json, number: int, folder: pathlib.Path) -> str:
     if not run.get("ran"):
         return head + f"<p>Not run: {_e(run.get('why', ''))}</p>" + _list(str(run.get("text", "")).splitlines()[-LOG_LINES:])
     w = run["wall_clock"]
-    journal = [" ".join(f"{k}={v}" for k, v in record.items() if k not in _JOURNAL_LEFT_OUT) for record in w["journal"]]
+    journal = [" ".join(f"{k}={_value(v)}" for k, v in record.items() if k not in _JOURNAL_LEFT_OUT) + more
+               for record, more in in_brief(w["journal"])]
     connections = [f"{c['from']}  opened {c['opened_s']:.2f} s  {c['bytes']} bytes taken  settings sent {c['settings']}x  "
                    f"zero windows {c['zero_windows']}  {c['ended_by'] or 'open to the end'}" for c in w["connections"]]
     process = w["process"]
@@ -227,8 +244,7 @@ def _run_part(row: Json, number: int, folder: pathlib.Path) -> str:
     missed = f"<p><mark>The capture missed {w['packets_missed']} packets: the data verdict may be wrong.</mark></p>" \
         if w["packets_missed"] else ""
     return f"""{head}<div class="verdicts">
-<div class="{_DATA.get(run["data"], "none")}"><small>data</small><strong>{_e(w["data"])}</strong></div>
-<div class="{_RECOVERY.get(run["recovery"], "none")}"><small>recovery</small><strong>{_e(w["recovery"])}</strong></div>
+{_verdict("data", _DATA, run["data"], w["data"])}{_verdict("recovery", _RECOVERY, run["recovery"], w["recovery"])}
 </div>{missed}
 <h2>Expectations</h2>{_checks(w)}
 <h2>Time line</h2><div class="sheet"><table><thead><tr><th scope="col">Time</th><th scope="col">What</th></tr></thead><tbody>
@@ -253,5 +269,5 @@ def case_page(column: Json, row: Json, folder: pathlib.Path, reasons: Sequence[s
 <p><span class="swatch {row["colour"]}">&nbsp;{_MARKS[row["colour"]]} {_e(row["result"])}&nbsp;</span>
 {_MEANINGS[row["colour"]]}</p>
 <ul>{why}</ul><dl class="facts"><dt>expectation</dt><dd>{_e(row["expectation"])}</dd><dt>parameters</dt><dd>{_e(parameters)}</dd>
-<dt>begins, lasts</dt><dd>{_e(row["at"])}, {_e(row["duration"])}; the driver has {row["limit"]:g} s after it</dd></dl>
+<dt>a good driver</dt><dd>{_e(row.get("good_driver") or "goes on as before")}</dd><dt>begins, lasts</dt><dd>{_e(row["at"])}, {_e(row["duration"])}; the driver has {row["limit"]:g} s after it</dd></dl>
 <h2>Repeat</h2><pre>{_e(row["repeat"])}</pre>{parts}</main>""")

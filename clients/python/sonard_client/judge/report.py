@@ -95,7 +95,8 @@ def junit(columns: Sequence[Json], strict: bool) -> bytes:
             elif row in failed:
                 why = reasons(row, strict or row["result"] == "FLAKY")
                 failure = xml.SubElement(case, "failure", type=row["result"], message="; ".join(why)[:500] or row["result"])
-                failure.text = f"data {row['data']}, recovery {row['recovery']}\n" + "\n".join(why) + f"\nrepeat: {row['repeat']}"
+                failure.text = f"data {row['data']}, recovery {row['recovery']}\n" + "\n".join(why) + (
+                    f"\na good driver {row['good_driver']}" if row.get("good_driver") else "") + f"\nrepeat: {row['repeat']}"
             elif not row["should_holds"]:
                 xml.SubElement(case, "system-out").text = "\n".join(reasons(row))
     return xml.tostring(suites, encoding="utf-8", xml_declaration=True)
