@@ -64,7 +64,8 @@ class Page(unittest.TestCase):
     """The examples, all on one daemon, in the order in which they stand."""
 
     def run_examples(self, run_one):
-        daemon = Sonard(profile="oculus-m1200d", trajectory="way.csv", more="recording: {folder: .}", arguments=["--clock", "lockstep"])
+        daemon = Sonard(profile="oculus-m1200d", trajectory="way.csv", more="recording: {folder: .}",
+                        arguments=["--clock", "lockstep", "--faults"])
         (pathlib.Path(daemon.folder.name) / "way.csv").write_text("# frame: ENU_FLU\nt,x,y,z\n0,-7,0,-3\n100,-5,0,-3\n", encoding="utf-8")
         with daemon:
             host = f"{daemon.address}:8088"
@@ -80,6 +81,10 @@ class Page(unittest.TestCase):
             self.assertEqual(json.loads(text)["sonars"][0]["name"], "front")
         elif path == "/api/v1/step":
             self.assertEqual(json.loads(text), {"now_ns": "100000000", "pings": "0"})
+        elif path == "/api/v1/faults/kinds":
+            self.assertIn("silent-open", text)
+        elif path.startswith("/api/v1/faults/journal"):
+            self.assertIn("journal", json.loads(text))
         elif path.startswith("/api/"):
             self.assertEqual(json.loads(text)["code"], "OK")
         else:
