@@ -66,7 +66,8 @@ class Page(unittest.TestCase):
     """The examples, all on one daemon, in the order in which they stand."""
 
     def run_examples(self, run_one):
-        daemon = Sonard(profile="oculus-m1200d", trajectory="way.csv", more="recording: {folder: .}", arguments=["--clock", "lockstep", "--faults"])
+        daemon = Sonard(profile="oculus-m1200d", trajectory="way.csv", more="recording: {folder: .}",
+                        arguments=["--clock", "lockstep", "--faults"])
         (pathlib.Path(daemon.folder.name) / "way.csv").write_text("# frame: ENU_FLU\nt,x,y,z\n0,-7,0,-3\n100,-5,0,-3\n", encoding="utf-8")
         with daemon:
             host = f"{daemon.address}:8088"
