@@ -299,7 +299,7 @@ constexpr FaultKind table[] = {
      "does not block the next ping", 0, {}, {}, "parts"},
     {"G05", "part-of-older-frame", 1, S::datagrams, E::older_part, "A datagram is that of the ping before.",
      "does not mix two pings", 0, {}, {}, "parts"},
-    {"G06", "fragment-lost", 1, S::datagrams, E::harness, "An IP fragment is lost.", "loses one ping", 6, {}, {}, {}},
+    {"G06", "ip-fragment-lost", 1, S::datagrams, E::harness, "An IP fragment is lost.", "loses one ping", 6, {}, {}, {}},
     {"G07", "group-lost", 1, S::datagrams, E::leave_group, "Datagrams do not reach the group.", "joins again", 6, {}, {}, "group"},
 };
 
@@ -350,6 +350,7 @@ const FaultKind* find_fault_kind(std::string_view code_or_name) {
 
 std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& vendor) {
   using Port = protocol::Port::Kind;
+  if (kind.code == "B15") return "is of files: cut one with head -c";
   if (kind.effect == E::harness) return "needs two network namespaces: sonarctl lab";
   const bool blueview_only = kind.code.front() == 'B';
   if (blueview_only && vendor.name() != "blueview") return "only the BlueView link has it";
