@@ -223,14 +223,17 @@ class Tap(unittest.TestCase):
                          ["a", "--x=127.0.0.2:52100", "7", "{other}"])
 
     def test_a_drivers_output_and_end(self):
-        program = ("import sys\nprint('{\"id\": 1, \"crc32\": 2}')\nprint('words')\n"
-                   "for i in range(50): print(i, file=sys.stderr)\nsys.exit(3)")
+        program = ("import os, sys, time\nprint('{\"id\": 1, \"crc32\": 2}')\nprint('words')\n"
+                   "for i in range(50): print(i, file=sys.stderr)\nwhile not os.path.exists(sys.argv[1]): time.sleep(0.01)\n"
+                   "sys.exit(3)")
         with tempfile.TemporaryDirectory() as folder:
-            log = pathlib.Path(folder) / "log"
-            one = driver.Driver([sys.executable, "-c", program], [], log, tap=True)
+            log, may_end = pathlib.Path(folder) / "log", pathlib.Path(folder) / "may_end"
+            one = driver.Driver([sys.executable, "-c", program, str(may_end)], [], log, tap=True)
             one.start()
             deadline = time.monotonic() + 20
             while one.poll() is None and time.monotonic() < deadline:
+                if one.peak_mib > 1:  # it was seen
+                    may_end.touch()
                 time.sleep(0.01)
             one.stop()
             self.assertEqual(one.exited[1], 3)
