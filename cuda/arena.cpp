@@ -5,6 +5,7 @@
 namespace sonar::cuda {
 namespace {
 
+// Bytes: whole lines of the device's memory, and enough for any vector load.
 constexpr std::size_t slice_alignment = 256;
 
 }  // namespace
@@ -18,6 +19,7 @@ Arena::~Arena() {
 
 Arena::Place Arena::allocate_bytes(std::size_t bytes) {
   const std::size_t wanted = (bytes + slice_alignment - 1) / slice_alignment * slice_alignment;
+  // The first chunk with room; chunks are few.
   auto it = std::find_if(chunks_.begin(), chunks_.end(), [&](const Chunk& c) { return c.size - c.used >= wanted; });
   if (it == chunks_.end()) {
     chunks_.push_back({});
@@ -44,6 +46,7 @@ void Arena::download(int lane) {
 }
 
 void Arena::clear() {
+  // The memory stays: the next batch needs about as much.
   for (Chunk& c : chunks_) c.used = 0;
 }
 

@@ -9,6 +9,7 @@
 namespace sonar::cuda {
 namespace {
 
+// Surface area heuristic: boxes are hit in proportion to their area, so a split costs area times triangles on both sides.
 constexpr int bins = 16;
 constexpr std::size_t most_in_leaf = 4;
 constexpr int deepest_by_area = 32;  // deeper down items are halved by number, which ends within another 32 levels
@@ -20,10 +21,12 @@ void grow(Box& box, const Box& by) {
     box.high[k] = std::max(box.high[k], by.high[k]);
   }
 }
+/// Of a box; 0 for the empty one.
 float half_area(const Box& b) {
   const float x = b.high[0] - b.low[0], y = b.high[1] - b.low[1], z = b.high[2] - b.low[2];
   return x < 0 ? 0 : x * y + y * z + z * x;
 }
+/// Twice, because only the order of centres and their shares matter.
 float twice_centre(const Box& b, int axis) { return b.low[axis] + b.high[axis]; }
 
 struct Split {
@@ -109,6 +112,7 @@ class Builder {
     return std::clamp(static_cast<int>(part * bins), 0, bins - 1);
   }
   void consider(std::size_t from, std::size_t to, const Box& centres, int axis, Split& best) const {
+    // All centres in one plane: no division by a length of 0.
     if (!(centres.high[axis] > centres.low[axis])) return;
     std::array<Box, bins> box;
     box.fill(no_box);
@@ -119,6 +123,7 @@ class Builder {
       grow(box[b], item);
       ++count[b];
     }
+    // From above: the cost of all bins beyond each plane; then the same from below.
     std::array<float, bins> above{};
     Box all = no_box;
     std::size_t number = 0;

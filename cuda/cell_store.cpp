@@ -19,6 +19,7 @@ const CellStore::Held* CellStore::held(const CellTile& t) const {
   const auto it = tiles_.find(t.data.get());
   if (it == tiles_.end()) return nullptr;
   const Held& h = it->second;
+  // Memory of a dropped tile may have been given to another: its other fields tell them apart.
   const bool same = h.weight_unit == t.weight_unit && h.object == t.object && h.axis == t.axis && h.level == t.level &&
                     h.count == t.count && h.centre_m.x == t.centre_m.x && h.centre_m.y == t.centre_m.y &&
                     h.centre_m.z == t.centre_m.z;
@@ -38,11 +39,14 @@ bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
     for (std::size_t i = part * tiles_at_once; i < end; ++i)
       if (const Held* h = held(*tiles[i].tile)) cells[i] = h->device;
   });
+  // Values of 16 bits that the device lacks; tiles go there once and stay.
   std::size_t more = 0;
   for (std::size_t i = 0; i < tiles.size(); ++i)
     if (!cells[i]) more += values(*tiles[i].tile);
   if (more == 0) return true;
+  // An empty store takes any ping, over its budget if need be.
   if (!tiles_.empty() && bytes() + more * sizeof(std::int16_t) > budget_bytes_) return false;
+  // One copy for all new tiles of a ping.
   const auto host = staging.allocate<std::int16_t>(more);
   const auto device = memory_.allocate<std::int16_t>(more);
   std::size_t at = 0;

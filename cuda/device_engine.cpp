@@ -17,6 +17,7 @@
 namespace sonar::cuda {
 namespace {
 
+// Sets of settings with tables on the device.
 constexpr std::size_t most_plans = 8;
 constexpr int keeping_lane = 2;  // of what stays on the device: plans and cells; rooms have 0 and 1
 
@@ -99,12 +100,14 @@ class DeviceEngine final : public PingEngine {
         each_[i] = statistics_;
         continue;
       }
+      // Two rooms take turns: the CPU prepares one batch while the device computes the other.
       if (!prepare(requests[i], i, rooms_[which])) {
         launch(rooms_[which]);
         for (BatchRoom& room : rooms_) finish(room, pings);
         preparer_.forget_cells();
         if (!prepare(requests[i], i, rooms_[which])) throw std::runtime_error("the tiles of one ping do not fit an empty store");
       }
+      // A batch is full by number, or by memory [bytes].
       if (rooms_[which].pings.size() < batch_ && rooms_[which].work.taken_bytes() < device_options_.work_bytes) continue;
       launch(rooms_[which]);
       which = 1 - which;
@@ -153,11 +156,13 @@ class DeviceEngine final : public PingEngine {
 
   void launch(BatchRoom& room) {
     if (room.pings.empty()) return;
+    // Plans and cells that were sent before are there when this lane begins.
     machine_->order(room.lane, keeping_lane);
     Launch launch;
     launch.views = room.upload();
     launch.pings = static_cast<std::int32_t>(room.views.size());
     launch.timed = options_.now_s != nullptr ? 1 : 0;
+    // A launch covers the largest ping of the batch; smaller ones leave the rest idle.
     for (int step = 0; step < step_count; ++step)
       for (const PingView& view : room.views)
         launch.largest[step] = std::max(launch.largest[step], step_size(static_cast<Step>(step), view));
@@ -172,6 +177,7 @@ class DeviceEngine final : public PingEngine {
       machine_->run(room.lane, launch);
       launch.from = to;
     };
+    // (25): transform of the grids before fold, inverse transform before unfold.
     if (launch.largest[static_cast<int>(Step::spread)] > 0) {
       for (const bool inverse : {false, true}) {
         run_to(static_cast<int>(inverse ? Step::unfold : Step::fold));

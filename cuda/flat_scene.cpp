@@ -20,6 +20,7 @@ struct Bounds {
 };
 
 void add_object(const Mesh& mesh, const Pose& placed, std::uint32_t object, std::vector<FlatTriangle>& triangles) {
+  // In double to the place, then float relative to the origin of rays [m].
   const Rotation turn = rotation_from(placed.orientation);
   std::vector<std::array<float, 3>> corners;
   corners.reserve(mesh.vertices.size());
@@ -58,6 +59,7 @@ Box box_in_world(const Box& own, const PlacedBody& body) {
     bounds.add(at);
   }
   for (int k = 0; k < 3; ++k) {
+    // 1 mm, and the rounding of float at that distance [m]: a ray must not miss the box and hit what is in it.
     const float slack = 1e-3f + 1e-5f * std::max(std::abs(bounds.box.low[k]), std::abs(bounds.box.high[k]));
     bounds.box.low[k] -= slack;
     bounds.box.high[k] += slack;
@@ -68,6 +70,7 @@ Box box_in_world(const Box& own, const PlacedBody& body) {
 }  // namespace
 
 FlatScene::FlatScene(const Scene& scene) : origin_(ray_origin_of(scene)), bodies_(scene.bodies_in_world) {
+  // Group 0 stands still, in world axes; group b + 1 is body b, in its own axes, so that a moved body needs no new tree.
   std::vector<std::vector<FlatTriangle>> of_group(scene.bodies_in_world.size() + 1);
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const Object& object = scene.objects[i];
@@ -85,6 +88,7 @@ FlatScene::FlatScene(const Scene& scene) : origin_(ray_origin_of(scene)), bodies
     for (const FlatTriangle& t : own) boxes.push_back(box_of(t));
     const std::size_t first = order.size();
     group.root = build_bvh(boxes, nodes_, order);
+    // In the order of the leaves: a leaf is a stretch of the array.
     for (std::size_t i = first; i < order.size(); ++i) triangles_.push_back(own[order[i]]);
     Bounds bounds;
     for (const Box& b : boxes) {
@@ -103,6 +107,7 @@ BodyPlaces FlatScene::place(std::span<const Pose> bodies_in_world) const {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const Group& group = groups_[b + 1];
     if (!group.has_triangles) continue;
+    // A request may leave out bodies: they stay where the scene has them.
     const Pose& pose = b < bodies_in_world.size() ? bodies_in_world[b] : bodies_[b];
     const Rotation turn = rotation_from(pose.orientation);
     const Vec3 at = to_float(pose.position_m - origin_);
@@ -115,6 +120,7 @@ BodyPlaces FlatScene::place(std::span<const Pose> bodies_in_world) const {
   }
   if (bodies.empty()) return places;
   std::vector<std::uint32_t> order;
+  // A small tree over the bodies, made for every ping.
   build_bvh(boxes, places.top, order);
   for (const std::uint32_t i : order) places.bodies.push_back(bodies[i]);
   return places;

@@ -17,6 +17,7 @@ using Loop = void (*)(const PingView&, std::uint32_t size, LoopOrder order);
 
 /// A stride that meets every index once: about the golden part of them.
 std::uint64_t stride_over(std::uint64_t size) {
+  // Coprime to the size.
   std::uint64_t stride = size * 5 / 8 + 1;
   while (std::gcd(stride, size) != 1) ++stride;
   return stride;
@@ -24,6 +25,7 @@ std::uint64_t stride_over(std::uint64_t size) {
 
 template <Step step>
 void loop(const PingView& p, std::uint32_t size, LoopOrder order) {
+  // A step's indices must not depend on each other: results are equal in every order.
   if (order == LoopOrder::forwards)
     for (std::uint32_t i = 0; i < size; ++i) run_step<step>(p, i);
   if (order == LoopOrder::backwards)
@@ -48,6 +50,7 @@ class HostLoops final : public Machine {
   std::string name() const override { return "host loops"; }
   void* allocate(std::size_t bytes) override {
     void* const at = ::operator new(bytes, host_alignment);
+    // NaN in every float: what is read before it is written shows.
     if (order_ != LoopOrder::forwards) std::memset(at, 0xFF, bytes);
     return at;
   }

@@ -17,14 +17,17 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
       memory_(machine, Arena::Where::both, 1u << 20),
       noise_memory_(machine, Arena::Where::both, 0) {
   const PingPlan& p = plan_;
+  // (11): u and sqrt(1 - u^2) in float for the rays, which decide shadows only; u in double for the beams.
   std::vector<ColumnSine> sines;
   std::vector<double> u;
   for (int k = 0; k < p.columns.count; ++k) {
     u.push_back(p.columns.sine(k));
     sines.push_back({static_cast<float>(u.back()), static_cast<float>(std::sqrt(std::max(0.0, 1 - u.back() * u.back())))});
   }
+  // Elevations about the array axis [rad] (section 2).
   std::vector<BaseElevation> base;
   for (const float angle : p.fan.elevation_rad) base.push_back({angle, std::cos(angle), std::sin(angle)});
+  // (9): bands of weights, four beams a panel. The device has no beam transform.
   std::vector<BeamWeightRow> rows;
   for (const BeamPanel& panel : p.beam_weights.panels)
     rows.push_back({panel.first_column, panel.count, static_cast<std::uint32_t>(panel.weights), 0});
@@ -46,6 +49,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.beams = p.settings.beam_count;
   view_.max_code = p.settings.format.max_code;
   view_.half_gamma = p.settings.format.gamma / 2;
+  // (40) as a straight line in log2 of the power.
   const LevelLine line = level_line(p.settings.format);
   view_.per_octave = static_cast<float>(line.per_octave);
   view_.at_full_scale = static_cast<float>(line.at_full_scale);
@@ -64,6 +68,7 @@ void PlanTables::add_spectrum(const SpectralColumns& s) {
   v.width = t.width, v.terms = t.terms, v.padded = t.padded;
   v.kernel = memory_.put(t.polynomial);
   v.correction = memory_.put(t.correction);
+  // (25): P(nu_m) / period, interleaved.
   std::vector<double> response;
   for (const spectral::Complex& r : s.response()) response.push_back(r.real()), response.push_back(r.imag());
   v.response = memory_.put(response);
@@ -74,6 +79,7 @@ bool PlanTables::serves(const PingRequest& request) const {
 }
 
 void PlanTables::need_noise(int lane) {
+  // The table is made for the first ping that needs it, and stays on the device with the plan.
   if (view_.noise_table) return;
   noise_.prepare(seed_, plan_.noise_filter);
   view_.noise_table = noise_memory_.put(noise_.shaped());

@@ -12,6 +12,7 @@
 namespace sonar::cuda {
 namespace {
 
+// Bytes that an arena takes at a time: large enough that a batch needs few, and kept from batch to batch.
 constexpr std::size_t table_chunk = 4u << 20, work_chunk = 64u << 20, result_chunk = 4u << 20, cell_chunk = 8u << 20;
 constexpr std::size_t tiles_per_part = 256;  // that one worker writes
 
@@ -59,6 +60,7 @@ PingPreparer::PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene,
       flat_(*scene_),
       scene_memory_(machine, Arena::Where::both, 0),
       store_(machine, cell_bytes) {
+  // The scene goes to the device once; a ping adds the places of its bodies.
   tracer_.nodes = scene_memory_.put(flat_.nodes());
   tracer_.triangles = scene_memory_.put(flat_.triangles());
   tracer_.still_root = flat_.still_root();
@@ -70,6 +72,7 @@ PingPreparer::PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene,
 bool PingPreparer::add(const PingRequest& request, std::size_t index, std::shared_ptr<PlanTables> plan, SurfaceCells& cells,
                        int lane, BatchRoom& room) {
   const WaterColumn& water = scene_->water_column;
+  // Noise, leak and volume read one table of shaped noise (section 5).
   const bool leak = request.switches.leak && plan->plan().mode.receiver.leak_upa > 0;
   const bool wants_noise = request.switches.noise || leak || (request.switches.volume && water.has_volume());
   set_gain(plan->plan(), request.settings.gain_db);
@@ -94,6 +97,7 @@ bool PingPreparer::add(const PingRequest& request, std::size_t index, std::share
     add_water(m);
     if (m.plan.spectral) {
       SpectralView& v = m.view.spectral;
+      // Complex values of all columns: the fine grids of (25), and the spectra folded to one value a sample.
       v.grids = room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.points)).device;
       v.folded = room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.period)).device;
     }
@@ -111,6 +115,7 @@ bool PingPreparer::add(const PingRequest& request, std::size_t index, std::share
 void PingPreparer::place_fan(Making& m) {
   const PingPlan& plan = m.plan;
   const PingScalars& s = m.scalars;
+  // One group of all columns: the CPU divides them for its caches only.
   DepthMap all_columns;
   all_columns.columns = plan.columns.count;
   all_columns.bins = plan.fan.bins;
@@ -135,13 +140,16 @@ void PingPreparer::place_fan(Making& m) {
   std::copy(g.elevation, g.elevation + elevation_terms, sea.elevation);
   sea.origin[0] = s.position_in_scene.x, sea.origin[1] = s.position_in_scene.y, sea.origin[2] = s.position_in_scene.z;
   for (int i = 0; i < 9; ++i) sea.world_from_sonar[i] = static_cast<float>(s.world_from_sonar.m[i / 3][i % 3]);
+  // True range [m] of the last sample that can still receive.
   sea.far_m = static_cast<float>(s.max_range_m);
+  // Tolerance of the refinement (section 2) [m].
   sea.pulse_width_m = static_cast<float>(plan.pulse_width_m);
   sea.truth_half_width_rad = truth_half_width_rad(plan);
 
   m.view.has_scene = m.request.blank ? 0 : 1;
   if (m.request.blank) return;
   m.view.tracer = tracer_;
+  // Places relative to the origin of rays; see FlatScene.
   const BodyPlaces places = flat_.place(m.bodies);
   m.view.tracer.top = m.room.tables.put(places.top);
   m.view.tracer.bodies = m.room.tables.put(places.bodies);
@@ -159,6 +167,7 @@ PingContext PingPreparer::context_of(const Making& m, SurfaceCells& cells, const
 /// Point targets, specular echoes, other sonars; multipath echoes: those of points as points, those of surfaces as columns.
 void PingPreparer::find_points(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws) {
   const PingContext context = context_of(m, cells, laws);
+  // On the CPU: few echoes with many branches. The device adds their pulses to the beams.
   std::vector<PointEcho> points = scatter_points(context);
   const std::vector<ReceivedPulse> pulses = receive_other_sonars(context, m.request);
   if (m.request.switches.specular) specular_echoes_.find(context, points);
@@ -167,6 +176,7 @@ void PingPreparer::find_points(Making& m, SurfaceCells& cells, const std::vector
     m.ping.statistics.rays += counts.rays;
     m.ping.statistics.echoes += counts.echoes;
     if (multipath_.has_echoes) {
+      // Behind the lead: the device adds from sample 0 on.
       m.view.multipath = m.room.tables.put(multipath_.columns.data) + 2 * multipath_.columns.lead;
       m.view.multipath_stride = multipath_.columns.stride;
     }
@@ -193,6 +203,7 @@ void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std:
   for (const ReceivedPulse& pulse : pulses) add(pulse.sine, tone_of(pulse, 0, plan.samples));
   m.view.pulse_count = static_cast<std::int32_t>(in_beams.size());
   m.view.pulses = m.room.tables.put(in_beams);
+  // W of every beam at every point's exact direction, worked out on the device.
   m.view.point_weights =
       m.room.work.allocate<double>(static_cast<std::size_t>(m.view.point_count + m.view.pulse_count) * m.beams()).device;
 }
@@ -200,6 +211,7 @@ void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std:
 bool PingPreparer::find_tiles(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws, int lane) {
   const PingPlan& plan = m.plan;
   CellView in;
+  // As PingSimulation::find_echo_sources: cells within range and fan, in the same order, which is that of every sum.
   in.sonar_in_world = m.scalars.seen_from;
   in.bodies_in_world = m.bodies;
   in.min_range_m = static_cast<float>(m.scalars.min_range_m);
@@ -208,6 +220,7 @@ bool PingPreparer::find_tiles(Making& m, SurfaceCells& cells, const std::vector<
   in.max_elevation_rad = static_cast<float>(plan.widest_about_axis_rad());
   in.levels = plan.levels;
   const std::vector<TileInView>& seen = cells.in_view(in, pool_);
+  // False: the store is full. The caller lets the device finish, empties it and begins this ping again.
   if (!store_.find(seen, lane, m.room.cells, tile_cells_, pool_)) return false;
   prepare_tiles(context_of(m, cells, laws), seen, tiles_);
   m.ping.statistics.tiles = seen.size();
@@ -244,6 +257,7 @@ TileView PingPreparer::view_of(const PreparedTile& prepared, const std::int16_t*
 
 /// The tiles one after the other, every cell a slot.
 void PingPreparer::lay_out_tiles(Making& m, const std::vector<LawTable>& laws) {
+  // sqrt(sigma_b / mu) of a material, an empty table for Lambert's cosine.
   std::vector<const float*> law_on_device;
   for (const LawTable& law : laws) law_on_device.push_back(m.room.tables.put(law.root));
   const auto tiles = m.room.tables.allocate<TileView>(tiles_.size());
@@ -253,6 +267,7 @@ void PingPreparer::lay_out_tiles(Making& m, const std::vector<LawTable>& laws) {
     for (std::size_t i = part * tiles_per_part; i < end; ++i)
       tiles.host[i] = view_of(tiles_[i], tile_cells_[i], law_on_device[static_cast<std::size_t>(tiles_[i].seen.tile->material)]);
   });
+  // In the order of the tiles: a slot's number fixes the place of its echo in every sum.
   std::uint32_t slots = 0;
   for (std::size_t i = 0; i < tiles_.size(); ++i) {
     first_slot.host[i] = slots;
@@ -267,6 +282,7 @@ void PingPreparer::lay_out_tiles(Making& m, const std::vector<LawTable>& laws) {
   view.slots = slots;
   view.chunks = (slots + slots_a_chunk - 1) / slots_a_chunk;
   Arena& work = m.room.work;
+  // Echoes by slot, then sorted by column: ranks within chunks and counts of chunks keep the order of slots in a column.
   view.echoes = work.allocate<Echo>(slots).device;
   view.sorted = work.allocate<Echo>(slots).device;
   view.rank = work.allocate<std::uint32_t>(slots).device;
@@ -279,6 +295,7 @@ void PingPreparer::lay_out_tiles(Making& m, const std::vector<LawTable>& laws) {
 void PingPreparer::add_water(Making& m) {
   const Volume volume(scene_->water_column, m.plan, m.scalars);
   if (!volume.is_audible()) return;
+  // (17): slices of the fan [rad], power by sample [uPa^2], width of a column in u.
   std::vector<VolumeSlice> slices;
   for (const Volume::Slice& s : volume.slices()) slices.push_back({s.range_per_x, s.weight, s.bin, 0});
   std::vector<double> width;
@@ -296,6 +313,7 @@ void PingPreparer::add_water(Making& m) {
 /// Noise, leak, crosstalk and gains.
 void PingPreparer::add_receiver(Making& m) {
   PingView& view = m.view;
+  // The same draws as on the CPU, from (seed, sonar, ping, column).
   view.noise_key = {key_of(m.request.seed, Domain::noise_place), m.request.sonar_id,
                     static_cast<std::uint32_t>(m.request.number)};
   view.has_noise = m.request.switches.noise ? 1 : 0;
@@ -304,17 +322,21 @@ void PingPreparer::add_receiver(Making& m) {
   if (leak.is_audible() && !m.request.blank) {
     view.leak_rms = m.room.tables.put(leak.rms_upa());
     view.leak_samples = static_cast<std::int32_t>(leak.rms_upa().size());
+    // (31): powers of the fixed and the changing part add up to 1.
     view.leak_steady = static_cast<float>(std::sqrt(1 - Leak::changing_share));
     view.leak_changing = static_cast<float>(std::sqrt(Leak::changing_share));
   }
   const Crosstalk crosstalk(m.plan, m.request.switches);
   if (crosstalk.is_audible()) {
+    // (35).
     const Crosstalk::Mix mix = crosstalk.mix(m.plan.expected_power);
     view.crosstalk_own = mix.own;
     view.crosstalk_leaked = mix.leaked;
     view.crosstalk = m.room.work.allocate<float>(2 * m.samples()).device;
   }
+  // (36), (37): gain TVG / full scale, squared, since the receiver works on powers.
   view.row_power_factor = m.room.tables.put(m.plan.row_power_factor);
+  // Complex: columns before beamforming, beams after it [uPa].
   view.signals = m.room.work.allocate<float>(2 * m.samples() * m.columns()).device;
   view.beam_signals = m.room.work.allocate<float>(2 * m.samples() * m.beams()).device;
 }

@@ -15,6 +15,7 @@ constexpr double norm_allowed = 0.01;  // of a quaternion, or of a row of a matr
 constexpr double farthest = 1e8;       // m, m/s, rad/s
 constexpr std::size_t longest_quoted = 40, longest_name = 64;
 
+/// Nothing, or what is wrong with a line.
 using Complaint = std::optional<std::string>;
 
 Complaint not_a_number(std::string_view word, const char* what = "a number") {
@@ -23,6 +24,7 @@ Complaint not_a_number(std::string_view word, const char* what = "a number") {
 
 /// Finite, decimal; leading zeros are no octals in tables.
 std::optional<double> number(std::string_view word) {
+  // from_chars takes no plus sign.
   if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
   double v = 0;
   const char* const last = word.data() + word.size();
@@ -31,11 +33,13 @@ std::optional<double> number(std::string_view word) {
   return v;
 }
 
+/// Of the parts, to hold all three against one bound.
 double largest(Vec3d v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
 /// Of a rotation matrix; by its largest part, so that nothing is divided by something small.
 Quatd quat_from(const Rotation& r) {
   const auto& m = r.m;
+  // 1 + trace is 4 w^2; else the largest diagonal part gives 4 x^2, 4 y^2 or 4 z^2, each at least 1.
   const double trace = m[0][0] + m[1][1] + m[2][2];
   if (trace > 0) return normalized({1 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]});
   if (m[0][0] >= m[1][1] && m[0][0] >= m[2][2])
@@ -45,6 +49,7 @@ Quatd quat_from(const Rotation& r) {
   return normalized({m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], 1 + m[2][2] - m[0][0] - m[1][1]});
 }
 
+/// Rows of length 1, at right angles, right-handed, within norm_allowed: a mirrored frame is none.
 bool is_rotation(const Rotation& r) {
   const Vec3d a{r.m[0][0], r.m[0][1], r.m[0][2]}, b{r.m[1][0], r.m[1][1], r.m[1][2]}, c{r.m[2][0], r.m[2][1], r.m[2][2]};
   for (const Vec3d& row : {a, b, c})
@@ -54,6 +59,7 @@ bool is_rotation(const Rotation& r) {
 
 }  // namespace
 
+// In the order of enum Column. The long names carry the unit, which is the same for the short ones.
 const std::array<std::string_view, Columns::columns> Columns::long_names{
     "t_s",       "t_ns",    "x_m",    "y_m",    "z_m",    "qw",       "qx",       "qy",       "qz",  "roll_deg",
     "pitch_deg", "yaw_deg", "vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps", "body"};
@@ -62,6 +68,7 @@ const std::array<std::string_view, Columns::columns> Columns::short_names{
 
 std::string in_quotes(std::string_view word) {
   std::string out = "\"";
+  // Bytes of a broken file must not reach a terminal.
   for (const char c : word.substr(0, longest_quoted)) out += c >= 0x20 && c < 0x7f ? c : '?';
   return out + (word.size() > longest_quoted ? "...\"" : "\"");
 }
@@ -72,20 +79,24 @@ void Columns::put(std::span<const Column> order) {
 
 Columns Columns::tum() {
   Columns c;
+  // Time [s], position [m], quaternion with w last.
   c.put(std::array{t, x, y, z, qx, qy, qz, qw});
   return c;
 }
 
 Columns Columns::euroc(std::size_t words) {
   Columns c;
+  // Time [ns], position [m], quaternion with w first, velocity [m/s].
   c.put(std::array{t_ns, x, y, z, qw, qx, qy, qz});
   if (words > c.count_) c.put(std::array{vx, vy, vz});
+  // The biases of an IMU are counted, not read.
   c.count_ = std::max(c.count_, words);
   return c;
 }
 
 Columns Columns::kitti() {
   Columns c;
+  // A row-major 3 x 4 matrix: the fourth column is the position [m].
   c.count_ = 12;
   c.matrix_ = true;
   return c;
@@ -95,6 +106,7 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
   out = Columns();
   out.count_ = header.size();
   for (std::size_t i = 0; i < header.size(); ++i) {
+    // A header may mix both sets of names.
     std::size_t c = 0;
     while (c < columns && header[i] != long_names[c] && header[i] != short_names[c]) ++c;
     if (c == columns)
@@ -111,6 +123,7 @@ Complaint Columns::refuse_set() const {
   if (has(t) && has(t_ns)) return "give the time once: t_s or t_ns";
   for (const Column c : {x, y, z})
     if (!has(c)) return "column " + std::string(long_names[c]) + " is missing";
+  // Parts of a vector or a quaternion are given together or not at all.
   const auto of = [this](std::initializer_list<Column> group) {
     return std::count_if(group.begin(), group.end(), [this](Column c) { return has(c); });
   };
@@ -130,6 +143,7 @@ Complaint Columns::refuse_vector(const Words& words, Column first, const char* w
     if (!value) return not_a_number(text);
     *parts[i] = *value;
   }
+  // Beyond every scene [m]; at 1e8 m a double still resolves 1e-8 m.
   if (largest(out) > farthest) return std::string(what) + " is beyond 1e8";
   return std::nullopt;
 }
@@ -147,6 +161,7 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
   const auto fill = [&](std::initializer_list<Column> group) -> Complaint {
     std::size_t i = 0;
     for (const Column c : group) {
+      // Angles that have no column are 0; a quaternion has all four.
       const auto value = has(c) ? number(word(words, c)) : 0.0;
       if (!value) return not_a_number(word(words, c));
       v[i++] = *value;
@@ -156,11 +171,13 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
   if (!has(qw)) {
     if (auto wrong = fill({roll, pitch, yaw})) return wrong;
     if (std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}) > farthest) return "an angle is beyond 1e8";
+    // [rad] from here on.
     out.pose.orientation = quat_from_rpy({rad_from_deg(v[0]), rad_from_deg(v[1]), rad_from_deg(v[2])});
     return std::nullopt;
   }
   if (auto wrong = fill({qw, qx, qy, qz})) return wrong;
   const Quatd q{v[0], v[1], v[2], v[3]};
+  // A norm off by rounding is repaired, a larger error means that the columns are something else.
   const double norm = std::sqrt(norm_squared(q));
   if (norm == 0) return "the quaternion is zero";
   if (!(std::abs(norm - 1) <= norm_allowed)) return "the quaternion's norm is " + std::to_string(norm) + ", it must be 1";
@@ -175,6 +192,7 @@ Complaint Columns::refuse_matrix(const Words& words, Row& out) const {
     if (!value) return not_a_number(words[i]);
     v[i] = *value;
   }
+  // Words 4, 8 and 12 are the position.
   const Rotation turn{{{v[0], v[1], v[2]}, {v[4], v[5], v[6]}, {v[8], v[9], v[10]}}};
   out.pose.position_m = {v[3], v[7], v[11]};
   if (largest(out.pose.position_m) > farthest) return "the position is beyond 1e8";
@@ -194,6 +212,7 @@ Complaint Columns::refuse(const Words& words, Row& out) const {
     if (auto wrong = refuse_vector(words, wx, "the angular velocity", out.angular_velocity_radps)) return wrong;
   if (!has(body)) return std::nullopt;
   out.body = word(words, body);
+  // Names may be UTF-8: control characters alone are refused.
   const bool printable = std::none_of(out.body.begin(), out.body.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7f; });
   if (out.body.empty() || out.body.size() > longest_name || !printable)
     return "a body's name must have 1 to 64 printable characters";

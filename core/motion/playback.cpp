@@ -13,6 +13,7 @@ constexpr std::int64_t one = 1'000'000;  // in millionths
 }  // namespace
 
 std::optional<Speed> Speed::from(double factor) {
+  // So written that NaN is refused, too. In whole millionths a product with nanoseconds is exact.
   if (!(factor >= slowest && factor <= fastest)) return std::nullopt;
   return Speed{std::llround(factor * static_cast<double>(one))};
 }
@@ -24,23 +25,28 @@ bool is_same(const Plan& a, const Plan& b) {
 
 Ns Playback::line(Time clock) const {
   if (paused_) return place_at_;
+  // 64 bits overflow after 2.5 hours at speed 1: nanoseconds times millionths.
   const Wide product = static_cast<Wide>((clock - clock_at_).count()) * rules_.speed.millionths;
   Wide passed = product / one;
   if (product % one < 0) --passed;  // downwards, also before clock_at_
   constexpr auto farthest = static_cast<Wide>(std::numeric_limits<std::int64_t>::max());
+  // Held at 292 years, farther than stamps of a file may be.
   return Ns(static_cast<std::int64_t>(std::clamp(place_at_.count() + passed, -farthest, farthest)));
 }
 
 Playback::Place Playback::place(Time clock) const {
   const Ns reached = line(clock);
   const double rate = paused_ ? 0 : rules_.speed.factor();
+  // Before the start the first pose is held, at rest.
   if (reached < Ns{0}) return {Ns{0}, 0};
   if (duration_ == Ns{0}) return {Ns{0}, 0};
+  // The end of a round is the beginning of the next one.
   if (rules_.loop) return {reached % duration_, rate};
   return reached > duration_ ? Place{duration_, 0} : Place{reached, rate};
 }
 
 void Playback::begin_anew(Time clock) {
+  // Later speeds and pauses count from this place, so that the place itself does not jump.
   const Ns reached = line(clock);
   place_at_ = reached < Ns{0} ? reached : place(clock).at;  // what it still waits, it waits
   clock_at_ = clock;
@@ -58,6 +64,7 @@ void Playback::resume(Time clock) {
 
 void Playback::seek(Time clock, Ns to) {
   clock_at_ = clock;
+  // Speed and pause stay.
   place_at_ = std::clamp(to, Ns{0}, duration_);
 }
 

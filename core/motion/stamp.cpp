@@ -23,10 +23,12 @@ struct Digits {
   int exponent = 0, count = 0;
 
   void take(char digit, bool fraction) {
+    // Leading zeros move the decimal point only: they take none of the nineteen digits.
     if (count == 0 && digit == '0') {
       exponent -= fraction;
       return;
     }
+    // Nineteen digits always fit 64 bits; of later ones their number counts before the point.
     if (count <= most_digits) {
       number = number * 10 + static_cast<std::uint64_t>(digit - '0');
       ++count;
@@ -37,15 +39,19 @@ struct Digits {
   }
   /// Rounded half up; nothing when it is farther than a stamp may be.
   std::optional<std::int64_t> scaled(int shift) const {
+    // The value is number * 10^by.
     const int by = exponent + shift;
     if (number == 0 || by < -most_digits - 1) return 0;
     if (by > most_digits) return std::nullopt;
     if (by < 0) {
+      // 10^19 fits 64 bits unsigned, 10^20 does not.
       const std::uint64_t unit = by < -most_digits ? power_of_ten(most_digits) * 10 : power_of_ten(-by);
+      // Half up, without a sum that could overflow.
       const std::uint64_t rounded = number / unit + (number % unit >= unit - number % unit ? 1 : 0);
       return rounded > farthest_stamp_ns ? std::nullopt : std::optional(static_cast<std::int64_t>(rounded));
     }
     const std::uint64_t unit = power_of_ten(by);
+    // Compared by division: the product could overflow.
     if (number > static_cast<std::uint64_t>(farthest_stamp_ns) / unit) return std::nullopt;
     return static_cast<std::int64_t>(number * unit);
   }
@@ -61,9 +67,11 @@ std::optional<std::int64_t> scaled_number(std::string_view text, int shift) {
     for (++i; i < text.size() && is_digit(text[i]); ++i, ++seen) digits.take(text[i], true);
   if (seen == 0) return std::nullopt;
   if (i < text.size() && (text[i] == 'e' || text[i] == 'E')) {
+    // from_chars takes a minus sign, but no plus, and "+-" is no sign.
     if (++i < text.size() && text[i] == '+' && ++i < text.size() && text[i] == '-') return std::nullopt;
     int exponent = 0;
     const auto end = std::from_chars(text.data() + i, text.data() + text.size(), exponent);
+    // Bounds on text and exponent keep their sum within an int.
     if (end.ec != std::errc{} || exponent < -1000 || exponent > 1000 || text.size() > 1000) return std::nullopt;
     digits.exponent += exponent;
     i = static_cast<std::size_t>(end.ptr - text.data());

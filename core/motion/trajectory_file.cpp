@@ -14,6 +14,7 @@
 namespace sonar::motion {
 namespace {
 
+// Bounds for files that are no trajectories.
 constexpr std::size_t most_bodies = 256;
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
 constexpr std::uint64_t memory_of_a_line = 200;  // bytes: a stamp, a pose and two velocities, and a copy while a vector grows
@@ -41,6 +42,7 @@ void split(std::string_view line, bool commas, Words& words) {
   }
 }
 
+/// Tells a line of numbers from a header.
 bool is_number(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);
   double v = 0;
@@ -49,6 +51,7 @@ bool is_number(std::string_view word) {
 
 std::optional<Frame> frame_called(std::string_view word) {
   std::string upper(word.substr(0, 16));
+  // ASCII alone: toupper depends on the locale.
   std::transform(upper.begin(), upper.end(), upper.begin(),
                  [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; });
   for (std::size_t i = 0; i < frame_names.size(); ++i)
@@ -68,6 +71,7 @@ class Reader {
 
   Result<TrajectoryFile> run(std::string_view text) {
     if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
+    // To the first error: those after it mostly follow from it.
     for (std::size_t at = 0; at < text.size() && wrong_.empty();) {
       const std::size_t end = std::min(text.find('\n', at), text.size());
       ++line_;
@@ -90,6 +94,7 @@ class Reader {
     if (columns_) {
       split(line, commas_, words_);
     } else {
+      // The first line decides the separator, and in begin_table() format and columns.
       commas_ = line.find(',') != std::string_view::npos;
       split(line, commas_, words_);
       if (begin_table()) return;
@@ -100,6 +105,7 @@ class Reader {
     Row row;
     if (const auto wrong = columns_->refuse(words_, row)) return complain(*wrong);
     if (format_ == Format::kitti) {
+      // From the line's number each time [ns]: a sum of intervals would drift.
       const double stamp_ns = static_cast<double>(rows_) * 1e9 / *asked_.rate_hz;
       if (stamp_ns > static_cast<double>(farthest_stamp_ns)) return complain("the time is beyond 146 years");
       row.stamp_ns = std::llround(stamp_ns);
@@ -142,6 +148,7 @@ class Reader {
   }
 
   Format guessed(bool numbers) {
+    // Without a header commas mean EuRoC, 12 values KITTI, 8 values TUM.
     if (!numbers) return Format::csv;
     if (commas_) return Format::euroc;
     if (words_.size() == 12) return Format::kitti;
@@ -151,11 +158,13 @@ class Reader {
 
   void take_comment(std::string_view line) {
     const std::size_t word = line.find("frame:");
+    // Other comments are free.
     if (word == std::string_view::npos) return;
     Words words;
     split(line.substr(word + 6), false, words);
     const auto frame = words.empty() ? std::nullopt : frame_called(words.front());
     if (!frame) return complain("the frame must be ENU_FLU or NED_FRD");
+    // Frames that contradict each other are an error: the file's must not be overruled in silence.
     if (frame_.value_or(*frame) != *frame) return complain("the frame was another one before");
     if (asked_.frame.value_or(*frame) != *frame)
       return complain("the file says " + std::string(name_of(*frame)) + ", but it was to be read as " +
@@ -167,6 +176,7 @@ class Reader {
     Track* const track = track_of(row.body);
     if (track == nullptr) return complain("more than " + std::to_string(most_bodies) + " bodies");
     Points& p = track->points;
+    // Strictly, for each body: intervals have a length.
     if (!p.times.empty() && Ns(row.stamp_ns) <= p.times.back())
       return complain("the time does not rise" + (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
     p.times.emplace_back(row.stamp_ns);
@@ -176,6 +186,7 @@ class Reader {
   }
 
   Track* track_of(std::string_view body) {
+    // Lines of one body mostly follow each other.
     if (last_ < tracks_.size() && tracks_[last_].body == body) return &tracks_[last_];
     for (last_ = 0; last_ < tracks_.size(); ++last_)
       if (tracks_[last_].body == body) return &tracks_[last_];
@@ -197,6 +208,7 @@ class Reader {
     TrajectoryFile file;
     file.format = format_;
     file.frame = frame_ ? *frame_ : *asked_.frame;
+    // Times of all bodies count from the file's earliest.
     Ns first = tracks_.front().points.times.front(), last = first;
     for (const Track& t : tracks_) {
       first = std::min(first, t.points.times.front());
@@ -206,6 +218,7 @@ class Reader {
     file.duration = last - first;
     for (Track& t : tracks_) {
       for (Ns& at : t.points.times) at -= first;
+      // The file's frame ends here: inside, all is ENU and FLU (docs/glossary.md).
       if (file.frame == Frame::ned_frd) turn_to_enu_flu(t.points);
       file.bodies.push_back({std::move(t.body), std::make_shared<const Trajectory>(std::move(t.points), file.duration)});
     }

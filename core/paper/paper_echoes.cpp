@@ -12,22 +12,26 @@ namespace {
 
 /// Delay over the record's length; the record begins where the picture does.
 double turns_of(double range_m, const Prepared& p, const PingScalars& s) {
+  // In periods of the record: P25's sum over frequencies (its eq. 4) repeats after T.
   return (range_m * s.samples_per_m - p.plan.start_samples) / p.plan.samples;
 }
 
 }  // namespace
 
 double elevation_pattern(const Prepared& p, double elevation_rad) {
+  // One sinc of the quoted width, sinc(0.884 sin(phi) / width) (section 8).
   return p.elevation_per_sine > 0 ? sinc(p.elevation_per_sine * std::sin(elevation_rad)) : 1.0;
 }
 
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& p, const PingScalars& s,
               PaperEchoes& echoes) {
   const double turns = turns_of(range_m, p, s);
+  // Outside of the record the sum would fold an echo back into it.
   if (!(turns >= 0 && turns < 1)) return false;
   // Choi 2025, eq. 1: sqrt(cross-section) D(phi) e^{-2 a r} / r^2 times the source.
   const double amplitude =
       s.source_upa * std::sqrt(cross_section_m2) * pattern * two_way_transmission(range_m, s.absorption_np_per_m);
+  // (39) in expected power; else xi and the phase (12).
   if (p.plan.expected_power)
     echoes.push_back({turns, {amplitude * amplitude, 0}});
   else

@@ -18,11 +18,13 @@ class ComparisonEngine {
       : rays_(scene, pool.threads()), scene_(std::move(scene)), pool_(pool), options_(options), sum_(sum) {}
 
   Ping run(const PingRequest& asked) {
+    // At the sea surface the ping is computed elsewhere than asked for, and states where it was asked for.
     std::vector<PingRequest> room;
     const PingRequest& request = in_water({&asked, 1}, *scene_, room).front();
     if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
+    // Kept until model or settings change: the tables cost more than a ping.
     if (!prepared_ || !prepared_->serves(request)) prepared_ = std::make_unique<paper::Prepared>(request, sum_);
     statistics_ = {};
     Ping ping = paper::simulate(rays_, request, *prepared_, simd::kernels_for(options_.simd), pool_, options_.now_s, statistics_);

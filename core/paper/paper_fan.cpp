@@ -21,9 +21,11 @@ std::vector<double> widths_of(const std::vector<double>& centres, double lone) {
 }
 
 void tabulate(PaperFan& fan) {
+  // What depends on the column alone, and on the row alone: a direction is made of the two.
   for (const double azimuth : fan.azimuth_rad)
     fan.ahead.push_back(fan.perspective ? Vec3d{1, std::tan(azimuth), 0} : Vec3d{std::cos(azimuth), std::sin(azimuth), 0});
   for (int row = 0; row < fan.rows; ++row) {
+    // Elevation [rad], on the image plane its tangent.
     const double up = fan.first_row + row * fan.row_step;
     fan.level.push_back(fan.perspective ? 1 : std::cos(up));
     fan.rise.push_back(fan.perspective ? up : std::sin(up));
@@ -36,18 +38,22 @@ PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
   PaperFan fan;
   fan.perspective = mode == Mode::raster;
   fan.rows = rays > 0 ? rays : fan.perspective ? default_raster_rows : default_rays;
+  // Of the half angle: the fan spans twice the quoted width, as in P25.
   const double vertical = std::min(static_cast<double>(plan.mode.pattern.elevation_width_rad), widest_half_angle_rad);
   const double top = fan.perspective ? std::tan(vertical) : vertical;
   fan.row_step = 2 * top / fan.rows;
+  // Rows at the middles of even steps.
   fan.first_row = -top + 0.5 * fan.row_step;
 
   const double aperture = static_cast<double>(plan.mode.horizontal_aperture_rad);
   if (!fan.perspective) {
+    // Constant azimuth, not a cone about the array (O46).
     for (const double sine : plan.beam_sine) fan.azimuth_rad.push_back(std::asin(sine));
     fan.column_width = widths_of(fan.azimuth_rad, aperture);
     tabulate(fan);
     return fan;
   }
+  // Pixels are even in the tangent of azimuth.
   const double side = std::tan(std::min(0.5 * aperture, widest_half_angle_rad));
   const int columns = plan.settings.beam_count;
   for (int i = 0; i < columns; ++i) fan.azimuth_rad.push_back(std::atan(side * (1 - (2.0 * i + 1) / columns)));
@@ -66,6 +72,7 @@ Vec3d PaperFan::direction(int column, int row) const {
 
 double PaperFan::solid_angle_sr(int column, int row) const {
   const double cell = column_width[static_cast<std::size_t>(column)] * row_step;
+  // As P25's (2) is printed, dtheta dphi, without cos(phi) [sr].
   if (!perspective) return cell;
   const double x = direction(column, row).x;  // a pixel of the plane x = 1 is seen under dy dz x^3
   return cell * x * x * x;
@@ -88,6 +95,7 @@ void trace_column(const RayScene& scene, const PaperFan& fan, const PingScalars&
       if (packet.object[lane] == RayPacket::miss) continue;
       const Vec3 normal{packet.normal_x[lane], packet.normal_y[lane], packet.normal_z[lane]};
       const Vec3 along{packet.direction_x[lane], packet.direction_y[lane], packet.direction_z[lane]};
+      // Triangles without an area have no normal.
       if (!(length(normal) > 0)) continue;
       const int row = from + lane;
       hits.push_back({column, row, static_cast<double>(packet.far[lane]), fan.elevation_rad(column, row),

@@ -22,6 +22,7 @@ PingScalars still_scalars(const PingPlan& plan, PingRequest request, Vec3d origi
 
 std::vector<double> coefficients(const Scene& scene) {
   std::vector<double> mu;
+  // mu [1/sr] by material: P25 has Lambert's law alone.
   for (const Material& m : scene.materials) mu.push_back(lambert_coefficient(static_cast<double>(m.lambert_db)));
   return mu;
 }
@@ -39,6 +40,7 @@ std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p
   for (const PointTarget& target : scene.scene().point_targets) {
     const Vec3d in_world = scene.scene().in_world(target, bodies);
     const Vec3d at = transform(inverse(s.seen_from), in_world);
+    // 1e-9 m: a point in the sonar has no direction.
     const double range = length(at), azimuth = std::atan2(at.y, at.x), elevation = std::asin(at.z / std::max(range, 1e-9));
     int nearest = 0;
     const auto off = [&](int k) { return std::abs(p.fan.azimuth_rad[static_cast<std::size_t>(k)] - azimuth); };
@@ -80,6 +82,7 @@ class PaperPing {
         now_s_(now_s),
         statistics_(statistics),
         work_(static_cast<std::size_t>(pool.threads())) {
+    // Floats: in expected power one a sample, else two a frequency. The beam kernels take multiples of 32.
     values_ = static_cast<std::size_t>((p_.plan.expected_power ? p_.plan.samples : 2 * p_.spectrum.count) + 31) / 32 * 32;
     columns_.resize(values_ * static_cast<std::size_t>(p_.fan.columns()));
     if (request.switches.keep_truth) truth_.resize(static_cast<std::size_t>(p_.fan.columns()));
@@ -118,11 +121,13 @@ class PaperPing {
 };
 
 void PaperPing::simulate_columns() {
+  // Above the sea surface there are no echoes, and these modes have no noise.
   if (request_.blank) return;
   points_ = points_in_view(scene_, p_, s_, request_);
   pool_.for_each(static_cast<std::size_t>(p_.fan.columns()), [&](std::size_t column, int worker) {
     simulate_column(static_cast<int>(column), work_[static_cast<std::size_t>(worker)]);
   });
+  // Workers count for themselves, so that they share no memory.
   for (const Work& work : work_) {
     const PingStatistics& share = work.statistics;
     for (std::size_t i = 0; i < share.seconds.size(); ++i) statistics_.seconds[i] += share.seconds[i];
@@ -152,6 +157,7 @@ void PaperPing::simulate_column(int column, Work& work) {
   const double scattered = now();
   const std::span<float> out = std::span(columns_).subspan(static_cast<std::size_t>(column) * values_, values_);
   if (p_.plan.expected_power) {
+    // (39): the powers of pulses add, in time.
     for (std::size_t i = 0; i < echoes.size(); ++i)
       p_.pulse_power->add(echoes[i], out.first(static_cast<std::size_t>(p_.plan.samples)));
   } else {
@@ -190,6 +196,7 @@ Ping PaperPing::image() {
   pool_.for_each(static_cast<std::size_t>(beams), [&](std::size_t j, int worker) {
     const float* in = beams_.data() + j * values_;
     float* out = signals.beam(static_cast<int>(j));
+    // In expected power the values are samples already.
     if (p_.plan.expected_power)
       for (int n = 0; n < p_.plan.samples; ++n) out[2 * n] = in[n];
     else
@@ -209,6 +216,7 @@ Ping PaperPing::image() {
 
 /// Envelope, gain and codes, a window of rows at a time.
 void PaperPing::receive_rows(const BeamSignals& signals, Ping& ping) {
+  // Rows a task: from envelope to codes they stay in cache.
   constexpr int rows_at_once = 64;
   struct Scratch {
     BeamSignals window;
@@ -247,8 +255,10 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
   if (!even)
     correction =
         panels_of(make_correction(fan.azimuth_rad, spacing, plan.expected_power), plan.settings.beam_count, fan.columns());
+  // D(phi) = sinc(0.884 sin(phi) / width), one pattern of the quoted width (section 8).
   if (plan.mode.pattern.elevation_taper != Taper::unit)
     elevation_per_sine = width_constant / static_cast<double>(plan.mode.pattern.elevation_width_rad);
+  // Of a fan, a row has one elevation; on an image plane it depends on the column.
   for (int row = 0; row < fan.rows && !fan.perspective; ++row)
     pattern.push_back(elevation_pattern(*this, fan.elevation_rad(0, row)));
 }

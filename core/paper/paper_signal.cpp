@@ -9,6 +9,7 @@ namespace {
 using spectral::Complex;
 using spectral::turned;
 
+// Steps between samples at which the power of a pulse is tabulated: fewer on long records, to bound the memory.
 constexpr std::size_t largest_power_table = std::size_t{1} << 22;  // values
 constexpr int most_steps = 64;
 
@@ -18,6 +19,7 @@ PaperSpectrum make_spectrum(const PingPlan& plan) {
   PaperSpectrum s;
   s.samples = plan.samples;
   s.sample_offset = plan.sample_offset - plan.start_samples;
+  // T [s], there and back.
   const double record_s = plan.samples * 2 * plan.sample_spacing_m / static_cast<double>(plan.settings.device_sound_speed_mps);
   // Choi 2025, eq. 4: df = 1 / T, M = b T frequencies about the carrier.
   const double band = plan.envelope_hz * record_s;                  // b T, in units of df
@@ -47,6 +49,7 @@ void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, c
   if (fast) {
     sums.resize(static_cast<std::size_t>(spectrum.count));
     scratch.grid.assign(static_cast<std::size_t>(fast->grid_points() + fast->padding), 0.0);
+    // FrequencySums counts from the middle frequency; carriers are in the amplitudes.
     const double middle = spectrum.first_frequency + spectrum.count / 2;
     fast->add(echoes.turns, echoes.re, echoes.im, middle, kernels, scratch.grid.data());
     fast->transform(scratch.grid.data(), sums.data());
@@ -77,11 +80,13 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
 std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad) {
   const std::size_t n = azimuth_rad.size();
   if (n < 2) return nullptr;
+  // Even to 1e-9 rad, or the correction is no convolution.
   const double step = (azimuth_rad.back() - azimuth_rad.front()) / static_cast<double>(n - 1);
   std::vector<double> v;
   double energy = 0;
   for (std::size_t d = 0; d < n; ++d) {
     if (std::abs(azimuth_rad[d] - azimuth_rad[0] - static_cast<double>(d) * step) > 1e-9) return nullptr;
+    // The weight of make_correction; of n azimuths n - d pairs are d apart, either way.
     const double y = pi * 0.884 / spacing_rad * std::sin(static_cast<double>(d) * step);
     v.push_back(d == 0 ? 1.0 : std::abs(std::sin(y) / y));
     energy += v.back() * v.back() * static_cast<double>(n - d) * (d == 0 ? 1 : 2);
@@ -94,6 +99,7 @@ void correct(const BeamTransformTables& even, std::span<const float> in, int val
              std::span<float> out) {
   constexpr int block = 32;
   std::vector<AlignedFloats> work(static_cast<std::size_t>(pool.threads()), AlignedFloats(even.work_floats()));
+  // Every value is corrected for itself: the sums do not depend on the number of threads.
   pool.for_each(static_cast<std::size_t>(values / block), [&](std::size_t b, int worker) {
     kernels.transform_beams(even.tables(), in.data() + b * block, values, block, work[static_cast<std::size_t>(worker)].data(),
                             out.data() + b * block, values);
@@ -130,6 +136,7 @@ void correct(std::span<const float> panels, int beams, int columns, std::span<co
 InverseTransform::InverseTransform(const PaperSpectrum& spectrum) : grid_(spectrum) {
   const double samples = spectrum.samples;
   if (spectral::have_transform) inverse_ = std::make_unique<spectral::Fft>(spectrum.samples, spectral::Fft::Direction::inverse);
+  // t_0: sample 0 lies sample_offset after the record's beginning.
   for (int m = 0; m < spectrum.count; ++m)
     half_turn_.push_back(turned((spectrum.first_frequency + m) * spectrum.sample_offset / samples));
   for (int n = 0; n < spectrum.samples; ++n) {
@@ -151,6 +158,7 @@ void InverseTransform::run(std::span<const std::complex<float>> spectrum, std::v
       for (std::size_t m = 0; m < n; ++m) sums[i] += work[m] * root_[i * m % n];
     work.swap(sums);
   }
+  // The transform counts frequencies from 0: e^{i 2 pi f_1 t_n} puts the first one at its place.
   for (std::size_t i = 0; i < n; ++i) {
     const Complex s = work[i] * baseband_[i];
     out[2 * i] = static_cast<float>(s.real()), out[2 * i + 1] = static_cast<float>(s.imag());

@@ -11,6 +11,7 @@ namespace sonar {
 
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
                 BeamSignals& out) {
+  // A window of samples of all columns, complex: two floats a sample.
   const int floats = static_cast<int>(out.stride), first_sample = out.first_sample;
   // Eq. 9 for all beams at once: a convolution over columns that are even in u = sin(azimuth) (beam_transform.hpp).
   if (beam_weights.transform) {
@@ -19,6 +20,7 @@ void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, c
                             scratch.transform.data(), out.data.data(), floats);
     return;
   }
+  // Side by side, because the columns' records are too far apart to stay in cache together.
   scratch.window.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>(columns.columns));
   for (int k = 0; k < columns.columns; ++k) {
     const float* from = columns.first_sample(k) + 2 * first_sample;
@@ -36,6 +38,7 @@ SampledPulse place_pulse(const PointEcho& point, const PingPlan& plan, int from,
   // Only the samples within half the pulse's taps of the echo are not 0.
   pulse.first_sample = std::max(middle - plan.taps / 2 + 1, from);
   const int end = std::min(middle + plan.taps / 2 + 1, to);
+  // (8) for one echo, in double, at its exact delay: no table.
   for (int n = pulse.first_sample; n < end; ++n)
     pulse.values.push_back(point.amplitude * plan.pulse_shape.at(plan.sample_time_s * (n - point.sample)));
   return pulse;
@@ -55,6 +58,7 @@ void add_points(std::span<const PointEcho> points, const PingPlan& plan, BeamSig
 
   // A point's weight is the pattern at its exact direction, W(u - u_j), not that of its nearest column.
   std::vector<std::complex<double>> sum;
+  // Beam by beam in the order of the points: windows on different threads share no sum.
   for (int j = 0; j < out.beams; ++j) {
     sum.assign(static_cast<std::size_t>(out.samples), 0.0);
     for (const auto& [sine, pulse] : here) {

@@ -14,6 +14,7 @@ constexpr std::uint32_t table_samples = noise_table_samples;
 }  // namespace
 
 void NoiseTable::prepare(Seed seed, const std::vector<float>& filter) {
+  // Kept while seed and filter stay: a ping only reads the table.
   const bool same_seed = !white_.empty() && seed == seed_;
   if (same_seed && filter == filter_) return;
   // White complex Gaussians, E|z|^2 = 1; a draw of four words makes two of them.
@@ -55,6 +56,7 @@ void NoiseTable::read(std::uint32_t sonar, std::uint32_t ping, int column_index,
   std::size_t at = place.first;
   // The table from a hashed start, turned by one of four quarter turns: a function of (seed, sonar, ping, column).
   const float sign = place.negative ? -rms : rms;
+  // The table is periodic: reading goes on at its beginning.
   for (int done = 0; done < samples;) {
     const int run = static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(samples - done), table_samples - at));
     const float* __restrict from = shaped_.data() + 2 * at;

@@ -25,6 +25,7 @@ void detect(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels&
     for (int row = 0; row < rows; ++row)
       for (int j = from; j < to; ++j) {
         const float* s = beams.beam(j) + 2 * row * per_row;
+        // In expected power re is a power already.
         float sum = 0;
         for (int q = 0; q < per_row; ++q)
           sum += plan.expected_power ? s[2 * q] : s[2 * q] * s[2 * q] + s[2 * q + 1] * s[2 * q + 1];
@@ -38,12 +39,14 @@ void keep_signal(const BeamSignals& beams, std::vector<std::complex<float>>& kep
   for (int j = 0; j < beams.beams; ++j) {
     const float* s = beams.beam(j);
     for (int n = 0; n < beams.samples; ++n) {
+      // Windows are parts of their own of the same array: workers write without locks.
       const std::size_t at = static_cast<std::size_t>(beams.first_sample + n) * static_cast<std::size_t>(beams.beams);
       kept[at + static_cast<std::size_t>(j)] = {s[2 * n], s[2 * n + 1]};
     }
   }
 }
 
+/// Little-endian.
 void put(std::uint32_t code, int bytes, std::byte* at) {
   for (int b = 0; b < bytes; ++b) at[b] = static_cast<std::byte>(code >> (8 * b) & 0xFFu);
 }
@@ -75,6 +78,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
   const bool logarithmic = s.format.scale == SampleFormat::Scale::logarithmic;
   const LevelLine line = level_line(s.format);
   const auto per_octave = static_cast<float>(line.per_octave), at_full_scale = static_cast<float>(line.at_full_scale);
+  // Gain is that of the row in the picture, (36), whatever the window.
   for (int row = 0; row < rows; ++row) {
     const float* power = scratch.power.data() + static_cast<std::ptrdiff_t>(row) * width;
     const std::size_t at = static_cast<std::size_t>(first_row + row) * static_cast<std::size_t>(s.beam_count);
@@ -88,6 +92,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
       std::memcpy(out, scratch.bytes.data(), static_cast<std::size_t>(s.beam_count));
       continue;
     }
+    // (40) is a straight line in log2 of the power.
     if (logarithmic)
       kernels.quantise_levels(power, gain, per_octave, at_full_scale, max_code, scratch.codes.data(), width);
     else

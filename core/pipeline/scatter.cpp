@@ -11,11 +11,13 @@
 namespace sonar {
 namespace {
 
+/// 1 / length of a ramp [1/m]; a ramp without length becomes a step.
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
 /// Which columns the box round a tile's cells can reach: u = y / r (y / h for flat beams) over it, to second order.
 void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotation& sonar_from_object, const PingPlan& plan,
                   PreparedTile& out) {
+  // All columns unless the box is small beside its distance, where u is nearly linear over it.
   out.first_column = 0, out.last_column = plan.columns.count;
   const Vec3d half = to_double(tile.box_half_m), c = centre_from_sonar_m + sonar_from_object * to_double(tile.box_middle_m);
   const double from_axis = plan.switches.conical ? length(c) : std::sqrt(c.x * c.x + c.y * c.y);
@@ -29,6 +31,7 @@ void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotatio
   // First order: |du| <= sum |du/dx_i| half_i; second order: radius^2 / 2 times the bound 3 / r^2.
   const double spread = std::abs(gradient.x) * half.x + std::abs(gradient.y) * half.y + std::abs(gradient.z) * half.z +
                         1.5 * radius * radius / (nearest * nearest) + 1e-6;
+  // Column k spans u = first_sine - (k -+ 1/2) spacing: rounded outwards, a column too many costs little.
   const double from = (plan.columns.first_sine - (sine + spread)) / plan.columns.spacing + 0.5;
   const double to = (plan.columns.first_sine - (sine - spread)) / plan.columns.spacing + 1.5;
   out.first_column = static_cast<int>(std::clamp(std::floor(from), 0.0, static_cast<double>(plan.columns.count)));
@@ -46,6 +49,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Bubb
   const Rotation sonar_from_object = s.moves ? at.turn * seen_from_object : seen_from_object;
   const Vec3d from_sonar_object_m =
       s.moves ? t.from_sonar_object_m - transposed(seen_from_object) * at.moved_m : t.from_sonar_object_m;
+  // In double; cells add a float difference to it (section 1).
   const double range = length(at.from_sonar_m);
   seen.tile = &tile;
   const Vec3 q = to_float(from_sonar_object_m), p = to_float(at.from_sonar_m);
@@ -53,7 +57,9 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Bubb
   seen.from_sonar[0] = p.x, seen.from_sonar[1] = p.y, seen.from_sonar[2] = p.z;
   for (int i = 0; i < 9; ++i) seen.turn[i] = static_cast<float>(sonar_from_object.m[i / 3][i % 3]);
   seen.range_m = static_cast<float>(range);
+  // (12): phase of the tile's centre in [0, 1) turns.
   seen.phase_turns = static_cast<float>(fraction_of_turn(range * s.turns_per_m));
+  // (27) for the tile's middle: later by so many samples.
   seen.sample_shift = static_cast<float>(s.doppler_samples(at.from_sonar_m));
   const LawTable& law = context.laws[static_cast<std::size_t>(tile.material)];
   seen.law = law.table();
@@ -67,7 +73,9 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Bubb
     constant *= bubbles.two_way(sonar_z_m, sonar_z_m + (s.world_from_sonar * seen_at).z, length(seen_at));
   }
   seen.amplitude = static_cast<float>(constant * static_cast<double>(tile.weight_unit));
+  // Expected power: the edge of a cell [m], root of its area, replaces the weight, since |xi|^2 is 1 in the mean.
   seen.area_amplitude = static_cast<float>(constant * lattice::cell_size_m(tile.level));
+  // Levels cross-fade over 15 % of range (section 3).
   seen.fade_in_from_m = t.level->fade_in_from_m;
   seen.fade_in_per_m = per_metre(t.level->fade_in_from_m, t.level->full_from_m);
   seen.fade_out_to_m = t.level->fade_out_to_m;
@@ -97,6 +105,7 @@ std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const Pi
 void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view, std::vector<PreparedTile>& tiles) {
   const BubbleLayer bubbles(context.scene().sea_surface);
   tiles.resize(in_view.size());
+  // Tiles a task. Each writes its own place, so the order of the tiles, and of every sum, is that of one thread.
   constexpr std::size_t batch = 256;
   context.pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);
@@ -132,6 +141,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
 void sort_tiles(const std::vector<PreparedTile>& tiles, int group_columns, int groups,
                 std::vector<std::vector<std::uint32_t>>& by_group) {
   by_group.resize(static_cast<std::size_t>(groups));
+  // A tile that reaches into several groups is looked at by each of them; within a group the tiles keep their order.
   for (auto& wanted : by_group) wanted.clear();
   for (std::size_t i = 0; i < tiles.size(); ++i)
     for (int g = tiles[i].first_column / group_columns; g * group_columns < tiles[i].last_column && g < groups; ++g)
@@ -162,6 +172,7 @@ std::vector<PointEcho> scatter_points(const PingContext& context) {
   for (const PointTarget& target : scene.scene().point_targets) {
     const Vec3d in_world = scene.scene().in_world(target, context.bodies_in_world);
     const Vec3d seen = transform(world_in_sonar, in_world);
+    // Within the housing 1 / r^2 has no meaning; behind the array nothing is received.
     if (length(seen) < nearest_scatterer_m || seen.x <= 0) continue;
     const double strength = amplitude_from_db(static_cast<double>(target.target_strength_db));
     const std::optional<PointEcho> echo = point_echo(seen, strength, context.plan, s);
@@ -176,11 +187,13 @@ std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> str
   // Eq. 6 for one scatterer: |strength| = sqrt(sigma_b A_c) of a point, 10^(TS/20).
   const Vec3d p = s.echo_geometry(from_sonar_m).from_sonar_m;
   const double r = length(p);
+  // (29) has moved the place; (27) displaces the echo of a sweep.
   const double at_sample = s.sample_of(r) + s.doppler_samples(p);
   if (r < nearest_scatterer_m || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) return {};
   const ConicalDirection direction = plan.direction_of(p);
   const std::optional<std::size_t> column = plan.column_of(direction, plan.fan.half_angle_rad);
   if (!column) return {};
+  // 10^(SL/20) e^{-2 a r} / r^2 D_v T [uPa per m]; the phase is (12).
   const double transmit = static_cast<double>(plan.columns.transmit[*column]);
   const double amplitude = s.source_upa * two_way_transmission(r, s.absorption_np_per_m) *
                            elevation_two_way(plan.mode.pattern, direction.psi_rad) * transmit;

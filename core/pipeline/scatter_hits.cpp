@@ -27,6 +27,7 @@ class HitBatch {
         s_(context.scalars),
         kernels_(context.kernels),
         echoes_(echoes) {
+    // The draw is a function of (seed, object, column, ray): equal in every ping and on every thread count.
     const RandomKey key = key_of(seed, Domain::fixed_fan);
     arguments_.draw.counter[0] = object_, arguments_.draw.counter[1] = column_, arguments_.draw.counter[2] = ray_;
     arguments_.draw.key = key;
@@ -47,6 +48,7 @@ class HitBatch {
     const Object& object = scene_.objects[hit.object];
     // sqrt(sigma) / r^2, sigma = strength * footprint_area_m2; the solid angle of a ray is in its weight.
     const float strength = laws_[object.mesh->material[hit.triangle]].root_strength(hit.cosine);
+    // cosine_floor: the footprint of a facet seen edge-on would be infinite.
     const float slant = std::sqrt(std::max(hit.cosine, static_cast<float>(cosine_floor)));
     const float weight = static_cast<float>(s_.source_upa) * strength *
                          plan_.fixed_fan_rays[static_cast<std::size_t>(hit.ray)].weight / (slant * hit.range_m) *
@@ -84,6 +86,7 @@ class HitBatch {
     if (plan_.switches.conical) return 1;
     if (column != last_column_) {
       const double sine = plan_.columns.sine(column);
+      // Root of dtheta = du / cos(theta): weights are amplitudes.
       last_weight_ = static_cast<float>(1 / std::sqrt(std::sqrt(1 - sine * sine)));
       last_column_ = column;
     }

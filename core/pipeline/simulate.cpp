@@ -107,6 +107,7 @@ PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, B
   PreparedSettings& p = **it;
   p.last_used = w.pings;
   set_gain(p.plan, request.settings.gain_db);
+  // Noise, leak and volume read one table; it is drawn anew for another seed or filter only.
   const bool volume = request.switches.volume && scene.water_column.has_volume();
   const bool leak = request.switches.leak && p.plan.mode.receiver.leak_upa > 0;
   if ((request.switches.noise || leak || volume) && !p.plan.expected_power) p.noise.prepare(request.seed, p.plan.noise_filter);
@@ -134,6 +135,7 @@ class PingSimulation {
         crosstalk_(plan_, request.switches),
         bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world),
         context_{scene, cells, bodies_, w_.laws, plan_, scalars_, kernels, pool} {
+    // Buffers keep their memory from ping to ping; values of an earlier ping are never read.
     w_.columns.shape(plan_.columns.count, plan_.samples, plan_.taps);
     group_columns_ = group_columns();
     w_.workers.resize(static_cast<std::size_t>(pool.threads()));
@@ -188,6 +190,7 @@ class PingSimulation {
 /// as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
 int PingSimulation::group_columns() const {
   const int traced = traced_columns();
+  // Small groups: the other sonar's ping runs between them.
   if (w_.between && w_.between->expected()) return traced;
   const int bins = ray_is_scatterer() ? 0 : plan_.fan.bins;
   // Signals and depth maps of a group should fit a worker's share of the second-level cache.
@@ -255,6 +258,7 @@ void PingSimulation::simulate_columns() {
 
 void PingSimulation::simulate_group(int first, int last, Workspace::Buffers::PerWorker& mine) {
   Stopwatch watch(w_.now_s, mine.statistics);
+  // Draws depend on (seed, sonar, ping, column) alone: equal on every thread count.
   const PingNoise draws{&prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number)};
   const PingNoise noise{request_.switches.noise ? draws.table : nullptr, draws.sonar, draws.ping};
   // Order of a column's sums: noise, echoes, multipath, volume, T(u), leak; outside the sector the noise follows T(u).
@@ -300,6 +304,7 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
   watch.lap(Stage::trace);
   const simd::GroupView group = make_group_view(plan_, scalars_, mine.seen);
   const auto& wanted = w_.tiles_by_group[static_cast<std::size_t>(first / group_columns_)];
+  // scatter() stops when its buffer is full; the tiles' order stays.
   for (std::size_t next = 0; next < wanted.size();) {
     next = scatter(w_.tiles, wanted, next, group, kernels_, mine.echoes);
     mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
@@ -328,6 +333,7 @@ Ping PingSimulation::image() {
     const int first = static_cast<int>(window) * rows_at_once;
     image_rows(first, std::min(first + rows_at_once, rows), w_.workers[static_cast<std::size_t>(worker)], ping);
   });
+  // Workers count for themselves, so that they share no memory.
   for (const Workspace::Buffers::PerWorker& worker : w_.workers) {
     for (std::size_t s = 0; s < w_.statistics.seconds.size(); ++s) w_.statistics.seconds[s] += worker.statistics.seconds[s];
     w_.statistics.rays += worker.statistics.rays;
@@ -339,6 +345,7 @@ Ping PingSimulation::image() {
 void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWorker& mine, Ping& ping) {
   Stopwatch watch(w_.now_s, mine.statistics);
   const int per_row = plan_.settings.samples_per_row;
+  // A window is 64 samples of whole rows: its beams stay in cache until they are codes.
   mine.beams.shape(plan_.settings.beam_count, first * per_row, (last - first) * per_row);
   form_beams(w_.columns, plan_.beam_weights, kernels_, mine.beam_scratch, mine.beams);
   // On top of the beams at exact directions: points and other sonars; then crosstalk between the beams.

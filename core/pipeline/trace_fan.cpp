@@ -39,16 +39,20 @@ class PacketFiller {
 
   void add(ColumnSine column, Elevation e) {
     const auto i = static_cast<std::size_t>(count_++);
+    // Inverse of (11): a unit direction in sonar axes from the column's u and the elevation psi.
     const auto [x, y, z] = ray_in_sonar(conical_, column.along, column.across, e.cosine, e.sine);
     packet.direction_x[i] = m_[0] * x + m_[1] * y + m_[2] * z;
     packet.direction_y[i] = m_[3] * x + m_[4] * y + m_[5] * z;
     packet.direction_z[i] = m_[6] * x + m_[7] * y + m_[8] * z;
+    // Places relative to RayScene::origin() [m]: floats stay small far from the world's origin.
     packet.origin_x[i] = origin_.x;
     packet.origin_y[i] = origin_.y;
     packet.origin_z[i] = origin_.z;
+    // True range of the last sample that can still receive [m].
     packet.far[i] = far_m_;
   }
   void trace(const RayScene& scene) {
+    // Bit i stands for lane i: the last packet of a row may be partly filled.
     scene.trace(packet, count_ == RayPacket::size ? 0xFFFFu : (1u << count_) - 1u, true);
     traced += static_cast<std::size_t>(count_);
   }
@@ -74,6 +78,7 @@ class FanTracer {
         first_(first),
         last_(last),
         s_(scratch) {
+    // One pulse width [m]: the depth map need not follow a surface any closer (section 2).
     tolerance_m_ = static_cast<float>(plan.pulse_width_m);
     columns_ = column_sines(plan.columns, first, last);
     base_.reserve(plan.fan.elevation_rad.size());
@@ -97,6 +102,7 @@ class FanTracer {
   /// Turns a lane of the packet into the sample it was traced for.
   void store(int lane, Elevation e, ColumnSine column, Sample& sample) const {
     sample.elevation_rad = e.angle_rad;
+    // x of the unit direction: the map holds 1 / x, of flat beams 1 / h, h being the horizontal distance.
     sample.forward = plan_.switches.conical ? column.across * e.cosine : e.cosine;
     sample.tangent = e.sine / e.cosine;
     const auto i = static_cast<std::size_t>(lane);
@@ -106,6 +112,7 @@ class FanTracer {
   /// Elevation by elevation, sixteen neighbouring columns a packet: neighbours in a packet lie a fraction of a degree apart.
   void trace_base() {
     const int n = elevations();
+    // [columns][elevations] in front; refine() appends middles behind them and links them by `next`.
     s_.samples.resize(static_cast<std::size_t>(last_ - first_) * static_cast<std::size_t>(n));
     for (int e = 0; e < n; ++e) {
       const Elevation elevation = base_[static_cast<std::size_t>(e)];
@@ -126,11 +133,13 @@ class FanTracer {
 
   void refine() {
     FanRefinement<Sample> refinement(s_.samples, s_.open, s_.halves, tolerance_m_, first_);
+    // Elevation by elevation over all columns: a packet of middles holds neighbouring directions, too.
     const int n = elevations();
     for (int e = 0; e + 1 < n; ++e)
       for (int k = 0; k < last_ - first_; ++k) refinement.consider_base(k * n + e, k * n + e + 1, k);
     std::array<Elevation, RayPacket::size> middle;
     const auto trace = [&](std::span<const FanInterval> intervals) {
+      // FanRefinement expects the samples of the middles behind all others, in the order of the intervals.
       filler_.clear();
       for (std::size_t i = 0; i < intervals.size(); ++i) {
         middle[i] = elevation_at(refinement.middle_rad(intervals[i]));
@@ -152,8 +161,10 @@ class FanTracer {
       int bin = 0;
       for (std::int32_t i = k * n; at(i).next >= 0; i = at(i).next) {
         const Sample &a = at(i), &b = at(at(i).next);
+        // Bins up to `end` lie between a and b; the last interval takes what rounding left over.
         const float top = (b.tangent - fan.first_tangent) * fan.bins_per_tangent;
         const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
+        // 1 / x is linear in tan psi along a plane (section 2); 0 is infinitely far, so the smaller value is the farther surface.
         const float inverse_a = a.surface.inverse_x, inverse_b = b.surface.inverse_x, farther = std::min(inverse_a, inverse_b);
         const float per_tangent = (inverse_b - inverse_a) / (b.tangent - a.tangent);
         if (bin > end) continue;
@@ -161,6 +172,7 @@ class FanTracer {
           std::fill(map + bin, map + end + 1, farther);
         } else {
           const float* __restrict tangent = fan.tangent.data();
+          // A bin may lie a rounding error outside of [a, b]: 1 / x must not become negative there.
           for (int place = bin; place <= end; ++place)
             map[place] = std::max(0.0f, inverse_a + per_tangent * (tangent[place] - a.tangent));
         }
@@ -189,10 +201,12 @@ std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingSca
 void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                      std::vector<FanHit>& hits) {
   PacketFiller filler(plan, scalars, static_cast<float>(scalars.max_range_m));
+  // Every ray is a scatterer, as P25 samples (section 8): even elevations, the same in every column.
   const int rays = plan.fixed_fan;
   const std::vector<ColumnSine> sines = column_sines(plan.columns, first, last);
   for (int column = first; column < last; ++column) {
     const ColumnSine sine = sines[static_cast<std::size_t>(column - first)];
+    // No direction has |u| of 1 or more.
     if (!(sine.across > 0)) continue;
     for (int from = 0; from < rays; from += RayPacket::size) {
       const int to = std::min(from + RayPacket::size, rays);
@@ -207,9 +221,11 @@ void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScal
         const auto i = static_cast<std::size_t>(ray - from);
         const RayPacket& p = filler.packet;
         if (p.object[i] == RayPacket::miss) continue;
+        // Cosine of incidence on the facet, the same from both sides: |n . d| / |n|.
         const Vec3 normal{p.normal_x[i], p.normal_y[i], p.normal_z[i]};
         const Vec3 along{p.direction_x[i], p.direction_y[i], p.direction_z[i]};
         const float size = length(normal);
+        // Triangles without an area have no normal.
         if (!(size > 0)) continue;
         hits.push_back(
             {column, ray, p.far[i], elevation(ray).angle_rad, std::abs(dot(normal, along)) / size, p.object[i], p.triangle[i]});

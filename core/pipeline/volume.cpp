@@ -11,6 +11,7 @@
 namespace sonar {
 namespace {
 
+// Bound on the slices that stand for the integral over psi in (17): every column visits each of them for its shadows.
 constexpr int most_slices = 256;
 
 }  // namespace
@@ -25,6 +26,7 @@ double volume_column_width(const PingPlan& plan, int column) {
 Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars) : plan_(plan), scalars_(scalars) {
   if (!plan.switches.volume || !water.has_volume()) return;
   const Fan& fan = plan.fan;
+  // D_v of (34); without a pattern all of the fan counts with 1.
   const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
   const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
   const int bins_a_slice = std::max(1, fan.bins / most_slices);
@@ -32,6 +34,7 @@ Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars
     const auto angle = [&](double bin) {
       return std::atan(static_cast<double>(fan.first_tangent) + bin / static_cast<double>(fan.bins_per_tangent));
     };
+    // D_v^2 dpsi [rad] by the midpoint rule; dOmega of flat beams has a further cos(psi).
     const double psi = angle(from + 0.5 * bins_a_slice), amplitude = has_pattern ? elevation_two_way(aperture, psi) : 1;
     const double solid = plan.switches.conical ? 1 : std::cos(psi);
     slices_.push_back(
@@ -41,6 +44,7 @@ Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars
   // docs/acoustics.md, eq. 17: sigma = 10^(S_v / 10) Psi r^2 (c / 2) tau_eff, its echo falls as r^-4.
   const double at_1_m = scalars.source_upa * scalars.source_upa * power_from_db(static_cast<double>(water.volume_db)) * 0.5 *
                         scalars.sound_speed_mps * plan.pulse_shape.energy_width_s();
+  // [uPa^2] for Psi = 1: source^2 times sigma of (17), times e^{-4 a r} / r^4 for its way out and back.
   for (int n = 0; n < plan.samples; ++n) {
     const double r = (n + scalars.sample_offset) / scalars.samples_per_m;
     open_power_.push_back(at_1_m * std::pow(r * two_way_transmission(r, scalars.absorption_np_per_m), 2));
@@ -52,9 +56,11 @@ void Volume::find_blocked(const DepthMap& seen, int column, std::vector<double>&
   const float* map = seen.inverse_x.data() + static_cast<std::ptrdiff_t>(column - seen.first_column) * (seen.bins + 1);
   const double u = plan_.columns.sine(column);
   const double per_x = plan_.switches.conical ? 1 / std::sqrt(std::max(1 - u * u, 1e-12)) : 1;  // r / x = per_x / cos(psi)
+  // A slice of the fan ends at the surface that the rays saw: from that sample on its weight is missing.
   for (const Slice& slice : slices_) {
     const auto inverse_x = static_cast<double>(map[slice.bin]);
     if (!(inverse_x > 0)) continue;
+    // Surfaces before the record block it from its first sample on.
     const double sample = scalars_.sample_of(per_x * slice.range_per_x / inverse_x);
     if (sample < static_cast<double>(blocked.size())) blocked[static_cast<std::size_t>(std::max(sample, 0.0))] += slice.weight;
   }
@@ -68,6 +74,7 @@ void Volume::add(const DepthMap* seen, const PingNoise& noise, int first, int la
   for (int k = first; k < last; ++k) {
     if (seen) find_blocked(*seen, k, scratch.blocked);
     const double width = volume_column_width(plan_, k);
+    // max(0): the weights that remain are a difference, which rounding could make negative.
     double open = open_fan_;
     float* at = signals.column(k) + 2 * signals.lead;
     for (std::size_t n = 0; n < samples; ++n) {
@@ -80,6 +87,7 @@ void Volume::add(const DepthMap* seen, const PingNoise& noise, int first, int la
     }
     if (plan_.expected_power) continue;
     scratch.grains.assign(2 * samples, 0.0f);
+    // Grains have unit power and the pulse's correlation; their column numbers differ from those of the noise (noise_place.hpp).
     noise.table->add(noise.sonar, noise.ping, static_cast<int>(first_volume_column) + k, 1, static_cast<int>(samples),
                      scratch.grains.data());
     for (std::size_t i = 0; i < 2 * samples; ++i) at[i] += scratch.rms[i / 2] * scratch.grains[i];

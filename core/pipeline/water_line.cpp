@@ -7,10 +7,12 @@ namespace {
 
 /// Until the moment the scene is looked at, PingScalars::seen_at_s.
 double rise_m(const PingRequest& r) {
+  // Upwards [m]: vertical speed times range / c, the time until half of the ping.
   return std::max(0.0, r.sonar_moves.velocity_mps.z) * r.settings.range_m /
          static_cast<double>(r.settings.device_sound_speed_mps);
 }
 
+/// Above z = 0 by more than the depth at which a floating sonar is computed.
 bool is_above(const Pose& sonar_in_world) { return sonar_in_world.position_m.z > least_depth_m; }
 bool is_to_change(const PingRequest& r) {
   return is_above(r.sonar_in_world) ? !r.blank : r.sonar_in_world.position_m.z + rise_m(r) > -least_depth_m;
@@ -23,7 +25,9 @@ void change(PingRequest& r) {
   }
   double& z = r.sonar_in_world.position_m.z;
   double& climbs_mps = r.sonar_moves.velocity_mps.z;
+  // At the surface: computed 1 mm below it (section 3).
   z = std::min(z, -least_depth_m);
+  // Slowed so that it is just below the surface when the scene is looked at; one that does not rise keeps its speed.
   if (const double rise = rise_m(r); rise > 0) climbs_mps *= std::clamp((-least_depth_m - z) / rise, 0.0, 1.0);
 }
 
@@ -33,6 +37,7 @@ bool is_in_air(const Pose& sonar_in_world, const Scene& scene) { return scene.se
 
 std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room) {
   if (!scene.sea_surface.present || std::none_of(requests.begin(), requests.end(), is_to_change)) return requests;
+  // Copies only when a request changes, which is rare.
   room.assign(requests.begin(), requests.end());
   for (PingRequest& r : room)
     if (is_to_change(r)) change(r);
@@ -40,6 +45,7 @@ std::span<const PingRequest> in_water(std::span<const PingRequest> requests, con
 }
 
 void tell_as_asked(std::span<const PingRequest> requests, std::span<Ping> pings) {
+  // The ping states the pose that was asked for, not the one it was computed with.
   for (std::size_t i = 0; i < pings.size(); ++i) {
     pings[i].request.sonar_in_world = requests[i].sonar_in_world;
     pings[i].request.sonar_moves = requests[i].sonar_moves;

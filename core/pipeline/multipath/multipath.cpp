@@ -5,6 +5,7 @@
 namespace sonar {
 namespace {
 
+// A batch is a task's work, a round bounds the memory for echoes. Neither changes a sum.
 constexpr std::size_t tiles_a_batch = 16;
 constexpr std::size_t batches_a_round = 64;  // echoes of one round wait in memory, then are summed
 
@@ -51,6 +52,7 @@ class Rounds {
       : work_(work), plan_(plan), kernels_(kernels), pool_(pool) {
     groups_ = static_cast<std::size_t>((plan.columns.count + MultipathScatterer::group_columns - 1) /
                                        MultipathScatterer::group_columns);
+    // Kept from ping to ping, so that buffers grow to the scene's needs once.
     work.batches.resize(batches_a_round);
     for (auto& batch : work.batches) batch.resize(groups_);
     work.spectral.resize(groups_);
@@ -106,6 +108,7 @@ MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& wo
   const PingPlan& plan = context.plan;
   const PingScalars& s = context.scalars;
   work.has_echoes = false;
+  // Faces depend on the scene alone; which of them are mirrors depends on the ping.
   if (!work.faces_found) {
     work.faces = find_flat_faces(context.scene(), least_reflectance);
     work.faces_found = true;
@@ -119,6 +122,7 @@ MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& wo
   counts.rays = trace_bounces(context, work.faces, image_paths.mirrors, image_paths.map);
   image_paths.paths = paths_in_view(image_paths.mirrors, image_paths.map);
   multipath_of_points(context, work.faces, image_paths, points);
+  // Only the straight path is left: no mirror is in sight.
   if (image_paths.paths.size() == 1) return counts;
 
   std::vector<PathReach> reach;
@@ -127,6 +131,7 @@ MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& wo
   const std::vector<TileInView>& tiles = context.cells.in_view(view, context.pool);
   // gamma of eq. 21: needed for the cross term of a pair ij, ji in expected power only.
   const std::vector<float> correlation = plan.expected_power ? beam_correlation_over_columns(plan) : std::vector<float>{};
+  // A scatterer keeps the arrivals of the cell it is at: one a worker.
   std::vector<MultipathScatterer> scatterers;
   for (int worker = 0; worker < context.pool.threads(); ++worker)
     scatterers.emplace_back(context, image_paths, reach, correlation);

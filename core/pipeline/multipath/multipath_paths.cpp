@@ -32,6 +32,7 @@ std::vector<FlatMirror> mirrors_of(const PingContext& context, const FlatFaces& 
   const Scene& scene = context.scene();
   const PingScalars& s = context.scalars;
   std::vector<FlatMirror> mirrors;
+  // k = 2 pi f / c [rad/m].
   const double wave_number = 2 * pi * static_cast<double>(context.plan.mode.centre_hz) / s.sound_speed_mps;
   for (std::size_t f = 0; f < faces.faces.size() && static_cast<int>(mirrors.size()) < most_mirrors; ++f) {
     const FlatFace& face = faces.faces[f];
@@ -43,11 +44,13 @@ std::vector<FlatMirror> mirrors_of(const PingContext& context, const FlatFaces& 
     const double kh = wave_number * static_cast<double>(material.roughness_m);
     m.twice_kh_squared = 2 * kh * kh;
     if (std::abs(m.reflectance(most_grazing_cosine)) <= least_reflectance) continue;
+    // Planes in the axes of seen_from [m]. The normal is turned to the sonar: heights are positive on its side.
     const Pose in_sonar = compose(inverse(s.seen_from),
                                   scene.in_world(scene.objects[static_cast<std::size_t>(face.object)], context.bodies_in_world));
     m.normal = rotate(in_sonar.orientation, face.normal);
     m.height_m = -(face.offset_m + dot(m.normal, in_sonar.position_m));
     if (m.height_m < 0) m.normal = -1.0 * m.normal, m.height_m = -m.height_m;
+    // A sonar in the plane has no image; an image farther than the record is long [m] returns nothing.
     if (m.height_m < touching_m || m.height_m > 2 * s.max_range_m) continue;
     mirrors.push_back(m);
   }
@@ -79,6 +82,7 @@ double reflectance_of(const Path& path, const std::vector<FlatMirror>& mirrors, 
 
 bool is_lit(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place) {
   if (path.first < 0) return true;
+  // On the lit side, and off the mirror by touching_m: its own surface is no target.
   const double height = at(mirrors, path.second < 0 ? path.first : path.second).height_of(place);
   return (path.beyond_front ? height : -height) > touching_m;
 }
@@ -101,7 +105,9 @@ double bubble_factor(const BubbleLayer& bubbles, const Path& path, const std::ve
   }
   bends.push_back({});
   double factor = 1;
+  // World z [m], by which (16) knows the layer.
   const auto height = [&s](Vec3d p) { return s.seen_from.position_m.z + (s.world_from_sonar * p).z; };
+  // two_way() is e^{-2 b l}: its root is the loss of one way.
   for (std::size_t i = 0; i + 1 < bends.size(); ++i)
     factor *= std::sqrt(bubbles.two_way(height(bends[i]), height(bends[i + 1]), length(bends[i] - bends[i + 1])));
   return factor;

@@ -34,6 +34,7 @@ class PointMultipath {
 
   /// Eq. 10 for a point: every pair of arrivals, one out and one back, but for the direct pair.
   void add(Vec3d place, double strength_m, std::vector<PointEcho>& points) const {
+    // In the order of the paths; [0] is the straight one if it arrives.
     std::vector<PointArrival> arrivals;
     bool direct = false;
     for (const Path& path : paths_) {
@@ -44,8 +45,10 @@ class PointMultipath {
     }
     for (std::size_t i = 0; i < arrivals.size(); ++i)
       for (std::size_t j = 0; j < arrivals.size(); ++j) {
+        // DD is the direct echo of scatter_points.
         if (direct && i == 0 && j == 0) continue;
         const PointArrival &out = arrivals[i], &back = arrivals[j];
+        // (10): at the range (r_i + r_j) / 2 [m]; the bearing is that of the path back.
         const double sample = s_.sample_of(0.5 * (out.range_m + back.range_m)) + 0.5 * (out.sample_shift + back.sample_shift);
         if (sample <= -plan_.taps / 2 || sample >= plan_.samples + plan_.taps / 2 - 1) continue;
         points.push_back({back.sine, sample, s_.source_upa * strength_m * out.transmit * out.carried * back.carried});
@@ -55,6 +58,7 @@ class PointMultipath {
  private:
   std::optional<PointArrival> arrive(const Path& path, Vec3d place) const {
     if (!is_lit(path, image_paths_.mirrors, place)) return {};
+    // The path leaves in the direction of the image, so (29) applies to the image as to any place.
     const Vec3d image = path.image_of(place);
     const Vec3d p = s_.echo_geometry(image).from_sonar_m;
     const double r = length(p);

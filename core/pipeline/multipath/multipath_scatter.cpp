@@ -36,6 +36,7 @@ PathReach::PathReach(const Path& path, const ImagePaths& image_paths, const Ping
     return std::atan(
         static_cast<double>(image_paths.map.fan.first_tangent + static_cast<float>(bin) / image_paths.map.fan.bins_per_tangent));
   };
+  // One bin more on either side: cells between two nodes count, too.
   for (std::size_t block = 0; block < image_paths.map.windows.size(); ++block) {
     const PathWindow& w = image_paths.map.window(block, path);
     spans_.push_back(w.empty() ? Span{} : Span{angle(w.first_bin - 1), angle(w.last_bin + 1)});
@@ -47,6 +48,7 @@ PathReach::PathReach(const Path& path, const ImagePaths& image_paths, const Ping
 std::optional<DistanceSpan> PathReach::seen_between(Vec3d place, double radius) const {
   const Vec3d image = path_.image_of(place);
   const double r = length(image);
+  // The shortest pair with this path has the straight one for the other way; the ball may be a radius nearer on each.
   if (r + length(place) - 2 * radius > longest_m_) return {};
   if (path_.first >= 0) {
     const FlatMirror& last = image_paths_.mirrors[static_cast<std::size_t>(path_.second < 0 ? path_.first : path_.second)];
@@ -57,6 +59,7 @@ std::optional<DistanceSpan> PathReach::seen_between(Vec3d place, double radius) 
   const double from_axis = conical ? r : flat, blocks = static_cast<double>(spans_.size());
   double first_block = 0, last_block = blocks - 1;
   if (from_axis > 2 * radius) {
+    // u of the ball: that of its centre, and radius over its nearest distance from the array to either side.
     const double sine = image.y / from_axis, spread = radius / (from_axis - radius);
     const auto block = [&](double u) {
       return std::floor(((plan_.columns.first_sine - u) / plan_.columns.spacing + 0.5) / BounceMap::block_columns);
@@ -66,6 +69,7 @@ std::optional<DistanceSpan> PathReach::seen_between(Vec3d place, double radius) 
   }
   const double across = conical ? std::sqrt(image.x * image.x + image.z * image.z) : r;
   const bool anywhere = across <= radius;
+  // psi of the image, and half the angle about the array axis that the ball takes [rad].
   const double angle = std::atan2(image.z, conical ? image.x : flat), spread = anywhere ? pi : std::asin(radius / across);
   for (double b = first_block; b <= last_block; ++b) {
     const Span& span = spans_[static_cast<std::size_t>(b)];
@@ -154,6 +158,7 @@ void MultipathScatterer::scatter(const TileInView& tile, std::vector<Echoes>& by
 
   const CellTile& t = *tile.tile;
   const LawTable& law = laws_[static_cast<std::size_t>(t.material)];
+  // Constant over a tile in (10): 10^(SL/20) sqrt(mu). Weights as in scatter.cpp.
   const double constant = s_.source_upa * std::sqrt(law.mu);
   const auto unit = static_cast<float>(constant * static_cast<double>(t.weight_unit));
   const auto root_area = static_cast<float>(constant * lattice::cell_size_m(t.level));
@@ -178,6 +183,7 @@ void MultipathScatterer::scatter_cell(const Cell& cell, const LawTable& law, con
                                       std::vector<Echoes>& by_group) {
   const auto offset_of = [&cell](const TilePath& w, float& range_m) {  // range, and range less that of the tile's centre
     const float* q = w.from_sonar_object;
+    // r^2 = r0^2 + e, e from the cell's offset: no difference of large floats (section 1).
     const float e = cell.x * (2 * q[0] + cell.x) + cell.y * (2 * q[1] + cell.y) + cell.z * (2 * q[2] + cell.z);
     range_m = std::sqrt(std::max(w.range_m * w.range_m + e, 1e-6f));
     return e / (w.range_m + range_m);
@@ -227,6 +233,7 @@ bool MultipathScatterer::is_visible(const Path& path, int column, float bin, flo
 
 bool MultipathScatterer::arrive(const TilePath& w, const Cell& cell, float r, float offset, const LawTable& law,
                                 Arrival& out) const {
+  // The cell's image in the axes of reception [m].
   const float x = w.from_sonar[0] + w.turn[0] * cell.x + w.turn[1] * cell.y + w.turn[2] * cell.z;
   if (x <= 1e-6f || r < static_cast<float>(nearest_scatterer_m)) return false;
   const float y = w.from_sonar[1] + w.turn[3] * cell.x + w.turn[4] * cell.y + w.turn[5] * cell.z;
@@ -256,6 +263,7 @@ bool MultipathScatterer::arrive(const TilePath& w, const Cell& cell, float r, fl
   const float loss = std::exp(-first * first - second * second - absorption_np_per_m_ * offset);
   out.size = w.reflection * w.amplitude * loss * pattern_(z * z / (h * h + z * z)) *
              std::sqrt(law.relative_root(std::min(std::abs(along) * inverse_r, 1.0f))) * inverse_r;
+  // (12) of one way: the centre's turns, and the cell's in float.
   const float turns = w.half_turns + half_turns_per_m_ * offset;
   const float phase = static_cast<float>(-2 * pi) * (turns - static_cast<float>(static_cast<int>(turns)));
   out.carried = {out.size * std::cos(phase), out.size * std::sin(phase)};
@@ -263,6 +271,7 @@ bool MultipathScatterer::arrive(const TilePath& w, const Cell& cell, float r, fl
 }
 
 void MultipathScatterer::pair_up(const Cell& cell, float fade, std::vector<Echoes>& by_group) const {
+  // The samples whose pulses reach into the record.
   const float per_m = static_cast<float>(s_.samples_per_m), from = static_cast<float>(s_.sample_offset);
   const auto first = static_cast<float>(-plan_.taps / 2), last = static_cast<float>(plan_.samples + plan_.taps / 2 - 1);
   for (std::size_t i = 0; i < arrivals_.size(); ++i)
@@ -281,6 +290,7 @@ void MultipathScatterer::pair_up(const Cell& cell, float fade, std::vector<Echoe
         add(sample, amplitude * (plan_.expected_power ? lit * lit : lit), back.column, by_group);
       };
       if (!plan_.expected_power) {
+        // Levels fade in power: the root here.
         const std::complex<float> amplitude = times(times(std::sqrt(fade) * cell.weight, a.carried), b.carried);
         add_arrival(a, b, amplitude);
         if (i != j) add_arrival(b, a, amplitude);

@@ -147,6 +147,7 @@ class ColumnsTracer {
   void trace_base() {
     const std::int32_t n = elevations();
     samples_.assign(static_cast<std::size_t>(columns()) * static_cast<std::size_t>(n), {});
+    // Lanes are columns: at one elevation neighbours mostly meet the same mirror.
     std::array<std::int32_t, RayPacket::size> index{};
     for (std::int32_t e = 0; e < n; ++e) {
       rays_.clear();
@@ -160,6 +161,7 @@ class ColumnsTracer {
   }
 
   void refine() {
+    // The tolerance, one pulse width [m], holds for the unfolded path.
     FanRefinement<Chain> refinement(samples_, open_, halves_, static_cast<float>(plan_.pulse_width_m), first_);
     for (std::int32_t e = 0; e + 1 < elevations(); ++e)
       for (int k = 0; k < columns(); ++k) refinement.consider_base(k * elevations() + e, k * elevations() + e + 1, k);
@@ -195,6 +197,7 @@ class ColumnsTracer {
     const std::size_t node =
         static_cast<std::size_t>(column) * static_cast<std::size_t>(map_.fan.bins + 1) + static_cast<std::size_t>(bin);
     const Chain& nearer = part < 0.5f ? a : b;
+    // Different mirrors at a stage: what follows has nothing in common and is taken from the nearer sample.
     bool same_mirrors = true;
     for (std::size_t stage = 0; stage < 3; ++stage) {
       float seen = nearer.surface[stage].inverse_x;

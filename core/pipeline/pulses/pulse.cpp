@@ -37,6 +37,7 @@ double sweep_bandwidth_hz(double width_s) { return sweep_width_times_bandwidth /
 Pulse::Pulse(const Waveform& waveform, double width_s) : shape_(waveform.shape), width_s_(width_s) {
   switch (shape_) {
     case Shape::gaussian:
+      // (22): b [1/s].
       scale_hz_ = 2 * half_power_bt / width_s;
       reach_s_ = gaussian_reach_widths * width_s;
       band_hz_ = gaussian_band_over_b * scale_hz_;
@@ -44,6 +45,7 @@ Pulse::Pulse(const Waveform& waveform, double width_s) : shape_(waveform.shape),
       noise_bandwidth_hz_ = sonar::noise_bandwidth_hz(scale_hz_);
       return;
     case Shape::cw:
+      // (23): 1 / T [Hz].
       scale_hz_ = tone_width_per_length / width_s;
       reach_s_ = 1 / scale_hz_;
       band_hz_ = band_of_tone * scale_hz_;
@@ -51,6 +53,7 @@ Pulse::Pulse(const Waveform& waveform, double width_s) : shape_(waveform.shape),
       noise_bandwidth_hz_ = 2 * scale_hz_ / 3;
       return;
     case Shape::lfm:
+      // (24): B [Hz].
       scale_hz_ = sweep_bandwidth_hz(width_s);
       reach_s_ = sweep_reach / scale_hz_;
       band_hz_ = band_of_sweep * scale_hz_;
@@ -64,6 +67,7 @@ Pulse::Pulse(const Waveform& waveform, double width_s) : shape_(waveform.shape),
 
 void Pulse::take_samples(const Waveform& waveform) {
   const std::vector<std::complex<float>>& all = waveform.samples;
+  // The peak, in the middle by definition, becomes p(0) = 1.
   const std::size_t peak = all.size() / 2;
   const Complex top(all[peak]);
   const auto kept = [&](std::size_t i) { return std::abs(Complex(all[i])) >= worth_keeping * std::abs(top); };
@@ -75,6 +79,7 @@ void Pulse::take_samples(const Waveform& waveform) {
   scale_hz_ = waveform.sample_rate_hz;
   reach_s_ = (std::max(middle_, static_cast<int>(last - peak)) + neighbours / 2) / scale_hz_;
 
+  // -3 dB points of |p|^2 [s], to a hundredth of a sample.
   const auto half_power = [&](double direction) {
     double t = 0;
     while (std::norm(at(t)) > 0.5) t += direction * 0.01 / scale_hz_;
@@ -94,6 +99,7 @@ std::complex<double> Pulse::at(double time_s) const {
     case Shape::measured:
       break;
   }
+  // Between samples a windowed sinc: `neighbours`, `window_sharpness`.
   const double place = middle_ + time_s * scale_hz_;
   const int near = static_cast<int>(std::floor(std::clamp(place, -1e9, 1e9)));
   const int from = std::max(near - neighbours / 2 + 1, 0);
@@ -133,6 +139,7 @@ std::vector<std::complex<double>> Pulse::spectrum_s(const spectral::FrequencyGri
 /// What has no formula, from samples in time and in frequency.
 void Pulse::integrate() {
   const double rate = shape_ == Shape::lfm ? 4 * scale_hz_ : scale_hz_;
+  // tau_eff = integral of |p|^2 dt [s].
   energy_width_s_ = 0;
   const int reach = static_cast<int>(std::ceil(reach_s_ * rate));
   for (int k = -reach; k <= reach; ++k) energy_width_s_ += std::norm(at(k / rate)) / rate;
@@ -141,6 +148,7 @@ void Pulse::integrate() {
   const std::vector<Complex> spectrum = spectrum_s(grid);
   double highest = 0;
   for (const Complex& v : spectrum) highest = std::max(highest, std::abs(v));
+  // B_n [Hz]: by Parseval the integral of |P|^2 is tau_eff.
   noise_bandwidth_hz_ = energy_width_s_ / (highest * highest);
   if (shape_ != Shape::measured) return;
   band_hz_ = 0;

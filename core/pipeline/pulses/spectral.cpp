@@ -9,6 +9,7 @@
 namespace sonar::spectral {
 namespace {
 
+// (26): 2.3 per point of width on a grid twice as fine; errors by width: FrequencySums.
 constexpr int oversampling = 2;
 constexpr double sharpness_per_width = 2.3;
 constexpr int small_padding = 8, large_padding = 16;  // of widths, so that loops over them are whole vectors
@@ -16,6 +17,7 @@ constexpr int extra_terms = 4;                        // of the polynomials, bey
 constexpr int restart_every = 256;                    // a phase turned on step by step forgets itself slowly
 
 double kernel(double x) {  // |x| <= 1 over its half width, times the width: see sharpness_per_width
+  // max(0): |x| may exceed 1 by rounding.
   return std::sqrt(std::max(0.0, 1 - x * x)) - 1;
 }
 
@@ -25,6 +27,7 @@ double kernel_transform(int width, double f) {
   const int steps = 20 * width + 60;
   double sum = 0;
   for (int i = 0; i < steps; ++i) {
+    // z = x width / 2, dz = cos(t) dt width / 2.
     const double t = pi * ((i + 0.5) / steps - 0.5), x = std::sin(t);
     sum += std::exp(sharpness_per_width * width * kernel(x)) * std::cos(pi * f * width * x) * std::cos(t);
   }
@@ -40,6 +43,7 @@ std::vector<double> fit(const Function& f, int terms) {
     node[i] = std::cos(pi * (static_cast<double>(i) + 0.5) / static_cast<double>(n));
     divided[i] = f(node[i]);
   }
+  // Newton's divided differences, then expanded to powers.
   for (std::size_t order = 1; order < n; ++order)
     for (std::size_t i = n - 1; i >= order; --i) divided[i] = (divided[i] - divided[i - 1]) / (node[i] - node[i - order]);
   for (std::size_t i = n; i-- > 0;) {  // power = power * (t - node_i) + divided_i
@@ -54,6 +58,7 @@ std::vector<double> fit(const Function& f, int terms) {
 std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid) {
   std::vector<Complex> sums(static_cast<std::size_t>(grid.count));
   for (const Arrival& a : arrivals) {
+    // (25) from one frequency to the next is one turn e^{-i 2 pi df tau}.
     const Complex step = turned(-grid.step_hz * a.delay_s);
     Complex now;
     for (int m = 0; m < grid.count; ++m) {
@@ -68,6 +73,7 @@ std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const Frequen
 std::vector<Complex> fast_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid, int width) {
   const FrequencySums fast(grid.count, width);
   std::vector<Complex> fine(static_cast<std::size_t>(fast.grid_points())), sums(static_cast<std::size_t>(grid.count));
+  // FrequencySums counts frequencies from the middle: an echo brings the phase of the middle one along.
   const double middle_hz = grid.first_hz + (grid.count / 2) * grid.step_hz;
   for (const Arrival& a : arrivals) fast.add(grid.step_hz * a.delay_s, a.amplitude * turned(-middle_hz * a.delay_s), fine.data());
   fast.transform(fine.data(), sums.data());
@@ -81,6 +87,7 @@ FrequencySums::FrequencySums(int count, int width)
       padded_(width <= small_padding ? small_padding : large_padding),
       forward_(points_, Fft::Direction::forward),
       terms_(width + extra_terms) {
+  // For point k of the kernel a polynomial in t in [-1, 1], which says where the echo lies between two points.
   polynomial_.assign(static_cast<std::size_t>(terms_ * padded_), 0.0);
   for (int k = 0; k < width; ++k) {
     const std::vector<double> fitted =
@@ -88,17 +95,21 @@ FrequencySums::FrequencySums(int count, int width)
     for (int term = 0; term < terms_; ++term)
       polynomial_[static_cast<std::size_t>(term * padded_ + k)] = fitted[static_cast<std::size_t>(terms_ - 1 - term)];
   }
+  // The grid is the echoes convolved with the kernel; in frequency the kernel's transform divides out.
   for (int m = 0; m < count; ++m)
     correction_.push_back(1 / kernel_transform(width, static_cast<double>(m - count / 2) / points_));
 }
 
 template <int padded>
 void FrequencySums::spread(double turns, Complex amplitude, Complex* grid) const {
+  // The delay in grid points: the grid is one turn long and periodic.
   const double place = (turns - std::floor(turns)) * points_;  // may round up to points_: the wrap below knows
   const double first = std::ceil(place - 0.5 * width_);
+  // From the kernel's edge to the first point, 0 to 1 spacings, as the t of the polynomials.
   const double t = 2 * (first - place + 0.5 * width_) - 1;
   double value[padded];
   const double* c = polynomial_.data();
+  // Horner's scheme for all points side by side; those beyond the width are padding.
   for (int k = 0; k < padded; ++k) value[k] = c[k];
   for (int term = 1; term < terms_; ++term) {
     c += padded;
@@ -121,6 +132,7 @@ void FrequencySums::add(double turns, Complex amplitude, Complex* grid) const {
 
 void FrequencySums::add(std::span<const double> turns, std::span<const double> re, std::span<const double> im, double turn_on,
                         const simd::Kernels& kernels, Complex* grid) const {
+  // The vector form is compiled for one width, 8, that of the paper mode.
   assert(width_ == simd::SpreadGrid::width && padded_ == small_padding);
   kernels.spread({points_, terms_, polynomial_.data()}, {turns.data(), re.data(), im.data(), turn_on},
                  static_cast<int>(turns.size()), reinterpret_cast<double*>(grid));
@@ -129,6 +141,7 @@ void FrequencySums::add(std::span<const double> turns, std::span<const double> r
 void FrequencySums::transform(Complex* grid, Complex* sums) const {
   forward_.run(grid);
   for (int m = 0; m < count_; ++m) {
+    // Frequencies below the middle stand in the upper half of the transform.
     const int frequency = m - count_ / 2;
     sums[m] = correction_[static_cast<std::size_t>(m)] * grid[frequency < 0 ? frequency + points_ : frequency];
   }

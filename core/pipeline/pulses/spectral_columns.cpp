@@ -6,6 +6,7 @@
 namespace sonar {
 namespace {
 
+// w of (26): relative L2 error 8e-6.
 constexpr int kernel_width = 6;
 
 /// Frequencies to a sample of the period: as many as the pulse's band needs.
@@ -22,6 +23,7 @@ SpectralColumns::SpectralColumns(const Pulse& pulse, double sample_time_s, int s
       period_(spectral::quick_size(samples + taps + 2)),
       sums_(period_ * per_sample(pulse, sample_time_s), kernel_width),
       inverse_(period_, spectral::Fft::Direction::inverse) {
+  // Frequencies [-count / 2, count / 2) / period about the carrier [Hz]; 1 / period is the scale of the inverse transform.
   const double period_s = period_ * sample_time_s;
   const int count = sums_.count();
   response_ = pulse.spectrum_s({-(count / 2) / period_s, 1 / period_s, count});
@@ -29,6 +31,7 @@ SpectralColumns::SpectralColumns(const Pulse& pulse, double sample_time_s, int s
 }
 
 void SpectralColumns::begin(int columns, SpectralScratch& scratch) const {
+  // The grids of a group of columns take echoes until finish() transforms them.
   scratch.grids.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(sums_.grid_points()), 0.0);
   scratch.sums.resize(static_cast<std::size_t>(sums_.count()));
 }
@@ -37,6 +40,7 @@ void SpectralColumns::add(Echoes& echoes, int first_column, SpectralScratch& scr
   for (std::size_t i = 0; i < static_cast<std::size_t>(echoes.count); ++i) {
     const auto column = static_cast<std::size_t>(echoes.column[i] - first_column);
     const spectral::Complex amplitude(static_cast<double>(echoes.re[i]), static_cast<double>(echoes.im[i]));
+    // The delay in periods.
     sums_.add(static_cast<double>(echoes.sample[i]) / period_, amplitude,
               scratch.grids.data() + column * static_cast<std::size_t>(sums_.grid_points()));
   }

@@ -52,6 +52,7 @@ void Fft::run(Complex* values) const { fftw_execute_dft(plan_->plan, as_fftw(val
 
 const bool have_transform = false;
 
+// why_invalid(Waveform) refuses the pulses that would come here.
 struct Fft::Plan {};
 
 Fft::Fft(int size, Direction) : size_(size) { assert(have_transform); }
@@ -61,6 +62,7 @@ void Fft::run(Complex*) const { assert(have_transform); }
 #endif
 
 int quick_size(int n) {
+  // Even, because FrequencySums counts frequencies from the middle; small factors, because FFTW is fast with them.
   for (int size = n + n % 2;; size += 2) {
     int rest = size;
     for (const int factor : {2, 3, 5, 7})

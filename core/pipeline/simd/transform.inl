@@ -3,17 +3,20 @@
 // In place and without reordering: forward passes leave the frequencies in the order of their digits, the response is stored in
 // that order, and the inverse passes go the same way back.
 
+/// A complex value of one column for each of `lanes` samples.
 struct ComplexLanes {
   Lanes re, im;
 };
 inline ComplexLanes operator+(ComplexLanes a, ComplexLanes b) { return {a.re + b.re, a.im + b.im}; }
 inline ComplexLanes operator-(ComplexLanes a, ComplexLanes b) { return {a.re - b.re, a.im - b.im}; }
+// Times a turn w = {re, im} of the tables, or its conjugate: the same for all lanes.
 inline ComplexLanes times(ComplexLanes v, const float* w) { return {v.re * w[0] - v.im * w[1], v.re * w[1] + v.im * w[0]}; }
 inline ComplexLanes times_conjugate(ComplexLanes v, const float* w) {
   return {v.re * w[0] + v.im * w[1], v.im * w[0] - v.re * w[1]};
 }
 inline ComplexLanes times_i(ComplexLanes v) { return {-v.im, v.re}; }
 
+/// Orders of lanes between memory, (re, im, re, im ...), and ComplexLanes.
 struct Shuffles {
   LaneNumbers even, odd, low, high;
 };
@@ -37,6 +40,8 @@ inline void store_interleaved(ComplexLanes v, const Shuffles& s, float* at) {
 /// One pass over a block of n: n / radix butterflies, `w` their (radix - 1) turns each.
 template <int radix, bool forward>
 inline void butterflies(ComplexLanes* x, int n, const float* w) {
+  // Forward: decimation in frequency, first the sums, then the turns e^{-i 2 pi i m / n}. Inverse: the same backwards, first the
+  // conjugate turns, then the sums with conjugate roots of unity.
   constexpr float half_root_3 = 0.8660254037844386f;
   const int q = n / radix;
   for (int i = 0; i < q; ++i, w += 2 * (radix - 1)) {
@@ -48,6 +53,7 @@ inline void butterflies(ComplexLanes* x, int n, const float* w) {
     } else if constexpr (radix == 3) {
       const ComplexLanes a = at[0], b = forward ? at[q] : times_conjugate(at[q], w),
                          c = forward ? at[2 * q] : times_conjugate(at[2 * q], w + 2);
+      // The cube roots of unity are -1/2 +- i sqrt(3)/2.
       const ComplexLanes sum = b + c, middle{a.re - 0.5f * sum.re, a.im - 0.5f * sum.im};
       const ComplexLanes across{half_root_3 * (b.re - c.re), half_root_3 * (b.im - c.im)};
       const ComplexLanes up = middle + times_i(across), down = middle - times_i(across);
@@ -58,6 +64,7 @@ inline void butterflies(ComplexLanes* x, int n, const float* w) {
       const ComplexLanes a = at[0], b = forward ? at[q] : times_conjugate(at[q], w),
                          c = forward ? at[2 * q] : times_conjugate(at[2 * q], w + 2),
                          d = forward ? at[3 * q] : times_conjugate(at[3 * q], w + 4);
+      // The fourth roots of unity are +-1 and +-i: no multiplication.
       const ComplexLanes s = a + c, t = a - c, u = b + d, v = times_i(b - d);
       at[0] = s + u;
       at[q] = forward ? times(t - v, w) : t + v;
@@ -69,6 +76,7 @@ inline void butterflies(ComplexLanes* x, int n, const float* w) {
 
 template <bool forward>
 inline void transform_pass(const BeamTransform& t, int level, ComplexLanes* block) {
+  // A level works on quarter / size blocks, each for itself.
   const BeamTransform::Level& l = t.level[level];
   for (int from = 0; from < t.quarter; from += l.size) {
     if (l.radix == 4)
@@ -87,6 +95,7 @@ __attribute__((noinline)) void take_columns(const BeamTransform& t, const float*
   const Shuffles s = shuffles();
   const float* w = t.split;
   for (int i = 0; i < q; ++i, w += 6) {
+    // A line of 4 q has inputs i, i + q, i + 2 q and i + 3 q; the last two are the padding.
     const ComplexLanes a = i < count ? load_interleaved(columns + i * stride, s) : ComplexLanes{};
     const ComplexLanes b = i + q < count ? load_interleaved(columns + (i + q) * stride, s) : ComplexLanes{};
     const ComplexLanes v = times_i(b);
@@ -100,6 +109,7 @@ __attribute__((noinline)) void take_columns(const BeamTransform& t, const float*
 /// A quarter to its frequencies, weighed there, and back.
 __attribute__((noinline)) void weigh_quarter(const BeamTransform& t, const float* response, ComplexLanes* x) {
   for (int level = 0; level < t.levels; ++level) transform_pass<true>(t, level, x);
+  // (9) over frequencies: times the transform of W, which is real since W is even; it includes 1 / size of the inverse.
   for (int i = 0; i < t.quarter; ++i) x[i] = {x[i].re * response[i], x[i].im * response[i]};
   for (int level = t.levels; level-- > 0;) transform_pass<false>(t, level, x);
 }
@@ -111,6 +121,7 @@ __attribute__((noinline)) void join_quarters(const BeamTransform& t, ComplexLane
   for (int i = 0; i < q; ++i, w += 6) {
     const ComplexLanes a = x[i], b = times_conjugate(x[i + q], w), c = times_conjugate(x[i + 2 * q], w + 2),
                        d = times_conjugate(x[i + 3 * q], w + 4);
+    // Outputs i + 2 q and i + 3 q would be beams beyond the columns.
     x[i] = (a + c) + (b + d);
     x[i + q] = (a - c) + times_i(b - d);
   }
@@ -120,6 +131,7 @@ __attribute__((noinline)) void join_quarters(const BeamTransform& t, ComplexLane
 __attribute__((noinline)) void read_beams(const BeamTransform& t, const ComplexLanes* line, float* out,
                                           std::ptrdiff_t out_stride) {
   const Shuffles s = shuffles();
+  // Interpolation of an array's response, band-limited by its aperture; one tap of 1 where beams lie on columns.
   const float* w = t.between;
   for (int j = 0; j < t.beams; ++j, w += t.taps, out += out_stride) {
     const ComplexLanes* at = line + t.first_column[j];
@@ -132,6 +144,7 @@ __attribute__((noinline)) void read_beams(const BeamTransform& t, const ComplexL
 void transform_beams(const BeamTransform& t, const float* columns, std::ptrdiff_t stride, int floats, float* work, float* out,
                      std::ptrdiff_t out_stride) {
   auto* x = reinterpret_cast<ComplexLanes*>(work);
+  // A vector of samples at a time: its line of 4 q complex values stays in cache through all passes.
   for (int f = 0; f < floats; f += 2 * lanes) {
     take_columns(t, columns + f, stride, t.columns, x);
     for (int k = 0; k < 4; ++k) weigh_quarter(t, t.response + k * t.quarter, x + k * t.quarter);
@@ -143,6 +156,7 @@ void transform_beams(const BeamTransform& t, const float* columns, std::ptrdiff_
 /// Squares of magnitudes, turned from beams of rows to rows of beams, `lanes` of both at a time.
 void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows, float* power, int width) {
   const Shuffles s = shuffles();
+  // Transposes a square tile: steps 1, 2, 4 ... exchange blocks of that size across the diagonal.
   LaneNumbers keep[5], swap[5];
   int steps = 0;
   for (int step = 1; step < lanes; step *= 2, ++steps)
@@ -152,6 +166,7 @@ void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows,
     }
   for (int j = 0; j < beam_count; j += lanes)
     for (int row = 0; row < rows; row += lanes) {
+      // Beams or rows that do not fill a vector, at the edges.
       if (j + lanes > beam_count || row + lanes > rows) {
         for (int n = row; n < rows && n < row + lanes; ++n)
           for (int k = j; k < beam_count && k < j + lanes; ++k) {
@@ -160,6 +175,7 @@ void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows,
           }
         continue;
       }
+      // |s|^2 [uPa^2]: rows lie side by side before the transposition, beams after it.
       Lanes tile[lanes];
       for (int k = 0; k < lanes; ++k) {
         const ComplexLanes v = load_interleaved(beams + (j + k) * stride + 2 * row, s);

@@ -131,6 +131,7 @@ std::complex<double> visible_factor(const SpecularPoint& point, double wavelengt
 
 /// Largest angle from straight ahead that the columns cover; more when the sonar turns while the ping is under way.
 double widest_direction_rad(const PingPlan& plan) {
+  // Bearings are measured at reception, (29): a turning sonar reaches farther, by this much at most [rad].
   constexpr double while_turning_rad = 0.05;
   const double sine = std::min(1.0, plan.columns.first_sine + plan.columns.spacing);
   return std::acos(std::sqrt(1 - sine * sine) * std::cos(std::min(plan.widest_about_axis_rad(), pi / 2))) + while_turning_rad;
@@ -178,6 +179,7 @@ void SpecularEchoes::candidates(const Object& object, PreparedMesh& mesh, const 
   }
   mirrors_.assign(reflection_.size(), false);
   for (const std::uint16_t m : mesh.materials) mirrors_[m] = reflection_[m] != 0;
+  // By the set of materials that mirror, which depends on the frequency: a ping must not depend on those before it.
   auto at = std::find_if(mesh.surfaces.begin(), mesh.surfaces.end(),
                          [this](const PreparedMesh::Surface& s) { return s.mirrors == mirrors_; });
   if (at == mesh.surfaces.end()) {
@@ -223,6 +225,7 @@ void SpecularEchoes::find(const PingContext& context, std::vector<PointEcho>& ec
       // range): strength = Rc r^2 / (2 r sqrt((1 + r / R1) (1 + r / R2))), times K_1 K_2 (visible_factor).
       const double bends = bending(point.range_m, point.curvature[0]) * bending(point.range_m, point.curvature[1]);
       const double strength = reflection * r * r / (2 * point.range_m * std::sqrt(std::abs(bends)));
+      // point_echo turns the phase by r; (7) has that of the foot's range, and K the rest.
       const double beside_turns = (r - point.range_m) * s.turns_per_m;
       std::optional<PointEcho> echo = point_echo(from_sonar, std::polar(1.0, 2 * pi * fraction_of_turn(beside_turns)), plan, s);
       if (!echo) continue;

@@ -27,6 +27,7 @@ struct Direction {
 };
 
 Direction direction_of(const SpecularPoint& p, std::size_t k, double wavelength_m) {
+  // q of (19) [1/m]; 1 + r / R is negative behind a focus.
   return {1 / fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]), bending(p.range_m, p.curvature[k]) < 0};
 }
 
@@ -69,6 +70,7 @@ SpecularWindow make_window(const SpecularPoint& p, double wavelength_m) {
   for (std::size_t k = 0; k < 2; ++k) {
     // Four Fresnel radii about the foot, or about the nearest place of the surface.
     double reach = window_in_units * fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]);
+    // Beyond half a radius of curvature [m] the surface is no parabola any more, on which (19) rests.
     if (p.curvature[k] != 0) reach = std::min(reach, window_in_radii / std::abs(p.curvature[k]));
     const double middle = std::clamp(0.0, p.from[k], p.to[k]);
     const double from = std::max(p.from[k], middle - reach), to = std::min(p.to[k], middle + reach);
@@ -90,6 +92,7 @@ Complex specular_factor(const SpecularPoint& p, double wavelength_m, const Specu
   // K_1 K_2 as a sum over strips: the integral over y of one strip times the integral over its intervals in x.
   const auto strip = [&](double from, double to, std::size_t row) {
     if (!(to > from)) return;
+    // An infinite strip has no middle: its extent is taken at the foot.
     const double middle = std::isinf(from) || std::isinf(to) ? 0 : 0.5 * (from + to);
     crossings(p, middle, x);
     sum += up.part(from, to) * along_strip(across, x, w, row);
@@ -123,6 +126,7 @@ std::array<double, 2> nearest_on_surface(const SpecularPoint& p) {
   for (const OutlineEdge& e : p.outline) {
     const double dx = e.x1 - e.x0, dy = e.y1 - e.y0;
     // Foot of the perpendicular on an edge.
+    // 1e-30 m^2: an edge without length is a point.
     const double t = std::clamp(-(e.x0 * dx + e.y0 * dy) / std::max(dx * dx + dy * dy, 1e-30), 0.0, 1.0);
     const std::array<double, 2> at{e.x0 + t * dx, e.y0 + t * dy};
     if (const double l = std::hypot(at[0], at[1]); l < nearest) nearest = l, best = at;
