@@ -31,10 +31,12 @@ inline Lanes gather(const float* table, LaneNumbers at) {
   return Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table, 4));
 }
 inline Lanes reciprocal(Lanes x) {
+  // Newton: g + g (1 - x g).
   const Lanes guess = Lanes(_mm512_rcp14_ps(native(x)));
   return guess + guess * (1.0f - x * guess);
 }
 inline Lanes inverse_root(Lanes x) {  // x > 0
+  // Newton: g + g (1 - x g^2) / 2.
   const Lanes guess = Lanes(_mm512_rsqrt14_ps(native(x)));
   return guess + 0.5f * guess * (1.0f - x * guess * guess);
 }
