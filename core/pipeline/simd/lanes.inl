@@ -1,4 +1,5 @@
-// A vector of `lanes` floats as a value, and the operations that loops over cells need; included once per instruction set, first of all.
+// A vector of `lanes` floats as a value, and the operations that loops over cells need; included once per instruction set,
+// first of all.
 // Reciprocals and roots: where an instruction set has quick estimates, those and a step of Newton's, to two units in the last
 // place; divisions in vectors take longer than all else that is done to a cell.
 
