@@ -36,6 +36,7 @@ Arena::Place Arena::allocate_bytes(std::size_t bytes) {
 }
 
 void Arena::upload(int lane) {
+  // Used parts only: one copy a chunk.
   for (const Chunk& c : chunks_)
     if (c.used > 0) machine_.upload(lane, c.device, c.host, c.used);
 }

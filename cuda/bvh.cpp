@@ -76,6 +76,7 @@ class Builder {
   std::int32_t split(std::size_t from, std::size_t to, int depth) {
     const auto node = static_cast<std::int32_t>(nodes_.size());
     nodes_.push_back({});
+    // Halving by number bounds the depth, and with it the stack of a ray (bvh.hpp).
     const std::size_t middle = depth < deepest_by_area ? divide(from, to) : halve(from, to);
     const std::size_t ends[3] = {from, middle, to};
     for (int side = 0; side < 2; ++side) {
@@ -103,6 +104,7 @@ class Builder {
     if (best.axis < 0) return halve(from, to);
     const auto first = index_.begin() + static_cast<std::ptrdiff_t>(from),
                last = index_.begin() + static_cast<std::ptrdiff_t>(to);
+    // Stable: the order of triangles, and so which of two equal hits counts, is the same in every build.
     const auto middle =
         std::stable_partition(first, last, [&](std::uint32_t i) { return bin_of(items_[i], centres, best.axis) <= best.bin; });
     return static_cast<std::size_t>(middle - index_.begin());
@@ -137,6 +139,7 @@ class Builder {
     for (std::size_t b = 0; b + 1 < bins; ++b) {
       grow(all, box[b]);
       number += count[b];
+      // A plane with nothing below it divides nothing.
       if (number == 0) continue;
       const float cost = node_cost + half_area(all) * static_cast<float>(number) + above[b];
       if (cost < best.cost) best = {axis, static_cast<int>(b), cost};

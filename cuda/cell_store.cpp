@@ -27,12 +27,14 @@ const CellStore::Held* CellStore::held(const CellTile& t) const {
 }
 
 void CellStore::clear() {
+  // Nothing may use the tiles any more: the caller has waited for the device.
   tiles_.clear();
   memory_.clear();
 }
 
 bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells,
                      Parallel& pool) {
+  // Looked up in parallel: the map does not change meanwhile.
   cells.assign(tiles.size(), nullptr);
   pool.for_each((tiles.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
     const std::size_t end = std::min(tiles.size(), (part + 1) * tiles_at_once);

@@ -21,6 +21,7 @@ std::vector<fs::path> module_places() {
   if (const char* given = std::getenv("SONARD_CUDA_MODULE")) return {given};
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  // No /proc: the loader's own search path.
   if (error) return {module_file};
   const fs::path folder = program.parent_path();
   return {folder / module_file, folder.parent_path() / "lib" / "sonard" / module_file};
@@ -41,6 +42,7 @@ Loaded load() {
     if (!library) return {nullptr, std::string("not loadable: ") + dlerror()};
     const auto entry = reinterpret_cast<CudaModuleEntry>(dlsym(library, module_entry));
     const CudaModule* module = entry ? entry() : nullptr;
+    // Structures cross the border as bytes: their sizes must agree, not the version alone.
     if (!module || module->version != module_version || module->view_bytes != sizeof(PingView) ||
         module->tile_bytes != sizeof(TileView) || module->steps != static_cast<std::uint32_t>(Step::steps))
       return {nullptr, place.string() + " belongs to another version of sonard"};
@@ -58,6 +60,7 @@ Found find_device() {
   const Loaded loaded = load();
   const CudaModule* module = loaded.module;
   if (!module) return {nullptr, 0, loaded.why_not};
+  // The name of the device, or of what is missing.
   std::array<char, 256> name{};
   Found found{module, 0, ""};
   const int code = module->query(&found.devices, name.data(), name.size());
@@ -114,6 +117,7 @@ class CudaMachine final : public Machine {
   void wait(int lane) override { check(module_.wait(at_, lane)); }
 
  private:
+  /// An error of the device ends its use: DeviceEngine reports it and may go on with the CPU.
   void check(int code) const {
     if (code != 0) throw std::runtime_error(name_ + ": " + module_.reason(code));
   }

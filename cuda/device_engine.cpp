@@ -83,6 +83,7 @@ class DeviceEngine final : public PingEngine {
         for (BatchRoom& room : rooms_) empty(room);
         if (device_options_.cpu_after_failure) say(*failed_ + "; from here on the CPU computes");
       }
+    // After a failure the device is not used again.
     if (!device_options_.cpu_after_failure) throw EngineUnavailable(*failed_ + "; use --engine cpu or auto");
     for (std::size_t i = 0; i < requests.size(); ++i) {
       pings[i] = by_cpu(requests[i]);
@@ -132,6 +133,7 @@ class DeviceEngine final : public PingEngine {
   /// What device and CPU share: the scene as this request finds it.
   void place(const PingRequest& request) {
     if (!cells_ || !cells_->serves(request.seed, request.switches.texture))
+      // Weights of cells are drawn from the seed: another seed needs other tiles.
       cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, request.switches.texture);
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
@@ -149,6 +151,7 @@ class DeviceEngine final : public PingEngine {
       std::rotate(plans_.begin(), it, it + 1);  // newest first
       return plans_.front();
     }
+    // The least recently used goes; batches under way hold their own reference.
     if (plans_.size() >= most_plans) plans_.pop_back();
     plans_.insert(plans_.begin(), std::make_shared<PlanTables>(*machine_, keeping_lane, request));
     return plans_.front();
@@ -227,6 +230,7 @@ class DeviceEngine final : public PingEngine {
           if (from.truth.host[k].object != no_object) by_column[k] = {from.truth.host[k].range_m, from.truth.host[k].object};
       ping.truth = truth_of_beams(from.plan->plan(), by_column);
     }
+    // Rays and echoes are counted on the device; base rays are known beforehand.
     statistics_ = from.statistics;
     if (view.has_scene != 0) {
       statistics_.rays +=
@@ -235,6 +239,7 @@ class DeviceEngine final : public PingEngine {
     }
     return ping;
   }
+  /// Arenas keep their memory.
   static void empty(BatchRoom& room) {
     room.views.clear();
     room.pings.clear();

@@ -55,6 +55,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.at_full_scale = static_cast<float>(line.at_full_scale);
   view_.logarithmic = p.settings.format.scale == SampleFormat::Scale::logarithmic ? 1 : 0;
   view_.bytes_a_sample = p.settings.format.bits / 8;
+  // Pulses without a table of rows, (25).
   if (p.spectral) add_spectrum(*p.spectral);
   memory_.upload(lane);
 }
@@ -65,6 +66,7 @@ void PlanTables::add_spectrum(const SpectralColumns& s) {
   v.points = s.sums().grid_points();
   v.period = s.period_samples();
   v.frequencies = s.frequencies();
+  // Width of (26), terms of its polynomials, and their padding to whole vectors.
   v.width = t.width, v.terms = t.terms, v.padded = t.padded;
   v.kernel = memory_.put(t.polynomial);
   v.correction = memory_.put(t.correction);
@@ -75,6 +77,7 @@ void PlanTables::add_spectrum(const SpectralColumns& s) {
 }
 
 bool PlanTables::serves(const PingRequest& request) const {
+  // The seed belongs to it because of the noise table.
   return model_ == request.model && seed_ == request.seed && sonar::serves(plan_, request);
 }
 

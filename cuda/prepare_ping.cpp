@@ -28,6 +28,7 @@ BatchRoom::BatchRoom(Machine& machine, int which_lane, std::size_t most_pings)
       view_table_(view_memory_.allocate<PingView>(most_pings)) {}
 
 const PingView* BatchRoom::upload() {
+  // All pings of a batch in one table: a step is launched once for all of them.
   std::copy(views.begin(), views.end(), view_table_.host);
   view_memory_.upload(lane);
   tables.upload(lane);
@@ -83,6 +84,7 @@ bool PingPreparer::add(const PingRequest& request, std::size_t index, std::share
            plan->plan(),
            make_scalars(plan->plan(), request, flat_.origin()),
            request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world};
+  // Constants of the settings first, then those of the ping.
   plan->fill(m.view);
   place_fan(m);
   if (!request.blank) {
@@ -154,6 +156,7 @@ void PingPreparer::place_fan(Making& m) {
   m.view.tracer.top = m.room.tables.put(places.top);
   m.view.tracer.bodies = m.room.tables.put(places.bodies);
   m.view.tracer.body_count = static_cast<std::int32_t>(places.bodies.size());
+  // Base rays of all columns; each interval between two is refined by itself, so it needs no list.
   const auto elevations = static_cast<std::size_t>(sea.elevations);
   m.view.fan_rays = m.room.work.allocate<FanRay>(elevations * m.columns()).device;
   m.view.depth = m.room.work.allocate<float>(m.columns() * static_cast<std::size_t>(sea.bins + 1)).device;
@@ -189,6 +192,7 @@ void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std:
   const PingPlan& plan = m.plan;
   std::vector<PulseInBeams> in_beams;
   const auto add = [&](double sine, const SampledPulse& pulse) {
+    // Samples [from, from + count) of (8), complex, in double as on the CPU.
     const auto& [from, values] = pulse;
     if (values.empty()) return;
     static_assert(sizeof(std::complex<double>) == 2 * sizeof(double));
@@ -239,6 +243,7 @@ TileView PingPreparer::view_of(const PreparedTile& prepared, const std::int16_t*
   t.law = law;
   t.count = tile.count;
   t.axis = tile.axis;
+  // Cells are 16-bit offsets from the tile's centre, in this unit [m].
   t.position_unit_m = tile.position_unit_m;
   std::copy_n(seen.from_sonar_object, 3, t.from_sonar_object);
   std::copy_n(seen.from_sonar, 3, t.from_sonar);
@@ -261,6 +266,7 @@ void PingPreparer::lay_out_tiles(Making& m, const std::vector<LawTable>& laws) {
   std::vector<const float*> law_on_device;
   for (const LawTable& law : laws) law_on_device.push_back(m.room.tables.put(law.root));
   const auto tiles = m.room.tables.allocate<TileView>(tiles_.size());
+  // Sums of the tiles' counts: finds the tile of a slot by bisection.
   const auto first_slot = m.room.tables.allocate<std::uint32_t>(tiles_.size() + 1);
   pool_.for_each((tiles_.size() + tiles_per_part - 1) / tiles_per_part, [&](std::size_t part, int) {
     const std::size_t end = std::min(tiles_.size(), (part + 1) * tiles_per_part);
@@ -304,6 +310,7 @@ void PingPreparer::add_water(Making& m) {
   m.view.slice_count = static_cast<std::int32_t>(slices.size());
   m.view.open_power = m.room.tables.put(volume.open_power_upa2());
   m.view.column_width = m.room.tables.put(width);
+  // By column and sample: how much of the fan [rad] ends there.
   m.view.blocked = m.room.work.allocate<double>(m.samples() * m.columns()).device;
   m.view.open_fan = volume.open_fan();
   m.view.volume_samples_per_m = m.scalars.samples_per_m;
@@ -317,6 +324,7 @@ void PingPreparer::add_receiver(Making& m) {
   view.noise_key = {key_of(m.request.seed, Domain::noise_place), m.request.sonar_id,
                     static_cast<std::uint32_t>(m.request.number)};
   view.has_noise = m.request.switches.noise ? 1 : 0;
+  // rms of a column [uPa]: (30) over the root of sum_k W_jk^2.
   view.noise_rms = static_cast<float>(m.plan.column_noise_upa);
   const Leak leak(m.plan, m.request.switches);
   if (leak.is_audible() && !m.request.blank) {
@@ -346,6 +354,7 @@ void PingPreparer::allocate_results(Making& m) {
   Ping& ping = m.ping.ping;
   ping.request = m.request;
   shape_ping(m.plan, m.request.switches, ping);
+  // Results are empty where the request keeps nothing of the kind.
   m.ping.codes = m.room.results.allocate<std::uint8_t>(ping.samples.size());
   m.ping.pressure = m.room.results.allocate<float>(ping.pressure_upa.size());
   m.ping.beams = m.room.results.allocate<float>(2 * ping.beam_signal_upa.size());

@@ -127,7 +127,7 @@ void PaperPing::simulate_columns() {
   pool_.for_each(static_cast<std::size_t>(p_.fan.columns()), [&](std::size_t column, int worker) {
     simulate_column(static_cast<int>(column), work_[static_cast<std::size_t>(worker)]);
   });
-  // Workers count for themselves, so that they share no memory.
+  // Each worker has counters of its own, so that no memory is shared.
   for (const Work& work : work_) {
     const PingStatistics& share = work.statistics;
     for (std::size_t i = 0; i < share.seconds.size(); ++i) statistics_.seconds[i] += share.seconds[i];

@@ -333,7 +333,7 @@ Ping PingSimulation::image() {
     const int first = static_cast<int>(window) * rows_at_once;
     image_rows(first, std::min(first + rows_at_once, rows), w_.workers[static_cast<std::size_t>(worker)], ping);
   });
-  // Workers count for themselves, so that they share no memory.
+  // Each worker has counters of its own, so that no memory is shared.
   for (const Workspace::Buffers::PerWorker& worker : w_.workers) {
     for (std::size_t s = 0; s < w_.statistics.seconds.size(); ++s) w_.statistics.seconds[s] += worker.statistics.seconds[s];
     w_.statistics.rays += worker.statistics.rays;

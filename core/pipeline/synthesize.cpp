@@ -16,6 +16,7 @@ void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernel
 
 namespace {
 
+/// Where T(u) is 1 the order of noise and T(u) does not matter.
 bool begins_with_noise(const PingPlan& plan, const PingNoise& noise, int column) {
   return noise.table && !plan.expected_power && plan.columns.transmit[static_cast<std::size_t>(column)] == 1.0f;
 }

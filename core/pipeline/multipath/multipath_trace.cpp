@@ -70,6 +70,7 @@ class ChainTracer {
     packet.direction_x[i] = d.x - 2 * along * n.x;
     packet.direction_y[i] = d.y - 2 * along * n.y;
     packet.direction_z[i] = d.z - 2 * along * n.z;
+    // The length of the unfolded path is bounded, not that of a leg [m].
     packet.far[i] = far_[i] - travelled[i];
     return packet.far[i] > 0 ? mirror : BounceMap::no_mirror;
   }

@@ -12,6 +12,7 @@ inline float float_of(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 template <int taps>
 void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                      int first_column, int lead) {
+  // (8) from the table of rows: the row by the echo's place between samples, linear between rows. Echoes add in their order.
   const float steps = static_cast<float>(pulse.steps);
   const int reach = (taps > 0 ? taps : pulse.taps) / 2 - 1;
   const int n_taps = taps > 0 ? taps : pulse.taps;
@@ -84,6 +85,7 @@ void accumulate(const EchoArrays& e, int count, const PulseRows& pulse, float* c
 void form_beam_panel(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats) {
   constexpr int width = 2;  // vectors side by side: eight sums in flight hide the latency of the multiply-add
   for (int f = 0; f < floats; f += width * lanes) {
+    // (9): W_jk g_k, the columns of a panel in ascending order.
     Lanes sum[4][width] = {};
     for (int k = 0; k < count; ++k) {
       const float* row = in + k * in_stride + f;

@@ -1,4 +1,5 @@
-// A vector of `lanes` floats as a value, and the operations that loops over cells need; included once per instruction set, first of all.
+// A vector of `lanes` floats as a value, and the operations that loops over cells need; included once per instruction set,
+// first of all.
 // Reciprocals and roots: where an instruction set has quick estimates, those and a step of Newton's, to two units in the last
 // place; divisions in vectors take longer than all else that is done to a cell.
 
@@ -31,10 +32,12 @@ inline Lanes gather(const float* table, LaneNumbers at) {
   return Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table, 4));
 }
 inline Lanes reciprocal(Lanes x) {
+  // Newton: g + g (1 - x g).
   const Lanes guess = Lanes(_mm512_rcp14_ps(native(x)));
   return guess + guess * (1.0f - x * guess);
 }
 inline Lanes inverse_root(Lanes x) {  // x > 0
+  // Newton: g + g (1 - x g^2) / 2.
   const Lanes guess = Lanes(_mm512_rsqrt14_ps(native(x)));
   return guess + 0.5f * guess * (1.0f - x * guess * guess);
 }
