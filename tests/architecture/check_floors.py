@@ -55,7 +55,7 @@ DEPENDENCIES = {
     r"boost/": ["daemon/"],
     r"boost/asio\.hpp": ["daemon/server/system/asio.hpp"],
     r"spdlog/|fmt/": ["daemon/", "clients/"],
-    r"google/protobuf|.*\.pb\.h": ["protocol/control/"],
+    r"google/protobuf|.*\.pb\.h": ["protocol/control/", "protocol/foxglove/"],
     # protoc's classes take long to compile: headers name them only, and requests are structs.
     r"protocol/control/answers\.hpp": [
         "protocol/control/", "daemon/server/control/control_http.cpp", "daemon/server/control/stream_connection.cpp", "daemon/server/events.cpp",
@@ -66,7 +66,7 @@ DEPENDENCIES = {
         "clients/sonarctl/control/fault_text.cpp", "clients/sonarctl/control/status_text.cpp", "clients/sonarctl/doctor/check_daemon.cpp",
         "clients/sonarctl/doctor/check_sonar.cpp", "clients/sonarctl/doctor/gather.cpp", "clients/sonarctl/doctor/watch_pings.cpp",
         "clients/sonarctl/record.cpp", "clients/sonarctl/source.cpp"],
-    r"nlohmann/": ["protocol/control/", "protocol/recording/mcap/", "daemon/", "clients/"],
+    r"nlohmann/": ["protocol/control/", "protocol/foxglove/", "protocol/recording/mcap/", "daemon/", "clients/"],
     r"CLI/": ["core/text/arguments.cpp", "daemon/", "clients/"],
     r"cuda|nv[a-z]+\.h": ["cuda/"],
     r"ignition/": ["clients/gazebo_bridge/"],
