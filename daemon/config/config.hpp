@@ -89,6 +89,12 @@ struct PoseConfig {
   OnStale on_stale = OnStale::hold;
   double max_jump_m = 50;
 };
+/// A site whose pages may open the live view (docs/live-view.md), exactly as browsers name it: "https://example.com".
+struct ViewOrigin {
+  std::string origin;
+  bool steer = false;  // else its pages only look
+  bool operator==(const ViewOrigin&) const = default;
+};
 /// The control interfaces (docs/control.md).
 struct ControlConfig {
   PoseListener stream{true, {{127, 0, 0, 1}, 14770}};  // TCP: the control stream
@@ -97,12 +103,14 @@ struct ControlConfig {
        http_given = false;           // by the file: then an address in use is an error; for a default it is a warning
   std::filesystem::path token_file;  // empty = none; needed when a listener is not on loopback
   std::vector<std::string> hosts;    // allowed names in HTTP's Host and Origin, beside addresses and localhost
+  std::vector<ViewOrigin> view_origins;
   bool operator==(const ControlConfig&) const = default;
 };
 /// Resource limits for clients.
 struct LimitConfig {
   int clients = 256;                             // of all sonars together; 16 of one: SonarConfig::max_clients
   int control_clients = 32;                      // of the stream, and of HTTP
+  int viewers = 8;                               // of HTTP's, those of the live view
   std::size_t input_bytes_per_s = 1u << 20;      // of one client; reading slows down above it
   std::size_t pose_bytes_per_s = 2u << 20;       // of all pose connections together
   std::size_t control_message_bytes = 1u << 20;  // of one message of the stream, one body of HTTP

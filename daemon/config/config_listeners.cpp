@@ -38,6 +38,22 @@ void read_control_listener(const Node& node, bool has_token, PoseListener& liste
     node.fail("can be reached from other computers: that needs control.token_file, the file of a secret that clients must show");
 }
 
+ViewOrigin read_view_origin(const Node& node) {
+  ViewOrigin allowed;
+  Node origin = node;
+  if (node.is_map()) {
+    Map map = node.map();
+    origin = map.required("origin");
+    allowed.steer = map.optional("steer").boolean_or(false);
+  }
+  allowed.origin = origin.text(256);
+  const std::size_t scheme = allowed.origin.find("://");
+  const bool is_web = allowed.origin.starts_with("http://") || allowed.origin.starts_with("https://");
+  if (!is_web || allowed.origin.find('/', scheme + 3) != std::string::npos || allowed.origin.size() == scheme + 3)
+    origin.fail("is not an origin; write it as browsers do: https://example.com or http://192.168.1.7:8080");
+  return allowed;
+}
+
 }  // namespace
 
 ControlConfig read_control(const Node& node, const std::filesystem::path& directory) {
@@ -46,6 +62,7 @@ ControlConfig read_control(const Node& node, const std::filesystem::path& direct
   Map map = node.map();
   if (const Node file = map.optional("token_file")) control.token_file = directory / file.text();
   control.hosts = map.optional("hosts").texts(0, 64);
+  for (const Node& origin : map.optional("view_origins").items(0, 64)) control.view_origins.push_back(read_view_origin(origin));
   const bool has_token = !control.token_file.empty();
   read_control_listener(map.optional("stream"), has_token, control.stream, control.stream_given);
   read_control_listener(map.optional("http"), has_token, control.http, control.http_given);

@@ -150,6 +150,7 @@ LimitConfig read_limits(const Node& node) {
   };
   whole("clients", limits.clients, 1, 65536);
   whole("control_clients", limits.control_clients, 1, 1024);
+  whole("viewers", limits.viewers, 0, 1024);
   whole("input_bytes_per_s", limits.input_bytes_per_s, 1024, std::int64_t{1} << 40);
   whole("pose_bytes_per_s", limits.pose_bytes_per_s, 1024, std::int64_t{1} << 40);
   whole("control_message_bytes", limits.control_message_bytes, 1024, 1 << 20);

@@ -16,12 +16,12 @@ class Keeper {
     keep("poses.mavlink", mavlink, next.mavlink);
   }
   void control(const ControlConfig& now, ControlConfig& next) {
-    const auto& [stream, http, stream_given, http_given, token_file, hosts] = now;
+    const auto& [stream, http, stream_given, http_given, token_file, hosts, view_origins] = now;
     next.stream_given = stream_given, next.http_given = http_given;  // the same address, written out, is no change
     keep("control", now, next);
   }
   void limits(const LimitConfig& now, LimitConfig& next) {
-    const auto& [clients, control_clients, input_bytes_per_s, pose_bytes_per_s, control_message_bytes, stall, dead_peer,
+    const auto& [clients, control_clients, viewers, input_bytes_per_s, pose_bytes_per_s, control_message_bytes, stall, dead_peer,
                  spare_descriptors, load] = now;
     keep("limits.control_clients", control_clients, next.control_clients);
   }

@@ -59,7 +59,8 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                    control_, fault_log_}),
       fault_operations_(config_, fleet_, fault_log_, clock_, log_),
       operations_(scene_operations_, sonar_operations_, time_operations_, monitoring_, fault_operations_),
-      control_(io_, config_.control, config_.limits, admission_, operations_, events_, pose_intake_, log_),
+      view_({io_, config_, clock_, world_, changes_, fleet_, operations_, log_}),
+      control_(io_, config_.control, config_.limits, admission_, operations_, events_, pose_intake_, log_, &view_),
       signals_(io_),
       housekeeping_timer_(io_),
       stop_timer_(io_),
@@ -143,6 +144,7 @@ void App::stop(const std::string& why) {
   pose_server_.stop();
   mavlink_server_.stop();
   control_.stop();
+  view_.stop();
   housekeeping_timer_.cancel();
   reload_.stop();
   changes_.stop();

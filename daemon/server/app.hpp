@@ -30,6 +30,7 @@
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
 #include "daemon/server/system/notify.hpp"
+#include "daemon/server/view/view_feed.hpp"
 
 namespace sonar {
 
@@ -72,6 +73,7 @@ class App {
   /// For servers of the control protocol, on the I/O thread.
   Operations& operations() { return operations_; }
   Events& events() { return events_; }
+  const ViewFeed& view() const { return view_; }
   const Admission& admission() const { return admission_; }
   /// After run().
   const World& world() const { return world_; }
@@ -113,6 +115,7 @@ class App {
   Monitoring monitoring_;
   FaultOperations fault_operations_;
   AppOperations operations_;
+  ViewFeed view_;
   ControlServer control_;
   asio::signal_set signals_;
   asio::steady_timer housekeeping_timer_, stop_timer_;

@@ -44,6 +44,8 @@ Result<void> set_rate(SonarSettings& all, double rate_hz, const protocol::Device
 
 float gain_db_from(double percent) { return static_cast<float>(half_gain_db * (percent / 50 - 1)); }
 
+double gain_percent_from(double gain_db) { return 50 * (gain_db / half_gain_db + 1); }
+
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   SonarSettings all = settings_from(device.settings.get(), device);
   if (wanted.mode) {

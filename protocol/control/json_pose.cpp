@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "protocol/control/json_depth.hpp"
 #include "protocol/control/refused.hpp"
 
 namespace sonar::control {
@@ -12,27 +13,6 @@ using nlohmann::json;
 constexpr int deepest_pose = 8;
 constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";  // .NET writes one
 constexpr double latest_timestamp_s = 1e-9 * static_cast<double>(largest_stamp_ns);
-
-/// Looks at nesting only: brackets outside strings. The parser recurses, so depth is bounded before it runs.
-bool too_deep(std::string_view text) {
-  int depth = 0;
-  bool in_string = false, escaped = false;
-  for (const char c : text) {
-    if (in_string) {
-      if (escaped)
-        escaped = false;
-      else if (c == '\\')
-        escaped = true;
-      else if (c == '"')
-        in_string = false;
-      continue;
-    }
-    if (c == '"') in_string = true;
-    if ((c == '{' || c == '[') && ++depth > deepest_pose) return true;
-    if (c == '}' || c == ']') --depth;
-  }
-  return false;
-}
 
 bool begins_object(std::string_view line) {
   const auto first = line.find_first_not_of(" \t\r\n");
@@ -134,7 +114,7 @@ Result<PoseSample> sample_from(const json& object) {
 
 Result<PoseSample> parse_json_pose(std::string_view line) {
   if (line.size() > longest_line) return refused("line is longer than 4096 bytes");
-  if (too_deep(line)) return refused("JSON is nested deeper than 8 levels");
+  if (nests_deeper(line, deepest_pose)) return refused("JSON is nested deeper than 8 levels");
   const json object = json::parse(line.begin(), line.end(), nullptr, false);
   if (object.is_discarded()) return refused("line is not JSON");
   if (!object.is_object()) return refused("line is not a JSON object");
@@ -142,7 +122,8 @@ Result<PoseSample> parse_json_pose(std::string_view line) {
 }
 
 bool is_json_object(std::string_view line) {
-  return begins_object(line) && line.size() <= longest_line && !too_deep(line) && json::accept(line.begin(), line.end());
+  return begins_object(line) && line.size() <= longest_line && !nests_deeper(line, deepest_pose) &&
+         json::accept(line.begin(), line.end());
 }
 
 void LineParser::feed(std::span<const std::byte> received) {

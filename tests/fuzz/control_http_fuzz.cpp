@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/server/control/http_router.hpp"
+#include "daemon/server/view/door.hpp"
 #include "tests/fuzz/byte_script.hpp"
 
 namespace {
@@ -34,6 +35,24 @@ Taken take(std::span<const std::byte> stream, std::size_t piece) {
   return taken;
 }
 
+/// A socket is opened only to who shows a secret or has an Origin that may look.
+void check_door(const HttpRequest& request, const SocketAction& asked, const HttpPolicy& policy) {
+  ControlConfig config;
+  config.hosts = {"sonar.example"};
+  config.view_origins = {{"http://a"}};
+  ViewSecrets secrets;
+  const auto opened = open_view(request, asked.query, {policy.token, secrets, policy.reached, config}, {});
+  const auto* welcome = std::get_if<ViewWelcome>(&opened);
+  if (welcome == nullptr) return;
+  require(request.socket_version == "13" && !request.bytes_behind);
+  if (policy.token.needed()) {
+    const auto is_token = [&](const auto& pair) { return pair.first == "token" && policy.token.matches(pair.second); };
+    return require(policy.token.matches(bearer_token(request.authorization)) || std::ranges::any_of(asked.query, is_token));
+  }
+  require(!request.has_origin || request.origin == "http://a" || origin_allowed(request.origin, policy.reached, policy.hosts));
+  require(request.origin != "http://a" || !welcome->may_steer);
+}
+
 void check(const HttpRequest& request, const HttpPolicy& policy) {
   require(request.body.size() <= HttpReader::longest_body);
   const RoutedRequest routed = route_request(request, policy);
@@ -41,7 +60,8 @@ void check(const HttpRequest& request, const HttpPolicy& policy) {
     require(answer->status >= 400 && answer->status < 500 && answer->body.starts_with('{'));
     return;
   }
-  require(request.has_host && host_allowed(request.host, policy.reached, policy.hosts));
+  if (const auto* asked = std::get_if<SocketAction>(&routed.action)) return check_door(request, *asked, policy);
+  require(request.has_host ? host_allowed(request.host, policy.reached, policy.hosts) : request.http_1_0);
   require(!request.has_origin || origin_allowed(request.origin, policy.reached, policy.hosts));
   if (!policy.token.matches(bearer_token(request.authorization))) {
     const auto* health = std::get_if<HealthAction>(&routed.action);

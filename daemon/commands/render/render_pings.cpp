@@ -11,6 +11,7 @@
 #include "core/text/format.hpp"
 #include "daemon/commands/render/npy.hpp"
 #include "daemon/commands/render/sidecar.hpp"
+#include "daemon/emulator/view/ping_payloads.hpp"
 #include "daemon/server/engine/choose_engine.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 
@@ -19,36 +20,12 @@ namespace {
 
 using std::filesystem::path;
 
-PolarImage picture_of(const Ping& ping) {
-  const PingSettings& s = ping.request.settings;
-  PolarImage image;
-  image.rows = static_cast<std::size_t>(s.range_bin_count);
-  image.beams = static_cast<std::size_t>(s.beam_count);
-  image.row_spacing_m = s.range_bin_m;
-  image.start_m = s.range_start_m;
-  image.azimuth_rad.assign(ping.beam_azimuth_rad.begin(), ping.beam_azimuth_rad.end());
-  const auto bytes = static_cast<std::size_t>(s.format.bits / 8);
-  for (std::size_t i = 0; i < image.rows * image.beams; ++i) {
-    std::uint32_t code = 0;
-    for (std::size_t b = 0; b < bytes; ++b) code |= std::to_integer<std::uint32_t>(ping.samples[i * bytes + b]) << (8 * b);
-    image.samples.push_back(static_cast<float>(code));
-  }
-  image.full_scale = static_cast<float>(s.format.max_code);
-  if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear) {  // wide samples rarely come near their maximum
-    std::vector<float> sorted = image.samples;
-    const auto place = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) * 999 / 1000);
-    std::nth_element(sorted.begin(), place, sorted.end());
-    image.full_scale = std::max(1.0f, *place);
-  }
-  return image;
-}
-
 Result<void> write_picture(const Ping& ping, bool rings, const path& file) {
   const auto colours = find_colour_map("viridis");
   if (!colours) return tl::make_unexpected(colours.error());
   const bool is_fan = ping.request.settings.beam_count > 1;
   const auto picture =
-      is_fan ? draw_fan(picture_of(ping), {.width_px = 1000, .colours = *colours, .rings = rings}) : Raster(64, 64);
+      is_fan ? draw_fan(polar_image_of(ping), {.width_px = 1000, .colours = *colours, .rings = rings}) : Raster(64, 64);
   if (!picture) return tl::make_unexpected(picture.error());
   const auto png = encode_png(*picture);
   if (!png) return tl::make_unexpected(png.error());

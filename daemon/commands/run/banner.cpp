@@ -73,6 +73,15 @@ std::string control_line(const App& app) {
   return text + (app.config().control.token_file.empty() ? "\n" : "   token needed\n");
 }
 
+/// For viewers whose pages come from elsewhere: the key is good until sonard stops.
+std::string view_line(const App& app) {
+  const Endpoint http = app.control().http();
+  const std::string& key = app.view().secrets().key();
+  if (http.port == 0 || app.config().limits.viewers == 0) return {};
+  return "view      ws://" + address_text(http) + "/" + (key.empty() ? "?token=TOKEN" : "?key=" + key) +
+         "   Foxglove, Lichtblick: docs/live-view.md\n";
+}
+
 /// Largest resident memory so far [MB]; 0 where the system does not tell.
 double peak_memory_mb() {
   std::ifstream status("/proc/self/status");
@@ -95,6 +104,7 @@ std::string banner(const App& app, const BannerFacts& facts) {
   for (const Device& d : app.devices()) text += sonar_lines(d);
   text += pose_line(app);
   text += control_line(app);
+  text += view_line(app);
   text += "seed      " + std::to_string(app.config().seed) + "   reproducible";
   if (const ClockMode clock = app.config().clock; clock != ClockMode::realtime)
     text += ", " + std::string(name_of(clock)) + " clock";

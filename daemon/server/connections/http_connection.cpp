@@ -53,6 +53,7 @@ std::string bytes_of(HttpAnswer answer, std::string_view connection, Part part) 
   if (answer.status != 204) response.content_length(answer.body.size());  // RFC 9110, 8.6
   if (!connection.empty()) response.set(http::field::connection, {connection.data(), connection.size()});
   if (!answer.allow.empty()) response.set(http::field::allow, answer.allow);
+  for (const auto& [name, value] : answer.headers) response.set(name, value);
   if (answer.status == 401) response.set(http::field::www_authenticate, "Bearer");
   response.body() = std::move(answer.body);
   return bytes_of(response, part);
@@ -93,6 +94,7 @@ HttpConnection::HttpConnection(ConnectionServices& services, HttpService& servic
 }
 
 void HttpConnection::close() {
+  if (takeover_ && !over()) takeover_->on_closing();
   error_code ec;
   socket_.close(ec);
   request_limit_->none();
@@ -115,6 +117,10 @@ asio::awaitable<void> HttpConnection::read() {
   request_limit_->within(greeting_limit);
   while (!over()) {
     error_code ec;
+    if (takeover_) {
+      co_await takeover_->read();
+      break;
+    }
     if (busy_ && !discards_) {  // one request after the other; later bytes wait in the kernel
       co_await wake_reader_.async_wait(into(ec));
       continue;
@@ -196,8 +202,7 @@ asio::awaitable<void> HttpConnection::write() {
 
 /// False: it shows the token, and no slot is free.
 bool HttpConnection::has_slot(const HttpRequest& request) {
-  if (!claim_slot_ || !services_.token.matches(bearer_token(request.authorization))) return true;
-  return std::exchange(claim_slot_, nullptr)();
+  return !services_.token.matches(bearer_token(request.authorization)) || claim_slot();
 }
 
 asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
@@ -211,6 +216,15 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
     co_await write_stream(std::move(*stream), head);
     all_sent_ = true;
     co_return;
+  }
+  if (auto* takeover = std::get_if<std::shared_ptr<HttpTakeover>>(&made)) {
+    if (co_await (*takeover)->begin()) {
+      takeover_ = *takeover;
+      wake_reader_.cancel();
+      co_await takeover_->write();
+    }
+    all_sent_ = true;
+    co_return close();
   }
   auto& answer = std::get<HttpAnswer>(made);
   if (!answer.why.empty()) log_refusal(services_, answer.why, sender_.id);

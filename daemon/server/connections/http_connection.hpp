@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "daemon/server/connections/connection_services.hpp"
 #include "daemon/server/connections/http_service.hpp"
@@ -33,6 +34,10 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   Endpoint reached() const { return reached_; }
   /// The address of the other end.
   Ipv4 peer() const { return peer_; }
+  /// Of a client that has shown the token in a way that only the service knows. False: no slot is free.
+  bool claim_slot() { return !claim_slot_ || std::exchange(claim_slot_, nullptr)(); }
+  /// For a takeover.
+  tcp::socket& socket() { return socket_; }
   /// For the service while it makes an answer.
   asio::steady_timer& wait_timer() { return wake_operation_; }
 
@@ -63,11 +68,12 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   std::optional<HttpRequest> request_;  // read, not yet answered
   std::optional<HttpRefusal> refusal_;  // of a request that cannot be parsed
   std::function<bool()> claim_slot_;    // empty: trusted
-  bool continue_asked_ = false;         // send "100 Continue"
-  bool busy_ = false;                   // a request is being answered
-  bool discards_ = false;               // input is discarded
-  bool peer_closed_ = false;            // the client sends no more
-  bool all_sent_ = false;               // we send no more
+  std::shared_ptr<HttpTakeover> takeover_;
+  bool continue_asked_ = false;  // send "100 Continue"
+  bool busy_ = false;            // a request is being answered
+  bool discards_ = false;        // input is discarded
+  bool peer_closed_ = false;     // the client sends no more
+  bool all_sent_ = false;        // we send no more
 };
 
 }  // namespace sonar

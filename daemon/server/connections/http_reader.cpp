@@ -22,6 +22,14 @@ HttpRefusal refusal_of(const boost::beast::error_code& ec, std::size_t most_body
   return {400, "this is not an HTTP request: " + ec.message()};
 }
 
+/// Of all headers of the name (RFC 9110, 5.3).
+std::string joined(const http::request<http::string_body>& message, http::field name) {
+  std::string all;
+  const auto [first, last] = message.equal_range(name);
+  for (auto field = first; field != last; ++field) all += (all.empty() ? "" : ", ") + text_of(field->value());
+  return all;
+}
+
 tl::expected<std::optional<HttpRequest>, HttpRefusal> request_from(http::request<http::string_body> message) {
   HttpRequest request;
   request.method = text_of(message.method_string());
@@ -34,6 +42,12 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> request_from(http::request
   request.origin = text_of(message[http::field::origin]);
   request.authorization = text_of(message[http::field::authorization]);
   request.content_type = text_of(message[http::field::content_type]);
+  request.upgrade = joined(message, http::field::upgrade);
+  request.connection = joined(message, http::field::connection);
+  request.accept = joined(message, http::field::accept);
+  request.socket_key = joined(message, http::field::sec_websocket_key);
+  request.socket_version = joined(message, http::field::sec_websocket_version);
+  request.socket_protocols = joined(message, http::field::sec_websocket_protocol);
   request.keep_alive = message.keep_alive();
   request.body = std::move(message.body());
   return std::optional(std::move(request));
@@ -79,7 +93,9 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
   auto message = beast.release();
   parser_ = std::make_unique<Parser>(most_body_);
   continued_ = false;
-  return request_from(std::move(message));
+  auto request = request_from(std::move(message));
+  if (request) (*request)->bytes_behind = !buffer_.empty();
+  return request;
 }
 
 bool HttpReader::asks_to_continue() {

@@ -14,6 +14,9 @@ namespace sonar {
 
 struct HttpRequest {
   std::string method, target, host, origin, authorization, content_type, body;
+  std::string upgrade, connection, accept;                   // as they came; several headers of a name joined by ", "
+  std::string socket_key, socket_version, socket_protocols;  // Sec-WebSocket-...
+  bool bytes_behind = false;                                 // more had been received when it was whole
   bool http_1_0 = false, keep_alive = true;
   bool has_host = false, has_origin = false;
 };

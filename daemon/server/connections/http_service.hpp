@@ -22,13 +22,28 @@ struct HttpStream {
   std::function<std::optional<std::string>()> next;  // nothing: wait
 };
 
+/// Takes the connection over: an upgrade to another protocol, with coroutines of its own in place of the connection's.
+class HttpTakeover {
+ public:
+  virtual ~HttpTakeover() = default;
+  /// The answer to the request. False: nothing goes on.
+  virtual asio::awaitable<bool> begin() = 0;
+  // Both until the socket closes.
+  virtual asio::awaitable<void> read() = 0;
+  virtual asio::awaitable<void> write() = 0;
+  /// The socket is about to be closed by us: last words, if they can be sent at once.
+  virtual void on_closing() = 0;
+};
+
+using HttpOutcome = std::variant<HttpAnswer, HttpStream, std::shared_ptr<HttpTakeover>>;
+
 class HttpConnection;
 
 class HttpService {
  public:
   virtual ~HttpService() = default;
   /// `from` outlives the call. May wait on from.wait_timer(), which ends when the connection does.
-  virtual asio::awaitable<std::variant<HttpAnswer, HttpStream>> answer(const HttpRequest& request, HttpConnection& from) = 0;
+  virtual asio::awaitable<HttpOutcome> answer(const HttpRequest& request, HttpConnection& from) = 0;
   /// Of a request that cannot be parsed, or that finds no slot.
   virtual HttpAnswer refusal(const HttpRefusal& refusal) const = 0;
 };

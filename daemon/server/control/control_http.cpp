@@ -2,12 +2,15 @@
 
 #include <utility>
 
+#include "daemon/server/view/view_feed.hpp"
 #include "protocol/control/answers.hpp"
 
 namespace sonar {
 namespace {
 
 using control::StatusCode;
+
+}  // namespace
 
 HttpAnswer answer_from(const OperationResult& result) {
   if (result.code == OperationResult::Code::refused) return answer_of(400, StatusCode::refused, result.text);
@@ -18,18 +21,35 @@ HttpAnswer answer_from(const OperationResult& result) {
   return answer_of(200, StatusCode::ok, result.text);
 }
 
-}  // namespace
-
-asio::awaitable<std::variant<HttpAnswer, HttpStream>> ControlHttp::answer(const HttpRequest& request, HttpConnection& from) {
+asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, HttpConnection& from) {
   RoutedRequest routed = route_request(request, {services_.token, from.reached().ip, config_.hosts});
   if (!routed.pose_refusal.empty()) targets_.poses.refuse(routed.pose_refusal, from.sender());
   if (auto* answer = std::get_if<HttpAnswer>(&routed.action)) co_return std::move(*answer);
   if (const auto* wanted = std::get_if<control::Subscribe>(&routed.action)) co_return stream_of(*wanted);
   if (const auto* asked = std::get_if<HealthAction>(&routed.action)) co_return health(asked->with_text);
+  if (const auto* asked = std::get_if<SocketAction>(&routed.action)) co_return open_socket(request, *asked, from);
+  if (std::holds_alternative<TicketAction>(routed.action) && view_ != nullptr)
+    co_return HttpAnswer{200, "{\"ticket\":\"" + view_->secrets().new_ticket(ViewSecrets::Steady::now()) + "\"}\n"};
   if (std::holds_alternative<MetricsAction>(routed.action))
     co_return HttpAnswer{200, targets_.operations.metrics(), "text/plain; version=0.0.4; charset=utf-8"};
   if (auto* asked = std::get_if<OperationAction>(&routed.action)) co_return co_await perform(std::move(asked->operation), from);
   co_return HttpAnswer{200, help_text(text_of(from.reached())), "text/plain; charset=utf-8"};
+}
+
+HttpOutcome ControlHttp::open_socket(const HttpRequest& request, const SocketAction& asked, HttpConnection& from) {
+  if (view_ == nullptr) return answer_of(404, StatusCode::unsupported, "there is no live view");
+  auto opened = open_view(request, asked.query, {services_.token, view_->secrets(), from.reached().ip, config_},
+                          ViewSecrets::Steady::now());
+  if (auto* answer = std::get_if<HttpAnswer>(&opened)) return *std::move(answer);
+  if (view_->is_full() || !from.claim_slot()) {
+    HttpAnswer full =
+        answer_of(503, StatusCode::failed, "all places of viewers are taken; limits.viewers in the configuration makes more");
+    full.why = "all " + std::to_string(services_.limits.viewers) + " places of viewers are taken: limits.viewers";
+    return full;
+  }
+  return std::shared_ptr<HttpTakeover>(
+      std::make_shared<ViewConnection>(services_, from, *view_, request, std::get<ViewWelcome>(opened),
+                                       [view = view_](const std::shared_ptr<ViewConnection>& viewer) { view->add(viewer); }));
 }
 
 HttpAnswer ControlHttp::refusal(const HttpRefusal& refusal) const {

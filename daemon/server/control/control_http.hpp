@@ -7,23 +7,30 @@
 
 namespace sonar {
 
+class ViewFeed;
+
+/// With the body that the operation's result has by HTTP.
+HttpAnswer answer_from(const OperationResult& result);
+
 class ControlHttp final : public HttpService {
  public:
-  /// All of it outlives the service.
-  ControlHttp(ConnectionServices& services, const ControlConfig& config, ControlTargets& targets)
-      : services_(services), config_(config), targets_(targets) {}
+  /// All of it outlives the service. Without `view` there is no live view.
+  ControlHttp(ConnectionServices& services, const ControlConfig& config, ControlTargets& targets, ViewFeed* view)
+      : services_(services), config_(config), targets_(targets), view_(view) {}
 
-  asio::awaitable<std::variant<HttpAnswer, HttpStream>> answer(const HttpRequest& request, HttpConnection& from) override;
+  asio::awaitable<HttpOutcome> answer(const HttpRequest& request, HttpConnection& from) override;
   HttpAnswer refusal(const HttpRefusal& refusal) const override;
 
  private:
   HttpAnswer health(bool with_text) const;
   asio::awaitable<HttpAnswer> perform(control::Operation operation, HttpConnection& from);
   HttpStream stream_of(const control::Subscribe& wanted);
+  HttpOutcome open_socket(const HttpRequest& request, const SocketAction& asked, HttpConnection& from);
 
   ConnectionServices& services_;
   const ControlConfig& config_;
   ControlTargets& targets_;
+  ViewFeed* view_;
 };
 
 }  // namespace sonar

@@ -3,11 +3,11 @@
 namespace sonar {
 
 ControlServer::ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Admission& admission,
-                             Operations& operations, Events& events, PoseIntake& poses, Log& log)
+                             Operations& operations, Events& events, PoseIntake& poses, Log& log, ViewFeed* view)
     : config_(config),
       services_{io, limits, admission, log, "control"},
       targets_{operations, events, poses, SharedRate(limits.pose_bytes_per_s)},
-      answers_(services_, config, targets_),
+      answers_(services_, config, targets_, view),
       stream_(services_, "protobuf",
               [this](tcp::socket socket, Sender sender) {
                 return std::make_shared<StreamConnection>(services_, targets_, std::move(socket), std::move(sender));

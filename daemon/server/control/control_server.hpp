@@ -14,7 +14,7 @@ class ControlServer {
  public:
   /// All of it outlives the server.
   ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Admission& admission,
-                Operations& operations, Events& events, PoseIntake& poses, Log& log);
+                Operations& operations, Events& events, PoseIntake& poses, Log& log, ViewFeed* view = nullptr);
 
   /// Reads the token and opens both listeners. A default address in use is a warning; one from the file is an error.
   Result<void> open();

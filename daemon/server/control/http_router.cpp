@@ -1,6 +1,7 @@
 #include "daemon/server/control/http_router.hpp"
 
 #include "core/text/decimal.hpp"
+#include "daemon/server/view/door.hpp"
 
 namespace sonar {
 namespace {
@@ -33,12 +34,15 @@ RoutedRequest operation_of(const Route& route, const std::string& body) {
       std::move(request->op));
 }
 
-/// Checks Host and Origin. Empty = accepted.
-std::optional<HttpAnswer> reject_host_or_origin(const HttpRequest& request, const HttpPolicy& policy) {
+/// Empty = accepted.
+std::optional<HttpAnswer> reject_host(const HttpRequest& request, const HttpPolicy& policy) {
   // HTTP/1.0 has no Host header (RFC 9112, 3.2). Browsers always send one, so this does not weaken the check.
   if (!request.has_host && !request.http_1_0) return refused(400, "the Host header is missing");
   if (request.has_host && !host_allowed(request.host, policy.reached, policy.hosts))
     return refused(403, "unknown Host: use this computer's address, or add the name to control.hosts");
+  return std::nullopt;
+}
+std::optional<HttpAnswer> reject_origin(const HttpRequest& request, const HttpPolicy& policy) {
   if (request.has_origin && !origin_allowed(request.origin, policy.reached, policy.hosts))
     return refused(403, "cross-origin requests are not allowed (Origin); add the site to control.hosts to allow them");
   return std::nullopt;
@@ -53,8 +57,10 @@ HttpAnswer answer_of(unsigned status, StatusCode code, const std::string& text) 
 }
 
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy) {
-  if (auto answer = reject_host_or_origin(request, policy)) return {*std::move(answer)};
+  if (auto answer = reject_host(request, policy)) return {*std::move(answer)};
   const auto target = parse_target(request.target);
+  if (target && target->segments.empty() && wants_socket(request)) return {SocketAction{target->query}};
+  if (auto answer = reject_origin(request, policy)) return {*std::move(answer)};
   if (!target) return {refused(400, "the target is not a path")};
   const Route route = route_of(*target, request.method);
   const bool authorised = policy.token.matches(bearer_token(request.authorization));
@@ -70,6 +76,8 @@ RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy
       return {HealthAction{authorised}};
     case Kind::metrics:
       return {MetricsAction{}};
+    case Kind::ticket:
+      return {TicketAction{}};
     case Kind::status:
       return {OperationAction{control::GetStatus{}}};
     case Kind::faults: {

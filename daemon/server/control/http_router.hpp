@@ -31,8 +31,14 @@ struct MetricsAction {};
 struct OperationAction {
   control::Operation operation;
 };
+/// A WebSocket of the live view: daemon/server/view/door.hpp decides, by rules of its own for Origin and secrets.
+struct SocketAction {
+  std::vector<std::pair<std::string, std::string>> query;
+};
+struct TicketAction {};
 /// What an HTTP request asks for. A Subscribe = a stream of events.
-using HttpAction = std::variant<HttpAnswer, HelpAction, HealthAction, MetricsAction, OperationAction, control::Subscribe>;
+using HttpAction = std::variant<HttpAnswer, HelpAction, HealthAction, MetricsAction, OperationAction, control::Subscribe,
+                                SocketAction, TicketAction>;
 
 struct RoutedRequest {
   HttpAction action;

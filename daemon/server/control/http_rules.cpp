@@ -124,6 +124,7 @@ Route route_of(const Target& target, std::string_view method) {
   if (s.size() == 4 && s[2] == "objects" && !s[3].empty()) return {Route::Kind::operation, "POST", "set_object", s[3]};
   if (s.size() != 3) return {};
   if (s[2] == "status") return {Route::Kind::status, "GET", "status"};
+  if (s[2] == "view_ticket") return {Route::Kind::ticket, "POST", ""};
   if (s[2] == "events") return {Route::Kind::events, "GET", ""};
   constexpr std::array<std::string_view, 12> operations = {
       "sonar",         "environment", "load",           "pose", "object",          "add_object",

@@ -36,7 +36,7 @@ bool begins_http_request(std::string_view bytes);
 inline constexpr std::size_t longest_http_method = 8;  // "OPTIONS "
 
 struct Route {
-  enum class Kind { unknown, help, health, metrics, status, events, operation, faults, end_fault };
+  enum class Kind { unknown, help, health, metrics, status, events, operation, faults, end_fault, ticket };
   Kind kind = Kind::unknown;
   std::string_view method;  // the allowed one
   std::string op;           // of an operation: the member of Request.op; of faults: "faults", "kinds" or "journal"

@@ -30,6 +30,7 @@
 namespace sonar {
 
 namespace v1 {  // of control.pb.h
+class PingEvent;
 class SonarStatus;
 }  // namespace v1
 
@@ -96,6 +97,7 @@ class Device final : public SessionParent {
 
   // Control (device_control.cpp).
   v1::SonarStatus status(Time now) const;
+  v1::PingEvent event_of(const PingQueued& queued) const;
   /// As recordings name it.
   RecordedSonar recorded() const;
   /// Empty when all is well.

@@ -62,6 +62,21 @@ v1::SonarStatus Device::status(Time now) const {
   return s;
 }
 
+v1::PingEvent Device::event_of(const PingQueued& queued) const {
+  const PingRequest& r = queued.ping->request;
+  v1::PingEvent e;
+  e.set_sonar(config().name);
+  e.set_number(static_cast<std::uint32_t>(r.number));
+  e.set_fired_at_ns(r.fired_at.time_since_epoch().count());
+  control::set_pose(e, r.sonar_in_world);
+  e.set_range_m(r.settings.range_m);
+  e.set_beams(static_cast<std::uint32_t>(r.settings.beam_count));
+  e.set_rows(static_cast<std::uint32_t>(r.settings.range_bin_count));
+  e.set_clients(static_cast<std::uint32_t>(sonar_.connections().clients()));
+  e.set_simulation_ms(ms(queued.simulation_s));
+  return e;
+}
+
 std::string Device::problem() const {
   const bool lost = std::any_of(tcp_ports_.begin(), tcp_ports_.end(), [](const TcpPort& p) { return !p.listener.is_open(); }) ||
                     std::any_of(http_.begin(), http_.end(), [](const SonarHttp& http) { return !http.is_open(); });

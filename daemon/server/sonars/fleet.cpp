@@ -185,19 +185,10 @@ void Fleet::on_ping_queued(const Device& of, const PingQueued& queued) {
   if (recordings_.takes(name))
     recordings_.take(name, {now, queued.ping, queued.bytes, queued.datagrams, of.sonar().vendor().beacon(of.sonar().state(), now),
                             computed_names_[of.sonar().index()]});
+  if (tap_) tap_(of, queued);
   if (!events_.has_listeners()) return;
-  const PingRequest& r = queued.ping->request;
   v1::Event event;
-  v1::PingEvent& e = *event.mutable_ping();
-  e.set_sonar(name);
-  e.set_number(static_cast<std::uint32_t>(r.number));
-  e.set_fired_at_ns(r.fired_at.time_since_epoch().count());
-  control::set_pose(e, r.sonar_in_world);
-  e.set_range_m(r.settings.range_m);
-  e.set_beams(static_cast<std::uint32_t>(r.settings.beam_count));
-  e.set_rows(static_cast<std::uint32_t>(r.settings.range_bin_count));
-  e.set_clients(static_cast<std::uint32_t>(of.sonar().connections().clients()));
-  e.set_simulation_ms(1e3 * queued.simulation_s);
+  *event.mutable_ping() = of.event_of(queued);
   events_.publish(event);
 }
 

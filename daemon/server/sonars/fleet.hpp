@@ -51,6 +51,9 @@ class Fleet final : public DeviceParent {
   const std::list<Device>& devices() const { return devices_; }
   std::list<Device>& devices() { return devices_; }
   Device* find(const std::string& name);
+  /// `tap` gets each ping when it is queued to clients, as recordings do; empty = none.
+  using PingTap = std::function<void(const Device& of, const PingQueued& ping)>;
+  void tap_pings(PingTap tap) { tap_ = std::move(tap); }
   bool gone() const;  // after stop(): nothing is left
   std::uint64_t served() const;
   /// Empty when all is well.
@@ -87,6 +90,7 @@ class Fleet final : public DeviceParent {
   Recordings& recordings_;
   Events& events_;
   Handlers handlers_;
+  PingTap tap_;
   std::map<std::uint32_t, std::shared_ptr<const SceneNames>> computed_names_;  // by index: of the scene its ping is computed in
   std::list<Device> devices_;                                                  // in the configuration's order
   std::list<Retired> retired_;

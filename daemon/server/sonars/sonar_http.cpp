@@ -13,7 +13,7 @@ SonarHttp::SonarHttp(asio::io_context& io, const LimitConfig& limits, Admission&
         return std::make_shared<HttpConnection>(services_, *this, std::move(socket), sender);
       }) {}
 
-asio::awaitable<std::variant<HttpAnswer, HttpStream>> SonarHttp::answer(const HttpRequest& request, HttpConnection& from) {
+asio::awaitable<HttpOutcome> SonarHttp::answer(const HttpRequest& request, HttpConnection& from) {
   const std::size_t path_end = std::min(request.target.find('?'), request.target.size());
   protocol::ResourceRequest resource;
   resource.method = request.method == "HEAD" ? "GET" : request.method;

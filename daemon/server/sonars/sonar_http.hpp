@@ -24,7 +24,7 @@ class SonarHttp final : public HttpService {
   bool is_open() const { return listener_.is_open(); }
   bool gone() const { return listener_.gone(); }
 
-  asio::awaitable<std::variant<HttpAnswer, HttpStream>> answer(const HttpRequest& request, HttpConnection& from) override;
+  asio::awaitable<HttpOutcome> answer(const HttpRequest& request, HttpConnection& from) override;
   HttpAnswer refusal(const HttpRefusal& refusal) const override;
 
  private:

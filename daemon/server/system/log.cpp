@@ -73,6 +73,7 @@ Log::~Log() = default;
 
 void Log::write(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields) {
   if (level >= options_.level) emit(level, phrase, fields);
+  if (listener_ && level >= LogLevel::info) listener_(level, text_line(phrase, fields), fields);
 }
 
 void Log::announce(std::string_view lines) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -22,10 +23,14 @@ class Log {
   void write(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields);
   /// Banner and summary, which no level holds back. As they stand in the text format; in JSON a message each line.
   void announce(std::string_view lines);
+  /// Gets the text of each line from info on, whatever the log's own level; empty = none.
+  using Listener = std::function<void(LogLevel level, const std::string& line, const std::vector<LogField>& fields)>;
+  void listen(Listener listener) { listener_ = std::move(listener); }
 
  private:
   void emit(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields);
   LogOptions options_;
+  Listener listener_;
   struct Sink;
   std::unique_ptr<Sink> sink_;
 };

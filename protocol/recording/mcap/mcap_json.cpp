@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "protocol/wire/base64.hpp"
+
 namespace sonar::recording::mcap {
 namespace {
 
@@ -67,7 +69,7 @@ std::string image_text(Time at, const std::string& frame, const Picture& picture
                                                         : "32FC1"},
                               {"step", picture.beams * (width <= 2 ? width : 4)}});
   text.pop_back();  // base64 needs no escapes: appended without a search for them, since an image can exceed 1 MB
-  return text.append(R"(,"data":")").append(base64(width <= 2 ? picture.samples : as_floats(picture))).append("\"}");
+  return text.append(R"(,"data":")").append(wire::base64(width <= 2 ? picture.samples : as_floats(picture))).append("\"}");
 }
 
 /// The objects that the beams hit, each once.
@@ -88,19 +90,6 @@ Json moving_bodies(const PingTruth& truth) {
 }
 
 }  // namespace
-
-std::string base64(wire::BytesView bytes) {
-  constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t three = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      three = three << 8 | (i + k < bytes.size() ? std::to_integer<std::uint32_t>(bytes[i + k]) : 0);
-    for (unsigned k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : digits[three >> (18 - 6 * k) & 0x3Fu];
-  }
-  return text;
-}
 
 std::string image_json(Time at, const std::string& frame, const oculus::DecodedPing& ping) {
   return image_text(at, frame, picture_of(ping));

@@ -45,6 +45,4 @@ struct PingTruth {
 };
 std::string truth_json(const PingTruth& truth);
 
-std::string base64(wire::BytesView bytes);
-
 }  // namespace sonar::recording::mcap

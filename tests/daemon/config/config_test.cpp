@@ -174,13 +174,15 @@ TEST(Config, LimitsAndPriorityAreRead) {
   EXPECT_EQ(usual->limits.dead_peer, std::chrono::seconds(15));
   EXPECT_EQ(usual->limits.spare_descriptors, 32);
   EXPECT_EQ(usual->engine.io_priority, 0);
-  const auto c = parse(base +
-                       "limits: {clients: 7, control_clients: 3, input_bytes_per_s: 4096, control_message_bytes: 2048, stall_s: "
-                       "0.5, dead_peer_s: 4,"
-                       " spare_descriptors: 9}\nengine: {io_priority: 5}\n");
+  const auto c =
+      parse(base +
+            "limits: {clients: 7, control_clients: 3, viewers: 2, input_bytes_per_s: 4096, control_message_bytes: 2048, stall_s: "
+            "0.5, dead_peer_s: 4,"
+            " spare_descriptors: 9}\nengine: {io_priority: 5}\n");
   ASSERT_TRUE(c) << c.error().text;
   EXPECT_EQ(c->limits.clients, 7);
   EXPECT_EQ(c->limits.control_clients, 3);
+  EXPECT_EQ(c->limits.viewers, 2);
   EXPECT_EQ(c->limits.input_bytes_per_s, 4096u);
   EXPECT_EQ(c->limits.control_message_bytes, 2048u);
   EXPECT_EQ(c->limits.stall, std::chrono::milliseconds(500));
@@ -391,11 +393,17 @@ TEST(ConfigControl, ReadsItsKeysAndRefusesStrangersWithoutAToken) {
   EXPECT_EQ(config->control.hosts.at(0), "sonar-lab");
   EXPECT_EQ(config->control.token_file.filename(), "secret");
   EXPECT_TRUE(with("{http: '0.0.0.0:8088', token_file: /etc/secret}"));
+  const auto viewed = with("{view_origins: ['https://a.example', {origin: 'http://b.example:8080', steer: true}]}");
+  ASSERT_TRUE(viewed) << viewed.error().text;
+  EXPECT_EQ(viewed->control.view_origins,
+            (std::vector<ViewOrigin>{{"https://a.example", false}, {"http://b.example:8080", true}}));
   const auto refusal = [&](const std::string& control) {
     const auto c = with(control);
     EXPECT_TRUE(c || c.error().kind == ErrorKind::config);
     return c ? std::string("accepted") : c.error().text;
   };
+  for (const char* origin : {"'null'", "'file://'", "https://a.example/page", "a.example", "'https://'"})
+    EXPECT_THAT(refusal(std::string("{view_origins: [") + origin + "]}"), HasSubstr("is not an origin")) << origin;
   EXPECT_THAT(refusal("{http: '0.0.0.0:8088'}"), HasSubstr("control.http: can be reached from other computers"));
   EXPECT_THAT(refusal("{stream: '192.168.2.5:14770'}"), HasSubstr("control.token_file"));
   EXPECT_THAT(refusal("{stream: '127.0.0.1:8088', http: '127.0.0.1:8088'}"), HasSubstr("the same address as control.stream"));

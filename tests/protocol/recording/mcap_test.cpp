@@ -39,11 +39,11 @@ Bytes session(const std::vector<RecordedMessage>& messages, bool closed = true) 
 TEST(Crc32, KnownAnswer) { EXPECT_EQ(crc32(bytes_of("123456789")), 0xCBF43926u); }
 
 TEST(Base64, KnownAnswers) {
-  EXPECT_EQ(mcap::base64(bytes_of("")), "");
-  EXPECT_EQ(mcap::base64(bytes_of("f")), "Zg==");
-  EXPECT_EQ(mcap::base64(bytes_of("fo")), "Zm8=");
-  EXPECT_EQ(mcap::base64(bytes_of("foobar")), "Zm9vYmFy");
-  EXPECT_EQ(mcap::base64(Bytes{std::byte{0xFB}, std::byte{0xFF}, std::byte{0}}), "+/8A");
+  EXPECT_EQ(wire::base64(bytes_of("")), "");
+  EXPECT_EQ(wire::base64(bytes_of("f")), "Zg==");
+  EXPECT_EQ(wire::base64(bytes_of("fo")), "Zm8=");
+  EXPECT_EQ(wire::base64(bytes_of("foobar")), "Zm9vYmFy");
+  EXPECT_EQ(wire::base64(Bytes{std::byte{0xFB}, std::byte{0xFF}, std::byte{0}}), "+/8A");
 }
 
 TEST(Mcap, ChannelsForViewers) {

@@ -1,0 +1,127 @@
+#include "daemon/emulator/view/ping_payloads.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/image/draw_fan.hpp"
+#include "protocol/foxglove/foxglove_messages.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr int fan_width_px = 720;
+constexpr std::size_t most_points = 20000;
+constexpr int arc_pieces = 16;
+
+ViewPayload::Piece piece(wire::Bytes bytes) { return {"", std::make_shared<const wire::Bytes>(std::move(bytes))}; }
+
+ViewPayloadPointer picture(Time at, const std::string& frame, const foxglove::Image& image) {
+  ViewPayload payload{at, {piece(foxglove::image_head(at, frame, image))}};
+  payload.pieces.push_back({"", image.samples});
+  return std::make_shared<const ViewPayload>(std::move(payload));
+}
+
+}  // namespace
+
+PolarImage polar_image_of(const Ping& ping) {
+  const PingSettings& s = ping.request.settings;
+  PolarImage image;
+  image.rows = static_cast<std::size_t>(s.range_bin_count);
+  image.beams = static_cast<std::size_t>(s.beam_count);
+  image.row_spacing_m = s.range_bin_m;
+  image.start_m = s.range_start_m;
+  image.azimuth_rad.assign(ping.beam_azimuth_rad.begin(), ping.beam_azimuth_rad.end());
+  const auto bytes = static_cast<std::size_t>(s.format.bits / 8);
+  image.samples.reserve(image.rows * image.beams);
+  for (std::size_t i = 0; i < image.rows * image.beams; ++i) {
+    std::uint32_t code = 0;
+    for (std::size_t b = 0; b < bytes; ++b) code |= std::to_integer<std::uint32_t>(ping.samples[i * bytes + b]) << (8 * b);
+    image.samples.push_back(static_cast<float>(code));
+  }
+  image.full_scale = static_cast<float>(s.format.max_code);
+  if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear) {  // wide samples rarely come near their maximum
+    std::vector<float> sorted = image.samples;
+    const auto place = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) * 999 / 1000);
+    std::nth_element(sorted.begin(), place, sorted.end());
+    image.full_scale = std::max(1.0f, *place);
+  }
+  return image;
+}
+
+ViewPayloadPointer view_payload(Time at, wire::Bytes bytes) {
+  return std::make_shared<const ViewPayload>(ViewPayload{at, {piece(std::move(bytes))}});
+}
+
+ViewPayloadPointer image_payload(const std::string& sonar, const PingPointer& ping) {
+  return picture(ping->request.fired_at, sonar, foxglove::image_of(ping));
+}
+
+ViewPayloadPointer geometry_payload(const Ping& ping) {
+  return view_payload(ping.request.fired_at, foxglove::geometry(ping, static_cast<std::uint32_t>(ping.request.number)));
+}
+
+ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping) {
+  const PingSettings& s = ping.request.settings;
+  const double half_height = static_cast<double>(ping.mode().pattern.elevation_width_rad) / 2;
+  const double port = ping.beam_azimuth_rad.empty() ? 0 : static_cast<double>(ping.beam_azimuth_rad.front());
+  const double starboard = ping.beam_azimuth_rad.empty() ? 0 : static_cast<double>(ping.beam_azimuth_rad.back());
+  const auto at = [](double range, double azimuth, double elevation) {
+    return Vec3d{range * std::cos(elevation) * std::cos(azimuth), range * std::cos(elevation) * std::sin(azimuth),
+                 range * std::sin(elevation)};
+  };
+  foxglove::Lines lines{"swath/" + sonar, sonar, {}};
+  const auto line = [&lines](Vec3d a, Vec3d b) { lines.points.insert(lines.points.end(), {a, b}); };
+  for (const double azimuth : {port, starboard}) {
+    for (const double elevation : {-half_height, half_height})
+      line(at(s.range_start_m, azimuth, elevation), at(s.range_m, azimuth, elevation));
+    for (const double range : {s.range_start_m, s.range_m})
+      line(at(range, azimuth, -half_height), at(range, azimuth, half_height));
+  }
+  for (const double elevation : {-half_height, half_height}) {
+    line(at(s.range_start_m, port, elevation), at(s.range_start_m, starboard, elevation));
+    for (int i = 0; i < arc_pieces; ++i) {
+      const auto azimuth = [&](int step) { return port + (starboard - port) * step / arc_pieces; };
+      line(at(s.range_m, azimuth(i), elevation), at(s.range_m, azimuth(i + 1), elevation));
+    }
+  }
+  ViewPayload payload{ping.request.fired_at, {piece(foxglove::scene_update(ping.request.fired_at, lines))}, true};
+  payload.pieces.front().key = sonar;
+  return std::make_shared<const ViewPayload>(std::move(payload));
+}
+
+ViewPayloadPointer fan_payload(const std::string& sonar, const Ping& ping) {
+  const auto gray = find_colour_map("gray");
+  if (!gray || ping.request.settings.beam_count < 2) return nullptr;
+  const auto fan = draw_fan(polar_image_of(ping), {.width_px = fan_width_px, .colours = *gray, .rings = false});
+  if (!fan) return nullptr;
+  auto samples = std::make_shared<wire::Bytes>();
+  samples->reserve(fan->pixels.size());
+  for (const Rgb& p : fan->pixels)  // what is outside has a colour, which the map has not
+    samples->push_back(static_cast<std::byte>(p.r == p.g && p.g == p.b ? p.r : 0));
+  return picture(ping.request.fired_at, sonar,
+                 {static_cast<std::uint32_t>(fan->width), static_cast<std::uint32_t>(fan->height), "mono8", 1, samples});
+}
+
+ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold) {
+  const PolarImage image = polar_image_of(ping);
+  std::vector<std::pair<float, std::size_t>> bright;  // sample, where
+  const auto least = static_cast<float>(threshold) * image.full_scale;
+  for (std::size_t i = 0; i < image.samples.size(); ++i)
+    if (image.samples[i] > least) bright.emplace_back(image.samples[i], i);
+  if (bright.size() > most_points) {
+    std::nth_element(bright.begin(), bright.begin() + most_points, bright.end(), std::greater<>());
+    bright.resize(most_points);
+  }
+  std::vector<foxglove::CloudPoint> points;
+  points.reserve(bright.size());
+  for (const auto& [sample, i] : bright) {
+    const double range = ping.request.settings.range_of_row(static_cast<double>(i / image.beams));
+    const double azimuth = image.azimuth_rad[i % image.beams];
+    const float part = std::min(1.0f, sample / image.full_scale);
+    points.push_back({static_cast<float>(range * std::cos(azimuth)), static_cast<float>(range * std::sin(azimuth)), 0,
+                      static_cast<std::uint8_t>(std::lround(255 * part))});
+  }
+  return view_payload(ping.request.fired_at, foxglove::cloud(ping.request.fired_at, sonar, points));
+}
+
+}  // namespace sonar

@@ -1,0 +1,31 @@
+// What viewers see of a ping: made from the ping alone, once for all of them. Those that say so take long enough to be made on a
+// thread of their own. Pure.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/image/polar_image.hpp"
+#include "core/sonar/ping.hpp"
+#include "daemon/emulator/view/viewer.hpp"
+
+namespace sonar {
+
+/// Bright enough to look at: the full scale of wide samples is that which one sample in a thousand exceeds.
+PolarImage polar_image_of(const Ping& ping);
+
+using PingPointer = std::shared_ptr<const Ping>;
+// Stamped with the ping's firing; `sonar` is its frame.
+ViewPayloadPointer image_payload(const std::string& sonar, const PingPointer& ping);
+ViewPayloadPointer geometry_payload(const Ping& ping);
+/// The edges of the volume that the beams cover, to the end of the range.
+ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);
+/// As draw_fan has it, without rings, 0 outside. Takes long. Null: the ping has no fan.
+ViewPayloadPointer fan_payload(const std::string& sonar, const Ping& ping);
+/// The samples above `threshold` of the full scale in the plane of the fan, the 20,000 brightest. Takes long.
+ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold);
+
+/// A payload of one piece.
+ViewPayloadPointer view_payload(Time at, wire::Bytes bytes);
+
+}  // namespace sonar

@@ -1,0 +1,167 @@
+// One viewer of the live view, without its socket: what it says becomes requests to its host, what it subscribed to becomes
+// messages to write, and what it is too slow for is replaced. Sans I/O: bytes and time go in, messages come out.
+//
+// Three kinds of messages leave in this order: words (JSON, answers), never dropped; last values, of which a newer one replaces
+// an older one; pictures and events. Pictures have one place; of events 64 wait, the oldest go.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/foxglove/foxglove_frames.hpp"
+#include "protocol/foxglove/foxglove_words.hpp"
+
+namespace sonar {
+
+using ViewBytes = std::shared_ptr<const wire::Bytes>;
+
+/// What all viewers are offered.
+struct ViewChannel {
+  enum class Kind { last_value, picture, event };
+  foxglove::Channel advertised;
+  Kind kind = Kind::last_value;
+  double most_hz = 0;        // 0 = no bound
+  std::size_t deepest = 64;  // events that wait
+};
+
+/// A message of a channel: its pieces one after the other, shared by all viewers.
+struct ViewPayload {
+  struct Piece {
+    std::string key;  // of a part of the message that a later one replaces
+    ViewBytes bytes;
+  };
+  Time at{};
+  std::vector<Piece> pieces;
+  bool merges = false;  // pieces of other keys that wait are kept: their bytes together are one message
+};
+using ViewPayloadPointer = std::shared_ptr<const ViewPayload>;
+
+/// What is written as one WebSocket message.
+struct ViewMessage {
+  bool is_text = false;
+  wire::Bytes head;               // all of it, but for channels
+  std::vector<ViewBytes> pieces;  // what follows
+};
+
+class Viewer;
+
+/// What viewers ask for; outlives them. May call the viewer back.
+class ViewerHost {
+ public:
+  virtual ~ViewerHost() = default;
+  /// Null = there is none of that id.
+  virtual const ViewChannel* channel(std::uint32_t id) const = 0;
+  /// Offers what newcomers get.
+  virtual void on_subscribed(Viewer& viewer, std::uint32_t channel) = 0;
+  /// No names = all. Unknown names are left out.
+  virtual std::vector<foxglove::Parameter> parameters(const Viewer& viewer, const std::vector<std::string>& names) = 0;
+  /// Empty, or why not.
+  virtual std::string set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) = 0;
+  /// Answers with Viewer::answer() or fail(), now or later.
+  virtual void call(Viewer& viewer, const foxglove::ServiceCall& call) = 0;
+};
+
+class Viewer {
+ public:
+  /// Since any origin, never backwards.
+  using Moment = std::chrono::nanoseconds;
+  struct Rights {
+    bool may_steer = false;
+    double most_hz = 0;  // of pictures; 0 = no bound
+  };
+  enum class CloseCode : std::uint16_t { none = 0, policy = 1008, try_again_later = 1013 };
+  static constexpr std::size_t most_subscriptions = 256, most_words = 256, most_word_bytes = std::size_t{1} << 20, most_calls = 4;
+
+  /// `who` = its address, for the log.
+  Viewer(ViewerHost& host, Rights rights, std::string who) : host_(host), rights_(rights), who_(std::move(who)) {}
+
+  // ---- from the socket
+  void on_text(std::string_view text, Moment now);
+  void on_binary(wire::BytesView frame, Moment now);
+  /// The next message to write; nothing: wait until something is offered, or until next_due().
+  std::optional<ViewMessage> next(Moment now);
+  /// When something that waits for its rate, or to say that all is well, is due.
+  std::optional<Moment> next_due(Moment now) const;
+  /// Not none: the connection must end.
+  CloseCode close_code() const { return close_; }
+
+  // ---- from the host
+  /// The first words, which may be many.
+  void greet(std::string word) { words_.push_back({true, bytes_of(word), {}}); }
+  void say(std::string word);
+  void say_frame(wire::Bytes frame);
+  void say_status(foxglove::StatusLevel level, const std::string& text, const std::string& id = {}) {
+    say(foxglove::status(level, text, id));
+  }
+  /// Gone after `lasts`.
+  void say_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts);
+  void offer(std::uint32_t channel, const ViewPayloadPointer& payload, Moment now);
+  bool subscribes(std::uint32_t channel) const;
+  bool subscribes_any() const { return !slots_.empty(); }
+  /// Of channels that are gone.
+  void forget(std::uint32_t channel);
+  /// The daemon's time, at most 30 times a second, the last one always.
+  void set_time(Time now) { time_ = now; }
+  void answer(const foxglove::ServiceCall& answer);
+  void fail(const foxglove::ServiceCall& call, const std::string& why);
+  /// Those it watches of what has changed.
+  void on_parameters(std::span<const foxglove::Parameter> changed);
+  bool watches_parameters() const { return watches_all_ || !watched_.empty(); }
+
+  bool may_steer() const { return rights_.may_steer; }
+  const std::string& who() const { return who_; }
+  /// Messages replaced before they were written, by channel.
+  const std::map<std::uint32_t, std::uint64_t>& dropped() const { return dropped_; }
+
+ private:
+  struct Slot {
+    std::uint32_t channel = 0;
+    ViewChannel::Kind kind{};
+    Moment interval{0};
+    std::size_t deepest = 1;
+    std::optional<Moment> sent_at;
+    std::deque<ViewPayloadPointer> waiting;  // one, but for events
+    bool is_due(Moment now) const { return !sent_at || now - *sent_at >= interval; }
+  };
+  static wire::Bytes bytes_of(std::string_view text);
+  void add_word(ViewMessage word);
+  bool has_room_for_message(Moment now);
+  void complain(const std::string& why);
+  void on_word(const foxglove::Subscribe& word, Moment);
+  void on_word(const foxglove::Unsubscribe& word, Moment);
+  void on_word(const foxglove::GetParameters& word, Moment);
+  void on_word(const foxglove::SetParameters& word, Moment now);
+  void on_word(const foxglove::WatchParameters& word, Moment);
+  void on_word(const foxglove::Incapable& word, Moment);
+  void on_word(const foxglove::UnknownWord& word, Moment);
+  void merge(Slot& slot, const ViewPayloadPointer& payload, Moment now);
+  Slot* next_slot(bool last_values, Moment now, std::uint32_t& subscription);
+
+  ViewerHost& host_;
+  Rights rights_;
+  std::string who_;
+  std::deque<ViewMessage> words_;
+  std::size_t word_bytes_ = 0;
+  std::map<std::uint32_t, Slot> slots_;  // by subscription
+  std::map<std::uint32_t, std::uint64_t> dropped_;
+  std::optional<Time> time_;
+  std::optional<Moment> time_sent_, slow_since_, allowance_at_;
+  std::map<std::string, Moment> passing_;  // statuses that go by themselves
+  std::set<std::string> watched_;
+  bool watches_all_ = false, said_unknown_ = false;
+  double allowance_ = 200;  // messages that may come now
+  int complaints_ = 0;
+  std::size_t open_calls_ = 0;
+  CloseCode close_ = CloseCode::none;
+};
+
+}  // namespace sonar

@@ -1,0 +1,59 @@
+// Who may open the live view's socket, and whether they may steer: the rules of docs/live-view.md, each in its place. Pure.
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "daemon/config/config.hpp"
+#include "daemon/server/connections/http_answer.hpp"
+#include "daemon/server/connections/http_reader.hpp"
+#include "daemon/server/connections/token.hpp"
+
+namespace sonar {
+
+/// GET with "Upgrade: websocket".
+bool wants_socket(const HttpRequest& request);
+
+/// The secrets of one run beside the token.
+class ViewSecrets {
+ public:
+  using Steady = std::chrono::steady_clock;
+  static constexpr std::chrono::seconds ticket_lasts{30};
+  static constexpr std::size_t most_tickets = 64;
+
+  /// 32 hexadecimal digits, new at every start; empty = there is none.
+  const std::string& key() const { return key_; }
+  void make_key();
+  /// Good for one connection within ticket_lasts. Beyond most_tickets the oldest goes.
+  std::string new_ticket(Steady::time_point now);
+  bool take_ticket(std::string_view shown, Steady::time_point now);
+
+ private:
+  std::string key_;
+  std::deque<std::pair<std::string, Steady::time_point>> tickets_;
+};
+
+/// A handshake that is accepted.
+struct ViewWelcome {
+  std::string protocol;  // the one agreed upon
+  bool may_steer = false;
+  double most_hz = 0;  // of pictures, as the viewer asked; 0 = no bound
+};
+struct ViewDoor {
+  const Token& token;
+  ViewSecrets& secrets;
+  Ipv4 reached;  // our end of the connection
+  const ControlConfig& config;
+};
+/// Host has been checked. `query` = of the target. A refusal is one sentence; its `why` names the configuration that would allow
+/// it.
+std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
+                                                const std::vector<std::pair<std::string, std::string>>& query,
+                                                const ViewDoor& door, ViewSecrets::Steady::time_point now);
+
+}  // namespace sonar

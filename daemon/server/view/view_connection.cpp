@@ -1,0 +1,181 @@
+#include "daemon/server/view/view_connection.hpp"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <utility>
+#include <vector>
+
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <boost/beast/websocket/stream.hpp>
+
+namespace sonar {
+namespace {
+
+namespace beast = boost::beast;
+namespace websocket = beast::websocket;
+
+constexpr std::chrono::seconds handshake_limit{10}, silence_limit{30};  // a ping is sent at half of it
+// Old pictures wait with us, where newer ones replace them, not in the kernel.
+constexpr int most_unsent = 128 << 10;
+
+}  // namespace
+
+/// A socket that says when bytes move. Beast finds the friends by its type.
+struct ViewConnection::Watched {
+  tcp::socket& socket;
+  Steady::time_point& moved_at;
+
+  using executor_type = tcp::socket::executor_type;
+  executor_type get_executor() { return socket.get_executor(); }
+  template <class Buffers, class Token>
+  auto async_read_some(const Buffers& buffers, Token&& token) {
+    return socket.async_read_some(buffers, std::forward<Token>(token));
+  }
+  template <class Buffers, class Token>
+  auto async_write_some(const Buffers& buffers, Token&& token) {
+    moved_at = Steady::now();
+    return socket.async_write_some(buffers, std::forward<Token>(token));
+  }
+  friend void teardown(beast::role_type role, Watched& watched, error_code& ec) { websocket::teardown(role, watched.socket, ec); }
+  template <class Handler>
+  friend void async_teardown(beast::role_type role, Watched& watched, Handler&& handler) {
+    websocket::async_teardown(role, watched.socket, std::forward<Handler>(handler));
+  }
+  friend void beast_close_socket(Watched& watched) {
+    error_code ec;
+    watched.socket.close(ec);
+  }
+};
+
+struct ViewConnection::Socket {
+  websocket::stream<Watched> stream;
+  explicit Socket(Watched watched) : stream(watched) {}
+};
+
+ViewConnection::ViewConnection(ConnectionServices& services, HttpConnection& from, ViewerHost& host, const HttpRequest& request,
+                               const ViewWelcome& welcome, std::function<void(const std::shared_ptr<ViewConnection>&)> on_open)
+    : services_(services),
+      from_(from),
+      request_(request),
+      protocol_(welcome.protocol),
+      on_open_(std::move(on_open)),
+      viewer_(host, {welcome.may_steer, welcome.most_hz}, from.sender().source),
+      socket_(std::make_unique<Socket>(Watched{from.socket(), moved_at_})),
+      wake_(services.io, never),
+      stall_(services.io, never) {}
+ViewConnection::~ViewConnection() = default;
+
+asio::awaitable<bool> ViewConnection::begin() {
+  auto& stream = socket_->stream;
+  stream.auto_fragment(false);  // a picture is one frame
+  stream.read_message_max(foxglove::longest_word);
+  stream.set_option(websocket::stream_base::timeout{handshake_limit, silence_limit, true});
+  stream.set_option(websocket::stream_base::decorator([this](websocket::response_type& response) {
+    response.set(beast::http::field::server, "sonard");
+    response.set(beast::http::field::sec_websocket_protocol, protocol_);
+  }));
+  const int unsent = most_unsent;
+  ::setsockopt(from_.socket().native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
+  beast::http::request<beast::http::empty_body> request(beast::http::verb::get, "/", 11);
+  request.set(beast::http::field::host, request_.host);
+  request.set(beast::http::field::connection, request_.connection);
+  request.set(beast::http::field::upgrade, request_.upgrade);
+  request.set(beast::http::field::sec_websocket_key, request_.socket_key);
+  request.set(beast::http::field::sec_websocket_version, request_.socket_version);
+  error_code ec;
+  co_await stream.async_accept(request, into(ec));
+  over_ = static_cast<bool>(ec);
+  if (!over_) on_open_(shared_from_this());
+  co_return !over_;
+}
+
+asio::awaitable<void> ViewConnection::read() {
+  beast::flat_buffer buffer;
+  while (!over_ && viewer_.close_code() == Viewer::CloseCode::none) {
+    error_code ec;
+    co_await socket_->stream.async_read(buffer, into(ec));
+    if (ec) break;
+    from_.active_at = Steady::now();
+    const auto* const bytes = static_cast<const std::byte*>(buffer.data().data());
+    const wire::BytesView message(bytes, buffer.size());
+    if (socket_->stream.got_text())
+      viewer_.on_text({static_cast<const char*>(buffer.data().data()), buffer.size()}, now());
+    else
+      viewer_.on_binary(message, now());
+    buffer.consume(buffer.size());
+    wake();
+  }
+  if (viewer_.close_code() == Viewer::CloseCode::none) over_ = true;
+  wake();
+}
+
+asio::awaitable<void> ViewConnection::write() {
+  while (!over_) {
+    if (const auto code = viewer_.close_code(); code != Viewer::CloseCode::none) {
+      co_await say_goodbye(static_cast<std::uint16_t>(code),
+                           code == Viewer::CloseCode::policy ? "too many or malformed messages" : "too slow");
+      break;
+    }
+    error_code ec;
+    if (const auto message = viewer_.next(now())) {
+      if (!co_await write(*message)) break;
+    } else {
+      const auto due = viewer_.next_due(now());
+      wake_.expires_at(due ? Steady::time_point(std::chrono::duration_cast<Steady::duration>(*due)) : never);
+      co_await wake_.async_wait(into(ec));
+    }
+  }
+  over_ = true;
+}
+
+asio::awaitable<bool> ViewConnection::write(const ViewMessage& message) {
+  std::vector<asio::const_buffer> buffers{asio::buffer(message.head)};
+  for (const ViewBytes& piece : message.pieces) buffers.push_back(asio::buffer(*piece));
+  socket_->stream.text(message.is_text);
+  writing_ = true;
+  moved_at_ = Steady::now();
+  look_for_progress();
+  error_code ec;
+  co_await socket_->stream.async_write(buffers, into(ec));
+  writing_ = false;
+  stall_.expires_at(never);
+  from_.active_at = Steady::now();
+  co_return !ec;
+}
+
+/// Closes the socket when nothing of a message moves.
+void ViewConnection::look_for_progress() {
+  stall_.expires_at(moved_at_ + services_.limits.stall);
+  stall_.async_wait([weak = weak_from_this()](const error_code& ec) {
+    const auto self = weak.lock();
+    if (!self || ec || !self->writing_) return;
+    if (Steady::now() < self->moved_at_ + self->services_.limits.stall) return self->look_for_progress();
+    log_refusal(self->services_, "viewer does not read", self->viewer_.who());
+    error_code ignored;
+    self->from_.socket().close(ignored);
+  });
+}
+
+asio::awaitable<void> ViewConnection::say_goodbye(std::uint16_t code, const char* why) {
+  log_refusal(services_, std::string("viewer: ") + why, viewer_.who());
+  websocket::close_reason reason(static_cast<websocket::close_code>(code));
+  reason.reason = why;
+  error_code ec;
+  co_await socket_->stream.async_close(reason, into(ec));
+}
+
+void ViewConnection::on_closing() {
+  wake_.cancel();
+  stall_.cancel();
+  if (!std::exchange(over_, true) && !writing_) {
+    const std::array<std::uint8_t, 4> going_away{0x88, 2, 1001 >> 8, 1001 & 0xFF};  // a frame of RFC 6455, 5.5.1
+    if (::send(from_.socket().native_handle(), going_away.data(), going_away.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) return;
+  }
+}
+
+}  // namespace sonar

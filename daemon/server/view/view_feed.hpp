@@ -1,0 +1,128 @@
+// The live view inside the daemon: who looks, the channels, and what is offered on them (docs/live-view.md). Pings reach it where
+// recordings tap them; with no viewer there is no tap. What takes long is made on a thread of its own, and skipped when that is
+// busy. Looking changes nothing: no driver waits for a viewer. I/O thread only. Owned by App.
+#pragma once
+
+#include <deque>
+#include <list>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/config/config.hpp"
+#include "daemon/emulator/view/viewer.hpp"
+#include "daemon/emulator/world/world.hpp"
+#include "daemon/server/operations.hpp"
+#include "daemon/server/scene_changes.hpp"
+#include "daemon/server/sonars/fleet.hpp"
+#include "daemon/server/time/clock.hpp"
+#include "daemon/server/view/door.hpp"
+#include "daemon/server/view/scene_shapes.hpp"
+#include "daemon/server/view/view_connection.hpp"
+#include "daemon/server/view/view_parameters.hpp"
+
+namespace sonar {
+
+/// The parts of the daemon that are looked at; they outlive the feed.
+struct Viewed {
+  asio::io_context& io;
+  const Config& config;
+  const Clock& clock;
+  const World& world;
+  const SceneChanges& changes;
+  Fleet& fleet;
+  Operations& operations;
+  Log& log;
+};
+
+class ViewFeed final : public ViewerHost {
+ public:
+  static constexpr std::size_t lines_kept = 100;
+
+  explicit ViewFeed(const Viewed& of);
+  /// Waits for the picture being made.
+  ~ViewFeed() override;
+  ViewFeed(const ViewFeed&) = delete;
+  ViewFeed& operator=(const ViewFeed&) = delete;
+
+  /// One more viewer, which is greeted.
+  void add(const std::shared_ptr<ViewConnection>& viewer);
+  bool is_full() const;
+  ViewSecrets& secrets() { return secrets_; }
+  const ViewSecrets& secrets() const { return secrets_; }
+  void stop();
+
+  const ViewChannel* channel(std::uint32_t id) const override;
+  void on_subscribed(Viewer& viewer, std::uint32_t channel) override;
+  std::vector<foxglove::Parameter> parameters(const Viewer& viewer, const std::vector<std::string>& names) override;
+  std::string set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) override;
+  void call(Viewer& viewer, const foxglove::ServiceCall& call) override;
+
+ private:
+  using Steady = std::chrono::steady_clock;
+  using Make = std::function<ViewPayloadPointer()>;
+  /// Made on the thread from the newest ping; what it shows may be some pings old.
+  struct Slow {
+    std::uint32_t channel = 0;
+    bool under_way = false;
+    Steady::time_point begun_at{};
+    ViewPayloadPointer last = nullptr;
+  };
+  struct SonarView {
+    std::string name;
+    std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0;
+    Slow fan = {}, cloud = {};
+    std::shared_ptr<const Ping> last = nullptr;
+    wire::Bytes shape = {};   // of last, without its number
+    std::string volume = {};  // what the swath depends on
+  };
+
+  void on_ping(const Device& of, const PingQueued& queued);
+  void make_slowly(SonarView& sonar, Slow SonarView::*which, double most_hz, Make make);
+  void begin_slow_ones(SonarView& sonar);
+  void on_log(LogLevel level, const std::string& line, const std::vector<LogField>& fields);
+  void arm();
+  void tick();
+  void sync_sonars();
+  void offer_status();
+  void offer_scene(std::vector<ViewPayload::Piece> pieces);
+  std::uint32_t add_channel(const std::string& topic, const std::string& schema, ViewChannel::Kind kind, double most_hz = 0);
+  void remove(const SonarView& sonar);
+  SonarView* find(const std::string& name);
+  bool wanted(std::uint32_t channel) const;
+  void offer(std::uint32_t channel, const ViewPayloadPointer& payload);
+  std::string server_info(const Viewer& viewer) const;
+  ViewPayloadPointer places() const;
+  ViewPayloadPointer status() const;
+  ViewPayloadPointer faults() const;
+  ParameterSource source() const;
+  void push_parameters();
+  static std::string services_word();
+  ViewPayloadPointer current(std::uint32_t channel);
+  template <class Visit>
+  void each(Visit visit) {
+    for (const auto& weak : connections_)
+      if (const auto connection = weak.lock(); connection && !connection->over()) visit(*connection);
+  }
+
+  Viewed of_;
+  ViewSecrets secrets_;
+  std::vector<std::weak_ptr<ViewConnection>> connections_;
+  std::map<std::uint32_t, ViewChannel> channels_;
+  std::uint32_t last_channel_ = 0, tf_ = 0, scene_ = 0, swath_ = 0, log_ = 0, status_ = 0, faults_ = 0;
+  std::list<SonarView> sonars_;
+  SceneShapes shapes_;
+  std::deque<ViewPayloadPointer> lines_;
+  ViewPayloadPointer faults_said_;
+  std::vector<foxglove::Parameter> pushed_;
+  asio::steady_timer timer_;
+  bool armed_ = false, stopping_ = false, changed_ = false;
+  Time told_{Time::min()};  // the daemon's time, last said to viewers
+  Steady::time_point status_at_{}, ping_at_{};
+  std::string session_;
+  std::uint64_t sessions_ = 0;
+  asio::thread_pool thread_{1};
+};
+
+}  // namespace sonar

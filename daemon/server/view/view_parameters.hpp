@@ -1,0 +1,29 @@
+// What viewers may read and set of a running daemon, as parameters of the Foxglove protocol: a write becomes an operation, as if
+// it came by HTTP. Their names are listed in docs/live-view.md.
+#pragma once
+
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/emulator/world/world.hpp"
+#include "daemon/server/sonars/fleet.hpp"
+#include "daemon/server/time/clock.hpp"
+#include "protocol/control/operations.hpp"
+#include "protocol/foxglove/foxglove_words.hpp"
+
+namespace sonar {
+
+struct ParameterSource {
+  const Config& config;
+  const Clock& clock;
+  const World& world;
+  const Fleet& fleet;
+};
+
+/// All, by name. Unset: what has no value now.
+std::vector<foxglove::Parameter> parameters_of(const ParameterSource& of);
+/// What the write asks for; else a sentence (usage).
+Result<control::Operation> operation_of(const foxglove::Parameter& wanted, const ParameterSource& of);
+
+}  // namespace sonar

@@ -1,0 +1,107 @@
+// What viewers may ask of the daemon: parameters and services, carried out as requests of control.
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "daemon/server/control/control_http.hpp"
+#include "daemon/server/view/view_feed.hpp"
+#include "protocol/control/control.hpp"
+
+namespace sonar {
+namespace {
+
+/// For the log.
+Sender sender_of(const Viewer& viewer) { return {"live view " + viewer.who(), viewer.who()}; }
+
+/// Every POST of the HTTP API: the name there, in Request.op, and the message. Their ids count from 1.
+struct ServiceRow {
+  const char *name, *op, *type;
+};
+constexpr std::array<ServiceRow, 14> service_table{{{"set_sonar", "sonar", "SetSonar"},
+                                                    {"set_environment", "environment", "SetEnvironment"},
+                                                    {"load", "load", "LoadScene"},
+                                                    {"pose", "pose", "PoseUpdate"},
+                                                    {"object", "object", "ObjectUpdate"},
+                                                    {"add_object", "add_object", "AddObject"},
+                                                    {"remove_object", "remove_object", "RemoveObject"},
+                                                    {"set_object", "set_object", "SetObject"},
+                                                    {"set_trajectory", "set_trajectory", "SetTrajectory"},
+                                                    {"step", "step", "Step"},
+                                                    {"start_recording", "start_recording", "StartRecording"},
+                                                    {"stop_recording", "stop_recording", "StopRecording"},
+                                                    {"add_fault", "add_fault", "Fault"},
+                                                    {"end_faults", "end_faults", "EndFaults"}}};
+
+}  // namespace
+
+std::string ViewFeed::services_word() {
+  std::vector<foxglove::Service> services;
+  for (const ServiceRow& row : service_table)
+    services.push_back({static_cast<std::uint32_t>(services.size() + 1), std::string("/sonard/") + row.name,
+                        std::string("sonar.v1.") + row.type});
+  return foxglove::advertise_services(services);
+}
+
+ParameterSource ViewFeed::source() const { return {of_.config, of_.clock, of_.world, of_.fleet}; }
+
+std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer&, const std::vector<std::string>& names) {
+  std::vector<foxglove::Parameter> all = parameters_of(source());
+  if (!names.empty())
+    std::erase_if(all,
+                  [&](const foxglove::Parameter& p) { return std::find(names.begin(), names.end(), p.name) == names.end(); });
+  return all;
+}
+
+std::string ViewFeed::set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) {
+  const auto operation = operation_of(wanted, source());
+  if (!operation) return operation.error().text;
+  const auto why = std::make_shared<std::string>();
+  of_.operations.perform(*operation, sender_of(viewer), [why](const OperationResult& result) {
+    if (result.code != OperationResult::Code::done) *why = result.text;
+  });
+  changed_ = true;
+  return *why;
+}
+
+/// What has changed since the last time.
+void ViewFeed::push_parameters() {
+  bool watched = false;
+  each([&](const ViewConnection& c) { watched = watched || c.viewer().watches_parameters(); });
+  if (!watched) return;
+  std::vector<foxglove::Parameter> now = parameters_of(source()), changed;
+  std::erase_if(now, [](const foxglove::Parameter& p) { return p.name == "/clock/now_s"; });
+  for (const foxglove::Parameter& p : now)
+    if (std::find(pushed_.begin(), pushed_.end(), p) == pushed_.end()) changed.push_back(p);
+  pushed_ = std::move(now);
+  if (changed.empty()) return;
+  each([&](ViewConnection& c) {
+    c.viewer().on_parameters(changed);
+    c.wake();
+  });
+}
+
+void ViewFeed::call(Viewer& viewer, const foxglove::ServiceCall& call) {
+  if (call.service == 0 || call.service > service_table.size()) return viewer.fail(call, "there is no such service");
+  auto request = control::request_from_json(service_table[call.service - 1].op, call.payload);
+  if (!request) return viewer.fail(call, request.error().text);
+  std::weak_ptr<ViewConnection> from;
+  each([&](ViewConnection& c) {
+    if (&c.viewer() == &viewer) from = c.weak_from_this();
+  });
+  std::visit(
+      [&](auto operation) {
+        if constexpr (std::is_constructible_v<control::Operation, decltype(operation)>)
+          of_.operations.perform(std::move(operation), sender_of(viewer), [from, call](const OperationResult& result) {
+            const auto connection = from.lock();
+            if (!connection) return;
+            if (result.code == OperationResult::Code::done)
+              connection->viewer().answer({call.service, call.call, "json", answer_from(result).body});
+            else
+              connection->viewer().fail(call, result.text);
+            connection->wake();
+          });
+      },
+      std::move(request->op));
+}
+
+}  // namespace sonar

@@ -1,0 +1,54 @@
+// The binary messages of the Foxglove WebSocket protocol, little-endian, the first byte says which. Its text is in the history
+// of https://github.com/foxglove/ws-protocol (the commit before 8e2a044). Pure.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+
+#include "core/base/result.hpp"
+#include "core/base/units.hpp"
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::foxglove {
+
+using wire::Bytes;
+using wire::BytesView;
+
+/// What a message of a channel begins with; its payload follows.
+Bytes message_head(std::uint32_t subscription, Time at);
+Bytes time_frame(Time now);
+
+/// `payload` in `encoding`; the same both ways.
+struct ServiceCall {
+  std::uint32_t service = 0, call = 0;
+  std::string encoding;
+  std::string payload;
+};
+Bytes service_answer(const ServiceCall& answer);
+
+enum class PlaybackStatus : std::uint8_t { playing, paused, buffering, ended };
+struct PlaybackState {
+  PlaybackStatus status{};
+  Time at{};
+  float speed = 1;
+  bool did_seek = false;
+  std::string request;  // its id; empty = nothing was asked
+};
+Bytes playback_frame(const PlaybackState& state);
+
+struct PlaybackControl {
+  bool pause = false;
+  float speed = 1;
+  bool seeks = false;
+  Time to{};  // of a seek
+  std::string request;
+};
+/// Of a viewer. bad_data: shorter than its layout, lengths that do not fit, an opcode that viewers do not have here.
+Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView frame);
+
+/// For tests and clients.
+Bytes encode(const ServiceCall& call);
+Bytes encode(const PlaybackControl& control);
+
+}  // namespace sonar::foxglove

@@ -1,0 +1,233 @@
+#include "protocol/foxglove/foxglove_messages.hpp"
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
+
+#include <set>
+
+#include "control.pb.h"
+#include "foxglove.pb.h"
+#include "protocol/wire/base64.hpp"
+#include "view.pb.h"
+
+namespace sonar::foxglove {
+namespace {
+
+namespace pb = ::google::protobuf;
+namespace fg = ::foxglove;
+
+Bytes bytes_of(const pb::MessageLite& message) {
+  Bytes bytes(message.ByteSizeLong());
+  message.SerializeToArray(bytes.data(), static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+void fill(pb::Timestamp& out, Time at) {
+  const auto since = at.time_since_epoch();
+  const auto whole = std::chrono::floor<std::chrono::seconds>(since);
+  out.set_seconds(whole.count());
+  out.set_nanos(static_cast<std::int32_t>((since - whole).count()));
+}
+template <class Vector>
+void fill(Vector& out, Vec3d v) {
+  out.set_x(v.x);
+  out.set_y(v.y);
+  out.set_z(v.z);
+}
+void fill(fg::Quaternion& out, Quatd q) {
+  out.set_x(q.x);
+  out.set_y(q.y);
+  out.set_z(q.z);
+  out.set_w(q.w);
+}
+void fill(fg::Pose& out, const Pose& pose) {
+  fill(*out.mutable_position(), pose.position_m);
+  fill(*out.mutable_orientation(), pose.orientation);
+}
+
+void add_with_imports(const pb::FileDescriptor& file, std::set<std::string>& known, pb::FileDescriptorSet& out) {
+  if (!known.insert(file.name()).second) return;
+  for (int i = 0; i < file.dependency_count(); ++i) add_with_imports(*file.dependency(i), known, out);
+  file.CopyTo(out.add_file());
+}
+
+std::uint32_t code_at(const Bytes& samples, std::size_t at) {
+  std::uint32_t code = 0;
+  for (std::size_t b = 4; b-- > 0;) code = code << 8 | std::to_integer<std::uint32_t>(samples[at + b]);
+  return code;
+}
+
+fg::SceneEntity& entity(fg::SceneUpdate& update, Time at, const std::string& id, const std::string& frame) {
+  fg::SceneEntity& entity = *update.add_entities();
+  fill(*entity.mutable_timestamp(), at);
+  entity.set_id(id);
+  entity.set_frame_id(frame);
+  entity.set_frame_locked(true);
+  return entity;
+}
+
+}  // namespace
+
+Schema protobuf_schema(const std::string& name) {
+  // Names what is looked up by name only, so that the linker keeps it.
+  fg::RawImage::descriptor();
+  v1::PingGeometry::descriptor();
+  v1::DaemonStatus::descriptor();
+  const pb::Descriptor* const message = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(name);
+  if (message == nullptr) return {name, "protobuf", ""};
+  pb::FileDescriptorSet set;
+  std::set<std::string> known;
+  add_with_imports(*message->file(), known, set);
+  return {name, "protobuf", wire::base64(bytes_of(set))};
+}
+
+Image image_of(const std::shared_ptr<const Ping>& ping) {
+  const PingSettings& s = ping->request.settings;
+  Image image{static_cast<std::uint32_t>(s.beam_count), static_cast<std::uint32_t>(s.range_bin_count), "mono8", 1,
+              std::shared_ptr<const Bytes>(ping, &ping->samples)};
+  if (s.format.bits == 16) {
+    image.encoding = "mono16";
+    image.bytes_per_sample = 2;
+  } else if (s.format.bits == 32) {
+    image.encoding = "32FC1";
+    image.bytes_per_sample = 4;
+    const auto parts = std::make_shared<Bytes>();
+    wire::Writer writer(*parts);
+    for (std::size_t at = 0; at + 4 <= ping->samples.size(); at += 4) {
+      const auto part = static_cast<float>(static_cast<double>(code_at(ping->samples, at)) / s.format.max_code);
+      writer("sample", part);
+    }
+    image.samples = parts;
+  }
+  return image;
+}
+
+Bytes image_head(Time at, const std::string& frame, const Image& image) {
+  fg::RawImage message;
+  fill(*message.mutable_timestamp(), at);
+  message.set_frame_id(frame);
+  message.set_width(image.width);
+  message.set_height(image.height);
+  message.set_encoding(image.encoding);
+  message.set_step(static_cast<std::uint32_t>(image.width * image.bytes_per_sample));
+  Bytes head = bytes_of(message);
+  constexpr unsigned length_delimited = 2;
+  head.push_back(static_cast<std::byte>(fg::RawImage::kDataFieldNumber << 3 | length_delimited));
+  std::size_t left = image.samples->size();
+  for (; left >= 0x80; left >>= 7) head.push_back(static_cast<std::byte>(0x80 | (left & 0x7F)));
+  head.push_back(static_cast<std::byte>(left));
+  return head;
+}
+
+Bytes transforms(std::span<const Transform> all) {
+  fg::FrameTransforms message;
+  for (const Transform& t : all) {
+    fg::FrameTransform& out = *message.add_transforms();
+    fill(*out.mutable_timestamp(), t.at);
+    out.set_parent_frame_id(t.parent);
+    out.set_child_frame_id(t.child);
+    fill(*out.mutable_translation(), t.child_in_parent.position_m);
+    fill(*out.mutable_rotation(), t.child_in_parent.orientation);
+  }
+  return bytes_of(message);
+}
+
+Bytes pose_in_frame(Time at, const std::string& frame, const Pose& pose) {
+  fg::PoseInFrame message;
+  fill(*message.mutable_timestamp(), at);
+  message.set_frame_id(frame);
+  fill(*message.mutable_pose(), pose);
+  return bytes_of(message);
+}
+
+Bytes scene_update(Time at, const Model& model) {
+  fg::SceneUpdate update;
+  fg::SceneEntity& out = entity(update, at, model.id, model.frame);
+  for (const auto& [key, value] : model.metadata) {
+    fg::KeyValuePair& pair = *out.add_metadata();
+    pair.set_key(key);
+    pair.set_value(value);
+  }
+  fg::ModelPrimitive& shape = *out.add_models();
+  fill(*shape.mutable_pose(), model.in_frame);
+  fill(*shape.mutable_scale(), Vec3d{1, 1, 1});
+  shape.set_media_type("model/gltf-binary");
+  shape.set_data(model.glb.data(), model.glb.size());
+  return bytes_of(update);
+}
+
+Bytes scene_update(Time at, const Lines& lines) {
+  fg::SceneUpdate update;
+  fg::LinePrimitive& out = *entity(update, at, lines.id, lines.frame).add_lines();
+  out.set_type(fg::LinePrimitive::LINE_LIST);
+  fill(*out.mutable_pose(), Pose{});
+  out.set_thickness(1);
+  out.set_scale_invariant(true);
+  for (const Vec3d& point : lines.points) fill(*out.add_points(), point);
+  fg::Color& colour = *out.mutable_color();
+  colour.set_r(1);
+  colour.set_g(0.75);
+  colour.set_b(0.25);
+  colour.set_a(0.6);
+  return bytes_of(update);
+}
+
+Bytes scene_deletion(Time at, const std::string& id) {
+  fg::SceneUpdate update;
+  fg::SceneEntityDeletion& deletion = *update.add_deletions();
+  fill(*deletion.mutable_timestamp(), at);
+  deletion.set_id(id);
+  return bytes_of(update);
+}
+
+Bytes log_line(Time at, Severity severity, const std::string& message, const std::string& name) {
+  fg::Log line;
+  fill(*line.mutable_timestamp(), at);
+  line.set_level(static_cast<fg::Log::Level>(severity));
+  line.set_message(message);
+  line.set_name(name);
+  return bytes_of(line);
+}
+
+Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> points) {
+  constexpr std::uint32_t stride = 16;
+  fg::PointCloud message;
+  fill(*message.mutable_timestamp(), at);
+  message.set_frame_id(frame);
+  fill(*message.mutable_pose(), Pose{});
+  message.set_point_stride(stride);
+  for (const auto& [name, offset, type] :
+       {std::tuple("x", 0u, fg::PackedElementField::FLOAT32), std::tuple("y", 4u, fg::PackedElementField::FLOAT32),
+        std::tuple("z", 8u, fg::PackedElementField::FLOAT32), std::tuple("intensity", 12u, fg::PackedElementField::UINT8)}) {
+    fg::PackedElementField& field = *message.add_fields();
+    field.set_name(name);
+    field.set_offset(offset);
+    field.set_type(type);
+  }
+  Bytes data;
+  data.reserve(points.size() * stride);
+  wire::Writer writer(data);
+  for (const CloudPoint& p : points) {
+    writer("x", p.x);
+    writer("y", p.y);
+    writer("z", p.z);
+    const std::uint32_t intensity_and_padding = p.intensity;
+    writer("intensity", intensity_and_padding);
+  }
+  message.set_data(data.data(), data.size());
+  return bytes_of(message);
+}
+
+Bytes geometry(const Ping& ping, std::uint32_t number) {
+  const PingSettings& s = ping.request.settings;
+  v1::PingGeometry message;
+  message.set_number(number);
+  message.set_row_spacing_m(s.range_bin_m);
+  message.set_range_start_m(s.range_start_m);
+  message.set_full_scale(s.format.max_code);
+  message.mutable_azimuth_rad()->Add(ping.beam_azimuth_rad.begin(), ping.beam_azimuth_rad.end());
+  message.mutable_row_gain()->Add(ping.row_gain.begin(), ping.row_gain.end());
+  return bytes_of(message);
+}
+
+}  // namespace sonar::foxglove

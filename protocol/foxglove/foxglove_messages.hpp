@@ -1,0 +1,75 @@
+// Messages of the live view as protobuf, in Foxglove's schemas (schemas/foxglove.proto) and our own (schemas/view.proto): plain
+// structs in, bytes out. World ENU, bodies FLU, metres. Pure.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+#include "core/base/units.hpp"
+#include "core/sonar/ping.hpp"
+#include "protocol/foxglove/foxglove_words.hpp"
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::foxglove {
+
+using wire::Bytes;
+using wire::BytesView;
+
+/// Of any message that is linked in: "foxglove.RawImage", "sonar.v1.PingEvent". With all that it imports. Empty text: there is
+/// none of that name.
+Schema protobuf_schema(const std::string& name);
+
+/// A picture whose samples may be those of a ping, shared.
+struct Image {
+  std::uint32_t width = 0, height = 0;
+  std::string encoding;
+  std::size_t bytes_per_sample = 1;
+  std::shared_ptr<const Bytes> samples;  // [height][width], little-endian
+};
+/// Samples as sent: row 0 nearest, column 0 most to port; mono8, mono16, or for 32 bits 32FC1 as parts of the full scale.
+Image image_of(const std::shared_ptr<const Ping>& ping);
+/// foxglove.RawImage up to the samples, which end it.
+Bytes image_head(Time at, const std::string& frame, const Image& image);
+
+struct Transform {
+  Time at{};
+  std::string parent, child;
+  Pose child_in_parent;
+};
+Bytes transforms(std::span<const Transform> all);
+Bytes pose_in_frame(Time at, const std::string& frame, const Pose& pose);
+
+/// An object of a scene.
+struct Model {
+  std::string id, frame;
+  Pose in_frame;
+  std::vector<std::pair<std::string, std::string>> metadata;
+  BytesView glb;  // model/gltf-binary
+};
+struct Lines {
+  std::string id, frame;
+  std::vector<Vec3d> points;  // two a line
+};
+// foxglove.SceneUpdate of one entity each. Updates one after the other are one update: so protobuf has it.
+Bytes scene_update(Time at, const Model& model);
+Bytes scene_update(Time at, const Lines& lines);
+Bytes scene_deletion(Time at, const std::string& id);
+
+enum class Severity { debug = 1, info, warning, error };
+Bytes log_line(Time at, Severity severity, const std::string& message, const std::string& name);
+
+struct CloudPoint {
+  float x = 0, y = 0, z = 0;
+  std::uint8_t intensity = 0;
+};
+Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> points);
+
+/// sonar.v1.PingGeometry. `number` = 0: to compare geometries of different pings.
+Bytes geometry(const Ping& ping, std::uint32_t number);
+}  // namespace sonar::foxglove

@@ -1,0 +1,206 @@
+#include "protocol/foxglove/foxglove_words.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "protocol/control/json_depth.hpp"
+
+namespace sonar::foxglove {
+namespace {
+
+using Json = nlohmann::ordered_json;
+constexpr int deepest = 16;
+
+/// Invalid UTF-8 in names is replaced, not refused.
+std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+Json json_of(Time at) {
+  const auto since = at.time_since_epoch();
+  const auto whole = std::chrono::floor<std::chrono::seconds>(since);
+  return {{"sec", whole.count()}, {"nsec", (since - whole).count()}};
+}
+
+Json json_of(const Parameter& parameter) {
+  Json json{{"name", parameter.name}};
+  std::visit(
+      [&json](const auto& value) {
+        using T = std::decay_t<decltype(value)>;
+        if constexpr (std::is_same_v<T, double>) {
+          if (!std::isfinite(value)) return;
+          json["value"] = value;
+          json["type"] = "float64";
+        } else if constexpr (!std::is_same_v<T, std::monostate> && !std::is_same_v<T, OtherValue>) {
+          json["value"] = value;
+        }
+      },
+      parameter.value);
+  return json;
+}
+
+// ---- what viewers say
+
+tl::unexpected<Error> refused(const std::string& why) { return failure(ErrorKind::bad_data, why); }
+
+bool is_u32(const Json& json) {
+  return json.is_number_unsigned() && json.get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max();
+}
+
+/// The members of a list, each as `take` reads it; nothing = one is of a wrong type.
+template <class T, class Take>
+std::optional<std::vector<T>> list(const Json& word, const char* key, Take take) {
+  const auto found = word.find(key);
+  if (found == word.end() || !found->is_array()) return std::nullopt;
+  std::vector<T> all;
+  for (const Json& item : *found) {
+    std::optional<T> one = take(item);
+    if (!one) return std::nullopt;
+    all.push_back(*std::move(one));
+  }
+  return all;
+}
+std::optional<std::string> text(const Json& json) {
+  return json.is_string() ? std::optional(json.get<std::string>()) : std::nullopt;
+}
+std::optional<std::uint32_t> number(const Json& json) {
+  return is_u32(json) ? std::optional(json.get<std::uint32_t>()) : std::nullopt;
+}
+std::optional<std::pair<std::uint32_t, std::uint32_t>> subscription(const Json& json) {
+  if (!json.is_object() || !json.contains("id") || !json.contains("channelId")) return std::nullopt;
+  const auto id = number(json["id"]), channel = number(json["channelId"]);
+  if (!id || !channel) return std::nullopt;
+  return std::pair(*id, *channel);
+}
+Value value(const Json& json, bool is_float) {
+  if (json.is_boolean()) return json.get<bool>();
+  if (json.is_number_float() || (json.is_number() && is_float)) return json.get<double>();
+  if (json.is_number_integer() && (!json.is_number_unsigned() || json.get<std::uint64_t>() >> 63 == 0))
+    return json.get<std::int64_t>();
+  if (json.is_string()) return json.get<std::string>();
+  return OtherValue{};
+}
+std::optional<Parameter> parameter(const Json& json) {
+  if (!json.is_object() || !json.contains("name") || !json["name"].is_string()) return std::nullopt;
+  const bool is_float = json.contains("type") && json["type"] == "float64";
+  return Parameter{json["name"].get<std::string>(), json.contains("value") ? value(json["value"], is_float) : Value{}};
+}
+
+template <class Word>
+Result<ViewerWord> parameters_word(const Json& word, std::optional<std::vector<std::string>> names) {
+  if (!names) return refused("parameterNames must be a list of names");
+  if (names->size() > most_parameters) return refused("more than 64 parameters in one request");
+  if constexpr (std::is_same_v<Word, GetParameters>) {
+    const auto id = word.find("id");
+    if (id != word.end() && !id->is_string()) return refused("id must be a string");
+    return GetParameters{*std::move(names), id == word.end() ? std::nullopt : std::optional(id->template get<std::string>())};
+  } else {
+    return WatchParameters{*std::move(names), word["op"] == "subscribeParameterUpdates"};
+  }
+}
+
+Result<ViewerWord> set_parameters(const Json& word) {
+  auto parameters = list<Parameter>(word, "parameters", parameter);
+  const auto id = word.find("id");
+  if (!parameters) return refused("parameters must be a list of objects with a name and a value");
+  if (id != word.end() && !id->is_string()) return refused("id must be a string");
+  if (parameters->size() > most_parameters) return refused("more than 64 parameters in one request");
+  return SetParameters{*std::move(parameters), id == word.end() ? std::nullopt : std::optional(id->get<std::string>())};
+}
+
+}  // namespace
+
+std::string text_of(const ServerInfo& info) {
+  Json json{{"op", "serverInfo"},
+            {"name", info.name},
+            {"capabilities", info.capabilities},
+            {"supportedEncodings", {"json"}},
+            {"metadata", info.metadata},
+            {"sessionId", info.session}};
+  if (info.data) {
+    json["dataStartTime"] = json_of(info.data->first);
+    json["dataEndTime"] = json_of(info.data->second);
+  }
+  return dump(json);
+}
+
+std::string advertise(std::span<const Channel> channels) {
+  Json list = Json::array();
+  for (const Channel& c : channels)
+    list.push_back({{"id", c.id},
+                    {"topic", c.topic},
+                    {"encoding", c.encoding},
+                    {"schemaName", c.schema.name},
+                    {"schema", c.schema.text},
+                    {"schemaEncoding", c.schema.encoding}});
+  return dump({{"op", "advertise"}, {"channels", std::move(list)}});
+}
+
+std::string unadvertise(std::span<const std::uint32_t> channels) {
+  return dump({{"op", "unadvertise"}, {"channelIds", std::vector(channels.begin(), channels.end())}});
+}
+
+std::string status(StatusLevel level, const std::string& message, const std::string& id) {
+  Json json{{"op", "status"}, {"level", static_cast<int>(level)}, {"message", message}};
+  if (!id.empty()) json["id"] = id;
+  return dump(json);
+}
+
+std::string remove_status(const std::string& id) { return dump({{"op", "removeStatus"}, {"statusIds", Json::array({id})}}); }
+
+std::string parameter_values(std::span<const Parameter> parameters, const std::optional<std::string>& request) {
+  Json list = Json::array();
+  for (const Parameter& p : parameters) list.push_back(json_of(p));
+  Json json{{"op", "parameterValues"}, {"parameters", std::move(list)}};
+  if (request) json["id"] = *request;
+  return dump(json);
+}
+
+std::string advertise_services(std::span<const Service> services) {
+  Json list = Json::array();
+  for (const Service& s : services) {
+    const auto side = [&s](const char* what) {
+      return Json{{"encoding", "json"},
+                  {"schemaName", s.type + what},
+                  {"schemaEncoding", "jsonschema"},
+                  {"schema", R"({"type":"object"})"}};
+    };
+    list.push_back({{"id", s.id}, {"name", s.name}, {"type", s.type}, {"request", side("")}, {"response", side("Response")}});
+  }
+  return dump({{"op", "advertiseServices"}, {"services", std::move(list)}});
+}
+
+std::string service_failure(std::uint32_t service, std::uint32_t call, const std::string& why) {
+  return dump({{"op", "serviceCallFailure"}, {"serviceId", service}, {"callId", call}, {"message", why}});
+}
+
+Result<ViewerWord> word_of_viewer(std::string_view message) {
+  if (control::nests_deeper(message, deepest)) return refused("JSON nested deeper than 16");
+  const Json word = Json::parse(message, nullptr, false);
+  if (!word.is_object()) return refused("not a JSON object");
+  const auto op = word.find("op");
+  if (op == word.end() || !op->is_string()) return refused("a message needs a string \"op\"");
+  const auto is = [&op](const char* name) { return *op == name; };
+  if (is("subscribe")) {
+    auto wanted = list<std::pair<std::uint32_t, std::uint32_t>>(word, "subscriptions", subscription);
+    if (!wanted) return refused("subscriptions must be a list of objects with a 32-bit id and channelId");
+    return Subscribe{*std::move(wanted)};
+  }
+  if (is("unsubscribe")) {
+    auto ids = list<std::uint32_t>(word, "subscriptionIds", number);
+    if (!ids) return refused("subscriptionIds must be a list of 32-bit numbers");
+    return Unsubscribe{*std::move(ids)};
+  }
+  if (is("setParameters")) return set_parameters(word);
+  if (is("getParameters")) return parameters_word<GetParameters>(word, list<std::string>(word, "parameterNames", text));
+  if (is("subscribeParameterUpdates") || is("unsubscribeParameterUpdates"))
+    return parameters_word<WatchParameters>(word, list<std::string>(word, "parameterNames", text));
+  for (const auto& [incapable, capability] :
+       {std::pair("advertise", "clientPublish"), std::pair("unadvertise", "clientPublish"),
+        std::pair("subscribeConnectionGraph", "connectionGraph"), std::pair("unsubscribeConnectionGraph", "connectionGraph"),
+        std::pair("fetchAsset", "assets")})
+    if (is(incapable)) return Incapable{incapable, capability};
+  return UnknownWord{op->get<std::string>().substr(0, 64)};
+}
+
+}  // namespace sonar::foxglove

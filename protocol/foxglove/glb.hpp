@@ -1,0 +1,18 @@
+// A mesh as binary glTF 2.0 (https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, 4.4). Pure.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/base/geometry.hpp"
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::foxglove {
+
+/// One mesh with one material. glTF is y-up, we are z-up: (x, y, z) is written as (x, z, -y), which viewers turn back. Normals
+/// are means over the triangles at a vertex, by area. `colour`: red, green, blue from 0 to 1.
+wire::Bytes glb(std::span<const Vec3> vertices, std::span<const std::array<std::uint32_t, 3>> triangles,
+                const std::array<double, 3>& colour);
+
+}  // namespace sonar::foxglove

@@ -1,0 +1,20 @@
+// Figures of a sonar as a ROS 2 message in CDR: PlotJuggler reads no other encoding over this socket. Pure.
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "protocol/foxglove/foxglove_words.hpp"
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::foxglove {
+
+inline constexpr std::array<std::string_view, 15> figure_names = {
+    "stamp_s", "number", "range_m", "rate_hz", "simulation_ms", "latency_ms", "clients",    "served",
+    "dropped", "x",      "y",       "z",       "roll_deg",      "pitch_deg",  "heading_deg"};
+
+/// sonard_msgs/msg/SonarFigures: float64 each, by the names above.
+Schema figures_schema();
+wire::Bytes figures(const std::array<double, figure_names.size()>& values);
+
+}  // namespace sonar::foxglove

@@ -1,0 +1,266 @@
+"""A strict viewer of the live view: WebSocket (RFC 6455), the Foxglove protocol and protobuf from their texts alone, no libraries.
+Shares nothing with the C++ code. Whatever is not as the texts demand is an AssertionError."""
+import base64
+import hashlib
+import json
+import os
+import socket
+import struct
+import time
+
+NAMES = ("foxglove.websocket.v1", "foxglove.sdk.v1")
+GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+
+
+class Refused(Exception):
+    def __init__(self, status, headers, body):
+        super().__init__(f"{status} {body}")
+        self.status, self.headers, self.body = status, headers, body
+
+
+class Closed(Exception):
+    """The server closed the connection; code 0: without a close frame."""
+
+    def __init__(self, code):
+        super().__init__(code)
+        self.code = code
+
+
+class Viewer:
+    def __init__(self, address, port=8088, path="/", protocols=", ".join(NAMES), headers=None, small_window=False, patience_s=20):
+        self.socket = socket.socket()
+        if small_window:
+            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        self.socket.settimeout(patience_s)
+        self.socket.connect((address, port))
+        self.buffer = b""
+        self.frames = 0  # of data, received
+        self.words, self.messages, self.times = [], [], []
+        self.channels, self.subscriptions, self.info = {}, {}, None
+        key = base64.b64encode(os.urandom(16)).decode()
+        asked = {"Host": f"{address}:{port}", "Connection": "keep-alive, Upgrade", "Upgrade": "websocket",
+                 "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": key, "Sec-WebSocket-Protocol": protocols, **(headers or {})}
+        lines = [f"GET {path} HTTP/1.1"] + [f"{name}: {value}" for name, value in asked.items() if value is not None]
+        self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+        while b"\r\n\r\n" not in self.buffer:
+            self._more()
+        head, self.buffer = self.buffer.split(b"\r\n\r\n", 1)
+        status, *lines = head.decode().split("\r\n")
+        answered = {name.lower(): value.strip() for name, value in (line.split(":", 1) for line in lines)}
+        code = int(status.split()[1])
+        if code != 101:
+            while len(self.buffer) < int(answered.get("content-length", 0)):
+                self._more()
+            self.socket.close()
+            raise Refused(code, answered, self.buffer.decode())
+        assert answered["upgrade"].lower() == "websocket" and answered["connection"].lower() == "upgrade", answered
+        assert answered["sec-websocket-accept"] == base64.b64encode(hashlib.sha1(key.encode() + GUID).digest()).decode(), answered
+        assert "sec-websocket-extensions" not in answered, answered
+        self.protocol = answered["sec-websocket-protocol"]
+        assert self.protocol in [p.strip() for p in protocols.split(",")], answered
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+    # ---- frames
+
+    def _more(self):
+        try:
+            chunk = self.socket.recv(1 << 16)
+        except ConnectionResetError:
+            chunk = b""
+        if not chunk:
+            raise Closed(0)
+        self.buffer += chunk
+
+    def _take(self, count):
+        while len(self.buffer) < count:
+            self._more()
+        taken, self.buffer = self.buffer[:count], self.buffer[count:]
+        return taken
+
+    def send_frame(self, opcode, payload, final=True):
+        mask = os.urandom(4)
+        length = len(payload)
+        head = bytes([opcode | (0x80 if final else 0)])
+        head += bytes([0x80 | length]) if length < 126 else bytes([0xFE]) + struct.pack(">H", length) if length < 65536 else \
+            bytes([0xFF]) + struct.pack(">Q", length)
+        self.socket.sendall(head + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(payload)))
+
+    def frame(self):
+        """The next message: (is_text, payload). Each is one frame."""
+        while True:
+            first, second = self._take(2)
+            assert first & 0x70 == 0 and second & 0x80 == 0, "reserved bits, or a mask"
+            opcode, length = first & 15, second & 127
+            if length == 126:
+                length = struct.unpack(">H", self._take(2))[0]
+                assert length >= 126, "length not as short as it can be"
+            elif length == 127:
+                length = struct.unpack(">Q", self._take(8))[0]
+                assert length >= 65536, "length not as short as it can be"
+            payload = self._take(length)
+            if opcode == 9:
+                self.send_frame(10, payload)
+            elif opcode == 8:
+                raise Closed(struct.unpack(">H", payload[:2])[0] if payload else 1005)
+            elif opcode != 10:
+                assert opcode in (1, 2) and first & 0x80, f"message in several frames, opcode {opcode}"
+                self.frames += 1
+                return opcode == 1, payload
+
+    # ---- the protocol
+
+    def say(self, **word):
+        self.send_frame(1, json.dumps(word).encode())
+
+    def receive(self):
+        """Files the next message; ("word", dict), ("message", (topic, ns, bytes)), ("time", ns) or ("answer", ...)."""
+        is_text, payload = self.frame()
+        if is_text:
+            word = json.loads(payload.decode())
+            self.words.append(word)
+            if word["op"] == "serverInfo":
+                self.info = word
+            elif word["op"] == "advertise":
+                for channel in word["channels"]:
+                    assert channel["id"] not in self.channels, "an id twice"
+                    self.channels[channel["id"]] = channel
+            elif word["op"] == "unadvertise":
+                for channel in word["channelIds"]:
+                    del self.channels[channel]
+            return "word", word
+        if payload[0] == 1:
+            subscription, ns = struct.unpack_from("<IQ", payload, 1)
+            message = self.channels[self.subscriptions[subscription]]["topic"], ns, payload[13:]
+            self.messages.append(message)
+            return "message", message
+        if payload[0] == 2:
+            assert len(payload) == 9
+            self.times.append(struct.unpack_from("<Q", payload, 1)[0])
+            return "time", self.times[-1]
+        assert payload[0] == 3, payload[:1]
+        service, call, length = struct.unpack_from("<III", payload, 1)
+        return "answer", (service, call, payload[13:13 + length].decode(), payload[13 + length:])
+
+    def wait_for(self, wanted, patience_s=20):
+        """The first thing received for which wanted(kind, value)."""
+        deadline = time.monotonic() + patience_s
+        while time.monotonic() < deadline:
+            kind, value = self.receive()
+            if wanted(kind, value):
+                return value
+        raise AssertionError("did not come")
+
+    def greeted(self):
+        self.wait_for(lambda kind, value: kind == "word" and value["op"] == "advertise")
+        return self
+
+    def channel(self, topic):
+        return next(id for id, channel in self.channels.items() if channel["topic"] == topic)
+
+    def subscribe(self, *topics):
+        new = []
+        for topic in topics:
+            subscription = 1000 + len(self.subscriptions)
+            self.subscriptions[subscription] = self.channel(topic)
+            new.append({"id": subscription, "channelId": self.channel(topic)})
+        self.say(op="subscribe", subscriptions=new)
+
+    def first_of(self, topic, patience_s=20):
+        """The first message of the channel, decoded; waits for it if there is none yet."""
+        found = [payload for name, _, payload in self.messages if name == topic]
+        if not found:
+            found = [self.wait_for(lambda kind, value: kind == "message" and value[0] == topic, patience_s)[2]]
+        return self.decode(topic, found[0])
+
+    def decode(self, topic, payload):
+        channel = self.channels[self.channel(topic)]
+        assert channel["encoding"] == channel["schemaEncoding"] == "protobuf", channel["encoding"]
+        return Schema(base64.b64decode(channel["schema"])).decode(channel["schemaName"], payload)
+
+    def status(self, part="", patience_s=20):
+        """The next status word with these words."""
+        return self.wait_for(lambda kind, value: kind == "word" and value["op"] == "status" and part in value["message"], patience_s)
+
+
+def varint(data, at):
+    value = shift = 0
+    while True:
+        value |= (data[at] & 0x7F) << shift
+        shift += 7
+        at += 1
+        if data[at - 1] < 0x80:
+            return value, at
+
+
+def fields(data):
+    """(number, wire type, value) of a protobuf message."""
+    at = 0
+    while at < len(data):
+        tag, at = varint(data, at)
+        number, wire = tag >> 3, tag & 7
+        if wire == 0:
+            value, at = varint(data, at)
+        else:
+            length = {1: 8, 5: 4}.get(wire)
+            if length is None:
+                assert wire == 2, wire
+                length, at = varint(data, at)
+            value, at = data[at:at + length], at + length
+            assert len(value) == length, "cut off"
+        yield number, wire, value
+
+
+class Schema:
+    """The messages of a FileDescriptorSet (google/protobuf/descriptor.proto), as far as is needed to read others by it."""
+
+    def __init__(self, descriptor_set):
+        self.messages = {}
+        for _, _, file in fields(descriptor_set):
+            package = next((v.decode() for n, _, v in fields(file) if n == 2), "")
+            for number, _, value in fields(file):
+                if number == 4:
+                    self._add("." + package, value)
+
+    def _add(self, scope, message):
+        name = scope + "." + next(v.decode() for n, _, v in fields(message) if n == 1)
+        self.messages[name] = {}
+        for number, _, value in fields(message):
+            if number == 2:
+                field = {n: v for n, _, v in fields(value)}
+                self.messages[name][field[3]] = (field[1].decode(), field[4], field[5], field.get(6, b"").decode())
+            elif number == 3:
+                self._add(name, value)
+
+    def decode(self, name, data):
+        """Fields by name; those that are not there are left out, repeated ones are lists. Unknown fields are an error."""
+        known = self.messages["." + name]
+        out = {}
+        for number, wire, value in fields(data):
+            field, label, kind, type_name = known[number]
+            values = self._values(kind, type_name, wire, value)
+            if label == 3:
+                out.setdefault(field, []).extend(values)
+            else:
+                out[field], = values
+        return out
+
+    def _values(self, kind, type_name, wire, value):
+        if kind == 11:
+            return [self.decode(type_name[1:], value)]
+        if kind in (9, 12):
+            return [value.decode() if kind == 9 else value]
+        packed = {1: "d", 2: "f", 6: "Q", 7: "I", 15: "i", 16: "q"}.get(kind)
+        if packed:
+            return list(struct.unpack(f"<{len(value) // struct.calcsize(packed)}{packed}", value))
+        if wire == 2:
+            all_, at = [], 0
+            while at < len(value):
+                one, at = varint(value, at)
+                all_.append(one)
+            return all_
+        return [bool(value) if kind == 8 else value - (1 << 64) if kind in (3, 5) and value >> 63 else value]
