@@ -2,6 +2,8 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace sonar {
 
@@ -11,6 +13,7 @@ struct HttpAnswer {
   std::string type = "application/json";
   std::string allow = {};  // of 405
   std::string why = {};    // for the log, of a refusal worth a line
+  std::vector<std::pair<std::string, std::string>> headers = {};
 };
 
 }  // namespace sonar

@@ -22,6 +22,14 @@ HttpRefusal refusal_of(const boost::beast::error_code& ec, std::size_t most_body
   return {400, "this is not an HTTP request: " + ec.message()};
 }
 
+/// Of all headers of the name (RFC 9110, 5.3).
+std::string joined(const http::request<http::string_body>& message, http::field name) {
+  std::string all;
+  const auto [first, last] = message.equal_range(name);
+  for (auto field = first; field != last; ++field) all += (all.empty() ? "" : ", ") + text_of(field->value());
+  return all;
+}
+
 tl::expected<std::optional<HttpRequest>, HttpRefusal> request_from(http::request<http::string_body> message) {
   HttpRequest request;
   request.method = text_of(message.method_string());
@@ -34,6 +42,9 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> request_from(http::request
   request.origin = text_of(message[http::field::origin]);
   request.authorization = text_of(message[http::field::authorization]);
   request.content_type = text_of(message[http::field::content_type]);
+  request.accept = joined(message, http::field::accept);
+  request.accept_encoding = joined(message, http::field::accept_encoding);
+  request.if_none_match = joined(message, http::field::if_none_match);
   request.keep_alive = message.keep_alive();
   request.body = std::move(message.body());
   return std::optional(std::move(request));

@@ -14,6 +14,7 @@ namespace sonar {
 
 struct HttpRequest {
   std::string method, target, host, origin, authorization, content_type, body;
+  std::string accept, accept_encoding, if_none_match;  // several headers of a name joined by ", "
   bool http_1_0 = false, keep_alive = true;
   bool has_host = false, has_origin = false;
 };

@@ -29,7 +29,9 @@ asio::awaitable<std::variant<HttpAnswer, HttpStream>> ControlHttp::answer(const 
   if (std::holds_alternative<MetricsAction>(routed.action))
     co_return HttpAnswer{200, targets_.operations.metrics(), "text/plain; version=0.0.4; charset=utf-8"};
   if (auto* asked = std::get_if<OperationAction>(&routed.action)) co_return co_await perform(std::move(asked->operation), from);
-  co_return HttpAnswer{200, help_text(text_of(from.reached())), "text/plain; charset=utf-8"};
+  HttpAnswer help{200, help_text(text_of(from.reached())), "text/plain; charset=utf-8"};
+  help.headers = {{"Vary", "Accept"}};
+  co_return help;
 }
 
 HttpAnswer ControlHttp::refusal(const HttpRefusal& refusal) const {

@@ -1,6 +1,7 @@
 #include "daemon/server/control/http_router.hpp"
 
 #include "core/text/decimal.hpp"
+#include "daemon/server/view/page.hpp"
 
 namespace sonar {
 namespace {
@@ -56,6 +57,11 @@ RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy
   if (auto answer = reject_host_or_origin(request, policy)) return {*std::move(answer)};
   const auto target = parse_target(request.target);
   if (!target) return {refused(400, "the target is not a path")};
+  if (request.method == "GET" || request.method == "HEAD") {
+    const std::string path = request.target.substr(0, request.target.find('?'));
+    if (auto page = page_answer({path, request.accept, request.accept_encoding, request.if_none_match}))
+      return {*std::move(page)};
+  }
   const Route route = route_of(*target, request.method);
   const bool authorised = policy.token.matches(bearer_token(request.authorization));
   if (!authorised && route.kind != Kind::health)
