@@ -1,4 +1,4 @@
-// Small helpers for the page's elements. They touch an element only when something changes, so that focus and selections stay.
+// Small functions for the page's elements. They touch an element only when something changes, so that focus and selections stay.
 
 export const $ = (id) => document.getElementById(id);
 

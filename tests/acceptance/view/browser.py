@@ -2,6 +2,7 @@
 import base64
 import json
 import os
+import pathlib
 import shutil
 import socket
 import subprocess
@@ -27,11 +28,15 @@ class Browser:
             [program(), "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-sandbox",
              "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
              "--disable-dev-shm-usage", "--remote-debugging-port=0", f"--user-data-dir={self.folder.name}", "about:blank"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        for line in self.process.stderr:
-            if "DevTools listening on" in line:
-                self.at = urllib.parse.urlsplit(line.split()[-1]).netloc
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        told = pathlib.Path(self.folder.name) / "DevToolsActivePort"  # the browser writes its port there
+        deadline = time.monotonic() + 60
+        while self.process.poll() is None and time.monotonic() < deadline:
+            if told.is_file() and "\n" in told.read_text():
+                self.at = "127.0.0.1:" + told.read_text().splitlines()[0]
                 return self
+            time.sleep(0.05)
+        self.__exit__()
         raise RuntimeError("the browser did not start")
 
     def __exit__(self, *_):
@@ -71,8 +76,11 @@ class Page:
         self.close()
 
     def close(self):
-        self.call("Page.close")
-        self.socket.stream.close()
+        try:
+            self.call("Page.close")
+        except OSError:
+            pass  # it is closed already
+        self.socket.close()
 
     def size(self, width, height, scale=1, touch=False):
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=touch)

@@ -18,6 +18,10 @@ class WebSocket:
         self.stream, self.masks = stream, masks
         self.file = stream.makefile("rb")
 
+    def close(self):
+        self.file.close()
+        self.stream.close()
+
     @classmethod
     def connect(cls, stream, host, target):
         key = base64.b64encode(os.urandom(16)).decode()
@@ -61,6 +65,8 @@ class WebSocket:
                 size, = struct.unpack(">Q", self.file.read(8))
             key = self.file.read(4) if head[1] & 0x80 else b""
             data = self.file.read(size)
+            if len(data) < size:
+                return None
             if key:
                 data = bytes(b ^ key[i % 4] for i, b in enumerate(data))
             opcode = head[0] & 15
