@@ -53,6 +53,7 @@ class Browser:
         with urllib.request.urlopen(request) as answer:
             target = json.load(answer)
         page = Page(urllib.parse.urlsplit(target["webSocketDebuggerUrl"]), width, height, **options)
+        page.call("Storage.clearDataForOrigin", origin=url.partition("/?")[0].rstrip("/"), storageTypes="all")
         page.go(url)
         return page
 
@@ -123,7 +124,7 @@ class Page:
             raise RuntimeError(result["exceptionDetails"].get("exception", {}).get("description") or str(result["exceptionDetails"]))
         return result["result"].get("value")
 
-    def wait(self, expression, patience_s=20):
+    def wait(self, expression, patience_s=60):
         """Until the expression is true; its value."""
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:
