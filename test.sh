@@ -15,7 +15,10 @@ case "${1:-}" in
 esac
 
 setup_and_build || exit
-need_packages "${test_packages[@]}" || echo "going on without: the tests that need them are skipped"
+for packages in "${test_packages[*]}" "${browser_packages[*]}"; do
+  # shellcheck disable=SC2086
+  need_packages $packages || echo "going on without: the tests that need them are skipped"
+done
 if [ -n "$long" ]; then  # tests that measure what reliability_table.py shows leave it there
   export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
   rm -f "$SONARD_RELIABILITY"/*.json  # what is not measured now is told as "not run"

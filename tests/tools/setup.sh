@@ -8,10 +8,14 @@ build_packages=(
   libfftw3-dev
 )
 
+# For the page of the live view; without them the daemon is built without it.
+page_packages=(esbuild libjs-three)
+
 # What only tests use: without it some are skipped, saying so.
 test_packages=(
   tshark systemd dpkg-dev file strace python3-numpy
 )
+browser_packages=(chromium)
 
 say() { printf '\n== %s\n' "$*"; }
 
@@ -84,6 +88,7 @@ build() {
 # setup_and_build [targets...]: the release build; without targets everything in it, tests too.
 setup_and_build() {
   need_packages "${build_packages[@]}" || return
+  need_packages "${page_packages[@]}" || echo "going on without: this sonard has no page for browsers"
   say "building in build/release"
   configure release -DSONAR_WERROR="${SONAR_WERROR:-OFF}" && build release "$@"
 }

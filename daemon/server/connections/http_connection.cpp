@@ -50,7 +50,7 @@ std::string bytes_of(const http::response<Body>& response, Part part) {
 
 std::string bytes_of(HttpAnswer answer, std::string_view connection, Part part) {
   auto response = response_of<http::string_body>(answer.status, answer.type);
-  if (answer.status != 204) response.content_length(answer.body.size());  // RFC 9110, 8.6
+  if (answer.status != 204 && answer.status != 304) response.content_length(answer.body.size());  // RFC 9110, 8.6
   if (!connection.empty()) response.set(http::field::connection, {connection.data(), connection.size()});
   if (!answer.allow.empty()) response.set(http::field::allow, answer.allow);
   for (const auto& [name, value] : answer.headers) response.set(name, value);

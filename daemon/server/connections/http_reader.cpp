@@ -45,6 +45,8 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> request_from(http::request
   request.upgrade = joined(message, http::field::upgrade);
   request.connection = joined(message, http::field::connection);
   request.accept = joined(message, http::field::accept);
+  request.accept_encoding = joined(message, http::field::accept_encoding);
+  request.if_none_match = joined(message, http::field::if_none_match);
   request.socket_key = joined(message, http::field::sec_websocket_key);
   request.socket_version = joined(message, http::field::sec_websocket_version);
   request.socket_protocols = joined(message, http::field::sec_websocket_protocol);

@@ -14,7 +14,8 @@ namespace sonar {
 
 struct HttpRequest {
   std::string method, target, host, origin, authorization, content_type, body;
-  std::string upgrade, connection, accept;                   // as they came; several headers of a name joined by ", "
+  // As they came; several headers of a name are joined by ", ".
+  std::string upgrade, connection, accept, accept_encoding, if_none_match;
   std::string socket_key, socket_version, socket_protocols;  // Sec-WebSocket-...
   bool bytes_behind = false;                                 // more had been received when it was whole
   bool http_1_0 = false, keep_alive = true;

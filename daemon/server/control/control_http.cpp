@@ -33,7 +33,9 @@ asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, Htt
   if (std::holds_alternative<MetricsAction>(routed.action))
     co_return HttpAnswer{200, targets_.operations.metrics(), "text/plain; version=0.0.4; charset=utf-8"};
   if (auto* asked = std::get_if<OperationAction>(&routed.action)) co_return co_await perform(std::move(asked->operation), from);
-  co_return HttpAnswer{200, help_text(text_of(from.reached())), "text/plain; charset=utf-8"};
+  HttpAnswer help{200, help_text(text_of(from.reached())), "text/plain; charset=utf-8"};
+  help.headers = {{"Vary", "Accept"}};
+  co_return help;
 }
 
 HttpOutcome ControlHttp::open_socket(const HttpRequest& request, const SocketAction& asked, HttpConnection& from) {

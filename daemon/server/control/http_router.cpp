@@ -2,6 +2,7 @@
 
 #include "core/text/decimal.hpp"
 #include "daemon/server/view/door.hpp"
+#include "daemon/server/view/page.hpp"
 
 namespace sonar {
 namespace {
@@ -62,6 +63,11 @@ RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy
   if (target && target->segments.empty() && wants_socket(request)) return {SocketAction{target->query}};
   if (auto answer = reject_origin(request, policy)) return {*std::move(answer)};
   if (!target) return {refused(400, "the target is not a path")};
+  if (request.method == "GET" || request.method == "HEAD") {
+    const std::string path = request.target.substr(0, request.target.find('?'));
+    if (auto page = page_answer({path, request.accept, request.accept_encoding, request.if_none_match}))
+      return {*std::move(page)};
+  }
   const Route route = route_of(*target, request.method);
   const bool authorised = policy.token.matches(bearer_token(request.authorization));
   if (!authorised && route.kind != Kind::health)

@@ -46,7 +46,7 @@ struct RoutedRequest {
 };
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy);
 
-/// The text of GET /.
+/// The text of GET /, for those who do not ask for the page.
 std::string help_text(const std::string& address);
 
 }  // namespace sonar

@@ -46,6 +46,16 @@ const std::string chunked =
 const std::string no_chunk = "POST /y HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n";
 const std::string old = "GET / HTTP/1.0\r\n\r\n";
 
+TEST(HttpReader, JoinsTheHeadersThatBrowsersChooseAFileBy) {
+  const Taken t = take(
+      "GET / HTTP/1.1\r\nHost: a\r\nAccept: text/html\r\nAccept: */*;q=0.1\r\nAccept-Encoding: gzip\r\n"
+      "If-None-Match: \"x\"\r\n\r\n");
+  ASSERT_EQ(t.requests.size(), 1u);
+  EXPECT_EQ(t.requests[0].accept, "text/html, */*;q=0.1");
+  EXPECT_EQ(t.requests[0].accept_encoding, "gzip");
+  EXPECT_EQ(t.requests[0].if_none_match, "\"x\"");
+}
+
 TEST(HttpReader, EverySplitGivesTheSameRequests) {
   const std::string stream = get + post + chunked + no_chunk + old;
   for (std::size_t piece = 1; piece <= stream.size(); ++piece) {

@@ -5,6 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/server/view/page_files.hpp"
+
 namespace sonar {
 namespace {
 
@@ -48,6 +50,19 @@ TEST(HttpRouter, RoutesValidRequests) {
   const auto& set = std::get<control::SetSonar>(std::get<OperationAction>(sonar.action).operation);
   EXPECT_EQ(set.sonar, "front");
   EXPECT_EQ(set.range_m, 5.0);
+}
+
+TEST(HttpRouter, GivesThePageWithoutATokenToBrowsersThatMayCall) {
+  if (page_files().empty()) GTEST_SKIP() << "this build has no page";
+  HttpRequest browser = request_for("GET", "/?sonar=front");
+  browser.accept = "text/html,*/*;q=0.8";
+  browser.accept_encoding = "gzip, br";
+  const RoutedRequest page = routed(browser, lab_token);
+  EXPECT_EQ(std::get<HttpAnswer>(page.action).status, 200u);
+  EXPECT_EQ(std::get<HttpAnswer>(page.action).type, "text/html; charset=utf-8");
+  browser.host = "elsewhere.example";
+  EXPECT_EQ(answer_to(browser, lab_token).status, 403u);
+  EXPECT_EQ(answer_to(request_for("GET", "/"), lab_token).status, 401u) << "the help text";
 }
 
 TEST(HttpRouter, WrongRequestsHaveTheirStatus) {

@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""Bundles the page with esbuild and embeds it, each file compressed, in a C++ file.
+
+usage: bundle.py ESBUILD THREE_DIR GENERATED_DIR OUT_DIR
+
+THREE_DIR holds three.module.js, GENERATED_DIR generated/colour-maps.js. OUT_DIR gets index.html, app-HASH.js, app-HASH.css and
+icon.svg as they are served, page_files.cpp with their gzip bytes, and sizes.txt. The hash is of the content: names change with it.
+"""
+import gzip
+import hashlib
+import os
+import pathlib
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8",
+         ".svg": "image/svg+xml"}
+
+
+def bundled(esbuild, source, three, generated, *options):
+    # three.js is found by its name, so that any release of it can be bundled.
+    command = [esbuild, str(source), "--bundle", "--minify", "--target=es2022", "--legal-comments=inline", *options]
+    environment = dict(os.environ, NODE_PATH=os.pathsep.join([str(three), str(generated)]))
+    return subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE).stdout
+
+
+def hashed(name, content):
+    stem, dot, extension = name.partition(".")
+    return f"{stem}-{hashlib.sha256(content).hexdigest()[:10]}{dot}{extension}"
+
+
+def bytes_of(content):
+    lines = [content[i:i + 40] for i in range(0, len(content), 40)]
+    return ",\n  ".join(",".join(str(b) for b in line) for line in lines)
+
+
+def cpp_of(files):
+    parts = ['// Made by clients/web/bundle.py.\n#include "daemon/server/view/page_files.hpp"\n\nnamespace sonar {\nnamespace {\n']
+    rows = []
+    for i, (name, content) in enumerate(files.items()):
+        packed = gzip.compress(content, 9, mtime=0)
+        parts.append(f"constexpr unsigned char bytes_{i}[] = {{\n  {bytes_of(packed)}}};\n")
+        path = "/" if name == "index.html" else "/" + name
+        rows.append(f'  {{"{path}", "{TYPES[pathlib.Path(name).suffix]}", "{hashlib.sha256(content).hexdigest()[:16]}", bytes_{i}}},')
+    table = "\n".join(rows)
+    parts.append(f"constexpr PageFile files[] = {{\n{table}\n}};\n\n}}  // namespace\n")
+    parts.append("\nstd::span<const PageFile> page_files() { return files; }\n\n}  // namespace sonar\n")
+    return "".join(parts)
+
+
+def main():
+    if len(sys.argv) != 5:
+        sys.exit(__doc__)
+    esbuild, three, generated, out = sys.argv[1], *map(pathlib.Path, sys.argv[2:])
+    out.mkdir(parents=True, exist_ok=True)
+    for old in out.glob("app-*"):
+        old.unlink()
+    script = bundled(esbuild, HERE / "src/main.js", three, generated, "--format=esm")
+    style = bundled(esbuild, HERE / "style/app.css", three, generated)
+    files = {hashed("app.js", script): script, hashed("app.css", style): style, "icon.svg": (HERE / "icon.svg").read_bytes()}
+    html = (HERE / "index.html").read_text(encoding="utf-8")
+    for name in files:
+        html = html.replace(f'"/app{pathlib.Path(name).suffix}"', f'"/{name}"')
+    files = {"index.html": html.encode(), **files}
+    for name, content in files.items():
+        (out / name).write_bytes(content)
+    (out / "page_files.cpp").write_text(cpp_of(files), encoding="utf-8")
+    sizes = {name: len(gzip.compress(content, 9, mtime=0)) for name, content in files.items()}
+    (out / "sizes.txt").write_text("".join(f"{size} {name}\n" for name, size in sizes.items()), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,37 @@
+// Small functions for the page's elements. They touch an element only when something changes, so that focus and selections stay.
+
+export const $ = (id) => document.getElementById(id);
+
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+export function setHidden(element, hidden) {
+  if (element.hidden !== hidden) element.hidden = hidden;
+}
+export function setClass(element, name) {
+  if (element.className !== name) element.className = name;
+}
+
+/// make('button', {class: 'x', onclick}, 'text', child...). Keys that are functions or known properties are set as properties.
+export function make(tag, options = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [key, value] of Object.entries(options)) {
+    if (key === 'class') element.className = value;
+    else if (key in element) element[key] = value;
+    else element.setAttribute(key, value);
+  }
+  element.append(...children.filter((child) => child !== null && child !== undefined));
+  return element;
+}
+
+/// Calls build() for new children of the element only when `content` (anything JSON can hold) is not what was shown last.
+export function showList(element, content, build) {
+  const key = JSON.stringify(content);
+  if (element.shown === key) return;
+  element.shown = key;
+  element.replaceChildren(...build());
+}
+
+/// A sign beside a coloured thing: its meaning must not hang on the colour.
+export const sign = (level) =>
+  make('span', { class: `sign ${level}`, 'aria-hidden': 'true' }, level === 'error' || level === 'warning' ? '!' : level === 'ok' ? '✓' : '•');

@@ -1,0 +1,196 @@
+// What the page knows of the daemon: messages come in, panels read. No drawing here.
+import { Counter, Counters } from './rates.js';
+
+const log_lines = 500;
+const recent_pings = 64;
+const history_s = 60;
+
+const now_s = () => performance.now() / 1000;
+
+export class Facts {
+  constructor() {
+    this.parameters = new Map();
+    this.log = [];
+    this.logCount = 0;
+    this.sonar = '';
+    this.connection = 'connecting';  // connecting, open, lost, token
+    this.problems = new Map();       // status messages of the daemon, by id
+    this.clear();
+  }
+
+  /// After a new session: nothing of the old one holds, but the log stays readable.
+  clear() {
+    this.status = null;
+    this.findings = null;
+    this.faults = [];
+    this.frames = new Map();  // child -> {parent, translation, rotation}
+    this.ping = null;
+    this.geometry = new Map();  // by sonar
+    this.events = new Map();    // log time -> ping event
+    this.clientPings = new Counters();
+    this.clientBytes = new Counters();
+    this.drawn = new Counter();
+    this.drawnPings = 0;
+    this.received = new Counter();
+    this.receivedBytes = 0;
+    this.missed = 0;
+    this.lastNumber = Infinity;  // of the ping before
+    this.history = [];  // {time_s, rate} of pings made, the last minute
+    this.droppedAt = new Map();  // client -> when its drops last rose, now_s
+    this.drops = new Map();
+    this.movedAt = now_s();  // when the daemon's time last moved
+    this.now_ns = null;
+    this.now_at = now_s();
+  }
+
+  opened(info) {
+    const same = this.info?.sessionId === info.sessionId;
+    this.info = info;
+    this.connection = 'open';
+    const meta = info.metadata ?? {};
+    this.maySteer = meta['sonard.may_steer'] !== 'false';
+    this.clock = meta['sonard.clock'] ?? 'realtime';
+    if (!same) this.clear();
+    this.parameters.clear();
+    this.problems.clear();
+  }
+
+  get realtime() {
+    return this.clock === 'realtime';
+  }
+  get sonarStatus() {
+    return this.status?.sonars.find((s) => s.name === this.sonar) ?? null;
+  }
+  /// The vehicle that carries the sonar: by the frames, else the only one.
+  get vehicle() {
+    const name = this.frames.get(this.sonar)?.parent;
+    const vehicles = this.status?.vehicles ?? [];
+    return vehicles.find((v) => v.name === name) ?? (vehicles.length === 1 ? vehicles[0] : null);
+  }
+  /// The daemon's time, carried on by the page's clock while it runs in real time.
+  get time_ns() {
+    if (this.now_ns === null) return null;
+    return this.realtime ? this.now_ns + (now_s() - this.now_at) * 1e9 : this.now_ns;
+  }
+
+  setTime(ns) {
+    if (ns !== this.now_ns) this.movedAt = now_s();
+    this.now_ns = ns;
+    this.now_at = now_s();
+  }
+
+  setParameters(list) {
+    for (const p of list) {
+      if (p.value === undefined) this.parameters.delete(p.name);
+      else this.parameters.set(p.name, p);
+    }
+  }
+  value(name) {
+    return this.parameters.get(name)?.value;
+  }
+  of(name) {
+    return this.value(`/${this.sonar}/${name}`);
+  }
+
+  message(topic, value, ns) {
+    switch (topic) {
+      case '/status':
+        return this.setStatus(value, ns);
+      case '/doctor':
+        this.findings = value.findings;
+        this.checkedAt = now_s();
+        return;
+      case '/faults':
+        this.faults = value.faults.filter((f) => f.state !== 'over').map((f) => ({ ...f, ends_ns: f.expires_s > 0 ? ns + f.expires_s * 1e9 : 0 }));
+        this.armed = value.armed;
+        return;
+      case '/log':
+        this.log.push({ ...value, ns });
+        this.logCount++;
+        if (this.log.length > log_lines) this.log.shift();
+        return;
+      case '/tf':
+        for (const t of value.transforms) this.frames.set(t.child_frame_id, { parent: t.parent_frame_id, translation: t.translation, rotation: t.rotation });
+        return;
+    }
+    const [, sonar, kind] = topic.split('/');
+    if (kind === 'geometry') this.geometry.set(sonar, value);
+    if (kind === 'ping' && sonar === this.sonar) this.pingEvent(value, ns);
+    if (kind === 'image' && sonar === this.sonar) this.image(value, ns);
+  }
+
+  pingEvent(event, ns) {
+    this.events.set(ns, event);
+    if (this.events.size > recent_pings) this.events.delete(this.events.keys().next().value);
+    if (this.ping?.ns === ns) this.count(this.ping, event);
+  }
+
+  image(image, ns) {
+    const geometry = this.geometry.get(this.sonar);
+    if (!geometry) return;
+    this.receivedBytes += image.data.length;
+    this.received.add(now_s(), this.receivedBytes);
+    this.ping = { image, geometry, ns, at: now_s() };
+    const event = this.events.get(ns);
+    if (event) this.count(this.ping, event);
+  }
+
+  /// A picture has no number: the event of the same time has, and comes before it or after it.
+  count(ping, event) {
+    ping.number = event.number;
+    if (event.number > this.lastNumber + 1 && event.number - this.lastNumber < 1000) this.missed += event.number - this.lastNumber - 1;
+    this.lastNumber = event.number;
+  }
+
+  pingDrawn() {
+    this.drawn.add(now_s(), ++this.drawnPings);
+  }
+
+  setStatus(status, ns) {
+    const before = this.vehicle;
+    this.status = status;
+    if (!this.vehicle?.stale) this.staleSince = undefined;
+    else if (before && !before.stale) this.staleSince = now_s();  // opened later, the page cannot know
+    this.clock = status.clock || this.clock;
+    this.setTime(status.now_ns || ns);
+    if (!status.sonars.some((s) => s.name === this.sonar)) this.sonar = status.sonars[0]?.name ?? '';
+    const time_s = this.realtime ? ns / 1e9 : now_s();
+    const pings = new Map();
+    const bytes = new Map();
+    for (const sonar of status.sonars) {
+      for (const client of sonar.clients) {
+        const key = `${sonar.name} ${client.address}`;
+        pings.set(key, client.pings_written);
+        bytes.set(key, client.bytes_written);
+        if (client.pings_dropped > (this.drops.get(key) ?? client.pings_dropped)) this.droppedAt.set(key, now_s());
+        this.drops.set(key, client.pings_dropped);
+      }
+    }
+    this.clientPings.update(time_s, pings);
+    this.clientBytes.update(time_s, bytes);
+    const made = this.sonarStatus?.figures?.pings;
+    if (made !== undefined) {
+      const last = this.history.at(-1);
+      const rate = last && made >= last.made && time_s > last.time_s ? (made - last.made) / (time_s - last.time_s) : undefined;
+      if (!last || time_s - last.time_s > 0.5 || made < last.made) this.history.push({ time_s, made, rate });
+      this.history = this.history.filter((h) => h.time_s > time_s - history_s && h.time_s <= time_s);
+    }
+  }
+
+  /// Pings the sonar makes a second; 0 when it has made none for longer than its rate allows.
+  get rate() {
+    const last = this.history.at(-1);
+    const first = this.history.findLast((h) => h.time_s <= (last?.time_s ?? 0) - 1.9) ?? this.history[0];
+    if (!last || !first || last === first) return undefined;
+    return (last.made - first.made) / (last.time_s - first.time_s);
+  }
+
+  select(sonar) {
+    if (sonar === this.sonar) return;
+    this.sonar = sonar;
+    this.ping = null;
+    this.history = [];
+    this.lastNumber = Infinity;
+    this.missed = 0;
+  }
+}

@@ -1,0 +1,198 @@
+// The fan's pane: draws each ping, its marks, and what lies under the cursor.
+import { $, setClass, setHidden, setText } from '../dom.js';
+import { beamTable, exactLayout, fittedLayout, polarOf, samplesOf, under } from './layout.js';
+import { bearingText, drawMarks } from './marks.js';
+import { colourTable, mapNames } from './colours.js';
+import { drawFlat } from './flat.js';
+import { fixed, short, whole } from '../numbers.js';
+import { makeFanPainter } from './shader.js';
+import { makeRemembered } from '../remember.js';
+
+const background = [13, 17, 23];
+const slow_ms = 40;
+const very_slow_ms = 80;
+const empty_grid = { rows: 500, beams: 2, spacing_m: 0.02, start_m: 0, range_m: 10, azimuth_rad: [Math.PI / 6, -Math.PI / 6] };
+
+export class Fan {
+  constructor(facts, exact) {
+    this.facts = facts;
+    this.exact = exact;  // for tests: the layout of `sonarctl view --png --no-rings`, so many pixels wide; else 0
+    this.canvas = $('fan');
+    this.marks = $('fan-marks');
+    this.painter = makeFanPainter(this.canvas);
+    this.remembered = makeRemembered('fan', { map: 'copper', rings: true });
+    this.gain = 1;
+    this.gamma = 1;
+    this.rings = !exact && this.remembered.rings;
+    this.cost_ms = 0;
+    this.quality = 2;  // 2: footprint mean; 1: one sample a pixel; 0: also half resolution
+    this.useMap(this.remembered.map);
+    const observer = new ResizeObserver(() => this.resize());
+    for (const id of ['fan-pane', 'fan-top', 'fan-controls']) observer.observe($(id));
+    this.marks.addEventListener('pointermove', (event) => this.point(event));
+    this.marks.addEventListener('pointerleave', () => this.point(null));
+  }
+
+  get flat() {
+    return !this.painter;
+  }
+
+  useMap(name) {
+    this.mapName = mapNames.includes(name) ? name : 'copper';
+    this.remembered.map = this.mapName;
+    this.map = colourTable(this.mapName);
+    this.redraw();
+  }
+  nextMap() {
+    this.useMap(mapNames[(mapNames.indexOf(this.mapName) + 1) % mapNames.length]);
+  }
+  setGain(gain) {
+    this.gain = Math.min(8, Math.max(0.125, gain));
+    this.redraw();
+  }
+  toggleRings() {
+    this.rings = !this.rings;
+    this.remembered.rings = this.rings;
+    this.redraw();
+  }
+  toggleFreeze() {
+    this.frozen = !this.frozen;
+    if (!this.frozen) this.show(this.facts.ping);
+    return this.frozen;
+  }
+
+  resize() {
+    this.layout = null;
+    this.redraw();
+  }
+
+  /// A new ping, or null: nothing was received yet.
+  show(ping) {
+    if (this.frozen || ping === this.ping) return;
+    this.ping = ping;
+    if (!ping) {
+      this.polar = null;
+      return this.redraw();
+    }
+    const geometry = ping.geometry;
+    if (geometry !== this.geometry) {
+      this.geometry = geometry;
+      this.table = beamTable(geometry.azimuth_rad);
+    }
+    const before = this.polar;
+    this.polar = polarOf(ping.image, geometry);
+    if (before?.range_m !== this.polar.range_m || before?.azimuth_rad.length !== this.polar.azimuth_rad.length) this.layout = null;
+    if (this.painter) {
+      const { samples, full_scale } = samplesOf(ping.image);
+      [this.samples, this.full_scale] = [samples, full_scale];
+      this.painter.load(ping.image, samples, this.table, full_scale);
+    }
+    this.paint();
+    this.facts.pingDrawn();
+  }
+
+  /// A scan-converted picture of the daemon, where there is no WebGL2.
+  showFlat(image) {
+    if (this.flat && !this.frozen) drawFlat(this.canvas, image, this.map, this.gain);
+  }
+
+  redraw() {
+    cancelAnimationFrame(this.asked);
+    this.asked = requestAnimationFrame(() => this.paint());
+  }
+
+  paint() {
+    const pane = $('fan-pane');
+    const width = this.exact || pane.clientWidth;
+    const height = pane.clientHeight;
+    if (width < 40 || height < 40) return;
+    const polar = this.polar ?? empty_grid;
+    if (!this.layout) this.arrange(polar, width, height);
+    const layout = this.layout;
+    if (this.painter && this.polar) this.paintPicture();
+    setHidden(this.canvas, !this.polar && !this.flat);
+    if (!this.flat) drawMarks(this.marks, polar, layout, { rings: this.rings, cursor: this.cursor, ratio: this.ratio });
+    this.caption();
+  }
+
+  arrange(polar, width, height) {
+    const margins = { left: 36, right: 46, top: $('fan-top').offsetHeight + 20, bottom: $('fan-controls').offsetHeight + 18 };
+    this.layout = this.exact ? exactLayout(polar, width, 4) : fittedLayout(polar, width, height, margins);
+    this.ratio = this.exact ? 1 : Math.min(2, devicePixelRatio || 1);
+    const scale = this.exact ? 1 : this.quality === 0 ? this.ratio / 2 : this.ratio;
+    this.scale = scale;
+    for (const [canvas, s] of [[this.canvas, scale], [this.marks, this.ratio]]) {
+      if (canvas === this.canvas && this.flat) continue;
+      canvas.width = Math.round(this.layout.width * s);
+      canvas.height = Math.round(this.layout.height * s);
+      canvas.style.width = `${this.layout.width}px`;
+      canvas.style.height = `${this.layout.height}px`;
+    }
+  }
+
+  paintPicture() {
+    const { layout, scale } = this;
+    const scaled = {
+      width: layout.width * scale,
+      height: this.canvas.height,
+      apex_x: layout.apex_x * scale,
+      apex_y: layout.apex_y * scale,
+      metres_per_pixel: layout.metres_per_pixel / scale,
+    };
+    const measured = !this.exact && ++this.painted % 8 === 0;
+    const from = performance.now();
+    this.painter.paint(this.polar, scaled, { map: this.map, gain: this.gain, gamma: this.gamma, single: this.quality < 2, outside: background });
+    if (!measured) return;
+    this.painter.finish();
+    this.adapt(performance.now() - from);
+  }
+  painted = 0;
+
+  /// On slow machines a picture takes one sample a pixel, then also half the pixels.
+  adapt(ms) {
+    this.cost_ms = this.cost_ms ? 0.6 * this.cost_ms + 0.4 * ms : ms;
+    const worst = this.quality === 2 ? slow_ms : very_slow_ms;
+    if (this.cost_ms <= worst || this.quality === 0) return;
+    this.quality--;
+    this.cost_ms = 0;
+    this.layout = null;
+  }
+
+  point(event) {
+    this.cursor = event && this.polar && this.layout ? under(this.polar, this.layout, event.offsetX, event.offsetY) : null;
+    this.redraw();
+  }
+
+  caption() {
+    const ping = this.ping;
+    if (!ping || ping.number) setText($('ping-number'), whole(ping?.number));
+    const bits = { mono8: 8, mono16: 16 }[ping?.image.encoding] ?? 32;
+    setHidden($('ping-size'), !ping);
+    setText($('ping-size'), ping ? `${ping.image.width} × ${ping.image.height} · ${bits} bit` : '–');
+    const c = this.cursor;
+    setHidden($('cursor'), !c);
+    if (!c || !this.samples) return;
+    const value = this.samples[c.row * this.polar.beams + c.beam];
+    setText($('cursor'), `${fixed(c.range_m, 2)} m  ${bearingText(c.azimuth_rad, 1)}  sample ${short(value, 3)}`);
+  }
+
+  setMood(picture) {
+    setClass($('fan-glass'), picture);
+  }
+
+  /// The picture and its marks as a PNG file.
+  save() {
+    const whole_picture = document.createElement('canvas');
+    whole_picture.width = this.marks.width;
+    whole_picture.height = this.marks.height;
+    const g = whole_picture.getContext('2d');
+    for (const canvas of [this.canvas, this.marks]) g.drawImage(canvas, 0, 0, whole_picture.width, whole_picture.height);
+    whole_picture.toBlob((blob) => {
+      const link = document.createElement('a');
+      link.href = URL.createObjectURL(blob);
+      link.download = `${this.facts.sonar || 'sonar'}-${this.ping?.number ?? 'ping'}.png`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
+  }
+}

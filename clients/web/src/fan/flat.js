@@ -1,0 +1,14 @@
+// Without WebGL2: the fan that the daemon has drawn (/SONAR/fan, mono8; 0 = outside), coloured here.
+
+const outside = new Uint32Array(new Uint8Array([13, 17, 23, 255]).buffer)[0];
+
+export function drawFlat(canvas, image, map, gain) {
+  canvas.width = image.width;
+  canvas.height = image.height;
+  const g = canvas.getContext('2d');
+  const out = g.createImageData(image.width, image.height);
+  const pixels = new Uint32Array(out.data.buffer);
+  const colours = new Uint32Array(map.slice().buffer);
+  for (let i = 0; i < pixels.length; i++) pixels[i] = image.data[i] ? colours[Math.min(255, Math.round(image.data[i] * gain))] : outside;
+  g.putImageData(out, 0, 0);
+}

@@ -1,0 +1,104 @@
+// Where a ping's metres lie among the picture's pixels, and where a direction lies among its beams: as core/image/draw_fan.cpp has it.
+
+/// Of a geometry message and an image: {rows, beams, spacing_m, start_m, range_m, azimuth_rad, full_scale}.
+export function polarOf(image, geometry) {
+  const spacing_m = geometry.row_spacing_m;
+  const start_m = geometry.range_start_m ?? 0;
+  return {
+    rows: image.height,
+    beams: image.width,
+    spacing_m,
+    start_m,
+    range_m: start_m + image.height * spacing_m,
+    azimuth_rad: geometry.azimuth_rad,  // falling, positive to port
+  };
+}
+
+/// The layout that `sonarctl view --png` has with that width; margin 4 without rings.
+export function exactLayout(polar, width, margin) {
+  const half = Math.max(Math.abs(polar.azimuth_rad[0]), Math.abs(polar.azimuth_rad.at(-1)));
+  const metres_per_pixel = Math.max((2 * polar.range_m * Math.sin(Math.min(half, Math.PI / 2))) / (width - 2 * margin), polar.range_m / (4 * width));
+  const apex_y = margin + polar.range_m / metres_per_pixel;
+  return { width, height: Math.ceil(apex_y + margin), apex_x: width / 2, apex_y, metres_per_pixel };
+}
+
+/// The largest fan that fits between the margins {left, right, top, bottom} of a pane.
+export function fittedLayout(polar, width, height, margins) {
+  const half = Math.min(Math.PI / 2, Math.max(Math.abs(polar.azimuth_rad[0]), Math.abs(polar.azimuth_rad.at(-1))));
+  const wide = width - margins.left - margins.right;
+  const tall = height - margins.top - margins.bottom;
+  const metres_per_pixel = Math.max((2 * polar.range_m * Math.sin(half)) / Math.max(wide, 40), polar.range_m / Math.max(tall, 40));
+  const used = polar.range_m / metres_per_pixel;
+  return { width, height, apex_x: margins.left + wide / 2, apex_y: margins.top + tall / 2 + used / 2, metres_per_pixel };
+}
+
+/// Distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.
+export function ringSpacing_m(range_m) {
+  const decade = 10 ** Math.floor(Math.log10(range_m));
+  for (const step of [0.1, 0.2, 0.5, 1]) if (range_m / (step * decade) <= 10) return step * decade;
+  return 2 * decade;
+}
+
+/// Place in the beam table, fractional; beam k spans [k - 0.5, k + 0.5]. Outside the fan: below -0.5 or above beams - 0.5.
+export function beamAt(azimuth_rad, azimuth) {
+  let low = 0;
+  let high = azimuth_rad.length;
+  while (low < high) {  // the first that is not greater
+    const middle = (low + high) >> 1;
+    if (azimuth_rad[middle] > azimuth) low = middle + 1;
+    else high = middle;
+  }
+  const right = Math.min(Math.max(low, 1), azimuth_rad.length - 1);
+  const a = azimuth_rad[right - 1];
+  return right - 1 + (a - azimuth) / (a - azimuth_rad[right]);
+}
+
+/// What lies under a pixel: {range_m, azimuth_rad, row, beam}, or null outside the fan.
+export function under(polar, layout, x, y) {
+  const x_m = (x - layout.apex_x) * layout.metres_per_pixel;
+  const y_m = (layout.apex_y - y) * layout.metres_per_pixel;
+  const range_m = Math.hypot(x_m, y_m);
+  if (range_m < polar.start_m || range_m >= polar.range_m) return null;
+  const azimuth_rad = Math.atan2(-x_m, y_m);
+  const beam = Math.round(beamAt(polar.azimuth_rad, azimuth_rad));
+  if (beam < 0 || beam >= polar.beams) return null;
+  return { range_m, azimuth_rad, row: Math.min(polar.rows - 1, Math.floor((range_m - polar.start_m) / polar.spacing_m)), beam };
+}
+
+export const table_entries = 1024;
+/// Azimuth -> beam in equal steps from `first` to `last` [rad], which lie half a beam beyond the outermost beams' middles.
+export function beamTable(azimuth_rad) {
+  const n = azimuth_rad.length;
+  const first = azimuth_rad[0] + (azimuth_rad[0] - azimuth_rad[1]) / 2;
+  const last = azimuth_rad[n - 1] - (azimuth_rad[n - 2] - azimuth_rad[n - 1]) / 2;
+  const beams = new Float32Array(table_entries);
+  for (let i = 0; i < table_entries; i++) beams[i] = beamAt(azimuth_rad, first + ((last - first) * i) / (table_entries - 1));
+  return { first, last, beams };
+}
+
+/// Samples of the image as a typed array, and the code that is drawn brightest: as `sonarctl view` has it.
+export function samplesOf(image) {
+  const { data, encoding } = image;
+  const at = data.byteOffset;
+  const count = image.width * image.height;
+  if (encoding === 'mono8') return { samples: data, full_scale: 254 };
+  if (encoding === 'mono16') {
+    const samples = new Uint16Array(data.slice().buffer, 0, count);
+    return { samples, full_scale: Math.max(1, brightest(samples, 65536, (v) => v)) };
+  }
+  const samples = new Float32Array(data.buffer.slice(at, at + 4 * count));
+  const scale = 65535;
+  return { samples, full_scale: Math.max(1, brightest(samples, scale + 1, (v) => Math.min(scale, Math.max(0, Math.round(v * scale))))) / scale };
+}
+
+/// What 999 of a thousand samples do not exceed.
+function brightest(samples, bins, binOf) {
+  const histogram = new Uint32Array(bins);
+  for (let i = 0; i < samples.length; i++) histogram[binOf(samples[i])]++;
+  let left = Math.floor(((samples.length - 1) * 999) / 1000);
+  for (let v = 0; v < bins; v++) {
+    left -= histogram[v];
+    if (left < 0) return v;
+  }
+  return bins - 1;
+}

@@ -1,0 +1,94 @@
+// Range rings, bearings and the cursor's cross above the fan, on a 2D canvas.
+import { ringSpacing_m } from './layout.js';
+import { short } from '../numbers.js';
+
+const ring = 'rgba(200, 214, 229, 0.32)';
+const edge = 'rgba(200, 214, 229, 0.45)';
+const words = '#aeb9c4';
+const font = '11px system-ui, sans-serif';
+const label_gap_px = 30;
+
+const degrees = (radians) => (radians * 180) / Math.PI;
+const place = (layout, range_m, azimuth) => [
+  layout.apex_x - (range_m / layout.metres_per_pixel) * Math.sin(azimuth),
+  layout.apex_y - (range_m / layout.metres_per_pixel) * Math.cos(azimuth),
+];
+
+/// Starboard positive, as operators read it: "+15°".
+export function bearingText(azimuth_rad, digits = 0) {
+  const bearing = -degrees(azimuth_rad);
+  const text = Math.abs(bearing).toFixed(digits);
+  return `${Number(text) === 0 ? '' : bearing < 0 ? '-' : '+'}${text}°`;
+}
+
+function bearingStep(aperture_deg) {
+  return aperture_deg > 100 ? 30 : aperture_deg > 45 ? 15 : aperture_deg > 25 ? 10 : 5;
+}
+
+function drawRings(g, polar, layout, port, starboard) {
+  const spacing = ringSpacing_m(polar.range_m);
+  const px = spacing / layout.metres_per_pixel;
+  const every = Math.max(1, Math.ceil(label_gap_px / px)) * (px * 2 < 90 ? 2 : 1);
+  for (let n = 1; n * spacing <= polar.range_m * 1.0001; n++) {
+    const outermost = (n + 1) * spacing > polar.range_m * 1.0001;
+    g.strokeStyle = outermost ? edge : ring;
+    g.beginPath();
+    g.arc(layout.apex_x, layout.apex_y, n * px, -Math.PI / 2 - port, -Math.PI / 2 - starboard);
+    g.stroke();
+    if (n % every || outermost) continue;
+    const [x, y] = place(layout, n * spacing, starboard);
+    const flat = starboard < -1.2;
+    g.textAlign = flat ? 'center' : 'left';
+    g.fillText(`${short(n * spacing)} m`, x + (flat ? 0 : 9 * Math.cos(starboard)), y + (flat ? 13 : 4 - 9 * Math.sin(starboard)));
+  }
+}
+
+function drawBearings(g, polar, layout, port, starboard) {
+  const step = bearingStep(degrees(port - starboard));
+  g.strokeStyle = ring;
+  for (const azimuth of [port, starboard]) {
+    g.beginPath();
+    g.moveTo(layout.apex_x, layout.apex_y);
+    g.lineTo(...place(layout, polar.range_m, azimuth));
+    g.stroke();
+  }
+  const marks = [];
+  for (let d = Math.ceil(degrees(starboard) / step) * step; d <= degrees(port) + 1e-6; d += step) marks.push((d * Math.PI) / 180);
+  g.textAlign = 'center';
+  for (const azimuth of marks) {
+    const tick = 5 * layout.metres_per_pixel;
+    g.strokeStyle = edge;
+    g.beginPath();
+    g.moveTo(...place(layout, polar.range_m, azimuth));
+    g.lineTo(...place(layout, polar.range_m + tick, azimuth));
+    g.stroke();
+    const [x, y] = place(layout, polar.range_m + 2.6 * tick, azimuth);
+    g.fillText(bearingText(azimuth), x - 4 * Math.sin(azimuth), y + 3);
+  }
+}
+
+/// What is under the cursor is marked with its range and direction.
+function drawCursor(g, polar, layout, cursor, port, starboard) {
+  g.strokeStyle = 'rgba(79, 184, 255, 0.8)';
+  g.beginPath();
+  g.arc(layout.apex_x, layout.apex_y, cursor.range_m / layout.metres_per_pixel, -Math.PI / 2 - port, -Math.PI / 2 - starboard);
+  g.moveTo(layout.apex_x, layout.apex_y);
+  g.lineTo(...place(layout, polar.range_m, cursor.azimuth_rad));
+  g.stroke();
+}
+
+/// `canvas` has layout.width x layout.height CSS pixels.
+export function drawMarks(canvas, polar, layout, { rings, cursor, ratio }) {
+  const g = canvas.getContext('2d');
+  g.setTransform(ratio, 0, 0, ratio, 0, 0);
+  g.clearRect(0, 0, layout.width, layout.height);
+  g.font = font;
+  g.fillStyle = words;
+  g.lineWidth = 1;
+  const [port, starboard] = [polar.azimuth_rad[0], polar.azimuth_rad.at(-1)];
+  if (rings) {
+    drawRings(g, polar, layout, port, starboard);
+    drawBearings(g, polar, layout, port, starboard);
+  }
+  if (cursor) drawCursor(g, polar, layout, cursor, port, starboard);
+}

@@ -1,0 +1,192 @@
+// The page: one connection, what it tells, and the panes that show it.
+import { $, make, setHidden, setText, setClass } from './dom.js';
+import { Connection } from './socket/connection.js';
+import { Facts } from './facts.js';
+import { Fan } from './fan/fan.js';
+import { LogPane } from './panels/log.js';
+import { Notice } from './panels/notice.js';
+import { Scene } from './scene/scene.js';
+import { Timeline } from './panels/timeline.js';
+import { drawConnections } from './panels/connections.js';
+import { drawDoctor } from './panels/doctor.js';
+import { drawFaults } from './panels/faults.js';
+import { drawHead } from './panels/head.js';
+import { drawSettings } from './panels/settings.js';
+import { fixed } from './numbers.js';
+import { listenToKeys } from './keys.js';
+import { makeRemembered } from './remember.js';
+import { mapNames } from './fan/colours.js';
+import { activeTroubles, titleOf } from './panels/faults.js';
+
+const test = Number(new URLSearchParams(location.search).get('test'));  // for tests: the fan so wide, without rings
+const look = makeRemembered('look', { theme: '', tab: 'fan' });
+
+const facts = new Facts();
+const fan = new Fan(facts, test);
+const scene = new Scene(facts, fan);
+const connection = new Connection({
+  open(info) {
+    facts.opened(info);
+    scene.forget();
+    choose();
+  },
+  lost() {
+    facts.connection = facts.info ? 'lost' : 'connecting';
+  },
+  needsToken() {
+    facts.connection = 'token';
+  },
+  topics: choose,
+  message(topic, value, ns) {
+    facts.message(topic, value, ns);
+    if (topic === '/scene') scene.update(value);
+    if (topic === '/swath') scene.swath(value);
+    if (topic === '/status') choose();
+    if (topic === `/${facts.sonar}/fan`) fan.showFlat(value);
+  },
+  time: (ns) => facts.setTime(ns),
+  parameters: (list) => facts.setParameters(list),
+  status(status) {
+    facts.problems.set(status.id ?? status.message, status);
+    setTimeout(() => facts.problems.get(status.id ?? status.message) === status && facts.problems.delete(status.id ?? status.message), 10000);
+  },
+  removeStatus: (ids) => ids.forEach((id) => facts.problems.delete(id)),
+});
+
+const steering = {
+  set: (name, value) => connection.set(name, value, facts.parameters.get(name)?.type),
+  start: (name, seconds) => connection.set(name, Number(seconds), 'float64'),
+  clear(fault) {
+    const trouble = (fault.do || fault.name).replace(/-/g, '_');
+    const name = [`/faults/${fault.sonar}/${trouble}`, `/faults/${trouble}`].find((n) => facts.parameters.has(n));
+    if (name) connection.set(name, 0, 'float64');
+    else connection.set('/faults/clear_all', true);
+  },
+};
+const notice = new Notice(facts, connection, steering);
+const timeline = new Timeline(facts, steering);
+const log = new LogPane(facts);
+
+/// Subscribes to what is looked at: no pictures while the page is hidden.
+function choose() {
+  if (!facts.sonar) {
+    const first = [...connection.byTopic.keys()].find((topic) => /^\/[^/]+\/image$/.test(topic));
+    if (first) facts.sonar = first.split('/')[1];
+  }
+  const topics = ['/status', '/doctor', '/faults', '/log'];
+  const own = (name) => `/${facts.sonar}/${name}`;
+  if (!document.hidden) topics.push(own('geometry'), own('ping'), own(fan.flat ? 'fan' : 'image'), '/tf', '/scene', '/swath');
+  facts.judged = connection.byTopic.has('/doctor');
+  connection.want(topics);
+}
+
+function draw() {
+  fan.show(facts.ping);
+  const now = notice.draw();
+  fan.setMood(`${now ? now.picture : 'fresh'}${fan.flat ? ' flat' : ''}`);
+  drawHead(facts);
+  drawConnections(facts);
+  drawDoctor(facts, steering);
+  drawFaults(facts, steering);
+  drawSettings(facts, steering);
+  timeline.draw();
+  log.draw();
+  setText($('fps'), facts.drawn.rate === undefined || !facts.ping ? '–' : `${fixed(facts.drawn.rate, 0)} fps`);
+  announce();
+}
+
+/// Findings and faults are told to screen readers, at most once in two seconds.
+let told = '';
+let toldAt = 0;
+function announce() {
+  const faults = activeTroubles(facts).map((f) => `fault: ${titleOf(f.trouble)}`);
+  const findings = (facts.findings ?? []).filter((f) => f.level > 0).map((f) => f.text);
+  const text = [...faults, ...findings].join('. ');
+  if (text === told || performance.now() - toldAt < 2000) return;
+  [told, toldAt] = [text, performance.now()];
+  setText($('announce'), text);
+}
+
+function frame() {
+  fan.show(facts.ping);
+  scene.draw();
+  requestAnimationFrame(frame);
+}
+
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme || (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
+}
+function toggleTheme() {
+  look.theme = document.documentElement.dataset.theme === 'light' ? 'dark' : 'light';
+  setTheme(look.theme);
+}
+
+function showTab(tab) {
+  document.body.dataset.tab = look.tab = tab;
+  for (const button of $('tabs').children) {
+    if (button.dataset.tab === tab) button.setAttribute('aria-current', 'page');
+    else button.removeAttribute('aria-current');
+  }
+}
+
+function maximise(pane) {
+  document.body.dataset.max = document.body.dataset.max === pane ? '0' : pane;
+  for (const button of document.querySelectorAll('.maximise')) button.setAttribute('aria-pressed', String(button.dataset.pane === document.body.dataset.max));
+}
+
+function showMap() {
+  $('map').value = fan.mapName;
+  const g = $('ramp').getContext('2d');
+  g.putImageData(new ImageData(new Uint8ClampedArray(fan.map), 256, 1), 0, 0);
+}
+function showGain() {
+  $('gain').value = String(Math.log2(fan.gain));
+  setText($('gain-text'), `×${fixed(fan.gain, 1)}`);
+}
+function changeGain(octaves) {
+  fan.setGain(fan.gain * 2 ** octaves);
+  showGain();
+}
+function freeze() {
+  const frozen = fan.toggleFreeze();
+  $('freeze').setAttribute('aria-pressed', String(frozen));
+  setText($('freeze'), frozen ? 'Go on' : 'Freeze');
+}
+
+$('map').append(...mapNames.map((name) => make('option', { value: name }, name)));
+$('map').onchange = () => (fan.useMap($('map').value), showMap());
+$('gain').oninput = () => (fan.setGain(2 ** Number($('gain').value)), showGain());
+$('png').onclick = () => fan.save();
+$('freeze').onclick = freeze;
+$('theme').onclick = toggleTheme;
+$('help-button').onclick = () => $('help').showModal();
+$('sonar').onchange = () => (facts.select($('sonar').value), choose());
+$('clear-faults').onclick = () => connection.set('/faults/clear_all', true);
+for (const button of $('tabs').children) button.onclick = () => showTab(button.dataset.tab);
+for (const button of document.querySelectorAll('.maximise')) button.onclick = () => maximise(button.dataset.pane);
+document.addEventListener('visibilitychange', choose);
+matchMedia('(prefers-color-scheme: light)').addEventListener('change', () => setTheme(look.theme));
+listenToKeys([
+  [[' '], 'space', 'play or pause the trajectory', () => timeline.toggle()],
+  [['ArrowLeft', 'ArrowRight'], '← →', 'one second back or ahead', (key) => timeline.step(key === 'ArrowLeft' ? -1 : 1)],
+  [['c'], 'c', 'next colour map', () => (fan.nextMap(), showMap())],
+  [['+', '=', '-'], '+ −', 'more or less gain of the display', (key) => changeGain(key === '-' ? -0.25 : 0.25)],
+  [['f'], 'f', 'hold the picture, or go on', freeze],
+  [['s'], 's', 'save the picture as PNG', () => fan.save()],
+  [['g'], 'g', 'range rings', () => fan.toggleRings()],
+  [['1', '2', '0'], '1 2 0', 'fan alone, scene alone, both', (key) => maximise(key)],
+  [['t'], 't', 'light or dark', toggleTheme],
+  [['?'], '?', 'this list; Esc closes it', () => $('help').showModal()],
+]);
+
+setTheme(look.theme);
+showTab(test ? 'fan' : look.tab);
+showMap();
+showGain();
+setHidden($('no-scene'), !scene.missing);
+setHidden($('scene'), scene.missing);
+setClass($('fan-glass'), 'fresh');
+connection.open();
+setInterval(draw, 200);
+requestAnimationFrame(frame);
+if (test) window.sonardTest = { facts, fan, scene, connection };

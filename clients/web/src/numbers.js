@@ -1,0 +1,20 @@
+// How numbers are written. What is not known is a dash.
+
+const thin = '\u2009';
+const known = (value) => typeof value === 'number' && Number.isFinite(value);
+
+export const dash = '–';
+/// 12909 -> "12 909", with thin spaces.
+export const whole = (value) => (known(value) ? String(Math.round(value)).replace(/\B(?=(\d{3})+$)/g, thin) : dash);
+export const fixed = (value, digits) => (known(value) ? value.toFixed(digits).replace(/^-(0\.?0*)$/, '$1') : dash);
+/// As short as it is: 10, 7.5
+export const short = (value, digits = 2) => (known(value) ? String(Number(value.toFixed(digits))) : dash);
+export const clockTime = (ns) => new Date(ns / 1e6).toTimeString().slice(0, 8);
+/// 0:09, 1:30
+export const countdown = (seconds) => {
+  const left = Math.max(0, Math.ceil(seconds));
+  return `${Math.floor(left / 60)}:${String(left % 60).padStart(2, '0')}`;
+};
+export const frequency = (hz) => (!known(hz) || hz <= 0 ? dash : hz >= 1e6 ? `${short(hz / 1e6, 1)} MHz` : `${short(hz / 1e3, 0)} kHz`);
+/// 600 kHz and 12.5 kbit/s are both "of a thousand": bits a second as Mbit/s with a digit more below one.
+export const megabits = (bits) => (known(bits) ? fixed(bits / 1e6, bits < 1e6 ? 2 : 1) : dash);

@@ -1,0 +1,42 @@
+// "Why is my driver silent?": the daemon's findings, worst first, each with its cure.
+import { $, make, setHidden, setText, showList, sign } from '../dom.js';
+import { dash } from '../numbers.js';
+import { activeTroubles, titleOf, troubleOf } from './faults.js';
+
+const levels = ['ok', 'warning', 'error'];
+const now_s = () => performance.now() / 1000;
+
+function item(finding, clear) {
+  const level = levels[finding.level] ?? 'warning';
+  return make(
+    'li',
+    { class: 'finding' },
+    sign(level),
+    make('span', {}, finding.text),
+    finding.cure || clear ? make('small', {}, finding.cure ?? '', clear ? ' ' : '', clear) : null,
+  );
+}
+
+/// `steering.clear(fault)` ends it.
+export function drawDoctor(facts, steering) {
+  const findings = facts.findings;
+  setText($('checked'), findings ? `checked ${Math.max(0, Math.round(now_s() - facts.checkedAt))} s ago` : dash);
+  const bad = (findings ?? []).filter((f) => f.level !== 0).sort((a, b) => b.level - a.level);
+  if (!bad.some((f) => f.check === 'fault'))  // always the first line
+    bad.unshift(...activeTroubles(facts).map((f) => ({ level: 2, check: 'fault', text: `A fault acts on ${f.sonar || 'every sonar'}: ${titleOf(f.trouble)}.`, cure: '' })));
+  const well = (findings ?? []).filter((f) => f.level === 0);
+  const active = facts.faults;
+  const ofFault = (finding) => (finding.check === 'fault' ? active.find((f) => finding.text.includes(troubleOf(f)) || finding.text.includes(titleOf(troubleOf(f))) || finding.text.includes(f.name) || active.length === 1) : null);
+  showList($('findings'), [bad, active.map((f) => f.name), facts.maySteer, findings === null, facts.judged], () => {
+    if (bad.length === 0 && !findings) return [make('li', { class: 'dim' }, facts.judged ? 'Not looked at yet.' : 'Run sonarctl doctor: it looks at the daemon and the network.')];
+    if (bad.length === 0) return [item({ level: 0, text: 'Nothing is in the way of a driver.', cure: '' })];
+    return bad.map((finding) => {
+      const fault = ofFault(finding);
+      const clear = fault && make('button', { class: 'link', onclick: () => steering.clear(fault), disabled: !facts.maySteer, title: facts.maySteer ? `ends ${titleOf(troubleOf(fault))}` : 'this page may only look' }, 'Clear it');
+      return item(finding, clear);
+    });
+  });
+  setHidden($('well'), well.length === 0);
+  setText($('well-count'), `${well.length} ${well.length === 1 ? 'check is' : 'checks are'} well`);
+  showList($('well-list'), well, () => well.map((finding) => item({ ...finding, cure: '' })));
+}

@@ -1,0 +1,79 @@
+// Faults on purpose: what acts now with its countdown, and a button for each trouble.
+import { $, make, setHidden, setText, showList } from '../dom.js';
+import { countdown } from '../numbers.js';
+
+/// "thin_tether" and "thin-tether" -> "Thin tether".
+export const titleOf = (trouble) => trouble.replace(/[-_]/g, ' ').replace(/^./, (c) => c.toUpperCase());
+/// What was asked for: a trouble or a single kind. Its kinds are separate faults with the same `do`.
+export const troubleOf = (fault) => fault.do || fault.name;
+
+/// The faults that act, one entry a trouble and sonar: {trouble, sonar, names, ends_ns, by}.
+export function activeTroubles(facts) {
+  const groups = new Map();
+  for (const fault of facts.faults) {
+    const key = `${troubleOf(fault)} ${fault.sonar}`;
+    const group = groups.get(key) ?? { trouble: troubleOf(fault), sonar: fault.sonar, names: [], ends_ns: 0, by: fault.by ?? '', waiting: true };
+    group.names.push(fault.name);
+    group.ends_ns = Math.max(group.ends_ns, fault.ends_ns);
+    group.waiting &&= fault.state === 'waiting';
+    groups.set(key, group);
+  }
+  return [...groups.values()];
+}
+
+/// Parameters /faults/TROUBLE, or /faults/SONAR/TROUBLE: {name, trouble, sonar}.
+function offered(facts) {
+  const out = [];
+  for (const name of facts.parameters.keys()) {
+    const parts = name.split('/').slice(1);
+    if (parts[0] !== 'faults' || ['armed', 'clear_all'].includes(parts.at(-1))) continue;
+    const sonar = parts.length > 2 ? parts[1] : '';
+    if (!sonar || sonar === facts.sonar) out.push({ name, trouble: parts.at(-1), sonar });
+  }
+  return out;
+}
+
+const whole_of = new Map();  // longest countdown seen of each trouble, for the bar
+
+function card(group) {
+  return make(
+    'li',
+    { class: 'fault-card' },
+    make('div', {}, make('b', {}, titleOf(group.trouble)), make('span', { class: 'left' })),
+    make('div', { class: 'dim' }, [group.sonar || 'every sonar', group.by && `asked by ${group.by}`].filter(Boolean).join(' · ')),
+    make('progress', { max: 1, 'aria-label': 'time left' }),
+  );
+}
+
+export function drawFaults(facts, steering) {
+  const armed = facts.armed ?? facts.value('/faults/armed') ?? facts.status?.faults_armed;
+  setText($('armed'), armed === undefined ? '–' : armed ? 'armed' : 'not armed');
+  const groups = activeTroubles(facts);
+  const list = $('active-faults');
+  showList(list, groups.map((g) => [g.trouble, g.sonar, g.by]), () => groups.map(card));
+  groups.forEach((group, i) => {
+    const left_s = group.ends_ns ? (group.ends_ns - facts.time_ns) / 1e9 : NaN;
+    const key = `${group.trouble} ${group.sonar} ${group.ends_ns}`;
+    whole_of.set(key, Math.max(left_s, whole_of.get(key) ?? 0));
+    setText(list.children[i].querySelector('.left'), group.waiting ? 'waits' : Number.isNaN(left_s) ? 'acts' : countdown(left_s));
+    const bar = list.children[i].querySelector('progress');
+    setHidden(bar, Number.isNaN(left_s));
+    bar.value = Number.isNaN(left_s) ? 0 : Math.max(0, left_s / whole_of.get(key));
+  });
+  if (whole_of.size > 100) whole_of.clear();
+
+  const troubles = armed ? offered(facts) : [];
+  const able = facts.maySteer && facts.connection === 'open';
+  showList($('troubles'), [troubles, able, armed], () => {
+    if (armed === undefined) return [];
+    if (!armed) return [make('p', { class: 'dim' }, 'To begin faults from here, start sonard with --faults.')];
+    return troubles.map(({ name, trouble }) =>
+      make('button', { onclick: () => steering.start(name, $('fault-seconds').value), disabled: !able, title: able ? '' : 'this page may only look' }, titleOf(trouble)));
+  });
+  const seconds = $('fault-seconds').selectedOptions[0].textContent;
+  if (able) for (const button of $('troubles').querySelectorAll('button')) button.title = `begins now, ends in ${seconds}`;
+  $('troubles').classList.toggle('single', !armed);
+  setHidden($('fault-row'), !armed);
+  $('clear-faults').disabled = !able || groups.length === 0;
+  $('fan-pane').classList.toggle('faulty', groups.some((g) => !g.sonar || g.sonar === facts.sonar));
+}

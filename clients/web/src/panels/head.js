@@ -1,0 +1,43 @@
+// The line at the top: which sonar, how it pings, what is wrong, whose time.
+import { $, make, setClass, setHidden, setText, showList } from '../dom.js';
+import { dash, fixed, frequency } from '../numbers.js';
+
+function rateOf(facts) {
+  const sonar = facts.sonarStatus;
+  if (facts.connection !== 'open' || !sonar) return { word: facts.connection === 'lost' ? 'lost' : 'connecting', dot: 'error', rate: dash };
+  if (sonar.clients.length === 0 && !facts.of('preview')) return { word: 'no driver', dot: 'warning', rate: '' };
+  if (sonar.rate_hz === 0) return { word: 'standby', dot: 'warning', rate: '0 Hz' };
+  if (!sonar.pinging && !facts.of('preview')) return { word: 'silent', dot: 'warning', rate: dash };
+  const slow = facts.rate !== undefined && facts.rate < 0.9 * sonar.rate_hz && facts.realtime;
+  return { word: facts.of('preview') ? 'preview' : 'pinging', dot: slow ? 'warning' : 'ok', rate: facts.rate === undefined ? dash : `${fixed(facts.rate, 1)} Hz` };
+}
+
+/// The product's short name: "oculus-m1200d" -> "M1200d".
+const product = (profile) => profile.replace(/^(oculus|blueview)-/, '').replace(/^./, (c) => c.toUpperCase());
+
+export function drawHead(facts) {
+  const sonars = facts.status?.sonars ?? [];
+  const select = $('sonar');
+  showList(select, sonars.map((s) => [s.name, s.profile]), () =>
+    sonars.map((s) => make('option', { value: s.name }, `${s.name} · ${product(s.profile)}`)));
+  if (select.value !== facts.sonar) select.value = facts.sonar;
+  setHidden(select, sonars.length === 0);
+  const { word, dot, rate } = rateOf(facts);
+  setText($('rate-word'), word);
+  setClass($('rate-dot'), `dot ${dot}`);
+  setText($('rate'), rate);
+  const sonar = facts.sonarStatus;
+  setHidden($('frequency-chip'), !sonar);
+  setText($('frequency'), frequency(sonar?.frequency_hz));
+  const latency = sonar?.figures?.latency_ms_p50;
+  setText($('latency'), latency > 0 ? `${fixed(latency, 0)} ms` : dash);
+  const faults = new Set(facts.faults.map((f) => f.do + f.sonar)).size;
+  setHidden($('chip-faults'), faults === 0);
+  setText($('fault-count'), String(faults));
+  setText($('fault-word'), faults === 1 ? 'fault' : 'faults');
+  setHidden($('chip-look'), facts.connection !== 'open' || facts.maySteer);
+  setText($('clock'), facts.realtime || facts.now_ns === null ? facts.clock ?? dash : `${facts.clock} ${fixed(facts.now_ns / 1e9, 1)} s`);
+  setText($('scene-name'), facts.status?.scene.replace(/^.*\//, '') || dash);
+  const name = facts.sonar ? `${facts.sonar} · sonard` : 'sonard';
+  if (document.title !== name) document.title = name;
+}

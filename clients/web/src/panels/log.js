@@ -1,0 +1,43 @@
+// The last lines of the log: newest below, filtered by sonar and level.
+import { $, make, showList } from '../dom.js';
+import { clockTime, fixed } from '../numbers.js';
+
+const names = { 3: 'warning', 4: 'error', 5: 'error' };
+const near_end_px = 30;
+
+export class LogPane {
+  constructor(facts) {
+    this.facts = facts;
+    this.shown = 0;  // logCount of the last line that is shown
+    for (const id of ['log-sonar', 'log-level']) $(id).addEventListener('change', () => this.again());
+  }
+
+  again() {
+    this.shown = this.facts.logCount - this.facts.log.length;
+    $('log').replaceChildren();
+    this.draw();
+  }
+
+  line(entry) {
+    const level = names[entry.level] ?? '';
+    const time = this.facts.realtime ? clockTime(entry.ns) : `${fixed(entry.ns / 1e9, 3)} s`;
+    const text = make('span', {}, level && make('span', { class: 'unseen' }, `${level}: `), entry.name && entry.name !== 'sonard' && !entry.message.startsWith(entry.name) ? `${entry.name}: ` : '', entry.message);
+    return make('div', { class: `log-line ${level}` }, make('time', {}, time), text);
+  }
+
+  draw() {
+    const { facts } = this;
+    const sonars = (facts.status?.sonars ?? []).map((s) => s.name);
+    showList($('log-sonar'), sonars, () => [['', 'all'], ...sonars.map((s) => [s, s]), ['sonard', 'sonard']].map(([value, text]) => make('option', { value }, text)));
+    const fresh = Math.min(facts.log.length, facts.logCount - this.shown);
+    if (fresh <= 0) return;
+    const box = $('log');
+    const at_end = box.scrollHeight - box.scrollTop - box.clientHeight < near_end_px;
+    const [sonar, level] = [$('log-sonar').value, Number($('log-level').value)];
+    const wanted = facts.log.slice(-fresh).filter((entry) => (!sonar || entry.name === sonar) && (entry.level || 2) >= level);
+    box.append(...wanted.map((entry) => this.line(entry)));
+    while (box.children.length > 500) box.firstChild.remove();
+    this.shown = facts.logCount;
+    if (at_end) box.scrollTop = box.scrollHeight;
+  }
+}

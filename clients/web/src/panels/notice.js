@@ -1,0 +1,43 @@
+// The sentence over the fan, its button, and the badges beside the ping's number.
+import { $, make, setHidden, setText, showList, sign } from '../dom.js';
+import { badgesOf, situationOf } from '../situation.js';
+
+export class Notice {
+  constructor(facts, connection, steering) {
+    Object.assign(this, { facts, connection, steering });
+    $('notice-button').addEventListener('click', () => this.act());
+    $('token-form').addEventListener('submit', (event) => {
+      event.preventDefault();
+      connection.useToken($('token').value.trim());
+    });
+  }
+
+  async act() {
+    const button = this.now?.button;
+    if (!button) return;
+    if (button.parameter) return this.steering.set(button.parameter, button.value);
+    try {
+      await this.connection.call(button.service, button.request);
+    } catch (error) {
+      this.facts.problems.set('call', { id: 'call', level: 2, message: error.message });
+    }
+  }
+
+  /// The situation, or null.
+  draw() {
+    const { facts } = this;
+    const now = (this.now = situationOf(facts, this.connection));
+    document.body.dataset.situation = now?.kind ?? 'fine';
+    setHidden($('notice'), !now);
+    setText($('notice-text'), now?.text ?? '');
+    setHidden($('token-form'), now?.kind !== 'token');
+    const button = $('notice-button');
+    setHidden(button, !now?.button);
+    setText(button, now?.button?.label ?? '');
+    button.disabled = !facts.maySteer;
+    button.title = facts.maySteer ? '' : 'this page may only look';
+    const badges = badgesOf(facts);
+    showList($('badges'), badges, () => badges.map((b) => make('span', { class: `chip ${b.level}`, title: b.title }, b.level === 'warning' ? sign('warning') : null, b.text)));
+    return now;
+  }
+}

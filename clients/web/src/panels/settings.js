@@ -1,0 +1,72 @@
+// Settings of the sonar and the water: what holds, and a field for each that may be changed.
+import { $, make, setHidden, setText, showList } from '../dom.js';
+import { dash, fixed, short } from '../numbers.js';
+
+const numbers = [
+  { name: 'range_m', label: 'range', unit: 'm', step: 'any' },
+  { name: 'rate_hz', label: 'rate', unit: 'Hz', step: 'any' },
+  { name: 'gain_percent', label: 'gain', unit: '%', step: 1 },
+];
+const water = [
+  { name: '/water/temperature_c', label: 'temperature', unit: '°C', step: 0.1 },
+  { name: '/water/salinity_psu', label: 'salinity', unit: 'psu', step: 0.1 },
+  { name: '/water/sound_speed_mps', label: 'sound speed', unit: 'm/s', step: 0.1 },
+];
+
+function numberRow(setting, name, steering) {
+  const id = `set${name.replace(/\W/g, '-')}`;
+  const input = make('input', { id, type: 'number', step: setting.step, required: true });
+  input.name = name;
+  input.onchange = () => (input.value === '' ? input.dispatchEvent(new Event('blur')) : steering.set(name, Number(input.value)));
+  input.onkeydown = (event) => event.key === 'Escape' && input.blur();
+  return make('div', { class: 'setting' }, make('label', { htmlFor: id }, setting.label), make('span', {}, input, ' ', make('span', { class: 'unit' }, setting.unit)));
+}
+
+function choiceRow(label, name, choices, steering) {
+  const id = `set${name.replace(/\W/g, '-')}`;
+  const select = make('select', { id, onchange: () => steering.set(name, choices.find((c) => String(c.value) === select.value).value) });
+  select.name = name;
+  select.append(...choices.map((c) => make('option', { value: String(c.value) }, c.text)));
+  return make('div', { class: 'setting' }, make('label', { htmlFor: id }, label), select);
+}
+
+function rowsOf(facts, steering) {
+  const of = (name) => `/${facts.sonar}/${name}`;
+  const rows = numbers.filter((s) => facts.parameters.has(of(s.name))).map((s) => numberRow(s, of(s.name), steering));
+  const yesNo = [{ value: true, text: 'on' }, { value: false, text: 'off' }];
+  const modes = [{ value: 0, text: 'low frequency' }, { value: 1, text: 'high frequency' }];
+  const mode = facts.of('mode');
+  if (mode !== undefined) rows.push(mode <= 1 ? choiceRow('mode', of('mode'), modes, steering) : numberRow({ label: 'mode', unit: '', step: 1 }, of('mode'), steering));
+  if (facts.parameters.has(of('beams'))) rows.push(choiceRow('beams', of('beams'), [...new Set([256, 512, facts.of('beams')])].map((n) => ({ value: n, text: String(n) })), steering));
+  if (facts.parameters.has(of('transmit'))) rows.push(choiceRow('transmit', of('transmit'), yesNo, steering));
+  rows.push(...water.filter((s) => facts.parameters.has(s.name)).map((s) => numberRow(s, s.name, steering)));
+  return rows;
+}
+
+/// Without parameters (an older daemon, or none yet): what the status says, to read only.
+function plainRows(sonar) {
+  const rows = [['range', `${short(sonar?.range_m)} m`], ['rate', `${short(sonar?.rate_hz)} Hz`], ['gain', `${fixed(sonar?.gain_db, 0)} dB`]];
+  return rows.map(([label, text]) => make('div', { class: 'setting' }, make('span', {}, label), make('b', {}, sonar ? text : dash)));
+}
+
+export function drawSettings(facts, steering) {
+  const box = $('setting-rows');
+  const names = [...facts.parameters.keys()].filter((n) => n.startsWith(`/${facts.sonar}/`) || n.startsWith('/water/'));
+  const able = facts.maySteer && facts.connection === 'open';
+  showList(box, [facts.sonar, names, names.length ? facts.of('mode') > 1 : facts.sonarStatus?.range_m], () => {
+    const rows = names.length ? rowsOf(facts, steering) : plainRows(facts.sonarStatus);
+    return [...rows, make('p', { class: 'setting refused', id: 'refusal', role: 'alert', hidden: true })];
+  });
+  for (const field of box.querySelectorAll('input, select')) {
+    field.disabled = !able;
+    field.title = able ? '' : 'this page may only look';
+    const value = facts.value(field.name);
+    const text = typeof value === 'number' ? short(value, 2) : String(value ?? '');
+    if (document.activeElement !== field && field.value !== text) field.value = text;
+  }
+  const by = facts.sonarStatus?.asked_by;
+  setText($('asked-by'), by ? `last asked by ${by === facts.info?.metadata?.['sonard.viewer'] ? 'this page' : by}` : '');
+  const refusal = [...facts.problems.values()].filter((p) => String(p.id ?? '').startsWith('param:')).at(-1);
+  setHidden($('refusal'), !refusal);
+  setText($('refusal'), refusal?.message ?? '');
+}

@@ -1,0 +1,23 @@
+// Choices of the viewer that a browser keeps for the next visit. Without storage they last as long as the page.
+
+/// An object whose properties, with these defaults, are read from and written to localStorage.
+export function makeRemembered(name, defaults) {
+  const key = `sonard.${name}`;
+  let values = { ...defaults };
+  try {
+    values = { ...defaults, ...JSON.parse(localStorage.getItem(key) ?? '{}') };
+  } catch {
+    // not readable: the defaults
+  }
+  return new Proxy(values, {
+    set(target, property, value) {
+      target[property] = value;
+      try {
+        localStorage.setItem(key, JSON.stringify(target));
+      } catch {
+        // storage is full or forbidden
+      }
+      return true;
+    },
+  });
+}

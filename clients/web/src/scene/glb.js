@@ -1,0 +1,34 @@
+// Reads the GLB files that sonard writes for objects: one mesh with positions, normals and indices, one colour. Axes y up.
+import { BufferAttribute, BufferGeometry } from 'three.module.js';
+
+const arrays = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
+const widths = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
+
+/// {geometry, colour: [r, g, b] of 0 to 1}; axes z up again.
+export function readGlb(bytes) {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  if (view.getUint32(0, true) !== 0x46546c67) throw new Error('not a GLB file');
+  const size = view.getUint32(12, true);
+  const about = JSON.parse(new TextDecoder().decode(bytes.subarray(20, 20 + size)));
+  const data = bytes.subarray(28 + size);
+  const take = (index) => {
+    const accessor = about.accessors[index];
+    const part = about.bufferViews[accessor.bufferView];
+    const Array = arrays[accessor.componentType];
+    const from = data.byteOffset + (part.byteOffset ?? 0) + (accessor.byteOffset ?? 0);
+    const count = accessor.count * widths[accessor.type];
+    return new Array(data.buffer.slice(from, from + count * Array.BYTES_PER_ELEMENT));
+  };
+  const turned = (vectors) => {  // (x, z, -y) is written
+    for (let i = 0; i < vectors.length; i += 3) [vectors[i + 1], vectors[i + 2]] = [-vectors[i + 2], vectors[i + 1]];
+    return new BufferAttribute(vectors, 3);
+  };
+  const primitive = about.meshes[0].primitives[0];
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', turned(take(primitive.attributes.POSITION)));
+  if (primitive.attributes.NORMAL === undefined) geometry.computeVertexNormals();
+  else geometry.setAttribute('normal', turned(take(primitive.attributes.NORMAL)));
+  if (primitive.indices !== undefined) geometry.setIndex(new BufferAttribute(take(primitive.indices), 1));
+  const colour = about.materials?.[primitive.material]?.pbrMetallicRoughness?.baseColorFactor ?? [0.6, 0.6, 0.6];
+  return { geometry, colour: colour.slice(0, 3) };
+}

@@ -1,0 +1,199 @@
+// The scene's pane: objects as the daemon sends them, the vehicle, and the last ping where it was heard.
+import { $, setHidden, setText } from '../dom.js';
+import { Camera, drawCompass } from './camera.js';
+import { Color, DirectionalLight, DoubleSide, FogExp2, Group, HemisphereLight, Mesh, MeshPhongMaterial, Raycaster, Scene as Graph, Vector2, Vector3, WebGLRenderer } from 'three.module.js';
+import { fixed } from '../numbers.js';
+import { makeFanPlane, makeGrid, makeLines, makeTrail, makeVehicle } from './bodies.js';
+import { readGlb } from './glb.js';
+
+const water = 0x0b2233;
+const least_interval_ms = 1000 / 15;
+const click_px = 4;
+
+export class Scene {
+  constructor(facts, fan) {
+    this.facts = facts;
+    this.fan = fan;
+    this.canvas = $('scene');
+    const context = this.canvas.getContext('webgl2', { alpha: false, antialias: true });
+    this.missing = !context;
+    if (this.missing) return;
+    this.renderer = new WebGLRenderer({ canvas: this.canvas, context });
+    this.graph = new Graph();
+    this.graph.background = new Color(water);
+    this.graph.fog = new FogExp2(water, 0.028);
+    const sun = new DirectionalLight(0xffffff, 0.75);
+    sun.position.set(-4, -6, 10);
+    this.grid = makeGrid();
+    this.trail = makeTrail();
+    this.plane = makeFanPlane();
+    this.graph.add(new HemisphereLight(0xcfe6f5, 0x4a4438, 0.62), sun, this.grid, this.trail.line);
+    this.camera = new Camera(this.canvas);
+    this.frames = new Map();
+    this.objects = new Map();
+    this.vehicles = new Map();
+    this.drawnAt = 0;
+    this.interval_ms = least_interval_ms;
+    this.count = 0;
+    for (const button of document.querySelectorAll('.camera')) button.onclick = () => this.use(button.dataset.camera);
+    this.canvas.addEventListener('pointerdown', (event) => (this.pressed = [event.clientX, event.clientY]));
+    this.canvas.addEventListener('click', (event) => this.pick(event));
+  }
+
+  use(mode) {
+    this.camera.use(mode);
+    for (const button of document.querySelectorAll('.camera')) button.setAttribute('aria-pressed', String(button.dataset.camera === mode));
+  }
+
+  /// A new session: nothing of the old scene holds.
+  forget() {
+    if (this.missing) return;
+    for (const id of [...this.objects.keys()]) this.remove(id);
+    this.lines?.parent?.remove(this.lines);
+    this.lines = null;
+    this.trail.clear();
+    this.camera.placed = false;
+  }
+
+  /// The group of a frame, below that of its parent. "world" and unknown parents are the graph's root.
+  frame(name) {
+    if (!name || name === 'world') return this.graph;
+    if (!this.frames.has(name)) this.frames.set(name, new Group());
+    const group = this.frames.get(name);
+    const parent = this.frame(this.facts.frames.get(name)?.parent);
+    if (group.parent !== parent) parent.add(group);
+    return group;
+  }
+
+  update({ deletions, entities }) {
+    if (this.missing) return;
+    for (const deletion of deletions) {
+      if (deletion.type === 1) for (const id of [...this.objects.keys()]) this.remove(id);
+      else this.remove(deletion.id);
+    }
+    for (const entity of entities) this.add(entity);
+    this.stale = true;
+  }
+
+  add(entity) {
+    this.remove(entity.id);
+    const group = new Group();
+    for (const model of entity.models) {
+      const { geometry, colour } = readGlb(model.data);
+      const mesh = new Mesh(geometry, new MeshPhongMaterial({ color: new Color(...colour), shininess: 6, side: DoubleSide }));
+      const { position = null, orientation = null } = model.pose ?? {};
+      if (position) mesh.position.set(position.x, position.y, position.z);
+      if (orientation) mesh.quaternion.set(orientation.x, orientation.y, orientation.z, orientation.w);
+      if (model.scale?.x) mesh.scale.set(model.scale.x, model.scale.y, model.scale.z);
+      mesh.userData = entity;
+      group.add(mesh);
+    }
+    this.objects.set(entity.id, group);
+    this.frame(entity.frame_id).add(group);
+  }
+
+  remove(id) {
+    const group = this.objects.get(id);
+    if (!group) return;
+    group.parent?.remove(group);
+    for (const mesh of group.children) {
+      mesh.geometry.dispose();
+      mesh.material.dispose();
+    }
+    this.objects.delete(id);
+  }
+
+  /// The edges of the beams.
+  swath({ entities }) {
+    if (this.missing) return;
+    for (const entity of entities) {
+      if (entity.frame_id !== this.facts.sonar) continue;
+      this.lines?.parent?.remove(this.lines);
+      this.lines = makeLines(entity.lines);
+      this.frame(entity.frame_id).add(this.lines);
+    }
+    this.stale = true;
+  }
+
+  /// Places the frames as the last ping's poses have them.
+  place() {
+    for (const [name, { translation: t, rotation: r }] of this.facts.frames) {
+      const group = this.frame(name);
+      if (t) group.position.set(t.x, t.y, t.z);
+      if (r) group.quaternion.set(r.x, r.y, r.z, r.w);
+    }
+    for (const vehicle of this.facts.status?.vehicles ?? []) {
+      if (!this.facts.frames.has(vehicle.name)) continue;
+      if (!this.vehicles.has(vehicle.name)) {
+        const made = makeVehicle();
+        this.vehicles.set(vehicle.name, made);
+        this.frame(vehicle.name).add(made.group);
+      }
+      this.vehicles.get(vehicle.name).hollow(vehicle.stale);
+    }
+    const sonar = this.frame(this.facts.sonar);
+    if (sonar !== this.graph && this.plane.mesh.parent !== sonar) sonar.add(this.plane.mesh);
+    this.graph.updateMatrixWorld();
+  }
+
+  /// At most 15 times a second, and only when something moved.
+  draw() {
+    if (this.missing || document.hidden) return;
+    const now = performance.now();
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (width < 40 || height < 40 || now - this.drawnAt < this.interval_ms) return;
+    const resized = width !== this.width || height !== this.height;
+    const news = this.fan.ping !== this.shownPing || this.plane.show(this.fan) || this.facts.frames.size !== this.knownFrames;
+    if (!news && !resized && !this.camera.moved && !this.stale) return;
+    this.drawnAt = now;
+    this.plane.show(this.fan);
+    [this.shownPing, this.knownFrames] = [this.fan.ping, this.facts.frames.size];
+    [this.stale, this.camera.moved] = [false, false];
+    if (resized) {
+      [this.width, this.height] = [width, height];
+      this.renderer.setPixelRatio(Math.min(2, devicePixelRatio || 1));
+      this.renderer.setSize(width, height, false);
+    }
+    this.place();
+    const vehicle = this.frames.get(this.facts.vehicle?.name);
+    if (vehicle) this.trail.add(now / 1000, vehicle.position);
+    const ahead = vehicle ? new Vector3(1, 0, 0).applyQuaternion(vehicle.quaternion) : new Vector3(1, 0, 0);
+    this.camera.update(vehicle?.position ?? null, Math.atan2(ahead.y, ahead.x), width / height);
+    this.renderer.render(this.graph, this.camera.camera);
+    drawCompass($('compass'), this.camera.view);
+    this.caption(vehicle);
+    if (++this.count % 10 === 0) this.measure();
+  }
+
+  /// On slow machines the scene leaves half of the time to the rest of the page.
+  measure() {
+    const gl = this.renderer.getContext();
+    const from = performance.now();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    this.interval_ms = Math.max(least_interval_ms, 3 * (performance.now() - from));
+  }
+
+  caption(vehicle) {
+    setText($('pose-name'), this.facts.vehicle?.name ?? 'vehicle');
+    const p = vehicle?.position;
+    setText($('pose'), p ? `${fixed(p.x, 2)}, ${fixed(p.y, 2)}, ${fixed(p.z, 2)} m` : '–');
+  }
+
+  /// A click names what lies under it.
+  pick(event) {
+    if (!this.pressed || Math.hypot(event.clientX - this.pressed[0], event.clientY - this.pressed[1]) > click_px) return;
+    const box = this.canvas.getBoundingClientRect();
+    const at = new Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
+    const ray = new Raycaster();
+    ray.setFromCamera(at, this.camera.camera);
+    const hit = ray.intersectObjects([...this.objects.values()], true)[0];
+    setHidden($('picked'), !hit);
+    if (!hit) return;
+    const sonar = this.frames.get(this.facts.sonar);
+    const entity = hit.object.userData;
+    const material = entity.metadata?.find((m) => m.key === 'material')?.value;
+    const distance = sonar && new Vector3().setFromMatrixPosition(sonar.matrixWorld).distanceTo(hit.point);
+    const parts = [entity.id, material, distance === undefined ? '' : `${fixed(distance, 1)} m from ${this.facts.sonar}`];
+    setText($('picked'), parts.filter(Boolean).join(' · '));
+  }
+}

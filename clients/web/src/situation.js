@@ -1,0 +1,76 @@
+// What the fan's pane says when there is no fresh picture, or a doubtful one: facts in, one sentence and at most one button out.
+import { fixed, short } from './numbers.js';
+
+const stands_after_s = 2;
+const now_s = () => performance.now() / 1000;
+
+/// The part of an address that a user knows: without the port.
+const host = (address) => address?.replace(/:\d+$/, '') ?? '';
+const noted = (facts, check) => facts.findings?.find((f) => f.check === check && f.level !== 0)?.text;
+
+function lost(facts, connection) {
+  if (connection.lostAt === null) return 'Connecting to sonard.';
+  const since = Math.round((performance.now() - connection.lostAt) / 1000);
+  const next = Math.max(0, Math.ceil((connection.retryAt - performance.now()) / 1000));
+  return `sonard has not answered for ${since} s; trying again in ${next} s.`;
+}
+
+function stands(facts) {
+  const clock = facts.clock;
+  if (clock === 'follow' && !facts.status.vehicles.some((v) => v.source))
+    return { kind: 'no-pose-yet', picture: 'none', text: 'Waiting for the first pose: time follows the poses.' };
+  if (facts.realtime || now_s() - facts.movedAt < stands_after_s) return null;
+  const at = `Time stands still at ${fixed((facts.now_ns ?? 0) / 1e9, 3)} s`;
+  const text = noted(facts, 'clock') ?? (clock === 'lockstep' ? `${at}: it moves when control asks for a step.` : `${at}: it moves when every driver has taken the last ping.`);
+  const button = clock === 'lockstep' ? { label: 'Step 0.1 s', service: '/sonard/step', request: { dt_s: 0.1 } } : undefined;
+  return { kind: `${clock}-waits`, picture: 'dim', text, button };
+}
+
+/// {kind, picture: 'as is' | 'dim' | 'old' | 'none', text, button?: {label, parameter, value | service, request}}; null = all is well.
+export function situationOf(facts, connection) {
+  if (facts.connection === 'token') return { kind: 'token', picture: 'none', text: 'sonard wants the token of its configuration (control.token_file).' };
+  if (facts.connection !== 'open') return { kind: 'lost', picture: 'old', text: lost(facts, connection) };
+  const sonar = facts.sonarStatus;
+  if (!sonar) return facts.status ? { kind: 'no-sonar', picture: 'none', text: 'This sonard has no sonar.' } : null;
+  if (sonar.clients.length === 0 && !facts.of('preview')) {
+    return {
+      kind: 'no-client',
+      picture: 'old',
+      text: `No driver is connected. Nothing is simulated without one. Point a driver at ${host(sonar.listens)}.`,
+      button: facts.parameters.has(`/${sonar.name}/preview`) ? { label: 'Preview at 5 Hz', parameter: `/${sonar.name}/preview`, value: true } : undefined,
+    };
+  }
+  const standing = stands(facts);
+  if (standing) return standing;
+  if (sonar.rate_hz === 0 && sonar.clients.length > 0) {
+    const who = sonar.asked_by || (sonar.clients.length === 1 ? sonar.clients[0].address : '');
+    return {
+      kind: 'standby',
+      picture: 'dim',
+      text: who ? `Standby: ${host(who)} set the rate to 0.` : 'Standby: the rate is 0.',
+      button: { label: 'Ask for 10 Hz', parameter: `/${sonar.name}/rate_hz`, value: 10 },
+    };
+  }
+  return null;
+}
+
+/// Short remarks above the picture: {text, level, title}.
+export function badgesOf(facts) {
+  const out = [];
+  const sonar = facts.sonarStatus;
+  if (facts.connection !== 'open' || !sonar) return out;
+  if (facts.of('preview')) out.push({ text: 'PREVIEW', level: 'note', title: 'for this page only; it ends when a driver connects' });
+  if (!sonar.transmits) out.push({ text: 'noise only', level: 'warning', title: 'transmit is off' });
+  const vehicle = facts.vehicle;
+  if (vehicle?.stale) {
+    const since = facts.staleSince ? ` for ${fixed(now_s() - facts.staleSince, 1)} s` : '';
+    out.push({ text: `no pose${since}; ${vehicle.name} stands where it was`, level: 'warning', title: '' });
+  }
+  const wanted = sonar.rate_hz;
+  if (sonar.pinging && facts.realtime && wanted > 0 && facts.rate !== undefined && facts.rate < 0.9 * wanted && sonar.figures?.simulation_ms > 900 / wanted)
+    out.push({ text: `${short(facts.rate, 1)} of ${short(wanted, 1)} Hz: computing takes ${short(sonar.figures.simulation_ms, 0)} ms`, level: 'warning', title: 'the engine is slower than the rate asked for' });
+  const age_s = facts.ping ? now_s() - facts.ping.at : 0;
+  if (sonar.pinging && wanted > 0 && facts.ping && age_s > Math.max(0.5, 2 / wanted) && facts.realtime)
+    out.push({ text: `picture is ${fixed(age_s, 1)} s old`, level: 'warning', title: '' });
+  return out;
+}

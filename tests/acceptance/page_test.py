@@ -1,0 +1,369 @@
+"""The page of the live view in a real browser, before a scripted daemon (view/mock_daemon.py). Skipped without browser or page.
+
+Pictures of the states are kept in the folder that SONARD_SHOTS names, else beside the build.
+"""
+import base64
+import gzip
+import http.client
+import os
+import pathlib
+import re
+import shutil
+import sys
+import tempfile
+import time
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
+
+from browser import Browser, program  # noqa: E402
+from pictures import difference, mirrored, read_png  # noqa: E402
+from running_sonard import BUILD, ROOT, SONARCTL, Sonard, run  # noqa: E402
+
+from sonard_client import OculusClient  # noqa: E402  pylint: disable=wrong-import-order
+
+PAGE = BUILD / "clients/web/page"
+SHOTS = pathlib.Path(os.environ.get("SONARD_SHOTS", BUILD / "tests/page-pictures"))
+WHY_NOT = ("this build has no page" if not (PAGE / "index.html").is_file() else
+           "no chromium" if program() is None else
+           "no protoc" if shutil.which("protoc") is None else "")
+BUDGET_BYTES = 190_000
+MOUNT = "{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}"
+STATES = {  # of the mock -> the page's name of it, what the user reads, the button
+    "no client": ("no-client", "No driver is connected. Nothing is simulated without one. Point a driver at 127.0.0.2.",
+                  "Preview at 5 Hz"),
+    "standby": ("standby", "Standby: 192.0.2.7 set the rate to 0.", "Ask for 10 Hz"),
+    "stepped": ("stepped-waits", "Time stands still at 41.600 s: it moves when 127.0.0.1:40122 has taken ping 12 896", ""),
+    "lockstep": ("lockstep-waits", "Time stands still at 41.600 s", "Step 0.1 s"),
+    "follow": ("no-pose-yet", "Waiting for the first pose: time follows the poses.", ""),
+    "transmit off": ("fine", "noise only", ""),
+    "no pose": ("fine", "rov stands where it was", ""),
+    "slow engine": ("fine", " of 10 Hz: computing takes 138 ms", ""),
+    "fault": ("fine", "Thin tether", ""),
+    "look only": ("fine", "look only", ""),
+}
+
+
+# Elements whose words stand out less than 4.5 to 1 from what is painted behind them (WCAG 1.4.3).
+FAINT_WORDS = """(() => {
+  const channels = (c) => c.match(/[\\d.]+/g).map(Number);
+  const light = ([r, g, b]) => [r, g, b].map((v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+  const behind = (e) => {
+    for (; e; e = e.parentElement) {
+      const c = channels(getComputedStyle(e).backgroundColor);
+      if (c.length === 3 || c[3] > 0.8) return c;
+    }
+    return [255, 255, 255];
+  };
+  return [...document.querySelectorAll('body *')].filter((e) => e.offsetWidth && !e.closest(':disabled, .unseen, .skip, option')
+    && [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim())).filter((e) => {
+      const [a, b] = [light(channels(getComputedStyle(e).color)), light(behind(e))];
+      return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05) < 4.5;
+    }).map((e) => `${e.id || e.className || e.tagName}: ${e.textContent.slice(0, 30)}`);
+})()"""
+NAMELESS_CONTROLS = """[...document.querySelectorAll('button, input, select, canvas:not([aria-hidden])')].filter((e) => e.offsetWidth
+  && !(e.getAttribute('aria-label') || e.labels?.length || /\\w/.test(e.textContent) && e.tagName === 'BUTTON')).map((e) => e.outerHTML.slice(0, 80))"""
+SMALL_TARGETS = """[...document.querySelectorAll('button:not(.link), select')].filter((e) => e.offsetWidth && (e.offsetHeight < 44 || e.offsetWidth < 44))
+  .map((e) => `${e.id || e.className} ${e.offsetWidth} x ${e.offsetHeight}`)"""
+
+
+def ping_about(ping, full_scale=254):
+    """A ping of the Python client as the mock wants it: (samples, description)."""
+    rows, beams = ping.samples.shape
+    return ping.samples.tobytes(), {
+        "settings": {"rows": rows, "beams": beams, "max_code": full_scale}, "row_spacing_m": ping.row_m,
+        "beam_azimuth_rad": [float(a) for a in ping.azimuths_rad],
+        "vehicle_in_world": {"wxyz": [1, 0, 0, 0], "xyz_m": [-7, 0, -3]}}
+
+
+@unittest.skipIf(WHY_NOT, WHY_NOT)
+class Page(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        from mock_daemon import MockDaemon  # pylint: disable=import-outside-toplevel
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.pings, cls.raw = {}, {}
+        with Sonard(mount=MOUNT) as daemon:
+            for name, settings in {"60 degrees, 8 bit": {}, "60 degrees, 16 bit": {"bits": 16}, "130 degrees, 8 bit": {"mode": 1}}.items():
+                with OculusClient(daemon.address) as sonar:
+                    sonar.fire(rate_hz=5, range_m=10 if "mode" not in settings else 20, **settings)
+                    ping = sonar.ping(90)
+                cls.pings[name] = ping_about(ping)
+                cls.raw[name] = pathlib.Path(cls.folder.name) / name.replace(" ", "-")
+                cls.raw[name].write_bytes(ping.data)
+        SHOTS.mkdir(parents=True, exist_ok=True)
+        cls.mock = MockDaemon(PAGE, [cls.pings["60 degrees, 8 bit"]]).start()
+        cls.addClassCleanup(cls.mock.stop)
+        cls.url = f"http://127.0.0.1:{cls.mock.port}/"
+        cls.browser = cls.enterClassContext(Browser())
+
+    def setUp(self):
+        self.mock.token = ""
+        self.mock.pings = [self.pings["60 degrees, 8 bit"]]
+        self.mock.state("fine")
+
+    def open(self, width=1440, height=900, query="", **options):
+        page = self.browser.open(self.url + query, width, height, **options)
+        self.addCleanup(page.close)
+        return page
+
+    def shown(self, page):
+        """Until the page has drawn pings."""
+        page.wait("document.querySelector('#ping-number').textContent.length > 2", 60)
+
+    def test_fan_is_true(self):
+        """What the page draws is what `sonarctl view` draws of the same ping: the usual picture, the others smaller."""
+        maps = [line for line in (ROOT / "core/image/colour_map.cpp").read_text().split('"') if line.isalpha() and line.islower()]
+        self.assertIn("cividis", maps)
+        for name, width, colours in [("60 degrees, 8 bit", 1000, ["copper"]), ("60 degrees, 8 bit", 300, maps),
+                                     ("60 degrees, 16 bit", 300, ["copper"]), ("130 degrees, 8 bit", 300, ["gray"])]:
+            self.mock.pings = [self.pings[name]]
+            page = self.browser.open(f"{self.url}?test={width}", 1100, 700)
+            self.shown(page)
+            for map_name in colours:
+                with self.subTest(ping=name, width=width, colours=map_name):
+                    self.compare(self.drawn(page, map_name), self.reference(name, map_name, width))
+            page.close()
+
+    def reference(self, name, map_name, width):
+        png = pathlib.Path(self.folder.name) / "reference.png"
+        done = run(SONARCTL, "view", "--from-raw", self.raw[name], "--png", png, "--no-rings", "--colour-map", map_name, "--width", width)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return read_png(png.read_bytes())
+
+    @staticmethod
+    def drawn(page, map_name):
+        url = page.run(f"sonardTest.fan.useMap('{map_name}'), sonardTest.fan.paint(), document.querySelector('#fan').toDataURL()")
+        return read_png(base64.b64decode(url.partition(",")[2]))
+
+    def compare(self, drawn, reference):
+        (width, height, ours), (_, other_height, theirs) = drawn, reference
+        self.assertEqual(width, reference[0])
+        self.assertLessEqual(abs(height - other_height), 1)  # bearings have 32 bits here, 64 there: the last row may be one more
+        height = min(height, other_height)
+        ours, theirs = ours[:3 * width * height], theirs[:3 * width * height]
+        mean, p99, above = difference(ours, theirs)
+        print(f"\n  {width} pixels wide: mean {mean:.3f}, p99 {p99}, above 8: {100 * above:.4f} %", end="", file=sys.stderr)
+        self.assertLessEqual(mean, 0.5)
+        self.assertLessEqual(p99, 2)
+        self.assertLessEqual(above, 0.001)
+        self.assertGreater(difference(mirrored(width, height, ours), theirs)[0], 2)
+
+    def test_nothing_outside_and_no_error(self):
+        page = self.open()
+        self.shown(page)
+        for key in "c+fgst120?":
+            page.press(key)
+        page.press("Escape")
+        time.sleep(1)
+        page.run("1")
+        self.assertEqual(page.errors, [])
+        own = self.url.replace("http", "", 1)
+        strangers = [r for r in page.requests if not r.startswith(("http" + own, "ws" + own, "blob:", "data:", "about:"))]
+        self.assertEqual(strangers, [])
+        loaded = {r for r in page.requests if r.startswith("http" + own)}
+        self.assertLessEqual(len(loaded), 5, loaded)
+
+    def test_files_fit_their_budget(self):
+        sizes = [int(line.split()[0]) for line in (PAGE / "sizes.txt").read_text().splitlines()]
+        self.assertLessEqual(sum(sizes), BUDGET_BYTES)
+
+    def test_states(self):
+        page = self.open(1100, 760)
+        self.shown(page)
+        for state, (kind, text, button) in STATES.items():
+            with self.subTest(state=state):
+                self.mock.state(state)
+                page.wait(f"document.body.dataset.situation === '{kind}' && document.body.innerText.includes({text!r})", 12)
+                if button:
+                    self.assertEqual(page.text("#notice-button"), button)
+                time.sleep(1.5)
+                page.picture(SHOTS / f"{state.replace(' ', '-')}.png")
+
+    def test_buttons_of_states(self):
+        page = self.open()
+        self.shown(page)
+        for state, call in {"standby": ("/front/rate_hz", 10), "no client": ("/front/preview", True),
+                            "lockstep": ("/sonard/step", {"dt_s": 0.1})}.items():
+            with self.subTest(state=state):
+                self.mock.state(state)
+                page.wait(f"document.body.dataset.situation === '{STATES[state][0]}'")
+                page.click("#notice-button")
+                deadline = time.monotonic() + 5
+                while call not in self.mock.set_calls and time.monotonic() < deadline:
+                    time.sleep(0.1)
+                self.assertIn(call, self.mock.set_calls)
+
+    def test_looking_only_steers_nothing(self):
+        self.mock.state("look only")
+        page = self.open()
+        page.wait("document.querySelector('#troubles button')?.disabled")
+        self.mock.set_calls.clear()
+        page.run("document.querySelectorAll('#troubles button, #clear-faults, #play').forEach((b) => b.click())")
+        page.press(" ")
+        time.sleep(0.5)
+        self.assertEqual(self.mock.set_calls, [])
+        self.assertEqual(page.run("document.querySelector('#troubles button').title"), "this page may only look")
+
+    def test_faults_begin_and_are_cleared(self):
+        page = self.open()
+        page.wait("document.querySelectorAll('#troubles button').length > 5")
+        page.run("[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === 'Thin tether').click()")
+        page.wait("document.querySelector('.fault-card .left')?.innerText.startsWith('0:')")
+        self.assertIn(("/faults/thin_tether", 20), self.mock.set_calls)
+        self.assertEqual(page.text("#fault-count"), "1")
+        page.click("#clear-faults")
+        page.wait("!document.querySelector('.fault-card')")
+
+    def test_lost_and_found_again(self):
+        page = self.open(1100, 760)
+        self.shown(page)
+        self.mock.state("lost")
+        page.wait("document.querySelector('#notice-text').innerText.includes('sonard has not answered for')", 10)
+        time.sleep(1)
+        page.picture(SHOTS / "lost.png")
+        self.mock.state("fine")
+        page.wait("document.body.dataset.situation === 'fine'", 12)
+
+    def test_token(self):
+        self.mock.token = "secret"
+        page = self.open(1100, 760)
+        page.wait("document.querySelector('#token').offsetWidth > 0")
+        page.picture(SHOTS / "token.png")
+        page.run("document.querySelector('#token').value = 'secret', document.querySelector('#token-form').requestSubmit()")
+        self.shown(page)
+
+    def test_without_webgl(self):
+        page = self.open(1100, 760, script="HTMLCanvasElement.prototype.getContext = ((old) => function (kind, ...rest) {"
+                         " return kind === 'webgl2' ? null : old.call(this, kind, ...rest); })(HTMLCanvasElement.prototype.getContext)")
+        page.wait("document.querySelector('#no-scene').offsetWidth > 0")
+        page.wait("document.querySelector('#fan').width === 720", 60)  # as sonard has drawn it
+        page.picture(SHOTS / "no-webgl.png")
+        page.run("1")
+        self.assertEqual(page.errors, [])
+
+    def test_keys(self):
+        page = self.open()
+        self.shown(page)
+        before = page.run("document.querySelector('#map').value")
+        page.press("c")
+        self.assertNotEqual(page.run("document.querySelector('#map').value"), before)
+        page.press("+")
+        self.assertEqual(page.text("#gain-text"), "×1.2")
+        page.press("f")
+        self.assertEqual(page.text("#freeze"), "Go on")
+        page.press("2")
+        self.assertEqual(page.run("document.querySelector('#fan-pane').offsetWidth"), 0)
+        page.press("0")
+        self.assertGreater(page.run("document.querySelector('#fan-pane').offsetWidth"), 100)
+        self.mock.set_calls.clear()
+        page.press(" ")
+        time.sleep(0.5)
+        self.assertEqual(self.mock.set_calls, [("/rov/trajectory/paused", True)])
+        page.run("document.querySelector('#setting-rows input').focus()")
+        page.press("c")
+        page.press("?")
+        self.assertFalse(page.run("document.querySelector('#help').open"))
+        page.run("document.activeElement.blur()")
+        page.press("?")
+        self.assertTrue(page.run("document.querySelector('#help').open"))
+
+    def test_no_sideways_scrolling(self):
+        for width, height in ((320, 640), (390, 844), (768, 1024), (1440, 900), (2560, 1440)):
+            with self.subTest(width=width):
+                page = self.browser.open(self.url, width, height, touch=width < 800)
+                self.shown(page)
+                for tab in ("fan", "scene", "clients", "faults", "log") if width < 820 else ("fan",):
+                    if width < 820:
+                        page.click(f"#tabs [data-tab={tab}]")
+                        time.sleep(0.5)
+                    self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
+                    wide = page.run("[...document.querySelectorAll('main *, header *, nav *')].filter((e) => e.offsetWidth && !e.closest('#fan-glass, .unseen')"
+                                    f" && e.getBoundingClientRect().right > {width} + 1).map((e) => e.id || e.className || e.tagName)")
+                    self.assertEqual(wide, [], tab)
+                    page.picture(SHOTS / f"{width}-{tab}.png")
+                page.close()
+
+    def test_can_be_read_and_reached(self):
+        """Contrast of words, names of controls, size of targets on touch screens; dark and light."""
+        for theme in ("dark", "light"):
+            for touch in (False, True):
+                with self.subTest(theme=theme, touch=touch):
+                    page = self.browser.open(self.url, 390 if touch else 1440, 844 if touch else 900, touch=touch, theme=theme)
+                    self.shown(page)
+                    page.run("localStorage.clear(), document.documentElement.dataset.theme = '%s', document.body.dataset.tab = 'faults'" % theme)
+                    self.assertEqual(page.run(FAINT_WORDS), [])
+                    self.assertEqual(page.run(NAMELESS_CONTROLS), [])
+                    if touch:
+                        self.assertEqual(page.run(SMALL_TARGETS), [])
+                    page.picture(SHOTS / f"{theme}{'-phone' if touch else ''}.png")
+                    page.close()
+
+    def test_settings_are_asked_for_and_refusals_shown(self):
+        page = self.open()
+        page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
+        change = "(v) => {{ const f = document.querySelector('[name=\"/front/range_m\"]'); f.value = v; f.dispatchEvent(new Event('change')); }}"
+        page.run(f"({change.replace('{{', '{').replace('}}', '}')})('7.5')")
+        page.wait("document.querySelector('[name=\"/front/range_m\"]').value === '7.5'")
+        self.assertEqual(self.mock.parameters["/front/range_m"], 7.5)
+        page.run(f"({change.replace('{{', '{').replace('}}', '}')})('400')")
+        page.wait("document.querySelector('#refusal').innerText.includes('range_m must be')")
+        page.wait("document.querySelector('[name=\"/front/range_m\"]').value === '7.5'")
+        self.mock.parameters["/front/range_m"] = 10.0
+
+    def test_numbers_are_true(self):
+        page = self.open()
+        page.wait("Math.abs(document.querySelector('#clients tr:nth-child(2) td:nth-child(2)').innerText - 7) <= 0.3", 40)
+        rows = page.run("[...document.querySelectorAll('#clients tr')].map((r) => [...r.children].map((c) => c.innerText.trim()))")
+        slow = next(r for r in rows if r[0].startswith("192.0.2.9"))
+        self.assertAlmostEqual(float(slow[2]), 7 * 231_000 * 8 / 1e6, delta=0.6)
+        self.assertEqual(slow[3].split()[0], str(self.mock.drops))
+
+
+@unittest.skipIf(WHY_NOT == "this build has no page", WHY_NOT)
+class Serving(unittest.TestCase):
+    """What sonard itself sends; which file answers what is tested without sockets in page_test.cpp."""
+
+    @staticmethod
+    def ask(daemon, path, method="GET", **headers):
+        connection = http.client.HTTPConnection(daemon.address, 8088, timeout=20)
+        connection.request(method, path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+        answer = connection.getresponse()
+        body = answer.read()
+        connection.close()
+        return answer, body
+
+    def test_browsers_get_the_page_and_others_the_help_text(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        token = pathlib.Path(folder.name) / "token"
+        token.write_text("0123456789abcdef0123456789abcdef")
+        token.chmod(0o600)
+        with Sonard(control=f", token_file: {token}") as daemon:
+            browser = {"Accept": "text/html,*/*;q=0.8", "Accept_Encoding": "gzip, br"}
+            answer, body = self.ask(daemon, "/", **browser)
+            self.assertEqual(answer.status, 200)
+            self.assertEqual(gzip.decompress(body), (PAGE / "index.html").read_bytes())
+            self.assertIn("default-src 'none'", answer.headers["Content-Security-Policy"])
+            self.assertEqual(answer.headers.get_all("Cache-Control"), ["no-cache"])
+            self.assertEqual(answer.headers["X-Content-Type-Options"], "nosniff")
+            tag = answer.headers["ETag"]
+            answer, body = self.ask(daemon, "/", "HEAD", **browser)
+            self.assertEqual((answer.status, body), (200, b""))
+            self.assertEqual(self.ask(daemon, "/", If_None_Match=tag, **browser)[0].status, 304)
+            for name in re.findall(r'"(/app-[^"]+)"', (PAGE / "index.html").read_text()):
+                answer, body = self.ask(daemon, name, Accept_Encoding="gzip")
+                self.assertEqual(answer.status, 200)
+                self.assertIn("immutable", answer.headers["Cache-Control"])
+                self.assertEqual(gzip.decompress(body), (PAGE / name[1:]).read_bytes())
+            self.assertEqual(self.ask(daemon, "/", Host="elsewhere.example", **browser)[0].status, 403)
+            self.assertEqual(self.ask(daemon, "/")[0].status, 401)
+            answer, body = self.ask(daemon, "/", Authorization=f"Bearer {token.read_text()}")
+            self.assertIn(b"curl -s", body)
+            self.assertEqual(answer.headers["Vary"], "Accept")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,155 @@
+"""Drives Debian's chromium over its debugging protocol: pages, scripts, pictures. Standard library only."""
+import base64
+import json
+import os
+import pathlib
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+import urllib.parse
+import urllib.request
+
+from websocket import TEXT, WebSocket
+
+
+def program():
+    """The browser, or None."""
+    return os.environ.get("SONARD_BROWSER") or shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+class Browser:
+    """with Browser() as browser: page = browser.open(url)"""
+
+    def __enter__(self):
+        self.folder = tempfile.TemporaryDirectory(prefix="browser-", ignore_cleanup_errors=True)
+        self.process = subprocess.Popen(
+            [program(), "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-sandbox",
+             "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
+             "--disable-dev-shm-usage", "--remote-debugging-port=0", f"--user-data-dir={self.folder.name}", "about:blank"],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        told = pathlib.Path(self.folder.name) / "DevToolsActivePort"  # the browser writes its port there
+        deadline = time.monotonic() + 60
+        while self.process.poll() is None and time.monotonic() < deadline:
+            if told.is_file() and "\n" in told.read_text():
+                self.at = "127.0.0.1:" + told.read_text().splitlines()[0]
+                return self
+            time.sleep(0.05)
+        self.__exit__()
+        raise RuntimeError("the browser did not start")
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self.folder.cleanup()
+
+    def open(self, url, width=1440, height=900, **options):
+        request = urllib.request.Request(f"http://{self.at}/json/new?about:blank", method="PUT")
+        with urllib.request.urlopen(request) as answer:
+            target = json.load(answer)
+        page = Page(urllib.parse.urlsplit(target["webSocketDebuggerUrl"]), width, height, **options)
+        page.call("Storage.clearDataForOrigin", origin=url.partition("/?")[0].rstrip("/"), storageTypes="all")
+        page.go(url)
+        return page
+
+
+class Page:
+    def __init__(self, url, width, height, scale=1, touch=False, script="", theme="dark"):
+        host, _, port = url.netloc.partition(":")
+        self.socket = WebSocket.connect(socket.create_connection((host, int(port)), timeout=60), url.netloc, url.path)
+        self.calls, self.requests, self.errors = 0, [], []
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            self.call(f"{domain}.enable")
+        self.size(width, height, scale, touch)
+        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}])
+        if script:
+            self.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self):
+        try:
+            self.call("Page.close")
+        except OSError:
+            pass  # it is closed already
+        self.socket.close()
+
+    def size(self, width, height, scale=1, touch=False):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=touch)
+        self.call("Emulation.setTouchEmulationEnabled", enabled=touch)
+
+    def call(self, method, **parameters):
+        self.calls += 1
+        self.socket.send(TEXT, json.dumps({"id": self.calls, "method": method, "params": parameters}))
+        while True:
+            message = self.socket.receive()
+            if message is None:
+                raise ConnectionError("the browser has closed the page")
+            word = json.loads(message[1])
+            if word.get("id") == self.calls:
+                if "error" in word:
+                    raise RuntimeError(f"{method}: {word['error']['message']}")
+                return word["result"]
+            self.note(word)
+
+    def note(self, word):
+        """Requests, and what the console holds against the page."""
+        method, about = word.get("method"), word.get("params", {})
+        if method in ("Network.requestWillBeSent", "Network.webSocketCreated"):
+            self.requests.append(about.get("url") or about["request"]["url"])
+        elif method == "Runtime.exceptionThrown":
+            details = about["exceptionDetails"]
+            self.errors.append(details.get("exception", {}).get("description") or details["text"])
+        elif method == "Log.entryAdded" and about["entry"]["level"] == "error":
+            self.errors.append(f"{about['entry']['text']} {about['entry'].get('url', '')}")
+        elif method == "Runtime.consoleAPICalled" and about["type"] in ("error", "assert"):
+            self.errors.append(str([a.get("value", a.get("description")) for a in about["args"]]))
+
+    def go(self, url):
+        self.call("Page.navigate", url=url)
+
+    def run(self, expression):
+        """The value of an expression, or of what it promises."""
+        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in result:
+            raise RuntimeError(result["exceptionDetails"].get("exception", {}).get("description") or str(result["exceptionDetails"]))
+        return result["result"].get("value")
+
+    def wait(self, expression, patience_s=60):
+        """Until the expression is true; its value."""
+        deadline = time.monotonic() + patience_s
+        while time.monotonic() < deadline:
+            try:
+                value = self.run(expression)
+            except RuntimeError:
+                value = None
+            if value:
+                return value
+            time.sleep(0.1)
+        raise AssertionError(f"not so within {patience_s} s: {expression}")
+
+    def text(self, selector):
+        return self.run(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''")
+
+    def press(self, key):
+        code = {" ": "Space", "?": "Slash"}.get(key, key)
+        text = {"text": key} if len(key) == 1 else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, **text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, code=code)
+
+    def click(self, selector):
+        self.run(f"document.querySelector({json.dumps(selector)}).click()")
+
+    def picture(self, path):
+        data = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+        with open(path, "wb") as file:
+            file.write(data)
