@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/recording/zlib.hpp"
+#include "protocol/wire/base64.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::testing {
