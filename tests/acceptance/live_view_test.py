@@ -66,7 +66,7 @@ class Handshake(unittest.TestCase):
         self.assertIn('control: {view_origins: ["https://evil.example"]}', self.daemon.log())
 
     def test_other_requests_stay_as_they_were(self):
-        refused = refusal(self.daemon.address, headers={"Upgrade": "h2c", "Accept": "text/html"})
+        refused = refusal(self.daemon.address, headers={"Upgrade": "h2c", "Accept": "*/*"})
         self.assertEqual(refused.status, 200)
         self.assertIn("curl", refused.body)
 
