@@ -31,7 +31,8 @@ def stages():
 
 def setup_packages():
     text = (ROOT / "tests/tools/setup.sh").read_text(encoding="utf-8")
-    return set(re.search(r"^build_packages=\(\n(.*?)^\)", text, re.M | re.S).group(1).split())
+    listed = re.search(r"^build_packages=\(\n(.*?)^\)", text, re.M | re.S).group(1)
+    return set((listed + " " + re.search(r"^page_packages=\((.*?)\)", text, re.M).group(1)).split())
 
 
 class Container(unittest.TestCase):
