@@ -43,7 +43,7 @@ export class Viewer {
     const deadline = performance.now() + 1000 * patience_s;
     for (let i = from; ; ++i) {
       while (i === this.received.length) {
-        assert(performance.now() < deadline, 'did not come');
+        assert(performance.now() < deadline, `${expected} did not come`);
         await new Promise((resolve) => {
           this.wake = resolve;
           setTimeout(resolve, 100);
