@@ -71,13 +71,14 @@ async function channels(url) {
   const topics = [...viewer.channels.keys()];
   viewer.subscribe(...topics);
   const messages = new Map(topics.map((topic) => [topic, []]));
-  for await (const { kind, value } of viewer.coming({ patience_s: 60 })) {
+  const missing = () => topics.filter((topic) => messages.get(topic).length < (topic === '/front/image' ? 15 : 1));
+  for await (const { kind, value } of viewer.coming({ patience_s: 60, missing })) {
     if (kind !== 'message') continue;
     const { topic, timestamp: ns } = value;
     const content = viewer.decode(value);
     meaning[viewer.channels.get(topic).schemaName]?.(content, ns);
     messages.get(topic).push({ ns, content });
-    if (messages.get('/front/image').length >= 15 && [...messages.values()].every((some) => some.length > 0)) break;
+    if (missing().length === 0) break;
   }
   const numbers = new Map(messages.get('/front/ping').map(({ ns, content }) => [ns, content.number]));
   for (const { ns, content } of messages.get('/front/ping')) assert.equal(content.fired_at_ns, ns);

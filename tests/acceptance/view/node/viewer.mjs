@@ -39,11 +39,11 @@ export class Viewer {
   }
 
   // What comes, in order, from number `from` on; an error or the end of the connection fails.
-  async *coming({ from = 0, patience_s = 20, expected = [] } = {}) {
+  async *coming({ from = 0, patience_s = 20, expected = [], missing = () => expected } = {}) {
     const deadline = performance.now() + 1000 * patience_s;
     for (let i = from; ; ++i) {
       while (i === this.received.length) {
-        assert(performance.now() < deadline, `${expected} did not come`);
+        assert(performance.now() < deadline, `${missing()} did not come`);
         await new Promise((resolve) => {
           this.wake = resolve;
           setTimeout(resolve, 100);
