@@ -2,6 +2,7 @@
 // here; what foxglove_judge_test.py compares is printed as JSON.
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
+import { validateBytes } from 'gltf-validator';
 import { compare, foxgloveTypes, typesOfFile } from './schemas.mjs';
 import { Viewer, names, typesOf } from './viewer.mjs';
 
@@ -39,11 +40,12 @@ const meaning = {
     assert.deepEqual([parents.get('front'), parents.get('rov')], ['rov', 'world']);
     for (const { rotation: { x, y, z, w } } of transforms) assert(Math.abs(Math.hypot(x, y, z, w) - 1) < 1e-9);
   },
-  'foxglove.SceneUpdate'({ entities }) {
+  async 'foxglove.SceneUpdate'({ entities }) {
     for (const { models, lines } of entities) {
       for (const { data, media_type } of models) {
         assert.equal(media_type, 'model/gltf-binary');
-        assert.deepEqual([data.toString('latin1', 0, 4), data.readUInt32LE(8)], ['glTF', data.length]);
+        const { issues: { numErrors, numWarnings, messages } } = await validateBytes(new Uint8Array(data), { format: 'glb' });
+        assert.deepEqual([numErrors, numWarnings], [0, 0], JSON.stringify(messages));
       }
       for (const { points } of lines) assert(points.length > 1);
       assert(models.length + lines.length > 0);
@@ -76,7 +78,7 @@ async function channels(url) {
     if (kind !== 'message') continue;
     const { topic, timestamp: ns } = value;
     const content = viewer.decode(value);
-    meaning[viewer.channels.get(topic).schemaName]?.(content, ns);
+    await meaning[viewer.channels.get(topic).schemaName]?.(content, ns);
     messages.get(topic).push({ ns, content });
     if (missing().length === 0) break;
   }
