@@ -1,0 +1,126 @@
+"""The live view before independent readers: Foxglove's client library and schemas, protobuf.js, Lichtblick's reader of ROS 2 messages.
+
+npm installs them into the build folder, in the versions of view/node/package-lock.json. Skipped without npm or network."""
+import contextlib
+import hashlib
+import json
+import pathlib
+import shutil
+import socket
+import subprocess
+import threading
+import time
+import unittest
+
+from oculus_reader import Client, Ping, fire_message
+from running_sonard import BUILD, ROOT, Sonard, run
+
+SOURCE, PLACE = pathlib.Path(__file__).parent / "view/node", BUILD / "tests/acceptance/view-node"
+SCHEMAS = ROOT / "protocol/foxglove/schemas/foxglove.proto"
+OURS = ("EUSAGE", "EINTEGRITY", "EJSONPARSE")  # npm's codes for a package.json or a lock file that is wrong
+
+
+def install():
+    """Why the readers are not there; empty when they are."""
+    for program in ("node", "npm"):
+        if not shutil.which(program):
+            return f"no {program}"
+    lock, installed = SOURCE / "package-lock.json", PLACE / "installed-lock.json"
+    PLACE.mkdir(parents=True, exist_ok=True)
+    for file in SOURCE.iterdir():
+        shutil.copy(file, PLACE)
+    if installed.is_file() and installed.read_bytes() == lock.read_bytes():
+        return ""
+    command = ["npm", "ci", "--ignore-scripts", "--prefer-offline", "--fetch-retries=1", "--fetch-retry-mintimeout=1000",
+               "--fetch-timeout=30000"]
+    try:
+        done = subprocess.run(command, cwd=PLACE, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=150, check=False)
+    except subprocess.TimeoutExpired:
+        return "npm took too long"
+    if done.returncode != 0:
+        assert not any(code in done.stderr for code in OURS), done.stderr
+        return "npm cannot install: " + next((line for line in done.stderr.splitlines() if "code" in line), done.stderr[-200:])
+    shutil.copy(lock, installed)
+    return ""
+
+
+WHY_NOT = install()
+
+
+def judge(what, where):
+    done = run("node", PLACE / "judge.mjs", what, where, patience_s=100)
+    if done.returncode != 0:
+        raise AssertionError(f"{what}: {done.stderr}")
+    return json.loads(done.stdout)
+
+
+def url(daemon):
+    return f"ws://{daemon.address}:8088/"
+
+
+class Driver:
+    """Takes pings until it is left."""
+
+    def __init__(self, daemon):
+        self.messages, self._client = [], Client(daemon.address)
+        self._thread = threading.Thread(target=self._take)
+
+    def __enter__(self):
+        self._client.send(fire_message())
+        self._thread.start()
+        return self
+
+    def _take(self):
+        with contextlib.suppress(OSError, EOFError):
+            while True:
+                kind, message = self._client.message()
+                if kind == 0x23:
+                    self.messages.append(message)
+
+    def sums(self):
+        """{ping number: SHA-256 of its samples}; 8 bit."""
+        pings = [Ping(message) for message in self.messages]
+        return {ping.id: hashlib.sha256(b"".join(map(bytes, ping.image))).hexdigest() for ping in pings}
+
+    def __exit__(self, *_):
+        self._client.socket.shutdown(socket.SHUT_RDWR)
+        self._thread.join(20)
+        self._client.socket.close()
+
+
+@unittest.skipIf(WHY_NOT, WHY_NOT)
+class Foxglove(unittest.TestCase):
+    def test_schemas_are_those_of_foxglove(self):
+        self.assertGreater(judge("schemas", SCHEMAS)["fields"], 60)
+
+    def test_subprotocols(self):
+        with Sonard() as daemon:
+            judge("subprotocols", url(daemon))
+
+    def test_channels_decode_and_the_picture_is_what_the_driver_got(self):
+        with Sonard(trajectory="orbit") as daemon, Driver(daemon) as driver:
+            seen = judge("channels", url(daemon))
+            time.sleep(0.5)  # the viewer may have its last picture before the driver
+        self.assertLessEqual({"/tf", "/scene", "/swath", "/log", "/status", "/faults", "/front/image", "/front/fan", "/front/cloud",
+                              "/front/geometry", "/front/ping", "/front/figures"}, set(seen["topics"]))
+        taken = driver.sums()
+        both = {number: sha for number, sha in seen["images"] if number in taken}
+        self.assertGreater(len(both), 10)
+        self.assertGreater(len(set(both.values())), 1)
+        self.assertEqual(both, {number: taken[number] for number in both})
+
+    def test_parameters(self):
+        with Sonard() as daemon:
+            judge("parameters", url(daemon))
+
+    def test_services_and_time_after_a_step(self):
+        with Sonard(arguments=["--clock", "lockstep"]) as daemon:
+            judge("services", url(daemon))
+
+    def test_stepped_time(self):
+        with Sonard(trajectory="orbit", arguments=["--clock", "stepped"]) as daemon, Driver(daemon):
+            judge("stepped", url(daemon))
+
+
+if __name__ == "__main__":
+    unittest.main()
