@@ -117,6 +117,10 @@ class Foxglove(unittest.TestCase):
         with Sonard(arguments=["--clock", "lockstep"]) as daemon:
             judge("services", url(daemon))
 
+    def test_one_that_does_not_read_for_a_while(self):
+        with Sonard() as daemon, Driver(daemon):
+            judge("stalled", url(daemon))
+
     def test_stepped_time(self):
         with Sonard(trajectory="orbit", arguments=["--clock", "stepped"]) as daemon, Driver(daemon):
             judge("stepped", url(daemon))
