@@ -26,9 +26,7 @@ def install():
         if not shutil.which(program):
             return f"no {program}"
     lock, installed = SOURCE / "package-lock.json", PLACE / "installed-lock.json"
-    PLACE.mkdir(parents=True, exist_ok=True)
-    for file in SOURCE.iterdir():
-        shutil.copy(file, PLACE)
+    shutil.copytree(SOURCE, PLACE, dirs_exist_ok=True)
     if installed.is_file() and installed.read_bytes() == lock.read_bytes():
         return ""
     command = ["npm", "ci", "--ignore-scripts", "--prefer-offline", "--fetch-retries=1", "--fetch-retry-mintimeout=1000",
