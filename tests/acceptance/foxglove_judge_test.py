@@ -26,9 +26,7 @@ def install():
         if not shutil.which(program):
             return f"no {program}"
     lock, installed = SOURCE / "package-lock.json", PLACE / "installed-lock.json"
-    PLACE.mkdir(parents=True, exist_ok=True)
-    for file in SOURCE.iterdir():
-        shutil.copy(file, PLACE)
+    shutil.copytree(SOURCE, PLACE, dirs_exist_ok=True)
     if installed.is_file() and installed.read_bytes() == lock.read_bytes():
         return ""
     command = ["npm", "ci", "--ignore-scripts", "--prefer-offline", "--fetch-retries=1", "--fetch-retry-mintimeout=1000",
@@ -116,6 +114,10 @@ class Foxglove(unittest.TestCase):
     def test_services_and_time_after_a_step(self):
         with Sonard(arguments=["--clock", "lockstep"]) as daemon:
             judge("services", url(daemon))
+
+    def test_one_that_does_not_read_for_a_while(self):
+        with Sonard() as daemon, Driver(daemon):
+            judge("stalled", url(daemon))
 
     def test_stepped_time(self):
         with Sonard(trajectory="orbit", arguments=["--clock", "stepped"]) as daemon, Driver(daemon):

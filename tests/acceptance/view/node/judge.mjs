@@ -213,6 +213,29 @@ async function stepped(url) {
   return { times: times.length };
 }
 
+// A viewer that does not read for 8 s is told, then gets the newest picture instead of those that waited.
+async function stalled(url) {
+  const viewer = await new Viewer(url).greeted();
+  viewer.subscribe('/front/image');
+  await viewer.first('message');
+  viewer.socket.pause();
+  await pause(8);
+  const from = viewer.received.length;
+  const now = BigInt(Date.now()) * 1_000_000n;
+  viewer.socket.resume();
+  await viewer.first('message', ({ timestamp }) => timestamp > now, { from });
+  const { level, id } = await viewer.first('status', ({ message }) => message === 'Send buffer limit reached');
+  assert.deepEqual([level, id], [1, 'slow']);
+  const stamps = viewer.all('message').map(({ timestamp }) => timestamp);
+  stamps.forEach((stamp, i) => assert(i === 0 || stamp > stamps[i - 1], `${stamps[i - 1]} then ${stamp}`));
+  const [gap, next] = stamps.slice(1).map((stamp, i) => [stamp - stamps[i], stamp]).sort(([a], [b]) => Number(b - a))[0];
+  assert(gap > 3_000_000_000n, `the largest gap is ${gap} ns`);
+  assert(next > now - 2_000_000_000n, `the first picture after the gap is ${now - next} ns old`);
+  await viewer.first('removeStatus', ({ statusIds }) => statusIds.includes(id), { from });
+  await viewer.close();
+  return { gap_s: Number(gap) / 1e9 };
+}
+
 function schemas(file) {
   const { differences, fields } = compare(typesOfFile(file), foxgloveTypes());
   assert.deepEqual(differences, []);
@@ -220,6 +243,6 @@ function schemas(file) {
 }
 
 const [what, where] = process.argv.slice(2);
-const judges = { channels, parameters, schemas, services, stepped, subprotocols };
+const judges = { channels, parameters, schemas, services, stalled, stepped, subprotocols };
 console.log(JSON.stringify((await judges[what](where)) ?? {}));
 process.exit(0);  // a failure has thrown before; sockets may still be open
