@@ -4,6 +4,7 @@ import hashlib
 import json
 import pathlib
 import re
+import signal
 import struct
 import threading
 import time
@@ -11,7 +12,7 @@ import unittest
 
 from foxglove_viewer import NAMES, Closed, Refused, Viewer
 from oculus_reader import Client, fire_message
-from running_sonard import Sonard
+from running_sonard import Sonard, free_address
 
 ORIGINS = ', view_origins: ["https://look.example", {origin: "https://steer.example", steer: true}], hosts: [sonar-lab]'
 
@@ -165,6 +166,37 @@ class Channels(unittest.TestCase):
         with Sonard() as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted().subscribe("/log")
             self.assertEqual(viewer.first_of("/log")["level"], 2)
+
+
+SECOND = "  - {{name: second, profile: oculus-m1200d, mount: {{frame: FLU, xyz_m: [0, 0, 0]}}, bind_ip: {0}, status_to: [{0}]}}\nposes:"
+
+
+class Reload(unittest.TestCase):
+    def test_kept_values_come_again_with_a_new_session(self):
+        with Sonard(arguments=["--clock", "lockstep"]) as daemon, Client(daemon.address) as client, Viewer(daemon.address) as viewer:
+            config = pathlib.Path(daemon.folder.name) / "sonard.yaml"
+            text = config.read_text(encoding="utf-8")
+            client.send(fire_message())
+            kept = ["/scene", "/swath", "/front/geometry", "/front/image", "/faults", "/tf", "/status"]
+            viewer.greeted().subscribe(*kept)
+            viewer.wait_for(lambda kind, word: kind == "word" and word["op"] == "advertiseServices")
+            Steering.call(viewer, "/sonard/step", b'{"dt_s": 1}')
+            for topic in kept:
+                viewer.first_of(topic)
+            config.write_text(text.replace("poses:", SECOND.format(free_address()), 1), encoding="utf-8")
+            daemon.process.send_signal(signal.SIGHUP)
+            viewer.wait_for(lambda kind, word: kind == "word" and word["op"] == "advertise")
+            first = viewer.info["sessionId"]
+            config.write_text(text, encoding="utf-8")
+            daemon.process.send_signal(signal.SIGHUP)
+            viewer.wait_for(lambda kind, word: kind == "word" and word["op"] == "serverInfo")
+            self.assertNotEqual(viewer.info["sessionId"], first)
+            viewer.messages.clear()
+            viewer.times.clear()
+            for topic in kept:
+                with self.subTest(topic):
+                    viewer.first_of(topic, patience_s=5)
+            self.assertTrue(viewer.times)
 
 
 class Steering(unittest.TestCase):
