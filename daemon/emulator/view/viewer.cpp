@@ -189,6 +189,7 @@ void Viewer::answer(const foxglove::ServiceCall& answer) {
 void Viewer::fail(const foxglove::ServiceCall& call, const std::string& why) {
   open_calls_ -= std::min<std::size_t>(open_calls_, 1);
   say(foxglove::service_failure(call.service, call.call, why));
+  say_status(foxglove::StatusLevel::error, why);  // Lichtblick shows this, and ignores the failure
 }
 
 void Viewer::on_parameters(std::span<const foxglove::Parameter> changed) {

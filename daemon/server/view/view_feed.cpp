@@ -63,12 +63,12 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
   connections_.push_back(connection);
   Viewer& viewer = connection->viewer();
   viewer.greet(server_info(viewer));
+  if (of_.clock.stepped()) viewer.say_frame(foxglove::time_frame(of_.clock.now()));
   std::vector<foxglove::Channel> channels;
   for (const auto& [id, channel] : channels_) channels.push_back(channel.advertised);
   for (std::size_t at = 0; at < channels.size(); at += most_advertised)
     viewer.greet(foxglove::advertise(std::span(channels).subspan(at, std::min(most_advertised, channels.size() - at))));
   viewer.greet(services_word());
-  if (of_.clock.stepped()) viewer.set_time(of_.clock.now());
   of_.fleet.tap_pings([this](const Device& of, const PingQueued& queued) { on_ping(of, queued); });
   of_.log.info("viewer connected", {{"from", viewer.who()}, {"steers", viewer.may_steer() ? "yes" : "no"}});
   arm();
@@ -201,6 +201,11 @@ void ViewFeed::remove(const SonarView& sonar) {
     for (const std::uint32_t id : gone) c.viewer().forget(id);
     c.viewer().say(foxglove::unadvertise(gone));
     c.viewer().say(server_info(c.viewer()));
+    // Viewers forget what they had.
+    if (of_.clock.stepped()) c.viewer().set_time(of_.clock.now());
+    for (const auto& [id, channel] : channels_)
+      if (id != log_ && c.viewer().subscribes(id)) on_subscribed(c.viewer(), id);
+    c.wake();
   });
 }
 
