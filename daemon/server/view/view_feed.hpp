@@ -79,7 +79,7 @@ class ViewFeed final : public ViewerHost {
   };
 
   void on_ping(const Device& of, const PingQueued& queued);
-  void make_slowly(SonarView& sonar, Slow SonarView::*which, double most_hz, Make make);
+  void make_slowly(SonarView& sonar, Slow SonarView::*which, Make make);
   void begin_slow_ones(SonarView& sonar);
   void on_log(LogLevel level, const std::string& line, const std::vector<LogField>& fields);
   void arm();

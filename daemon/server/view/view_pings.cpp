@@ -1,0 +1,104 @@
+// What viewers see of a ping: what is offered when one comes, what is made on the thread of the live view, and where all stands.
+#include <algorithm>
+#include <new>
+#include <utility>
+
+#include "daemon/emulator/view/ping_payloads.hpp"
+#include "daemon/server/view/view_feed.hpp"
+#include "daemon/server/view/view_messages.hpp"
+#include "protocol/foxglove/foxglove_messages.hpp"
+
+namespace sonar {
+
+void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
+  SonarView* const sonar = find(of.config().name);
+  if (sonar == nullptr) return;
+  const Ping& ping = *queued.ping;
+  sonar->last = queued.ping;
+  ping_at_ = Steady::now();
+  if (wanted(sonar->geometry))
+    if (wire::Bytes shape = foxglove::geometry(ping, 0); shape != sonar->shape) {
+      sonar->shape = std::move(shape);
+      offer(sonar->geometry, geometry_payload(ping));
+    }
+  if (wanted(sonar->image)) offer(sonar->image, image_payload(sonar->name, queued.ping));
+  if (wanted(sonar->ping)) offer(sonar->ping, ping_payload(of, queued));
+  if (wanted(sonar->figures)) offer(sonar->figures, figures_payload(of, queued));
+  if (wanted(tf_)) offer(tf_, places());
+  if (wanted(swath_)) {
+    const PingSettings& s = ping.request.settings;
+    const std::string volume = std::to_string(s.mode) + " " + std::to_string(s.range_m) + " " + std::to_string(s.range_start_m);
+    if (std::exchange(sonar->volume, volume) != volume) offer(swath_, swath_payload(sonar->name, ping));
+  }
+  begin_slow_ones(*sonar);
+  if (of_.clock.stepped()) arm();
+}
+
+void ViewFeed::begin_slow_ones(SonarView& sonar) {
+  if (sonar.last == nullptr) return;
+  make_slowly(sonar, &SonarView::fan, [name = sonar.name, ping = sonar.last] { return fan_payload(name, *ping); });
+  make_slowly(sonar, &SonarView::cloud, [name = sonar.name, ping = sonar.last] { return cloud_payload(name, *ping, 0.35); });
+}
+
+/// Pings that come meanwhile are skipped, but for the last: it is made when this one is done.
+void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, Make make) {
+  Slow& slow = sonar.*which;
+  const auto now = Steady::now();
+  const Time at = sonar.last->request.fired_at;
+  const double most_hz = channels_.at(slow.channel).most_hz;
+  if (slow.under_way || (slow.last && slow.last->at == at) || now < slow.begun_at + nanoseconds_from(1 / most_hz) ||
+      !wanted(slow.channel))
+    return;
+  slow.under_way = true;
+  slow.begun_at = now;
+  asio::post(thread_, [this, name = sonar.name, which, make = std::move(make)] {
+    ViewPayloadPointer made;
+    try {
+      made = make();
+    } catch (const std::bad_alloc&) {  // there will be other pings
+    }
+    asio::post(of_.io, [this, name, which, made = std::move(made)] {
+      SonarView* const found = find(name);
+      if (found == nullptr || stopping_) return;
+      Slow& done = found->*which;
+      done.under_way = false;
+      done.last = made;
+      offer(done.channel, made);
+    });
+  });
+}
+
+/// Where vehicles, sonars and moving objects are: as the last pings saw them, else now.
+ViewPayloadPointer ViewFeed::places() const {
+  const Time now = of_.clock.now();
+  std::vector<foxglove::Transform> all;
+  Time newest = Time::min();
+  std::shared_ptr<const Ping> last;
+  std::vector<bool> has_vehicle(of_.config.vehicles.size(), false);
+  for (const Device& device : of_.fleet.devices()) {
+    const SonarConfig& config = device.config();
+    const auto sonar = std::find_if(sonars_.begin(), sonars_.end(), [&](const SonarView& s) { return s.name == config.name; });
+    const bool is_fresh = sonar != sonars_.end() && sonar->last && now - sonar->last->request.fired_at < std::chrono::seconds(1);
+    if (config.vehicle >= has_vehicle.size()) continue;
+    const Time at = is_fresh ? sonar->last->request.fired_at : now;
+    const Pose vehicle = is_fresh ? sonar->last->request.vehicle_in_world : of_.world.vehicle_at(config.vehicle, now);
+    const Pose in_vehicle = is_fresh ? compose(inverse(vehicle), sonar->last->request.sonar_in_world)
+                                     : compose(inverse(vehicle), device.sonar().pose_at(now));
+    const std::string& name = of_.config.vehicles[config.vehicle].name;
+    if (!has_vehicle[config.vehicle]) all.push_back({at, "world", name, vehicle});
+    has_vehicle[config.vehicle] = true;
+    all.push_back({at, name, config.name, in_vehicle});
+    if (is_fresh && at > newest) last = sonar->last;
+    newest = std::max(newest, at);
+  }
+  for (std::size_t i = 0; i < has_vehicle.size(); ++i)
+    if (!has_vehicle[i]) all.push_back({now, "world", of_.config.vehicles[i].name, of_.world.vehicle_at(i, now)});
+  const Scene& scene = *of_.changes.scene();
+  const bool of_ping = last && last->request.bodies_in_world.size() == scene.body_names.size();
+  const std::vector<Pose> bodies = of_ping ? last->request.bodies_in_world : of_.world.objects_at(now);
+  for (std::size_t i = 0; i < scene.body_names.size() && i < bodies.size(); ++i)
+    all.push_back({of_ping ? last->request.fired_at : now, "world", "object/" + scene.body_names[i], bodies[i]});
+  return view_payload(newest == Time::min() ? now : newest, foxglove::transforms(all));
+}
+
+}  // namespace sonar
