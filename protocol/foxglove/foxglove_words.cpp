@@ -1,6 +1,7 @@
 #include "protocol/foxglove/foxglove_words.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -84,6 +85,28 @@ std::optional<Parameter> parameter(const Json& json) {
   if (!json.is_object() || !json.contains("name") || !json["name"].is_string()) return std::nullopt;
   const bool is_float = json.contains("type") && json["type"] == "float64";
   return Parameter{json["name"].get<std::string>(), json.contains("value") ? value(json["value"], is_float) : Value{}};
+}
+
+std::string stray_field(const Json& object, std::span<const std::string_view> known) {
+  for (const auto& [key, value] : object.items())
+    if (std::find(known.begin(), known.end(), key) == known.end()) return key.substr(0, 64);
+  return {};
+}
+/// Of the messages that are read here, and of the objects in their lists.
+std::string stray_field(const Json& word) {
+  constexpr std::array<std::string_view, 6> fields{"op",        "id", "subscriptions", "subscriptionIds", "parameterNames",
+                                                   "parameters"};
+  constexpr std::array<std::string_view, 2> of_subscriptions{"id", "channelId"};
+  constexpr std::array<std::string_view, 3> of_parameters{"name", "value", "type"};
+  std::string stray = stray_field(word, fields);
+  const auto look_into = [&](const char* list, std::span<const std::string_view> known) {
+    if (const auto found = word.find(list); found != word.end() && found->is_array())
+      for (const Json& item : *found)
+        if (stray.empty() && item.is_object()) stray = stray_field(item, known);
+  };
+  look_into("subscriptions", of_subscriptions);
+  look_into("parameters", of_parameters);
+  return stray;
 }
 
 template <class Word>
@@ -174,12 +197,13 @@ std::string service_failure(std::uint32_t service, std::uint32_t call, const std
   return dump({{"op", "serviceCallFailure"}, {"serviceId", service}, {"callId", call}, {"message", why}});
 }
 
-Result<ViewerWord> word_of_viewer(std::string_view message) {
+Result<ViewerWord> word_of_viewer(std::string_view message, std::string* stray) {
   if (control::nests_deeper(message, deepest)) return refused("JSON nested deeper than 16");
   const Json word = Json::parse(message, nullptr, false);
   if (!word.is_object()) return refused("not a JSON object");
   const auto op = word.find("op");
   if (op == word.end() || !op->is_string()) return refused("a message needs a string \"op\"");
+  if (stray != nullptr) *stray = stray_field(word);
   const auto is = [&op](const char* name) { return *op == name; };
   if (is("subscribe")) {
     auto wanted = list<std::pair<std::uint32_t, std::uint32_t>>(word, "subscriptions", subscription);

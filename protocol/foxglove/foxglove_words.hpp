@@ -88,7 +88,8 @@ struct UnknownWord {
   std::string op;
 };
 using ViewerWord = std::variant<UnknownWord, Subscribe, Unsubscribe, GetParameters, SetParameters, WatchParameters, Incapable>;
-/// bad_data: no JSON object, nested deeper than 16, no "op", or a field of a wrong type.
-Result<ViewerWord> word_of_viewer(std::string_view text);
+/// bad_data: no JSON object, nested deeper than 16, no "op", or a field of a wrong type. `stray`, if not null: the name of a
+/// field that the protocol does not have; empty = there is none.
+Result<ViewerWord> word_of_viewer(std::string_view text, std::string* stray = nullptr);
 
 }  // namespace sonar::foxglove

@@ -9,11 +9,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace sonar::foxglove;
   using sonar::fuzz::require;
   const std::string text(reinterpret_cast<const char*>(data), size);
-  const auto word = word_of_viewer(text);
+  std::string stray;
+  const auto word = word_of_viewer(text, &stray);
   if (!word) {
     require(!word.error().text.empty() && word.error().text.find('\n') == std::string::npos);
     return 0;
   }
+  require(stray.size() <= 64 && nlohmann::json::accept(status(StatusLevel::warning, stray)));
   if (const auto* set = std::get_if<SetParameters>(&*word)) {
     require(set->parameters.size() <= most_parameters);
     const auto json = nlohmann::json::parse(parameter_values(set->parameters, set->request));

@@ -61,6 +61,19 @@ TEST(FoxgloveWords, WhatViewersSay) {
   EXPECT_EQ(std::get<UnknownWord>(*word_of_viewer(R"({"op": "dance"})")).op, "dance");
 }
 
+TEST(FoxgloveWords, StrayFieldsAreNamed) {
+  const auto stray = [](std::string_view text) {
+    std::string name = "?";
+    EXPECT_TRUE(word_of_viewer(text, &name)) << text;
+    return name;
+  };
+  EXPECT_EQ(stray(R"({"op": "setParameters", "id": "1", "parameters": [{"name": "/r", "value": 5, "type": "float64"}]})"), "");
+  EXPECT_EQ(stray(R"({"op": "setParameters", "parameters": [{"name": "/r", "value": 5, "unit": "m"}]})"), "unit");
+  EXPECT_EQ(stray(R"({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 2}, {"id": 2, "channelId": 3, "rate": 1}]})"),
+            "rate");
+  EXPECT_EQ(stray(R"({"op": "unsubscribe", "subscriptionIds": [1], "why": 0})"), "why");
+}
+
 TEST(FoxgloveWords, WhatIsRefused) {
   const auto refusal = [](std::string_view text) {
     const auto word = word_of_viewer(text);
