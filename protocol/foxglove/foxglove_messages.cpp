@@ -2,11 +2,13 @@
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
+#include <google/protobuf/message.h>
 
 #include <set>
 
 #include "control.pb.h"
 #include "foxglove.pb.h"
+#include "protocol/foxglove/ros_cdr.hpp"
 #include "protocol/wire/base64.hpp"
 #include "view.pb.h"
 
@@ -66,7 +68,39 @@ fg::SceneEntity& entity(fg::SceneUpdate& update, Time at, const std::string& id,
   return entity;
 }
 
+using Stamp = std::function<Time(Time)>;
+
+void change_stamps(pb::Message& message, const Stamp& stamp) {
+  if (auto* const at = dynamic_cast<pb::Timestamp*>(&message)) {
+    const Time was{std::chrono::seconds(at->seconds()) + std::chrono::nanoseconds(at->nanos())};
+    return fill(*at, stamp(was));
+  }
+  const pb::Reflection& fields = *message.GetReflection();
+  std::vector<const pb::FieldDescriptor*> set;
+  fields.ListFields(message, &set);
+  for (const pb::FieldDescriptor* field : set) {
+    const bool is_message = field->cpp_type() == pb::FieldDescriptor::CPPTYPE_MESSAGE && !field->is_map();
+    if (is_message && field->is_repeated())
+      for (int i = 0; i < fields.FieldSize(message, field); ++i)
+        change_stamps(*fields.MutableRepeatedMessage(&message, field, i), stamp);
+    else if (is_message)
+      change_stamps(*fields.MutableMessage(&message, field), stamp);
+    else if (field->type() == pb::FieldDescriptor::TYPE_SFIXED64 && field->name().ends_with("_ns"))
+      fields.SetInt64(&message, field,
+                      stamp(Time(std::chrono::nanoseconds(fields.GetInt64(message, field)))).time_since_epoch().count());
+  }
+}
+
 }  // namespace
+
+Bytes with_stamps(const Channel& of, BytesView message, const Stamp& stamp) {
+  const auto* const type = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(of.schema.name);
+  if (of.encoding == "cdr") return with_stamp(message, stamp);
+  const std::unique_ptr<pb::Message> read(pb::MessageFactory::generated_factory()->GetPrototype(type)->New());
+  read->ParseFromArray(message.data(), static_cast<int>(message.size()));
+  change_stamps(*read, stamp);
+  return bytes_of(*read);
+}
 
 Schema protobuf_schema(const std::string& name) {
   // Names what is looked up by name only, so that the linker keeps it.

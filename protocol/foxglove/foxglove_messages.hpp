@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -24,6 +25,9 @@ using wire::BytesView;
 /// Of any message that is linked in: "foxglove.RawImage", "sonar.v1.PingEvent". With all that it imports. Empty text: there is
 /// none of that name.
 Schema protobuf_schema(const std::string& name);
+
+/// A message of the channel with other times: its stamps, and fields of our own in nanoseconds of the daemon's time.
+Bytes with_stamps(const Channel& of, BytesView message, const std::function<Time(Time)>& stamp);
 
 /// A picture whose samples may be those of a ping, shared.
 struct Image {

@@ -15,4 +15,17 @@ wire::Bytes figures(const std::array<double, figure_names.size()>& values) {
   return out;
 }
 
+wire::Bytes with_stamp(wire::BytesView figures, const std::function<Time(Time)>& stamp) {
+  constexpr std::size_t at = 4;  // behind the head
+  wire::Reader reader(figures.subspan(at));
+  double stamp_s = 0;
+  reader("stamp_s", stamp_s);
+  stamp_s = seconds(stamp(Time(nanoseconds_from(stamp_s))).time_since_epoch());
+  wire::Bytes out(figures.begin(), figures.begin() + at);
+  wire::Writer writer(out);
+  writer("stamp_s", stamp_s);
+  out.insert(out.end(), figures.begin() + at + sizeof stamp_s, figures.end());
+  return out;
+}
+
 }  // namespace sonar::foxglove

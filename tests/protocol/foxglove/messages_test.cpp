@@ -143,6 +143,36 @@ TEST(FoxgloveMessages, CloudsAndGeometry) {
   EXPECT_EQ(shape["azimuth_rad"], R"([0.5, 0.0, -0.5])"_json);
 }
 
+TEST(FoxgloveMessages, StampsMayBeOthers) {
+  const auto later = [](Time was) { return was + std::chrono::hours(1); };
+  const auto of = [](const char* schema) { return Channel{1, "/x", "protobuf", {schema, "protobuf", ""}}; };
+  const Time then{std::chrono::milliseconds(1500)};
+  const std::vector<Transform> places{{then, "world", "rov", {}}, {then + std::chrono::seconds(1), "rov", "front", {}}};
+  const std::vector<Transform> shifted{{later(then), "world", "rov", {}},
+                                       {later(then + std::chrono::seconds(1)), "rov", "front", {}}};
+  EXPECT_EQ(with_stamps(of("foxglove.FrameTransforms"), transforms(places), later), transforms(shifted));
+  EXPECT_EQ(with_stamps(of("foxglove.SceneUpdate"), scene_deletion(then, "crate"), later), scene_deletion(later(then), "crate"));
+  const Image image{2, 1, "mono8", 1, std::make_shared<const Bytes>(2, std::byte{7})};
+  const auto whole = [&image](Time stamp) {
+    Bytes bytes = image_head(stamp, "front", image);
+    bytes.insert(bytes.end(), image.samples->begin(), image.samples->end());
+    return bytes;
+  };
+  const auto same = [](Time was) { return was; };  // fields come in another order
+  EXPECT_EQ(with_stamps(of("foxglove.RawImage"), whole(then), later),
+            with_stamps(of("foxglove.RawImage"), whole(later(then)), same));
+  // sonar.v1.PingEvent: number = 7, fired_at_ns = 1
+  const Bytes event{std::byte{0x10}, std::byte{7}, std::byte{0x19}, std::byte{1}, {}, {}, {}, {}, {}, {}, {}};
+  const Bytes changed =
+      with_stamps(of("sonar.v1.PingEvent"), event, [](Time fired) { return fired + std::chrono::nanoseconds(4); });
+  ASSERT_EQ(changed.size(), event.size());
+  EXPECT_EQ(changed[3], std::byte{5});
+  std::array<double, figure_names.size()> values{1.5, 2, 3};
+  const Bytes before = figures(values);
+  values[0] += 3600;
+  EXPECT_EQ(with_stamps({1, "/front/figures", "cdr", figures_schema()}, before, later), figures(values));
+}
+
 TEST(FoxgloveMessages, StatusIsDescribedToo) {
   EXPECT_NE(protobuf_schema("sonar.v1.DaemonStatus").text, "");
   EXPECT_NE(protobuf_schema("sonar.v1.Findings").text, "");
