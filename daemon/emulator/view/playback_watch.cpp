@@ -1,0 +1,40 @@
+#include "daemon/emulator/view/playback_watch.hpp"
+
+#include <algorithm>
+
+namespace sonar {
+namespace {
+
+constexpr std::chrono::milliseconds slack{1};  // a change of speed or a pause rounds
+
+}  // namespace
+
+PlaybackWatch::PlaybackWatch(const motion::Playback& of, Time now) : playback_(of), looked_at_(now), said_(state(now)) {}
+
+std::optional<foxglove::PlaybackState> PlaybackWatch::look(const motion::Playback* of, Time now) {
+  const double before = playback_.rules().speed.factor();
+  if (of != nullptr)
+    playback_ = *of;
+  else if (!playback_.paused())
+    playback_.pause(now);
+  // Speed and pause may have changed at any moment since the last look.
+  const double fastest = std::max(before, playback_.rules().speed.factor());
+  const Time farthest = said_.at + nanoseconds_from(fastest * seconds(now - looked_at_)) + slack;
+  foxglove::PlaybackState holds = state(now);
+  holds.did_seek = holds.at + slack < said_.at || holds.at > farthest;
+  const bool is_news = holds.did_seek || holds.status != said_.status || holds.speed != said_.speed;
+  looked_at_ = now;
+  said_ = holds;
+  return is_news ? std::optional(holds) : std::nullopt;
+}
+
+foxglove::PlaybackState PlaybackWatch::state(Time now) const {
+  using Status = foxglove::PlaybackStatus;
+  foxglove::PlaybackState holds;
+  holds.status = playback_.ended(now) ? Status::ended : playback_.paused() ? Status::paused : Status::playing;
+  holds.at = stamp(now);
+  holds.speed = static_cast<float>(playback_.rules().speed.factor());
+  return holds;
+}
+
+}  // namespace sonar
