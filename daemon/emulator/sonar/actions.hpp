@@ -80,6 +80,7 @@ struct PingQueued {
   std::shared_ptr<const protocol::Bytes> bytes;                                // null: not sent over TCP
   std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // of each stream that has receivers
   double simulation_s = 0;
+  bool preview = false;  // for viewers of the live view alone
 };
 /// A line for the log; those of one topic are limited together.
 struct Report {

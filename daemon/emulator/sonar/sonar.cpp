@@ -192,23 +192,37 @@ PingNumber Sonar::next_number() {
   return PingNumber(++ping_number_);
 }
 
-void Sonar::request_ping(Time at, Actions& actions) {
+/// But for its number.
+PingRequest Sonar::request_at(Time at) const {
   const Config& config = around_.config;
-  const World& world = around_.world;
-  const bool stale = world.is_stale(config_.vehicle, at);
-  if (stale && config.poses.on_stale == OnStale::stop) {
+  const bool stale = around_.world.is_stale(config_.vehicle, at);
+  PingRequest request = ping_request(config, around_.world, config_.vehicle, config_.mount, at);
+  request.model = state_.model;
+  request.settings = settings_;
+  request.vendor_settings = state_.settings;
+  request.sonar_id = index_;
+  request.blank = (stale && config.poses.on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
+  return request;
+}
+
+std::optional<PingRequest> Sonar::preview_request(PingNumber number, Time at) const {
+  if (waits_for_pose(at)) return std::nullopt;
+  PingRequest request = request_at(at);
+  request.number = number;
+  request.sonar_id = ~index_;
+  return request;
+}
+
+void Sonar::request_ping(Time at, Actions& actions) {
+  if (waits_for_pose(at)) {
     ++figures_.skipped_stale;
     return;
   }
   update_depth(at);
-  PingRequest request = ping_request(config, world, config_.vehicle, config_.mount, at);
-  request.model = state_.model;
+  PingRequest request = request_at(at);
   request.number = next_number();
-  request.settings = settings_;
   request.settings.gain_db = gain_assist_.gain_db(settings_, at);
-  request.vendor_settings = busy_settings_ = state_.settings;
-  request.sonar_id = index_;
-  request.blank = (stale && config.poses.on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
+  busy_settings_ = state_.settings;
   busy_ = true;
   busy_blank_ = request.blank;
   busy_unwanted_ = false;

@@ -131,6 +131,9 @@ class Sonar {
   /// Of those: pings that at least one client has got, and pings that were made.
   std::uint64_t served() const { return figures_.served; }
   std::uint64_t pings() const { return figures_.pings; }
+  /// A ping as a client would get it now, with a number and noise that no client's ping has: nothing of the sonar changes. None
+  /// when its rule for stale poses says so.
+  std::optional<PingRequest> preview_request(PingNumber number, Time at) const;
 
  private:
   Time unskipped(Time now) const { return now - skipped_; }
@@ -175,6 +178,7 @@ class Sonar {
   void use_initial_settings();
   void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
   bool waits_for_pose(Time at) const;
+  PingRequest request_at(Time at) const;
   void request_ping(Time at, Actions& actions);
   PingNumber next_number();
   void queue_ping(const PingOutcome& outcome, Time now, Actions& actions);

@@ -1,0 +1,33 @@
+// Pings for viewers while no driver is connected: at most 5 a second, with numbers and noise of their own, so that the first
+// driver gets what it would have got without them. Pure: the caller computes what is due, and asks whether it must end.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include "daemon/emulator/sonar/sonar.hpp"
+
+namespace sonar {
+
+class Preview {
+ public:
+  static constexpr std::chrono::milliseconds shortest_period{200};
+  static constexpr std::chrono::seconds longest{600};
+
+  void begin(Time now) { until_ = now + longest; }
+  void end() { until_.reset(); }
+  bool on() const { return until_.has_value(); }
+  /// Why it must end now, for the log; empty = it may go on.
+  std::string why_over(const Sonar& sonar, Time now) const;
+  /// The ping that is due. One at a time: done() comes before the next.
+  std::optional<PingRequest> due(const Sonar& sonar, Time now);
+  void done() { busy_ = false; }
+
+ private:
+  std::optional<Time> until_, fired_at_;
+  std::uint32_t number_ = 0;
+  bool busy_ = false;
+};
+
+}  // namespace sonar

@@ -1,0 +1,83 @@
+// A preview in virtual time: its rate and its end, and that the first driver gets the same bytes with and without one before.
+#include "daemon/emulator/view/preview.hpp"
+
+#include <gmock/gmock.h>
+
+#include "tests/daemon/emulator/sonar/virtual_time.hpp"
+
+namespace sonar {
+namespace {
+
+using namespace testing_emulator;
+using std::chrono::milliseconds;
+
+struct Story {
+  std::vector<PingRequest> shown;
+  protocol::Bytes driver;
+  std::uint64_t pings = 0;
+  std::string end;
+};
+
+Story story_of(bool with_preview) {
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
+  Sonar& sonar = time.sonar("front");
+  Preview preview;
+  if (with_preview) preview.begin(time.now);
+  Story story;
+  const auto look = [&](int ticks) {
+    for (int i = 0; i < ticks; ++i) {
+      time.run(milliseconds(100));
+      if (preview.on() && preview.why_over(sonar, time.now).empty())
+        if (auto request = preview.due(sonar, time.now)) {
+          story.shown.push_back(*request);
+          preview.done();
+        }
+    }
+  };
+  look(50);
+  const ConnectionId client = time.connect("front");
+  time.send(client, fire());
+  look(30);
+  story.end = preview.on() ? preview.why_over(sonar, time.now) : "";
+  story.driver = time.clients[client].received;
+  story.pings = sonar.pings();
+  return story;
+}
+
+TEST(Preview, TheFirstDriverGetsWhatItWouldHaveGotWithoutIt) {
+  const Story with = story_of(true), without = story_of(false);
+  EXPECT_EQ(with.shown.size(), 25u) << "5 a second, and none beside a driver";
+  EXPECT_TRUE(without.shown.empty());
+  EXPECT_EQ(with.driver, without.driver);
+  EXPECT_EQ(with.pings, without.pings);
+  EXPECT_EQ(ping_numbers(with.driver).at(0), 1u);
+  EXPECT_EQ(with.end, "a driver is connected");
+}
+
+TEST(Preview, HasNumbersAndNoiseOfItsOwn) {
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2") + oculus_sonar("left", "127.0.0.3")));
+  std::set<std::uint32_t> noise;
+  for (const Sonar& sonar : time.sonars) {
+    noise.insert(sonar.index());
+    Preview preview;
+    EXPECT_FALSE(preview.due(sonar, time.now)) << "off";
+    preview.begin(time.now);
+    const auto first = preview.due(sonar, time.now);
+    ASSERT_TRUE(first);
+    noise.insert(first->sonar_id);
+    EXPECT_EQ(static_cast<std::uint32_t>(first->number), 1u);
+    EXPECT_FALSE(preview.due(sonar, time.now + milliseconds(200))) << "the first is being computed";
+    preview.done();
+    EXPECT_FALSE(preview.due(sonar, time.now + milliseconds(199)));
+    const auto second = preview.due(sonar, time.now + milliseconds(200));
+    ASSERT_TRUE(second);
+    EXPECT_EQ(static_cast<std::uint32_t>(second->number), 2u);
+    EXPECT_EQ(second->fired_at, time.now + milliseconds(200));
+    EXPECT_EQ(preview.why_over(sonar, time.now + std::chrono::seconds(599)), "");
+    EXPECT_EQ(preview.why_over(sonar, time.now + std::chrono::seconds(600)), "after 600 s");
+  }
+  EXPECT_EQ(noise.size(), 4u);
+}
+
+}  // namespace
+}  // namespace sonar
