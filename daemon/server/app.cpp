@@ -56,7 +56,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       sonar_operations_(config_, fleet_, recordings_, log_),
       time_operations_(stepped_time_, pose_intake_, fleet_, [this] { on_change(); }),
       monitoring_({config_, clock_, world_, changes_, fleet_, simulator_, admission_, recordings_, plausibility_, mavlink_server_,
-                   control_, fault_log_}),
+                   control_, fault_log_, view_}),
       fault_operations_(config_, fleet_, fault_log_, clock_, log_),
       operations_(scene_operations_, sonar_operations_, time_operations_, monitoring_, fault_operations_),
       view_({io_, config_, clock_, world_, changes_, fleet_, operations_, log_}),

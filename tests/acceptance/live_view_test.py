@@ -9,12 +9,18 @@ import struct
 import threading
 import time
 import unittest
+import urllib.request
 
 from foxglove_viewer import NAMES, Closed, Refused, Viewer
 from oculus_reader import Client, fire_message
 from running_sonard import Sonard, free_address
 
 ORIGINS = ', view_origins: ["https://look.example", {origin: "https://steer.example", steer: true}], hosts: [sonar-lab]'
+
+
+def http(daemon, path):
+    with urllib.request.urlopen(f"http://{daemon.address}:8088{path}", timeout=20) as answer:
+        return answer.read().decode()
 
 
 def refusal(*arguments, **options):
@@ -320,6 +326,19 @@ class Limits(unittest.TestCase):
                 viewer.send_frame(2, b"\1\0")
                 self.assertIn("clientPublish", viewer.status()["message"])
             self.assertEqual(daemon.stop()[0], 0)
+
+    def test_what_a_slow_one_loses_is_counted(self):
+        with Sonard() as daemon, Viewer(daemon.address, small_window=True) as viewer, Client(daemon.address) as client:
+            viewer.greeted().subscribe("/front/image")
+            client.send(fire_message(rate_hz=5))
+            deadline = time.monotonic() + 30
+            while not (count := re.search(r'sonard_viewer_dropped_total\{viewer="http 127\.[^"]+:\d+",channel="/front/image"\} ([1-9]\d*)\n',
+                                          http(daemon, "/metrics"))):
+                self.assertLess(time.monotonic(), deadline, http(daemon, "/metrics"))
+                client.message()
+            self.assertIn("\nsonard_viewers 1\n", http(daemon, "/metrics"))
+            viewers = json.loads(http(daemon, "/api/v1/status"))["viewers"]
+            self.assertGreaterEqual(int(viewers[0]["dropped"]["/front/image"]), int(count[1]))
 
     def test_says_goodbye(self):
         with Sonard() as daemon, Viewer(daemon.address) as viewer:

@@ -75,6 +75,7 @@ void Viewer::on_word(const foxglove::Subscribe& word, Moment) {
     } else {
       const Moment own = offered->kind == ViewChannel::Kind::picture ? interval_of(rights_.most_hz) : Moment{0};
       slots_[id] = {channel, offered->kind, std::max(interval_of(offered->most_hz), own), offered->deepest, {}, {}};
+      dropped_[channel];  // none so far
       host_.on_subscribed(*this, channel);
     }
   }

@@ -52,6 +52,12 @@ struct ViewMessage {
   std::vector<ViewBytes> pieces;  // what follows
 };
 
+struct ViewerFigures {
+  std::string address;  // "http 127.0.0.1:40123"
+  bool may_steer = false;
+  std::map<std::string, std::uint64_t> dropped = {};  // by topic: messages replaced before they were written
+};
+
 class Viewer;
 
 /// What viewers ask for; outlives them. May call the viewer back.

@@ -194,6 +194,11 @@ void write_process(PrometheusText& text, const DaemonFigures& figures) {
   text.family("sonard_connections_refused_total", Type::counter, "Connections closed at once for a limit of the whole daemon.");
   text.sample({{"reason", "places"}}, static_cast<double>(figures.turned_away_for_places));
   text.sample({{"reason", "descriptors"}}, static_cast<double>(figures.turned_away_for_descriptors));
+  one("sonard_viewers", Type::gauge, "Viewers of the live view now.", static_cast<double>(figures.viewers.size()));
+  text.family("sonard_viewer_dropped_total", Type::counter, "Messages that newer ones replaced: the viewer was too slow.");
+  for (const ViewerFigures& v : figures.viewers)
+    for (const auto& [topic, count] : v.dropped)
+      text.sample({{"viewer", v.address}, {"channel", topic}}, static_cast<double>(count));
   const ProcessFigures& p = figures.process;
   one("process_resident_memory_bytes", Type::gauge, "Resident memory size in bytes.", static_cast<double>(p.resident_bytes));
   one("process_open_fds", Type::gauge, "Open file descriptors.", static_cast<double>(p.open_descriptors));

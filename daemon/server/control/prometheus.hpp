@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/emulator/sonar/metrics.hpp"
+#include "daemon/emulator/view/viewer.hpp"
 #include "daemon/server/system/process_figures.hpp"
 
 namespace sonar {
@@ -36,6 +37,7 @@ struct DaemonFigures {
   std::vector<std::pair<std::string, DeviceFigures>> sonars;  // by name
   PoseCounters poses;
   std::uint64_t clients_now = 0, turned_away_for_places = 0, turned_away_for_descriptors = 0;  // of all sonars
+  std::vector<ViewerFigures> viewers;                                                          // of the live view
   ProcessFigures process;
   std::vector<std::pair<std::string, std::uint64_t>> active_faults;          // by sonar
   std::vector<std::pair<std::string_view, std::uint64_t>> fault_injections;  // by code, since the start

@@ -76,6 +76,15 @@ void add_notes(v1::DaemonStatus& out, const std::vector<Note>& notes) {
   }
 }
 
+void add_viewers(v1::DaemonStatus& out, const std::vector<ViewerFigures>& viewers) {
+  for (const ViewerFigures& v : viewers) {
+    v1::ViewerStatus& viewer = *out.add_viewers();
+    viewer.set_address(v.address);
+    viewer.set_may_steer(v.may_steer);
+    viewer.mutable_dropped()->insert(v.dropped.begin(), v.dropped.end());
+  }
+}
+
 /// Empty = no listener.
 std::string address(Endpoint at) { return at.port == 0 ? std::string() : text_of(at); }
 
@@ -106,6 +115,7 @@ std::shared_ptr<const v1::DaemonStatus> Monitoring::status() const {
   add_notes(s, of_.mavlink.notes());
   s.set_faults_armed(of_.config.faults.armed);
   for (v1::FaultStatus& fault : fault_statuses(of_.fleet, now, false)) *s.add_faults() = std::move(fault);
+  add_viewers(s, of_.view.viewers());
   return status;
 }
 
@@ -120,6 +130,7 @@ std::string Monitoring::metrics() const {
   f.clients_now = of_.admission.now();
   f.turned_away_for_places = of_.admission.refused_for_places();
   f.turned_away_for_descriptors = of_.admission.refused_for_descriptors();
+  f.viewers = of_.view.viewers();
   f.process = figures_of_this_process();
   return metrics_text(f);
 }

@@ -17,6 +17,7 @@
 #include "daemon/server/scene_changes.hpp"
 #include "daemon/server/sonars/fleet.hpp"
 #include "daemon/server/time/clock.hpp"
+#include "daemon/server/view/view_feed.hpp"
 
 namespace sonar {
 
@@ -34,6 +35,7 @@ struct Monitored {
   const MavlinkServer& mavlink;
   const ControlServer& control;
   const FaultLog& faults;
+  const ViewFeed& view;
 };
 
 class Monitoring {

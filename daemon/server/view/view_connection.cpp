@@ -63,11 +63,15 @@ ViewConnection::ViewConnection(ConnectionServices& services, HttpConnection& fro
       from_(from),
       request_(request),
       protocol_(welcome.protocol),
+      address_(from.sender().source),
       on_open_(std::move(on_open)),
       viewer_(host, {welcome.may_steer, welcome.most_hz}, from.sender().source),
       socket_(std::make_unique<Socket>(Watched{from.socket(), moved_at_})),
       wake_(services.io, never),
-      stall_(services.io, never) {}
+      stall_(services.io, never) {
+  error_code ec;
+  if (const auto peer = from.socket().remote_endpoint(ec); !ec) address_ += ":" + std::to_string(peer.port());
+}
 ViewConnection::~ViewConnection() = default;
 
 asio::awaitable<bool> ViewConnection::begin() {

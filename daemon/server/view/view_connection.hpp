@@ -30,6 +30,8 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   Viewer& viewer() { return viewer_; }
   const Viewer& viewer() const { return viewer_; }
   bool over() const { return over_; }
+  /// With its port: of no other viewer.
+  const std::string& address() const { return address_; }
   /// The viewer has something to write.
   void wake() { wake_.cancel(); }
 
@@ -43,7 +45,7 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   ConnectionServices& services_;
   HttpConnection& from_;
   HttpRequest request_;
-  std::string protocol_;
+  std::string protocol_, address_;
   std::function<void(const std::shared_ptr<ViewConnection>&)> on_open_;
   Viewer viewer_;
   std::unique_ptr<Socket> socket_;

@@ -81,6 +81,17 @@ bool ViewFeed::is_full() const {
   return open >= of_.config.limits.viewers;
 }
 
+std::vector<ViewerFigures> ViewFeed::viewers() const {
+  std::vector<ViewerFigures> all;
+  each([&](const ViewConnection& c) {
+    ViewerFigures one{c.address(), c.viewer().may_steer()};
+    for (const auto& [id, count] : c.viewer().dropped())
+      if (const ViewChannel* const of = channel(id)) one.dropped[of->advertised.topic] = count;
+    all.push_back(std::move(one));
+  });
+  return all;
+}
+
 std::string ViewFeed::server_info(const Viewer& viewer) const {
   foxglove::ServerInfo info;
   info.name = "sonard " SONARD_VERSION;

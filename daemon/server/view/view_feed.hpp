@@ -49,6 +49,7 @@ class ViewFeed final : public ViewerHost {
   /// One more viewer, which is greeted.
   void add(const std::shared_ptr<ViewConnection>& viewer);
   bool is_full() const;
+  std::vector<ViewerFigures> viewers() const;
   ViewSecrets& secrets() { return secrets_; }
   const ViewSecrets& secrets() const { return secrets_; }
   void stop();
@@ -101,7 +102,7 @@ class ViewFeed final : public ViewerHost {
   static std::string services_word();
   ViewPayloadPointer current(std::uint32_t channel);
   template <class Visit>
-  void each(Visit visit) {
+  void each(Visit visit) const {
     for (const auto& weak : connections_)
       if (const auto connection = weak.lock(); connection && !connection->over()) visit(*connection);
   }
