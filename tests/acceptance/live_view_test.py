@@ -287,6 +287,57 @@ class Steering(unittest.TestCase):
                 self.assertEqual(self.set(looker, "/front/range_m", 5), 10)
 
 
+class Preview(unittest.TestCase):
+    @staticmethod
+    def numbers(viewer, seconds):
+        """Of the pings shown meanwhile: (number, whether it is a preview)."""
+        seen, deadline = [], time.monotonic() + seconds
+        while time.monotonic() < deadline:  # /status comes every second
+            kind, value = viewer.receive()
+            if kind == "message" and value[0] == "/front/ping":
+                event = viewer.decode(*value[::2])
+                seen.append((event["number"], event.get("preview", False)))
+        return seen
+
+    def test_pings_for_viewers_until_a_driver_connects(self):
+        with Sonard() as daemon, Viewer(daemon.address) as viewer:
+            viewer.greeted().subscribe("/front/ping", "/front/image", "/status")
+            self.assertEqual(self.numbers(viewer, 1), [])
+            self.assertEqual(Steering.set(viewer, "/front/preview", True), True)
+            shown = self.numbers(viewer, 4)
+            self.assertEqual(shown, [(n, True) for n in range(1, len(shown) + 1)])
+            self.assertTrue(8 <= len(shown) <= 21, shown)
+            status = json.loads(http(daemon, "/api/v1/status"))
+            self.assertTrue(status["sonars"][0]["preview"], status)
+            self.assertEqual((status["sonars"][0]["figures"]["pings"], status["sonars"][0]["clients"]), ("0", []))
+            with Client(daemon.address) as client:
+                client.send(fire_message())
+                self.assertEqual(client.ping().id, 1, "a driver's first ping")
+                self.assertFalse(Steering.parameters(viewer, "now", "/front/preview")["/front/preview"])
+                self.assertEqual(Steering.set(viewer, "/front/preview", True), False)
+                self.assertTrue(self.numbers(viewer, 2))
+            events = [viewer.decode(topic, payload) for topic, _, payload in viewer.messages if topic == "/front/ping"]
+            self.assertEqual([e["number"] for e in events if not e.get("preview")][0], 1)
+            self.assertIn("preview ends", daemon.log())
+
+    def test_ends_with_its_viewer(self):
+        with Sonard(control=ORIGINS) as daemon, Viewer(daemon.address) as viewer:
+            viewer.greeted().subscribe("/front/ping", "/status")
+            with Viewer(daemon.address, headers={"Origin": "https://look.example"}) as looker:
+                self.assertEqual(Steering.set(looker.greeted(), "/front/preview", True), False)
+            with Viewer(daemon.address) as other:
+                self.assertEqual(Steering.set(other.greeted(), "/front/preview", True), True)
+                self.assertTrue(self.numbers(viewer, 2))
+            time.sleep(0.5)
+            self.numbers(viewer, 1)
+            self.assertEqual(self.numbers(viewer, 1), [])
+
+    def test_only_in_real_time(self):
+        with Sonard(arguments=["--clock", "stepped"]) as daemon, Viewer(daemon.address) as viewer:
+            self.assertNotIn("/front/preview", Steering.parameters(viewer.greeted()))
+            self.assertIsNone(Steering.set(viewer, "/front/preview", True))
+
+
 class Limits(unittest.TestCase):
     def test_eight_viewers_and_no_more(self):
         with Sonard() as daemon, contextlib.ExitStack() as stack:

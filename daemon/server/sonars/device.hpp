@@ -14,6 +14,7 @@
 #include "core/base/result.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/sonar/sonar.hpp"
+#include "daemon/emulator/view/preview.hpp"
 #include "daemon/server/connections/listener.hpp"
 #include "daemon/server/engine/simulator.hpp"
 #include "daemon/server/recording/recording_file.hpp"
@@ -88,6 +89,8 @@ class Device final : public SessionParent {
 
   bool gone() const;  // after stop(): nothing is left
   const Sonar& sonar() const { return sonar_; }
+  Preview& preview() { return preview_; }
+  const Preview& preview() const { return preview_; }
   const SonarConfig& config() const { return sonar_.config(); }
   DeviceFigures figures() const { return sonar_.figures(); }
   std::vector<StreamDigest> digests() const;
@@ -172,6 +175,7 @@ class Device final : public SessionParent {
   DeviceParent& parent_;
   const LimitConfig& limits_;
   Sonar sonar_;
+  Preview preview_;
   std::list<TcpPort> tcp_ports_;
   Listener observer_listener_;
   Beacon beacon_;

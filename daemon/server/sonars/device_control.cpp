@@ -48,6 +48,7 @@ v1::SonarStatus Device::status(Time now) const {
   control::set_pose(s, sonar_.pose_at(now));
   if (observer_listener_.at().port != 0) s.set_observers(text_of(observer_listener_.at()));
   s.set_observing(static_cast<std::uint32_t>(sonar_.connections().observers()));
+  s.set_preview(preview_.on());
   for (const Connection& c : sonar_.connections().all()) {
     if (c.role != Role::client || c.state != Connection::State::served) continue;
     const SessionPointer session = session_of(c.id);
@@ -74,6 +75,7 @@ v1::PingEvent Device::event_of(const PingQueued& queued) const {
   e.set_rows(static_cast<std::uint32_t>(r.settings.range_bin_count));
   e.set_clients(static_cast<std::uint32_t>(sonar_.connections().clients()));
   e.set_simulation_ms(ms(queued.simulation_s));
+  e.set_preview(queued.preview);
   return e;
 }
 

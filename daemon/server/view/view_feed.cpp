@@ -144,6 +144,14 @@ ViewPayloadPointer ViewFeed::current(std::uint32_t channel) {
   return nullptr;
 }
 
+std::weak_ptr<ViewConnection> ViewFeed::connection_of(const Viewer& viewer) const {
+  std::weak_ptr<ViewConnection> found;
+  each([&](ViewConnection& c) {
+    if (&c.viewer() == &viewer) found = c.weak_from_this();
+  });
+  return found;
+}
+
 bool ViewFeed::wanted(std::uint32_t channel) const {
   return std::any_of(connections_.begin(), connections_.end(), [channel](const std::weak_ptr<ViewConnection>& weak) {
     const auto connection = weak.lock();
@@ -250,6 +258,7 @@ void ViewFeed::tick() {
     return !connection || connection->over();
   });
   for (const std::string& who : gone) of_.log.info("viewer gone", {{"from", who}});
+  drive_previews();
   if (connections_.empty()) {
     of_.fleet.tap_pings({});
     for (SonarView& sonar : sonars_) sonar.last.reset();

@@ -80,6 +80,10 @@ class ViewFeed final : public ViewerHost {
   };
 
   void on_ping(const Device& of, const PingQueued& queued);
+  std::string set_preview(Viewer& viewer, Device& device, bool on);
+  void end_preview(Device& device, const std::string& why);
+  void drive_previews();
+  void on_preview(const std::string& sonar, const PingOutcome& outcome);
   void make_slowly(SonarView& sonar, Slow SonarView::*which, Make make);
   void begin_slow_ones(SonarView& sonar);
   void on_log(LogLevel level, const std::string& line, const std::vector<LogField>& fields);
@@ -92,6 +96,7 @@ class ViewFeed final : public ViewerHost {
   void remove(const SonarView& sonar);
   SonarView* find(const std::string& name);
   bool wanted(std::uint32_t channel) const;
+  std::weak_ptr<ViewConnection> connection_of(const Viewer& viewer) const;
   void offer(std::uint32_t channel, const ViewPayloadPointer& payload);
   std::string server_info(const Viewer& viewer) const;
   ViewPayloadPointer places() const;
@@ -101,6 +106,8 @@ class ViewFeed final : public ViewerHost {
   void push_parameters();
   static std::string services_word();
   ViewPayloadPointer current(std::uint32_t channel);
+  /// Empty, or why not; nothing: it is no parameter of the view's own.
+  std::optional<std::string> set_own(Viewer& viewer, const foxglove::Parameter& wanted);
   template <class Visit>
   void each(Visit visit) const {
     for (const auto& weak : connections_)
@@ -113,6 +120,7 @@ class ViewFeed final : public ViewerHost {
   std::map<std::uint32_t, ViewChannel> channels_;
   std::uint32_t last_channel_ = 0, tf_ = 0, scene_ = 0, swath_ = 0, log_ = 0, status_ = 0, faults_ = 0;
   std::list<SonarView> sonars_;
+  std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // who asked, by sonar
   SceneShapes shapes_;
   std::deque<ViewPayloadPointer> lines_;
   ViewPayloadPointer faults_said_;

@@ -43,7 +43,7 @@ double gain_percent(const Device& device) {
   return blueview::gain_percent_from(static_cast<double>(device.sonar().settings().gain_db));
 }
 
-void add_sonar(std::vector<Parameter>& all, const Device& device) {
+void add_sonar(std::vector<Parameter>& all, const Device& device, bool has_preview) {
   const PingSettings& s = device.sonar().settings();
   const std::string at = "/" + device.config().name + "/";
   all.push_back({at + "range_m", s.range_m});
@@ -52,6 +52,7 @@ void add_sonar(std::vector<Parameter>& all, const Device& device) {
   all.push_back({at + "mode", std::int64_t{s.mode}});
   all.push_back({at + "beams", std::int64_t{s.beam_count}});
   all.push_back({at + "transmit", device.sonar().transmits()});
+  if (has_preview) all.push_back({at + "preview", device.preview().on()});
 }
 
 void add_trajectory(std::vector<Parameter>& all, const std::string& name, const std::optional<World::Played>& played, Time now) {
@@ -158,7 +159,7 @@ Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSou
 std::vector<Parameter> parameters_of(const ParameterSource& of) {
   const Time now = of.clock.now();
   std::vector<Parameter> all;
-  for (const Device& device : of.fleet.devices()) add_sonar(all, device);
+  for (const Device& device : of.fleet.devices()) add_sonar(all, device, !of.clock.stepped());
   all.push_back({"/water/temperature_c", of.config.water.temperature_c});
   all.push_back({"/water/salinity_psu", of.config.water.salinity_psu});
   all.push_back({"/water/ph", of.config.water.ph});

@@ -52,7 +52,18 @@ std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer&, const std::
   return all;
 }
 
+std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Parameter& wanted) {
+  for (Device& device : of_.fleet.devices()) {
+    if (wanted.name != "/" + device.config().name + "/preview") continue;
+    const bool* const on = std::get_if<bool>(&wanted.value);
+    if (of_.clock.stepped()) return "there is a preview with clock: realtime only";
+    return on == nullptr ? "takes true or false" : set_preview(viewer, device, *on);
+  }
+  return std::nullopt;
+}
+
 std::string ViewFeed::set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) {
+  if (auto own = set_own(viewer, wanted)) return *std::move(own);
   const auto operation = operation_of(wanted, source());
   if (!operation) return operation.error().text;
   const auto why = std::make_shared<std::string>();
@@ -84,12 +95,8 @@ void ViewFeed::call(Viewer& viewer, const foxglove::ServiceCall& call) {
   if (call.service == 0 || call.service > service_table.size()) return viewer.fail(call, "there is no such service");
   auto request = control::request_from_json(service_table[call.service - 1].op, call.payload);
   if (!request) return viewer.fail(call, request.error().text);
-  std::weak_ptr<ViewConnection> from;
-  each([&](ViewConnection& c) {
-    if (&c.viewer() == &viewer) from = c.weak_from_this();
-  });
   std::visit(
-      [&](auto operation) {
+      [&, from = connection_of(viewer)](auto operation) {
         if constexpr (std::is_constructible_v<control::Operation, decltype(operation)>)
           of_.operations.perform(std::move(operation), sender_of(viewer), [from, call](const OperationResult& result) {
             const auto connection = from.lock();
