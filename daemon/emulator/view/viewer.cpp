@@ -30,8 +30,12 @@ wire::Bytes Viewer::bytes_of(std::string_view text) {
 
 void Viewer::on_text(std::string_view text, Moment now) {
   if (!has_room_for_message(now)) return;
-  const auto word = foxglove::word_of_viewer(text);
+  std::string stray;
+  const auto word = foxglove::word_of_viewer(text, &stray);
   if (!word) return complain(word.error().text);
+  const bool is_read =
+      !std::holds_alternative<foxglove::UnknownWord>(*word) && !std::holds_alternative<foxglove::Incapable>(*word);
+  if (is_read && !stray.empty()) say_ignored("fields such as \"" + stray + "\" are ignored");
   std::visit([&](const auto& said) { on_word(said, now); }, *word);
 }
 
@@ -119,8 +123,12 @@ void Viewer::on_word(const foxglove::Incapable& word, Moment) {
 }
 
 void Viewer::on_word(const foxglove::UnknownWord& word, Moment) {
-  if (!std::exchange(said_unknown_, true))
-    say_status(foxglove::StatusLevel::warning, "operations such as \"" + word.op + "\" are ignored");
+  say_ignored("operations such as \"" + word.op + "\" are ignored");
+}
+
+/// Once a connection.
+void Viewer::say_ignored(const std::string& what) {
+  if (!std::exchange(said_unknown_, true)) say_status(foxglove::StatusLevel::warning, what);
 }
 
 // ---- from the host

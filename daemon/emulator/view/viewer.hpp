@@ -142,6 +142,7 @@ class Viewer {
   void add_word(ViewMessage word);
   bool has_room_for_message(Moment now);
   void complain(const std::string& why);
+  void say_ignored(const std::string& what);
   void on_word(const foxglove::Subscribe& word, Moment);
   void on_word(const foxglove::Unsubscribe& word, Moment);
   void on_word(const foxglove::GetParameters& word, Moment);

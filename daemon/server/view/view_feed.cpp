@@ -24,6 +24,11 @@ constexpr int nice_by = 5;
 
 const Sender ourselves{"live view", "live view"};
 
+void advertise(Viewer& viewer, std::span<const foxglove::Channel> channels) {
+  for (std::size_t at = 0; at < channels.size(); at += most_advertised)
+    viewer.greet(foxglove::advertise(channels.subspan(at, std::min(most_advertised, channels.size() - at))));
+}
+
 }  // namespace
 
 ViewFeed::ViewFeed(const Viewed& of) : of_(of), timer_(of.io) {
@@ -65,8 +70,7 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
   if (of_.clock.stepped()) viewer.say_frame(foxglove::time_frame(of_.clock.now()));
   std::vector<foxglove::Channel> channels;
   for (const auto& [id, channel] : channels_) channels.push_back(channel.advertised);
-  for (std::size_t at = 0; at < channels.size(); at += most_advertised)
-    viewer.greet(foxglove::advertise(std::span(channels).subspan(at, std::min(most_advertised, channels.size() - at))));
+  advertise(viewer, channels);
   viewer.greet(services_word());
   of_.fleet.tap_pings([this](const Device& of, const PingQueued& queued) { on_ping(of, queued); });
   of_.log.info("viewer connected", {{"from", viewer.who()}, {"steers", viewer.may_steer() ? "yes" : "no"}});
@@ -207,7 +211,11 @@ void ViewFeed::sync_sonars() {
     sonars_.push_back(std::move(sonar));
     for (std::uint32_t id = before + 1; id <= last_channel_; ++id) added.push_back(channels_.at(id).advertised);
   }
-  if (!added.empty()) each([&](ViewConnection& c) { c.viewer().say(foxglove::advertise(added)); });
+  if (added.empty()) return;
+  each([&](ViewConnection& c) {
+    advertise(c.viewer(), added);
+    c.wake();
+  });
 }
 
 void ViewFeed::remove(const SonarView& sonar) {

@@ -214,6 +214,30 @@ TEST_F(OneViewer, TimeAtMostThirtyTimesASecondAndTheLastAlways) {
   EXPECT_EQ(viewer.next(now)->head, foxglove::time_frame(Time(milliseconds(3))));
 }
 
+TEST_F(OneViewer, StrayFieldsAndOperationsAreIgnoredWithOneWarning) {
+  say(R"({"op": "getParameters", "parameterNames": [], "id": "x", "colour": 1})");
+  EXPECT_EQ(next_word()["message"], "fields such as \"colour\" are ignored");
+  EXPECT_EQ(next_word()["op"], "parameterValues");
+  say(R"({"op": "unsubscribe", "subscriptionIds": [], "shape": 1})");
+  say(R"({"op": "dance", "with": "me"})");
+  EXPECT_EQ(next_word(), json());
+}
+
+TEST_F(OneViewer, SubscriptionsAndParametersAreCounted) {
+  for (std::uint32_t id = 1000; id < 1300; ++id) host.channels[id] = {{id, "/x", "protobuf", {}}, Kind::event, 0};
+  for (std::uint32_t id = 1000; id < 1256; ++id, now += milliseconds(10)) subscribe(id);
+  EXPECT_EQ(next_word(), json()) << "256 are taken";
+  subscribe(1256);
+  EXPECT_EQ(next_word()["message"], "more than 256 subscriptions");
+  std::string names;
+  for (int i = 0; i < 65; ++i) names += (i == 0 ? "\"a\"" : ", \"a\"");
+  say(R"({"op": "getParameters", "parameterNames": [)" + names + "]}");
+  EXPECT_EQ(next_word()["message"], "more than 64 parameters in one request");
+  say(std::string(17, '[') + std::string(17, ']'));
+  EXPECT_EQ(next_word()["message"], "JSON nested deeper than 16");
+  EXPECT_EQ(viewer.close_code(), Viewer::CloseCode::none);
+}
+
 TEST_F(OneViewer, NoiseEndsTheConnection) {
   for (int i = 0; i < 9; ++i) say("nonsense");
   EXPECT_EQ(viewer.close_code(), Viewer::CloseCode::none);
