@@ -118,7 +118,7 @@ class Viewer:
         self.send_frame(1, json.dumps(word).encode())
 
     def receive(self):
-        """Files the next message; ("word", dict), ("message", (topic, ns, bytes)), ("time", ns) or ("answer", ...)."""
+        """Files the next message; ("word", dict), ("message", (topic, ns, bytes)), ("time", ns), ("playback", dict) or ("answer", ...)."""
         is_text, payload = self.frame()
         if is_text:
             word = json.loads(payload.decode())
@@ -142,6 +142,11 @@ class Viewer:
             assert len(payload) == 9
             self.times.append(struct.unpack_from("<Q", payload, 1)[0])
             return "time", self.times[-1]
+        if payload[0] == 5:
+            state, ns, speed, did_seek, length = struct.unpack_from("<BQfBI", payload, 1)
+            assert len(payload) == 19 + length, payload
+            return "playback", {"state": ("playing", "paused", "buffering", "ended")[state], "ns": ns, "speed": speed, "did_seek": did_seek,
+                                "request": payload[19:].decode()}
         assert payload[0] == 3, payload[:1]
         service, call, length = struct.unpack_from("<III", payload, 1)
         return "answer", (service, call, payload[13:13 + length].decode(), payload[13 + length:])

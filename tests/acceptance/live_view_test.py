@@ -252,6 +252,9 @@ class Steering(unittest.TestCase):
             self.assertEqual(self.set(viewer, "/front/range_m", 5000), 5)
             self.assertEqual(self.set(viewer, "/front/range_m", "far"), 5)
             self.assertEqual(self.set(viewer, "/front/mode", 1.5), values["/front/mode"])
+            self.assertEqual(self.set(viewer, "/front/view/cloud_threshold", 0.9), 0.9)
+            self.assertEqual(self.set(viewer, "/front/view/cloud_threshold", 1.5), 0.9)
+            self.assertEqual(self.parameters(other, "own", "/front/view/cloud_threshold")["/front/view/cloud_threshold"], 0.35)
             self.assertIsNone(self.set(viewer, "/front/nothing", 1))
             self.assertEqual(self.set(viewer, "/clock/mode", "stepped"), "realtime")
             self.assertIsNone(self.set(viewer, "/faults/power_cycle", 5))
@@ -336,6 +339,81 @@ class Preview(unittest.TestCase):
         with Sonard(arguments=["--clock", "stepped"]) as daemon, Viewer(daemon.address) as viewer:
             self.assertNotIn("/front/preview", Steering.parameters(viewer.greeted()))
             self.assertIsNone(Steering.set(viewer, "/front/preview", True))
+
+
+def follows_file(loop=False):
+    """Ten seconds straight ahead."""
+    daemon = Sonard(trajectory=f"{{file: ahead.tum, loop: {str(loop).lower()}}}", control=ORIGINS)
+    lines = ["# frame: ENU_FLU", "100 -7 0 -3 0 0 0 1", "110 -6 0 -3 0 0 0 1"]
+    (pathlib.Path(daemon.folder.name) / "ahead.tum").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return daemon
+
+
+class Playback(unittest.TestCase):
+    S = 10**9
+
+    @staticmethod
+    def control(viewer, request, pause=False, speed=1.0, to_ns=None):
+        viewer.send_frame(2, struct.pack("<BBfBQI", 3, pause, speed, to_ns is not None, to_ns or 0, len(request)) + request.encode())
+        return viewer.wait_for(lambda kind, value: kind == "playback" and value["request"] == request)
+
+    def test_a_trajectory_is_played_as_a_recording(self):
+        with follows_file() as daemon, Viewer(daemon.address, path="/?playback=rov") as viewer, \
+                Viewer(daemon.address, path="/?playback=rov") as other, Viewer(daemon.address) as plain:
+            for each in (viewer, other):
+                each.greeted()
+                self.assertTrue({"playbackControl", "time"} <= set(each.info["capabilities"]))
+            end_ns = viewer.info["dataEndTime"]["sec"] * self.S + viewer.info["dataEndTime"]["nsec"]
+            self.assertEqual(viewer.info["dataStartTime"], {"sec": 0, "nsec": 0})
+            self.assertNotIn("playbackControl", plain.greeted().info["capabilities"])
+            viewer.wait_for(lambda kind, value: kind == "playback" and value["state"] == "playing")
+            viewer.wait_for(lambda kind, value: kind == "time" and value <= end_ns)
+
+            paused = self.control(viewer, "a", pause=True, speed=1.5, to_ns=3 * self.S)
+            self.assertEqual(paused, {"state": "paused", "ns": 3 * self.S, "speed": 1.5, "did_seek": 1, "request": "a"})
+            told = other.wait_for(lambda kind, value: kind == "playback" and value["state"] == "paused")
+            self.assertEqual((told["ns"], told["did_seek"], told["request"]), (3 * self.S, 1, ""))
+            for speed in (0.0, -1.0, 2000.0, float("nan"), float("inf")):
+                self.assertEqual(self.control(viewer, "b", pause=True, speed=speed)["speed"], 1.5)
+                self.assertIn("speed", viewer.words[-1]["message"])
+            self.assertEqual(self.control(viewer, "c", pause=True, to_ns=2**62)["ns"], end_ns)
+            self.control(viewer, "d", pause=True, to_ns=3 * self.S)
+
+            # What others steer is told; stamps are the trajectory's.
+            self.assertEqual(Steering.set(plain, "/rov/trajectory/position_s", 5), 5)
+            moved = viewer.wait_for(lambda kind, value: kind == "playback" and value["request"] == "")
+            self.assertEqual((moved["ns"], moved["did_seek"]), (5 * self.S, 1))
+            viewer.wait_for(lambda kind, value: kind == "time" and value == 5 * self.S)
+            viewer.subscribe("/front/image", "/tf", "/status", "/front/figures", "/front/ping")
+            with Client(daemon.address) as client:
+                client.send(fire_message())
+                image = viewer.first_of("/front/image")
+                self.assertEqual(image["timestamp"], {"seconds": 5})
+                self.assertEqual(int(viewer.first_of("/front/ping")["fired_at_ns"]), 5 * self.S)
+                self.assertEqual(int(viewer.first_of("/status")["now_ns"]), 5 * self.S)
+                figures = viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/figures")
+                self.assertEqual((figures[1], struct.unpack_from("<d", figures[2], 4)[0]), (5 * self.S, 5.0))
+                plain.subscribe("/front/image")
+                self.assertGreater(plain.first_of("/front/image")["timestamp"]["seconds"], 10**9)
+            self.assertTrue(all(ns == 5 * self.S for topic, ns, _ in viewer.messages if topic == "/front/image"))
+
+    def test_rounds_and_rights(self):
+        with follows_file(loop=True) as daemon:
+            with Viewer(daemon.address, path="/?playback=rov", headers={"Origin": "https://look.example"}) as looker:
+                looker.greeted()
+                self.assertEqual(self.control(looker, "x", pause=True)["state"], "playing")
+                self.assertIn("may only look", looker.words[-1]["message"])
+            with Viewer(daemon.address, path="/?playback=nothing") as viewer:
+                self.assertIn("nothing", viewer.greeted().status()["message"])
+                self.assertNotIn("playbackControl", viewer.info["capabilities"])
+                viewer.send_frame(2, struct.pack("<BBfBQI", 3, 0, 1.0, 0, 0, 0))
+                self.assertIn("playbackControl", viewer.status()["message"])
+            with Viewer(daemon.address, path="/?playback=rov") as viewer:
+                viewer.greeted()
+                end_ns = viewer.info["dataEndTime"]["sec"] * self.S + viewer.info["dataEndTime"]["nsec"]
+                self.control(viewer, "near the end", to_ns=end_ns - self.S)
+                round_ = viewer.wait_for(lambda kind, value: kind == "playback" and value["did_seek"] and not value["request"])
+                self.assertLess(round_["ns"], self.S)
 
 
 class Limits(unittest.TestCase):

@@ -43,10 +43,13 @@ void Viewer::on_binary(wire::BytesView frame, Moment now) {
   if (!has_room_for_message(now)) return;
   const auto read = foxglove::frame_of_viewer(frame);
   if (!read) return complain(read.error().text);
+  if (const auto* playback = std::get_if<foxglove::PlaybackControl>(&*read)) {
+    if (!host_.steer_playback(*this, *playback)) complain("playbackControl is not among the capabilities of this connection");
+    return;
+  }
   const auto* call = std::get_if<foxglove::ServiceCall>(&*read);
-  if (call == nullptr) return complain("playbackControl is not among the capabilities of this connection");
   ++open_calls_;
-  if (!rights_.may_steer) return fail(*call, "this connection may only look");
+  if (!rights_.may_steer) return fail(*call, may_only_look);
   if (open_calls_ > most_calls) return fail(*call, "4 calls are open already");
   if (call->encoding != "json") return fail(*call, "the encoding of services is json");
   host_.call(*this, *call);
@@ -99,7 +102,7 @@ void Viewer::on_word(const foxglove::SetParameters& word, Moment now) {
   std::vector<std::string> names;
   for (const foxglove::Parameter& wanted : word.parameters) {
     names.push_back(wanted.name);
-    const std::string why = rights_.may_steer ? host_.set_parameter(*this, wanted) : "this connection may only look";
+    const std::string why = rights_.may_steer ? host_.set_parameter(*this, wanted) : may_only_look;
     if (!why.empty()) say_for_now(wanted.name + ": " + why, "param:" + wanted.name, now, refusal_is_said_for);
   }
   if (!names.empty()) say(foxglove::parameter_values(host_.parameters(*this, names), word.request));

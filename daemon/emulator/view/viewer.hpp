@@ -15,6 +15,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "protocol/foxglove/foxglove_frames.hpp"
@@ -72,6 +73,8 @@ class ViewerHost {
   virtual std::vector<foxglove::Parameter> parameters(const Viewer& viewer, const std::vector<std::string>& names) = 0;
   /// Empty, or why not.
   virtual std::string set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) = 0;
+  /// Answers with its state. False: the viewer looks at no trajectory.
+  virtual bool steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) = 0;
   /// Answers with Viewer::answer() or fail(), now or later.
   virtual void call(Viewer& viewer, const foxglove::ServiceCall& call) = 0;
 };
@@ -85,6 +88,7 @@ class Viewer {
     double most_hz = 0;  // of pictures; 0 = no bound
   };
   enum class CloseCode : std::uint16_t { none = 0, policy = 1008, try_again_later = 1013 };
+  static constexpr const char* may_only_look = "this connection may only look";
   static constexpr std::size_t most_subscriptions = 256, most_words = 256, most_word_bytes = std::size_t{1} << 20, most_calls = 4;
 
   /// `who` = its address, for the log.
@@ -116,12 +120,24 @@ class Viewer {
   /// Of channels that are gone.
   void forget(std::uint32_t channel);
   /// The daemon's time, at most 30 times a second, the last one always.
-  void set_time(Time now) { time_ = now; }
+  void set_time(Time now) {
+    if (std::exchange(newest_time_, now) != now) time_ = now;
+  }
   void answer(const foxglove::ServiceCall& answer);
   void fail(const foxglove::ServiceCall& call, const std::string& why);
   /// Those it watches of what has changed.
   void on_parameters(std::span<const foxglove::Parameter> changed);
   bool watches_parameters() const { return watches_all_ || !watched_.empty(); }
+
+  /// It looks at the trajectory of this vehicle, in the trajectory's time; empty = at none.
+  void play(std::string vehicle) { playback_ = std::move(vehicle); }
+  const std::string& playback() const { return playback_; }
+  /// Parameters of this connection alone.
+  void choose(const std::string& parameter, double value) { choices_[parameter] = value; }
+  double choice(const std::string& parameter, double usual) const {
+    const auto found = choices_.find(parameter);
+    return found == choices_.end() ? usual : found->second;
+  }
 
   bool may_steer() const { return rights_.may_steer; }
   const std::string& who() const { return who_; }
@@ -155,12 +171,13 @@ class Viewer {
 
   ViewerHost& host_;
   Rights rights_;
-  std::string who_;
+  std::string who_, playback_;
+  std::map<std::string, double> choices_;
   std::deque<ViewMessage> words_;
   std::size_t word_bytes_ = 0;
   std::map<std::uint32_t, Slot> slots_;  // by subscription
   std::map<std::uint32_t, std::uint64_t> dropped_;
-  std::optional<Time> time_;
+  std::optional<Time> time_, newest_time_;
   std::optional<Moment> time_sent_, slow_since_, allowance_at_;
   std::map<std::string, Moment> passing_;  // statuses that go by themselves
   std::set<std::string> watched_;

@@ -122,6 +122,7 @@ std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
     if (!number || !(*number > 0 && *number <= 1000)) return turned_away(400, "max_hz must be a number above 0, at most 1000");
     welcome.most_hz = *number;
   }
+  welcome.playback = value_of(query, "playback");
 
   welcome.may_steer = true;
   if (shows_secret(request, query, door, now)) return welcome;

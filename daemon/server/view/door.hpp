@@ -42,7 +42,8 @@ class ViewSecrets {
 struct ViewWelcome {
   std::string protocol;  // the one agreed upon
   bool may_steer = false;
-  double most_hz = 0;  // of pictures, as the viewer asked; 0 = no bound
+  double most_hz = 0;    // of pictures, as the viewer asked; 0 = no bound
+  std::string playback;  // the vehicle whose trajectory it looks at, as it asked; empty = none
 };
 struct ViewDoor {
   const Token& token;

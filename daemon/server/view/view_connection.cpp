@@ -64,6 +64,7 @@ ViewConnection::ViewConnection(ConnectionServices& services, HttpConnection& fro
       request_(request),
       protocol_(welcome.protocol),
       address_(from.sender().source),
+      playback_(welcome.playback),
       on_open_(std::move(on_open)),
       viewer_(host, {welcome.may_steer, welcome.most_hz}, from.sender().source),
       socket_(std::make_unique<Socket>(Watched{from.socket(), moved_at_})),

@@ -32,6 +32,8 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   bool over() const { return over_; }
   /// With its port: of no other viewer.
   const std::string& address() const { return address_; }
+  /// The vehicle whose trajectory it asked to look at; empty = none.
+  const std::string& playback() const { return playback_; }
   /// The viewer has something to write.
   void wake() { wake_.cancel(); }
 
@@ -45,7 +47,7 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   ConnectionServices& services_;
   HttpConnection& from_;
   HttpRequest request_;
-  std::string protocol_, address_;
+  std::string protocol_, address_, playback_;
   std::function<void(const std::shared_ptr<ViewConnection>&)> on_open_;
   Viewer viewer_;
   std::unique_ptr<Socket> socket_;

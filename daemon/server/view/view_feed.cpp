@@ -66,15 +66,28 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
   sync_sonars();
   connections_.push_back(connection);
   Viewer& viewer = connection->viewer();
+  const std::string no_playback = begin_playback(viewer, connection->playback());
   viewer.greet(server_info(viewer));
-  if (of_.clock.stepped()) viewer.say_frame(foxglove::time_frame(of_.clock.now()));
+  say_time(viewer);
   std::vector<foxglove::Channel> channels;
   for (const auto& [id, channel] : channels_) channels.push_back(channel.advertised);
   advertise(viewer, channels);
   viewer.greet(services_word());
+  if (!no_playback.empty()) viewer.say_status(foxglove::StatusLevel::warning, no_playback);
+  if (const auto watch = watches_.find(viewer.playback()); watch != watches_.end())
+    viewer.say_frame(foxglove::playback_frame(watch->second.state(of_.clock.now())));
   of_.fleet.tap_pings([this](const Device& of, const PingQueued& queued) { on_ping(of, queued); });
   of_.log.info("viewer connected", {{"from", viewer.who()}, {"steers", viewer.may_steer() ? "yes" : "no"}});
   arm();
+}
+
+/// At once, where the time of arrival is not the viewer's time.
+void ViewFeed::say_time(Viewer& viewer) const {
+  const Time now = of_.clock.now();
+  if (const auto watch = watches_.find(viewer.playback()); watch != watches_.end())
+    viewer.say_frame(foxglove::time_frame(watch->second.stamp(now)));
+  else if (of_.clock.stepped())
+    viewer.say_frame(foxglove::time_frame(now));
 }
 
 bool ViewFeed::is_full() const {
@@ -100,7 +113,12 @@ std::string ViewFeed::server_info(const Viewer& viewer) const {
   foxglove::ServerInfo info;
   info.name = "sonard " SONARD_VERSION;
   info.capabilities = {"parameters", "parametersSubscribe", "services"};
-  if (of_.clock.stepped()) info.capabilities.emplace_back("time");
+  const auto watch = watches_.find(viewer.playback());
+  if (of_.clock.stepped() || watch != watches_.end()) info.capabilities.emplace_back("time");
+  if (watch != watches_.end()) {
+    info.capabilities.emplace_back("playbackControl");
+    info.data = {Time{}, watch->second.end()};
+  }
   info.metadata = {{"sonard.version", SONARD_VERSION},
                    {"sonard.config", of_.config.source},
                    {"sonard.scene", of_.config.scene.name()},
@@ -116,18 +134,16 @@ const ViewChannel* ViewFeed::channel(std::uint32_t id) const {
 }
 
 void ViewFeed::on_subscribed(Viewer& viewer, std::uint32_t channel) {
-  const auto now = ViewConnection::now();
-  if (channel == log_) {
-    for (const ViewPayloadPointer& line : lines_) viewer.offer(log_, line, now);
-  } else if (const ViewPayloadPointer payload = current(channel)) {
-    viewer.offer(channel, payload, now);
-  }
+  if (channel == log_)
+    for (const ViewPayloadPointer& line : lines_) give(viewer, log_, line);
+  else
+    give(viewer, channel, current(viewer, channel));
   for (SonarView& sonar : sonars_)
     if (channel == sonar.fan.channel || channel == sonar.cloud.channel) begin_slow_ones(sonar);
 }
 
 /// What newcomers get; null = nothing.
-ViewPayloadPointer ViewFeed::current(std::uint32_t channel) {
+ViewPayloadPointer ViewFeed::current(const Viewer& viewer, std::uint32_t channel) {
   if (channel == tf_) return places();
   if (channel == status_) return status();
   if (channel == faults_) return faults();
@@ -142,8 +158,9 @@ ViewPayloadPointer ViewFeed::current(std::uint32_t channel) {
     if (!sonar.last) continue;
     if (channel == sonar.image) return image_payload(sonar.name, sonar.last);
     if (channel == sonar.geometry) return geometry_payload(*sonar.last);
-    if (channel == sonar.fan.channel) return sonar.fan.last;
-    if (channel == sonar.cloud.channel) return sonar.cloud.last;
+    for (const Slow* slow : {&sonar.fan, &sonar.cloud})
+      if (channel == slow->channel)
+        if (const auto made = slow->made.find(threshold_of(viewer, *slow)); made != slow->made.end()) return made->second;
   }
   return nullptr;
 }
@@ -165,12 +182,18 @@ bool ViewFeed::wanted(std::uint32_t channel) const {
 
 void ViewFeed::offer(std::uint32_t channel, const ViewPayloadPointer& payload) {
   if (payload == nullptr) return;
-  const auto now = ViewConnection::now();
   each([&](ViewConnection& connection) {
-    connection.viewer().offer(channel, payload, now);
+    give(connection.viewer(), channel, payload);
     connection.wake();
   });
 }
+
+void ViewFeed::give(Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) {
+  if (payload != nullptr && viewer.subscribes(channel))
+    viewer.offer(channel, in_time_of(viewer, channel, payload), ViewConnection::now());
+}
+
+void ViewFeed::give(Viewer& viewer, const Slow& slow) { give(viewer, slow.channel, current(viewer, slow.channel)); }
 
 // ---- channels
 
@@ -205,6 +228,7 @@ void ViewFeed::sync_sonars() {
     sonar.ping = add_channel("/" + name + "/ping", "sonar.v1.PingEvent", ChannelKind::event, ping_hz);
     sonar.fan.channel = add_channel("/" + name + "/fan", "foxglove.RawImage", ChannelKind::picture, fan_hz);
     sonar.cloud.channel = add_channel("/" + name + "/cloud", "foxglove.PointCloud", ChannelKind::picture, cloud_hz);
+    sonar.cloud.threshold = "/" + name + "/view/cloud_threshold";
     sonar.figures = add_channel("/" + name + "/figures", "", ChannelKind::event, ping_hz);
     channels_.at(sonar.figures).advertised.encoding = "cdr";
     channels_.at(sonar.figures).advertised.schema = foxglove::figures_schema();
@@ -228,7 +252,7 @@ void ViewFeed::remove(const SonarView& sonar) {
     c.viewer().say(foxglove::unadvertise(gone));
     c.viewer().say(server_info(c.viewer()));
     // Viewers forget what they had.
-    if (of_.clock.stepped()) c.viewer().set_time(of_.clock.now());
+    say_time(c.viewer());
     for (const auto& [id, channel] : channels_)
       if (id != log_ && c.viewer().subscribes(id)) on_subscribed(c.viewer(), id);
     c.wake();
@@ -277,9 +301,10 @@ void ViewFeed::tick() {
   const Time now = of_.clock.now();
   if (of_.clock.stepped() && std::exchange(told_, now) != now)
     each([now](ViewConnection& c) {
-      c.viewer().set_time(now);
+      if (c.viewer().playback().empty()) c.viewer().set_time(now);
       c.wake();
     });
+  watch_playback();
   for (SonarView& sonar : sonars_) begin_slow_ones(sonar);
   if (wanted(scene_)) {
     SceneShapes::Job job;

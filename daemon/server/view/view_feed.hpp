@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/config/config.hpp"
+#include "daemon/emulator/view/playback_watch.hpp"
 #include "daemon/emulator/view/viewer.hpp"
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/operations.hpp"
@@ -39,6 +40,7 @@ struct Viewed {
 class ViewFeed final : public ViewerHost {
  public:
   static constexpr std::size_t lines_kept = 100;
+  static constexpr double usual_threshold = 0.35;  // of a cloud, part of the full scale
 
   explicit ViewFeed(const Viewed& of);
   /// Waits for the picture being made.
@@ -58,22 +60,25 @@ class ViewFeed final : public ViewerHost {
   void on_subscribed(Viewer& viewer, std::uint32_t channel) override;
   std::vector<foxglove::Parameter> parameters(const Viewer& viewer, const std::vector<std::string>& names) override;
   std::string set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) override;
+  bool steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) override;
   void call(Viewer& viewer, const foxglove::ServiceCall& call) override;
 
  private:
   using Steady = std::chrono::steady_clock;
-  using Make = std::function<ViewPayloadPointer()>;
+  using Make = std::function<ViewPayloadPointer(double threshold)>;
   /// Made on the thread from the newest ping; what it shows may be some pings old.
   struct Slow {
     std::uint32_t channel = 0;
+    std::string threshold = {};  // the parameter that it depends on; empty = on none
     bool under_way = false;
     Steady::time_point begun_at{};
-    ViewPayloadPointer last = nullptr;
+    Time of{Time::min()};                         // the ping's
+    std::map<double, ViewPayloadPointer> made{};  // by threshold
   };
   struct SonarView {
     std::string name;
     std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0;
-    Slow fan = {}, cloud = {};
+    Slow fan{}, cloud{};
     std::shared_ptr<const Ping> last = nullptr;
     wire::Bytes shape = {};   // of last, without its number
     std::string volume = {};  // what the swath depends on
@@ -103,9 +108,20 @@ class ViewFeed final : public ViewerHost {
   ViewPayloadPointer status() const;
   ViewPayloadPointer faults() const;
   ParameterSource source() const;
+  std::string perform_at_once(const control::Operation& operation, const Viewer& viewer);
   void push_parameters();
   static std::string services_word();
-  ViewPayloadPointer current(std::uint32_t channel);
+  ViewPayloadPointer current(const Viewer& viewer, std::uint32_t channel);
+  void say_time(Viewer& viewer) const;
+  /// One payload to one viewer.
+  void give(Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload);
+  void give(Viewer& viewer, const Slow& slow);
+  static double threshold_of(const Viewer& viewer, const Slow& slow) { return viewer.choice(slow.threshold, usual_threshold); }
+  // Playback (view_playback.cpp).
+  const motion::Playback* playback_of(const std::string& vehicle) const;
+  std::string begin_playback(Viewer& viewer, const std::string& vehicle);
+  void watch_playback(const Viewer* but = nullptr);
+  ViewPayloadPointer in_time_of(const Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) const;
   /// Empty, or why not; nothing: it is no parameter of the view's own.
   std::optional<std::string> set_own(Viewer& viewer, const foxglove::Parameter& wanted);
   template <class Visit>
@@ -120,6 +136,7 @@ class ViewFeed final : public ViewerHost {
   std::map<std::uint32_t, ViewChannel> channels_;
   std::uint32_t last_channel_ = 0, tf_ = 0, scene_ = 0, swath_ = 0, log_ = 0, status_ = 0, faults_ = 0;
   std::list<SonarView> sonars_;
+  std::map<std::string, PlaybackWatch> watches_;                     // by vehicle that viewers look at
   std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // who asked, by sonar
   SceneShapes shapes_;
   std::deque<ViewPayloadPointer> lines_;

@@ -65,11 +65,6 @@ void add_trajectory(std::vector<Parameter>& all, const std::string& name, const 
 
 // ---- writes
 
-std::optional<double> number_of(const Value& value) {
-  if (const auto* number = std::get_if<double>(&value)) return std::isfinite(*number) ? std::optional(*number) : std::nullopt;
-  if (const auto* whole = std::get_if<std::int64_t>(&value)) return static_cast<double>(*whole);
-  return std::nullopt;
-}
 std::optional<std::uint32_t> count_of(const Value& value) {
   const auto number = number_of(value);
   if (!number || *number < 0 || *number > 1e9 || *number != std::floor(*number)) return std::nullopt;
@@ -155,6 +150,12 @@ Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSou
 }
 
 }  // namespace
+
+std::optional<double> number_of(const Value& value) {
+  if (const auto* number = std::get_if<double>(&value)) return std::isfinite(*number) ? std::optional(*number) : std::nullopt;
+  if (const auto* whole = std::get_if<std::int64_t>(&value)) return static_cast<double>(*whole);
+  return std::nullopt;
+}
 
 std::vector<Parameter> parameters_of(const ParameterSource& of) {
   const Time now = of.clock.now();

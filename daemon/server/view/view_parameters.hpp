@@ -2,6 +2,7 @@
 // it came by HTTP. Their names are listed in docs/live-view.md.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/base/result.hpp"
@@ -21,6 +22,8 @@ struct ParameterSource {
   const Fleet& fleet;
 };
 
+/// Nothing: no finite number.
+std::optional<double> number_of(const foxglove::Value& value);
 /// All, by name. Unset: what has no value now.
 std::vector<foxglove::Parameter> parameters_of(const ParameterSource& of);
 /// What the write asks for; else a sentence (usage).

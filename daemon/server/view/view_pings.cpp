@@ -14,6 +14,7 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   SonarView* const sonar = find(of.config().name);
   if (sonar == nullptr) return;
   const Ping& ping = *queued.ping;
+  watch_playback();
   sonar->last = queued.ping;
   ping_at_ = Steady::now();
   if (wanted(sonar->geometry))
@@ -36,34 +37,42 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
 
 void ViewFeed::begin_slow_ones(SonarView& sonar) {
   if (sonar.last == nullptr) return;
-  make_slowly(sonar, &SonarView::fan, [name = sonar.name, ping = sonar.last] { return fan_payload(name, *ping); });
-  make_slowly(sonar, &SonarView::cloud, [name = sonar.name, ping = sonar.last] { return cloud_payload(name, *ping, 0.35); });
+  make_slowly(sonar, &SonarView::fan, [name = sonar.name, ping = sonar.last](double) { return fan_payload(name, *ping); });
+  make_slowly(sonar, &SonarView::cloud,
+              [name = sonar.name, ping = sonar.last](double threshold) { return cloud_payload(name, *ping, threshold); });
 }
 
-/// Pings that come meanwhile are skipped, but for the last: it is made when this one is done.
+/// Pings that come meanwhile are skipped, but for the last: it is made when this one is done. Once for each threshold.
 void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, Make make) {
   Slow& slow = sonar.*which;
   const auto now = Steady::now();
   const Time at = sonar.last->request.fired_at;
   const double most_hz = channels_.at(slow.channel).most_hz;
-  if (slow.under_way || (slow.last && slow.last->at == at) || now < slow.begun_at + nanoseconds_from(1 / most_hz) ||
-      !wanted(slow.channel))
-    return;
+  if (slow.under_way || now < slow.begun_at + nanoseconds_from(1 / most_hz)) return;
+  std::map<double, ViewPayloadPointer> made;
+  each([&](const ViewConnection& c) {
+    if (c.viewer().subscribes(slow.channel)) made[threshold_of(c.viewer(), slow)];
+  });
+  const auto is_there = [&slow](const auto& one) { return slow.made.contains(one.first); };
+  if (made.empty() || (slow.of == at && std::all_of(made.begin(), made.end(), is_there))) return;
   slow.under_way = true;
   slow.begun_at = now;
-  asio::post(thread_, [this, name = sonar.name, which, make = std::move(make)] {
-    ViewPayloadPointer made;
+  asio::post(thread_, [this, name = sonar.name, which, at, make = std::move(make), made = std::move(made)]() mutable {
     try {
-      made = make();
+      for (auto& [threshold, payload] : made) payload = make(threshold);
     } catch (const std::bad_alloc&) {  // there will be other pings
     }
-    asio::post(of_.io, [this, name, which, made = std::move(made)] {
+    asio::post(of_.io, [this, name, which, at, made = std::move(made)] {
       SonarView* const found = find(name);
       if (found == nullptr || stopping_) return;
       Slow& done = found->*which;
       done.under_way = false;
-      done.last = made;
-      offer(done.channel, made);
+      done.of = at;
+      done.made = made;
+      each([&](ViewConnection& c) {
+        give(c.viewer(), done);
+        c.wake();
+      });
     });
   });
 }

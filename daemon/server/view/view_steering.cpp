@@ -44,8 +44,9 @@ std::string ViewFeed::services_word() {
 
 ParameterSource ViewFeed::source() const { return {of_.config, of_.clock, of_.world, of_.fleet}; }
 
-std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer&, const std::vector<std::string>& names) {
+std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer& viewer, const std::vector<std::string>& names) {
   std::vector<foxglove::Parameter> all = parameters_of(source());
+  for (const SonarView& sonar : sonars_) all.push_back({sonar.cloud.threshold, threshold_of(viewer, sonar.cloud)});
   if (!names.empty())
     std::erase_if(all,
                   [&](const foxglove::Parameter& p) { return std::find(names.begin(), names.end(), p.name) == names.end(); });
@@ -53,6 +54,14 @@ std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer&, const std::
 }
 
 std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Parameter& wanted) {
+  for (SonarView& sonar : sonars_) {
+    if (wanted.name != sonar.cloud.threshold) continue;
+    const auto part = number_of(wanted.value);
+    if (!part || !(*part >= 0 && *part <= 1)) return "takes a number from 0 to 1";
+    viewer.choose(wanted.name, *part);
+    begin_slow_ones(sonar);
+    return "";
+  }
   for (Device& device : of_.fleet.devices()) {
     if (wanted.name != "/" + device.config().name + "/preview") continue;
     const bool* const on = std::get_if<bool>(&wanted.value);
@@ -66,8 +75,13 @@ std::string ViewFeed::set_parameter(Viewer& viewer, const foxglove::Parameter& w
   if (auto own = set_own(viewer, wanted)) return *std::move(own);
   const auto operation = operation_of(wanted, source());
   if (!operation) return operation.error().text;
+  return perform_at_once(*operation, viewer);
+}
+
+/// Empty, or why it was not done.
+std::string ViewFeed::perform_at_once(const control::Operation& operation, const Viewer& viewer) {
   const auto why = std::make_shared<std::string>();
-  of_.operations.perform(*operation, sender_of(viewer), [why](const OperationResult& result) {
+  of_.operations.perform(operation, sender_of(viewer), [why](const OperationResult& result) {
     if (result.code != OperationResult::Code::done) *why = result.text;
   });
   changed_ = true;

@@ -34,11 +34,17 @@ struct FakeHost final : ViewerHost {
     values[wanted.name] = wanted.value;
     return "";
   }
+  bool steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) override {
+    if (viewer.playback().empty()) return false;
+    playback.push_back(asked);
+    return true;
+  }
   void call(Viewer&, const foxglove::ServiceCall& call) override { calls.push_back(call); }
 
   std::map<std::string, foxglove::Value> values{{"/front/range_m", 10.0}};
   std::vector<std::uint32_t> subscribed;
   std::vector<foxglove::ServiceCall> calls;
+  std::vector<foxglove::PlaybackControl> playback;
 };
 
 struct OneViewer : testing::Test {
@@ -207,6 +213,7 @@ TEST_F(OneViewer, HearsOfTheParametersItWatches) {
 TEST_F(OneViewer, TimeAtMostThirtyTimesASecondAndTheLastAlways) {
   viewer.set_time(Time(milliseconds(1)));
   EXPECT_EQ(viewer.next(now)->head, foxglove::time_frame(Time(milliseconds(1))));
+  viewer.set_time(Time(milliseconds(1)));
   viewer.set_time(Time(milliseconds(2)));
   viewer.set_time(Time(milliseconds(3)));
   EXPECT_FALSE(viewer.next(now));
@@ -220,6 +227,17 @@ TEST_F(OneViewer, StrayFieldsAndOperationsAreIgnoredWithOneWarning) {
   EXPECT_EQ(next_word()["op"], "parameterValues");
   say(R"({"op": "unsubscribe", "subscriptionIds": [], "shape": 1})");
   say(R"({"op": "dance", "with": "me"})");
+  EXPECT_EQ(next_word(), json());
+}
+
+TEST_F(OneViewer, OnlyWhoLooksAtATrajectoryPlaysIt) {
+  const foxglove::PlaybackControl asked{.pause = true, .speed = 2, .seeks = false, .to = {}, .request = "1"};
+  viewer.on_binary(foxglove::encode(asked), now);
+  EXPECT_THAT(next_word()["message"].get<std::string>(), testing::HasSubstr("playbackControl"));
+  viewer.play("rov");
+  viewer.on_binary(foxglove::encode(asked), now);
+  ASSERT_EQ(host.playback.size(), 1u);
+  EXPECT_TRUE(host.playback[0].pause);
   EXPECT_EQ(next_word(), json());
 }
 
