@@ -260,8 +260,10 @@ void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, st
   if (now.clock() == "lockstep")
     findings.push_back({Level::warn, "clock", stands + "it moves when control asks for a step", "sonarctl step 0.1"});
   else if (now.clock() == "follow")
-    findings.push_back(
-        {Level::warn, "clock", stands + "it follows the stamps of the poses, and none comes", "start the sender of the poses"});
+    findings.push_back({Level::warn, "clock",
+                        now.poses().accepted() == 0 ? "Waiting for the first pose: time follows the poses"
+                                                    : stands + "it follows the stamps of the poses, and none comes",
+                        "start the sender of the poses"});
   else if (any_client)
     findings.push_back({Level::warn, "clock",
                         stands + (any_pings ? "it moves when the last ping is computed and taken"
@@ -281,17 +283,18 @@ void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere,
     where += (where.empty() ? "" : "; or at ") + where_to_connect(sonar);
     if (sonar.listens().starts_with("0.0.0.0:")) return;  // every address of this computer
   }
+  if (ports.empty()) return;
   const std::string cure = "point the driver at " + where;
-  std::set<std::string> texts;
+  std::map<std::string, Level> texts;
   for (const SocketLine& line : elsewhere.tcp) {
     const std::string port = std::to_string(line.remote_port), to = line.remote_host + ":" + port;
     if (!ports.contains(port) || ours.contains(to) || texts.size() >= most_elsewhere) continue;
     if (line.state == syn_sent)
-      texts.insert("A program of this computer tries to connect to " + to + ", and nothing answers there");
+      texts["A program of this computer tries to connect to " + to + ", and nothing answers there"] = Level::fail;
     if (line.state == established)
-      texts.insert("A program of this computer is connected to " + to + ", which is no sonar of this sonard");
+      texts["A program of this computer is connected to " + to + ", which is no sonar of this sonard"] = Level::warn;
   }
-  for (const std::string& text : texts) findings.push_back({Level::fail, "address", text, cure});
+  for (const auto& [text, level] : texts) findings.push_back({level, "address", text, cure});
   if (texts.empty() && elsewhere.refused > 0)
     findings.push_back(
         {Level::warn, "address",

@@ -92,8 +92,8 @@ TEST(Judge, OneOnAWrongAddress) {
       web{"10.0.0.5", "192.0.2.3", 40122, 443, syn_sent, 0};
   const auto texts = texts_of({{tries, held, ours, web}, 3});
   ASSERT_EQ(texts.size(), 3u);
-  EXPECT_THAT(texts[0], HasSubstr("is connected to 127.0.0.9:52100, which is no sonar"));
-  EXPECT_THAT(texts[1], HasSubstr("tries to connect to 192.168.2.3:52100, and nothing answers"));
+  EXPECT_THAT(texts[0], HasSubstr("tries to connect to 192.168.2.3:52100, and nothing answers"));
+  EXPECT_THAT(texts[2], HasSubstr("is connected to 127.0.0.9:52100, which is no sonar"));
   EXPECT_THAT(texts_of({{ours, web}, 3}), testing::Contains(HasSubstr("3 connections of programs of this computer failed")));
   EXPECT_EQ(trouble(judge(with(""), nullptr, {{tries}, 0}), "address").cure, "point the driver at 127.0.0.2, TCP port 52100");
   EXPECT_THAT(troubles(judge(with(pinging + driver), nullptr, {{tries}, 3})), IsEmpty());
@@ -183,13 +183,14 @@ TEST(Judge, WhatTimeWaitsFor) {
   const std::string slow = pinging + silent + "requests: 1 unread_s: 8 taking: 12896 }";
   EXPECT_EQ(trouble(with(slow, "", "stepped"), "clock").text,
             "Time stands still at 41.600 s: it moves when 127.0.0.1:40122 has taken ping 12896; it has not read for 8 s");
-  const auto stands = [](const std::string& clock) {
-    const v1::DaemonStatus now = with(pinging + driver, "", clock);
+  const auto stands = [](const std::string& clock, const std::string& poses = "poses { accepted: 1 }") {
+    const v1::DaemonStatus now = with(pinging + driver, poses, clock);
     const v1::DaemonStatus before = two_seconds_before(now);
     return trouble(judge(now, &before), "clock").text;
   };
   EXPECT_EQ(stands("lockstep"), "Time stands still at 41.600 s: it moves when control asks for a step");
   EXPECT_THAT(stands("follow"), HasSubstr("stamps of the poses"));
+  EXPECT_EQ(stands("follow", ""), "Waiting for the first pose: time follows the poses");
   EXPECT_THAT(stands("stepped"), HasSubstr("when the last ping is computed and taken"));
   v1::DaemonStatus before = two_seconds_before(with(pinging + driver, "", "stepped"));
   before.set_now_ns(1);
