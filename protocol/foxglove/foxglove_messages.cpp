@@ -264,4 +264,18 @@ Bytes geometry(const Ping& ping, std::uint32_t number) {
   return bytes_of(message);
 }
 
+Bytes findings(std::span<const doctor::Finding> all) {
+  v1::Findings message;
+  for (const doctor::Finding& finding : all) {
+    v1::Finding& out = *message.add_findings();
+    out.set_level(static_cast<v1::Finding::Level>(finding.level));
+    out.set_check(finding.check);
+    out.set_text(finding.text);
+    out.set_cure(finding.cure);
+    out.set_sonar(finding.sonar);
+    out.set_client(finding.client);
+  }
+  return bytes_of(message);
+}
+
 }  // namespace sonar::foxglove

@@ -14,6 +14,7 @@
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
 #include "core/sonar/ping.hpp"
+#include "protocol/doctor/finding.hpp"
 #include "protocol/foxglove/foxglove_words.hpp"
 #include "protocol/wire/wire.hpp"
 
@@ -76,4 +77,6 @@ Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> point
 
 /// sonar.v1.PingGeometry. `number` = 0: to compare geometries of different pings.
 Bytes geometry(const Ping& ping, std::uint32_t number);
+/// sonar.v1.Findings.
+Bytes findings(std::span<const doctor::Finding> all);
 }  // namespace sonar::foxglove

@@ -91,8 +91,9 @@ class Viewer:
         self.socket.sendall(head + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(payload)))
 
     def frame(self):
-        """The next message: (is_text, payload). Each is one frame."""
-        while True:
+        """The next message: (is_text, payload). Each is one frame. Pings alone do not put the timeout off."""
+        deadline = time.monotonic() + self.socket.gettimeout()
+        while time.monotonic() < deadline:
             first, second = self._take(2)
             assert first & 0x70 == 0 and second & 0x80 == 0, "reserved bits, or a mask"
             opcode, length = first & 15, second & 127
@@ -111,6 +112,7 @@ class Viewer:
                 assert opcode in (1, 2) and first & 0x80, f"message in several frames, opcode {opcode}"
                 self.frames += 1
                 return opcode == 1, payload
+        raise TimeoutError("no message")
 
     # ---- the protocol
 

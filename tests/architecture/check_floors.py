@@ -23,6 +23,7 @@ FLOORS = {
     "protocol": ["core/base/", "core/sonar/", "core/text/", "protocol/"],
     "protocol/wire": ["core/base/", "protocol/wire/"],
     "protocol/control": ["core/base/", "protocol/control/"],
+    "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/"],
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
     "protocol/oculus": ["core/base/", "core/sonar/", "core/text/", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
     "protocol/blueview": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
@@ -58,10 +59,10 @@ DEPENDENCIES = {
     r"google/protobuf|.*\.pb\.h": ["protocol/control/", "protocol/foxglove/"],
     # protoc's classes take long to compile: headers name them only, and requests are structs.
     r"protocol/control/answers\.hpp": [
-        "protocol/control/", "daemon/server/control/control_http.cpp", "daemon/server/control/stream_connection.cpp", "daemon/server/events.cpp",
+        "protocol/control/", "protocol/doctor/", "daemon/server/control/control_http.cpp", "daemon/server/control/stream_connection.cpp", "daemon/server/events.cpp",
         "daemon/server/faults/fault_log.cpp", "daemon/server/operations/fault_operations.cpp",
         "daemon/server/operations/monitoring.cpp", "daemon/server/operations/time_operations.cpp", "daemon/server/recording/recordings.cpp",
-        "daemon/server/sonars/device_control.cpp", "daemon/server/sonars/fleet.cpp", "daemon/server/view/view_messages.cpp", "clients/sonarctl/control/control_client.cpp",
+        "daemon/server/sonars/device_control.cpp", "daemon/server/sonars/fleet.cpp", "daemon/server/view/view_doctor.cpp", "daemon/server/view/view_messages.cpp", "clients/sonarctl/control/control_client.cpp",
         "clients/sonarctl/control/control_commands.cpp", "clients/sonarctl/control/fault_commands.cpp",
         "clients/sonarctl/control/fault_text.cpp", "clients/sonarctl/control/status_text.cpp", "clients/sonarctl/doctor/check_daemon.cpp",
         "clients/sonarctl/doctor/check_sonar.cpp", "clients/sonarctl/doctor/gather.cpp", "clients/sonarctl/doctor/watch_pings.cpp",

@@ -4,6 +4,7 @@
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
+#include "protocol/doctor/check_status.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -44,28 +45,6 @@ void check_control(const Facts& facts, std::vector<Finding>& findings) {
       findings.push_back({Level::warn, "control", "that sonard does not serve " + sonar.at.host,
                           "give the control stream of the sonard that does with --control"});
   if (!status.engine().empty()) findings.push_back({Level::ok, "engine", "trace backend: " + status.engine(), ""});
-}
-
-/// True when the daemon reports faults of the vehicle's poses.
-bool has_notes(const v1::DaemonStatus& status, const std::string& vehicle) {
-  return std::any_of(status.notes().begin(), status.notes().end(),
-                     [&vehicle](const v1::Note& note) { return note.vehicle() == vehicle; });
-}
-
-void check_poses(const v1::DaemonStatus& status, std::vector<Finding>& findings) {
-  for (const v1::VehicleStatus& v : status.vehicles()) {
-    if (v.stale())
-      findings.push_back({Level::warn, "poses", "poses of " + v.name() + " have stopped, the last came from " + v.source(),
-                          "start the sender again, or choose poses.on_stale for the time without poses"});
-    else if (!has_notes(status, v.name()))
-      findings.push_back({Level::ok, "poses", "poses of " + v.name() + ": " + v.source(), ""});
-  }
-  for (const v1::Note& note : status.notes()) findings.push_back({Level::warn, "note", note.text(), note.cure()});
-  if (status.poses().refused() > 0)
-    findings.push_back({Level::warn, "poses",
-                        std::to_string(status.poses().refused()) + " messages were refused as poses, " +
-                            std::to_string(status.poses().accepted()) + " accepted",
-                        "see sonard's log for the reason: not JSON, the frame, a quaternion's norm, a name, the clock"});
 }
 
 void check_http(const Facts& facts, std::vector<Finding>& findings) {
@@ -126,7 +105,7 @@ void check_clocks(const ControlFacts& control, std::vector<Finding>& findings) {
 
 void check_daemon(const Facts& facts, std::vector<Finding>& findings) {
   check_control(facts, findings);
-  if (facts.control.status) check_poses(*facts.control.status, findings);
+  if (facts.control.status) sonar::doctor::check_poses(*facts.control.status, findings);
   check_http(facts, findings);
   check_heads(facts, findings);
   check_clocks(facts.control, findings);

@@ -3,15 +3,17 @@
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
+#include "protocol/doctor/check_status.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
 
 using Outcome = StreamFacts::Outcome;
+using sonar::doctor::computing_text;
+using sonar::doctor::less_to_compute;
 using text::format;
 
 constexpr double fastest_hz = 40;  // that an Oculus can be asked for
-constexpr const char* less_to_compute = "fewer beams, less range, more threads (engine.threads), or less else on this computer";
 
 std::string joined(const auto& words) {
   std::string text;
@@ -112,7 +114,7 @@ class SonarChecks {
         return add(Level::warn, "ping",
                    at_ + " closed the connection without a byte: all its client slots are taken" +
                        (sonar_.clients.empty() ? "" : " (" + joined(sonar_.clients) + ")"),
-                   "stop the other client, or raise clients.max of the sonar");
+                   sonar::doctor::free_a_place);
       case Outcome::no_ping:
         return check_no_ping();
       case Outcome::pings:
@@ -214,10 +216,6 @@ class SonarChecks {
     return sonar_.reported ? sonar_.reported->figures().simulation_ms() : 0;
   }
   bool too_slow_for(double rate_hz) const { return computing_ms() * rate_hz > 1000; }
-  std::string computing_text() const {
-    const double ms = computing_ms(), hz = 1000 / ms;
-    return "computing takes " + format("%.0f", ms) + " ms per ping: " + format("%.*f", hz < 10 ? 1 : 0, hz) + " Hz at most here";
-  }
 
   /// The rate that another, connected client requested.
   void check_rate_of_others() {
@@ -225,7 +223,7 @@ class SonarChecks {
       return;
     add(Level::warn, "rate",
         "rate " + format("%g", sonar_.reported->rate_hz()) + " Hz requested by " + joined(sonar_.clients) + ", " +
-            computing_text() + ", " + std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",
+            computing_text(computing_ms()) + ", " + std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",
         less_to_compute);
   }
 
@@ -244,7 +242,7 @@ class SonarChecks {
     if (expected_hz > 0) text += (sonar_.blueview ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
     text += latency_text();
     const bool slow = expected_hz > 0 && s.rate_hz < 0.85 * expected_hz;
-    if (too_slow_for(slow || sonar_.blueview ? expected_hz : fastest_hz)) text += ", " + computing_text();
+    if (too_slow_for(slow || sonar_.blueview ? expected_hz : fastest_hz)) text += ", " + computing_text(computing_ms());
     if (slow) return add(Level::warn, "rate", text + ": the simulation is slower than the rate", less_to_compute);
     if (s.missing > 0)
       return add(Level::warn, "rate", text + ", " + std::to_string(s.missing) + " pings missing",

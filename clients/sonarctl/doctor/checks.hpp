@@ -5,16 +5,12 @@
 #include <vector>
 
 #include "clients/sonarctl/doctor/facts.hpp"
+#include "protocol/doctor/finding.hpp"
 
 namespace sonar::clients::doctor {
 
-enum class Level { ok, warn, fail };
-struct Finding {
-  Level level = Level::ok;
-  std::string check;  // "status", "ping", "rate", "ports", ...: for programs
-  std::string text;
-  std::string cure;  // empty for Level::ok
-};
+using sonar::doctor::Finding;
+using sonar::doctor::Level;
 
 std::vector<Finding> run_checks(const Facts& facts);
 

@@ -5,23 +5,17 @@
 #include <cstdint>
 #include <map>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "clients/sonarctl/doctor/facts.hpp"
+#include "protocol/doctor/socket_table.hpp"
 
 namespace sonar::clients::doctor {
 
-struct SocketLine {
-  std::string local_host, remote_host;  // "127.0.0.2"; IPv6 in brackets, but addresses of IPv4 as such
-  std::uint16_t local_port = 0, remote_port = 0;
-  int state = 0;  // as the kernel numbers them: 1 established, 10 listening
-  std::uint64_t inode = 0;
-};
-inline constexpr int established = 1, listening = 10;
-
-/// Lines of /proc/net/tcp, tcp6, udp or udp6; the header and unreadable lines are skipped.
-std::vector<SocketLine> parse_proc_net(std::string_view text);
+using sonar::doctor::established;
+using sonar::doctor::listening;
+using sonar::doctor::parse_proc_net;
+using sonar::doctor::SocketLine;
 
 /// Of all sockets, IPv4 and IPv6. Empty where there is no /proc.
 std::vector<SocketLine> tcp_sockets();

@@ -47,6 +47,8 @@ struct Connection {
   bool finishing = false;  // no more bytes are taken in, no more pings offered
   Time not_before{};       // earliest next call of dialogue->on_tick, in unskipped time
   std::uint64_t bytes_written = 0, bytes_read = 0;
+  std::uint64_t requests = 0;  // for settings or a ping
+  std::string complaint = {};  // the last about what it sent
 
   /// When the conversation has something to do; nothing while it ends.
   std::optional<Time> next_tick() const;

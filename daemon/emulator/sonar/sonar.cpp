@@ -36,6 +36,7 @@ void Sonar::report(Report::Topic topic, LogLevel level, std::string phrase, std:
 /// As if no client had ever connected: the next one finds the device as it comes.
 void Sonar::use_initial_settings() {
   asked_ = false;
+  asked_by_.clear();
   protocol::ChangeSettings initial = vendor_.initial_settings(state_);
   settings_ = initial.settings;
   state_.settings = std::move(initial.vendor_settings);
@@ -50,6 +51,7 @@ void Sonar::change_settings(const protocol::ChangeSettings& change, const std::s
   // Some drivers repeat their settings at ping rate: only a change is worth a line.
   if (!asked_ || !change.vendor_settings->equals(*state_.settings)) {
     state_.settings = change.vendor_settings;
+    asked_by_ = who;
     report(Report::Topic::settings, LogLevel::info, "settings: " + change.summary, {{"client", who}}, actions);
   }
   settings_ = change.settings;  // of a repeat too: the device's own sound speed follows its depth

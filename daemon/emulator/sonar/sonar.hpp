@@ -104,6 +104,8 @@ class Sonar {
   /// Returns whether that was a change.
   bool set_transmit(bool on);
   bool transmits() const { return transmits_; }
+  /// The last who changed the settings; empty = they are the initial ones.
+  const std::string& asked_by() const { return asked_by_; }
   Pose pose_at(Time at) const { return compose(around_.world.vehicle_at(config_.vehicle, at), config_.mount); }  // in world
   void move_mount(const Pose& mount, Time now);
   /// Vehicle and mount of a configuration that is otherwise the same.
@@ -202,6 +204,7 @@ class Sonar {
   PingSettings settings_;
   GainAssist gain_assist_;
   bool asked_ = false;  // settings were requested since the first client or receiver came
+  std::string asked_by_;
   bool transmits_ = true;
   bool stopping_ = false;
 

@@ -218,7 +218,12 @@ void Sonar::handle(Connection& from, protocol::Reaction reaction, Time now, Acti
 void Sonar::on_event(const Source& from, const protocol::Event& event, Time now, Actions& actions) {
   if (stopping_) return;
   const bool observer = from.connection != nullptr && from.connection->role == Role::observer;
-  if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
+  const auto* const notice = std::get_if<protocol::Notice>(&event);
+  if (from.connection != nullptr && notice != nullptr) from.connection->complaint = notice->text;
+  const bool asks =
+      std::holds_alternative<protocol::ChangeSettings>(event) || std::holds_alternative<protocol::RequestPing>(event);
+  if (from.connection != nullptr && asks) ++from.connection->requests;
+  if (notice != nullptr) {
     if (!observer) report(Report::Topic::notice, LogLevel::warning, notice->text, {{"client", from.name}}, actions);
   } else if (observer) {
     // Settings, triggers and addresses are for clients. An observer that sends them may have meant the other port.

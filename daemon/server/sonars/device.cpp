@@ -57,6 +57,7 @@ Result<void> Device::open(const protocol::Port& port) {
     (*datagrams)->answer_with(config(), [this, &port](Endpoint from, protocol::BytesView datagram) {
       Sonar::Answers answers = sonar_.on_datagram(port, from, datagram, network_.clock.now());
       perform(std::move(answers.actions));
+      if (!answers.datagrams.empty()) searched_ = Visit{text_of(from), {}};
       return std::move(answers.datagrams);
     });
     return {};
@@ -121,6 +122,7 @@ bool Device::gone() const {
 void Device::on_client_socket(tcp::socket socket, const protocol::Port& port) {
   if (auto place = network_.admission.enter(socket)) return on_arrival(std::move(socket), std::move(place), Role::client, &port);
   sonar_.count_refused_client();
+  turned_away_ = Visit{peer_of(socket).name, "sonard has no descriptor or place left for it"};
   close_politely(socket);
 }
 
@@ -281,6 +283,8 @@ void Device::carry_out(const TurnAway& action) {
   auto arrived = arrived_.extract(action.connection);
   if (arrived.empty()) return;
   Arrived& from = arrived.mapped();
+  if (from.role == Role::client)
+    turned_away_ = Visit{peer_of(from.socket).name, action.reset ? "reset by a fault" : "no place is free"};
   if (action.reset) {
     report_visit(from.role, VisitLog::Kind::turned_away, "client turned away: reset", {});
     error_code ec;
@@ -348,6 +352,7 @@ void Device::carry_out(const Closed& action) {
   } else if (action.role == Role::observer) {
     report_visit(Role::observer, VisitLog::Kind::gone, "observer gone: " + action.why, {{"observer", action.peer}});
   } else {
+    gone_ = Visit{action.peer, action.why};
     report_visit(Role::client, VisitLog::Kind::gone, "client gone: " + action.why,
                  {{"client", action.peer}, {"pings", action.pings_written}, {"dropped", action.pings_dropped}});
     parent_.on_client(*this, action.peer, false, action.why);

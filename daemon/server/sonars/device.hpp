@@ -67,6 +67,12 @@ struct StreamDigest {
   std::string sha256;
 };
 
+/// What became of one that came.
+struct Visit {
+  std::string address, why;
+  std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
+};
+
 class Device final : public SessionParent {
  public:
   Device(DeviceNetwork& network, Sonar::Surroundings around, const SonarConfig& config, std::uint32_t index,
@@ -189,6 +195,8 @@ class Device final : public SessionParent {
   std::list<SessionPointer> sessions_;
   std::list<StreamPointer> streams_;
   int turning_away_ = 0;
+  std::optional<Visit> turned_away_, gone_, searched_;  // the last ones
+  std::string silenced_by_;
 
   bool started_ = false, stopping_ = false;
   std::array<LogLimiter, static_cast<std::size_t>(Report::Topic::topics)> limiters_;

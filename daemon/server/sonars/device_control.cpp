@@ -24,6 +24,31 @@ void fill(v1::SonarFigures& out, const DeviceFigures& f) {
   out.set_late_ms_p99(ms(f.lateness.quantile_s(0.99)));
 }
 
+v1::Visit message_of(const Visit& visit) {
+  v1::Visit out;
+  out.set_address(visit.address);
+  out.set_why(visit.why);
+  out.set_utc_ns(std::chrono::nanoseconds(visit.at.time_since_epoch()).count());
+  out.set_ago_s(seconds(std::chrono::system_clock::now() - visit.at));
+  return out;
+}
+
+/// `session`: null when it ends.
+void fill(v1::ClientStatus& out, const Connection& c, Session* session) {
+  out.set_address(c.peer.name);
+  out.set_pings_written(c.outbox.pings_written());
+  out.set_pings_dropped(c.outbox.pings_dropped());
+  out.set_bytes_written(c.bytes_written);
+  out.set_bytes_read(c.bytes_read);
+  out.set_requests(static_cast<std::uint32_t>(c.requests));
+  out.set_complaint(c.complaint);
+  if (session == nullptr) return;
+  out.set_connected_s(seconds(session->connected_for()));
+  out.set_unread_s(seconds(session->stands_for()));
+  out.set_taking(session->writes_ping());
+  out.set_unsent_bytes(static_cast<std::uint32_t>(session->unconfirmed_bytes()));
+}
+
 }  // namespace
 
 v1::SonarStatus Device::status(Time now) const {
@@ -50,15 +75,16 @@ v1::SonarStatus Device::status(Time now) const {
   s.set_observing(static_cast<std::uint32_t>(sonar_.connections().observers()));
   s.set_preview(preview_.on());
   for (const Connection& c : sonar_.connections().all()) {
+    if (c.role == Role::observer && c.requests > 0) s.set_asking_observer(c.peer.name);
     if (c.role != Role::client || c.state != Connection::State::served) continue;
-    const SessionPointer session = session_of(c.id);
-    v1::ClientStatus& client = *s.add_clients();
-    client.set_address(c.peer.name);
-    client.set_pings_written(c.outbox.pings_written());
-    client.set_pings_dropped(c.outbox.pings_dropped());
-    client.set_bytes_written(c.bytes_written);
-    client.set_connected_s(session ? seconds(session->connected_for()) : 0);
+    fill(*s.add_clients(), c, session_of(c.id).get());
   }
+  s.set_asked_by(sonar_.asked_by());
+  if (!sonar_.transmits()) s.set_silenced_by(silenced_by_);
+  s.set_waiting(static_cast<std::uint32_t>(sonar_.connections().waiting()));
+  if (turned_away_) *s.mutable_turned_away() = message_of(*turned_away_);
+  if (gone_) *s.mutable_gone() = message_of(*gone_);
+  if (searched_) *s.mutable_searched() = message_of(*searched_);
   fill(*s.mutable_figures(), figures());
   return s;
 }
@@ -103,6 +129,7 @@ Result<void> Device::ask(const control::SetSonar& asked, const std::string& who)
     if (!changed) return tl::make_unexpected(changed.error());
     actions = *std::move(changed);
   }
+  if (asked.transmit && !*asked.transmit) silenced_by_ = who;
   if (asked.transmit && sonar_.set_transmit(*asked.transmit))
     network_.log.info(*asked.transmit ? "transmits again" : "does not transmit any more",
                       {{"sonar", config().name}, {"client", who}});

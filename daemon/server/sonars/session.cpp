@@ -169,10 +169,18 @@ void Session::end_pauses() {
   pause_.cancel();
 }
 
+int Session::unconfirmed_bytes() {
+  int bytes = 0;
+  return ::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) == 0 ? bytes : 0;
+}
+
+std::chrono::steady_clock::duration Session::stands_for() const {
+  return writing_ ? std::max(Steady::duration{}, Steady::now() - progress_at_) : Steady::duration{};
+}
+
 /// A reset throws away what the client's kernel has not confirmed. The watch ends the session of a client that takes nothing.
 asio::awaitable<bool> Session::deliver() {
-  int unconfirmed = 0;
-  while (!over_ && ::ioctl(socket_.native_handle(), SIOCOUTQ, &unconfirmed) == 0 && unconfirmed > 0) {
+  while (!over_ && unconfirmed_bytes() > 0) {
     pause_.expires_after(delivery_watch);
     error_code ec;
     co_await pause_.async_wait(into(ec));
@@ -195,6 +203,7 @@ asio::awaitable<void> Session::write() {
     error_code ec;
     if (message) {
       writing_ = true;
+      ping_ = message.ping;
       progress_at_ = Steady::now();
       if (!co_await write_whole(message)) co_return;
       writing_ = hurries_ = false;

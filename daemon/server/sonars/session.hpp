@@ -75,6 +75,12 @@ class Session : public std::enable_shared_from_this<Session> {
   ConnectionId id() const { return setup_.id; }
   const Sha256& digest() const { return digest_; }
   std::chrono::steady_clock::duration connected_for() const { return Steady::now() - connected_at_; }
+  /// How long no byte of the message being written has gone out; 0 when none is written, and in a pause that a fault makes.
+  std::chrono::steady_clock::duration stands_for() const;
+  /// Number of the ping being written; 0 = none.
+  std::uint32_t writes_ping() const { return writing_ ? ping_ : 0; }
+  /// With the kernel, not yet confirmed by the client's.
+  int unconfirmed_bytes();
 
  private:
   using Steady = std::chrono::steady_clock;
@@ -105,6 +111,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Steady::time_point received_at_ = connected_at_;  // a byte came in
   Steady::time_point progress_at_{};                // a byte went out, while writing; in a pause its end
   Steady::time_point finish_by_{};
+  std::uint32_t ping_ = 0;  // that is written now or was last; 0 = a reply
   bool reading_ = true, writing_ = false, hurries_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
   std::string why_;
 };

@@ -42,6 +42,7 @@ ViewFeed::ViewFeed(const Viewed& of) : of_(of), timer_(of.io) {
   channels_.at(log_).deepest = lines_kept;
   status_ = add_channel("/status", "sonar.v1.DaemonStatus", ChannelKind::last_value, 5);
   faults_ = add_channel("/faults", "sonar.v1.FaultReport", ChannelKind::last_value);
+  doctor_channel_ = add_channel("/doctor", "sonar.v1.Findings", ChannelKind::last_value);
   if (of_.config.control.token_file.empty()) secrets_.make_key();
   of_.log.listen(
       [this](LogLevel level, const std::string& line, const std::vector<LogField>& fields) { on_log(level, line, fields); });
@@ -147,6 +148,7 @@ ViewPayloadPointer ViewFeed::current(const Viewer& viewer, std::uint32_t channel
   if (channel == tf_) return places();
   if (channel == status_) return status();
   if (channel == faults_) return faults();
+  if (channel == doctor_channel_) return doctor_.newest();
   if (channel == scene_ || channel == swath_) {
     ViewPayload payload{of_.clock.now(), {}, true};
     if (channel == scene_) payload.pieces = shapes_.all();
@@ -315,6 +317,7 @@ void ViewFeed::tick() {
         asio::post(of_.io, [this, made] { offer_scene(shapes_.take(std::move(*made))); });
       });
   }
+  if (wanted(doctor_channel_)) offer(doctor_channel_, doctor_.news());
   const auto since_status = Steady::now() - status_at_;
   if (since_status >= status_period || (changed_ && since_status >= after_change)) offer_status();
   arm();

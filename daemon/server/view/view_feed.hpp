@@ -21,6 +21,7 @@
 #include "daemon/server/view/door.hpp"
 #include "daemon/server/view/scene_shapes.hpp"
 #include "daemon/server/view/view_connection.hpp"
+#include "daemon/server/view/view_doctor.hpp"
 #include "daemon/server/view/view_parameters.hpp"
 
 namespace sonar {
@@ -134,11 +135,12 @@ class ViewFeed final : public ViewerHost {
   ViewSecrets secrets_;
   std::vector<std::weak_ptr<ViewConnection>> connections_;
   std::map<std::uint32_t, ViewChannel> channels_;
-  std::uint32_t last_channel_ = 0, tf_ = 0, scene_ = 0, swath_ = 0, log_ = 0, status_ = 0, faults_ = 0;
+  std::uint32_t last_channel_ = 0, tf_ = 0, scene_ = 0, swath_ = 0, log_ = 0, status_ = 0, faults_ = 0, doctor_channel_ = 0;
   std::list<SonarView> sonars_;
   std::map<std::string, PlaybackWatch> watches_;                     // by vehicle that viewers look at
   std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // who asked, by sonar
   SceneShapes shapes_;
+  ViewDoctor doctor_{of_.operations, of_.clock};
   std::deque<ViewPayloadPointer> lines_;
   ViewPayloadPointer faults_said_;
   std::vector<foxglove::Parameter> pushed_;

@@ -1,0 +1,44 @@
+// The channel `/doctor` of the live view: what keeps drivers from their pings (protocol/doctor/judge.hpp), looked at every two
+// seconds while a viewer has subscribed, and sent when it changes. Owned by ViewFeed. I/O thread only.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <utility>
+
+#include "daemon/emulator/view/ping_payloads.hpp"
+#include "daemon/server/operations.hpp"
+#include "daemon/server/time/clock.hpp"
+#include "protocol/doctor/judge.hpp"
+
+namespace sonar {
+
+class ViewDoctor {
+ public:
+  static constexpr std::chrono::milliseconds period{2000};
+
+  /// Both outlive it.
+  ViewDoctor(Operations& operations, const Clock& clock) : operations_(operations), clock_(clock) {}
+
+  /// The findings for newcomers: no older than the period. Null: there is no status.
+  ViewPayloadPointer newest();
+  /// The same, null when all who have subscribed know it.
+  ViewPayloadPointer news();
+
+ private:
+  using Steady = std::chrono::steady_clock;
+  void look();
+  /// What shows a driver on a wrong address.
+  doctor::Elsewhere look_elsewhere();
+
+  Operations& operations_;
+  const Clock& clock_;
+  Steady::time_point looked_at_{};
+  std::shared_ptr<const v1::DaemonStatus> last_;
+  std::deque<std::pair<Steady::time_point, std::uint64_t>> failed_;  // connections of this computer, when it was looked
+  ViewPayloadPointer newest_, said_;                                 // said_: to all who have subscribed
+};
+
+}  // namespace sonar

@@ -1,0 +1,25 @@
+// Checks of a status that are the same from outside the daemon and from inside, and the words they share. Pure.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "protocol/doctor/finding.hpp"
+
+namespace sonar::v1 {  // of control.pb.h
+class DaemonStatus;
+}  // namespace sonar::v1
+
+namespace sonar::doctor {
+
+inline constexpr const char* less_to_compute =
+    "fewer beams, less range, more threads (engine.threads), or less else on this computer";
+inline constexpr const char* free_a_place = "stop the other client, or raise clients.max of the sonar";
+
+/// "computing takes 138 ms per ping: 7.2 Hz at most here".
+std::string computing_text(double ms_per_ping);
+
+/// Poses that have stopped, notes, refused poses.
+void check_poses(const v1::DaemonStatus& status, std::vector<Finding>& findings);
+
+}  // namespace sonar::doctor

@@ -1,0 +1,19 @@
+// A finding of doctor: what is well, or a fault with its cause and its cure. Made by sonarctl doctor from outside, and by the
+// daemon from inside for the live view (judge.hpp).
+#pragma once
+
+#include <string>
+
+namespace sonar::doctor {
+
+enum class Level { ok, warn, fail };
+struct Finding {
+  Level level = Level::ok;
+  std::string check;  // "status", "ping", "rate", "ports", ...: for programs
+  std::string text;
+  std::string cure;         // empty for Level::ok
+  std::string sonar = {};   // empty = of none
+  std::string client = {};  // its address; empty = of none
+};
+
+}  // namespace sonar::doctor

@@ -1,0 +1,24 @@
+// Why a driver is silent, as the daemon sees it: a finding per check, from its status alone. sonarctl doctor looks from outside,
+// as a driver does. Pure.
+#pragma once
+
+#include <vector>
+
+#include "protocol/doctor/check_status.hpp"
+#include "protocol/doctor/socket_table.hpp"
+
+namespace sonar::doctor {
+
+/// What programs of the daemon's computer try, for drivers on a wrong address. Read only while no driver is connected.
+struct Elsewhere {
+  std::vector<SocketLine> tcp;
+  std::uint64_t refused = 0;  // connections, in the last seconds
+};
+
+/// An active fault first, then the worst first. `before`: a status of about two seconds earlier, for what changes with time;
+/// null = none.
+std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere = {});
+
+bool has_driver(const v1::DaemonStatus& status);
+
+}  // namespace sonar::doctor
