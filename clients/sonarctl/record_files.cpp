@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "protocol/oculus/framer.hpp"
 #include "protocol/recording/oculus_log.hpp"
 #include "protocol/recording/raw_dump.hpp"
 

@@ -53,9 +53,9 @@ void add_with_imports(const pb::FileDescriptor& file, std::set<std::string>& kno
   file.CopyTo(out.add_file());
 }
 
-std::uint32_t code_at(const Bytes& samples, std::size_t at) {
+std::uint32_t code_at(const Bytes& samples, std::size_t at, std::size_t width) {
   std::uint32_t code = 0;
-  for (std::size_t b = 4; b-- > 0;) code = code << 8 | std::to_integer<std::uint32_t>(samples[at + b]);
+  for (std::size_t b = width; b-- > 0;) code = code << 8 | std::to_integer<std::uint32_t>(samples[at + b]);
   return code;
 }
 
@@ -102,38 +102,43 @@ Bytes with_stamps(const Channel& of, BytesView message, const Stamp& stamp) {
   return bytes_of(*read);
 }
 
-Schema protobuf_schema(const std::string& name) {
+Bytes descriptor_set(const std::string& name) {
   // Names what is looked up by name only, so that the linker keeps it.
   fg::RawImage::descriptor();
   v1::PingGeometry::descriptor();
   v1::DaemonStatus::descriptor();
   const pb::Descriptor* const message = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(name);
-  if (message == nullptr) return {name, "protobuf", ""};
+  if (message == nullptr) return {};
   pb::FileDescriptorSet set;
   std::set<std::string> known;
   add_with_imports(*message->file(), known, set);
-  return {name, "protobuf", wire::base64(bytes_of(set))};
+  return bytes_of(set);
+}
+
+Schema protobuf_schema(const std::string& name) { return {name, "protobuf", wire::base64(descriptor_set(name))}; }
+
+Image image_of(std::size_t beams, std::size_t rows, int bits, std::uint32_t max_code, std::shared_ptr<const Bytes> codes) {
+  const auto width = static_cast<std::size_t>(bits / 8);
+  Image image{static_cast<std::uint32_t>(beams), static_cast<std::uint32_t>(rows), width == 1 ? "mono8" : "mono16", width,
+              std::move(codes)};
+  if (width <= 2) return image;
+  const auto parts = std::make_shared<Bytes>();
+  parts->reserve(image.samples->size() / width * sizeof(float));
+  wire::Writer writer(*parts);
+  for (std::size_t at = 0; at + width <= image.samples->size(); at += width) {
+    const auto part = static_cast<float>(static_cast<double>(code_at(*image.samples, at, width)) / max_code);
+    writer("sample", part);
+  }
+  image.encoding = "32FC1";
+  image.bytes_per_sample = sizeof(float);
+  image.samples = parts;
+  return image;
 }
 
 Image image_of(const std::shared_ptr<const Ping>& ping) {
   const PingSettings& s = ping->request.settings;
-  Image image{static_cast<std::uint32_t>(s.beam_count), static_cast<std::uint32_t>(s.range_bin_count), "mono8", 1,
-              std::shared_ptr<const Bytes>(ping, &ping->samples)};
-  if (s.format.bits == 16) {
-    image.encoding = "mono16";
-    image.bytes_per_sample = 2;
-  } else if (s.format.bits == 32) {
-    image.encoding = "32FC1";
-    image.bytes_per_sample = 4;
-    const auto parts = std::make_shared<Bytes>();
-    wire::Writer writer(*parts);
-    for (std::size_t at = 0; at + 4 <= ping->samples.size(); at += 4) {
-      const auto part = static_cast<float>(static_cast<double>(code_at(ping->samples, at)) / s.format.max_code);
-      writer("sample", part);
-    }
-    image.samples = parts;
-  }
-  return image;
+  return image_of(static_cast<std::size_t>(s.beam_count), static_cast<std::size_t>(s.range_bin_count), s.format.bits,
+                  s.format.max_code, std::shared_ptr<const Bytes>(ping, &ping->samples));
 }
 
 Bytes image_head(Time at, const std::string& frame, const Image& image) {
@@ -151,6 +156,12 @@ Bytes image_head(Time at, const std::string& frame, const Image& image) {
   for (; left >= 0x80; left >>= 7) head.push_back(static_cast<std::byte>(0x80 | (left & 0x7F)));
   head.push_back(static_cast<std::byte>(left));
   return head;
+}
+
+Bytes raw_image(Time at, const std::string& frame, const Image& image) {
+  Bytes whole = image_head(at, frame, image);
+  whole.insert(whole.end(), image.samples->begin(), image.samples->end());
+  return whole;
 }
 
 Bytes transforms(std::span<const Transform> all) {

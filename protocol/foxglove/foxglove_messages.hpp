@@ -23,8 +23,10 @@ namespace sonar::foxglove {
 using wire::Bytes;
 using wire::BytesView;
 
-/// Of any message that is linked in: "foxglove.RawImage", "sonar.v1.PingEvent". With all that it imports. Empty text: there is
-/// none of that name.
+/// The FileDescriptorSet of a message that is linked in ("foxglove.RawImage", "sonar.v1.PingEvent"), with all that it imports.
+/// Empty: there is none of that name.
+Bytes descriptor_set(const std::string& name);
+/// The same as a channel of the socket states it: in base64.
 Schema protobuf_schema(const std::string& name);
 
 /// A message of the channel with other times: its stamps, and fields of our own in nanoseconds of the daemon's time.
@@ -37,10 +39,13 @@ struct Image {
   std::size_t bytes_per_sample = 1;
   std::shared_ptr<const Bytes> samples;  // [height][width], little-endian
 };
-/// Samples as sent: row 0 nearest, column 0 most to port; mono8, mono16, or for 32 bits 32FC1 as parts of the full scale.
+/// Samples as sent: row 0 nearest, column 0 most to port; mono8, mono16, or for 24 and 32 bits 32FC1 as parts of `max_code`.
+/// `codes`: [rows][beams], little-endian, of `bits` = 8, 16, 24 or 32.
+Image image_of(std::size_t beams, std::size_t rows, int bits, std::uint32_t max_code, std::shared_ptr<const Bytes> codes);
 Image image_of(const std::shared_ptr<const Ping>& ping);
 /// foxglove.RawImage up to the samples, which end it.
 Bytes image_head(Time at, const std::string& frame, const Image& image);
+Bytes raw_image(Time at, const std::string& frame, const Image& image);  // whole
 
 struct Transform {
   Time at{};

@@ -2,9 +2,12 @@
 
 Written from the description (mcap.dev), shares nothing with the C++ code. Used by recording_test; alone: mcap_checker.py FILE...
 """
+import json
 import struct
 import sys
 import zlib
+
+from foxglove_viewer import Schema
 
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX, STATISTICS, SUMMARY_OFFSET, DATA_END = (
@@ -86,6 +89,13 @@ class Checked:
         self._check_data()
         self._check_summary()
 
+    def read(self, topic):
+        """The messages of a topic, JSON or protobuf, by the schema that the file holds. Protobuf leaves out what is 0 or empty."""
+        _, schema, _, encoding, _ = next(channel for channel in self.channels.values() if channel[2] == topic)
+        _, name, _, described = self.schemas[schema]
+        read = json.loads if encoding == "json" else lambda data: Schema(described).decode(name, data)
+        return [read(data) for of, _, data in self.messages if of == topic]
+
     def _check_footer(self):
         opcode, self.footer_at, content = list(records(self.data, len(self.data) - 8 - 29, len(self.data) - 8))[0]
         expect(opcode == FOOTER and len(content) == 20, "footer")
@@ -100,6 +110,8 @@ class Checked:
         expect(known.setdefault(found[0], found) == found, f"two things with the id {found[0]}")
         if opcode == CHANNEL:
             expect(found[1] == 0 or found[1] in self.schemas, f"channel {found[2]} has a schema that was not told")
+            expect(found[1] == 0 or self.schemas[found[1]][2] == {"json": "jsonschema"}.get(found[3], found[3]),
+                   f"channel {found[2]} and its schema differ in encoding")
 
     def _check_data(self):
         ended, pending = False, None

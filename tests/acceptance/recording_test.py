@@ -1,4 +1,5 @@
 """Recorded by sonarctl, replayed by sonard: the same bytes, whatever kind of file lies between; files judged by other readers."""
+import base64
 import json
 import os
 import pathlib
@@ -8,6 +9,7 @@ import signal
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -109,7 +111,7 @@ class Recorded(Files):
         pings = [Ping(message) for message in sent if struct.unpack_from("<H", message, 6)[0] == 0x23]
         self.assertEqual([ping.id for ping in pings], list(range(pings[0].id, pings[0].id + 6)))
         self.assertEqual(oculus_log_messages(self.read("oculus")), sent)
-        self.expect_mcap(sent)
+        self.expect_mcap(sent, pings)
         with self.subTest("tshark"):
             self.expect_capture(sent)
         for kind in KINDS:
@@ -123,15 +125,29 @@ class Recorded(Files):
             self.assertTrue(self.read("raw").startswith(again.read_bytes()))
             self.assertEqual(len([m for m in split(again.read_bytes()) if m[6] == 0x23]), 6)
 
-    def expect_mcap(self, sent):
+    def expect_mcap(self, sent, pings):
         checked = mcap_checker.check(self.read("mcap"))
         by_topic = {}
         for topic, _, data in checked.messages:
             by_topic.setdefault(topic, []).append(data)
         self.assertEqual(by_topic["/front/device"], sent)
         self.assertEqual(len(by_topic["/front/client"]), 1)
-        self.assertEqual(len(by_topic["/front/image"]), 6)
-        self.assertGreaterEqual(len(by_topic["/front/pose"]), 1)
+        for image, ping in zip(checked.read("/front/image"), pings, strict=True):
+            samples = b"".join(sample.to_bytes(ping.sample_bytes, "little") for row in ping.image for sample in row)
+            self.assertEqual((image["width"], image["height"], image["step"], image["frame_id"]),
+                             (ping.beams, ping.rows, ping.beams * ping.sample_bytes, "front"))
+            self.assertEqual((image["encoding"], image["data"] == samples), ("mono8", True))
+            self.assertLess(max(map(len, by_topic["/front/image"])), len(samples) + 64)
+        poses, frames = checked.read("/front/pose"), checked.read("/tf")
+        self.assertGreaterEqual(len(poses), 1)
+        for pose, frame in zip(poses, frames, strict=True):
+            of_sonar, = frame["transforms"]
+            self.assertEqual((of_sonar["parent_frame_id"], of_sonar["child_frame_id"]), (pose["frame_id"], "front"))
+            self.assertEqual([of_sonar[part] for part in ("timestamp", "translation", "rotation")],
+                             [pose["timestamp"], pose["pose"]["position"], pose["pose"]["orientation"]])
+        done = run("env", f"PYTHONPATH={ROOT / 'clients/python'}", sys.executable, "-B", "-m", "sonard_client.convert",
+                   self.path("mcap"), "-o", self.folder / "way.csv")
+        self.assertEqual(done.returncode, 0, done.stderr)
         self.assertTrue(all(len(status) == 142 for status in by_topic.get("/front/status", [])))
 
     def expect_capture(self, sent):
@@ -238,6 +254,15 @@ class OneIntoAnother(Files):
             self.assertEqual((done.returncode, out.read_bytes() == self.read("raw")), (0, True), done.stderr)
         self.assertEqual(oculus_log_messages(self.read("oculus")), split(self.made()))
         mcap_checker.check(self.read("mcap"))
+
+    def test_mcap_with_pictures_in_json_as_written_before(self):
+        kept = SEEDS / "mcap/with_truth.mcap"
+        sent = [data for topic, _, data in mcap_checker.check(kept.read_bytes()).messages if topic == "/s/device"]
+        done = self.convert(kept, "--raw", self.path("raw"), "--mcap", self.path("mcap"))
+        self.assertEqual((done.returncode, self.read("raw")), (0, b"".join(sent)), done.stderr)
+        old, new = (mcap_checker.check(path.read_bytes()).read(topic)[0]
+                    for path, topic in ((kept, "/s/image"), (self.path("mcap"), "/sonar/image")))
+        self.assertEqual(base64.b64decode(old["data"]), new["data"])
 
     def test_a_damaged_file_gives_what_it_has(self):
         self.path("raw").write_bytes(self.made()[:-100])

@@ -62,12 +62,13 @@ class Reproducibility(unittest.TestCase):
             self.expect_the_same(mission)
             kept = oculus_log_messages(mission.recorded("run.oculus").read_bytes())
             self.assertEqual(b"".join(kept), self.plain.stream)
-            by_topic = {}
-            for topic, _, data in mcap_checker.check(mission.recorded("run.mcap").read_bytes()).messages:
+            by_topic, checked = {}, mcap_checker.check(mission.recorded("run.mcap").read_bytes())
+            for topic, _, data in checked.messages:
                 by_topic.setdefault(topic, []).append(data)
             self.assertEqual(b"".join(by_topic["/front/device"]), self.plain.stream)
             for topic in ("image", "pose", "truth"):
                 self.assertEqual(len(by_topic[f"/front/{topic}"]), PINGS, topic)
+            self.expect_true_places(checked)
         with Mission(SECONDS, PINGS, record=("run.mcap",)) as mission:
             mission.fly(keep=False, after=(10, lambda: mission.steer("recording", "start", "rest.mcap")))
             self.expect_the_same(mission)
@@ -77,6 +78,18 @@ class Reproducibility(unittest.TestCase):
             self.assertEqual(again.pop("/front/status")[0][:16], by_topic.pop("/front/status")[0][:16])  # each run has its address
             self.assertEqual(again, by_topic, "the file too is the same")
             mcap_checker.check(mission.recorded("rest.mcap").read_bytes())
+
+    def expect_true_places(self, recording):
+        """Pose and frames in protobuf say what the ground truth says in JSON."""
+        frames = [frame for message in recording.read("/tf") for frame in message["transforms"]]
+        self.assertEqual([frame["child_frame_id"] for frame in frames], ["front", "object/rod"] * PINGS)
+        for number, (pose, truth) in enumerate(zip(recording.read("/front/pose"), recording.read("/front/truth"))):
+            for found, place in ((frames[2 * number], truth["sonar_in_world"]), (frames[2 * number + 1], truth["bodies"][0]["pose"])):
+                stamp = found["timestamp"]
+                self.assertEqual({"sec": stamp.get("seconds", 0), "nsec": stamp.get("nanos", 0)}, truth["timestamp"])
+                self.assertEqual({axis: found["translation"].get(axis, 0) for axis in "xyz"}, place["position"])
+                self.assertEqual({axis: found["rotation"].get(axis, 0) for axis in "xyzw"}, place["orientation"])
+            self.assertEqual(pose["pose"], {"position": frames[2 * number]["translation"], "orientation": frames[2 * number]["rotation"]})
 
     def test_killed_in_the_middle_and_started_again(self):
         def kill():

@@ -27,7 +27,7 @@ FLOORS = {
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
     "protocol/oculus": ["core/base/", "core/sonar/", "core/text/", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
     "protocol/blueview": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
-    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/wire/", "protocol/oculus/", "protocol/recording/"],
+    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/wire/", "protocol/oculus/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     # Within the daemon: files of configuration < what is emulated < sockets, threads and clocks < commands.
     "daemon/config": ["core/", "protocol/", "daemon/config/"],

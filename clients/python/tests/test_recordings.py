@@ -70,6 +70,20 @@ class Decompression(unittest.TestCase):
                 self.refused(kind, bytes(2000))
 
 
+def part(field, content):
+    return bytes((field << 3 | 2, len(content))) + content
+
+
+def doubles(values):
+    return b"".join(bytes((i << 3 | 1,)) + struct.pack("<d", v) for i, v in enumerate(values, 1) if v)
+
+
+def in_frame(step):
+    """foxglove.PoseInFrame in protobuf, 7 ns after 100 s."""
+    _, position, xyzw = made.enu_moment(step)
+    return part(1, b"\x08\x64\x10\x07") + part(2, b"map") + part(3, part(1, doubles(position)) + part(2, doubles(xyzw)))
+
+
 class Recordings(WithFolder):
     def channel(self, maker, schema, topic="/odom", encoding="cdr", steps=30, **how):
         return topic, encoding, schema, [(5000 + made.STEP_S * i, maker(i, **how)) for i in range(steps)]
@@ -120,29 +134,22 @@ class Recordings(WithFolder):
         self.assert_track(track, range(30), t0=100, radians=1e-6)
 
     def test_a_recording_of_sonard_itself(self):
-        """Images and poses as in docs/recording.md."""
+        """Images, poses and frames in protobuf, as in docs/recording.md, and in JSON, as before."""
         def pose(step):
             t, (x, y, z), (a, b, c, d) = made.enu_moment(step)
             return (f'{{"timestamp":{{"sec":100,"nsec":{round(1e9 * t)}}},"frame_id":"world","pose":'
                     f'{{"position":{{"x":{x},"y":{y},"z":{z}}},"orientation":{{"x":{a},"y":{b},"z":{c},"w":{d}}}}}}}').encode()
 
-        image = self.channel(lambda step: b'{"data":"' + bytes(1000) + b'"}', "foxglove.RawImage", "/front/image", "json", 10)
-        log = made.mcap([image, self.channel(pose, "foxglove.PoseInFrame", "/front/pose", "json", 10)])
-        track = self.convert(log)
-        self.assertEqual((track.source, track.frame, self.warned), ("/front/pose", "ENU_FLU", []))
-        self.assert_track(track, range(10), t0=100, radians=1e-6)
+        frames = self.channel(lambda step: part(1, b"\x00"), "foxglove.FrameTransforms", "/tf", "protobuf", 1)
+        for encoding, maker, steps in (("json", pose, 10), ("protobuf", in_frame, 1)):
+            with self.subTest(encoding):
+                image = self.channel(lambda step: b'{"data":"' + bytes(1000) + b'"}', "foxglove.RawImage", "/front/image", encoding, 10)
+                poses = self.channel(maker, "foxglove.PoseInFrame", "/front/pose", encoding, steps)
+                track = self.convert(made.mcap([image, poses, frames]))
+                self.assertEqual((track.source, track.frame, self.warned), ("/front/pose", "ENU_FLU", []))
+                self.assert_track(track, range(steps), t0=100, radians=1e-6)
 
     def test_poses_of_the_foxglove_schemas(self):
-        def part(field, content):
-            return bytes((field << 3 | 2, len(content))) + content
-
-        def doubles(values):
-            return b"".join(bytes((i << 3 | 1,)) + struct.pack("<d", v) for i, v in enumerate(values, 1) if v)
-
-        def in_frame(step):
-            _, position, xyzw = made.enu_moment(step)
-            return part(1, b"\x08\x64\x10\x07") + part(2, b"map") + part(3, part(1, doubles(position)) + part(2, doubles(xyzw)))
-
         def transform(step):
             _, position, xyzw = made.enu_moment(step)
             return part(2, b"map") + part(3, b"rov") + part(4, doubles(position)) + part(5, doubles(xyzw))

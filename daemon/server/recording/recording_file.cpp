@@ -115,7 +115,7 @@ Result<void> RecordingFile::put(recording::RecordedMessage message) {
 Result<void> RecordingFile::put_truth(const RecordedPing& ping) {
   const PingRequest& request = ping.ping->request;
   if (vendor_ != "oculus")  // whose messages the session reads itself
-    if (Result<void> written = mcap_->write_image(ping.at, *ping.ping); !written) return written;
+    if (Result<void> written = mcap_->write_image(ping.at, ping.ping); !written) return written;
   if (Result<void> written = mcap_->write_pose(ping.at, request.fired_at, request.sonar_in_world); !written) return written;
   recording::mcap::PingTruth truth;
   truth.ping = static_cast<std::uint32_t>(request.number);

@@ -3,8 +3,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "protocol/wire/base64.hpp"
-
 namespace sonar::recording::mcap {
 namespace {
 
@@ -25,53 +23,6 @@ Json json_of(const Pose& pose) {
   return {{"position", {{"x", p.x}, {"y", p.y}, {"z", p.z}}}, {"orientation", {{"x", q.x}, {"y", q.y}, {"z", q.z}, {"w", q.w}}}};
 }
 
-/// Rows by range, little-endian, of `width` bytes a sample.
-struct Picture {
-  std::size_t beams = 0, rows = 0, width = 1;
-  wire::Bytes samples;
-};
-
-Picture picture_of(const oculus::DecodedPing& ping) {
-  Picture picture{ping.beams(), ping.rows(), ping.bytes_per_sample(), {}};
-  for (std::size_t row = 0; row < ping.rows(); ++row) {
-    const wire::BytesView samples = ping.row_samples(row);
-    picture.samples.insert(picture.samples.end(), samples.begin(), samples.end());
-  }
-  return picture;
-}
-
-Picture picture_of(const Ping& ping) {
-  const PingSettings& s = ping.request.settings;
-  return {static_cast<std::size_t>(s.beam_count), static_cast<std::size_t>(s.range_bin_count),
-          static_cast<std::size_t>(s.format.bits / 8), ping.samples};
-}
-
-wire::Bytes as_floats(const Picture& picture) {
-  wire::Bytes out;
-  wire::Writer writer(out);
-  for (std::size_t at = 0; at + picture.width <= picture.samples.size(); at += picture.width) {
-    std::uint32_t value = 0;
-    for (std::size_t i = picture.width; i-- > 0;) value = value << 8 | std::to_integer<std::uint32_t>(picture.samples[at + i]);
-    const auto sample = static_cast<float>(value);
-    writer("sample", sample);
-  }
-  return out;
-}
-
-std::string image_text(Time at, const std::string& frame, const Picture& picture) {
-  const std::size_t width = picture.width;
-  std::string text = text_of({{"timestamp", json_of(at)},
-                              {"frame_id", frame},
-                              {"width", picture.beams},
-                              {"height", picture.rows},
-                              {"encoding", width == 1   ? "mono8"
-                                           : width == 2 ? "16UC1"
-                                                        : "32FC1"},
-                              {"step", picture.beams * (width <= 2 ? width : 4)}});
-  text.pop_back();  // base64 needs no escapes: appended without a search for them, since an image can exceed 1 MB
-  return text.append(R"(,"data":")").append(wire::base64(width <= 2 ? picture.samples : as_floats(picture))).append("\"}");
-}
-
 /// The objects that the beams hit, each once.
 Json objects_hit(const PingTruth& truth) {
   std::set<std::uint32_t> hit;
@@ -90,16 +41,6 @@ Json moving_bodies(const PingTruth& truth) {
 }
 
 }  // namespace
-
-std::string image_json(Time at, const std::string& frame, const oculus::DecodedPing& ping) {
-  return image_text(at, frame, picture_of(ping));
-}
-
-std::string image_json(Time at, const std::string& frame, const Ping& ping) { return image_text(at, frame, picture_of(ping)); }
-
-std::string pose_json(Time at, const std::string& frame, const Pose& pose) {
-  return text_of({{"timestamp", json_of(at)}, {"frame_id", frame}, {"pose", json_of(pose)}});
-}
 
 std::string truth_json(const PingTruth& truth) {
   Json ranges_m = Json::array(), objects = Json::array();
@@ -138,22 +79,6 @@ JsonSchema schema(const char* title, const char* description, Json properties) {
 }
 
 }  // namespace
-
-JsonSchema image_schema() {
-  return schema("foxglove.RawImage", "Samples as sent: one row per range, nearest first; one column per beam, port first",
-                {{"timestamp", timestamp()},
-                 {"frame_id", type("string")},
-                 {"width", type("integer")},
-                 {"height", type("integer")},
-                 {"encoding", type("string")},
-                 {"step", type("integer")},
-                 {"data", {{"type", "string"}, {"contentEncoding", "base64"}}}});
-}
-
-JsonSchema pose_schema() {
-  return schema("foxglove.PoseInFrame", "World ENU, body FLU: x ahead, y to port, z up",
-                {{"timestamp", timestamp()}, {"frame_id", type("string")}, {"pose", pose()}});
-}
 
 JsonSchema truth_schema() {
   return schema(

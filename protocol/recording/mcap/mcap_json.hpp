@@ -1,5 +1,4 @@
-// JSON messages for viewers: images and poses in the schemas of Foxglove, ground truth in a schema of sonard.
-// Written into MCAP files by mcap_session.
+// JSON messages in schemas of sonard's own: ground truth, faults. Written into MCAP files by mcap_session.
 #pragma once
 
 #include <span>
@@ -9,25 +8,14 @@
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
 #include "core/sonar/ping.hpp"
-#include "protocol/oculus/decode.hpp"
 
 namespace sonar::recording::mcap {
 
 struct JsonSchema {
   std::string name, text;
 };
-JsonSchema image_schema();  // foxglove.RawImage
-JsonSchema pose_schema();   // foxglove.PoseInFrame
 JsonSchema truth_schema();  // sonard.PingTruth
 JsonSchema fault_schema();  // sonard.FaultEntry
-
-/// Samples as sent: one row per range (row 0 nearest), one column per beam (column 0 most to port); mono8, 16UC1 or, for 24 and
-/// 32 bits, 32FC1.
-std::string image_json(Time at, const std::string& frame, const oculus::DecodedPing& ping);
-std::string pose_json(Time at, const std::string& frame, const Pose& pose);
-
-/// The same for a ping of any vendor, from the samples of its message.
-std::string image_json(Time at, const std::string& frame, const Ping& ping);
 
 struct SceneNames {
   std::vector<std::string> objects;  // by BeamTruth::object

@@ -58,7 +58,8 @@ void append(Bytes& out, const Schema& schema) {
   record.number(schema.id);
   record.string(schema.name);
   record.string(schema.encoding);
-  record.string(schema.text);  // length and bytes, as a string
+  record.number(static_cast<std::uint32_t>(schema.data.size()));
+  record.bytes(schema.data);
   record.end();
 }
 
@@ -79,7 +80,7 @@ std::optional<Schema> read_schema(BytesView content) {
   schema.id = record.number<std::uint16_t>();
   schema.name = record.string();
   schema.encoding = record.string();
-  record.bytes(record.number<std::uint32_t>());  // the text, unused
+  record.bytes(record.number<std::uint32_t>());  // the data, unused
   if (!record.ok()) return std::nullopt;
   return schema;
 }

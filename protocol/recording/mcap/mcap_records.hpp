@@ -35,8 +35,9 @@ inline constexpr std::size_t longest_description = 1 << 20;                  // 
 inline constexpr std::uint64_t latest_time_ns = 4'000'000'000'000'000'000u;  // in 2096; later times are damage
 
 struct Schema {
-  std::uint16_t id = 0;              // not 0
-  std::string name, encoding, text;  // text: written, not read back
+  std::uint16_t id = 0;  // not 0
+  std::string name, encoding;
+  Bytes data;  // written, not read back
 };
 struct Channel {
   std::uint16_t id = 0, schema = 0;  // schema 0 = none

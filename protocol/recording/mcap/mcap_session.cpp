@@ -3,11 +3,32 @@
 #include <algorithm>
 #include <set>
 
+#include "protocol/foxglove/foxglove_messages.hpp"
+#include "protocol/oculus/decode.hpp"
+
 namespace sonar::recording {
 namespace {
 
 constexpr const char* replayed_encoding = "oculus";  // of opaque messages: the vendor whose recordings are read
 constexpr std::size_t most_names = 16;
+constexpr const char* world = "world";  // the frame of poses
+
+Bytes bytes_of(const std::string& text) {
+  Bytes bytes(text.size());
+  std::transform(text.begin(), text.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
+  return bytes;
+}
+
+/// Full scale is the largest code of that many bits: the message does not state another.
+foxglove::Image image_of(const oculus::DecodedPing& ping) {
+  const auto codes = std::make_shared<Bytes>();
+  for (std::size_t row = 0; row < ping.rows(); ++row) {
+    const BytesView samples = ping.row_samples(row);
+    codes->insert(codes->end(), samples.begin(), samples.end());
+  }
+  const int bits = static_cast<int>(8 * ping.bytes_per_sample());
+  return foxglove::image_of(ping.beams(), ping.rows(), bits, 0xFFFFFFFFu >> (32 - bits), codes);
+}
 
 class McapRecordingReader final : public RecordingReader {
  public:
@@ -56,8 +77,9 @@ McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::str
   device_ = vendor_channel("device", "device", "tcp");
   client_ = vendor_channel("client", "client", "tcp");
   status_ = vendor_channel("status", "device", "udp");
-  image_ = json_channel("/" + sonar_ + "/image", mcap::image_schema());
-  pose_ = json_channel("/" + sonar_ + "/pose", mcap::pose_schema());
+  image_ = protobuf_channel("/" + sonar_ + "/image", "foxglove.RawImage");
+  pose_ = protobuf_channel("/" + sonar_ + "/pose", "foxglove.PoseInFrame");
+  tf_ = protobuf_channel("/tf", "foxglove.FrameTransforms");
   truth_ = json_channel("/" + sonar_ + "/truth", mcap::truth_schema());
   faults_ = json_channel("/faults", mcap::fault_schema());
 }
@@ -70,9 +92,17 @@ std::uint16_t McapSession::vendor_channel(const char* topic, const char* from, c
   return writer_.add_channel(std::move(channel));
 }
 
+std::uint16_t McapSession::protobuf_channel(const std::string& topic, const std::string& message) {
+  mcap::Channel channel;
+  channel.schema = writer_.add_schema(message, "protobuf", foxglove::descriptor_set(message));
+  channel.topic = topic;
+  channel.message_encoding = "protobuf";
+  return writer_.add_channel(std::move(channel));
+}
+
 std::uint16_t McapSession::json_channel(const std::string& topic, const mcap::JsonSchema& schema) {
   mcap::Channel channel;
-  channel.schema = writer_.add_schema(schema.name, "jsonschema", schema.text);
+  channel.schema = writer_.add_schema(schema.name, "jsonschema", bytes_of(schema.text));
   channel.topic = topic;
   channel.message_encoding = "json";
   return writer_.add_channel(std::move(channel));
@@ -84,25 +114,31 @@ Result<void> McapSession::write(const RecordedMessage& message) {
   if (vendor_ != replayed_encoding || channel != device_ || message.bytes.size() < oculus::header_size) return {};
   if (oculus::header_of(message.bytes).type != oculus::MessageType::ping_result) return {};
   const auto ping = oculus::decode_ping(message.bytes);
-  return ping && ping->has_image ? write_json(image_, message.at, mcap::image_json(message.at, sonar_, *ping)) : Result<void>{};
+  if (!ping || !ping->has_image) return {};
+  return writer_.write(image_, message.at, foxglove::raw_image(message.at, sonar_, image_of(*ping)));
 }
 
 Result<void> McapSession::write_pose(Time at, Time of, const Pose& sonar_in_world) {
-  return write_json(pose_, at, mcap::pose_json(of, "world", sonar_in_world));
+  const foxglove::Transform frame{of, world, sonar_, sonar_in_world};
+  if (Result<void> put = writer_.write(pose_, at, foxglove::pose_in_frame(of, world, sonar_in_world)); !put) return put;
+  return writer_.write(tf_, at, foxglove::transforms({&frame, 1}));
 }
 
-Result<void> McapSession::write_image(Time at, const Ping& ping) {
-  return write_json(image_, at, mcap::image_json(at, sonar_, ping));
+Result<void> McapSession::write_image(Time at, const std::shared_ptr<const Ping>& ping) {
+  return writer_.write(image_, at, foxglove::raw_image(at, sonar_, foxglove::image_of(ping)));
 }
 
 Result<void> McapSession::write_truth(Time at, const mcap::PingTruth& truth) {
+  std::vector<foxglove::Transform> bodies;
+  for (std::size_t i = 0; truth.names != nullptr && i < std::min(truth.names->bodies.size(), truth.bodies_in_world.size()); ++i)
+    bodies.push_back({truth.fired_at, world, "object/" + truth.names->bodies[i], truth.bodies_in_world[i]});
+  if (!bodies.empty())
+    if (Result<void> put = writer_.write(tf_, at, foxglove::transforms(bodies)); !put) return put;
   return write_json(truth_, at, mcap::truth_json(truth));
 }
 
 Result<void> McapSession::write_json(std::uint16_t channel, Time at, const std::string& text) {
-  Bytes bytes(text.size());
-  std::transform(text.begin(), text.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
-  return writer_.write(channel, at, bytes);
+  return writer_.write(channel, at, bytes_of(text));
 }
 
 Result<std::unique_ptr<RecordingReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar) {

@@ -11,18 +11,19 @@
 
 namespace sonar::recording {
 
-/// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose, /NAME/truth and
-/// /faults in JSON.
+/// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose and /tf in the live view's
+/// protobuf (protocol/foxglove/foxglove_messages.hpp); /NAME/truth and /faults in JSON.
 class McapSession final : public RecordingWriter {
  public:
   /// `vendor`: vendor of the messages; only pings of "oculus" are converted to images automatically.
   McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::string vendor = "oculus");
 
   Result<void> write(const RecordedMessage& message) override;
-  /// Pose of the sonar at time `of`. `at` as in RecordedMessage: must not decrease.
+  /// Pose of the sonar at time `of`, also as the frame NAME of /tf. `at` as in RecordedMessage: must not decrease.
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
   /// Image of a ping of another vendor than Oculus.
-  Result<void> write_image(Time at, const Ping& ping);
+  Result<void> write_image(Time at, const std::shared_ptr<const Ping>& ping);
+  /// Moving bodies also as the frames object/NAME of /tf.
   Result<void> write_truth(Time at, const mcap::PingTruth& truth);
   /// `json`: a FaultEntry of control.proto.
   Result<void> write_fault(Time at, const std::string& json) { return write_json(faults_, at, json); }
@@ -30,12 +31,13 @@ class McapSession final : public RecordingWriter {
 
  private:
   std::uint16_t vendor_channel(const char* topic, const char* from, const char* carrier);
+  std::uint16_t protobuf_channel(const std::string& topic, const std::string& message);
   std::uint16_t json_channel(const std::string& topic, const mcap::JsonSchema& schema);
   Result<void> write_json(std::uint16_t channel, Time at, const std::string& text);
 
   mcap::Writer writer_;
   std::string sonar_, vendor_;
-  std::uint16_t device_, client_, status_, image_, pose_, truth_, faults_;
+  std::uint16_t device_, client_, status_, image_, pose_, tf_, truth_, faults_;
 };
 
 /// The vendor's bytes of one sonar: the named one, or the first. bad_data: not an MCAP file.

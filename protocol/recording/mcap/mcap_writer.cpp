@@ -6,9 +6,9 @@
 
 namespace sonar::recording::mcap {
 
-std::uint16_t Writer::add_schema(std::string name, std::string encoding, std::string text) {
+std::uint16_t Writer::add_schema(std::string name, std::string encoding, Bytes data) {
   const auto id = static_cast<std::uint16_t>(schemas_.size() + 1);
-  schemas_.push_back({id, std::move(name), std::move(encoding), std::move(text)});
+  schemas_.push_back({id, std::move(name), std::move(encoding), std::move(data)});
   return id;
 }
 

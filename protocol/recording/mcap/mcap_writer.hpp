@@ -15,7 +15,7 @@ class Writer {
 
   explicit Writer(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
 
-  std::uint16_t add_schema(std::string name, std::string encoding, std::string text);
+  std::uint16_t add_schema(std::string name, std::string encoding, Bytes data);
   std::uint16_t add_channel(Channel channel);  // sets its id
   /// Messages of a channel are numbered from 0. io: later calls fail; the file stays readable.
   Result<void> write(std::uint16_t channel, Time at, BytesView data);

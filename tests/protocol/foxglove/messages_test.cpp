@@ -13,6 +13,7 @@
 
 #include "protocol/foxglove/glb.hpp"
 #include "protocol/foxglove/ros_cdr.hpp"
+#include "protocol/wire/base64.hpp"
 
 namespace sonar::foxglove {
 namespace {
@@ -64,18 +65,26 @@ std::shared_ptr<Ping> ping_of(int bits) {
   PingSettings& s = ping->request.settings;
   s.beam_count = 3;
   s.range_bin_count = 2;
-  s.format = {.bits = bits, .max_code = bits == 32 ? 8u : 255u};
+  s.format = {.bits = bits, .max_code = bits > 16 ? 8u : 255u};
   ping->beam_azimuth_rad = {0.5f, 0, -0.5f};
   for (int i = 0; i < 6; ++i)
     for (int b = 0; b < bits / 8; ++b) ping->samples.push_back(static_cast<std::byte>(b == 0 ? i : 0));
   return ping;
 }
 
-json read_image(int bits) {
-  const Image image = image_of(ping_of(bits));
-  Bytes whole = image_head(at, "front", image);
-  whole.insert(whole.end(), image.samples->begin(), image.samples->end());
-  return read_back("foxglove.RawImage", whole);
+json read_image(int bits) { return read_back("foxglove.RawImage", raw_image(at, "front", image_of(ping_of(bits)))); }
+
+TEST(Base64, KnownAnswers) {
+  const auto base64 = [](const std::string& text) {
+    Bytes bytes;
+    for (const char c : text) bytes.push_back(static_cast<std::byte>(c));
+    return wire::base64(bytes);
+  };
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(base64(std::string("\xFB\xFF\0", 3)), "+/8A");
 }
 
 TEST(FoxgloveMessages, Images) {
@@ -89,12 +98,16 @@ TEST(FoxgloveMessages, Images) {
   EXPECT_EQ(decoded(image["data"]), std::string("\0\1\2\3\4\5", 6));
   EXPECT_EQ(read_image(16)["encoding"], "mono16");
   EXPECT_EQ(read_image(16)["step"], 6);
-  const json parts = read_image(32);
-  EXPECT_EQ(parts["encoding"], "32FC1");
-  const std::string last = decoded(parts["data"]).substr(20);
-  std::uint32_t bits = 0;
-  for (int i = 3; i >= 0; --i) bits = bits << 8 | static_cast<unsigned char>(last[static_cast<std::size_t>(i)]);
-  EXPECT_EQ(std::bit_cast<float>(bits), 5.0f / 8);
+  for (const int bits : {24, 32}) {
+    const json parts = read_image(bits);
+    EXPECT_EQ(parts["encoding"], "32FC1");
+    EXPECT_EQ(parts["step"], 12);
+    const std::string data = decoded(parts["data"]);
+    ASSERT_EQ(data.size(), 24u);
+    std::uint32_t last = 0;
+    for (std::size_t i = 24; i-- > 20;) last = last << 8 | static_cast<unsigned char>(data[i]);
+    EXPECT_EQ(std::bit_cast<float>(last), 5.0f / 8);
+  }
 }
 
 TEST(FoxgloveMessages, SamplesAreNotCopied) {

@@ -97,7 +97,7 @@ TEST(RecordingFile, KeepsAStatusASecondAndTheTruthOfEveryPing) {
     for (const std::byte b : message->data) truth += static_cast<char>(b);
   }
   EXPECT_THAT(found, ElementsAre(std::pair("/front/device", 5), std::pair("/front/pose", 5), std::pair("/front/status", 2),
-                                 std::pair("/front/truth", 5)));
+                                 std::pair("/front/truth", 5), std::pair("/tf", 10)));
   EXPECT_THAT(truth,
               HasSubstr(R"("range_m":[2.5,0.0],"object":[1,-1],"objects":[{"index":1,"name":"box"}],"bodies":[{"name":"crate")"));
 }
