@@ -4,6 +4,17 @@ import { clockTime, fixed } from '../numbers.js';
 
 const names = { 3: 'warning', 4: 'error', 5: 'error' };
 const near_end_px = 30;
+const field = / +([a-z_]+)=("(?:[^"\\]|\\.)*"|\S*)/g;
+
+/// "viewer connected  from=\"http 127.0.0.1\"  steers=yes": {words: 'viewer connected', fields: 'from http 127.0.0.1 · steers yes'}.
+export function partsOf(message) {
+  const fields = [];
+  const words = message.replace(field, (_, key, value) => {
+    fields.push(`${key.replace(/_/g, ' ')} ${value.replace(/^"|"$/g, '')}`);
+    return '';
+  });
+  return { words, fields: fields.join(' · ') };
+}
 
 export class LogPane {
   constructor(facts) {
@@ -21,7 +32,9 @@ export class LogPane {
   line(entry) {
     const level = names[entry.level] ?? '';
     const time = this.facts.realtime ? clockTime(entry.ns) : `${fixed(entry.ns / 1e9, 3)} s`;
-    const text = make('span', {}, level && make('span', { class: 'unseen' }, `${level}: `), entry.name && entry.name !== 'sonard' && !entry.message.startsWith(entry.name) ? `${entry.name}: ` : '', entry.message);
+    const { words, fields } = partsOf(entry.message);
+    const of = entry.name && entry.name !== 'sonard' && !words.startsWith(entry.name) && this.facts.status?.sonars.length > 1 ? `${entry.name}: ` : '';
+    const text = make('span', {}, level && make('span', { class: 'unseen' }, `${level}: `), of, words, fields && make('small', {}, ` ${fields}`));
     return make('div', { class: `log-line ${level}` }, make('time', {}, time), text);
   }
 
