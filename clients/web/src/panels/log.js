@@ -7,10 +7,11 @@ const near_end_px = 30;
 const field = / +([a-z_]+)=("(?:[^"\\]|\\.)*"|\S*)/g;
 
 /// "viewer connected  from=\"http 127.0.0.1\"  steers=yes": {words: 'viewer connected', fields: 'from http 127.0.0.1 · steers yes'}.
-export function partsOf(message) {
+/// The field `hidden` is left out.
+export function partsOf(message, hidden = '') {
   const fields = [];
   const words = message.replace(field, (_, key, value) => {
-    fields.push(`${key.replace(/_/g, ' ')} ${value.replace(/^"|"$/g, '')}`);
+    if (key !== hidden) fields.push(`${key.replace(/_/g, ' ')} ${value.replace(/^"|"$/g, '')}`);
     return '';
   });
   return { words, fields: fields.join(' · ') };
@@ -32,15 +33,15 @@ export class LogPane {
   line(entry) {
     const level = names[entry.level] ?? '';
     const time = this.facts.realtime ? clockTime(entry.ns) : `${fixed(entry.ns / 1e9, 3)} s`;
-    const { words, fields } = partsOf(entry.message);
-    const of = entry.name && entry.name !== 'sonard' && !words.startsWith(entry.name) && this.facts.status?.sonars.length > 1 ? `${entry.name}: ` : '';
-    const text = make('span', {}, level && make('span', { class: 'unseen' }, `${level}: `), of, words, fields && make('small', {}, ` ${fields}`));
+    const { words, fields } = partsOf(entry.message, this.facts.status.sonars.length > 1 ? '' : 'sonar');
+    const text = make('span', {}, level && make('span', { class: 'unseen' }, `${level}: `), words, fields && make('small', {}, ` ${fields}`));
     return make('div', { class: `log-line ${level}` }, make('time', {}, time), text);
   }
 
   draw() {
     const { facts } = this;
-    const sonars = (facts.status?.sonars ?? []).map((s) => s.name);
+    if (!facts.status) return;
+    const sonars = facts.status.sonars.map((s) => s.name);
     showList($('log-sonar'), sonars, () => [['', 'all'], ...sonars.map((s) => [s, s]), ['sonard', 'sonard']].map(([value, text]) => make('option', { value }, text)));
     const fresh = Math.min(facts.log.length, facts.logCount - this.shown);
     if (fresh <= 0) return;
