@@ -25,6 +25,6 @@ case "${1:-}" in
 esac
 
 setup_and_build sonard sonarctl || exit
-say "starting sonard"
+say "starting sonard: open the address that it prints first in a browser"
 [ $# -gt 0 ] || set -- --demo
 exec build/release/daemon/sonard "$@"

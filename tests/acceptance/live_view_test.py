@@ -174,6 +174,21 @@ class Channels(unittest.TestCase):
             model = scene["entities"][0]["models"][0]
             self.assertEqual(struct.unpack_from("<4sII", model["data"]), (b"glTF", 2, len(model["data"])))
 
+    def test_who_comes_after_all_have_left_gets_geometry_too(self):
+        with Sonard() as daemon, Client(daemon.address) as client:
+            client.send(fire_message(rate_hz=5))
+            for _ in range(2):
+                with Viewer(daemon.address) as viewer:
+                    viewer.greeted().subscribe("/front/geometry", "/swath")
+                    reader = threading.Thread(target=lambda: [client.ping() for _ in range(5)])
+                    reader.start()
+                    self.assertGreater(viewer.first_of("/front/geometry")["row_spacing_m"], 0)
+                    self.assertEqual(viewer.first_of("/swath")["entities"][0]["frame_id"], "front")
+                    reader.join()
+                deadline = time.monotonic() + 10
+                while "viewer gone" not in daemon.log() and time.monotonic() < deadline:
+                    time.sleep(0.05)
+
     def test_one_channel_is_for_plotjuggler(self):
         with Sonard() as daemon, Viewer(daemon.address) as viewer:
             figures = viewer.greeted().channels[viewer.channel("/front/figures")]

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What takes too long for every run, and is run before a release: the loads, a mission of ten minutes, full fuzzing, the whole
+# What takes too long for every run, and is run before a release: the loads, a mission of ten minutes, the page for 20, full fuzzing, the whole
 # functional suite under the address and undefined-behaviour sanitizers, and what has threads under the thread sanitizer. Run by
 # ./test.sh --long, or alone; two to four hours on two cores. Every step is run, also after one that failed; a table ends it.
 # usage: tests/tools/long_checks.sh [STEP...]
@@ -25,11 +25,12 @@ step() {  # step NAME COMMAND...: runs it, when wished, and remembers how it end
 
 step load tests/load/load.sh
 step mission env SONARD_BUILD=build/release python3 -B tests/acceptance/mission_test.py --long
+step page env SONARD_BUILD=build/release SONARD_PAGE_MINUTES=20 python3 -B tests/acceptance/page_live_test.py Long
 step tsan tests/tools/sanitized_tests.sh tsan
 step asan tests/tools/sanitized_tests.sh asan-all
 step fuzz tests/tools/fuzz.sh
 
-[ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are load, mission, tsan, asan, fuzz" >&2; exit 64; }
+[ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are load, mission, page, tsan, asan, fuzz" >&2; exit 64; }
 say "long checks"
 printf '%s\n' "${rows[@]}"
 echo "figures: $SONARD_RELIABILITY"

@@ -114,7 +114,7 @@ export class Facts {
         return;
     }
     const [, sonar, kind] = topic.split('/');
-    if (kind === 'geometry') this.geometry.set(sonar, value);
+    if (kind === 'geometry') this.geometry.set(sonar, { ...value, ns });
     if (kind === 'ping' && sonar === this.sonar) this.pingEvent(value, ns);
     if (kind === 'image' && sonar === this.sonar) this.image(value, ns);
   }
@@ -131,7 +131,7 @@ export class Facts {
     this.receivedBytes += image.data.length;
     this.received.add(now_s(), this.receivedBytes);
     this.ping = { image, geometry, ns, at: now_s() };
-    const event = this.events.get(ns);
+    const event = this.events.get(ns) ?? (geometry.ns === ns ? geometry : null);  // newcomers get the last picture without its event
     if (event) this.count(this.ping, event);
   }
 

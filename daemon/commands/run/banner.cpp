@@ -5,6 +5,7 @@
 
 #include "core/text/format.hpp"
 #include "cuda/cuda_status.hpp"
+#include "daemon/server/view/page_files.hpp"
 #include "protocol/blueview/frames.hpp"
 
 namespace sonar {
@@ -73,6 +74,14 @@ std::string control_line(const App& app) {
   return text + (app.config().control.token_file.empty() ? "\n" : "   token needed\n");
 }
 
+/// The page; empty in builds without it.
+std::string page_line(const App& app) {
+  const Endpoint http = app.control().http();
+  if (http.port == 0 || app.config().limits.viewers == 0 || page_files().empty()) return {};
+  const std::string host = http.ip == Ipv4{} ? "127.0.0.1:" + std::to_string(http.port) : address_text(http);
+  return "open      http://" + host + "   the live view, in a browser\n";
+}
+
 /// For viewers whose pages come from elsewhere: the key is good until sonard stops.
 std::string view_line(const App& app) {
   const Endpoint http = app.control().http();
@@ -97,6 +106,7 @@ double peak_memory_mb() {
 
 std::string banner(const App& app, const BannerFacts& facts) {
   std::string text = "sonard " SONARD_VERSION "  (" + app.engine_description() + ", CUDA: " + cuda_status() + ")\n";
+  text += page_line(app);
   text += "config    " + facts.config_line + "\n";
   text += "scene     " + app.scene().name +
           format("   %zu triangles, %zu materials, %zu moving, built in %.0f ms\n", app.scene().triangle_count(),

@@ -17,13 +17,39 @@ bool is_shown(const Object& object) { return !object.name.empty() && object.name
 
 ViewBytes shared(wire::Bytes bytes) { return std::make_shared<const wire::Bytes>(std::move(bytes)); }
 
-/// Materials have no colours: a few calm ones, by name.
-std::array<double, 3> colour_of(const std::string& material) {
-  constexpr std::array<std::array<double, 3>, 6> colours{
-      {{0.62, 0.56, 0.44}, {0.46, 0.52, 0.56}, {0.55, 0.42, 0.36}, {0.44, 0.54, 0.44}, {0.60, 0.60, 0.58}, {0.52, 0.48, 0.60}}};
+using Colour = std::array<double, 3>;
+
+/// Materials have no colours: that of the first word found in the name ("rusty pipe", "quay_stone"), else a calm one of its own.
+Colour colour_of(const std::string& material) {
+  struct Row {
+    std::string_view word;
+    Colour colour;
+  };
+  constexpr Colour sand{0.62, 0.57, 0.47}, rock{0.50, 0.50, 0.52}, stone{0.55, 0.58, 0.62}, steel{0.52, 0.62, 0.74};
+  constexpr std::array<Row, 18> rows{{{"sand", sand},
+                                      {"bed", sand},
+                                      {"mud", {0.42, 0.38, 0.32}},
+                                      {"gravel", {0.56, 0.53, 0.49}},
+                                      {"rust", {0.58, 0.33, 0.22}},
+                                      {"stone", stone},
+                                      {"concrete", stone},
+                                      {"tank", stone},
+                                      {"rock", rock},
+                                      {"steel", steel},
+                                      {"metal", steel},
+                                      {"alumin", {0.72, 0.75, 0.78}},
+                                      {"wood", {0.47, 0.36, 0.24}},
+                                      {"rubber", {0.16, 0.17, 0.18}},
+                                      {"plastic", {0.86, 0.45, 0.10}},
+                                      {"glass", {0.60, 0.74, 0.76}},
+                                      {"ice", {0.80, 0.88, 0.93}},
+                                      {"air", {0.85, 0.86, 0.80}}}};
+  for (const Row& row : rows)
+    if (material.find(row.word) != std::string::npos) return row.colour;
+  constexpr std::array<Colour, 5> others{{sand, {0.46, 0.52, 0.56}, {0.55, 0.42, 0.36}, {0.44, 0.54, 0.44}, {0.60, 0.60, 0.58}}};
   const auto sum = std::accumulate(material.begin(), material.end(), 0u,
-                                   [](unsigned s, char c) { return 31 * s + static_cast<unsigned char>(c); });
-  return colours[sum % colours.size()];
+                                   [](unsigned n, char c) { return 31 * n + static_cast<unsigned char>(c); });
+  return others[sum % others.size()];
 }
 
 Mesh bounding_box(const Mesh& mesh) {

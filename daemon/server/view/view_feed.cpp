@@ -295,7 +295,11 @@ void ViewFeed::tick() {
   drive_previews();
   if (connections_.empty()) {
     of_.fleet.tap_pings({});
-    for (SonarView& sonar : sonars_) sonar.last.reset();
+    for (SonarView& sonar : sonars_) {  // the next viewer gets geometry and swath anew
+      sonar.last.reset();
+      sonar.shape.clear();
+      sonar.volume.clear();
+    }
     shapes_.clear();
     return;
   }

@@ -180,6 +180,7 @@ class MockDaemon:
     def serve(self, request):
         path = request.path.partition("?")[0]
         self.requests.append(request.path)
+        request.rfile.read(int(request.headers.get("Content-Length", 0)))  # left there, it would begin the connection's next request
         if "upgrade" in request.headers.get("Connection", "").lower():
             return self.serve_socket(request)
         if path == "/api/v1/view_ticket":

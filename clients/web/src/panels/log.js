@@ -4,6 +4,18 @@ import { clockTime, fixed } from '../numbers.js';
 
 const names = { 3: 'warning', 4: 'error', 5: 'error' };
 const near_end_px = 30;
+const field = / +([a-z_]+)=("(?:[^"\\]|\\.)*"|\S*)/g;
+
+/// "viewer connected  from=\"http 127.0.0.1\"  steers=yes": {words: 'viewer connected', fields: 'from http 127.0.0.1 · steers yes'}.
+/// The field `hidden` is left out.
+export function partsOf(message, hidden = '') {
+  const fields = [];
+  const words = message.replace(field, (_, key, value) => {
+    if (key !== hidden) fields.push(`${key.replace(/_/g, ' ')} ${value.replace(/^"|"$/g, '')}`);
+    return '';
+  });
+  return { words, fields: fields.join(' · ') };
+}
 
 export class LogPane {
   constructor(facts) {
@@ -21,13 +33,15 @@ export class LogPane {
   line(entry) {
     const level = names[entry.level] ?? '';
     const time = this.facts.realtime ? clockTime(entry.ns) : `${fixed(entry.ns / 1e9, 3)} s`;
-    const text = make('span', {}, level && make('span', { class: 'unseen' }, `${level}: `), entry.name && entry.name !== 'sonard' && !entry.message.startsWith(entry.name) ? `${entry.name}: ` : '', entry.message);
+    const { words, fields } = partsOf(entry.message, this.facts.status.sonars.length > 1 ? '' : 'sonar');
+    const text = make('span', {}, level && make('span', { class: 'unseen' }, `${level}: `), words, fields && make('small', {}, ` ${fields}`));
     return make('div', { class: `log-line ${level}` }, make('time', {}, time), text);
   }
 
   draw() {
     const { facts } = this;
-    const sonars = (facts.status?.sonars ?? []).map((s) => s.name);
+    if (!facts.status) return;
+    const sonars = facts.status.sonars.map((s) => s.name);
     showList($('log-sonar'), sonars, () => [['', 'all'], ...sonars.map((s) => [s, s]), ['sonard', 'sonard']].map(([value, text]) => make('option', { value }, text)));
     const fresh = Math.min(facts.log.length, facts.logCount - this.shown);
     if (fresh <= 0) return;

@@ -10,14 +10,14 @@ const numbers = [
 const water = [
   { name: '/water/temperature_c', label: 'temperature', unit: '°C', step: 0.1 },
   { name: '/water/salinity_psu', label: 'salinity', unit: 'psu', step: 0.1 },
-  { name: '/water/sound_speed_mps', label: 'sound speed', unit: 'm/s', step: 0.1 },
+  { name: '/water/sound_speed_mps', label: 'sound speed', unit: 'm/s', step: 0.1, zero: 'computed' },
 ];
 
 function numberRow(setting, name, steering) {
   const id = `set${name.replace(/\W/g, '-')}`;
-  const input = make('input', { id, type: 'number', step: setting.step, required: true });
+  const input = make('input', { id, type: 'number', step: setting.step, required: !setting.zero, placeholder: setting.zero ?? '' });
   input.name = name;
-  input.onchange = () => (input.value === '' ? input.dispatchEvent(new Event('blur')) : steering.set(name, Number(input.value)));
+  input.onchange = () => (input.value === '' && !setting.zero ? input.dispatchEvent(new Event('blur')) : steering.set(name, Number(input.value)));
   input.onkeydown = (event) => event.key === 'Escape' && input.blur();
   return make('div', { class: 'setting' }, make('label', { htmlFor: id }, setting.label), make('span', {}, input, ' ', make('span', { class: 'unit' }, setting.unit)));
 }
@@ -61,7 +61,7 @@ export function drawSettings(facts, steering) {
     field.disabled = !able;
     field.title = able ? '' : 'this page may only look';
     const value = facts.value(field.name);
-    const text = typeof value === 'number' ? short(value, 2) : String(value ?? '');
+    const text = value === 0 && field.placeholder ? '' : typeof value === 'number' ? short(value, 2) : String(value ?? '');
     if (document.activeElement !== field && field.value !== text) field.value = text;
   }
   const by = facts.sonarStatus?.asked_by;

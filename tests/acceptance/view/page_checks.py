@@ -1,0 +1,95 @@
+"""What the browser tests of the page hold against it, before a scripted daemon (page_test.py) and a real one (page_live_test.py)."""
+import base64
+import os
+import pathlib
+import shutil
+import sys
+import time
+
+from browser import program
+from pictures import difference, mirrored, read_png
+from running_sonard import BUILD, SONARCTL, run
+
+PAGE = BUILD / "clients/web/page"
+SHOTS = pathlib.Path(os.environ.get("SONARD_SHOTS", BUILD / "tests/page-pictures"))
+WHY_NOT = ("this build has no page" if not (PAGE / "index.html").is_file() else
+           "no chromium" if program() is None else
+           "no protoc" if shutil.which("protoc") is None else "")
+TABS = ("fan", "scene", "clients", "faults", "log")
+
+# Elements whose words stand out less than 4.5 to 1 from what is painted behind them (WCAG 1.4.3).
+FAINT_WORDS = """(() => {
+  const channels = (c) => c.match(/[\\d.]+/g).map(Number);
+  const light = ([r, g, b]) => [r, g, b].map((v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+  const behind = (e) => {
+    for (; e; e = e.parentElement) {
+      const c = channels(getComputedStyle(e).backgroundColor);
+      if (c.length === 3 || c[3] > 0.8) return c;
+    }
+    return [255, 255, 255];
+  };
+  return [...document.querySelectorAll('body *')].filter((e) => e.offsetWidth && !e.closest(':disabled, .unseen, .skip, option')
+    && [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim())).filter((e) => {
+      const [a, b] = [light(channels(getComputedStyle(e).color)), light(behind(e))];
+      return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05) < 4.5;
+    }).map((e) => `${e.id || e.className || e.tagName}: ${e.textContent.slice(0, 30)}`);
+})()"""
+NAMELESS_CONTROLS = """[...document.querySelectorAll('button, input, select, canvas:not([aria-hidden])')].filter((e) => e.offsetWidth
+  && !(e.getAttribute('aria-label') || e.labels?.length || /\\w/.test(e.textContent) && e.tagName === 'BUTTON')).map((e) => e.outerHTML.slice(0, 80))"""
+SMALL_TARGETS = """[...document.querySelectorAll('button:not(.link), select')].filter((e) => e.offsetWidth && (e.offsetHeight < 44 || e.offsetWidth < 44))
+  .map((e) => `${e.id || e.className} ${e.offsetWidth} x ${e.offsetHeight}`)"""
+WIDER_THAN = """[...document.querySelectorAll('main *, header *, nav *')].filter((e) => e.offsetWidth && !e.closest('#fan-glass, .unseen')
+  && e.getBoundingClientRect().right > WIDTH + 1).map((e) => e.id || e.className || e.tagName)"""
+
+
+def shown(page, patience_s=60):
+    """Until the page has drawn a ping."""
+    page.wait("/\\d/.test(document.querySelector('#ping-number').textContent)", patience_s)
+
+
+class PageChecks:
+    """Of a TestCase."""
+
+    def reference(self, raw, map_name, width):
+        """What `sonarctl view` draws of a ping's message in a file."""
+        png = pathlib.Path(f"{raw}.png")
+        done = run(SONARCTL, "view", "--from-raw", raw, "--png", png, "--no-rings", "--colour-map", map_name, "--width", width)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return read_png(png.read_bytes())
+
+    @staticmethod
+    def drawn(page, map_name):
+        url = page.run(f"sonardTest.fan.useMap('{map_name}'), sonardTest.fan.paint(), document.querySelector('#fan').toDataURL()")
+        return read_png(base64.b64decode(url.partition(",")[2]))
+
+    def compare(self, drawn, reference):
+        (width, height, ours), (_, other_height, theirs) = drawn, reference
+        self.assertEqual(width, reference[0])
+        self.assertLessEqual(abs(height - other_height), 1)  # bearings have 32 bits here, 64 there: the last row may be one more
+        height = min(height, other_height)
+        ours, theirs = ours[:3 * width * height], theirs[:3 * width * height]
+        mean, p99, above = difference(ours, theirs)
+        print(f"\n  {width} pixels wide: mean {mean:.3f}, p99 {p99}, above 8: {100 * above:.4f} %", end="", file=sys.stderr)
+        self.assertLessEqual(mean, 0.5)
+        self.assertLessEqual(p99, 2)
+        self.assertLessEqual(above, 0.001)
+        self.assertGreater(difference(mirrored(width, height, ours), theirs)[0], 2)
+
+    def assert_fits(self, page, width, name=""):
+        """No sideways scrolling in any pane; a picture of each."""
+        for tab in TABS if width < 820 else TABS[:1]:
+            if width < 820:
+                page.click(f"#tabs [data-tab={tab}]")
+                time.sleep(0.5)
+            self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
+            self.assertEqual(page.run(WIDER_THAN.replace("WIDTH", str(width))), [], tab)
+            page.picture(SHOTS / f"{name}{width}-{tab}.png")
+
+    def assert_quiet(self, page, url):
+        """No error of the console, and no request but to `url`."""
+        page.run("1")
+        self.assertEqual(page.errors, [])
+        own = url.replace("http", "", 1)
+        strangers = [r for r in page.requests if not r.startswith(("http" + own, "ws" + own, "blob:", "data:", "about:"))]
+        self.assertEqual(strangers, [])
