@@ -127,7 +127,10 @@ class SonarJudge {
     if (!gone.address().empty())
       last = "; the last one, " + gone.address() + ", left at " + utc_text(gone.utc_ns()) + ": " + gone.why();
     const std::string cure = "point a driver at " + where_to_connect(sonar_);
-    add(Level::warn, "driver", "No driver is connected to " + sonar_.name() + "; nothing is simulated without one" + last, cure);
+    add(Level::warn, "driver",
+        "No driver is connected to " + sonar_.name() +
+            (sonar_.preview() ? "; pings are a preview for viewers alone" : "; nothing is simulated without one") + last,
+        cure);
     if (is_recent(searched))
       add(Level::warn, "driver",
           searched.address() + " searched for sonars at " + utc_text(searched.utc_ns()) +

@@ -66,6 +66,7 @@ TEST(Judge, NoDriverConnected) {
   EXPECT_EQ(f.level, Level::warn);
   EXPECT_THAT(f.text, StartsWith("No driver is connected to front"));
   EXPECT_EQ(f.cure, "point a driver at 127.0.0.2, TCP port 52100");
+  EXPECT_THAT(trouble(with("preview: true"), "driver").text, HasSubstr("a preview for viewers alone"));
   EXPECT_THAT(
       trouble(with(R"(gone { address: "10.0.0.7:1" why: "closed by the client" utc_ns: 3723000000000 ago_s: 500 })"), "driver")
           .text,
