@@ -52,9 +52,9 @@ export function drawFaults(facts, steering) {
   const list = $('active-faults');
   showList(list, groups.map((g) => [g.trouble, g.sonar, g.by]), () => groups.map(card));
   groups.forEach((group, i) => {
-    const left_s = group.ends_ns ? (group.ends_ns - facts.time_ns) / 1e9 : NaN;
+    const left_s = group.ends_ns && facts.time_ns !== null ? (group.ends_ns - facts.time_ns) / 1e9 : NaN;
     const key = `${group.trouble} ${group.sonar}`;
-    if (!(Math.abs(wholes.get(key)?.ends_ns - group.ends_ns) < 1e9)) wholes.set(key, { ends_ns: group.ends_ns, whole_s: left_s });
+    if (!Number.isNaN(left_s) && !(Math.abs(wholes.get(key)?.ends_ns - group.ends_ns) < 1e9)) wholes.set(key, { ends_ns: group.ends_ns, whole_s: left_s });
     setText(list.children[i].querySelector('.left'), group.waiting ? 'waits' : Number.isNaN(left_s) ? 'acts' : countdown(left_s));
     const bar = list.children[i].querySelector('progress');
     setHidden(bar, Number.isNaN(left_s));
