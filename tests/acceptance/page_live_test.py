@@ -200,10 +200,11 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("document.querySelector('#timeline').offsetWidth > 0")
             page.press(" ")
             self.patiently(lambda: ask(daemon, "status")["vehicles"][0]["trajectory"].get("paused"))
-            page.run("[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === 'Deaf head').click()")
+            page.run("document.querySelector('#fault-seconds').value = 60, "
+                     "[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === 'Deaf head').click()")
             page.wait("document.querySelector('.fault-card .left')?.innerText.startsWith('0:') && document.querySelector('#fan-pane').matches('.faulty')")
             self.assertEqual(page.text("#fault-count"), "1")
-            page.picture(SHOTS / "live-fault.png")
+            page.wait("document.querySelector('.fault-card progress').value < 0.97")
             page.click("#findings button.link")
             page.wait("!document.querySelector('.fault-card')")
             ask(daemon, "sonar", {"rate_hz": 0})
@@ -222,8 +223,9 @@ class Live(PageChecks, unittest.TestCase):
                 shown(page)
                 page.wait("document.querySelectorAll('#clients tr').length === 3")
                 if width > 800:
-                    page.run("[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === 'Thin tether').click()")
-                    page.wait("document.querySelector('#findings li')?.innerText.includes('Thin tether')")
+                    page.run("document.querySelector('#fault-seconds').value = 60, "
+                             "[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === 'Thin tether').click()")
+                    page.wait("/thin.tether/i.test(document.querySelector('#findings li')?.innerText)")
                     time.sleep(8)
                 page.picture(SHOTS / f"{name}.png")
                 self.assert_quiet(page, url_of(daemon))

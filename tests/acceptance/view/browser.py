@@ -61,7 +61,7 @@ class Browser:
 class Page:
     def __init__(self, url, width, height, scale=1, touch=False, script="", theme="dark"):
         host, _, port = url.netloc.partition(":")
-        self.socket = WebSocket.connect(socket.create_connection((host, int(port)), timeout=60), url.netloc, url.path)
+        self.socket = WebSocket.connect(socket.create_connection((host, int(port)), timeout=180), url.netloc, url.path)
         self.calls, self.requests, self.errors = 0, [], []
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.call(f"{domain}.enable")

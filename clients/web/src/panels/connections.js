@@ -46,7 +46,8 @@ function rowsOf(facts) {
 export function drawConnections(facts) {
   const rows = rowsOf(facts);
   const drivers = rows.length - 1;
-  setText($('connection-count'), facts.status ? many(drivers, 'driver') : dash);
+  const viewers = facts.status?.viewers?.length ?? 0;  // of daemons that tell
+  setText($('connection-count'), facts.status ? many(drivers, 'driver') + (viewers ? `, ${many(viewers, 'viewer')}` : '') : dash);
   const body = $('clients');
   showList(body, rows.map((r) => r.key), () =>
     rows.map(() => make('tr', {}, make('td', { class: 'who' }, make('span', { class: 'dot' }), make('span')), make('td'), make('td'), make('td'))));

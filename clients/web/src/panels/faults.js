@@ -33,7 +33,7 @@ function offered(facts) {
   return out;
 }
 
-const whole_of = new Map();  // longest countdown seen of each trouble, for the bar
+const wholes = new Map();  // {ends_ns, whole_s} of each trouble, for its bar; ends that messages tell differ by less than a second
 
 function card(group) {
   return make(
@@ -52,15 +52,14 @@ export function drawFaults(facts, steering) {
   const list = $('active-faults');
   showList(list, groups.map((g) => [g.trouble, g.sonar, g.by]), () => groups.map(card));
   groups.forEach((group, i) => {
-    const left_s = group.ends_ns ? (group.ends_ns - facts.time_ns) / 1e9 : NaN;
-    const key = `${group.trouble} ${group.sonar} ${group.ends_ns}`;
-    whole_of.set(key, Math.max(left_s, whole_of.get(key) ?? 0));
+    const left_s = group.ends_ns && facts.time_ns !== null ? (group.ends_ns - facts.time_ns) / 1e9 : NaN;
+    const key = `${group.trouble} ${group.sonar}`;
+    if (!Number.isNaN(left_s) && !(Math.abs(wholes.get(key)?.ends_ns - group.ends_ns) < 1e9)) wholes.set(key, { ends_ns: group.ends_ns, whole_s: left_s });
     setText(list.children[i].querySelector('.left'), group.waiting ? 'waits' : Number.isNaN(left_s) ? 'acts' : countdown(left_s));
     const bar = list.children[i].querySelector('progress');
     setHidden(bar, Number.isNaN(left_s));
-    bar.value = Number.isNaN(left_s) ? 0 : Math.max(0, left_s / whole_of.get(key));
+    bar.value = Number.isNaN(left_s) ? 0 : Math.max(0, Math.min(1, left_s / wholes.get(key).whole_s));
   });
-  if (whole_of.size > 100) whole_of.clear();
 
   const troubles = armed ? offered(facts) : [];
   const able = facts.maySteer && facts.connection === 'open';
