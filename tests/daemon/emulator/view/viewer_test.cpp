@@ -192,6 +192,7 @@ TEST_F(OneViewer, CallsServicesFourAtATime) {
     viewer.on_binary(foxglove::encode(foxglove::ServiceCall{1, call, "json", "{}"}), now);
   EXPECT_EQ(host.calls.size(), 4u);
   EXPECT_EQ(next_word()["callId"], 5);
+  EXPECT_EQ(next_word()["message"], "4 calls are open already") << "Lichtblick ignores the failure and shows the status";
   viewer.answer({1, 1, "json", "{}"});
   EXPECT_EQ(viewer.next(now)->head, foxglove::service_answer({1, 1, "json", "{}"}));
   viewer.on_binary(foxglove::encode(foxglove::ServiceCall{1, 6, "json", "{}"}), now);
