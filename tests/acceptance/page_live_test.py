@@ -154,15 +154,17 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("Number(document.querySelector('#clients td:nth-child(4)').innerText.replace(/\\D/g, '')) > 0", 90)
             cell = "Number(document.querySelector('#clients td:nth-child(%d)').innerText.replace(/[^\\d.]/g, ''))"
             page.wait(f"Math.abs({cell % 2} - 7) <= 0.3", 60)
-            before, written = client_of(daemon), []
+            # Pings leave in bursts, as the kernel's buffers drain: means over ten seconds.
+            before, written, shown_hz = client_of(daemon), [], []
             for _ in range(50):
                 written.append((time.monotonic(), int(client_of(daemon)["pings_written"])))
-                time.sleep(0.1)
+                shown_hz.append(page.run(cell % 2))
+                time.sleep(0.2)
             hz = (written[-1][1] - written[0][1]) / (written[-1][0] - written[0][0])
             rate, mbit, dropped = (page.run(cell % n) for n in (2, 3, 4))
             after = client_of(daemon)
-            self.assertAlmostEqual(rate, 7, delta=0.3)
-            self.assertAlmostEqual(rate, hz, delta=0.6)  # a quarter of a ping in each of its windows
+            self.assertAlmostEqual(sum(shown_hz) / len(shown_hz), 7, delta=0.3)
+            self.assertAlmostEqual(hz, 7, delta=0.6)
             bytes_each = int(after["bytes_written"]) / int(after["pings_written"])
             self.assertAlmostEqual(mbit, 8e-6 * rate * bytes_each, delta=0.3)
             self.assertTrue(int(before.get("pings_dropped", 0)) <= dropped <= int(after["pings_dropped"]), (before, dropped, after))
