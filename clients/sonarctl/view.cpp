@@ -20,8 +20,8 @@ Result<void> check(const ViewOptions& o) {
   return {};
 }
 
-Result<Raster> write_picture(const ViewOptions& options, const PolarImage& image) {
-  Result<Raster> fan = draw_fan(image, options.style);
+Result<Raster> write_picture(const ViewOptions& options, FanPainter& painter, const PolarImage& image) {
+  Result<Raster> fan = painter.draw(image);
   if (!fan) return fan;
   if (Result<void> written = write_png(*fan, options.png); !written) return tl::unexpected(written.error());
   return fan;
@@ -45,7 +45,8 @@ Result<void> view_one(const ViewOptions& options) {
   const Result<PolarImage> image = picture_of(*ping);
   if (!image) return tl::unexpected(image.error());
   if (!options.png.empty()) {
-    const Result<Raster> fan = write_picture(options, *image);
+    FanPainter painter(options.style);
+    const Result<Raster> fan = write_picture(options, painter, *image);
     if (!fan) return tl::unexpected(fan.error());
     std::printf("%s: %d x %d pixels, %zu rows x %zu beams, %.2f m\n", options.png.c_str(), fan->width, fan->height, image->rows,
                 image->beams, image->range_m());
@@ -62,7 +63,8 @@ Result<void> view_one(const ViewOptions& options) {
 
 class LiveView {
  public:
-  LiveView(const ViewOptions& options, PingStream stream) : options_(options), stream_(std::move(stream)) {}
+  LiveView(const ViewOptions& options, PingStream stream)
+      : options_(options), stream_(std::move(stream)), painter_(options.style) {}
 
   /// Succeeds when interrupted, after the requested pings, or when the output was closed.
   Result<void> run() {
@@ -94,7 +96,7 @@ class LiveView {
     const Result<PolarImage> image = picture_of(ping);
     if (!image) return tl::unexpected(image.error());
     if (!options_.png.empty())
-      if (const Result<Raster> fan = write_picture(options_, *image); !fan) return tl::unexpected(fan.error());
+      if (const Result<Raster> fan = write_picture(options_, painter_, *image); !fan) return tl::unexpected(fan.error());
     if (!options_.terminal) {
       const bool overwrites = terminal_facts().is_terminal;  // one line that changes, or one line per ping
       std::printf(overwrites ? "\r\x1b[K%s  %s" : "%s  %s\n", options_.png.c_str(), figures_.text().c_str());
@@ -108,6 +110,7 @@ class LiveView {
 
   const ViewOptions& options_;
   PingStream stream_;
+  FanPainter painter_;
   ViewCaption figures_;
 };
 

@@ -22,45 +22,26 @@ std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azi
   return beam;
 }
 
-/// Cells [first, last] that a box of `width` around `centre` touches, cell i being [i, i + 1); weights by overlap.
-struct Span {
+struct Interval {
   double low = 0, high = 0;
-  std::size_t first = 0, last = 0;
-  double weight(std::size_t i) const {
-    return std::min(high, static_cast<double>(i) + 1) - std::max(low, static_cast<double>(i));
-  }
 };
-Span span_around(double centre, double width, std::size_t cells) {
+/// A box of `width` around `centre`, within the cells there are.
+Interval box_around(double centre, double width, std::size_t cells) {
   const double limit = static_cast<double>(cells);
-  Span span;
-  span.low = std::clamp(centre - width / 2, 0.0, limit - 1e-6);
-  span.high = std::clamp(centre + width / 2, span.low + 1e-6, limit);
-  span.first = static_cast<std::size_t>(span.low);
-  span.last = std::min(cells - 1, static_cast<std::size_t>(span.high));
-  return span;
+  const double low = std::clamp(centre - width / 2, 0.0, limit - 1e-6);
+  return {low, std::clamp(centre + width / 2, low + 1e-6, limit)};
 }
 
-/// Mean sample over the pixel's footprint; a footprint smaller than a cell becomes one cell wide, which interpolates linearly.
-std::optional<float> footprint_mean(const PolarImage& image, double x_m, double y_m, double pixel_m) {
-  const double range = std::hypot(x_m, y_m);
-  if (range < image.start_m || range >= image.range_m()) return std::nullopt;
-  const std::optional<double> beam = beam_at(image.azimuth_rad, std::atan2(-x_m, y_m));
-  if (!beam) return std::nullopt;
-  const double beam_spacing = (image.azimuth_rad.front() - image.azimuth_rad.back()) / static_cast<double>(image.beams - 1);
-  const double beams_wide = pixel_m / std::max(range, pixel_m) / beam_spacing;
-  const double row = (range - image.start_m) / image.row_spacing_m;
-  const Span rows = span_around(row, std::max(1.0, pixel_m / image.row_spacing_m), image.rows);
-  const Span beams = span_around(*beam + 0.5, std::max(1.0, beams_wide), image.beams);
-  double sum = 0, weights = 0;
-  for (std::size_t r = rows.first; r <= rows.last; ++r) {
-    for (std::size_t b = beams.first; b <= beams.last; ++b) {
-      const double weight = std::max(0.0, rows.weight(r)) * std::max(0.0, beams.weight(b));
-      sum += weight * static_cast<double>(image.at(r, b));
-      weights += weight;
-    }
+/// Cells [first, last] that an interval touches, weighted by their overlap.
+struct Span {
+  double low, high;
+  std::size_t first, last;
+  Span(double from, double to, std::size_t cells)
+      : low(from), high(to), first(static_cast<std::size_t>(from)), last(std::min(cells - 1, static_cast<std::size_t>(to))) {}
+  double weight(std::size_t i) const {
+    return std::max(0.0, std::min(high, static_cast<double>(i) + 1) - std::max(low, static_cast<double>(i)));
   }
-  return static_cast<float>(sum / weights);
-}
+};
 
 void draw_rings(Raster& raster, const PolarImage& image, const FanLayout& layout) {
   const double spacing = ring_spacing_m(image.range_m());
@@ -120,20 +101,65 @@ double ring_spacing_m(double range_m) {
   return 2 * decade;
 }
 
-Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style) {
-  if (Result<void> sound = check(image, style); !sound) return tl::unexpected(sound.error());
-  const FanLayout layout = fan_layout(image, style);
-  Raster raster(layout.width, layout.height);
-  for (int y = 0; y < layout.height; ++y) {
-    for (int x = 0; x < layout.width; ++x) {
-      const double x_m = (x + 0.5 - layout.apex_x) * layout.metres_per_pixel;
-      const double y_m = (layout.apex_y - y - 0.5) * layout.metres_per_pixel;
-      const std::optional<float> mean = footprint_mean(image, x_m, y_m, layout.metres_per_pixel);
-      raster.at(x, y) = mean ? style.colours.colour(*mean / image.full_scale) : background;
+/// A footprint smaller than a cell becomes one cell wide, which interpolates linearly.
+FanPainter::Footprint FanPainter::footprint(const PolarImage& image, double x_m, double y_m, double pixel_m) {
+  const double range = std::hypot(x_m, y_m);
+  if (range < image.start_m || range >= image.range_m()) return {};
+  const std::optional<double> beam = beam_at(image.azimuth_rad, std::atan2(-x_m, y_m));
+  if (!beam) return {};
+  const double beam_spacing = (image.azimuth_rad.front() - image.azimuth_rad.back()) / static_cast<double>(image.beams - 1);
+  const double beams_wide = pixel_m / std::max(range, pixel_m) / beam_spacing;
+  const double row = (range - image.start_m) / image.row_spacing_m;
+  const Interval rows = box_around(row, std::max(1.0, pixel_m / image.row_spacing_m), image.rows);
+  const Interval beams = box_around(*beam + 0.5, std::max(1.0, beams_wide), image.beams);
+  return {rows.low, rows.high, beams.low, beams.high};
+}
+
+float FanPainter::mean(const PolarImage& image, const Footprint& of) {
+  const Span rows(of.row_low, of.row_high, image.rows), beams(of.beam_low, of.beam_high, image.beams);
+  double sum = 0, weights = 0;
+  for (std::size_t r = rows.first; r <= rows.last; ++r) {
+    for (std::size_t b = beams.first; b <= beams.last; ++b) {
+      const double weight = rows.weight(r) * beams.weight(b);
+      sum += weight * static_cast<double>(image.at(r, b));
+      weights += weight;
     }
   }
-  if (style.rings) draw_rings(raster, image, layout);
+  return static_cast<float>(sum / weights);
+}
+
+bool FanPainter::fits(const PolarImage& image) const {
+  return !footprints_.empty() && image.rows == shape_.rows && image.beams == shape_.beams && image.start_m == shape_.start_m &&
+         image.row_spacing_m == shape_.row_spacing_m && image.azimuth_rad == shape_.azimuth_rad;
+}
+
+void FanPainter::lay_out(const PolarImage& image) {
+  shape_ = {image.rows, image.beams, image.row_spacing_m, image.azimuth_rad, {}, image.full_scale, image.start_m};
+  layout_ = fan_layout(image, style_);
+  footprints_.clear();
+  footprints_.reserve(static_cast<std::size_t>(layout_.width) * static_cast<std::size_t>(layout_.height));
+  for (int y = 0; y < layout_.height; ++y) {
+    for (int x = 0; x < layout_.width; ++x) {
+      const double x_m = (x + 0.5 - layout_.apex_x) * layout_.metres_per_pixel;
+      const double y_m = (layout_.apex_y - y - 0.5) * layout_.metres_per_pixel;
+      footprints_.push_back(footprint(image, x_m, y_m, layout_.metres_per_pixel));
+    }
+  }
+}
+
+Result<Raster> FanPainter::draw(const PolarImage& image) {
+  if (!fits(image)) {
+    if (Result<void> sound = check(image, style_); !sound) return tl::unexpected(sound.error());
+    lay_out(image);
+  }
+  Raster raster(layout_.width, layout_.height);
+  for (std::size_t i = 0; i < footprints_.size(); ++i)
+    raster.pixels[i] =
+        footprints_[i].is_outside() ? background : style_.colours.colour(mean(image, footprints_[i]) / image.full_scale);
+  if (style_.rings) draw_rings(raster, image, layout_);
   return raster;
 }
+
+Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style) { return FanPainter(style).draw(image); }
 
 }  // namespace sonar

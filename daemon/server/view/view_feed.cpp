@@ -299,6 +299,7 @@ void ViewFeed::tick() {
       sonar.last.reset();
       sonar.shape.clear();
       sonar.volume.clear();
+      sonar.painter.reset();
     }
     shapes_.clear();
     return;

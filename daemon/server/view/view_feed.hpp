@@ -81,8 +81,9 @@ class ViewFeed final : public ViewerHost {
     std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0;
     Slow fan{}, cloud{};
     std::shared_ptr<const Ping> last = nullptr;
-    wire::Bytes shape = {};   // of last, without its number
-    std::string volume = {};  // what the swath depends on
+    wire::Bytes shape = {};                         // of last, without its number
+    std::string volume = {};                        // what the swath depends on
+    std::shared_ptr<FanPainter> painter = nullptr;  // for the view thread alone
   };
 
   void on_ping(const Device& of, const PingQueued& queued);

@@ -37,7 +37,10 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
 
 void ViewFeed::begin_slow_ones(SonarView& sonar) {
   if (sonar.last == nullptr) return;
-  make_slowly(sonar, &SonarView::fan, [name = sonar.name, ping = sonar.last](double) { return fan_payload(name, *ping); });
+  if (sonar.painter == nullptr) sonar.painter = std::make_shared<FanPainter>(view_fan_style());
+  make_slowly(sonar, &SonarView::fan, [name = sonar.name, ping = sonar.last, painter = sonar.painter](double) {
+    return fan_payload(name, *ping, *painter);
+  });
   make_slowly(sonar, &SonarView::cloud,
               [name = sonar.name, ping = sonar.last](double threshold) { return cloud_payload(name, *ping, threshold); });
 }

@@ -94,6 +94,24 @@ TEST(Fan, KeepsTheMeanWhenPixelsAreCoarserThanSamples) {
   EXPECT_NEAR(middle.r, 150, 8) << "an alternating pattern must blend, not alias";
 }
 
+TEST(Fan, APainterDrawsPingsOfChangingShapesAsOneByOne) {
+  FanPainter painter(plain_gray(300));
+  const auto speckle = [](std::size_t rows, double aperture_deg, std::size_t seed) {
+    PolarImage image = black_fan(rows, 64, aperture_deg);
+    for (std::size_t i = 0; i < image.samples.size(); ++i) image.samples[i] = static_cast<float>((i * 7919 + seed) % 256);
+    return image;
+  };
+  PolarImage later = speckle(40, 60, 5);
+  later.start_m = 1;
+  PolarImage spread = speckle(40, 60, 6);
+  spread.azimuth_rad[3] += 0.001;
+  for (const PolarImage& image : {speckle(40, 60, 1), speckle(40, 60, 2), speckle(50, 60, 3), speckle(50, 40, 4), later, spread})
+    EXPECT_EQ(painter.draw(image)->pixels, draw_fan(image, plain_gray(300))->pixels);
+  EXPECT_FALSE(painter.draw(black_fan(10, 16, 120)));
+  const PolarImage first = speckle(40, 60, 1);
+  EXPECT_EQ(painter.draw(first)->pixels, draw_fan(first, plain_gray(300))->pixels) << "after one that it refused";
+}
+
 TEST(Fan, RefusesWhatCannotBeDrawn) {
   PolarImage none;
   EXPECT_THAT(draw_fan(none, plain_gray()).error().text, testing::HasSubstr("no picture"));
