@@ -30,7 +30,7 @@ FanLayout fan_layout(const PolarImage& image, const FanStyle& style);
 /// half a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 
-/// Draws one ping after another as draw_fan does, in a tenth of the time: where the footprint of each pixel lies is kept until
+/// Draws one ping after another as draw_fan does, in a third of the time: where the footprint of each pixel lies is kept until
 /// rows, beams or bearings change. 32 bytes a pixel.
 class FanPainter {
  public:
