@@ -28,6 +28,10 @@ Arena::Place Arena::allocate_bytes(std::size_t bytes) {
     if (where_ != Where::host) c.device = static_cast<std::byte*>(machine_.allocate(size));
     if (where_ != Where::device) c.host = static_cast<std::byte*>(machine_.allocate_host(size));
     c.size = size;
+    if (clear_lane_ != not_cleared) {
+      std::memset(c.host, 0, size);
+      machine_.upload(clear_lane_, c.device, c.host, size);
+    }
     it = chunks_.end() - 1;
   }
   const Place at{it->device ? it->device + it->used : nullptr, it->host ? it->host + it->used : nullptr};

@@ -15,7 +15,11 @@ namespace sonar::cuda {
 class Arena {
  public:
   enum class Where { device, host, both };
-  Arena(Machine& machine, Where where, std::size_t chunk_bytes) : machine_(machine), where_(where), chunk_bytes_(chunk_bytes) {}
+  static constexpr int not_cleared = -1;
+  /// `clear_lane`: the lane on which new memory is set to zero, both copies; Where::both only. A copy of whole chunks then reads
+  /// nothing that was never written, gaps between pieces included, which compute-sanitizer's initcheck would report.
+  Arena(Machine& machine, Where where, std::size_t chunk_bytes, int clear_lane = not_cleared)
+      : machine_(machine), where_(where), chunk_bytes_(chunk_bytes), clear_lane_(clear_lane) {}
   ~Arena();
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
@@ -66,6 +70,7 @@ class Arena {
   Machine& machine_;
   Where where_;
   std::size_t chunk_bytes_;
+  int clear_lane_;
   std::vector<Chunk> chunks_;
 };
 

@@ -22,7 +22,7 @@ BatchRoom::BatchRoom(Machine& machine, int which_lane, std::size_t most_pings)
     : lane(which_lane),
       tables(machine, Arena::Where::both, table_chunk),
       work(machine, Arena::Where::device, work_chunk),
-      results(machine, Arena::Where::both, result_chunk),
+      results(machine, Arena::Where::both, result_chunk, which_lane),
       cells(machine, Arena::Where::host, cell_chunk),
       view_memory_(machine, Arena::Where::both, 0),
       view_table_(view_memory_.allocate<PingView>(most_pings)) {}
