@@ -1,6 +1,7 @@
 // The device by way of the module, which is looked for beside the program and where packages put it.
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <filesystem>
@@ -143,5 +144,14 @@ Result<std::unique_ptr<Machine>> open_cuda_machine() {
 namespace sonar {
 
 std::string cuda_status() { return cuda::find_device().status; }
+
+std::string cuda_presence() {
+  const auto places = cuda::module_places();
+  const auto exists = [](const std::filesystem::path& place) {
+    std::error_code error;
+    return std::filesystem::exists(place, error);
+  };
+  return std::any_of(places.begin(), places.end(), exists) ? "not used" : "not installed";
+}
 
 }  // namespace sonar

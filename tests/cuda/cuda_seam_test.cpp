@@ -38,12 +38,14 @@ void expect_no_engine() {
 TEST(CudaSeam, SaysThatThereIsNoModule) {
   look_at("/nowhere/libsonard_cuda.so");
   EXPECT_EQ(cuda_status(), "not installed");
+  EXPECT_EQ(cuda_presence(), "not installed");
   expect_no_engine();
 }
 
 TEST(CudaSeam, SaysThatAModuleIsNone) {
   look_at(SONARD_SOURCE_DIR "/LICENSE");
   EXPECT_THAT(cuda_status(), StartsWith("not loadable: "));
+  EXPECT_EQ(cuda_presence(), "not used");  // which did not try to load it
   expect_no_engine();
 }
 

@@ -96,7 +96,8 @@ double peak_memory_mb() {
 }  // namespace
 
 std::string banner(const App& app, const BannerFacts& facts) {
-  std::string text = "sonard " SONARD_VERSION "  (" + app.engine_description() + ", CUDA: " + cuda_status() + ")\n";
+  const std::string cuda = app.config().engine.device == EngineDevice::cpu ? cuda_presence() : cuda_status();
+  std::string text = "sonard " SONARD_VERSION "  (" + app.engine_description() + ", CUDA: " + cuda + ")\n";
   text += "config    " + facts.config_line + "\n";
   text += "scene     " + app.scene().name +
           format("   %zu triangles, %zu materials, %zu moving, built in %.0f ms\n", app.scene().triangle_count(),
