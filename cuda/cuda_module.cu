@@ -3,6 +3,8 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <new>
 #include <thread>
 #include <vector>
@@ -128,6 +130,9 @@ int open(void** machine) {
     close(m);
     return error;
   }
+  // For measurements: graphs save launches, and cost a capture where launches differ.
+  const char* graphs = std::getenv("SONARD_CUDA_GRAPHS");
+  m->graphs_work = !graphs || std::strcmp(graphs, "0") != 0;
   *machine = m;
   return cudaSuccess;
 }
