@@ -53,6 +53,7 @@ class Arena {
   void upload(int lane);    // all that was taken; Where::both only
   void download(int lane);  // likewise
   void clear();
+  void give_back();  // the memory too; nothing queued may need it any more
   std::size_t taken_bytes() const;
 
  private:

@@ -24,6 +24,7 @@ class CellStore {
   /// when no ping under way needs them.
   bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();
+  void give_back();  // its memory too
 
   std::size_t bytes() const { return memory_.taken_bytes(); }
 
@@ -35,6 +36,8 @@ class CellStore {
     const std::int16_t* device = nullptr;
   };
   const Held* held(const CellTile& tile) const;
+  std::size_t send_from(std::span<const TileInView> tiles, std::size_t from, int lane, Arena& staging,
+                        std::vector<const std::int16_t*>& cells);
 
   Machine& machine_;
   std::size_t budget_bytes_;

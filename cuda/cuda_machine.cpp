@@ -82,6 +82,11 @@ class CudaMachine final : public Machine {
   CudaMachine& operator=(const CudaMachine&) = delete;
 
   std::string name() const override { return name_; }
+  std::size_t free_bytes() const override {
+    std::size_t bytes = 0;
+    check(module_.free_bytes(at_, &bytes));
+    return bytes;
+  }
   void* allocate(std::size_t bytes) override {
     void* device = nullptr;
     check(module_.allocate(at_, &device, bytes));
@@ -120,7 +125,10 @@ class CudaMachine final : public Machine {
  private:
   /// An error of the device ends its use: DeviceEngine reports it and may go on with the CPU.
   void check(int code) const {
-    if (code != 0) throw std::runtime_error(name_ + ": " + module_.reason(code));
+    if (code == 0) return;
+    const std::string why = name_ + ": " + module_.reason(code);
+    if (module_.is_memory_full(code) != 0) throw DeviceMemoryFull(why);
+    throw std::runtime_error(why);
   }
   const CudaModule& module_;
   std::string name_;

@@ -75,6 +75,10 @@ const char* reason(int code) {
   return code >= cufft_codes ? CufftLibrary::reason(code) : cudaGetErrorString(static_cast<cudaError_t>(code));
 }
 
+int is_memory_full(int code) {
+  return code == cudaErrorMemoryAllocation || (code >= cufft_codes && CufftLibrary::is_memory_full(code)) ? 1 : 0;
+}
+
 int query(int* devices, char* name, std::size_t room) {
   *devices = 0;
   cudaError_t error = cudaGetDeviceCount(devices);
@@ -141,6 +145,10 @@ int open(void** machine) {
 cudaError_t told(cudaError_t error) {
   if (error != cudaSuccess) cudaGetLastError();
   return error;
+}
+int free_bytes(void*, std::size_t* bytes) {
+  std::size_t all = 0;
+  return told(cudaMemGetInfo(bytes, &all));
 }
 int allocate(void*, void** at, std::size_t bytes) { return told(cudaMalloc(at, bytes)); }
 int release(void* machine, void* at) { return opened(machine).hung ? cudaErrorLaunchTimeout : cudaFree(at); }
@@ -295,9 +303,11 @@ const CudaModule module{module_version,
                         sizeof(TileView),
                         static_cast<std::uint32_t>(Step::steps),
                         reason,
+                        is_memory_full,
                         query,
                         open,
                         close,
+                        free_bytes,
                         allocate,
                         release,
                         allocate_host,

@@ -30,12 +30,19 @@ constexpr Stage stage_of(Step step) {
   return step == Step::receive ? Stage::receive : Stage::form_beams;
 }
 
+/// The options, with budgets that the device has room for. The rest is the kernels' own, other programs' and the scene's.
+DeviceEngineOptions fitted(DeviceEngineOptions options, std::size_t free_bytes) {
+  options.cell_bytes = std::min(options.cell_bytes, free_bytes / 5 * 2);
+  options.work_bytes = std::min(options.work_bytes, free_bytes / 5);
+  return options;
+}
+
 class DeviceEngine final : public PingEngine {
  public:
   DeviceEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options, std::unique_ptr<Machine> machine,
                DeviceEngineOptions device_options)
       : machine_(std::move(machine)),
-        device_options_(std::move(device_options)),
+        device_options_(fitted(std::move(device_options), machine_->free_bytes())),
         options_(options),
         scene_(scene),
         pool_(pool),
@@ -70,8 +77,10 @@ class DeviceEngine final : public PingEngine {
   std::vector<Ping> computed(std::span<const PingRequest> requests) {
     std::vector<Ping> pings(requests.size());
     each_.assign(requests.size(), {});
+    done_.assign(requests.size(), false);
     if (!failed_) try {
-        run_on_device(requests, pings);
+        while (!tried_on_device(requests, pings)) {
+        }
         return pings;
       } catch (const std::bad_alloc&) {  // of the computer's memory: what was begun is forgotten, the next ping begins anew
         for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);
@@ -92,13 +101,38 @@ class DeviceEngine final : public PingEngine {
     return pings;
   }
 
+  /// False: the device's memory was full. What it took has been given back, and what is not done may be tried again.
+  bool tried_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
+    try {
+      run_on_device(requests, pings);
+      return true;
+    } catch (const DeviceMemoryFull&) {
+      for (int lane = 0; lane < Machine::lanes; ++lane) machine_->wait(lane);
+      if (one_room_ && all_given_back_) throw;
+      all_given_back_ = true;
+      one_room_ = batch_ == 1;
+      batch_ = std::max<std::size_t>(1, batch_ / 2);
+      for (BatchRoom& room : rooms_) {
+        empty(room);
+        for (Arena* arena : room.arenas()) arena->give_back();
+      }
+      preparer_.give_back();
+      plans_.clear();
+      say("CUDA: the device's memory is full; from here on " +
+          (one_room_ ? "one ping at a time" : "batches of at most " + std::to_string(batch_)));
+      return false;
+    }
+  }
+
   void run_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
     std::size_t which = 0;
     for (std::size_t i = 0; i < requests.size(); ++i) {
+      if (done_[i]) continue;
       if (const std::string why = why_by_cpu(requests[i]); !why.empty()) {
         if (told_.insert(why).second) say("CUDA: " + why);
         pings[i] = by_cpu(requests[i]);
         each_[i] = statistics_;
+        done_[i] = true;
         continue;
       }
       // Two rooms take turns: the CPU prepares one batch while the device computes the other.
@@ -111,12 +145,13 @@ class DeviceEngine final : public PingEngine {
       // A batch is full by number, or by memory [bytes].
       if (rooms_[which].pings.size() < batch_ && rooms_[which].work.taken_bytes() < device_options_.work_bytes) continue;
       launch(rooms_[which]);
-      which = 1 - which;
+      if (!one_room_) which = 1 - which;
       finish(rooms_[which], pings);  // the other one: it has had the time it took to prepare this one
     }
     launch(rooms_[which]);
     finish(rooms_[1 - which], pings);
     finish(rooms_[which], pings);
+    all_given_back_ = false;
   }
 
   /// Empty when the device does it.
@@ -202,6 +237,7 @@ class DeviceEngine final : public PingEngine {
     for (std::size_t i = 0; i < room.pings.size(); ++i) {
       pings[room.pings[i].index] = ping_from(room.pings[i], room.views[i]);
       each_[room.pings[i].index] = statistics_;
+      done_[room.pings[i].index] = true;
     }
     empty(room);
   }
@@ -243,7 +279,7 @@ class DeviceEngine final : public PingEngine {
   static void empty(BatchRoom& room) {
     room.views.clear();
     room.pings.clear();
-    for (Arena* arena : {&room.tables, &room.work, &room.results, &room.cells}) arena->clear();
+    for (Arena* arena : room.arenas()) arena->clear();
   }
 
   void say(const std::string& what) const {
@@ -266,12 +302,15 @@ class DeviceEngine final : public PingEngine {
   std::unique_ptr<SurfaceCells> cells_;
   std::vector<std::shared_ptr<PlanTables>> plans_;
   PingPreparer preparer_;
-  std::size_t batch_;
+  std::size_t batch_;  // pings that are launched together
   BatchRoom rooms_[2];
   Workspace work_;  // of the CPU
   std::set<std::string> told_;
   PingStatistics statistics_;
   std::vector<PingStatistics> each_;   // of the last run
+  std::vector<bool> done_;             // which of its pings
+  bool one_room_ = false;              // for lack of memory: nothing is prepared while the device computes
+  bool all_given_back_ = false;        // since the last run that had memory enough
   std::optional<std::string> failed_;  // why
 };
 

@@ -3,6 +3,7 @@
 // multipath, whose echoes are summed by core/pipeline/multipath and sent as columns.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -39,6 +40,8 @@ struct BatchRoom {
   std::vector<PingView> views;
   std::vector<Ping> pings;
 
+  /// All that a batch fills.
+  std::array<Arena*, 4> arenas() { return {&tables, &work, &results, &cells}; }
   /// Queues views and tables. The views lie where those of the batch before lay: what was captured of it (cuda_module.cu) serves
   /// again.
   const PingView* upload();
@@ -59,6 +62,8 @@ class PingPreparer {
   bool add(const PingRequest& request, std::size_t index, std::shared_ptr<PlanTables> plan, SurfaceCells& cells, int lane,
            BatchRoom& room);
   void forget_cells() { store_.clear(); }
+  /// Likewise, and their memory goes back to the device.
+  void give_back() { store_.give_back(); }
 
  private:
   struct Making;
