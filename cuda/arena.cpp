@@ -21,6 +21,7 @@ void Arena::give_back() {
 }
 
 Arena::Place Arena::allocate_bytes(std::size_t bytes) {
+  const std::lock_guard lock(allocating_);
   const bool apart = machine_.pieces_apart();
   const std::size_t wanted = apart ? bytes : (bytes + slice_alignment - 1) / slice_alignment * slice_alignment;
   // The first chunk with room; chunks are few.

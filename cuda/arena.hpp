@@ -1,9 +1,10 @@
 // Memory of one batch of pings, taken slice by slice and given back all at once: on the device, on the host, or on both alike,
-// so that many small tables travel in one copy. Pieces stay where they are until clear().
+// so that many small tables travel in one copy. Pieces stay where they are until clear(). Several threads may allocate at once.
 #pragma once
 
 #include <cstddef>
 #include <cstring>
+#include <mutex>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -72,6 +73,7 @@ class Arena {
   Where where_;
   std::size_t chunk_bytes_;
   int clear_lane_;
+  std::mutex allocating_;
   std::vector<Chunk> chunks_;
 };
 

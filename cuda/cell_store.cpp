@@ -40,20 +40,29 @@ void CellStore::give_back() {
 
 bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells,
                      Parallel& pool) {
-  // Looked up in parallel: the map does not change meanwhile.
   cells.assign(tiles.size(), nullptr);
-  pool.for_each((tiles.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
-    const std::size_t end = std::min(tiles.size(), (part + 1) * tiles_at_once);
-    for (std::size_t i = part * tiles_at_once; i < end; ++i)
-      if (const Held* h = held(*tiles[i].tile)) cells[i] = h->device;
-  });
   // Values of 16 bits that the device lacks; tiles go there once and stay.
-  std::size_t more = 0;
-  for (std::size_t i = 0; i < tiles.size(); ++i)
-    if (!cells[i]) more += values(*tiles[i].tile);
-  if (more == 0) return true;
+  const auto missing = [&] {
+    std::size_t more = 0;
+    for (std::size_t i = 0; i < tiles.size(); ++i)
+      if (!cells[i]) more += values(*tiles[i].tile);
+    return more;
+  };
+  {
+    // Looked up in parallel: the map does not change meanwhile.
+    const std::shared_lock lock(changing_);
+    pool.for_each((tiles.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
+      const std::size_t end = std::min(tiles.size(), (part + 1) * tiles_at_once);
+      for (std::size_t i = part * tiles_at_once; i < end; ++i)
+        if (const Held* h = held(*tiles[i].tile)) cells[i] = h->device;
+    });
+  }
+  if (missing() == 0) return true;
+  const std::unique_lock lock(changing_);
+  for (std::size_t i = 0; i < tiles.size(); ++i)  // another ping may have sent them in between
+    if (const Held* h = cells[i] ? nullptr : held(*tiles[i].tile)) cells[i] = h->device;
   // An empty store takes any ping, over its budget if need be.
-  if (!tiles_.empty() && bytes() + more * sizeof(std::int16_t) > budget_bytes_) return false;
+  if (!tiles_.empty() && bytes() + missing() * sizeof(std::int16_t) > budget_bytes_) return false;
   for (std::size_t i = 0; i < tiles.size();) i = send_from(tiles, i, lane, staging, cells);
   return true;
 }

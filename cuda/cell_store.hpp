@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <shared_mutex>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -21,7 +22,7 @@ class CellStore {
 
   /// Where each tile's cells lie on the device, in the order of `tiles`. What was not there is queued on `lane`; it travels by
   /// way of `staging`, which must stay until that is done. False: they do not fit in beside those that are held; clear() first,
-  /// when no ping under way needs them.
+  /// when no ping under way needs them. Several threads may call it at once, each with staging that is its own or locks itself.
   bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();
   void give_back();  // its memory too
@@ -42,6 +43,7 @@ class CellStore {
   Machine& machine_;
   std::size_t budget_bytes_;
   Arena memory_;
+  std::shared_mutex changing_;                           // of tiles_ and memory_
   std::unordered_map<const std::int16_t*, Held> tiles_;  // by where the CPU has them
 };
 

@@ -126,25 +126,36 @@ class DeviceEngine final : public PingEngine {
 
   void run_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
     std::size_t which = 0;
-    for (std::size_t i = 0; i < requests.size(); ++i) {
-      if (done_[i]) continue;
+    for (std::size_t i = 0; i < requests.size();) {
+      if (done_[i]) {
+        ++i;
+        continue;
+      }
       if (const std::string why = why_by_cpu(requests[i]); !why.empty()) {
         if (told_.insert(why).second) say("CUDA: " + why);
         pings[i] = by_cpu(requests[i]);
         each_[i] = statistics_;
-        done_[i] = true;
+        done_[i++] = true;
         continue;
       }
       // Two rooms take turns: the CPU prepares one batch while the device computes the other.
-      if (!prepare(requests[i], i, rooms_[which])) {
-        launch(rooms_[which]);
-        for (BatchRoom& room : rooms_) finish(room, pings);
+      BatchRoom& room = rooms_[which];
+      std::vector<AskedPing> asked = some_from(requests, i, room);
+      i += asked.size();
+      for (bool forgotten = false;;) {
+        std::vector<AskedPing> left = preparer_.add(asked, *cells_, keeping_lane, room);
+        if (left.empty()) break;
+        if (forgotten && left.size() == asked.size()) throw std::runtime_error("the tiles of one ping do not fit an empty store");
+        launch(room);
+        for (BatchRoom& r : rooms_) finish(r, pings);
         preparer_.forget_cells();
-        if (!prepare(requests[i], i, rooms_[which])) throw std::runtime_error("the tiles of one ping do not fit an empty store");
+        forgotten = true;
+        asked = std::move(left);
       }
+      work_a_ping_ = room.work.taken_bytes() / room.pings.size();
       // A batch is full by number, or by memory [bytes].
-      if (rooms_[which].pings.size() < batch_ && rooms_[which].work.taken_bytes() < device_options_.work_bytes) continue;
-      launch(rooms_[which]);
+      if (room.pings.size() < batch_ && room.work.taken_bytes() < device_options_.work_bytes) continue;
+      launch(room);
       if (!one_room_) which = 1 - which;
       finish(rooms_[which], pings);  // the other one: it has had the time it took to prepare this one
     }
@@ -154,16 +165,30 @@ class DeviceEngine final : public PingEngine {
     all_given_back_ = false;
   }
 
+  /// The next requests, from `first` on, that can be prepared together, as many as the room has place for: by number, and by
+  /// memory as far as it is known what a ping takes.
+  std::vector<AskedPing> some_from(std::span<const PingRequest> requests, std::size_t first, const BatchRoom& room) {
+    place(requests[first]);
+    std::vector<AskedPing> some{{&requests[first], first, plan_for(requests[first])}};
+    const std::size_t bytes = device_options_.work_bytes - std::min(device_options_.work_bytes, room.work.taken_bytes());
+    const std::size_t most = std::min(batch_ - room.pings.size(), work_a_ping_ > 0 ? bytes / work_a_ping_ : 1);
+    for (std::size_t i = first + 1; i < requests.size() && some.size() < most; ++i) {
+      const PingRequest& request = requests[i];
+      if (done_[i] || !why_by_cpu(request).empty() || !cells_->serves(request.seed, request.switches.texture)) break;
+      AskedPing next{&request, i, plan_for(request)};
+      if (!std::all_of(some.begin(), some.end(), [&](const AskedPing& a) { return PingPreparer::may_go_together(a, next); }))
+        break;
+      some.push_back(std::move(next));
+    }
+    return some;
+  }
+
   /// Empty when the device does it.
   std::string why_by_cpu(const PingRequest& request) const {
     if (const std::string why = why_not_on_device(request); !why.empty()) return why + " are computed by the CPU";
     const std::string without = why_not_on_device(request, false);
     const std::string missing = without.empty() ? "" : machine_->why_no_transforms();  // not asked about without need
     return missing.empty() ? "" : without + " are computed by the CPU (" + missing + ")";
-  }
-  bool prepare(const PingRequest& request, std::size_t index, BatchRoom& room) {
-    place(request);
-    return preparer_.add(request, index, plan_for(request), *cells_, keeping_lane, room);
   }
   /// What device and CPU share: the scene as this request finds it.
   void place(const PingRequest& request) {
@@ -234,11 +259,13 @@ class DeviceEngine final : public PingEngine {
     if (room.pings.empty()) return;
     machine_->wait(room.lane);
     if (options_.now_s) share_times(room);
-    for (std::size_t i = 0; i < room.pings.size(); ++i) {
-      pings[room.pings[i].index] = ping_from(room.pings[i], room.views[i]);
-      each_[room.pings[i].index] = statistics_;
-      done_[room.pings[i].index] = true;
-    }
+    pool_.for_each(room.pings.size(), [&](std::size_t i, int) {
+      const std::size_t index = room.pings[i].index;
+      pings[index] = ping_from(room.pings[i], room.views[i]);
+      each_[index] = room.pings[i].statistics;
+    });
+    for (const BatchRoom::Ping& ping : room.pings) done_[ping.index] = true;
+    statistics_ = room.pings.back().statistics;
     empty(room);
   }
   /// Every ping of a batch took as long as the others.
@@ -251,7 +278,7 @@ class DeviceEngine final : public PingEngine {
         ping.statistics.seconds[static_cast<std::size_t>(stage_of(static_cast<Step>(step)))] += seconds.of[step] / pings;
     }
   }
-  Ping ping_from(BatchRoom::Ping& from, const PingView& view) {
+  static Ping ping_from(BatchRoom::Ping& from, const PingView& view) {
     Ping ping = std::move(from.ping);
     const auto copy = [](void* to, const void* host, std::size_t bytes) {
       if (bytes > 0) std::memcpy(to, host, bytes);
@@ -267,11 +294,10 @@ class DeviceEngine final : public PingEngine {
       ping.truth = truth_of_beams(from.plan->plan(), by_column);
     }
     // Rays and echoes are counted on the device; base rays are known beforehand.
-    statistics_ = from.statistics;
     if (view.has_scene != 0) {
-      statistics_.rays +=
+      from.statistics.rays +=
           from.counters.host[0] + static_cast<std::size_t>(view.sea.columns) * static_cast<std::size_t>(view.sea.elevations);
-      statistics_.echoes += from.counters.host[1];
+      from.statistics.echoes += from.counters.host[1];
     }
     return ping;
   }
@@ -302,7 +328,8 @@ class DeviceEngine final : public PingEngine {
   std::unique_ptr<SurfaceCells> cells_;
   std::vector<std::shared_ptr<PlanTables>> plans_;
   PingPreparer preparer_;
-  std::size_t batch_;  // pings that are launched together
+  std::size_t batch_;            // pings that are launched together
+  std::size_t work_a_ping_ = 0;  // bytes, of the last batch
   BatchRoom rooms_[2];
   Workspace work_;  // of the CPU
   std::set<std::string> told_;

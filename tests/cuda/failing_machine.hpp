@@ -1,8 +1,10 @@
 // A device that is lost at a given call and stays lost, with host loops inside: for tests of what happens then.
 #pragma once
 
+#include <atomic>
 #include <limits>
 #include <map>
+#include <mutex>
 #include <stdexcept>
 #include <utility>
 
@@ -23,12 +25,14 @@ class FailingMachine final : public cuda::Machine {
   std::size_t free_bytes() const override { return tells_bytes; }
   void* allocate(std::size_t bytes) override {
     called();
+    const std::lock_guard lock(taking_);
     if (bytes > room_bytes - taken_) throw cuda::DeviceMemoryFull("out of memory");
     void* const at = inner_->allocate(bytes);
     taken_ += sizes_[at] = bytes;
     return at;
   }
   void release(void* device) override {
+    const std::lock_guard lock(taking_);
     taken_ -= sizes_.at(device);
     sizes_.erase(device);
     inner_->release(device);
@@ -48,10 +52,11 @@ class FailingMachine final : public cuda::Machine {
 
  private:
   void called() {
-    if (calls_++ >= last_) throw std::runtime_error("the device is lost");
+    if (std::atomic_ref(calls_)++ >= last_) throw std::runtime_error("the device is lost");
   }
   int& calls_;
   int last_;
+  std::mutex taking_;
   std::size_t taken_ = 0;
   std::map<void*, std::size_t> sizes_;
   std::unique_ptr<cuda::Machine> inner_ = cuda::make_host_loops();
