@@ -10,24 +10,33 @@ constexpr std::size_t slice_alignment = 256;
 
 }  // namespace
 
-Arena::~Arena() {
+Arena::~Arena() { give_back(); }
+
+void Arena::give_back() {
   for (const Chunk& c : chunks_) {
     if (c.device) machine_.release(c.device);
     if (c.host) machine_.release_host(c.host);
   }
+  chunks_.clear();
 }
 
 Arena::Place Arena::allocate_bytes(std::size_t bytes) {
-  const std::size_t wanted = (bytes + slice_alignment - 1) / slice_alignment * slice_alignment;
+  const std::lock_guard lock(allocating_);
+  const bool apart = machine_.pieces_apart();
+  const std::size_t wanted = apart ? bytes : (bytes + slice_alignment - 1) / slice_alignment * slice_alignment;
   // The first chunk with room; chunks are few.
   auto it = std::find_if(chunks_.begin(), chunks_.end(), [&](const Chunk& c) { return c.size - c.used >= wanted; });
   if (it == chunks_.end()) {
     chunks_.push_back({});
     Chunk& c = chunks_.back();  // from here on ours: what is allocated is released, even if the second half fails
-    const std::size_t size = std::max(chunk_bytes_, wanted);
+    const std::size_t size = apart ? wanted : std::max(chunk_bytes_, wanted);
     if (where_ != Where::host) c.device = static_cast<std::byte*>(machine_.allocate(size));
     if (where_ != Where::device) c.host = static_cast<std::byte*>(machine_.allocate_host(size));
     c.size = size;
+    if (clear_lane_ != not_cleared) {
+      std::memset(c.host, 0, size);
+      machine_.upload(clear_lane_, c.device, c.host, size);
+    }
     it = chunks_.end() - 1;
   }
   const Place at{it->device ? it->device + it->used : nullptr, it->host ? it->host + it->used : nullptr};
@@ -47,6 +56,7 @@ void Arena::download(int lane) {
 }
 
 void Arena::clear() {
+  if (machine_.pieces_apart()) return give_back();
   // The memory stays: the next batch needs about as much.
   for (Chunk& c : chunks_) c.used = 0;
 }

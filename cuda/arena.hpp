@@ -1,9 +1,10 @@
 // Memory of one batch of pings, taken slice by slice and given back all at once: on the device, on the host, or on both alike,
-// so that many small tables travel in one copy. Pieces stay where they are until clear().
+// so that many small tables travel in one copy. Pieces stay where they are until clear(). Several threads may allocate at once.
 #pragma once
 
 #include <cstddef>
 #include <cstring>
+#include <mutex>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -15,7 +16,11 @@ namespace sonar::cuda {
 class Arena {
  public:
   enum class Where { device, host, both };
-  Arena(Machine& machine, Where where, std::size_t chunk_bytes) : machine_(machine), where_(where), chunk_bytes_(chunk_bytes) {}
+  static constexpr int not_cleared = -1;
+  /// `clear_lane`: the lane on which new memory is set to zero, both copies; Where::both only. A copy of whole chunks then reads
+  /// nothing that was never written, gaps between pieces included, which compute-sanitizer's initcheck would report.
+  Arena(Machine& machine, Where where, std::size_t chunk_bytes, int clear_lane = not_cleared)
+      : machine_(machine), where_(where), chunk_bytes_(chunk_bytes), clear_lane_(clear_lane) {}
   ~Arena();
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
@@ -49,6 +54,7 @@ class Arena {
   void upload(int lane);    // all that was taken; Where::both only
   void download(int lane);  // likewise
   void clear();
+  void give_back();  // the memory too; nothing queued may need it any more
   std::size_t taken_bytes() const;
 
  private:
@@ -66,6 +72,8 @@ class Arena {
   Machine& machine_;
   Where where_;
   std::size_t chunk_bytes_;
+  int clear_lane_;
+  std::mutex allocating_;
   std::vector<Chunk> chunks_;
 };
 

@@ -3,10 +3,30 @@
 #pragma once
 
 #include <cmath>
+#include <cstring>
 
 #include "cuda/device_types.hpp"
 
 namespace sonar::cuda {
+
+// One load of a device instead of two or four.
+struct alignas(8) Pair {
+  float re, im;
+};
+struct alignas(16) Four {
+  float of[4];
+};
+/// What lies at `from`, which is as aligned as a Vector must be.
+template <class Vector>
+SONAR_HD inline Vector load_aligned(const float* from) {
+#if defined(__CUDA_ARCH__)
+  return *reinterpret_cast<const Vector*>(from);
+#else
+  Vector v;
+  std::memcpy(&v, from, sizeof v);
+  return v;
+#endif
+}
 
 /// Weight `i` of [points and pulses][beams].
 SONAR_HD inline void point_weights(const PingView& p, std::uint32_t i) {
@@ -41,26 +61,48 @@ SONAR_HD inline void add_points(const PingView& p, std::uint32_t j, std::int32_t
   }
 }
 
-/// Sample `i` of [panels][samples]: the four beams of a panel at once, which listen to the same columns.
+/// Sums of one sample over columns, for the beams of `panels` panels that hear the same columns. `weight`: of each panel.
+template <std::uint32_t panels>
+SONAR_HD inline void sum_over_columns(const float* const* weight, const float* column, std::int64_t stride, std::int32_t count,
+                                      float* re, float* im) {
+  for (std::int32_t k = 0; k < count; ++k) {
+    const Pair s = load_aligned<Pair>(column);
+    for (std::uint32_t panel = 0; panel < panels; ++panel) {
+      const Four w = load_aligned<Four>(weight[panel] + static_cast<std::int64_t>(beams_a_panel) * k);
+      for (std::uint32_t beam = 0; beam < beams_a_panel; ++beam) {
+        re[panel * beams_a_panel + beam] += w.of[beam] * s.re;
+        im[panel * beams_a_panel + beam] += w.of[beam] * s.im;
+      }
+    }
+    column += stride;
+  }
+}
+
+/// Sample `i` of [pairs of panels][samples]: the eight beams of two panels at once, which as a rule hear the same columns; so
+/// every sample is read once for all of them.
 SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
   const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
-  const std::uint32_t panel = i / samples;
+  const std::uint32_t panels = (beams + beams_a_panel - 1) / beams_a_panel;
+  const std::uint32_t first = i / samples * panels_at_once;
   const auto n = static_cast<std::int32_t>(i % samples);
-  const BeamWeightRow& row = p.panels[panel];
-  const float* weight = p.weights + row.weights;
-  const float* column = p.signals + 2 * (static_cast<std::int64_t>(row.first_column) * p.samples + n);
-  float re[beams_a_panel] = {}, im[beams_a_panel] = {};
-  for (int k = 0; k < row.count; ++k) {
-    const float a = column[0], b = column[1];
-    for (std::uint32_t beam = 0; beam < beams_a_panel; ++beam) {
-      re[beam] += weight[beam] * a;
-      im[beam] += weight[beam] * b;
-    }
-    weight += beams_a_panel;
-    column += 2 * static_cast<std::int64_t>(p.samples);
+  constexpr std::uint32_t at_once = panels_at_once * beams_a_panel;
+  float re[at_once] = {}, im[at_once] = {};
+  const float* weight[panels_at_once];
+  const BeamWeightRow& row = p.panels[first];
+  const BeamWeightRow& other = p.panels[first + 1 < panels ? first + 1 : first];
+  weight[0] = p.weights + row.weights;
+  weight[1] = p.weights + other.weights;
+  const std::int64_t stride = 2 * static_cast<std::int64_t>(p.samples);
+  const float* const sample = p.signals + 2 * static_cast<std::int64_t>(n);
+  if (row.first_column == other.first_column && row.count == other.count) {
+    sum_over_columns<2>(weight, sample + row.first_column * stride, stride, row.count, re, im);
+  } else {
+    sum_over_columns<1>(weight, sample + row.first_column * stride, stride, row.count, re, im);
+    sum_over_columns<1>(weight + 1, sample + other.first_column * stride, stride, other.count, re + beams_a_panel,
+                        im + beams_a_panel);
   }
-  for (std::uint32_t beam = 0; beam < beams_a_panel; ++beam) {
-    const std::uint32_t j = panel * beams_a_panel + beam;
+  for (std::uint32_t beam = 0; beam < at_once; ++beam) {
+    const std::uint32_t j = first * beams_a_panel + beam;
     if (j >= beams) break;
     add_points(p, j, n, re[beam], im[beam]);
     float* to = p.beam_signals + 2 * (static_cast<std::int64_t>(j) * p.samples + n);

@@ -149,28 +149,33 @@ SONAR_HD inline void place(const PingView& p, std::uint32_t i) {
 /// The pulses of a column's echoes, at the samples n = part modulo sum_parts: i = column * sum_parts + part.
 SONAR_HD inline void sum_columns(const PingView& p, std::uint32_t i) {
   const std::uint32_t k = i / sum_parts;
-  const int part = static_cast<int>(i % sum_parts), parts = static_cast<int>(sum_parts);
-  float* signal = p.signals + 2 * static_cast<std::int64_t>(k) * p.samples;
-  for (int n = part; n < p.samples; n += parts) signal[2 * n] = signal[2 * n + 1] = 0;
+  const int part = static_cast<int>(i % sum_parts);
+  constexpr int parts = static_cast<int>(sum_parts);
+  // Read once: for all that the compiler knows, the sums below might change the view.
+  const int samples = p.samples, taps = p.taps;
+  const float* const pulse_rows = p.pulse_rows;
+  float* const signal = p.signals + 2 * static_cast<std::int64_t>(k) * samples;
+  for (int n = part; n < samples; n += parts) signal[2 * n] = signal[2 * n + 1] = 0;
   if (p.slots == 0) return;
   // Eq. 8: the pulse's row for the echo's place between two samples.
-  const int reach = p.taps / 2 - 1;
+  const int reach = taps / 2 - 1;
   const float steps = static_cast<float>(p.pulse_steps);
   const Echo* echo = p.sorted + p.column_at[k];
   const Echo* const end = echo + p.in_column[k];
   for (; echo != end; ++echo) {
-    const float whole = std::floor(echo->sample);
+    const float sample = echo->sample, echo_re = echo->re, echo_im = echo->im;
+    const float whole = std::floor(sample);
     const int first = static_cast<int>(whole) - reach;
-    const float position = (echo->sample - whole) * steps;
+    const float position = (sample - whole) * steps;
     const int step = static_cast<int>(position);
     const float fraction = position - static_cast<float>(step);
-    const float* row = p.pulse_rows + static_cast<std::int64_t>(step) * 2 * p.taps;
-    for (int tap = (part - first) & (parts - 1); tap < p.taps; tap += parts) {
+    const float* const row = pulse_rows + static_cast<std::int64_t>(step) * 2 * taps;
+    for (int tap = (part - first) & (parts - 1); tap < taps; tap += parts) {
       const int n = first + tap;
-      if (n < 0 || n >= p.samples) continue;
-      const float pulse = row[tap] + fraction * row[p.taps + tap];
-      signal[2 * n] += pulse * echo->re;
-      signal[2 * n + 1] += pulse * echo->im;
+      if (n < 0 || n >= samples) continue;
+      const float pulse = row[tap] + fraction * row[taps + tap];
+      signal[2 * n] += pulse * echo_re;
+      signal[2 * n + 1] += pulse * echo_im;
     }
   }
 }

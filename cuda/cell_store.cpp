@@ -7,6 +7,7 @@ namespace {
 
 constexpr std::size_t chunk_bytes = 16u << 20;
 constexpr std::size_t tiles_at_once = 256;  // that one worker looks up
+constexpr std::size_t most_values_a_copy = (2u << 20) / sizeof(std::int16_t);
 
 std::size_t values(const CellTile& t) { return static_cast<std::size_t>(t.stride) * CellTile::columns; }
 
@@ -32,40 +33,68 @@ void CellStore::clear() {
   memory_.clear();
 }
 
+void CellStore::give_back() {
+  clear();
+  memory_.give_back();
+}
+
 bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells,
                      Parallel& pool) {
-  // Looked up in parallel: the map does not change meanwhile.
   cells.assign(tiles.size(), nullptr);
-  pool.for_each((tiles.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
-    const std::size_t end = std::min(tiles.size(), (part + 1) * tiles_at_once);
-    for (std::size_t i = part * tiles_at_once; i < end; ++i)
-      if (const Held* h = held(*tiles[i].tile)) cells[i] = h->device;
-  });
   // Values of 16 bits that the device lacks; tiles go there once and stay.
-  std::size_t more = 0;
-  for (std::size_t i = 0; i < tiles.size(); ++i)
-    if (!cells[i]) more += values(*tiles[i].tile);
-  if (more == 0) return true;
+  const auto missing = [&] {
+    std::size_t more = 0;
+    for (std::size_t i = 0; i < tiles.size(); ++i)
+      if (!cells[i]) more += values(*tiles[i].tile);
+    return more;
+  };
+  {
+    // Looked up in parallel: the map does not change meanwhile.
+    const std::shared_lock lock(changing_);
+    pool.for_each((tiles.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
+      const std::size_t end = std::min(tiles.size(), (part + 1) * tiles_at_once);
+      for (std::size_t i = part * tiles_at_once; i < end; ++i)
+        if (const Held* h = held(*tiles[i].tile)) cells[i] = h->device;
+    });
+  }
+  if (missing() == 0) return true;
+  const std::unique_lock lock(changing_);
+  for (std::size_t i = 0; i < tiles.size(); ++i)  // another ping may have sent them in between
+    if (const Held* h = cells[i] ? nullptr : held(*tiles[i].tile)) cells[i] = h->device;
   // An empty store takes any ping, over its budget if need be.
-  if (!tiles_.empty() && bytes() + more * sizeof(std::int16_t) > budget_bytes_) return false;
-  // One copy for all new tiles of a ping.
+  if (!tiles_.empty() && bytes() + missing() * sizeof(std::int16_t) > budget_bytes_) return false;
+  for (std::size_t i = 0; i < tiles.size();) i = send_from(tiles, i, lane, staging, cells);
+  return true;
+}
+
+/// One copy for the next few missing tiles: memory that copies are fast from is slow to get in large pieces. Returns where they
+/// end.
+std::size_t CellStore::send_from(std::span<const TileInView> tiles, std::size_t from, int lane, Arena& staging,
+                                 std::vector<const std::int16_t*>& cells) {
+  const std::size_t most = machine_.pieces_apart() ? 1 : most_values_a_copy;
+  std::vector<std::size_t> sent;
+  std::size_t more = 0, end = from;
+  for (; end < tiles.size() && more < most; ++end) {
+    if (cells[end]) continue;
+    sent.push_back(end);
+    more += values(*tiles[end].tile);
+  }
+  if (sent.empty()) return end;
   const auto host = staging.allocate<std::int16_t>(more);
   const auto device = memory_.allocate<std::int16_t>(more);
   std::size_t at = 0;
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    if (cells[i]) continue;
+  for (const std::size_t i : sent) {
     const CellTile& t = *tiles[i].tile;
     std::memcpy(host.host + at, t.data.get(), values(t) * sizeof(std::int16_t));
     cells[i] = device.device + at;
     at += values(t);
   }
   machine_.upload(lane, device.device, host.host, more * sizeof(std::int16_t));
-  for (std::size_t i = 0; i < tiles.size(); ++i) {  // known from here on, when they are on their way
-    if (cells[i] < device.device || cells[i] >= device.device + more) continue;
+  for (const std::size_t i : sent) {  // known from here on, when they are on their way
     const CellTile& t = *tiles[i].tile;
     tiles_[t.data.get()] = {t.weight_unit, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]};
   }
-  return true;
+  return end;
 }
 
 }  // namespace sonar::cuda

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <shared_mutex>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -21,9 +22,10 @@ class CellStore {
 
   /// Where each tile's cells lie on the device, in the order of `tiles`. What was not there is queued on `lane`; it travels by
   /// way of `staging`, which must stay until that is done. False: they do not fit in beside those that are held; clear() first,
-  /// when no ping under way needs them.
+  /// when no ping under way needs them. Several threads may call it at once, each with staging that is its own or locks itself.
   bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();
+  void give_back();  // its memory too
 
   std::size_t bytes() const { return memory_.taken_bytes(); }
 
@@ -35,10 +37,13 @@ class CellStore {
     const std::int16_t* device = nullptr;
   };
   const Held* held(const CellTile& tile) const;
+  std::size_t send_from(std::span<const TileInView> tiles, std::size_t from, int lane, Arena& staging,
+                        std::vector<const std::int16_t*>& cells);
 
   Machine& machine_;
   std::size_t budget_bytes_;
   Arena memory_;
+  std::shared_mutex changing_;                           // of tiles_ and memory_
   std::unordered_map<const std::int16_t*, Held> tiles_;  // by where the CPU has them
 };
 

@@ -11,7 +11,7 @@ SONAR_HD inline void add_count(std::uint32_t& counter, std::uint32_t by) {
 #if defined(__CUDA_ARCH__)
   atomicAdd(&counter, by);
 #else
-  counter += by;
+  __atomic_fetch_add(&counter, by, __ATOMIC_RELAXED);  // C++17 has no atomic_ref
 #endif
 }
 

@@ -1,6 +1,7 @@
 // The device by way of the module, which is looked for beside the program and where packages put it.
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <filesystem>
@@ -81,6 +82,11 @@ class CudaMachine final : public Machine {
   CudaMachine& operator=(const CudaMachine&) = delete;
 
   std::string name() const override { return name_; }
+  std::size_t free_bytes() const override {
+    std::size_t bytes = 0;
+    check(module_.free_bytes(at_, &bytes));
+    return bytes;
+  }
   void* allocate(std::size_t bytes) override {
     void* device = nullptr;
     check(module_.allocate(at_, &device, bytes));
@@ -119,7 +125,10 @@ class CudaMachine final : public Machine {
  private:
   /// An error of the device ends its use: DeviceEngine reports it and may go on with the CPU.
   void check(int code) const {
-    if (code != 0) throw std::runtime_error(name_ + ": " + module_.reason(code));
+    if (code == 0) return;
+    const std::string why = name_ + ": " + module_.reason(code);
+    if (module_.is_memory_full(code) != 0) throw DeviceMemoryFull(why);
+    throw std::runtime_error(why);
   }
   const CudaModule& module_;
   std::string name_;
@@ -143,5 +152,14 @@ Result<std::unique_ptr<Machine>> open_cuda_machine() {
 namespace sonar {
 
 std::string cuda_status() { return cuda::find_device().status; }
+
+std::string cuda_presence() {
+  const auto places = cuda::module_places();
+  const auto exists = [](const std::filesystem::path& place) {
+    std::error_code error;
+    return std::filesystem::exists(place, error);
+  };
+  return std::any_of(places.begin(), places.end(), exists) ? "not used" : "not installed";
+}
 
 }  // namespace sonar

@@ -1,13 +1,18 @@
 // The CUDA module: a kernel for every step, whose body is the header's, and thin calls of the runtime. It contains no scenes.
 #include <cuda_runtime.h>
 
+#include <chrono>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <new>
+#include <thread>
 #include <vector>
 
 #include "cuda/cuda_module.hpp"
 #include "cuda/cufft_library.hpp"
 #include "cuda/graph_shelf.hpp"
+#include "cuda/patience.hpp"
 #include "cuda/steps.hpp"
 
 namespace sonar::cuda {
@@ -35,8 +40,21 @@ struct Lane {
 struct Opened {
   Lane lane[lanes];
   bool graphs_work = true;  // until one does not: then launches are plain for good
+  // A wait took too long. Whatever waits for the device would never return: from here on nothing is asked of it or given back.
+  bool hung = false;
 };
 Opened& opened(void* machine) { return *static_cast<Opened*>(machine); }
+
+/// What cudaStreamSynchronize does, but with an end.
+cudaError_t wait_for_stream(Opened& m, cudaStream_t stream) {
+  if (m.hung) return cudaErrorLaunchTimeout;
+  const auto now = [] { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); };
+  const cudaError_t error = wait_for(
+      cudaErrorNotReady, cudaErrorLaunchTimeout, [&] { return cudaStreamQuery(stream); }, now,
+      [] { std::this_thread::sleep_for(std::chrono::microseconds(200)); });
+  m.hung = error == cudaErrorLaunchTimeout;
+  return error;
+}
 
 // Index by index along x, ping by ping along y.
 template <Step step>
@@ -55,6 +73,10 @@ Kernel kernel_of(Step wanted, std::integer_sequence<int, step...>) {
 
 const char* reason(int code) {
   return code >= cufft_codes ? CufftLibrary::reason(code) : cudaGetErrorString(static_cast<cudaError_t>(code));
+}
+
+int is_memory_full(int code) {
+  return code == cudaErrorMemoryAllocation || (code >= cufft_codes && CufftLibrary::is_memory_full(code)) ? 1 : 0;
 }
 
 int query(int* devices, char* name, std::size_t room) {
@@ -80,8 +102,10 @@ int query(int* devices, char* name, std::size_t room) {
 }
 
 void close(void* machine) {
-  for (Lane& l : opened(machine).lane) {
-    if (l.stream) cudaStreamSynchronize(l.stream);
+  Opened& m = opened(machine);
+  for (Lane& l : m.lane) {
+    if (l.stream) wait_for_stream(m, l.stream);
+    if (m.hung) return;  // left to the end of the program
     for (auto& entry : l.graphs.entries())
       if (entry.graph) cudaGraphExecDestroy(entry.graph);
     for (const Transform& t : l.transforms) cufft().destroy(t.plan);
@@ -110,6 +134,9 @@ int open(void** machine) {
     close(m);
     return error;
   }
+  // For measurements: graphs save launches, and cost a capture where launches differ.
+  const char* graphs = std::getenv("SONARD_CUDA_GRAPHS");
+  m->graphs_work = !graphs || std::strcmp(graphs, "0") != 0;
   *machine = m;
   return cudaSuccess;
 }
@@ -119,10 +146,14 @@ cudaError_t told(cudaError_t error) {
   if (error != cudaSuccess) cudaGetLastError();
   return error;
 }
+int free_bytes(void*, std::size_t* bytes) {
+  std::size_t all = 0;
+  return told(cudaMemGetInfo(bytes, &all));
+}
 int allocate(void*, void** at, std::size_t bytes) { return told(cudaMalloc(at, bytes)); }
-int release(void*, void* at) { return cudaFree(at); }
+int release(void* machine, void* at) { return opened(machine).hung ? cudaErrorLaunchTimeout : cudaFree(at); }
 int allocate_host(void*, void** at, std::size_t bytes) { return told(cudaMallocHost(at, bytes)); }
-int release_host(void*, void* at) { return cudaFreeHost(at); }
+int release_host(void* machine, void* at) { return opened(machine).hung ? cudaErrorLaunchTimeout : cudaFreeHost(at); }
 int upload(void* machine, int lane, void* to, const void* from, std::size_t bytes) {
   return cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, opened(machine).lane[lane].stream);
 }
@@ -162,9 +193,8 @@ cudaError_t launch_by_graph(Opened& m, Lane& lane, const GraphKey& what) {
   cudaGraphExec_t dropped = nullptr;
   auto& entry = lane.graphs.look_up(what, dropped);
   if (dropped) {
-    const cudaError_t error = cudaStreamSynchronize(lane.stream);  // it may be at work
+    if (const cudaError_t error = wait_for_stream(m, lane.stream)) return error;  // it may be at work
     cudaGraphExecDestroy(dropped);
-    if (error != cudaSuccess) return error;
   }
   // What came before has been launched plainly: every kernel is loaded by then, which a capture must not do.
   if (!entry.graph && entry.seen > 1) {
@@ -214,13 +244,13 @@ int transforms(char* name, std::size_t room) {
 }
 
 /// The lane's plan for that size, now the newest. Making one allocates and may wait for the device; it is made once.
-int transform_for(Lane& lane, int size, int rows, CufftLibrary::Handle* plan) {
+int transform_for(Opened& m, Lane& lane, int size, int rows, CufftLibrary::Handle* plan) {
   std::vector<Transform>& all = lane.transforms;
   std::size_t i = 0;
   while (i < all.size() && (all[i].size != size || all[i].rows != rows)) ++i;
   if (i == all.size()) {
     if (i == most_transforms) {
-      if (const cudaError_t error = cudaStreamSynchronize(lane.stream)) return error;  // it may be at work
+      if (const cudaError_t error = wait_for_stream(m, lane.stream)) return error;  // it may be at work
       cufft().destroy(all.back().plan);
       all.pop_back();
     }
@@ -239,7 +269,7 @@ int transform_for(Lane& lane, int size, int rows, CufftLibrary::Handle* plan) {
 int transform(void* machine, int lane, void* values, int size, int rows, int inverse) {
   Lane& l = opened(machine).lane[lane];
   CufftLibrary::Handle plan;
-  if (const int code = transform_for(l, size, rows, &plan)) return code;
+  if (const int code = transform_for(opened(machine), l, size, rows, &plan)) return code;
   const int what = step_count + (inverse != 0 ? 1 : 0);
   if (l.timing)
     if (const cudaError_t error = begin_timing(l, what)) return error;
@@ -266,16 +296,18 @@ int order(void* machine, int lane, int earlier) {
   const cudaError_t error = cudaEventRecord(before.done, before.stream);
   return error != cudaSuccess ? error : cudaStreamWaitEvent(opened(machine).lane[lane].stream, before.done, 0);
 }
-int wait(void* machine, int lane) { return cudaStreamSynchronize(opened(machine).lane[lane].stream); }
+int wait(void* machine, int lane) { return wait_for_stream(opened(machine), opened(machine).lane[lane].stream); }
 
 const CudaModule module{module_version,
                         sizeof(PingView),
                         sizeof(TileView),
                         static_cast<std::uint32_t>(Step::steps),
                         reason,
+                        is_memory_full,
                         query,
                         open,
                         close,
+                        free_bytes,
                         allocate,
                         release,
                         allocate_host,

@@ -9,7 +9,7 @@
 
 namespace sonar::cuda {
 
-inline constexpr std::uint32_t module_version = 4;  // of this file, of device_types.hpp and of the steps
+inline constexpr std::uint32_t module_version = 6;  // of this file, of device_types.hpp and of the steps
 inline constexpr const char* module_file = "libsonard_cuda.so";
 inline constexpr const char* module_entry = "sonard_cuda_module";
 
@@ -17,10 +17,13 @@ inline constexpr const char* module_entry = "sonard_cuda_module";
 struct CudaModule {
   std::uint32_t version, view_bytes, tile_bytes, steps;
   const char* (*reason)(int code);
+  /// Whether the code says that memory is full; any other is the end of the machine.
+  int (*is_memory_full)(int code);
   /// Devices that there are; the name of the first: "NVIDIA H200, 139.8 GiB, compute 9.0"; of none, why, or nothing.
   int (*query)(int* devices, char* name, std::size_t room);
   int (*open)(void** machine);
   void (*close)(void* machine);
+  int (*free_bytes)(void* machine, std::size_t* bytes);
   int (*allocate)(void* machine, void** device, std::size_t bytes);
   int (*release)(void* machine, void* device);
   int (*allocate_host)(void* machine, void** host, std::size_t bytes);

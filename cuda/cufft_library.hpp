@@ -66,6 +66,7 @@ class CufftLibrary {
     return done == CUFFT_SUCCESS ? 0 : cufft_codes + done;
   }
   void destroy(Handle plan) const { destroy_(plan); }
+  static bool is_memory_full(int code) { return code - cufft_codes == CUFFT_ALLOC_FAILED; }
   static const char* reason(int code) {
     switch (code - cufft_codes) {
       case CUFFT_ALLOC_FAILED:
@@ -103,6 +104,7 @@ class CufftLibrary {
   int make(Handle*, int, int, cudaStream_t) const { return cufft_codes; }
   int run(Handle, void*, bool) const { return cufft_codes; }
   void destroy(Handle) const {}
+  static bool is_memory_full(int) { return false; }
   static const char* reason(int) { return "built without cuFFT"; }
 };
 

@@ -30,12 +30,19 @@ constexpr Stage stage_of(Step step) {
   return step == Step::receive ? Stage::receive : Stage::form_beams;
 }
 
+/// The options, with budgets that the device has room for. The rest is the kernels' own, other programs' and the scene's.
+DeviceEngineOptions fitted(DeviceEngineOptions options, std::size_t free_bytes) {
+  options.cell_bytes = std::min(options.cell_bytes, free_bytes / 5 * 2);
+  options.work_bytes = std::min(options.work_bytes, free_bytes / 5);
+  return options;
+}
+
 class DeviceEngine final : public PingEngine {
  public:
   DeviceEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options, std::unique_ptr<Machine> machine,
                DeviceEngineOptions device_options)
       : machine_(std::move(machine)),
-        device_options_(std::move(device_options)),
+        device_options_(fitted(std::move(device_options), machine_->free_bytes())),
         options_(options),
         scene_(scene),
         pool_(pool),
@@ -70,8 +77,10 @@ class DeviceEngine final : public PingEngine {
   std::vector<Ping> computed(std::span<const PingRequest> requests) {
     std::vector<Ping> pings(requests.size());
     each_.assign(requests.size(), {});
+    done_.assign(requests.size(), false);
     if (!failed_) try {
-        run_on_device(requests, pings);
+        while (!tried_on_device(requests, pings)) {
+        }
         return pings;
       } catch (const std::bad_alloc&) {  // of the computer's memory: what was begun is forgotten, the next ping begins anew
         for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);
@@ -92,31 +101,86 @@ class DeviceEngine final : public PingEngine {
     return pings;
   }
 
+  /// False: the device's memory was full. What it took has been given back, and what is not done may be tried again.
+  bool tried_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
+    try {
+      run_on_device(requests, pings);
+      return true;
+    } catch (const DeviceMemoryFull&) {
+      for (int lane = 0; lane < Machine::lanes; ++lane) machine_->wait(lane);
+      if (one_room_ && all_given_back_) throw;
+      all_given_back_ = true;
+      one_room_ = batch_ == 1;
+      batch_ = std::max<std::size_t>(1, batch_ / 2);
+      for (BatchRoom& room : rooms_) {
+        empty(room);
+        for (Arena* arena : room.arenas()) arena->give_back();
+      }
+      preparer_.give_back();
+      plans_.clear();
+      say("CUDA: the device's memory is full; from here on " +
+          (one_room_ ? "one ping at a time" : "batches of at most " + std::to_string(batch_)));
+      return false;
+    }
+  }
+
   void run_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
     std::size_t which = 0;
-    for (std::size_t i = 0; i < requests.size(); ++i) {
+    for (std::size_t i = 0; i < requests.size();) {
+      if (done_[i]) {
+        ++i;
+        continue;
+      }
       if (const std::string why = why_by_cpu(requests[i]); !why.empty()) {
         if (told_.insert(why).second) say("CUDA: " + why);
         pings[i] = by_cpu(requests[i]);
         each_[i] = statistics_;
+        done_[i++] = true;
         continue;
       }
       // Two rooms take turns: the CPU prepares one batch while the device computes the other.
-      if (!prepare(requests[i], i, rooms_[which])) {
-        launch(rooms_[which]);
-        for (BatchRoom& room : rooms_) finish(room, pings);
+      BatchRoom& room = rooms_[which];
+      std::vector<AskedPing> asked = some_from(requests, i, room);
+      i += asked.size();
+      for (bool forgotten = false;;) {
+        std::vector<AskedPing> left = preparer_.add(asked, *cells_, keeping_lane, room);
+        if (left.empty()) break;
+        if (forgotten && left.size() == asked.size()) throw std::runtime_error("the tiles of one ping do not fit an empty store");
+        launch(room);
+        for (BatchRoom& r : rooms_) finish(r, pings);
         preparer_.forget_cells();
-        if (!prepare(requests[i], i, rooms_[which])) throw std::runtime_error("the tiles of one ping do not fit an empty store");
+        forgotten = true;
+        asked = std::move(left);
       }
+      work_a_ping_ = room.work.taken_bytes() / room.pings.size();
       // A batch is full by number, or by memory [bytes].
-      if (rooms_[which].pings.size() < batch_ && rooms_[which].work.taken_bytes() < device_options_.work_bytes) continue;
-      launch(rooms_[which]);
-      which = 1 - which;
+      if (room.pings.size() < batch_ && room.work.taken_bytes() < device_options_.work_bytes) continue;
+      launch(room);
+      if (!one_room_) which = 1 - which;
       finish(rooms_[which], pings);  // the other one: it has had the time it took to prepare this one
     }
     launch(rooms_[which]);
     finish(rooms_[1 - which], pings);
     finish(rooms_[which], pings);
+    all_given_back_ = false;
+  }
+
+  /// The next requests, from `first` on, that can be prepared together, as many as the room has place for: by number, and by
+  /// memory as far as it is known what a ping takes.
+  std::vector<AskedPing> some_from(std::span<const PingRequest> requests, std::size_t first, const BatchRoom& room) {
+    place(requests[first]);
+    std::vector<AskedPing> some{{&requests[first], first, plan_for(requests[first])}};
+    const std::size_t bytes = device_options_.work_bytes - std::min(device_options_.work_bytes, room.work.taken_bytes());
+    const std::size_t most = std::min(batch_ - room.pings.size(), work_a_ping_ > 0 ? bytes / work_a_ping_ : 1);
+    for (std::size_t i = first + 1; i < requests.size() && some.size() < most; ++i) {
+      const PingRequest& request = requests[i];
+      if (done_[i] || !why_by_cpu(request).empty() || !cells_->serves(request.seed, request.switches.texture)) break;
+      AskedPing next{&request, i, plan_for(request)};
+      if (!std::all_of(some.begin(), some.end(), [&](const AskedPing& a) { return PingPreparer::may_go_together(a, next); }))
+        break;
+      some.push_back(std::move(next));
+    }
+    return some;
   }
 
   /// Empty when the device does it.
@@ -125,10 +189,6 @@ class DeviceEngine final : public PingEngine {
     const std::string without = why_not_on_device(request, false);
     const std::string missing = without.empty() ? "" : machine_->why_no_transforms();  // not asked about without need
     return missing.empty() ? "" : without + " are computed by the CPU (" + missing + ")";
-  }
-  bool prepare(const PingRequest& request, std::size_t index, BatchRoom& room) {
-    place(request);
-    return preparer_.add(request, index, plan_for(request), *cells_, keeping_lane, room);
   }
   /// What device and CPU share: the scene as this request finds it.
   void place(const PingRequest& request) {
@@ -199,10 +259,13 @@ class DeviceEngine final : public PingEngine {
     if (room.pings.empty()) return;
     machine_->wait(room.lane);
     if (options_.now_s) share_times(room);
-    for (std::size_t i = 0; i < room.pings.size(); ++i) {
-      pings[room.pings[i].index] = ping_from(room.pings[i], room.views[i]);
-      each_[room.pings[i].index] = statistics_;
-    }
+    pool_.for_each(room.pings.size(), [&](std::size_t i, int) {
+      const std::size_t index = room.pings[i].index;
+      pings[index] = ping_from(room.pings[i], room.views[i]);
+      each_[index] = room.pings[i].statistics;
+    });
+    for (const BatchRoom::Ping& ping : room.pings) done_[ping.index] = true;
+    statistics_ = room.pings.back().statistics;
     empty(room);
   }
   /// Every ping of a batch took as long as the others.
@@ -215,7 +278,7 @@ class DeviceEngine final : public PingEngine {
         ping.statistics.seconds[static_cast<std::size_t>(stage_of(static_cast<Step>(step)))] += seconds.of[step] / pings;
     }
   }
-  Ping ping_from(BatchRoom::Ping& from, const PingView& view) {
+  static Ping ping_from(BatchRoom::Ping& from, const PingView& view) {
     Ping ping = std::move(from.ping);
     const auto copy = [](void* to, const void* host, std::size_t bytes) {
       if (bytes > 0) std::memcpy(to, host, bytes);
@@ -231,11 +294,10 @@ class DeviceEngine final : public PingEngine {
       ping.truth = truth_of_beams(from.plan->plan(), by_column);
     }
     // Rays and echoes are counted on the device; base rays are known beforehand.
-    statistics_ = from.statistics;
     if (view.has_scene != 0) {
-      statistics_.rays +=
+      from.statistics.rays +=
           from.counters.host[0] + static_cast<std::size_t>(view.sea.columns) * static_cast<std::size_t>(view.sea.elevations);
-      statistics_.echoes += from.counters.host[1];
+      from.statistics.echoes += from.counters.host[1];
     }
     return ping;
   }
@@ -243,7 +305,7 @@ class DeviceEngine final : public PingEngine {
   static void empty(BatchRoom& room) {
     room.views.clear();
     room.pings.clear();
-    for (Arena* arena : {&room.tables, &room.work, &room.results, &room.cells}) arena->clear();
+    for (Arena* arena : room.arenas()) arena->clear();
   }
 
   void say(const std::string& what) const {
@@ -266,12 +328,16 @@ class DeviceEngine final : public PingEngine {
   std::unique_ptr<SurfaceCells> cells_;
   std::vector<std::shared_ptr<PlanTables>> plans_;
   PingPreparer preparer_;
-  std::size_t batch_;
+  std::size_t batch_;            // pings that are launched together
+  std::size_t work_a_ping_ = 0;  // bytes, of the last batch
   BatchRoom rooms_[2];
   Workspace work_;  // of the CPU
   std::set<std::string> told_;
   PingStatistics statistics_;
   std::vector<PingStatistics> each_;   // of the last run
+  std::vector<bool> done_;             // which of its pings
+  bool one_room_ = false;              // for lack of memory: nothing is prepared while the device computes
+  bool all_given_back_ = false;        // since the last run that had memory enough
   std::optional<std::string> failed_;  // why
 };
 

@@ -12,6 +12,9 @@
 
 namespace sonar::cuda {
 
+/// Bytes are at most so many: of what is free on the device when the engine is made, at most two fifths are for cells and a fifth
+/// for each of the two batches. When memory is full nevertheless, everything is given back and batches become half as large, in
+/// the end one ping without another beside it; the engine fails when that does not fit.
 struct DeviceEngineOptions {
   std::size_t cell_bytes = std::size_t{2} << 30;  // of the device's memory for surface cells; what one ping needs, it gets
   int batch = 8;                                  // pings that are launched together

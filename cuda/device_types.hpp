@@ -15,8 +15,10 @@ namespace sonar::cuda {
 inline constexpr std::uint32_t no_object = 0xFFFFFFFFu;  // what a ray that hits nothing has met
 inline constexpr std::uint32_t slots_a_chunk = 256;      // cells that are sorted into columns together
 inline constexpr std::uint32_t counters_a_ping = 2;
-inline constexpr std::uint32_t beams_a_panel = 4;  // as BeamPanel has
-inline constexpr std::uint32_t sum_parts = 32;     // threads that share the sum of one column: a warp
+inline constexpr std::uint32_t beams_a_panel = 4;   // as BeamPanel has
+inline constexpr std::uint32_t sum_parts = 8;       // threads that share the sum of one column: a pulse has about as many taps
+inline constexpr std::uint32_t spread_parts = 32;   // likewise, of one column's grid
+inline constexpr std::uint32_t panels_at_once = 2;  // that one thread sums
 
 /// Boxes of both children, one line of the cache. Links as in bvh_link.
 struct alignas(64) BvhNode {

@@ -12,13 +12,15 @@ namespace sonar::cuda {
 
 inline constexpr std::uint32_t threads_a_block = 128;
 
-/// Blocks for a step's indices, rounded up by at most an eighth, so that pings whose cells differ a little are launched alike:
-/// threads beyond a ping's own step_size return at once. Never so many that an index could wrap.
+/// Blocks for a step's indices, rounded up by at most an eighth and up to 8 or 16 where they are fewer, so that pings whose cells
+/// or points differ a little are launched alike: threads beyond a ping's own step_size return at once. Never so many that an
+/// index could wrap.
 inline std::uint32_t blocks_for(std::uint32_t largest) {
   constexpr std::uint64_t most = (std::uint64_t{1} << 32) / threads_a_block;
   const std::uint64_t blocks = (std::uint64_t{largest} + threads_a_block - 1) / threads_a_block;
   std::uint64_t unit = 1;
   while (unit * 16 <= blocks) unit *= 2;  // blocks are 8 to 16 units
+  if (blocks <= 16) unit = 8;
   const std::uint64_t rounded = (blocks + unit - 1) / unit * unit;
   return static_cast<std::uint32_t>(rounded < most ? rounded : most);
 }

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "core/base/result.hpp"
@@ -11,14 +13,26 @@
 
 namespace sonar::cuda {
 
-/// Lanes are queues of work: in order within one, at the same time between two. Whatever fails throws std::runtime_error.
+/// The device's memory is full, or that which it shares with the computer: it works on, with less.
+class DeviceMemoryFull : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Lanes are queues of work: in order within one, at the same time between two. Whatever fails throws std::runtime_error: the
+/// device is not to be used again, unless that is DeviceMemoryFull. One caller at a time, but for allocate, allocate_host and
+/// upload: threads that prepare pings call them at once.
 class Machine {
  public:
   static constexpr int lanes = 3;
   virtual ~Machine() = default;
   virtual std::string name() const = 0;  // "NVIDIA H200, 139.8 GiB, compute 9.0"
 
+  /// Of the device's memory, free at this moment; other programs may take of it.
+  virtual std::size_t free_bytes() const { return std::numeric_limits<std::size_t>::max(); }
   virtual void* allocate(std::size_t bytes) = 0;  // in the device's memory
+  /// For tests: every piece that an arena hands out is an allocation of its own, of just its size.
+  virtual bool pieces_apart() const { return false; }
   virtual void release(void* device) = 0;
   virtual void* allocate_host(std::size_t bytes) = 0;  // where copies to and from the device are fast
   virtual void release_host(void* host) = 0;

@@ -3,6 +3,7 @@
 // multipath, whose echoes are summed by core/pipeline/multipath and sent as columns.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -39,6 +40,8 @@ struct BatchRoom {
   std::vector<PingView> views;
   std::vector<Ping> pings;
 
+  /// All that a batch fills.
+  std::array<Arena*, 4> arenas() { return {&tables, &work, &results, &cells}; }
   /// Queues views and tables. The views lie where those of the batch before lay: what was captured of it (cuda_module.cu) serves
   /// again.
   const PingView* upload();
@@ -48,27 +51,45 @@ struct BatchRoom {
   Arena::Slice<PingView> view_table_;
 };
 
+/// A ping that is to be added to a batch.
+struct AskedPing {
+  const PingRequest* request;
+  std::size_t index;
+  std::shared_ptr<PlanTables> plan;
+};
+
 /// Scene and cells of an engine, and what it keeps between pings.
 class PingPreparer {
  public:
   PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene, const RayScene& rays, const simd::Kernels& kernels,
                Parallel& pool, std::size_t cell_bytes, double (*now_s)());
 
-  /// Adds the ping to the room. Bodies must have been placed; `cells` must serve the request. `lane` is that of the tables and
-  /// cells that stay on the device. False: there is no room for its tiles; finish what is under way, forget_cells(), and again.
-  bool add(const PingRequest& request, std::size_t index, std::shared_ptr<PlanTables> plan, SurfaceCells& cells, int lane,
-           BatchRoom& room);
+  /// Adds the pings to the room: one thread a ping where there are several (all of which may_go_together), all threads for one.
+  /// Bodies must have been placed; `cells` must serve the requests. `lane` is that of the tables and cells that stay on the
+  /// device. Returns those for whose tiles there is no room: finish what is under way, forget_cells(), and again.
+  std::vector<AskedPing> add(std::span<const AskedPing> pings, SurfaceCells& cells, int lane, BatchRoom& room);
+  /// Whether nothing that one of them needs is changed for the other: places of bodies, gain of a plan, mirrors.
+  static bool may_go_together(const AskedPing& a, const AskedPing& b);
   void forget_cells() { store_.clear(); }
+  /// Likewise, and their memory goes back to the device.
+  void give_back() { store_.give_back(); }
 
  private:
   struct Making;
+  struct Worker {  // what one thread keeps between pings
+    SpecularEchoes specular_echoes;
+    std::vector<PreparedTile> tiles;
+    std::vector<const std::int16_t*> tile_cells;
+  };
+  Making begin(const AskedPing& asked, int lane, BatchRoom& room);
+  void look(std::span<Making> all, SurfaceCells& cells);
+  void complete(Making& m, const PingContext& context, int lane, Worker& worker);
   void place_fan(Making& m);
-  PingContext context_of(const Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws) const;
-  void find_points(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws);
+  void find_points(Making& m, const PingContext& context, Worker& worker);
   void add_points(Making& m, std::span<const PointEcho> points, std::span<const ReceivedPulse> pulses);
-  bool find_tiles(Making& m, SurfaceCells& cells, const std::vector<LawTable>& laws, int lane);
+  bool find_tiles(Making& m, const PingContext& context, int lane, Worker& worker);
   static TileView view_of(const PreparedTile& prepared, const std::int16_t* cells, const float* law);
-  void lay_out_tiles(Making& m, const std::vector<LawTable>& laws);
+  void lay_out_tiles(Making& m, const Worker& worker, Parallel& pool);
   void add_water(Making& m);
   void add_receiver(Making& m);
   void allocate_results(Making& m);
@@ -78,15 +99,14 @@ class PingPreparer {
   const RayScene& rays_;
   const simd::Kernels& kernels_;
   Parallel& pool_;
+  Parallel one_thread_;
   double (*now_s_)();  // null = times are not measured
   FlatScene flat_;
   Arena scene_memory_;
   TracerView tracer_;
   CellStore store_;
-  SpecularEchoes specular_echoes_;
   MultipathWork multipath_;
-  std::vector<PreparedTile> tiles_;
-  std::vector<const std::int16_t*> tile_cells_;
+  std::vector<Worker> workers_;  // by number of the thread
 };
 
 }  // namespace sonar::cuda

@@ -9,12 +9,12 @@
 
 namespace sonar::cuda {
 
-/// The sums of a column's echoes at the grid's points = part modulo sum_parts: i = column * sum_parts + part. In the order of the
-/// echoes, as the CPU adds them.
+/// The sums of a column's echoes at the grid's points = part modulo spread_parts: i = column * spread_parts + part. In the order
+/// of the echoes, as the CPU adds them.
 SONAR_HD inline void spread(const PingView& p, std::uint32_t i) {
   const SpectralView& s = p.spectral;
-  const std::uint32_t k = i / sum_parts;
-  const int part = static_cast<int>(i % sum_parts), parts = static_cast<int>(sum_parts);
+  const std::uint32_t k = i / spread_parts;
+  const int part = static_cast<int>(i % spread_parts), parts = static_cast<int>(spread_parts);
   double* grid = s.grids + 2 * static_cast<std::int64_t>(k) * s.points;
   for (int at = part; at < s.points; at += parts) grid[2 * at] = grid[2 * at + 1] = 0;
   if (p.slots == 0) return;

@@ -39,7 +39,7 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
     case Step::sum_columns:
       return p.spectral.grids == nullptr ? columns * sum_parts : 0;
     case Step::spread:
-      return p.spectral.grids != nullptr ? columns * sum_parts : 0;
+      return p.spectral.grids != nullptr ? columns * spread_parts : 0;
     case Step::fold:
       return p.spectral.grids != nullptr ? columns * static_cast<std::uint32_t>(p.spectral.period) : 0;
     case Step::unfold:
@@ -53,7 +53,7 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
     case Step::point_weights:
       return static_cast<std::uint32_t>(p.point_count + p.pulse_count) * beams;
     case Step::form_beams:
-      return (beams + beams_a_panel - 1) / beams_a_panel * samples;
+      return (beams + panels_at_once * beams_a_panel - 1) / (panels_at_once * beams_a_panel) * samples;
     case Step::crosstalk_sum:
       return p.crosstalk != nullptr ? samples : 0;
     case Step::crosstalk_add:

@@ -38,14 +38,14 @@ void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotatio
   out.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(plan.columns.count)));
 }
 
-PreparedTile prepare(const PingContext& context, const TileInView& t, const BubbleLayer& bubbles) {
+PreparedTile prepare(const PingContext& context, const TileInView& t, const Rotation& seen_from_object,
+                     const BubbleLayer& bubbles) {
   const PingScalars& s = context.scalars;
   PreparedTile out;
   simd::TileSeen& seen = out.seen;
   const CellTile& tile = *t.tile;
   // The tile's place at the moment it scatters, and the axes of reception; all its cells share them.
   const EchoGeometry at = s.echo_geometry(t.from_sonar_m);
-  const Rotation& seen_from_object = context.cells.sonar_from_object(t.object);
   const Rotation sonar_from_object = s.moves ? at.turn * seen_from_object : seen_from_object;
   const Vec3d from_sonar_object_m =
       s.moves ? t.from_sonar_object_m - transposed(seen_from_object) * at.moved_m : t.from_sonar_object_m;
@@ -102,14 +102,16 @@ std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const Pi
   return laws;
 }
 
-void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view, std::vector<PreparedTile>& tiles) {
+void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
+                   std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles) {
   const BubbleLayer bubbles(context.scene().sea_surface);
   tiles.resize(in_view.size());
   // Tiles a task. Each writes its own place, so the order of the tiles, and of every sum, is that of one thread.
   constexpr std::size_t batch = 256;
   context.pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);
-    for (std::size_t i = b * batch; i < end; ++i) tiles[i] = prepare(context, in_view[i], bubbles);
+    for (std::size_t i = b * batch; i < end; ++i)
+      tiles[i] = prepare(context, in_view[i], sonar_from_object[static_cast<std::size_t>(in_view[i].object)], bubbles);
   });
 }
 

@@ -28,7 +28,9 @@ struct PreparedTile {
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& scalars);
 
 /// Prepares the tiles in view, in parallel; the order is kept. The tiles point into the laws, which must outlive them.
-void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view, std::vector<PreparedTile>& tiles);
+/// `sonar_from_object`: of the view, per object.
+void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
+                   std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles);
 
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen);
 

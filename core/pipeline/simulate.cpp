@@ -226,7 +226,7 @@ void PingSimulation::find_echo_sources() {
   view.levels = plan_.levels;
   const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
-  prepare_tiles(context_, in_view, w_.tiles);
+  prepare_tiles(context_, in_view, cells_.sonar_from_objects(), w_.tiles);
   sort_tiles(w_.tiles, group_columns_, groups(), w_.tiles_by_group);
   watch.lap(Stage::cull);
   w_.statistics.tiles = in_view.size();

@@ -57,6 +57,21 @@ class Unit(unittest.TestCase):
         self.assertEqual((result.returncode, ours), (0, []))
 
     @NEEDS_SYSTEMD
+    def test_the_drop_ins_of_the_manual_are_valid(self):
+        text = (ROOT / "docs/operations.md").read_text(encoding="utf-8").split("Changes go in a drop-in", 1)[1]
+        drop_ins = re.findall(r"^    \[Service\]\n(?:    \S.*\n)+", text, re.MULTILINE)
+        self.assertEqual(len(drop_ins), text.count("[Service]"))
+        base = self.file.read_text(encoding="utf-8")
+        for drop_in in drop_ins:
+            own = drop_in.replace("ExecStart=sonard", f"ExecStart={SONARD.resolve()}")
+            # A program that is not installed here is no fault of the drop-in.
+            own = re.sub(r"ExecStartPre=.*", "ExecStartPre=/bin/true", own)
+            self.file.write_text(base + "\n" + re.sub("^    ", "", own, flags=re.MULTILINE), encoding="utf-8")
+            result = run("systemd-analyze", "verify", "--man=no", self.file)
+            ours = [line for line in (result.stdout + result.stderr).splitlines() if "sonard" in line]
+            self.assertEqual((result.returncode, ours), (0, []), drop_in)
+
+    @NEEDS_SYSTEMD
     def test_its_exposure_is_at_most_one_and_a_half(self):
         result = run("systemd-analyze", "security", "--offline=true", "--no-pager", self.file)
         match = re.search(r"Overall exposure level for \S+: ([\d.]+)", result.stdout)

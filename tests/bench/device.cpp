@@ -1,6 +1,7 @@
 // P10 and P11: what a device does when it gets pings in batches, as `sonard render --batch` and data sets give them.
 #include <algorithm>
 #include <cstdio>
+#include <initializer_list>
 
 #include "cuda/cuda_engine.hpp"
 #include "cuda/cuda_status.hpp"
@@ -13,6 +14,8 @@ using nlohmann::json;
 
 constexpr double published_reference_ms = 36;  // a frame, P1's size: IOES-Lab/dave, issue 44; on a device of its author's
 constexpr int calls_in_batches = 4;            // batches in one call: two are under way at a time
+constexpr double most_warm_up_s = 1, most_rounds_s = 3;  // of one size of a batch; less for few pings
+constexpr std::size_t rounds = 5;
 
 Result<std::unique_ptr<PingEngine>> engine_of(const ScenePointer& scene, Parallel& pool, const BenchOptions& options, int batch,
                                               bool steps) {
@@ -23,19 +26,26 @@ Result<std::unique_ptr<PingEngine>> engine_of(const ScenePointer& scene, Paralle
 }
 
 struct BatchRate {
-  double pings_per_second = 0;             // as a user has it
-  double processor_ms = 0, device_ms = 0;  // a ping: finding tiles and points, and the device's steps
+  double pings_per_second = 0;  // as a user has it
+  // Means a ping, in a run of its own whose steps are timed: finding tiles and points, in one thread; the device's steps.
+  double processor_ms = 0, device_ms = 0;
 };
 
-/// Once to make and send the cells, then timed, pings a call.
+/// Warm: an idle device runs at a fraction of its clock and takes about a second to rise. Then the median of several rounds.
 double rate(PingEngine& engine, Pinger& pinger, const std::vector<PingRequest>& requests, std::size_t a_call) {
-  double seconds = 0;
-  for (int round = 0; round < 2; ++round) {
-    seconds = 0;
+  const auto round = [&] {
+    double seconds = 0;
     for (std::size_t i = 0; i < requests.size(); i += a_call)
       seconds += pinger.fire(engine, std::span(requests).subspan(i, std::min(a_call, requests.size() - i)));
+    return seconds;
+  };
+  const double share = std::min(1.0, static_cast<double>(requests.size()) / 100);
+  for (const double begin = now_s(); round(), now_s() - begin < share * most_warm_up_s;) {
   }
-  return static_cast<double>(requests.size()) / seconds;
+  std::vector<double> seconds;
+  for (const double begin = now_s(); seconds.empty() || (seconds.size() < rounds && now_s() - begin < share * most_rounds_s);)
+    seconds.push_back(round());
+  return static_cast<double>(requests.size()) / Times(std::move(seconds)).median;
 }
 
 Result<BatchRate> rate_of(const ScenePointer& scene, Parallel& pool, Pinger& pinger, const std::vector<PingRequest>& requests,
@@ -49,13 +59,34 @@ Result<BatchRate> rate_of(const ScenePointer& scene, Parallel& pool, Pinger& pin
   engine = engine_of(scene, pool, options, batch, true);
   if (!engine) return tl::make_unexpected(engine.error());
   const auto few = std::span(requests).first(std::min(requests.size(), 2 * a_call));
-  for (int round = 0; round < 2; ++round) pinger.fire(**engine, few);
-  const PingStatistics last = (*engine)->statistics();
-  const auto ms = [&](Stage s) { return 1e3 * last.seconds[static_cast<std::size_t>(s)]; };
-  for (const Stage s : {Stage::specular, Stage::multipath, Stage::cull, Stage::build_cells}) found.processor_ms += ms(s);
-  for (const Stage s : {Stage::trace, Stage::scatter, Stage::synthesize, Stage::noise, Stage::form_beams, Stage::receive})
-    found.device_ms += ms(s);
+  pinger.fire(**engine, few);
+  pinger.fire(**engine, few);
+  const std::vector<PingStatistics> each = (*engine)->statistics_of_each();
+  const auto mean_ms = [&](std::initializer_list<Stage> stages) {
+    double seconds = 0;
+    for (const PingStatistics& of : each)
+      for (const Stage s : stages) seconds += of.seconds[static_cast<std::size_t>(s)];
+    return 1e3 * seconds / static_cast<double>(each.size());
+  };
+  found.processor_ms = mean_ms({Stage::specular, Stage::multipath, Stage::cull, Stage::build_cells});
+  found.device_ms = mean_ms({Stage::trace, Stage::scatter, Stage::synthesize, Stage::noise, Stage::form_beams, Stage::receive});
   return found;
+}
+
+/// The row of the table and of the report.
+json told(const BatchRate& found, const BenchCase& c, int threads, int batch) {
+  std::printf(
+      "P10  %-4s %2d thread%s %2d pings a launch: %7.1f pings/s  (ms a ping: %.3f; tiles and points by the CPU %.3f, the "
+      "device's steps %.3f)\n",
+      c.name.c_str(), threads, threads == 1 ? " " : "s", batch, found.pings_per_second, 1e3 / found.pings_per_second,
+      found.processor_ms, found.device_ms);
+  std::fflush(stdout);
+  return {{"case", c.name},
+          {"threads", threads},
+          {"batch", batch},
+          {"pings_per_second", found.pings_per_second},
+          {"processor_ms", found.processor_ms},
+          {"device_ms", found.device_ms}};
 }
 
 }  // namespace
@@ -68,20 +99,14 @@ Result<json> find_device_rates(const ScenePointer& scene, const BenchScene& wher
     Pinger pinger(c, options);
     std::vector<PingRequest> requests;
     for (int k = 0; k < std::max(options.pings, 2); ++k) requests.push_back(pinger.request(k, bench_pose(c, where, k / 40.0)));
-    Parallel pool(options.threads.back());
-    for (const int batch : {1, 2, 4, 8, 16, 32}) {
-      const auto found = rate_of(scene, pool, pinger, requests, batch, options);
-      if (!found) return tl::make_unexpected(found.error());
-      std::printf(
-          "P10  %-4s %2d pings a launch: %7.1f pings/s  (ms a ping: tiles and points by the CPU %.3f, the device's steps %.3f)\n",
-          name, batch, found->pings_per_second, found->processor_ms, found->device_ms);
-      std::fflush(stdout);
-      rates.push_back({{"case", name},
-                       {"batch", batch},
-                       {"pings_per_second", found->pings_per_second},
-                       {"processor_ms", found->processor_ms},
-                       {"device_ms", found->device_ms}});
-      if (c.name == "P1") best_of_p1 = std::max(best_of_p1, found->pings_per_second);
+    for (const int threads : options.threads) {
+      Parallel pool(threads);
+      for (const int batch : {1, 2, 4, 8, 16, 32}) {
+        const auto found = rate_of(scene, pool, pinger, requests, batch, options);
+        if (!found) return tl::make_unexpected(found.error());
+        rates.push_back(told(*found, c, threads, batch));
+        if (c.name == "P1") best_of_p1 = std::max(best_of_p1, found->pings_per_second);
+      }
     }
   }
   const bool given = options.reference_ms > 0;

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""Writes the page of the CUDA engine's benchmarks from what `sonard_bench --engine cuda --json` found and from facts of the machine.
+"""Writes the page of the CUDA engine's benchmarks from what `tests/tools/gpu_check.sh run` left in a folder.
 
-usage: write_gpu_benchmarks.py REPORT.json FACTS.json PAGE
-FACTS: {"facts": {"driver": "...", ...}, "distances": "lines of the comparison with Embree's rays"}; tests/tools/gpu_check.sh
+usage: write_gpu_benchmarks.py FOUND PAGE
+FOUND has batches.json and single.json (sonard_bench --json) and, where those parts ran, facts.txt, digests.txt, ceiling.txt,
+memcheck.txt, initcheck.txt and the tests' *_test.txt.
 """
 
 import json
 import pathlib
+import re
 import sys
 
 # case: (required, goal) [pings/s], as for the CPU; P10 is that of batches.
@@ -51,11 +53,14 @@ def alone(results):
 def batches(device):
     yield "## In batches"
     yield ""
-    yield ("Four batches to a call, two of them under way at a time, framed; required 1,000 pings/s, goal 5,000 (P10). The processor "
-           "finds tiles and points of the next batch while the device is at work: the longer of the two sets the rate.")
+    yield ("Four batches to a call, two of them under way at a time, framed; required 1,000 pings/s, goal 5,000 (P10); median of five "
+           "rounds after a second of warming up. Means a ping: by the clock on the wall; tiles and points, summed over the threads "
+           "that find them; the device's steps, by its events, in a run of their own. Copies, launches, taking results and framing "
+           "are in the first only.")
     yield ""
-    yield from table(["case", "pings a launch", "pings/s", "", "ms a ping: processor", "device"],
-                     [[r["case"], r["batch"], f'{r["pings_per_second"]:.0f}', verdict(r["pings_per_second"], BATCH_FLOOR, BATCH_GOAL),
+    yield from table(["case", "threads", "pings a launch", "pings/s", "", "ms a ping: wall", "tiles and points", "device"],
+                     [[r["case"], r["threads"], r["batch"], f'{r["pings_per_second"]:.0f}',
+                       verdict(r["pings_per_second"], BATCH_FLOOR, BATCH_GOAL), f'{1e3 / r["pings_per_second"]:.3f}',
                        f'{r["processor_ms"]:.3f}', f'{r["device_ms"]:.3f}'] for r in device["rates"]])
     reference = device["reference"]
     yield ""
@@ -82,14 +87,42 @@ def page(report, facts):
     if facts.get("distances"):
         lines += ["", 'Beside the CPU engine with Embree (docs/cuda.md, "Equality with the CPU"), eight pings of P1:', "", "```",
                   facts["distances"].strip(), "```"]
+    if facts.get("ceiling"):
+        lines += ["", "What the processor allows when the device takes no time (host module, steps left out):", "", "```",
+                  facts["ceiling"].strip(), "```"]
     return "\n".join(lines) + "\n"
 
 
+def last_word(path, pattern, otherwise):
+    """What a tool or a test program said at its end."""
+    found = re.findall(pattern, path.read_text(encoding="utf-8", errors="replace")) if path.exists() else []
+    return found[-1].strip() if found else otherwise
+
+
+def load(folder):
+    """The report of both runs as one, and the facts."""
+    report = json.loads((folder / "single.json").read_text(encoding="utf-8"))
+    report["device"] = json.loads((folder / "batches.json").read_text(encoding="utf-8"))["device"]
+    facts = {}
+    if (folder / "facts.txt").exists():
+        facts = dict(line.split("=", 1) for line in (folder / "facts.txt").read_text(encoding="utf-8").splitlines() if "=" in line)
+    for test in sorted(folder.glob("cuda_*_test.txt")):
+        facts[test.stem] = last_word(test, r"\[  (?:PASSED|FAILED)  \] .*|\[  FAILED  \] .*", "did not end")
+    if (folder / "digests.txt").exists():
+        facts["digests"] = (folder / "digests.txt").read_text(encoding="utf-8").strip()
+    for tool in ("memcheck", "initcheck"):
+        facts["compute-sanitizer " + tool] = last_word(folder / f"{tool}.txt", r"ERROR SUMMARY: .*", "not run")
+    embree = folder / "cuda_device_embree_rays_test.txt"
+    distances = re.findall(r"^\d+: relative L2.*", embree.read_text(encoding="utf-8"), re.MULTILINE) if embree.exists() else []
+    ceiling = folder / "ceiling.txt"
+    lines = re.findall(r"^P10 .*", ceiling.read_text(encoding="utf-8"), re.MULTILINE) if ceiling.exists() else []
+    return report, {"facts": facts, "distances": "\n".join(distances), "ceiling": "\n".join(lines)}
+
+
 def main():
-    if len(sys.argv) != 4:
+    if len(sys.argv) != 3:
         sys.exit(__doc__)
-    report, facts = (json.loads(pathlib.Path(name).read_text(encoding="utf-8")) for name in sys.argv[1:3])
-    pathlib.Path(sys.argv[3]).write_text(page(report, facts), encoding="utf-8")
+    pathlib.Path(sys.argv[2]).write_text(page(*load(pathlib.Path(sys.argv[1]))), encoding="utf-8")
 
 
 if __name__ == "__main__":

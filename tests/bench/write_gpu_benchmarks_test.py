@@ -20,7 +20,7 @@ def result(case, engine, rate):
 
 
 def report(reference):
-    rates = [{"case": "P1", "batch": b, "pings_per_second": r, "processor_ms": 0.2, "device_ms": 0.15}
+    rates = [{"case": "P1", "threads": 4, "batch": b, "pings_per_second": r, "processor_ms": 0.2, "device_ms": 0.15}
              for b, r in ((1, 900), (8, 4000), (32, 5001))]
     return {"processor": "test", "results": [result("P1", "cuda, H200", 2000), result("P3d", "cuda, H200", 39), result("P2", "cpu", 50)],
             "device": {"name": "H200", "rates": rates, "reference": reference}, "latency": {"latency": TIMES},
@@ -32,9 +32,9 @@ class Page(unittest.TestCase):
         page = write_gpu_benchmarks.page(report({"ms": 30.0, "on_this_device": True, "ratio": 150.0}),
                                          {"facts": {"driver": "580.1"}, "distances": "1: relative L2 1e-3"})
         lines = page.splitlines()
-        self.assertIn("| P1 | 1 | 900 | **missed** | 0.200 | 0.150 |", lines)
-        self.assertIn("| P1 | 8 | 4000 | holds | 0.200 | 0.150 |", lines)
-        self.assertIn("| P1 | 32 | 5001 | goal | 0.200 | 0.150 |", lines)
+        self.assertIn("| P1 | 4 | 1 | 900 | **missed** | 1.111 | 0.200 | 0.150 |", lines)
+        self.assertIn("| P1 | 4 | 8 | 4000 | holds | 0.250 | 0.200 | 0.150 |", lines)
+        self.assertIn("| P1 | 4 | 32 | 5001 | goal | 0.200 | 0.200 | 0.150 |", lines)
         self.assertTrue(any(l.startswith("| P3d ") and "| **missed** |" in l for l in lines))
         self.assertFalse(any(l.startswith("| P2 ") for l in lines))
         for words in ("P2: not for the device", "| driver | 580.1 |", "150 times the public reference code on this device (30.0 ms a frame): holds",
@@ -49,17 +49,22 @@ class Page(unittest.TestCase):
     @unittest.skipUnless("SONARD_BENCH" in os.environ, "SONARD_BENCH names the program")
     def test_the_whole_way_with_host_loops(self):
         with tempfile.TemporaryDirectory() as folder:
-            found, facts, page = (pathlib.Path(folder) / name for name in ("found.json", "facts.json", "page"))
-            subprocess.run([os.environ["SONARD_BENCH"], "--engine", "cuda", "--scene", "demo", "--case", "P3c", "--case", "P10",
-                            "--pings", "2", "--threads", "1", "--reference-ms", "30", "--json", found], check=True, timeout=250,
-                           stdout=subprocess.DEVNULL)
-            facts.write_text(json.dumps({"facts": {"driver": "none"}}), encoding="utf-8")
-            subprocess.run([sys.executable, "-B", write_gpu_benchmarks.__file__, found, facts, page], check=True)
+            found, page = pathlib.Path(folder), pathlib.Path(folder) / "page"
+            bench = [os.environ["SONARD_BENCH"], "--engine", "cuda", "--scene", "demo", "--pings", "2", "--threads", "1"]
+            for cases, name in ((["--case", "P3c"], "single"), (["--case", "P10", "--reference-ms", "30"], "batches")):
+                subprocess.run([*bench, *cases, "--json", found / f"{name}.json"], check=True, timeout=250, stdout=subprocess.DEVNULL)
+            (found / "facts.txt").write_text("driver=none\n", encoding="utf-8")
+            (found / "memcheck.txt").write_text("x\n========= ERROR SUMMARY: 0 errors\n", encoding="utf-8")
+            (found / "cuda_seam_test.txt").write_text("[  PASSED  ] 2 tests.\n", encoding="utf-8")
+            subprocess.run([sys.executable, "-B", write_gpu_benchmarks.__file__, found, page], check=True)
             text = page.read_text(encoding="utf-8")
             self.assertIn("| device | host loops |", text)
             self.assertIn("30.0 ms a frame", text)
             self.assertEqual(text.count("| P3a |"), 6, "as many sizes of a batch")
-            device = json.loads(found.read_text(encoding="utf-8"))["device"]
+            for row in ("| driver | none |", "| cuda_seam_test | [  PASSED  ] 2 tests. |", "| compute-sanitizer initcheck | not run |",
+                        "| compute-sanitizer memcheck | ERROR SUMMARY: 0 errors |"):
+                self.assertIn(row, text)
+            device = json.loads((found / "batches.json").read_text(encoding="utf-8"))["device"]
             self.assertTrue(all(r["device_ms"] > 0 and r["processor_ms"] > 0 for r in device["rates"]))
 
 

@@ -19,7 +19,7 @@ namespace sonar::test {
 /// What the engine of these tests runs on: host loops, or, in programs compiled for it, the device.
 #ifdef SONAR_TEST_ON_DEVICE
 inline Result<std::unique_ptr<cuda::Machine>> test_machine() {
-  setenv("SONARD_CUDA_MODULE", SONAR_TEST_ON_DEVICE, 1);
+  setenv("SONARD_CUDA_MODULE", SONAR_TEST_ON_DEVICE, 0);  // the environment's first: a packed test lies elsewhere
   return cuda::open_cuda_machine();
 }
 #else

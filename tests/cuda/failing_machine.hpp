@@ -1,6 +1,10 @@
 // A device that is lost at a given call and stays lost, with host loops inside: for tests of what happens then.
 #pragma once
 
+#include <atomic>
+#include <limits>
+#include <map>
+#include <mutex>
 #include <stdexcept>
 #include <utility>
 
@@ -12,12 +16,27 @@ class FailingMachine final : public cuda::Machine {
  public:
   /// When set, it has no transforms, and this is why.
   std::string no_transforms;
+  /// Bytes of the device; more is DeviceMemoryFull. `tells_bytes`: what it claims to have free at the start.
+  std::size_t room_bytes = std::numeric_limits<std::size_t>::max(), tells_bytes = room_bytes;
   /// `calls` is counted up, and outlives this; the call that finds it at `last` fails, as do all that follow.
   FailingMachine(int& calls, int last) : calls_(calls), last_(last) {}
 
   std::string name() const override { return "a device that fails"; }
-  void* allocate(std::size_t bytes) override { return called(), inner_->allocate(bytes); }
-  void release(void* device) override { inner_->release(device); }
+  std::size_t free_bytes() const override { return tells_bytes; }
+  void* allocate(std::size_t bytes) override {
+    called();
+    const std::lock_guard lock(taking_);
+    if (bytes > room_bytes - taken_) throw cuda::DeviceMemoryFull("out of memory");
+    void* const at = inner_->allocate(bytes);
+    taken_ += sizes_[at] = bytes;
+    return at;
+  }
+  void release(void* device) override {
+    const std::lock_guard lock(taking_);
+    taken_ -= sizes_.at(device);
+    sizes_.erase(device);
+    inner_->release(device);
+  }
   void* allocate_host(std::size_t bytes) override { return called(), inner_->allocate_host(bytes); }
   void release_host(void* host) override { inner_->release_host(host); }
   void upload(int lane, void* to, const void* from, std::size_t n) override { called(), inner_->upload(lane, to, from, n); }
@@ -33,10 +52,13 @@ class FailingMachine final : public cuda::Machine {
 
  private:
   void called() {
-    if (calls_++ >= last_) throw std::runtime_error("the device is lost");
+    if (std::atomic_ref(calls_)++ >= last_) throw std::runtime_error("the device is lost");
   }
   int& calls_;
   int last_;
+  std::mutex taking_;
+  std::size_t taken_ = 0;
+  std::map<void*, std::size_t> sizes_;
   std::unique_ptr<cuda::Machine> inner_ = cuda::make_host_loops();
 };
 

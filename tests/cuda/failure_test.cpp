@@ -124,6 +124,48 @@ TEST_F(LostDevice, IsNotAskedForTransformsThatItDoesNotHave) {
   EXPECT_EQ(said_[0], "CUDA: pings with an exact pulse are computed by the CPU (no libcufft.so.12)");
 }
 
+/// A device whose memory is full is not lost: everything is given back, batches become smaller, and no ping is lost.
+TEST_F(LostDevice, IsNotWhatAFullOneIs) {
+  constexpr std::size_t megabyte = 1u << 20;
+  const std::vector<Ping> there = engine(never, false)->run(requests_);
+  bool any_full = false, all_fit = false;
+  for (std::size_t room_bytes = 36 * megabyte; !all_fit; room_bytes += 6 * megabyte) {
+    ASSERT_LT(room_bytes, 200 * megabyte);
+    auto machine = std::make_unique<FailingMachine>(calls_, never);
+    machine->room_bytes = room_bytes;
+    said_.clear();
+    cuda::DeviceEngineOptions device;
+    device.batch = 4;
+    device.cpu_after_failure = false;
+    device.say = [this](const std::string& what) { said_.push_back(what); };
+    const auto full = cuda::make_device_engine(scene_, pool_, options_, std::move(machine), device);
+    try {
+      for (int again = 0; again < 2; ++again) {
+        const auto pings = full->run(requests_);
+        for (std::size_t i = 0; i < pings.size(); ++i) EXPECT_EQ(pings[i].samples, there[i].samples) << room_bytes << ", " << i;
+      }
+      all_fit = said_.empty();
+      any_full = any_full || !all_fit;
+    } catch (const EngineUnavailable&) {
+      EXPECT_FALSE(any_full) << "with less room there was enough: " << room_bytes;
+      EXPECT_EQ(said_.size(), 3u) << "4, 2, 1 pings, and one batch at a time";
+    }
+    for (const std::string& what : said_) EXPECT_THAT(what, StartsWith("CUDA: the device's memory is full; from here on "));
+  }
+  EXPECT_TRUE(any_full) << "no room was too small";
+}
+
+TEST_F(LostDevice, IsOneThatHasNoRoomForAPing) {
+  auto machine = std::make_unique<FailingMachine>(calls_, never);
+  machine->room_bytes = 8u << 20;
+  cuda::DeviceEngineOptions device;
+  device.say = [this](const std::string& what) { said_.push_back(what); };
+  const auto full = cuda::make_device_engine(scene_, pool_, options_, std::move(machine), device);
+  const auto pings = full->run(requests_);
+  for (std::size_t i = 0; i < pings.size(); ++i) EXPECT_EQ(pings[i].samples, samples_[i]) << i;
+  EXPECT_EQ(said_.back(), "the CUDA engine stopped: out of memory; from here on the CPU computes");
+}
+
 TEST_F(LostDevice, IsNoEngineWhenItIsLostWhileTheSceneIsSent) {
   const int first = (engine(never, true), calls_);
   for (int last = 0; last < first; ++last) EXPECT_THROW(engine(last, true), std::runtime_error) << last;

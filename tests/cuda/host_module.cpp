@@ -20,17 +20,22 @@ struct Opened {
 };
 Machine& machine_of(void* opened) { return static_cast<Opened*>(opened)->machine; }
 
+constexpr int memory_full = 2;
+
 template <class Call>
 int code_of(const Call& call) {
   try {
     call();
     return 0;
+  } catch (const DeviceMemoryFull&) {
+    return memory_full;
   } catch (const std::exception&) {
     return 1;
   }
 }
 
-const char* reason(int) { return "the device is lost"; }
+const char* reason(int code) { return code == memory_full ? "out of memory" : "the device is lost"; }
+int is_memory_full(int code) { return code == memory_full ? 1 : 0; }
 int query(int* devices, char* name, std::size_t room) {
   *devices = 1;
   std::snprintf(name, room, "host loops");
@@ -42,6 +47,9 @@ int open(void** machine) {
   return 0;
 }
 void close(void* machine) { delete static_cast<Opened*>(machine); }
+int free_bytes(void* m, std::size_t* bytes) {
+  return code_of([&] { *bytes = machine_of(m).free_bytes(); });
+}
 int allocate(void* m, void** at, std::size_t bytes) {
   return code_of([&] { *at = machine_of(m).allocate(bytes); });
 }
@@ -86,9 +94,11 @@ const CudaModule module{module_version,
                         sizeof(TileView),
                         static_cast<std::uint32_t>(Step::steps),
                         reason,
+                        is_memory_full,
                         query,
                         open,
                         close,
+                        free_bytes,
                         allocate,
                         release,
                         allocate_host,

@@ -1,11 +1,12 @@
-// Threads of a device run in any order: whatever order host loops take, the bytes are the same, and no step reads what none has
-// written.
+// A device's threads run in any order and at once, its queues when they like, its memory lies anywhere: the bytes are the same,
+// and no step reads what none has written.
 #include <gtest/gtest.h>
 
 #include <set>
 
 #include "tests/core/pipeline/basin.hpp"
 #include "tests/cuda/comparing.hpp"
+#include "tests/cuda/strange_machines.hpp"
 
 namespace sonar::test {
 namespace {
@@ -28,20 +29,20 @@ std::vector<PingRequest> requests() {
   return all;
 }
 
-std::vector<Ping> pings_in(LoopOrder order, const std::shared_ptr<const Scene>& scene, const std::vector<PingRequest>& all) {
+using MachinePointer = std::unique_ptr<cuda::Machine>;
+
+std::vector<Ping> pings_of(MachinePointer machine, const std::shared_ptr<const Scene>& scene, const std::vector<PingRequest>& all,
+                           cuda::DeviceEngineOptions options = {.batch = 3}) {
   Parallel pool(1);
-  const auto engine =
-      cuda::make_device_engine(scene, pool, {.simd = SimdLevel::portable}, cuda::make_host_loops(order), {.batch = 3});
+  // What a machine throws is no reason to go on with the CPU.
+  options.cpu_after_failure = false;
+  const auto engine = cuda::make_device_engine(scene, pool, {.simd = SimdLevel::portable}, std::move(machine), options);
   return engine->run(all);
 }
 
-class AnyOrder : public ::testing::TestWithParam<LoopOrder> {};
-
-TEST_P(AnyOrder, OfThreadsMakesTheSameBytes) {
-  const auto scene = basin();
-  const std::vector<PingRequest> all = requests();
-  const auto there = pings_in(LoopOrder::forwards, scene, all), again = pings_in(GetParam(), scene, all);
-  for (std::size_t i = 0; i < all.size(); ++i) {
+void expect_same(const std::vector<Ping>& there, const std::vector<Ping>& again) {
+  ASSERT_EQ(there.size(), again.size());
+  for (std::size_t i = 0; i < there.size(); ++i) {
     EXPECT_EQ(there[i].samples, again[i].samples) << i;
     EXPECT_EQ(there[i].pressure_upa, again[i].pressure_upa) << i;
     EXPECT_EQ(there[i].beam_signal_upa, again[i].beam_signal_upa) << i;
@@ -49,7 +50,69 @@ TEST_P(AnyOrder, OfThreadsMakesTheSameBytes) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Orders, AnyOrder, ::testing::Values(LoopOrder::backwards, LoopOrder::scattered));
+struct Device {
+  const char* name;
+  MachinePointer (*make)();
+};
+class AnyDevice : public ::testing::TestWithParam<Device> {};
+
+TEST_P(AnyDevice, MakesTheSameBytes) {
+  const auto scene = basin();
+  const std::vector<PingRequest> all = requests();
+  expect_same(pings_of(cuda::make_host_loops(), scene, all), pings_of(GetParam().make(), scene, all));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Order, AnyDevice,
+    ::testing::Values(Device{"Backwards", [] { return cuda::make_host_loops(LoopOrder::backwards); }},
+                      Device{"Scattered", [] { return cuda::make_host_loops(LoopOrder::scattered); }},
+                      Device{"Deferring", []() -> MachinePointer { return std::make_unique<DeferringMachine>(); }},
+                      Device{"Threaded", []() -> MachinePointer { return std::make_unique<ThreadedMachine>(); }},
+                      Device{"Piecewise", []() -> MachinePointer { return std::make_unique<PiecewiseMachine>(); }}),
+    [](const auto& of) { return std::string(of.param.name); });
+
+// A source of a copy that is used again too early, and an order that is forgotten, would show.
+TEST(DeferringDevice, DoesAllWorkAsLateAsTheOrderAllows) {
+  DeferringMachine machine;
+  auto* host = static_cast<int*>(machine.allocate_host(sizeof(int)));
+  auto* back = static_cast<int*>(machine.allocate_host(sizeof(int)));
+  auto* device = static_cast<int*>(machine.allocate(sizeof(int)));
+  *host = 1, *back = 0;
+  machine.upload(2, device, host, sizeof(int));
+  machine.download(0, back, device, sizeof(int));
+  *host = 2;
+  machine.wait(0);
+  EXPECT_EQ(*back, -1) << "nothing orders lane 0 after lane 2";
+  machine.order(0, 2);
+  machine.download(0, back, device, sizeof(int));
+  *host = 3;
+  machine.wait(0);
+  EXPECT_EQ(*back, 3);
+  machine.upload(2, device, host, sizeof(int));
+  machine.release_host(host);
+  EXPECT_THROW(machine.wait(2), std::logic_error);
+  machine.release(device);
+  machine.release_host(back);
+}
+
+// Cells that are forgotten and sent again, more sets of settings than are kept, batches of every size: what is queued late must
+// find what it needs.
+TEST(DeferringDevice, FindsEverythingAsItWasQueued) {
+  const auto scene = basin();
+  std::vector<PingRequest> all;
+  const PingRequest wide = requests().at(0);
+  for (int k = 0; k < 20; ++k) {
+    PingRequest r = wide;
+    r.switches.multipath = false;
+    r.settings.range_bin_count = 20 + 2 * (k % 10);  // more sets of settings than an engine keeps
+    r.number = PingNumber{static_cast<std::uint32_t>(k)};
+    r.sonar_in_world.position_m.x += 0.2 * (k % 3);
+    all.push_back(std::move(r));
+  }
+  const auto there = pings_of(cuda::make_host_loops(), scene, all);
+  for (const auto& options : {cuda::DeviceEngineOptions{.cell_bytes = 1, .batch = 2}, cuda::DeviceEngineOptions{.batch = 5}})
+    expect_same(there, pings_of(std::make_unique<DeferringMachine>(), scene, all, options));
+}
 
 }  // namespace
 }  // namespace sonar::test

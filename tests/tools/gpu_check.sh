@@ -1,60 +1,231 @@
 #!/usr/bin/env bash
-# Checks the CUDA engine on this machine's device: builds, tests, compute-sanitizer, benchmark; writes docs/benchmarks-gpu.md.
-# Exit 77 without a device, 1 when something fails. usage: tests/tools/gpu_check.sh [build folder, default build/gpu]
-# GPU_CHECK_ARCHITECTURES=75 builds for compute 7.5, say; GPU_CHECK_REFERENCE_MS=30 is what a frame of the public reference code
-# takes on this device, for the ratio P11.
-set -euo pipefail
-cd "$(dirname "$0")/../.."
-build=${1:-build/gpu}
-page=docs/benchmarks-gpu.md
+# Checks the CUDA engine on a machine with a device, which needs a driver and nothing else: no package, no CMake, no compiler.
+#   gpu_check.sh build [FOLDER, default build/gpu]      where the CUDA toolkit is: programs, module and tests
+#   gpu_check.sh pack [FOLDER] [ARCHIVE]                 all of it with the libraries it needs, default FOLDER/gpu_pack.tar.gz
+#   gpu_check.sh prove [ARCHIVE]                         that the pack runs in an empty root, with host loops for a device
+#   gpu_check.sh run [ARCHIVE] [PART...]                 on the machine with the device; leaves found.tar.gz and the page that
+#                                                        becomes docs/benchmarks-gpu.md in $OUT (default gpu-found)
+# Parts: facts smoke check ceiling rates page (those by default), kernels sanitize soak memory. Each takes less than ten minutes;
+# `page` is made of what facts, check and rates have left. A part that fails does not end the others; exit 1 when one did, 77
+# without a device. GPU_CHECK_ARCHITECTURES=90 builds for compute 9.0 only; GPU_CHECK_REFERENCE_MS=30 is what a frame of the public
+# reference code takes on this device, for the ratio P11; GPU_CHECK_THREADS="1 4" are the numbers of threads.
+set -uo pipefail
 
-if ! command -v nvidia-smi >/dev/null || ! nvidia-smi -L 2>/dev/null | grep -q GPU; then
-  echo "gpu_check: no CUDA device here (nvidia-smi names none): nothing was checked" >&2
-  exit 77
-fi
-nvcc=$(command -v nvcc || ls /usr/local/cuda/bin/nvcc 2>/dev/null || true)
-if [ -z "$nvcc" ]; then
-  echo "gpu_check: there is a device but no nvcc: install the CUDA toolkit" >&2
-  exit 77
-fi
+default_build=build/gpu
+device_tests="cuda_device_same_rays_test cuda_device_embree_rays_test"
+# What every Linux machine's loader brings itself and must not be mixed.
+c_library='/(ld-linux[^/]*|libc|libm|libdl|librt|libpthread|libresolv|libstdc\+\+|libgcc_s)\.so[.0-9]*$'
+page_file=docs/benchmarks-gpu.md
+default_parts="facts smoke check ceiling rates page"
 
-cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSONAR_CUDA=REQUIRED -DCMAKE_CUDA_COMPILER="$nvcc" \
-  ${GPU_CHECK_ARCHITECTURES:+-DCMAKE_CUDA_ARCHITECTURES="$GPU_CHECK_ARCHITECTURES"} >"$build.log" 2>&1 ||
-  { tail -20 "$build.log" >&2; exit 1; }
-tests="cuda_device_same_rays_test cuda_device_embree_rays_test"
-ninja -C "$build" $tests cuda_seam_test sonard sonard_bench sonard_cuda
+do_build() {
+  local build=${1:-$default_build} nvcc
+  nvcc=$(command -v nvcc || ls /usr/local/cuda/bin/nvcc 2>/dev/null) || { echo "gpu_check: no nvcc: install the CUDA toolkit" >&2; return 69; }
+  cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSONAR_CUDA=REQUIRED -DCMAKE_CUDA_COMPILER="$nvcc" \
+    ${GPU_CHECK_ARCHITECTURES:+-DCMAKE_CUDA_ARCHITECTURES="$GPU_CHECK_ARCHITECTURES"} || return
+  # shellcheck disable=SC2086
+  ninja -C "$build" ${NINJA_JOBS:+-j"$NINJA_JOBS"} $device_tests cuda_seam_test host_module sonard sonard_bench sonard_cuda
+}
 
-for test in $tests cuda_seam_test; do
-  # A test that is skipped here has checked nothing: with a device there is no reason for it.
-  (cd "$build/tests/cuda" && "./$test" --gtest_output="xml:$test.xml" --gtest_filter='OnDevice*:*NamesTheDevice*') |
-    tee "$build/$test.log"
-  if grep -q "SKIPPED" "$build/$test.log"; then echo "gpu_check: $test was skipped" >&2; exit 1; fi
-done
+libraries_of() { for f in "$@"; do ldd "$f"; done | awk '$3 ~ /^\// {print $3}' | sort -u; }
 
-sanitizer=$(command -v compute-sanitizer || ls "$(dirname "$nvcc")/compute-sanitizer" 2>/dev/null || true)
-sanitized="not run: compute-sanitizer is not installed"
-if [ -n "$sanitizer" ]; then
-  for tool in memcheck initcheck; do  # not racecheck: it looks at shared memory, and the kernels have none
-    "$sanitizer" --tool "$tool" --error-exitcode 9 "$build/tests/cuda/cuda_device_same_rays_test" \
-      --gtest_filter='OnDevice.IsTheSame*:OnDevice.SumsPulses*'
+do_pack() (
+  set -e
+  build=${1:-$default_build} archive=${2:-${1:-$default_build}/gpu_pack.tar.gz}
+  stage=$(mktemp -d)
+  trap 'rm -rf "$stage"' EXIT
+  pack=$stage/gpu_pack
+  mkdir -p "$pack/bin" "$pack/lib" "$pack/lib-if-missing"
+  for program in daemon/sonard daemon/libsonard_cuda.so tests/bench/sonard_bench tests/cuda/cuda_seam_test tests/cuda/libhost_module.so; do
+    cp "$build/$program" "$pack/bin/"
   done
-  sanitized="clean: memcheck, initcheck ($("$sanitizer" --version | grep -o 'Version [0-9.]*' | head -1))"
-fi
+  for test in $device_tests; do cp "$build/tests/cuda/$test" "$pack/bin/"; done
+  libraries_of "$pack"/bin/* | grep -vE "$c_library" | while read -r library; do cp -L "$library" "$pack/lib/"; done
+  for library in libstdc++.so.6 libgcc_s.so.1; do
+    cp -L "$(libraries_of "$pack/bin/sonard" | grep "/$library\$")" "$pack/lib-if-missing/"
+  done
+  strip --strip-unneeded "$pack"/bin/* "$pack"/lib/* 2>/dev/null || true
+  "$(sed -n 's/^CMAKE_CUDA_COMPILER:[A-Z]*=//p' "$build/CMakeCache.txt")" --version | grep -oE 'release [0-9.]+, V[0-9.]+' >"$pack/toolkit"
+  cp -r scenes tests/tools/gpu_check.sh tests/bench/write_gpu_benchmarks.py "$pack/"
+  tar -C "$stage" -cf - gpu_pack | gzip -9 >"$archive"
+  bytes=$(stat -c %s "$archive")
+  echo "gpu_check: $archive, $((bytes / 1000000)) MB"
+  [ "$bytes" -lt 57000000 ] || { echo "gpu_check: more than 57 MB do not travel" >&2; exit 1; }
+)
 
-# The benchmark of docs/cuda.md, as any user can run it.
-SONARD_CUDA_MODULE="$build/daemon/libsonard_cuda.so" "$build/tests/bench/sonard_bench" --engine cuda --scene local-search \
-  --scenes-dir scenes --case P1 --case P3a --case P3b --case P3c --case P3d --case P5 --case P9 --case P10 --pings 256 \
-  ${GPU_CHECK_REFERENCE_MS:+--reference-ms "$GPU_CHECK_REFERENCE_MS"} --json "$build/bench-gpu.json"
+# The pack alone, the C library and its loader: no /usr, no /proc, no shell.
+do_prove() (
+  set -e
+  archive=${1:-$default_build/gpu_pack.tar.gz}
+  root=$(mktemp -d)
+  trap 'rm -rf "$root"' EXIT
+  tar -xzf "$archive" -C "$root"
+  for library in $(libraries_of "$root"/gpu_pack/bin/* | grep -E "$c_library" | grep -vE '/lib(stdc\+\+|gcc_s)\.so') /lib64/ld-linux-x86-64.so.2; do
+    mkdir -p "$root/$(dirname "$library")"
+    cp -L "$library" "$root/$library"
+  done
+  inside() { unshare -r chroot "$root" "/gpu_pack/bin/$1" "${@:2}"; }
+  export LD_LIBRARY_PATH=/gpu_pack/lib:/gpu_pack/lib-if-missing SONARD_CUDA_MODULE=/gpu_pack/bin/libhost_module.so
+  inside sonard --version
+  inside sonard_bench --engine cuda --scene demo --scenes-dir /gpu_pack/scenes --case P1 --pings 1 --threads 1
+  echo "gpu_check: the pack runs in an empty root"
+)
 
-ask() { nvidia-smi --query-gpu="$1" --format=csv,noheader -i 0; }
-DISTANCES=$(grep -hE "^[0-9]+: relative L2" "$build/cuda_device_embree_rays_test.log" || true) \
-  MEMORY=$(ask memory.total) DRIVER=$(ask driver_version) TOOLKIT=$("$nvcc" --version | grep -o 'release [0-9.]*') \
-  CLOCKS="SM $(ask clocks.sm), at most $(ask clocks.max.sm); memory $(ask clocks.mem)" SANITIZED=$sanitized \
-  python3 - >"$build/facts-gpu.json" <<'END'
-import json, os
-facts = {"memory": "MEMORY", "driver": "DRIVER", "toolkit": "TOOLKIT", "clocks as found": "CLOCKS", "compute-sanitizer": "SANITIZED"}
-facts = {name: os.environ[variable] for name, variable in facts.items()} | {"tests on the device": "pass"}
-print(json.dumps({"facts": facts, "distances": os.environ["DISTANCES"]}))
-END
-python3 -B tests/bench/write_gpu_benchmarks.py "$build/bench-gpu.json" "$build/facts-gpu.json" "$page"
-echo "gpu_check: passed; $page is written"
+# ---- what follows runs on the machine with the device
+
+begin_run() {
+  out=$(mkdir -p "${OUT:-gpu-found}" && cd "${OUT:-gpu-found}" && pwd)
+  found=$out/found
+  mkdir -p "$found"
+  local at=${GPU_CHECK_UNPACKED:-/tmp/gpu_check}
+  mkdir -p "$at" && tar -xzf "$1" -C "$at" || return
+  pack=$at/gpu_pack
+  export SONARD_CUDA_MODULE=$pack/bin/libsonard_cuda.so
+  # cuFFT may lie in the toolkit or among Python's packages; without it exact pulses are the CPU's.
+  local name
+  name=$(grep -aoE 'libcufft\.so\.[0-9]+' "$SONARD_CUDA_MODULE" | head -1)
+  cufft=$(find /usr/local /opt /usr/lib /root /home -name "${name:-libcufft.so.12}" -print -quit 2>/dev/null)
+  libraries=$pack/lib${cufft:+:${cufft%/*}}
+  ldconfig -p 2>/dev/null | grep -q 'libstdc++.so.6' || libraries=$libraries:$pack/lib-if-missing
+  # shellcheck disable=SC2012
+  sanitizer=$(command -v compute-sanitizer || ls /usr/local/cuda*/bin/compute-sanitizer 2>/dev/null | head -1)
+  # shellcheck disable=SC2012
+  ncu=$(command -v ncu || ls /usr/local/cuda*/bin/ncu /opt/nvidia/nsight-compute/*/ncu 2>/dev/null | head -1)
+  threads=${GPU_CHECK_THREADS:-1 2 4 8 16}
+  failures=0
+}
+
+# limited SECONDS COMMAND...: with the pack's libraries; what hangs is ended, and a part ends before its ten minutes do.
+limited() {
+  local left=$((part_ends - SECONDS)) wanted=$1
+  [ "$left" -gt 5 ] || { echo "no time left for: ${*:2}"; return 124; }
+  LD_LIBRARY_PATH="$libraries${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}" timeout -k 5 $((wanted < left ? wanted : left)) "${@:2}"
+}
+bench() { limited "$1" "$pack/bin/sonard_bench" --engine cuda --scene local-search --scenes-dir "$pack/scenes" "${@:2}"; }
+thread_options() { for n in $threads; do printf -- '--threads %s ' "$n"; done; }
+fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
+ask() { nvidia-smi --query-gpu="$1" --format=csv,noheader -i "${CUDA_VISIBLE_DEVICES:-0}" 2>/dev/null; }
+digests() { grep -oE '[0-9a-f]{64}' "$1"; }
+
+facts() {
+  nvidia-smi
+  nvidia-smi --query-gpu=name,driver_version,clocks.sm,clocks.max.sm,clocks.mem,mig.mode.current,compute_mode --format=csv
+  lscpu | grep -E 'Model name|^CPU\(s\)'
+  echo "cuFFT: ${cufft:-none}  compute-sanitizer: ${sanitizer:-none}  ncu: ${ncu:-none}"
+  for f in "$pack"/bin/*; do limited 20 ldd "$f" | grep 'not found' && fail "$f lacks a library"; done
+  {
+    echo "memory=$(ask memory.total)"
+    echo "driver=$(ask driver_version)"
+    echo "toolkit=$(cat "$pack/toolkit")"
+    echo "clocks as found=SM $(ask clocks.sm), at most $(ask clocks.max.sm); memory $(ask clocks.mem)"
+  } >"$found/facts.txt"
+}
+
+smoke() { bench 120 --case P1 --pings 64 --threads 1 || fail "P1 did not run: rc=$?"; }
+
+# The tests that host loops pass, and P9 beside host loops: the same bytes where the device rounds as the processor does.
+check() {
+  local test skipped
+  for test in cuda_seam_test $device_tests; do
+    limited 280 "$pack/bin/$test" --gtest_filter='OnDevice*:*NamesTheDevice*:*FindsCufft*' >"$found/$test.txt" 2>&1 ||
+      fail "$test: rc=$?"
+    # One test may be skipped, and only for want of cuFFT; any other skip has checked nothing.
+    skipped=$(grep -E '^\[  SKIPPED \].*\(' "$found/$test.txt" | grep -vE 'SumsPulses|FindsCufft' || true)
+    [ -z "$skipped" ] || fail "$test skipped: $skipped"
+    grep -hE '^\[  (PASSED|FAILED|SKIPPED)|relative L2|Failure|no libcufft' "$found/$test.txt"
+  done
+  bench 120 --case P9 --threads 1 >"$found/p9_device.txt" || fail "P9 on the device"
+  SONARD_CUDA_MODULE=$pack/bin/libhost_module.so bench 240 --case P9 --threads 1 >"$found/p9_host.txt" || fail "P9 by host loops"
+  if diff <(digests "$found/p9_host.txt") <(digests "$found/p9_device.txt") >/dev/null; then
+    echo "digests of device and host loops: equal" | tee "$found/digests.txt"
+  else
+    echo "digests of device and host loops: different" | tee "$found/digests.txt"  # no failure: the last bit of a sine may do it
+  fi
+}
+
+# What the processor allows when the device takes no time.
+ceiling() {
+  # shellcheck disable=SC2046
+  SONARD_TEST_DEVICE_IDLE=1 SONARD_CUDA_MODULE=$pack/bin/libhost_module.so bench 500 --case P10 --pings 128 $(thread_options) |
+    tee "$found/ceiling.txt" | grep -E 'P10|P11' || fail "the processor's share"
+}
+
+rates() {
+  # shellcheck disable=SC2046
+  bench 380 --case P10 --pings 512 $(thread_options) ${GPU_CHECK_REFERENCE_MS:+--reference-ms "$GPU_CHECK_REFERENCE_MS"} \
+    --json "$found/batches.json" | grep -E 'P1[01]' || fail "P10"
+  bench 170 --case P1 --case P3a --case P3b --case P3c --case P3d --case P5 --case P9 --pings 400 --threads 1 \
+    --json "$found/single.json" || fail "one ping at a time"
+}
+
+page() {
+  command -v python3 >/dev/null || { fail "no python3 here: write_gpu_benchmarks.py makes the page from the archive"; return; }
+  python3 -B "$pack/write_gpu_benchmarks.py" "$found" "$out/${page_file##*/}" || fail "the page"
+}
+
+# Time, instructions and divergence of each kernel.
+kernels() {
+  [ -n "$ncu" ] || { fail "no ncu"; return; }
+  SONARD_CUDA_GRAPHS=0 limited 400 "$ncu" --clock-control none --csv --launch-skip 300 --launch-count 90 --metrics \
+    gpu__time_duration.sum,smsp__inst_executed.sum,sm__inst_executed.avg.per_cycle_active,sm__warps_active.avg.pct_of_peak_sustained_active,smsp__thread_inst_executed_per_inst_executed.ratio,l1tex__data_pipe_lsu_wavefronts.sum,lts__t_bytes.sum,dram__bytes.sum \
+    "$pack/bin/sonard_bench" --engine cuda --scene local-search --scenes-dir "$pack/scenes" --case P10 --pings 64 --threads 1 \
+    >"$found/ncu.csv" 2>&1 || fail "ncu: $(tail -1 "$found/ncu.csv")"
+}
+
+# Not racecheck: it looks at shared memory, and the kernels have none.
+sanitize() {
+  [ -n "$sanitizer" ] || { fail "no compute-sanitizer"; return; }
+  local tool
+  for tool in memcheck initcheck; do
+    limited 270 "$sanitizer" --tool "$tool" --error-exitcode 9 "$pack/bin/cuda_device_same_rays_test" \
+      --gtest_filter='OnDevice.IsTheSameBytesInBatches*:OnDevice.SumsPulses*' >"$found/$tool.txt" 2>&1 || fail "$tool: rc=$?"
+    tail -3 "$found/$tool.txt"
+  done
+}
+
+soak() {
+  for i in 1 2 3; do
+    bench 180 --case P9 --threads 1 >"$found/soak_$i.txt" || fail "P9, time $i"
+    cmp <(digests "$found/soak_1.txt") <(digests "$found/soak_$i.txt") || fail "other bytes at time $i"
+  done
+}
+
+# A device without room: smaller batches or one sentence, and no ping lost.
+memory() {
+  python3 -c "import torch,time;f=torch.cuda.mem_get_info()[0];x=torch.empty(f-(900<<20),dtype=torch.uint8,device='cuda');time.sleep(90)" &
+  local hog=$!
+  sleep 15
+  kill -0 $hog 2>/dev/null || { fail "no program here that fills the memory (python3 with torch)"; return; }
+  bench 60 --case P1 --pings 8 --threads 1
+  case $? in 0 | 69) ;; *) fail "a full device: neither pings nor exit code 69" ;; esac
+  kill $hog
+}
+
+do_run() {
+  local archive=$default_build/gpu_pack.tar.gz
+  case ${1:-} in *.tar.gz) archive=$1; shift ;; esac
+  if ! command -v nvidia-smi >/dev/null || ! nvidia-smi -L 2>/dev/null | grep -q GPU; then
+    echo "gpu_check: no CUDA device here (nvidia-smi names none): nothing was checked" >&2
+    return 77
+  fi
+  begin_run "$archive" || return
+  local part
+  # shellcheck disable=SC2086
+  for part in ${*:-$default_parts}; do
+    printf '\n=== %s (%d s)\n' "$part" "$SECONDS"
+    part_ends=$((SECONDS + 570))
+    case $part in
+      facts | smoke | check | ceiling | rates | page | kernels | sanitize | soak | memory) "$part" ;;
+      *) fail "no part $part" ;;
+    esac > >(tee -a "$found/log.txt") 2>&1
+    tar -czf "$out/found.tar.gz" -C "$out" found  # after every part: what is there comes back even when time runs out
+  done
+  echo "gpu_check: $failures failures in $SECONDS s; $out"
+  [ "$failures" -eq 0 ]
+}
+
+case ${1:-} in
+  build | pack | prove) cd "$(dirname "$0")/../.." && "do_$1" "${@:2}" ;;
+  run) do_run "${@:2}" ;;
+  *) sed -n '2,12s/^# //p' "$0"; exit 64 ;;
+esac

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cassert>
 #include <map>
 #include <tuple>
@@ -16,9 +17,9 @@ namespace sonar {
 struct SurfaceCells::Node {
   // What every visit asks comes first, side by side.
   TileAddress address;
-  bool divided = false;
+  std::atomic<bool> divided = false;  // children are there for those who read true
   bool built = false;
-  std::uint64_t last_visited = 0;
+  std::atomic<std::uint64_t> last_visited = 0;
   std::array<std::unique_ptr<Node>, 8> children;  // null where no triangle goes
   std::vector<std::uint32_t> triangles;
   CellTile tile;
@@ -100,7 +101,6 @@ void SurfaceCells::SurfacePatch::plant(const std::vector<std::uint32_t>& triangl
 }
 
 std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
-  node.divided = true;
   std::array<TileAddress, 8> inside;
   std::array<Cube, 8> cubes;
   for (int c = 0; c < 8; ++c) {
@@ -134,6 +134,7 @@ std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
   }
   for (const auto& child : node.children)
     if (child) bytes += child->own_bytes();
+  node.divided.store(true, std::memory_order_release);
   return bytes;
 }
 
@@ -187,8 +188,11 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
 
 SurfaceCells::~SurfaceCells() = default;
 
-void SurfaceCells::visit(SurfacePatch& patch, Node& node, const CellView& view, const Pose& sonar_in_object, const Rotation& turn,
-                         Found& found) const {
+void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Found& found) {
+  const CellView& view = *look.view;
+  const auto object = static_cast<std::size_t>(patch.object);
+  const Pose& sonar_in_object = look.sonar_in_object[object];
+  const Rotation& turn = look.rotations[object];
   const Cube cube = cube_of(node.address);
   const Vec3d centre = lattice::from_permuted(cube.u, cube.v, cube.w, patch.axis);
   const double radius = cube.half * 1.7320508075688772 * 1.0001;
@@ -204,12 +208,12 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const CellView& view, 
     if (!span) return;
     seen = *span;
   } else {
-    if (std::abs(p.z) * fan_cosine_ - p.x * fan_sine_ > radius) return;
+    if (std::abs(p.z) * look.fan_cosine - p.x * look.fan_sine > radius) return;
     if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
   }
   if (seen.farthest_m < static_cast<double>(view.min_range_m)) return;
 
-  node.last_visited = now_;
+  node.last_visited.store(look.number, std::memory_order_relaxed);
   bool finer = node.address.level < view.levels.front().level;
   for (const CellLevel& level : view.levels) {
     const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
@@ -222,7 +226,10 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const CellView& view, 
     }
   }
   if (!finer) return;
-  if (!node.divided) found.new_bytes += patch.divide(node);
+  if (!node.divided.load(std::memory_order_acquire)) {
+    const std::lock_guard lock(dividing_[reinterpret_cast<std::uintptr_t>(&node) / sizeof(Node) % dividing_.size()]);
+    if (!node.divided.load(std::memory_order_relaxed)) found.new_bytes += patch.divide(node);
+  }
   for (const auto& child : node.children) {  // they lie anywhere in memory: ask for all before the first
     if (!child) continue;
     const auto* at = reinterpret_cast<const char*>(child.get());
@@ -230,47 +237,32 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const CellView& view, 
     __builtin_prefetch(at + 64);
   }
   for (auto& child : node.children)
-    if (child) visit(patch, *child, view, sonar_in_object, turn, found);
+    if (child) visit(patch, *child, look, found);
 }
 
-/// Stretches of roots side by side; what each finds stays apart, so that the order does not depend on who looked.
-void SurfaceCells::look(const CellView& view, Parallel& pool) {
-  constexpr std::size_t stretch = 16;
-  const std::size_t objects = scene_->objects.size();
-  rotations_.resize(objects);
-  sonar_in_object_.resize(objects);
-  for (std::size_t o = 0; o < objects; ++o) {
-    sonar_in_object_[o] = compose(inverse(scene_->in_world(scene_->objects[o], view.bodies_in_world)), view.sonar_in_world);
-    rotations_[o] = rotation_from(conjugate(sonar_in_object_[o].orientation));
-  }
-  found_.resize((roots_.size() + stretch - 1) / stretch);
-  pool.for_each(found_.size(), [&](std::size_t s, int) {
-    Found& found = found_[s];
-    found.in_view.clear();
-    found.wanted.clear();
-    found.new_bytes = 0;
-    for (std::size_t r = s * stretch; r < std::min(roots_.size(), (s + 1) * stretch); ++r) {
-      SurfacePatch& patch = *roots_[r].patch;
-      const auto object = static_cast<std::size_t>(patch.object);
-      visit(patch, *roots_[r].node, view, sonar_in_object_[object], rotations_[object], found);
-    }
-  });
-}
-
-const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
+void SurfaceCells::prepare(const CellView& view, Look& look) {
   assert(!view.levels.empty());
-  ++now_;
-  fan_cosine_ = std::cos(static_cast<double>(view.max_elevation_rad));
-  fan_sine_ = std::sin(static_cast<double>(view.max_elevation_rad));
-  look(view, pool);
-  in_view_.clear();
-  std::vector<Node*> missing;
-  for (const Found& found : found_) {
-    cached_bytes_ += found.new_bytes;
-    in_view_.insert(in_view_.end(), found.in_view.begin(), found.in_view.end());
-    for (Node* node : found.wanted)
-      if (!node->built) missing.push_back(node);
+  const std::size_t objects = scene_->objects.size();
+  look.view = &view;
+  look.number = ++now_;
+  look.fan_cosine = std::cos(static_cast<double>(view.max_elevation_rad));
+  look.fan_sine = std::sin(static_cast<double>(view.max_elevation_rad));
+  look.rotations.resize(objects);
+  look.sonar_in_object.resize(objects);
+  for (std::size_t o = 0; o < objects; ++o) {
+    look.sonar_in_object[o] = compose(inverse(scene_->in_world(scene_->objects[o], view.bodies_in_world)), view.sonar_in_world);
+    look.rotations[o] = rotation_from(conjugate(look.sonar_in_object[o].orientation));
   }
+}
+
+void SurfaceCells::look_through(const Look& look, std::size_t from, std::size_t to, Found& found) {
+  found.in_view.clear();
+  found.wanted.clear();
+  found.new_bytes = 0;
+  for (std::size_t r = from; r < to; ++r) visit(*roots_[r].patch, *roots_[r].node, look, found);
+}
+
+void SurfaceCells::build(std::vector<Node*>& missing, Parallel& pool) {
   pool.for_each(missing.size(), [&](std::size_t n, int) {
     Node& node = *missing[n];
     const TileAddress& a = node.address;
@@ -279,12 +271,61 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
                            scene_->materials[material].texture_seed, seed_, textures_[material].get());
     node.built = true;
   });
-  built_ = missing.size();
   for (const Node* node : missing) cached_bytes_ += node->tile.bytes();
+}
+
+const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
+  // Stretches of roots side by side; what each finds stays apart, so that the order does not depend on who looked.
+  constexpr std::size_t stretch = 16;
+  prepare(view, looked_);
+  found_.resize((roots_.size() + stretch - 1) / stretch);
+  pool.for_each(found_.size(), [&](std::size_t s, int) {
+    look_through(looked_, s * stretch, std::min(roots_.size(), (s + 1) * stretch), found_[s]);
+  });
+  in_view_.clear();
+  std::vector<Node*> missing;
+  for (const Found& found : found_) {
+    cached_bytes_ += found.new_bytes;
+    in_view_.insert(in_view_.end(), found.in_view.begin(), found.in_view.end());
+    for (Node* node : found.wanted)
+      if (!node->built) missing.push_back(node);
+  }
+  build(missing, pool);
+  built_ = missing.size();
   keep_within_budget();
 
   std::erase_if(in_view_, [](const TileInView& t) { return t.tile->count == 0; });
   return in_view_;
+}
+
+void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std::span<CellsInView> found) {
+  assert(found.size() == views.size());
+  const std::uint64_t first = now_ + 1;
+  looks_.resize(views.size());
+  found_.resize(views.size());
+  for (std::size_t v = 0; v < views.size(); ++v) prepare(views[v], looks_[v]);
+  pool.for_each(views.size(), [&](std::size_t v, int) { look_through(looks_[v], 0, roots_.size(), found_[v]); });
+  std::vector<Node*> missing;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    cached_bytes_ += found_[v].new_bytes;
+    const std::size_t before = missing.size();
+    for (Node* node : found_[v].wanted)
+      if (!node->built) missing.push_back(node);
+    found[v].built = missing.size() - before;
+  }
+  std::sort(missing.begin(), missing.end());
+  missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
+  build(missing, pool);
+  // Nothing of these views is forgotten.
+  const std::uint64_t kept = kept_since_;
+  kept_since_ = kept > 0 ? std::min(kept, first) : first;
+  keep_within_budget();
+  kept_since_ = kept;
+  pool.for_each(views.size(), [&](std::size_t v, int) {
+    found[v].tiles.assign(found_[v].in_view.begin(), found_[v].in_view.end());
+    std::erase_if(found[v].tiles, [](const TileInView& t) { return t.tile->count == 0; });
+    found[v].sonar_from_object = looks_[v].rotations;
+  });
 }
 
 /// Forgets what was not looked at for longest; it comes back identical when wanted again.

@@ -3,10 +3,12 @@
 // `scatter` asks for the tiles in view of a ping; the cells' speckle does not depend on ray or ping.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -75,6 +77,13 @@ struct TileInView {
   int object = 0;
 };
 
+/// What a view shows. Valid until the next call of in_view() or in_views().
+struct CellsInView {
+  std::vector<TileInView> tiles;
+  std::vector<Rotation> sonar_from_object;  // to the sonar's axes, per object
+  std::size_t built = 0;                    // tiles that were missing, also where another view of the call wanted them too
+};
+
 class TextureField;
 
 class SurfaceCells {
@@ -91,8 +100,11 @@ class SurfaceCells {
   /// Tiles that may lie in the view, missing ones built first, in an order that does not depend on the pool.
   /// Valid until the next call. `view` must outlive the result.
   const std::vector<TileInView>& in_view(const CellView& view, Parallel& pool);
-  /// Rotation from object to sonar axes of the last view, per object.
-  const Rotation& sonar_from_object(int object) const { return rotations_[static_cast<std::size_t>(object)]; }
+  /// The same for several views, one thread a view: what in_view() finds for each of them. `found` has room for each.
+  void in_views(std::span<const CellView> views, Parallel& pool, std::span<CellsInView> found);
+  /// Rotation from object to sonar axes of the last view of in_view(), per object.
+  const Rotation& sonar_from_object(int object) const { return looked_.rotations[static_cast<std::size_t>(object)]; }
+  std::span<const Rotation> sonar_from_objects() const { return looked_.rotations; }
   /// Views so far.
   std::uint64_t views() const { return now_; }
   /// From now on nothing is forgotten of that view and later ones: others may be asked for while its tiles are in use. 0 = of
@@ -114,9 +126,18 @@ class SurfaceCells {
     std::vector<Node*> wanted;  // the nodes of in_view
     std::size_t new_bytes = 0;
   };
-  void look(const CellView& view, Parallel& pool);
-  void visit(SurfacePatch& patch, Node& node, const CellView& view, const Pose& sonar_in_object,
-             const Rotation& sonar_from_object, Found& found) const;
+  struct Look {  // a view as the cubes are compared with it
+    const CellView* view = nullptr;
+    std::uint64_t number = 0;
+    double fan_cosine = 1, fan_sine = 0;  // of its half angle
+    std::vector<Pose> sonar_in_object;    // per object
+    std::vector<Rotation> rotations;
+  };
+  void prepare(const CellView& view, Look& look);
+  /// Through the roots [from, to).
+  void look_through(const Look& look, std::size_t from, std::size_t to, Found& found);
+  void visit(SurfacePatch& patch, Node& node, const Look& look, Found& found);
+  void build(std::vector<Node*>& missing, Parallel& pool);
   void keep_within_budget();
 
   std::shared_ptr<const Scene> scene_;
@@ -125,13 +146,13 @@ class SurfaceCells {
   std::vector<std::unique_ptr<const TextureField>> textures_;  // per material, null = none
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
-  double fan_cosine_ = 1, fan_sine_ = 0;    // of the last view's half angle
   std::vector<std::unique_ptr<SurfacePatch>> patches_;
-  std::vector<Root> roots_;            // of all patches, in order
-  std::vector<Pose> sonar_in_object_;  // of the last view, per object
-  std::vector<Rotation> rotations_;
+  std::vector<Root> roots_;  // of all patches, in order
   std::vector<TileInView> in_view_;
-  std::vector<Found> found_;  // for each stretch of roots
+  Look looked_;                          // of in_view()
+  std::vector<Look> looks_;              // of in_views()
+  std::vector<Found> found_;             // for each stretch of roots, or for each view
+  std::array<std::mutex, 64> dividing_;  // of a cube that several views want divided
 };
 
 }  // namespace sonar

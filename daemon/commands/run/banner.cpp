@@ -105,7 +105,8 @@ double peak_memory_mb() {
 }  // namespace
 
 std::string banner(const App& app, const BannerFacts& facts) {
-  std::string text = "sonard " SONARD_VERSION "  (" + app.engine_description() + ", CUDA: " + cuda_status() + ")\n";
+  const std::string cuda = app.config().engine.device == EngineDevice::cpu ? cuda_presence() : cuda_status();
+  std::string text = "sonard " SONARD_VERSION "  (" + app.engine_description() + ", CUDA: " + cuda + ")\n";
   text += page_line(app);
   text += "config    " + facts.config_line + "\n";
   text += "scene     " + app.scene().name +

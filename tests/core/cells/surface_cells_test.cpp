@@ -229,6 +229,37 @@ TEST(SurfaceCells, SameBytesForAnyPoolAndAfterBeingForgotten) {
   EXPECT_EQ(b.built_last_time(), 0u);
 }
 
+TEST(SurfaceCells, SeveralViewsAtOnceFindWhatEachFindsAlone) {
+  const auto scene = scene_of(terrain(20, 4.0, gentle));
+  Parallel one(1), three(3);
+  std::vector<CellView> views;
+  for (int k = 0; k < 7; ++k) {
+    views.push_back(whole_scene(4 + k % 3, {0.3 * k, 0, 1}));
+    views.back().max_range_m = 2.0f + 0.5f * static_cast<float>(k);
+  }
+  SurfaceCells alone(scene, Seed{5}, 1u << 30);
+  CellView nothing = whole_scene(4, {0, 0, 500});
+  nothing.max_range_m = 1;
+  // With next to no room everything is forgotten when nothing is looked at, and nothing within one call.
+  for (const std::size_t budget : {std::size_t{1} << 30, std::size_t{1} << 12}) {
+    SurfaceCells together(scene, Seed{5}, budget);
+    for (int again = 0; again < 2; ++again) {
+      std::vector<CellsInView> found(views.size());
+      together.in_views(views, three, found);
+      for (std::size_t v = 0; v < views.size(); ++v) {
+        const auto& expected = alone.in_view(views[v], one);
+        ASSERT_FALSE(expected.empty());
+        EXPECT_EQ(bytes_of(found[v].tiles), bytes_of(expected)) << v;
+        ASSERT_EQ(found[v].sonar_from_object.size(), scene->objects.size());
+        for (int i = 0; i < 9; ++i)
+          EXPECT_EQ(found[v].sonar_from_object[0].m[i / 3][i % 3], alone.sonar_from_object(0).m[i / 3][i % 3]);
+        EXPECT_EQ(found[v].built > 0, again == 0 || budget < 1u << 20) << v;
+      }
+      together.in_view(nothing, one);
+    }
+  }
+}
+
 TEST(SurfaceCells, AnObjectAttachedToABodyHasItsCellsWhereItIs) {
   const Pose attached{{1.5, -0.4, 0.3}, quat_from_rpy({0.2, -0.1, 0.7})};  // in the body
   const Pose body_then{{9, 9, -9}, quat_from_rpy({0, 0, 2})}, body_now{{3, 1, 0.5}, quat_from_rpy({0.1, 0.3, -0.4})};

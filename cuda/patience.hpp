@@ -1,0 +1,25 @@
+// Waiting for a device that may never answer: the policy alone, without a device, so that tests hold it.
+#pragma once
+
+namespace sonar::cuda {
+
+// Seconds. A batch takes milliseconds; a service's watchdog ends the program after 30 s (daemon/systemd/sonard.service).
+inline constexpr double longest_wait_s = 20;
+// Until then the question is repeated at once: a sleep would lengthen every ping.
+inline constexpr double busy_wait_s = 0.02;
+
+/// Asks `answer` until it is something else than `not_yet`, and returns that; after longest_wait_s, `hung`. `now` is a clock [s];
+/// `rest` gives the processor away for a moment.
+template <class Code, class Answer, class Now, class Rest>
+Code wait_for(Code not_yet, Code hung, const Answer& answer, const Now& now, const Rest& rest) {
+  Code code = answer();
+  if (code != not_yet) return code;
+  const double begin = now();
+  for (double waited = 0; (code = answer()) == not_yet; waited = now() - begin) {
+    if (waited > longest_wait_s) return hung;
+    if (waited > busy_wait_s) rest();
+  }
+  return code;
+}
+
+}  // namespace sonar::cuda
