@@ -28,7 +28,7 @@ STATES = {  # of the mock -> the page's name of it, what the user reads, the but
     "stepped": ("stepped-waits", "Time stands still at 41.600 s: it moves when 127.0.0.1:40122 has taken ping 12 896", ""),
     "lockstep": ("lockstep-waits", "Time stands still at 41.600 s", "Step 0.1 s"),
     "follow": ("no-pose-yet", "Waiting for the first pose: time follows the poses.", ""),
-    "transmit off": ("fine", "noise only", ""),
+    "transmit off": ("fine", "transmit is off: noise only", ""),
     "no pose": ("fine", "rov stands where it was", ""),
     "slow engine": ("fine", " of 10 Hz: computing takes 138 ms", ""),
     "fault": ("fine", "Thin tether", ""),

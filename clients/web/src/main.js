@@ -33,8 +33,9 @@ const connection = new Connection({
   lost() {
     facts.connection = facts.info ? 'lost' : 'connecting';
   },
-  needsToken() {
+  needsToken(refused) {
     facts.connection = 'token';
+    facts.tokenRefused = refused;
   },
   topics: choose,
   message(topic, value, ns) {

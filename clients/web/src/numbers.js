@@ -1,6 +1,6 @@
 // How numbers are written. What is not known is a dash.
 
-const thin = '\u2009';
+const thin = '\u202f';  // does not break
 const known = (value) => typeof value === 'number' && Number.isFinite(value);
 
 export const dash = '–';

@@ -12,23 +12,24 @@ function lost(facts, connection) {
   if (connection.lostAt === null) return 'Connecting to sonard.';
   const since = Math.round((performance.now() - connection.lostAt) / 1000);
   const next = Math.max(0, Math.ceil((connection.retryAt - performance.now()) / 1000));
-  return `sonard has not answered for ${since} s; trying again in ${next} s.`;
+  return `sonard has not answered for ${since} s; trying again in ${next} s. Does it still run?`;
 }
 
 function stands(facts) {
   const clock = facts.clock;
   if (clock === 'follow' && !facts.status.vehicles.some((v) => v.source))
-    return { kind: 'no-pose-yet', picture: 'none', text: 'Waiting for the first pose: time follows the poses.' };
+    return { kind: 'no-pose-yet', picture: 'none', text: 'Waiting for the first pose: time follows the poses. Start the sender of the poses.' };
   if (facts.realtime || now_s() - facts.movedAt < stands_after_s) return null;
   const at = `Time stands still at ${fixed((facts.now_ns ?? 0) / 1e9, 3)} s`;
-  const text = noted(facts, 'clock') ?? (clock === 'lockstep' ? `${at}: it moves when control asks for a step.` : `${at}: it moves when every driver has taken the last ping.`);
-  const button = clock === 'lockstep' ? { label: 'Step 0.1 s', service: '/sonard/step', request: { dt_s: 0.1 } } : undefined;
+  const driverIsSlow = facts.findings?.some((f) => f.check === 'clock' && f.level === 2);  // a step would wait too
+  const text = noted(facts, 'clock') ?? (clock === 'lockstep' ? `${at}: it moves when a step is requested, here or by sonarctl step.` : `${at}: it moves when every driver has taken the last ping.`);
+  const button = clock === 'lockstep' && !driverIsSlow ? { label: 'Step 0.1 s', service: '/sonard/step', request: { dt_s: 0.1 } } : undefined;
   return { kind: `${clock}-waits`, picture: 'dim', text, button };
 }
 
 /// {kind, picture: 'as is' | 'dim' | 'old' | 'none', text, button?: {label, parameter, value | service, request}}; null = all is well.
 export function situationOf(facts, connection) {
-  if (facts.connection === 'token') return { kind: 'token', picture: 'none', text: 'sonard wants the token of its configuration (control.token_file).' };
+  if (facts.connection === 'token') return { kind: 'token', picture: 'none', text: `${facts.tokenRefused ? 'That token was refused. ' : ''}Enter the token of sonard: the text in the file that control.token_file names.` };
   if (facts.connection !== 'open') return { kind: 'lost', picture: 'old', text: lost(facts, connection) };
   const sonar = facts.sonarStatus;
   if (!sonar) return facts.status ? { kind: 'no-sonar', picture: 'none', text: 'This sonard has no sonar.' } : null;
@@ -59,11 +60,11 @@ export function badgesOf(facts) {
   const out = [];
   const sonar = facts.sonarStatus;
   if (facts.connection !== 'open' || !sonar) return out;
-  if (facts.of('preview')) out.push({ text: 'PREVIEW', level: 'note', title: 'for this page only; it ends when a driver connects' });
-  if (!sonar.transmits) out.push({ text: 'noise only', level: 'warning', title: 'transmit is off' });
+  if (facts.of('preview')) out.push({ text: 'PREVIEW', level: 'note', title: 'for viewers only; it ends when a driver connects' });
+  if (!sonar.transmits) out.push({ text: 'transmit is off: noise only', level: 'warning', title: 'see the settings' });
   const vehicle = facts.vehicle;
   if (vehicle?.stale) {
-    const since = facts.staleSince ? ` for ${fixed(now_s() - facts.staleSince, 1)} s` : '';
+    const since = facts.staleSince ? ` for ${fixed(now_s() - facts.staleSince, 1)} s` : ' since before this page opened';
     out.push({ text: `no pose${since}; ${vehicle.name} stands where it was`, level: 'warning', title: '' });
   }
   const wanted = sonar.rate_hz;

@@ -19,15 +19,17 @@ function item(finding, clear) {
 
 /// `steering.clear(fault)` ends it.
 export function drawDoctor(facts, steering) {
-  const findings = facts.findings;
+  const findings = facts.connection === 'open' ? facts.findings : null;
   setText($('checked'), findings ? `checked ${Math.max(0, Math.round(now_s() - facts.checkedAt))} s ago` : dash);
-  const bad = (findings ?? []).filter((f) => f.level !== 0).sort((a, b) => b.level - a.level);
-  if (!bad.some((f) => f.check === 'fault'))  // always the first line
-    bad.unshift(...activeTroubles(facts).map((f) => ({ level: 2, check: 'fault', text: `A fault acts on ${f.sonar || 'every sonar'}: ${titleOf(f.trouble)}.`, cure: '' })));
+  const noted = (findings ?? []).filter((f) => f.level !== 0).sort((a, b) => b.level - a.level);
+  const faults = facts.connection !== 'open' ? [] : activeTroubles(facts).filter((f) => !f.waiting).map((f) => (
+    { level: 2, check: 'fault', text: `A fault acts on ${f.sonar || 'every sonar'}: ${titleOf(f.trouble)}.`, cure: f.ends_ns ? 'It ends by itself, or' : '' }));
+  const bad = faults.length > 0 ? [...faults, ...noted.filter((f) => f.check !== 'fault')] : noted;  // faults first, named as on their buttons
   const well = (findings ?? []).filter((f) => f.level === 0);
   const active = facts.faults;
   const ofFault = (finding) => (finding.check === 'fault' ? active.find((f) => finding.text.includes(troubleOf(f)) || finding.text.includes(titleOf(troubleOf(f))) || finding.text.includes(f.name) || active.length === 1) : null);
-  showList($('findings'), [bad, active.map((f) => f.name), facts.maySteer, findings === null, facts.judged], () => {
+  showList($('findings'), [bad, active.map((f) => f.name), facts.maySteer, findings === null, facts.judged, facts.connection], () => {
+    if (facts.connection !== 'open') return [make('li', { class: 'dim' }, 'Not known now.')];
     if (bad.length === 0 && !findings) return [make('li', { class: 'dim' }, facts.judged ? 'Not looked at yet.' : 'Run sonarctl doctor: it looks at the daemon and the network.')];
     if (bad.length === 0) return [item({ level: 0, text: 'Nothing is in the way of a driver.', cure: '' })];
     return bad.map((finding) => {

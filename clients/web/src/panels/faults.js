@@ -47,7 +47,7 @@ function card(group) {
 
 export function drawFaults(facts, steering) {
   const armed = facts.armed ?? facts.value('/faults/armed') ?? facts.status?.faults_armed;
-  setText($('armed'), armed === undefined ? '–' : armed ? 'armed' : 'not armed');
+  setText($('armed'), armed === undefined ? '–' : !armed ? 'not armed' : facts.maySteer ? 'armed' : 'look only');
   const groups = activeTroubles(facts);
   const list = $('active-faults');
   showList(list, groups.map((g) => [g.trouble, g.sonar, g.by]), () => groups.map(card));

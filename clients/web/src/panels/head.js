@@ -4,7 +4,7 @@ import { dash, fixed, frequency } from '../numbers.js';
 
 function rateOf(facts) {
   const sonar = facts.sonarStatus;
-  if (facts.connection !== 'open' || !sonar) return { word: facts.connection === 'lost' ? 'lost' : 'connecting', dot: 'error', rate: dash };
+  if (facts.connection !== 'open' || !sonar) return { word: { lost: 'lost', token: 'token wanted' }[facts.connection] ?? 'connecting', dot: 'error', rate: dash };
   if (sonar.clients.length === 0 && !facts.of('preview')) return { word: 'no driver', dot: 'warning', rate: '' };
   if (sonar.rate_hz === 0) return { word: 'standby', dot: 'warning', rate: '0 Hz' };
   if (!sonar.pinging && !facts.of('preview')) return { word: 'silent', dot: 'warning', rate: dash };
@@ -24,6 +24,7 @@ export function drawHead(facts) {
   setHidden(select, sonars.length === 0);
   const { word, dot, rate } = rateOf(facts);
   setText($('rate-word'), word);
+  setClass($('rate-word'), rate === '' || rate === dash ? '' : 'wide');  // narrow screens show one of the two
   setClass($('rate-dot'), `dot ${dot}`);
   setText($('rate'), rate);
   const sonar = facts.sonarStatus;
