@@ -143,7 +143,7 @@ class SonarJudge {
     const std::string& observer = sonar_.asking_observer();
     if (!observer.empty())
       add(Level::fail, "driver",
-          observer + " sends requests to the port of observers of " + sonar_.name() + ", who receive only: they are ignored",
+          observer + " sends requests to the port of observers of " + sonar_.name() + ", which receive only: they are ignored",
           "point it at " + where_to_connect(sonar_), observer);
   }
 

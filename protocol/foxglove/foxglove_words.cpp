@@ -11,7 +11,8 @@
 namespace sonar::foxglove {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::ordered_json;  // what is written; looks through all keys for each
+using Read = nlohmann::json;          // of viewers, who may send thousands
 constexpr int deepest = 16;
 
 /// Invalid UTF-8 in names is replaced, not refused.
@@ -44,36 +45,36 @@ Json json_of(const Parameter& parameter) {
 
 tl::unexpected<Error> refused(const std::string& why) { return failure(ErrorKind::bad_data, why); }
 
-bool is_u32(const Json& json) {
+bool is_u32(const Read& json) {
   return json.is_number_unsigned() && json.get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max();
 }
 
 /// The members of a list, each as `take` reads it; nothing = one is of a wrong type.
 template <class T, class Take>
-std::optional<std::vector<T>> list(const Json& word, const char* key, Take take) {
+std::optional<std::vector<T>> list(const Read& word, const char* key, Take take) {
   const auto found = word.find(key);
   if (found == word.end() || !found->is_array()) return std::nullopt;
   std::vector<T> all;
-  for (const Json& item : *found) {
+  for (const Read& item : *found) {
     std::optional<T> one = take(item);
     if (!one) return std::nullopt;
     all.push_back(*std::move(one));
   }
   return all;
 }
-std::optional<std::string> text(const Json& json) {
+std::optional<std::string> text(const Read& json) {
   return json.is_string() ? std::optional(json.get<std::string>()) : std::nullopt;
 }
-std::optional<std::uint32_t> number(const Json& json) {
+std::optional<std::uint32_t> number(const Read& json) {
   return is_u32(json) ? std::optional(json.get<std::uint32_t>()) : std::nullopt;
 }
-std::optional<std::pair<std::uint32_t, std::uint32_t>> subscription(const Json& json) {
+std::optional<std::pair<std::uint32_t, std::uint32_t>> subscription(const Read& json) {
   if (!json.is_object() || !json.contains("id") || !json.contains("channelId")) return std::nullopt;
   const auto id = number(json["id"]), channel = number(json["channelId"]);
   if (!id || !channel) return std::nullopt;
   return std::pair(*id, *channel);
 }
-Value value(const Json& json, bool is_float) {
+Value value(const Read& json, bool is_float) {
   if (json.is_boolean()) return json.get<bool>();
   if (json.is_number_float() || (json.is_number() && is_float)) return json.get<double>();
   if (json.is_number_integer() && (!json.is_number_unsigned() || json.get<std::uint64_t>() >> 63 == 0))
@@ -81,19 +82,19 @@ Value value(const Json& json, bool is_float) {
   if (json.is_string()) return json.get<std::string>();
   return OtherValue{};
 }
-std::optional<Parameter> parameter(const Json& json) {
+std::optional<Parameter> parameter(const Read& json) {
   if (!json.is_object() || !json.contains("name") || !json["name"].is_string()) return std::nullopt;
   const bool is_float = json.contains("type") && json["type"] == "float64";
   return Parameter{json["name"].get<std::string>(), json.contains("value") ? value(json["value"], is_float) : Value{}};
 }
 
-std::string stray_field(const Json& object, std::span<const std::string_view> known) {
+std::string stray_field(const Read& object, std::span<const std::string_view> known) {
   for (const auto& [key, value] : object.items())
     if (std::find(known.begin(), known.end(), key) == known.end()) return key.substr(0, 64);
   return {};
 }
 /// Of the messages that are read here, and of the objects in their lists.
-std::string stray_field(const Json& word) {
+std::string stray_field(const Read& word) {
   constexpr std::array<std::string_view, 6> fields{"op",        "id", "subscriptions", "subscriptionIds", "parameterNames",
                                                    "parameters"};
   constexpr std::array<std::string_view, 2> of_subscriptions{"id", "channelId"};
@@ -101,7 +102,7 @@ std::string stray_field(const Json& word) {
   std::string stray = stray_field(word, fields);
   const auto look_into = [&](const char* list, std::span<const std::string_view> known) {
     if (const auto found = word.find(list); found != word.end() && found->is_array())
-      for (const Json& item : *found)
+      for (const Read& item : *found)
         if (stray.empty() && item.is_object()) stray = stray_field(item, known);
   };
   look_into("subscriptions", of_subscriptions);
@@ -110,7 +111,7 @@ std::string stray_field(const Json& word) {
 }
 
 template <class Word>
-Result<ViewerWord> parameters_word(const Json& word, std::optional<std::vector<std::string>> names) {
+Result<ViewerWord> parameters_word(const Read& word, std::optional<std::vector<std::string>> names) {
   if (!names) return refused("parameterNames must be a list of names");
   if (names->size() > most_parameters) return refused("more than 64 parameters in one request");
   if constexpr (std::is_same_v<Word, GetParameters>) {
@@ -122,7 +123,7 @@ Result<ViewerWord> parameters_word(const Json& word, std::optional<std::vector<s
   }
 }
 
-Result<ViewerWord> set_parameters(const Json& word) {
+Result<ViewerWord> set_parameters(const Read& word) {
   auto parameters = list<Parameter>(word, "parameters", parameter);
   const auto id = word.find("id");
   if (!parameters) return refused("parameters must be a list of objects with a name and a value");
@@ -199,7 +200,7 @@ std::string service_failure(std::uint32_t service, std::uint32_t call, const std
 
 Result<ViewerWord> word_of_viewer(std::string_view message, std::string* stray) {
   if (control::nests_deeper(message, deepest)) return refused("JSON nested deeper than 16");
-  const Json word = Json::parse(message, nullptr, false);
+  const Read word = Read::parse(message, nullptr, false);
   if (!word.is_object()) return refused("not a JSON object");
   const auto op = word.find("op");
   if (op == word.end() || !op->is_string()) return refused("a message needs a string \"op\"");

@@ -58,6 +58,12 @@ const steering = {
   set: (name, value) => connection.set(name, value, facts.parameters.get(name)?.type),
   start: (name, seconds) => connection.set(name, Number(seconds), 'float64'),
   clear(fault) {
+    if (!fault.name.startsWith('view.')) {  // another's: ended by its name
+      for (const one of facts.faults)
+        if (one.do === fault.do && one.sonar === fault.sonar && (fault.do || one.name === fault.name))
+          connection.call('/sonard/end_faults', { name: one.name }).catch((error) => facts.problems.set('call', { id: 'call', level: 2, message: error.message }));
+      return;
+    }
     const trouble = (fault.do || fault.name).replace(/-/g, '_');
     const name = [`/faults/${fault.sonar}/${trouble}`, `/faults/${trouble}`].find((n) => facts.parameters.has(n));
     if (name) connection.set(name, 0, 'float64');
@@ -78,6 +84,7 @@ function choose() {
   const own = (name) => `/${facts.sonar}/${name}`;
   if (!document.hidden) topics.push(own('geometry'), own('ping'), own(fan.flat ? 'fan' : 'image'), '/tf', '/scene', '/swath');
   facts.judged = connection.byTopic.has('/doctor');
+  if (!document.hidden && !connection.topics.has('/scene')) scene.removeObjects();  // those that went meanwhile are not named
   connection.want(topics);
 }
 

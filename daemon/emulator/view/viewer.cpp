@@ -11,6 +11,7 @@ using std::chrono::seconds;
 
 constexpr double messages_per_s = 100, burst = 200;
 constexpr int most_complaints = 10;
+constexpr std::size_t most_passing = 64, longest_name_said = 256;
 constexpr milliseconds between_times{33};
 constexpr seconds slow_is_said_for{5}, refusal_is_said_for{10};
 // Viewers look for exactly these words to give a hint.
@@ -103,7 +104,9 @@ void Viewer::on_word(const foxglove::SetParameters& word, Moment now) {
   for (const foxglove::Parameter& wanted : word.parameters) {
     names.push_back(wanted.name);
     const std::string why = rights_.may_steer ? host_.set_parameter(*this, wanted) : may_only_look;
-    if (!why.empty()) say_for_now(wanted.name + ": " + why, "param:" + wanted.name, now, refusal_is_said_for);
+    const std::string name = wanted.name.substr(0, longest_name_said);
+    if (!why.empty()) say_for_now(name + ": " + why, "param:" + name, now, refusal_is_said_for);
+    if (!rights_.may_steer) break;  // once is enough
   }
   if (!names.empty()) say(foxglove::parameter_values(host_.parameters(*this, names), word.request));
 }
@@ -146,6 +149,7 @@ void Viewer::add_word(ViewMessage word) {
 }
 
 void Viewer::say_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts) {
+  if (passing_.size() >= most_passing && !passing_.contains(id)) return say_status(foxglove::StatusLevel::error, text);
   say_status(foxglove::StatusLevel::error, text, id);
   passing_[id] = now + lasts;
 }

@@ -104,7 +104,7 @@ asio::awaitable<void> ViewConnection::read() {
   while (!over_ && viewer_.close_code() == Viewer::CloseCode::none) {
     error_code ec;
     co_await socket_->stream.async_read(buffer, into(ec));
-    if (ec) break;
+    if (ec || over_) break;
     from_.active_at = Steady::now();
     const auto* const bytes = static_cast<const std::byte*>(buffer.data().data());
     const wire::BytesView message(bytes, buffer.size());

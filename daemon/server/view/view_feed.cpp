@@ -158,7 +158,7 @@ ViewPayloadPointer ViewFeed::current(const Viewer& viewer, std::uint32_t channel
   }
   for (const SonarView& sonar : sonars_) {
     if (!sonar.last) continue;
-    if (channel == sonar.image) return image_payload(sonar.name, sonar.last);
+    if (channel == sonar.image) return sonar.picture ? sonar.picture : image_payload(sonar.name, sonar.last);
     if (channel == sonar.geometry) return geometry_payload(*sonar.last);
     for (const Slow* slow : {&sonar.fan, &sonar.cloud})
       if (channel == slow->channel)
@@ -297,9 +297,11 @@ void ViewFeed::tick() {
     of_.fleet.tap_pings({});
     for (SonarView& sonar : sonars_) {  // the next viewer gets geometry and swath anew
       sonar.last.reset();
+      sonar.picture.reset();
       sonar.shape.clear();
       sonar.volume.clear();
       sonar.painter.reset();
+      for (Slow* slow : {&sonar.fan, &sonar.cloud}) slow->made.clear(), slow->of = Time::min();
     }
     shapes_.clear();
     return;
@@ -318,7 +320,14 @@ void ViewFeed::tick() {
     offer_scene(shapes_.update(of_.changes.scene(), of_.world, now, job));
     if (!job.objects.empty())
       asio::post(thread_, [this, job = std::move(job)] {
-        auto made = std::make_shared<std::vector<SceneShapes::Made>>(SceneShapes::make(job));
+        auto made = std::make_shared<std::vector<SceneShapes::Made>>();
+        try {
+          *made = SceneShapes::make(job);
+        } catch (const std::exception& e) {
+          asio::post(of_.io, [this, why = std::string(e.what())] {
+            log_limited(of_.log, failures_, LogLevel::error, "viewers get no scene: " + why);
+          });
+        }
         asio::post(of_.io, [this, made] { offer_scene(shapes_.take(std::move(*made))); });
       });
   }

@@ -81,6 +81,7 @@ class ViewFeed final : public ViewerHost {
     std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0;
     Slow fan{}, cloud{};
     std::shared_ptr<const Ping> last = nullptr;
+    ViewPayloadPointer picture = nullptr;           // of last, once it was wanted
     wire::Bytes shape = {};                         // of last, without its number
     std::string volume = {};                        // what the swath depends on
     std::shared_ptr<FanPainter> painter = nullptr;  // for the view thread alone
@@ -151,6 +152,7 @@ class ViewFeed final : public ViewerHost {
   Steady::time_point status_at_{}, ping_at_{};
   std::string session_;
   std::uint64_t sessions_ = 0;
+  LogLimiter failures_;
   asio::thread_pool thread_{1};
 };
 

@@ -22,7 +22,8 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
       sonar->shape = std::move(shape);
       offer(sonar->geometry, geometry_payload(ping));
     }
-  if (wanted(sonar->image)) offer(sonar->image, image_payload(sonar->name, queued.ping));
+  sonar->picture = wanted(sonar->image) ? image_payload(sonar->name, queued.ping) : nullptr;
+  offer(sonar->image, sonar->picture);
   if (wanted(sonar->ping)) offer(sonar->ping, ping_payload(of, queued));
   if (wanted(sonar->figures)) offer(sonar->figures, figures_payload(of, queued));
   if (wanted(tf_)) offer(tf_, places());

@@ -48,7 +48,7 @@ void ViewFeed::watch_playback(const Viewer* but) {
 }
 
 bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) {
-  const auto watch = watches_.find(viewer.playback());
+  auto watch = watches_.find(viewer.playback());
   if (watch == watches_.end()) return false;
   std::string why = viewer.may_steer() ? "" : Viewer::may_only_look;
   if (why.empty()) {
@@ -62,6 +62,8 @@ bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& a
   }
   if (!why.empty()) viewer.say_status(foxglove::StatusLevel::error, why);
   watch_playback(&viewer);
+  watch = watches_.find(viewer.playback());  // one that no viewer looks at is gone
+  if (watch == watches_.end()) return false;
   foxglove::PlaybackState state = watch->second.state(of_.clock.now());
   state.did_seek = asked.seeks && why.empty();
   state.request = asked.request;

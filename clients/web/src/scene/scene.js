@@ -45,10 +45,15 @@ export class Scene {
     for (const button of document.querySelectorAll('.camera')) button.setAttribute('aria-pressed', String(button.dataset.camera === mode));
   }
 
+  removeObjects() {
+    if (this.missing) return;
+    for (const id of [...this.objects.keys()]) this.remove(id);
+  }
+
   /// A new session: nothing of the old scene holds.
   forget() {
     if (this.missing) return;
-    for (const id of [...this.objects.keys()]) this.remove(id);
+    this.removeObjects();
     this.lines?.parent?.remove(this.lines);
     this.lines = null;
     this.trail.clear();

@@ -187,6 +187,28 @@ TEST_F(OneViewer, WhoMayOnlyLookSteersNothing) {
   EXPECT_THAT(text_of(*looker.next(now)), testing::HasSubstr("serviceCallFailure"));
 }
 
+TEST_F(OneViewer, RefusalsOfALookerStayFew) {
+  Viewer looker(host, {false, 0}, "127.0.0.1");
+  const std::string long_name(1000, 'x');
+  for (int i = 0; i < 100; ++i) {
+    looker.on_text(R"({"op": "setParameters", "parameters": [{"name": ")" + std::to_string(i) + long_name +
+                       R"(", "value": 5}, {"name": "/b", "value": 5}]})",
+                   now);
+    const std::string refusal = text_of(*looker.next(now));
+    EXPECT_LT(refusal.size(), 700u);
+    EXPECT_EQ(refusal.find("\"id\"") != std::string::npos, i < 64) << "beyond, it does not go by itself";
+    EXPECT_THAT(text_of(*looker.next(now)), testing::HasSubstr("parameterValues"));
+  }
+}
+
+TEST_F(OneViewer, ThousandsOfKeysAreReadQuickly) {
+  std::string word = R"({"op": "unknown")";
+  for (int i = 0; word.size() < 64000; ++i) word += ", \"" + std::to_string(i) + "\":0";
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < 100; ++i) viewer.on_text(word + "}", now);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5)) << "5 ms each is typical of keys in order";
+}
+
 TEST_F(OneViewer, CallsServicesFourAtATime) {
   for (std::uint32_t call = 1; call <= 5; ++call)
     viewer.on_binary(foxglove::encode(foxglove::ServiceCall{1, call, "json", "{}"}), now);
