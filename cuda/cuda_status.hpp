@@ -9,8 +9,7 @@ namespace sonar {
 /// "not installed" (there is no CUDA module), "no device", "no device (<the driver's reason>)", what is wrong with the module, or
 /// "NVIDIA H200, 139.8 GiB, compute 9.0". Queried every time: a device can disappear.
 std::string cuda_status();
-/// "not installed" or "not used": without loading the module, for to ask a driver takes seconds where it sleeps, and wakes the
-/// device.
+/// "not installed" or "not used", without loading the module: a driver that sleeps takes seconds to answer, and wakes its device.
 std::string cuda_presence();
 
 }  // namespace sonar
