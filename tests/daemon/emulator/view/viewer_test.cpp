@@ -201,12 +201,19 @@ TEST_F(OneViewer, RefusalsOfALookerStayFew) {
   }
 }
 
-TEST_F(OneViewer, ThousandsOfKeysAreReadQuickly) {
-  std::string word = R"({"op": "unknown")";
-  for (int i = 0; word.size() < 64000; ++i) word += ", \"" + std::to_string(i) + "\":0";
-  const auto start = std::chrono::steady_clock::now();
-  for (int i = 0; i < 100; ++i) viewer.on_text(word + "}", now);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5)) << "5 ms each is typical of keys in order";
+TEST_F(OneViewer, ReadsThousandsOfKeysInProportionToTheirNumber) {
+  const auto shortest_s = [this](int keys) {
+    std::string word = R"({"op": "unknown")";
+    for (int i = 0; i < keys; ++i) word += ", \"" + std::to_string(100000 + i) + "\":0";
+    double shortest = 1e9;
+    for (int i = 0; i < 7; ++i) {
+      const auto start = std::chrono::steady_clock::now();
+      viewer.on_text(word + "}", now);
+      shortest = std::min(shortest, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    }
+    return shortest;
+  };
+  EXPECT_LT(shortest_s(4800), 10 * shortest_s(1200)) << "16 times where each key is sought among all";
 }
 
 TEST_F(OneViewer, CallsServicesFourAtATime) {
