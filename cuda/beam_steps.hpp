@@ -16,7 +16,7 @@ struct alignas(8) Pair {
 struct alignas(16) Four {
   float of[4];
 };
-/// What lies at `from`, which is as aligned as a Vector must be.
+/// Reads a Vector at `from`, which must be aligned to alignof(Vector).
 template <class Vector>
 SONAR_HD inline Vector load_aligned(const float* from) {
 #if defined(__CUDA_ARCH__)

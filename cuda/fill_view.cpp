@@ -111,7 +111,7 @@ void PingPreparer::add_receiver(Making& m) {
   view.beam_signals = m.room.work.allocate<float>(2 * m.samples() * m.beams()).device;
 }
 
-/// Room for what comes back.
+/// Reserves the memory of the results that are downloaded.
 void PingPreparer::allocate_results(Making& m) {
   Ping& ping = m.ping.ping;
   ping.request = m.request();

@@ -51,6 +51,7 @@ class Fleet final : public DeviceParent {
   const std::list<Device>& devices() const { return devices_; }
   std::list<Device>& devices() { return devices_; }
   Device* find(const std::string& name);
+  const Device* find(const std::string& name) const { return const_cast<Fleet*>(this)->find(name); }
   /// `tap` gets each ping when it is queued to clients, as recordings do; empty = none.
   using PingTap = std::function<void(const Device& of, const PingQueued& ping)>;
   void tap_pings(PingTap tap) { tap_ = std::move(tap); }

@@ -103,9 +103,8 @@ std::vector<ViewPayload::Piece> SceneShapes::update(const std::shared_ptr<const 
       left.erase(before);
     }
     const bool was_visible = std::exchange(shown.visible, visible);
-    Object compared = shown.object;
-    compared.visible = object.visible;
-    if (shown.bytes == nullptr || !(compared == object)) job.objects.push_back(i);
+    shown.object.visible = object.visible;  // no reason to make its mesh again
+    if (shown.bytes == nullptr || !(shown.object == object)) job.objects.push_back(i);
     if (shown.bytes != nullptr && visible != was_visible)
       pieces.push_back({object.name, visible ? shown.bytes : shared(foxglove::scene_deletion(now, object.name))});
   }

@@ -92,10 +92,8 @@ void ViewFeed::say_time(Viewer& viewer) const {
 }
 
 bool ViewFeed::is_full() const {
-  const auto open = std::count_if(connections_.begin(), connections_.end(), [](const std::weak_ptr<ViewConnection>& weak) {
-    const auto connection = weak.lock();
-    return connection && !connection->over();
-  });
+  int open = 0;
+  each([&open](const ViewConnection&) { ++open; });
   return open >= of_.config.limits.viewers;
 }
 
@@ -214,8 +212,7 @@ ViewFeed::SonarView* ViewFeed::find(const std::string& name) {
 void ViewFeed::sync_sonars() {
   const auto& devices = of_.fleet.devices();
   for (auto sonar = sonars_.begin(); sonar != sonars_.end();) {
-    const bool is_there =
-        std::any_of(devices.begin(), devices.end(), [&](const Device& d) { return d.config().name == sonar->name; });
+    const bool is_there = of_.fleet.find(sonar->name) != nullptr;
     if (!is_there) remove(*sonar);
     sonar = is_there ? std::next(sonar) : sonars_.erase(sonar);
   }

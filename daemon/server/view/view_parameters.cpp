@@ -15,7 +15,8 @@ namespace {
 using foxglove::Parameter;
 using foxglove::Value;
 
-tl::unexpected<Error> unsettable(const std::string& why) { return failure(ErrorKind::usage, why); }
+tl::unexpected<Error> refused(const std::string& why) { return failure(ErrorKind::usage, why); }
+tl::unexpected<Error> no_such_parameter() { return refused("there is no such parameter"); }
 
 std::string fault_name(std::string_view trouble, const std::string& sonar) {
   return "view." + sonar + "." + std::string(trouble);
@@ -79,9 +80,9 @@ std::optional<bool> flag_of(const Value& value) {
 template <class Op, class T>
 Result<control::Operation> with(Op operation, std::optional<T> Op::*member, const std::optional<T>& value) {
   if (!value)
-    return unsettable("takes " + std::string(std::is_same_v<T, bool>     ? "true or false"
-                                             : std::is_same_v<T, double> ? "a number"
-                                                                         : "a whole number"));
+    return refused("takes " + std::string(std::is_same_v<T, bool>     ? "true or false"
+                                          : std::is_same_v<T, double> ? "a number"
+                                                                      : "a whole number"));
   operation.*member = value;
   return control::Operation(std::move(operation));
 }
@@ -96,7 +97,7 @@ Result<control::Operation> set_sonar(const std::string& sonar, std::string_view 
   if (key == "mode") return with(op, &Op::mode, count_of(value));
   if (key == "beams") return with(op, &Op::beams, count_of(value));
   if (key == "transmit") return with(op, &Op::transmit, flag_of(value));
-  return unsettable("there is no such parameter");
+  return no_such_parameter();
 }
 
 Result<control::Operation> set_water(std::string_view key, const Value& value) {
@@ -105,7 +106,7 @@ Result<control::Operation> set_water(std::string_view key, const Value& value) {
   if (key == "salinity_psu") return with(Op{}, &Op::salinity_psu, number_of(value));
   if (key == "ph") return with(Op{}, &Op::ph, number_of(value));
   if (key == "sound_speed_mps") return with(Op{}, &Op::sound_speed_mps, number_of(value));
-  return unsettable("there is no such parameter");
+  return no_such_parameter();
 }
 
 Result<control::Operation> set_trajectory(control::PoseSample::Of of, const std::string& name, std::string_view key,
@@ -117,14 +118,14 @@ Result<control::Operation> set_trajectory(control::PoseSample::Of of, const std:
   if (key == "paused") return with(op, &Op::paused, flag_of(value));
   if (key == "position_s") return with(op, &Op::position_s, number_of(value));
   if (key == "speed") return with(op, &Op::speed, number_of(value));
-  return unsettable("there is no such parameter");
+  return no_such_parameter();
 }
 
 Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSource& of) {
-  if (wanted.name == "/faults/armed") return unsettable("cannot be set: start sonard with --faults");
-  if (!of.config.faults.armed) return unsettable("start sonard with --faults");
+  if (wanted.name == "/faults/armed") return refused("cannot be set: start sonard with --faults");
+  if (!of.config.faults.armed) return refused("start sonard with --faults");
   if (wanted.name == "/faults/clear_all") {
-    if (!flag_of(wanted.value)) return unsettable("takes true or false");
+    if (!flag_of(wanted.value)) return refused("takes true or false");
     return *flag_of(wanted.value) ? control::Operation(control::EndFaults{}) : control::Operation(control::GetFaults{});
   }
   for (const Device& device : of.fleet.devices()) {
@@ -134,7 +135,7 @@ Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSou
       const auto lasts = number_of(wanted.value);
       const auto longest = static_cast<double>(longest_manual_fault.count());
       if (!lasts || *lasts < 0 || *lasts > longest)
-        return unsettable("takes seconds from 0 to " + std::to_string(longest_manual_fault.count()));
+        return refused("takes seconds from 0 to " + std::to_string(longest_manual_fault.count()));
       const std::string name = fault_name(trouble.name, sonar);
       if (*lasts == 0 && seconds_left(device, name, of.clock.now()) == 0) return control::Operation(control::GetFaults{});
       if (*lasts == 0) return control::Operation(control::EndFaults{name});
@@ -146,7 +147,7 @@ Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSou
       return control::Operation(control::AddFault{std::move(record)});
     }
   }
-  return unsettable("there is no such parameter");
+  return no_such_parameter();
 }
 
 }  // namespace
@@ -181,25 +182,23 @@ std::vector<Parameter> parameters_of(const ParameterSource& of) {
 }
 
 Result<control::Operation> operation_of(const Parameter& wanted, const ParameterSource& of) {
-  if (std::holds_alternative<std::monostate>(wanted.value)) return unsettable("a parameter cannot be unset");
+  if (std::holds_alternative<std::monostate>(wanted.value)) return refused("a parameter cannot be unset");
   std::string_view rest = wanted.name;
-  if (!rest.starts_with("/")) return unsettable("there is no such parameter");
+  if (!rest.starts_with("/")) return no_such_parameter();
   rest.remove_prefix(1);
   const std::size_t slash = std::min(rest.find('/'), rest.size());
   const std::string first(rest.substr(0, slash));
   rest.remove_prefix(std::min(slash + 1, rest.size()));
   if (first == "faults") return set_fault(wanted, of);
-  if (first == "clock") return unsettable("cannot be set");
+  if (first == "clock") return refused("cannot be set");
   if (first == "water") return set_water(rest, wanted.value);
   if (constexpr std::string_view trajectory = "trajectory/"; rest.starts_with(trajectory)) {
     const bool is_vehicle = std::any_of(of.config.vehicles.begin(), of.config.vehicles.end(),
                                         [&](const VehicleConfig& v) { return v.name == first; });
-    if (!is_vehicle) return unsettable("there is no such parameter");
+    if (!is_vehicle) return no_such_parameter();
     return set_trajectory(control::PoseSample::Of::vehicle, first, rest.substr(trajectory.size()), wanted.value);
   }
-  const bool is_sonar = std::any_of(of.fleet.devices().begin(), of.fleet.devices().end(),
-                                    [&](const Device& d) { return d.config().name == first; });
-  return is_sonar ? set_sonar(first, rest, wanted.value) : Result<control::Operation>(unsettable("there is no such parameter"));
+  return of.fleet.find(first) != nullptr ? set_sonar(first, rest, wanted.value) : Result<control::Operation>(no_such_parameter());
 }
 
 }  // namespace sonar
