@@ -72,6 +72,52 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
     }
   }
 }
+#elif defined(__AVX2__)
+/// The same for vectors of four samples, of which a pulse reaches into three. There is no quick way to shift a vector by a number
+/// of lanes: the taps, twice each, wait between zeros in memory and are loaded from where they fall. So many echoes at a time
+/// that their stores are done by then.
+template <>
+void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
+                        int first_column, int lead) {
+  constexpr int at_once = 32, margin = 8;
+  alignas(32) float taps_twice[at_once][margin + 16 + margin] = {};
+  alignas(32) float amplitude[at_once][2];
+  alignas(32) std::int32_t sample_at[at_once];
+  const float steps = static_cast<float>(pulse.steps);
+  for (int from = 0; from < count; from += at_once) {
+    const int n = count - from < at_once ? count - from : at_once;
+    for (int i = 0; i < n; i += lanes) {  // what lies behind the last may be any number
+      alignas(32) float part[lanes];
+      alignas(32) std::int32_t row_at[lanes];
+      const Lanes sample = load(e.sample + from + i), whole = Lanes(_mm256_floor_ps(native(sample)));
+      const Lanes position = (sample - whole) * steps;
+      const LaneNumbers step = whole_part(position);
+      store(part, position - as_floats(step));
+      *reinterpret_cast<LaneNumbers*>(row_at) = step * 16;
+      *reinterpret_cast<LaneNumbers*>(sample_at + i) = whole_part(whole) - (3 - lead);
+      const __m256 re = native(load(e.re + from + i)), im = native(load(e.im + from + i));
+      const __m256 low = _mm256_unpacklo_ps(re, im), high = _mm256_unpackhi_ps(re, im);
+      _mm256_store_ps(amplitude[i], _mm256_permute2f128_ps(low, high, 0x20));
+      _mm256_store_ps(amplitude[i + 4], _mm256_permute2f128_ps(low, high, 0x31));
+      for (int l = 0; l < lanes && i + l < n; ++l) {
+        const float* row = pulse.rows + row_at[l];
+        const __m256 taps = _mm256_fmadd_ps(_mm256_set1_ps(part[l]), _mm256_loadu_ps(row + 8), _mm256_loadu_ps(row));
+        const __m256 even = _mm256_unpacklo_ps(taps, taps), odd = _mm256_unpackhi_ps(taps, taps);
+        _mm256_store_ps(taps_twice[i + l] + margin, _mm256_permute2f128_ps(even, odd, 0x20));
+        _mm256_store_ps(taps_twice[i + l] + margin + 8, _mm256_permute2f128_ps(even, odd, 0x31));
+      }
+    }
+    const std::int32_t* column = e.column + from;
+    for (int i = 0; i < n; ++i) {
+      const int begin = sample_at[i] & 3;
+      const float* taps = taps_twice[i] + margin - 2 * begin;
+      const __m256 a = _mm256_castpd_ps(_mm256_broadcast_sd(reinterpret_cast<const double*>(amplitude[i])));
+      float* at = columns + (column[i] - first_column) * stride + 2 * (sample_at[i] - begin);
+      for (int v = 0; v < 24; v += lanes)
+        _mm256_storeu_ps(at + v, _mm256_fmadd_ps(_mm256_loadu_ps(taps + v), a, _mm256_loadu_ps(at + v)));
+    }
+  }
+}
 #endif
 
 void accumulate(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride, int first_column,
