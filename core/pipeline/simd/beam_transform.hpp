@@ -9,7 +9,7 @@ namespace sonar::simd {
 struct BeamTransform {
   static constexpr int most_levels = 12;
   struct Level {
-    int radix, size;     // 2, 3 or 4; of the blocks it works on
+    int radix, size;     // 2, 3, 4 or 6, of the last one not 6; of the blocks it works on
     const float* turns;  // [size / radix][radix - 1] complex: e^{-i 2 pi i m / size}
   };
   int columns = 0, beams = 0;

@@ -80,7 +80,9 @@ template <>
 void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                         int first_column, int lead) {
   constexpr int at_once = 32, margin = 8;
-  alignas(32) float taps_twice[at_once][margin + 16 + margin] = {};
+  alignas(32) float taps_twice[at_once][margin + 16 + margin];
+  for (auto& taps : taps_twice)
+    for (int f = 0; f < margin; ++f) taps[f] = taps[margin + 16 + f] = 0;
   alignas(32) float amplitude[at_once][2];
   alignas(32) std::int32_t sample_at[at_once];
   const float steps = static_cast<float>(pulse.steps);
@@ -113,8 +115,12 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
       const float* taps = taps_twice[i] + margin - 2 * begin;
       const __m256 a = _mm256_castpd_ps(_mm256_broadcast_sd(reinterpret_cast<const double*>(amplitude[i])));
       float* at = columns + (column[i] - first_column) * stride + 2 * (sample_at[i] - begin);
-      for (int v = 0; v < 24; v += lanes)
-        _mm256_storeu_ps(at + v, _mm256_fmadd_ps(_mm256_loadu_ps(taps + v), a, _mm256_loadu_ps(at + v)));
+      const __m256 first = _mm256_fmadd_ps(_mm256_loadu_ps(taps), a, _mm256_loadu_ps(at));
+      const __m256 second = _mm256_fmadd_ps(_mm256_loadu_ps(taps + 8), a, _mm256_loadu_ps(at + 8));
+      const __m256 third = _mm256_fmadd_ps(_mm256_loadu_ps(taps + 16), a, _mm256_loadu_ps(at + 16));
+      _mm256_storeu_ps(at, first);
+      _mm256_storeu_ps(at + 8, second);
+      _mm256_storeu_ps(at + 16, third);
     }
   }
 }

@@ -42,6 +42,10 @@ void quantise_bytes(const float* power, float gain, float half_gamma, float max_
     const LaneNumbers code = whole_part(codes_of(power + i, gain, half_gamma, max_code));
 #if defined(__AVX512F__)
     _mm_storeu_si128(reinterpret_cast<__m128i*>(codes + i), _mm512_cvtepi32_epi8(reinterpret_cast<__m512i>(code)));
+#elif defined(__AVX2__)
+    const auto numbers = reinterpret_cast<__m256i>(code);
+    const __m128i words = _mm_packus_epi32(_mm256_castsi256_si128(numbers), _mm256_extracti128_si256(numbers, 1));
+    _mm_storel_epi64(reinterpret_cast<__m128i*>(codes + i), _mm_packus_epi16(words, words));
 #else
     for (int l = 0; l < lanes; ++l) codes[i + l] = static_cast<std::uint8_t>(code[l]);
 #endif

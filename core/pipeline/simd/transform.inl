@@ -37,40 +37,57 @@ inline void store_interleaved(ComplexLanes v, const Shuffles& s, float* at) {
   *reinterpret_cast<Lanes*>(at + lanes) = __builtin_shuffle(v.re, v.im, s.high);
 }
 
-/// One pass over a block of n: n / radix butterflies, `w` their (radix - 1) turns each.
+/// The discrete Fourier transform of `radix` values side by side, not scaled; inverse: with conjugate roots of unity.
+template <int radix, bool forward>
+inline __attribute__((always_inline)) void sums(ComplexLanes* v) {
+  constexpr float half_root_3 = 0.8660254037844386f;
+  if constexpr (radix == 2) {
+    const ComplexLanes a = v[0], b = v[1];
+    v[0] = a + b, v[1] = a - b;
+  } else if constexpr (radix == 3) {
+    // The cube roots of unity are -1/2 +- i sqrt(3)/2.
+    const ComplexLanes a = v[0], b = v[1], c = v[2], sum = b + c, middle{a.re - 0.5f * sum.re, a.im - 0.5f * sum.im};
+    const ComplexLanes across{half_root_3 * (b.re - c.re), half_root_3 * (b.im - c.im)};
+    v[0] = a + sum, v[forward ? 2 : 1] = middle + times_i(across), v[forward ? 1 : 2] = middle - times_i(across);
+  } else if constexpr (radix == 4) {
+    // The fourth roots of unity are +-1 and +-i: no multiplication.
+    const ComplexLanes s = v[0] + v[2], t = v[0] - v[2], u = v[1] + v[3], across = times_i(v[1] - v[3]);
+    v[0] = s + u, v[forward ? 3 : 1] = t + across, v[2] = s - u, v[forward ? 1 : 3] = t - across;
+  } else {
+    // Good and Thomas: 6 = 2 x 3 without turns between, input (3 a + 2 b) mod 6, output (3 a + 4 b) mod 6.
+    static_assert(radix == 6);
+    ComplexLanes even[3] = {v[0] + v[3], v[2] + v[5], v[4] + v[1]}, odd[3] = {v[0] - v[3], v[2] - v[5], v[4] - v[1]};
+    sums<3, forward>(even);
+    sums<3, forward>(odd);
+    v[0] = even[0], v[4] = even[1], v[2] = even[2], v[3] = odd[0], v[1] = odd[1], v[5] = odd[2];
+  }
+}
+
+/// One pass over a block of n: n / radix butterflies, `w` their (radix - 1) turns each. Forward: decimation in frequency, first
+/// the sums, then the turns e^{-i 2 pi i m / n}. Inverse: the same backwards, with conjugate turns.
 template <int radix, bool forward>
 inline void butterflies(ComplexLanes* x, int n, const float* w) {
-  // Forward: decimation in frequency, first the sums, then the turns e^{-i 2 pi i m / n}. Inverse: the same backwards, first the
-  // conjugate turns, then the sums with conjugate roots of unity.
-  constexpr float half_root_3 = 0.8660254037844386f;
   const int q = n / radix;
   for (int i = 0; i < q; ++i, w += 2 * (radix - 1)) {
-    ComplexLanes* at = x + i;
-    if constexpr (radix == 2) {
-      const ComplexLanes a = at[0], b = forward ? at[q] : times_conjugate(at[q], w);
-      at[0] = a + b;
-      at[q] = forward ? times(a - b, w) : a - b;
-    } else if constexpr (radix == 3) {
-      const ComplexLanes a = at[0], b = forward ? at[q] : times_conjugate(at[q], w),
-                         c = forward ? at[2 * q] : times_conjugate(at[2 * q], w + 2);
-      // The cube roots of unity are -1/2 +- i sqrt(3)/2.
-      const ComplexLanes sum = b + c, middle{a.re - 0.5f * sum.re, a.im - 0.5f * sum.im};
-      const ComplexLanes across{half_root_3 * (b.re - c.re), half_root_3 * (b.im - c.im)};
-      const ComplexLanes up = middle + times_i(across), down = middle - times_i(across);
-      at[0] = a + sum;
-      at[q] = forward ? times(down, w) : up;
-      at[2 * q] = forward ? times(up, w + 2) : down;
-    } else {
-      const ComplexLanes a = at[0], b = forward ? at[q] : times_conjugate(at[q], w),
-                         c = forward ? at[2 * q] : times_conjugate(at[2 * q], w + 2),
-                         d = forward ? at[3 * q] : times_conjugate(at[3 * q], w + 4);
-      // The fourth roots of unity are +-1 and +-i: no multiplication.
-      const ComplexLanes s = a + c, t = a - c, u = b + d, v = times_i(b - d);
-      at[0] = s + u;
-      at[q] = forward ? times(t - v, w) : t + v;
-      at[2 * q] = forward ? times(s - u, w + 2) : s - u;
-      at[3 * q] = forward ? times(t + v, w + 4) : t - v;
-    }
+    ComplexLanes v[radix];
+    v[0] = x[i];
+    for (int m = 1; m < radix; ++m) v[m] = forward ? x[i + m * q] : times_conjugate(x[i + m * q], w + 2 * (m - 1));
+    sums<radix, forward>(v);
+    x[i] = v[0];
+    for (int m = 1; m < radix; ++m) x[i + m * q] = forward ? times(v[m], w + 2 * (m - 1)) : v[m];
+  }
+}
+
+/// The last pass forward, whose turns are all 1, the product with the response, and the first pass back.
+template <int radix>
+inline void weigh_values(ComplexLanes* x, int n, const float* response) {
+  for (int i = 0; i < n; i += radix) {
+    ComplexLanes v[radix];
+    for (int m = 0; m < radix; ++m) v[m] = x[i + m];
+    sums<radix, true>(v);
+    for (int m = 0; m < radix; ++m) v[m] = {v[m].re * response[i + m], v[m].im * response[i + m]};
+    sums<radix, false>(v);
+    for (int m = 0; m < radix; ++m) x[i + m] = v[m];
   }
 }
 
@@ -79,7 +96,9 @@ inline void transform_pass(const BeamTransform& t, int level, ComplexLanes* bloc
   // A level works on quarter / size blocks, each for itself.
   const BeamTransform::Level& l = t.level[level];
   for (int from = 0; from < t.quarter; from += l.size) {
-    if (l.radix == 4)
+    if (l.radix == 6)
+      butterflies<6, forward>(block + from, l.size, l.turns);
+    else if (l.radix == 4)
       butterflies<4, forward>(block + from, l.size, l.turns);
     else if (l.radix == 3)
       butterflies<3, forward>(block + from, l.size, l.turns);
@@ -108,10 +127,16 @@ __attribute__((noinline)) void take_columns(const BeamTransform& t, const float*
 
 /// A quarter to its frequencies, weighed there, and back.
 __attribute__((noinline)) void weigh_quarter(const BeamTransform& t, const float* response, ComplexLanes* x) {
-  for (int level = 0; level < t.levels; ++level) transform_pass<true>(t, level, x);
+  const int last = t.levels - 1;
+  for (int level = 0; level < last; ++level) transform_pass<true>(t, level, x);
   // (9) over frequencies: times the transform of W, which is real since W is even; it includes 1 / size of the inverse.
-  for (int i = 0; i < t.quarter; ++i) x[i] = {x[i].re * response[i], x[i].im * response[i]};
-  for (int level = t.levels; level-- > 0;) transform_pass<false>(t, level, x);
+  if (t.level[last].radix == 4)
+    weigh_values<4>(x, t.quarter, response);
+  else if (t.level[last].radix == 3)
+    weigh_values<3>(x, t.quarter, response);
+  else
+    weigh_values<2>(x, t.quarter, response);
+  for (int level = last; level-- > 0;) transform_pass<false>(t, level, x);
 }
 
 /// Last pass: only the half of the line that stands for columns is wanted.
