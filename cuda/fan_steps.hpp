@@ -12,7 +12,7 @@
 namespace sonar::cuda {
 
 namespace fan {
-inline constexpr int edge_depth = 4, deepest = 6;  // as in FanRefinement
+inline constexpr int edge_depth = 4, deepest = 4;  // as in FanRefinement
 inline constexpr float slope_tolerance_in_pulses = 4, golden_turn = 0.61803399f, widest_skew = 0.15f;
 }  // namespace fan
 

@@ -94,7 +94,7 @@ class FanRefinement {
 
  private:
   static constexpr int edge_depth = 4;  // edges are found to 1/16 of a base interval
-  static constexpr int deepest = 6;     // a surface that still will not interpolate hides itself
+  static constexpr int deepest = 4;     // a surface that still will not interpolate hides itself
   // A surface strays from the straight line between two hits by about a quarter of what its slopes promise; beyond a pulse width
   // of that a middle that happens to lie on the line proves nothing: the rays may fall in step with ripples.
   static constexpr float slope_tolerance_in_pulses = 4;

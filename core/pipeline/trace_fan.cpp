@@ -51,12 +51,13 @@ class PacketFiller {
     // True range of the last sample that can still receive [m].
     packet.far[i] = far_m_;
   }
-  void trace(const RayScene& scene) {
+  void trace(const RayScene& scene, bool coherent = true) {
     // Bit i stands for lane i: the last packet of a row may be partly filled.
-    scene.trace(packet, count_ == RayPacket::size ? 0xFFFFu : (1u << count_) - 1u, true);
+    scene.trace(packet, count_ == RayPacket::size ? 0xFFFFu : (1u << count_) - 1u, coherent);
     traced += static_cast<std::size_t>(count_);
   }
   void clear() { count_ = 0; }
+  float far_m() const { return far_m_; }
 
   RayPacket packet{};
   std::size_t traced = 0;
@@ -137,6 +138,9 @@ class FanTracer {
     const int n = elevations();
     for (int e = 0; e + 1 < n; ++e)
       for (int k = 0; k < last_ - first_; ++k) refinement.consider_base(k * n + e, k * n + e + 1, k);
+    // Rays of neighbouring columns that end farther apart than this share too few triangles to be traced as one bundle.
+    constexpr double bundled_m = 0.06;
+    const bool bundled = plan_.columns.spacing * static_cast<double>(filler_.far_m()) < bundled_m;
     std::array<Elevation, RayPacket::size> middle;
     const auto trace = [&](std::span<const FanInterval> intervals) {
       // FanRefinement expects the samples of the middles behind all others, in the order of the intervals.
@@ -145,7 +149,7 @@ class FanTracer {
         middle[i] = elevation_at(refinement.middle_rad(intervals[i]));
         filler_.add(column(intervals[i].column), middle[i]);
       }
-      filler_.trace(scene_);
+      filler_.trace(scene_, bundled);
       for (std::size_t i = 0; i < intervals.size(); ++i)
         store(static_cast<int>(i), middle[i], column(intervals[i].column), s_.samples.emplace_back());
     };

@@ -75,7 +75,8 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
     const Lanes bin_here = choose(keep, bin, all(0));
     const LaneNumbers bin_below = whole_part(bin_here);
     const LaneNumbers at = (whole_part(choose(keep, column, first_column)) - g.first_column) * row + bin_below;
-    const Lanes a = gather(g.inverse_depth, at), b = gather(g.inverse_depth + 1, at);
+    Lanes a, b;
+    gather_pairs(g.inverse_depth, at, a, b);
     const Lanes seen = a + (bin_here - as_floats(bin_below)) * (b - a);
     keep = both(keep, not_below(inverse_h * (1.0f + g.depth_tolerance_m * inverse_r), seen));
     if (!any(keep)) continue;

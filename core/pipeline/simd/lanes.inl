@@ -28,8 +28,10 @@ inline Lanes as_floats(LaneNumbers n) { return Lanes(_mm512_cvtepi32_ps(reinterp
 inline Lanes counts(const std::int16_t* at) {
   return Lanes(_mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(at)))));
 }
-inline Lanes gather(const float* table, LaneNumbers at) {
-  return Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table, 4));
+/// table[at] and table[at + 1].
+inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
+  first = Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table, 4));
+  second = Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table + 1, 4));
 }
 inline Lanes reciprocal(Lanes x) {
   // Newton: g + g (1 - x g).
@@ -85,8 +87,14 @@ inline Lanes square_root(Lanes x) { return Lanes(_mm256_sqrt_ps(native(x))); }
 inline Lanes counts(const std::int16_t* at) {
   return Lanes(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at)))));
 }
-inline Lanes gather(const float* table, LaneNumbers at) {
-  return Lanes(_mm256_i32gather_ps(table, reinterpret_cast<__m256i>(at), 4));
+/// table[at] and table[at + 1]: eight loads of both take half as long as two gathers.
+inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
+  alignas(32) std::int32_t place[lanes];
+  *reinterpret_cast<LaneNumbers*>(place) = at;
+  const auto pair = [&](int l) { return reinterpret_cast<const double*>(table + place[l]); };
+  const auto two = [&](int l) { return _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(pair(l)), pair(l + 1))); };
+  const __m256 a = _mm256_set_m128(two(4), two(0)), b = _mm256_set_m128(two(6), two(2));
+  first = Lanes(_mm256_shuffle_ps(a, b, 0x88)), second = Lanes(_mm256_shuffle_ps(a, b, 0xDD));
 }
 
 struct PackOrders {
@@ -129,10 +137,9 @@ inline Lanes counts(const std::int16_t* at) {
   for (int l = 0; l < lanes; ++l) v[l] = static_cast<float>(at[l]);
   return v;
 }
-inline Lanes gather(const float* table, LaneNumbers at) {
-  Lanes v;
-  for (int l = 0; l < lanes; ++l) v[l] = table[at[l]];
-  return v;
+/// table[at] and table[at + 1].
+inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
+  for (int l = 0; l < lanes; ++l) first[l] = table[at[l]], second[l] = table[at[l] + 1];
 }
 /// The lanes of the mask, packed, to `at`; may write a whole vector.
 inline void pack(float* at, LaneMask m, Lanes v) {
