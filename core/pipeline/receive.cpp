@@ -97,6 +97,13 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
       kernels.quantise_levels(power, gain, per_octave, at_full_scale, max_code, scratch.codes.data(), width);
     else
       kernels.quantise(power, gain, half_gamma, max_code, scratch.codes.data(), width);
+    if (bytes == 2) {  // most sonars' samples, in a loop that becomes vector code
+      for (int j = 0; j < s.beam_count; ++j) {
+        const auto code = static_cast<std::uint16_t>(static_cast<std::int32_t>(scratch.codes[static_cast<std::size_t>(j)]));
+        std::memcpy(out + 2 * j, &code, 2);
+      }
+      continue;
+    }
     for (int j = 0; j < s.beam_count; ++j) {
       // 2^32 - 1 is no float: compare before the conversion can overflow.
       const float code = scratch.codes[static_cast<std::size_t>(j)];
