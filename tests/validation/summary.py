@@ -72,7 +72,7 @@ def tank(text):
 
 
 def two_cylinders(text):
-    (head, rows), = tables_of(text)
+    head, rows = tables_of(text)[0]
     off = largest([first_number(rows[-1][i]) - float(re.search(r"at ([\d.]+) m", head[i])[1]) for i in (1, 2)])
     yield ["two cylinders: range of the peaks", "nearest points", f"{off:+.3f} m", "none"]
 

@@ -68,6 +68,18 @@ def differences(lambert, paper):
     return rows
 
 
+def draw_fans(sonard, readings, folder):
+    """One ping of each reading as a fan, what the paper's Figures 6 (calibration) and 8 (validation) show."""
+    figure, axes = page.plt.subplots(1, 2 * len(readings), figsize=(13, 3.4), width_ratios=[1, 1, 1.4, 1.4])
+    kinds = [("canonical", []), ("paper mode", ["--mode", "paper"])]
+    for axis, (i, (name, arguments)) in zip(axes, [(i, kind) for i in readings for kind in kinds]):
+        ping = next(sonard.pings_of("tank-rod", *arguments, text=with_step(text_of("tank-rod"), i)))
+        level = db(ping.power) + 30 * np.log10(np.maximum(ping.range, 0.1))[:, None]
+        top = np.percentile(level, 99.9)
+        page.draw_fan(axis, ping, level, top - 50, top, f"{READINGS[i].split(' (')[0]}\n{name}")
+    page.save(figure, folder / "tank-fans.png")
+
+
 def chapter(sonard, folder):
     lambert = sonard.expected("tank-rod", "--specular", "off")
     specular = sonard.expected("tank-rod")
@@ -103,11 +115,16 @@ def chapter(sonard, folder):
     axes[0].set_ylabel("echo level [dB re 1 uPa]")
     axes[0].legend(fontsize=7)
     page.save(figure, folder / "tank.png")
+    draw_fans(sonard, curves, folder)
     text += f"\nMean of {PINGS} pings, canonical with everything on, peaks along the centre line:\n\n"
     text += table(["", "rod [dB re 1 uPa]", "wall [dB re 1 uPa]"], means)
-    return INTRODUCTION + text + "\n![Echo level along the centre line](tank.png)\n"
+    return INTRODUCTION + text + "\n![Echo level along the centre line](tank.png)\n\n" + FANS
 
 
+FANS = """![Calibration and validation as fans, 50 dB below the brightest, 30 log r](tank-fans.png)
+
+The fans stand beside the paper's Figures 6 and 8: the rod at 0.5 m with its shadow, the tank's wall as an arc behind it.
+"""
 TOTALS = """
 Total echo of the rod, sum of `sigma D^2 / (mu r^4)` in dB re 1/m^2, without absorption. The prediction is an independent
 integration of the model's equations for an array without taper; `tests/core/paper` holds the engine to it within 0.15 dB. The

@@ -66,10 +66,11 @@ def makers_of(sonard, pictures, table_of_oracles):
     import local_search
     import parts
     import tank
+    import tilted_tank
     import two_cylinders
 
-    modules = {"tank": tank, "two-cylinders": two_cylinders, "local-search": local_search, "differences": differences,
-               "coverage": coverage, "cost": cost, "parts": parts}
+    modules = {"tank": tank, "tilted-tank": tilted_tank, "two-cylinders": two_cylinders, "local-search": local_search,
+               "differences": differences, "coverage": coverage, "cost": cost, "parts": parts}
     makers = {name: functools.partial(module.chapter, sonard, pictures) for name, module in modules.items()}
     return makers | {"capture": lambda: capture(sonard.program, pictures), "oracles": lambda: table_of_oracles}
 
