@@ -30,6 +30,15 @@ constexpr Stage stage_of(Step step) {
   return step == Step::receive ? Stage::receive : Stage::form_beams;
 }
 
+/// Whether neither ping waits long for the other where they are computed together: no ghosts, and of about one size.
+bool are_alike(const PingRequest& a, const PingRequest& b) {
+  const auto values = [](const PingSettings& s) {
+    return static_cast<double>(s.beam_count) * s.range_bin_count * s.samples_per_row;
+  };
+  const auto [less, more] = std::minmax({values(a.settings), values(b.settings)});
+  return !a.switches.multipath && !b.switches.multipath && more <= 2 * less;
+}
+
 /// The options, with budgets that the device has room for. The rest is the kernels' own, other programs' and the scene's.
 DeviceEngineOptions fitted(DeviceEngineOptions options, std::size_t free_bytes) {
   options.cell_bytes = std::min(options.cell_bytes, free_bytes / 5 * 2);
@@ -69,6 +78,9 @@ class DeviceEngine final : public PingEngine {
   std::string description() const override {
     return (failed_ ? "cpu, after a failure of " : "cuda, ") + machine_->name() + ", " + kernels_.name + ", " +
            std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
+  }
+  std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
+    return !failed_ && are_alike(a, b) && why_by_cpu(a).empty() && why_by_cpu(b).empty() ? batch_ : 1;
   }
   PingStatistics statistics() const override { return statistics_; }
   std::vector<PingStatistics> statistics_of_each() const override { return each_; }

@@ -76,6 +76,9 @@ class ModeRouter final : public PingEngine {
     return pings;
   }
 
+  std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
+    return is_canonical(a) && is_canonical(b) ? canonical_->most_together(a, b) : 1;
+  }
   void set_interruption(Interruption* interruption) override { canonical_->set_interruption(interruption); }
   std::string description() const override { return canonical_->description(); }
   PingStatistics statistics() const override {

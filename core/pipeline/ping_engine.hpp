@@ -59,6 +59,11 @@ class PingEngine {
   /// A request that cannot be simulated (why_invalid in core/pipeline/check_request.hpp) throws std::invalid_argument with the
   /// reason. One caller at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
+  /// How many requests that are like these two one run() computes sooner than several; 1 = none, or one of the two would take
+  /// much longer beside the other than alone.
+  virtual std::size_t most_together(const PingRequest& a, const PingRequest& b) const {
+    return static_cast<void>(a), static_cast<void>(b), 1;
+  }
   /// Engines that cannot be interrupted ignore it. Null = none; no ping may be under way.
   virtual void set_interruption(Interruption* interruption) { static_cast<void>(interruption); }
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
