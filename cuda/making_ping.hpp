@@ -19,7 +19,7 @@ struct PingPreparer::Making {
   BatchRoom::Ping ping{};
   bool fits = true;
 
-  const PingRequest& request() const { return *asked.request; }
+  const PingRequest& request() const { return asked.wanted->request; }
   double& seconds(Stage s) { return ping.statistics.seconds[static_cast<std::size_t>(s)]; }
   std::size_t columns() const { return static_cast<std::size_t>(plan.columns.count); }
   std::size_t samples() const { return static_cast<std::size_t>(plan.samples); }

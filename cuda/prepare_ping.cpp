@@ -58,9 +58,9 @@ bool PingPreparer::may_go_together(const AskedPing& a, const AskedPing& b) {
     return x.size() == y.size() && std::memcmp(x.data(), y.data(), x.size() * sizeof(Pose)) == 0;
   };
   // Ghosts are made by all threads.
-  return !a.request->switches.multipath && !b.request->switches.multipath &&
-         (a.plan != b.plan || a.request->settings.gain_db == b.request->settings.gain_db) &&
-         same_places(a.request->bodies_in_world, b.request->bodies_in_world);
+  const PingRequest &x = a.wanted->request, &y = b.wanted->request;
+  return !x.switches.multipath && !y.switches.multipath && (a.plan != b.plan || x.settings.gain_db == y.settings.gain_db) &&
+         same_places(x.bodies_in_world, y.bodies_in_world);
 }
 
 std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, SurfaceCells& cells, int lane, BatchRoom& room) {
@@ -86,7 +86,8 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
       left.push_back(m.asked);
       continue;
     }
-    m.ping.index = m.asked.index;
+    m.ping.wanted = m.asked.wanted;
+    m.ping.wanted->state = WantedPing::State::under_way;
     m.ping.plan = m.asked.plan;
     room.views.push_back(m.view);
     room.pings.push_back(std::move(m.ping));
@@ -96,7 +97,7 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
 
 /// What must be done one after the other: the plan's gain and noise, and the number of the view.
 PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, BatchRoom& room) {
-  const PingRequest& request = *asked.request;
+  const PingRequest& request = asked.wanted->request;
   PlanTables& plan = *asked.plan;
   // Noise, leak and volume read one table of shaped noise (section 5).
   const bool leak = request.switches.leak && plan.plan().mode.receiver.leak_upa > 0;
