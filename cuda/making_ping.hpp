@@ -14,7 +14,7 @@ struct PingPreparer::Making {
   std::span<const Pose> bodies;
   std::vector<LawTable> laws = {};
   CellView looks_at = {};
-  CellsInView seen = {};
+  const CellsInView* seen = nullptr;  // of PingPreparer::found_
   PingView view{};
   BatchRoom::Ping ping{};
   bool fits = true;

@@ -115,7 +115,8 @@ class PingPreparer {
   TracerView tracer_;
   CellStore store_;
   MultipathWork multipath_;
-  std::vector<Worker> workers_;  // by number of the thread
+  std::vector<CellsInView> found_;  // of the pings that are being added
+  std::vector<Worker> workers_;     // by number of the thread
 };
 
 }  // namespace sonar::cuda
