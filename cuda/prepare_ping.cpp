@@ -55,7 +55,7 @@ PingPreparer::PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene,
 
 bool PingPreparer::may_go_together(const AskedPing& a, const AskedPing& b) {
   const auto same_places = [](const std::vector<Pose>& x, const std::vector<Pose>& y) {
-    return x.size() == y.size() && std::memcmp(x.data(), y.data(), x.size() * sizeof(Pose)) == 0;
+    return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(Pose)) == 0);
   };
   // Ghosts are made by all threads.
   const PingRequest &x = a.wanted->request, &y = b.wanted->request;
