@@ -50,7 +50,7 @@ class DeviceEngine final : public PingEngine {
         kernels_(simd::kernels_for(options.simd)),
         rays_(scene, pool.threads()),
         preparer_(*machine_, scene, rays_, kernels_, pool, device_options_.cell_bytes, options.now_s),
-        batch_(static_cast<std::size_t>(std::max(1, device_options_.batch))),
+        batch_(static_cast<std::size_t>(device_options_.batch > 0 ? device_options_.batch : std::clamp(pool.threads(), 8, 32))),
         rooms_{BatchRoom(*machine_, 0, batch_), BatchRoom(*machine_, 1, batch_)},
         work_(options.now_s) {}
   ~DeviceEngine() override {
@@ -81,7 +81,9 @@ class DeviceEngine final : public PingEngine {
            std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
   }
   std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
-    return !failed_ && are_alike(a, b) && why_by_cpu(a).empty() && why_by_cpu(b).empty() ? batch_ : 1;
+    // As many as are prepared at once: then one waits for the others' steps on the device only.
+    const std::size_t most = std::min(batch_, static_cast<std::size_t>(pool_.threads()));
+    return !failed_ && are_alike(a, b) && why_by_cpu(a).empty() && why_by_cpu(b).empty() ? most : 1;
   }
   PingStatistics statistics() const override { return statistics_; }
   std::vector<PingStatistics> statistics_of_each() const override { return each_; }

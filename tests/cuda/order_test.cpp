@@ -122,8 +122,11 @@ class Grouped : public ::testing::TestWithParam<std::size_t> {};
 TEST_P(Grouped, MakesTheSameBytes) {
   const auto scene = basin();
   std::vector<PingRequest> all = requests();
-  for (std::size_t i = 0; i < all.size(); ++i) all[i].sonar_id = static_cast<std::uint32_t>(i % 3);
-  for (const std::size_t again : {0u, 2u, 4u}) all.push_back(PingRequest(all[again]));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    all[i].sonar_id = static_cast<std::uint32_t>(i % 3);
+    all[i].switches.multipath = false;
+  }
+  for (const std::size_t again : {0u, 2u}) all.push_back(PingRequest(all[again]));
   const std::vector<Ping> there = pings_of(cuda::make_host_loops(), scene, all, {.batch = 1});
   Parallel pool(2);
   const auto engine = cuda::make_device_engine(scene, pool, {.simd = SimdLevel::portable}, std::make_unique<DeferringMachine>(),
@@ -151,7 +154,31 @@ TEST_P(Grouped, MakesTheSameBytes) {
     expect_same(there, pings);
   }
 }
-INSTANTIATE_TEST_SUITE_P(BySize, Grouped, ::testing::Values(1, 2, 3, 9), ::testing::PrintToStringParamName());
+INSTANTIATE_TEST_SUITE_P(BySize, Grouped, ::testing::Values(1, 3), ::testing::PrintToStringParamName());
+
+TEST(DeviceEngine, TakesPingsOfOneSizeTogether) {
+  Parallel two(2), many(16);
+  const auto scene = basin();
+  const auto most = [&](Parallel& pool, const PingRequest& a, const PingRequest& b, int batch = 4) {
+    return cuda::make_device_engine(scene, pool, {}, cuda::make_host_loops(), {.batch = batch})->most_together(a, b);
+  };
+  PingRequest a = requests().at(1);
+  a.switches.multipath = false;
+  PingRequest b = a;
+  b.sonar_id = 7;
+  EXPECT_EQ(most(two, a, b), 2u);
+  EXPECT_EQ(most(many, a, b), 4u);
+  EXPECT_EQ(most(many, a, b, 0), 16u);
+  EXPECT_EQ(make_cpu_engine(scene, two)->most_together(a, b), 1u);
+  b.settings.beam_count *= 3;
+  EXPECT_EQ(most(many, a, b), 1u) << "one would wait for the other";
+  b = a;
+  b.switches.fixed_fan = 40;
+  EXPECT_EQ(most(many, a, b), 1u) << "the CPU computes it";
+  b = a;
+  b.switches.multipath = true;
+  EXPECT_EQ(most(many, a, b), 1u);
+}
 
 TEST(DeferringDevice, AnswersACallBesideThoseThatAreUnderWay) {
   const auto scene = basin();
