@@ -1,25 +1,51 @@
 #include "cuda/cell_store.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace sonar::cuda {
 namespace {
 
 constexpr std::size_t chunk_bytes = 16u << 20;
 constexpr std::size_t tiles_at_once = 256;  // that one worker looks up
+constexpr std::size_t ahead = 8;            // tiles
 constexpr std::size_t most_values_a_copy = (2u << 20) / sizeof(std::int16_t);
 
 std::size_t values(const CellTile& t) { return static_cast<std::size_t>(t.stride) * CellTile::columns; }
 
 }  // namespace
 
+std::size_t CellStore::Table::first_place(const std::int16_t* data) const {
+  // The upper bits of a product with 2^64 over the golden ratio are spread evenly.
+  const std::uint64_t spread = reinterpret_cast<std::uintptr_t>(data) * 0x9E3779B97F4A7C15u;
+  return static_cast<std::size_t>(spread >> 32) & (places_.size() - 1);
+}
+
+std::size_t CellStore::Table::place_of(const std::int16_t* data) const {
+  std::size_t i = first_place(data);
+  while (places_[i].data && places_[i].data != data) i = (i + 1) & (places_.size() - 1);
+  return i;
+}
+
+void CellStore::Table::put(const Held& held) {
+  if (2 * taken_ >= places_.size()) {
+    const std::vector<Held> before = std::exchange(places_, std::vector<Held>(2 * places_.size()));
+    for (const Held& h : before)
+      if (h.data) places_[place_of(h.data)] = h;
+  }
+  Held& place = places_[place_of(held.data)];
+  taken_ += place.data ? 0 : 1;
+  place = held;
+}
+
+void CellStore::Table::clear() { *this = Table(); }
+
 CellStore::CellStore(Machine& machine, std::size_t budget_bytes)
     : machine_(machine), budget_bytes_(budget_bytes), memory_(machine, Arena::Where::device, chunk_bytes) {}
 
 const CellStore::Held* CellStore::held(const CellTile& t) const {
-  const auto it = tiles_.find(t.data.get());
-  if (it == tiles_.end()) return nullptr;
-  const Held& h = it->second;
+  const Held& h = tiles_.at(t.data.get());
+  if (!h.data) return nullptr;
   // Memory of a dropped tile may have been given to another: its other fields tell them apart.
   const bool same = h.weight_unit == t.weight_unit && h.object == t.object && h.axis == t.axis && h.level == t.level &&
                     h.count == t.count && h.centre_m.x == t.centre_m.x && h.centre_m.y == t.centre_m.y &&
@@ -53,8 +79,12 @@ bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
     const std::shared_lock lock(changing_);
     pool.for_each((tiles.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
       const std::size_t end = std::min(tiles.size(), (part + 1) * tiles_at_once);
-      for (std::size_t i = part * tiles_at_once; i < end; ++i)
+      for (std::size_t i = part * tiles_at_once; i < end; ++i) {
+        // Tiles and places lie anywhere in memory: asked for before they are needed.
+        if (i + 2 * ahead < end) __builtin_prefetch(&tiles[i + 2 * ahead].tile->data);
+        if (i + ahead < end) tiles_.prefetch(tiles[i + ahead].tile->data.get());
         if (const Held* h = held(*tiles[i].tile)) cells[i] = h->device;
+      }
     });
   }
   if (missing() == 0) return true;
@@ -92,7 +122,7 @@ std::size_t CellStore::send_from(std::span<const TileInView> tiles, std::size_t 
   machine_.upload(lane, device.device, host.host, more * sizeof(std::int16_t));
   for (const std::size_t i : sent) {  // known from here on, when they are on their way
     const CellTile& t = *tiles[i].tile;
-    tiles_[t.data.get()] = {t.weight_unit, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]};
+    tiles_.put({t.data.get(), t.weight_unit, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]});
   }
   return end;
 }

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <shared_mutex>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include "core/base/parallel.hpp"
@@ -31,10 +30,26 @@ class CellStore {
 
  private:
   struct Held {
+    const std::int16_t* data = nullptr;  // where the CPU has the tile; null = a free place
     float weight_unit = 0;  // of the strongest speckle in it: a name that no other tile of the scene has, but by chance
     std::int32_t object = 0, axis = 0, level = 0, count = 0;
     Vec3d centre_m;
     const std::int16_t* device = nullptr;
+  };
+  /// By where the CPU has them: a pair of cache lines a tile, since a ping looks up thousands.
+  class Table {
+   public:
+    const Held& at(const std::int16_t* data) const { return places_[place_of(data)]; }  // free where there is none
+    void put(const Held& held);
+    void clear();
+    bool empty() const { return taken_ == 0; }
+    void prefetch(const std::int16_t* data) const { __builtin_prefetch(&places_[first_place(data)]); }
+
+   private:
+    std::size_t first_place(const std::int16_t* data) const;
+    std::size_t place_of(const std::int16_t* data) const;
+    std::vector<Held> places_ = std::vector<Held>(1024);  // a power of two, at most half of them taken
+    std::size_t taken_ = 0;
   };
   const Held* held(const CellTile& tile) const;
   std::size_t send_from(std::span<const TileInView> tiles, std::size_t from, int lane, Arena& staging,
@@ -43,8 +58,8 @@ class CellStore {
   Machine& machine_;
   std::size_t budget_bytes_;
   Arena memory_;
-  std::shared_mutex changing_;                           // of tiles_ and memory_
-  std::unordered_map<const std::int16_t*, Held> tiles_;  // by where the CPU has them
+  std::shared_mutex changing_;  // of tiles_ and memory_
+  Table tiles_;
 };
 
 }  // namespace sonar::cuda

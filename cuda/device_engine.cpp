@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <new>
 #include <optional>
 #include <set>
@@ -9,10 +10,10 @@
 
 #include "core/pipeline/check_request.hpp"
 #include "core/pipeline/simulate.hpp"
-#include "core/pipeline/truth.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "cuda/prepare_ping.hpp"
 #include "cuda/steps.hpp"
+#include "cuda/take_results.hpp"
 
 namespace sonar::cuda {
 namespace {
@@ -21,13 +22,13 @@ namespace {
 constexpr std::size_t most_plans = 8;
 constexpr int keeping_lane = 2;  // of what stays on the device: plans and cells; rooms have 0 and 1
 
-/// Where the benchmark's table has a step.
-constexpr Stage stage_of(Step step) {
-  if (step <= Step::first_hits) return Stage::trace;
-  if (step <= Step::place) return Stage::scatter;
-  if (step <= Step::unfold) return Stage::synthesize;
-  if (step <= Step::finish_columns) return Stage::noise;
-  return step == Step::receive ? Stage::receive : Stage::form_beams;
+/// Whether neither ping waits long for the other where they are computed together: no ghosts, and of about one size.
+bool are_alike(const PingRequest& a, const PingRequest& b) {
+  const auto values = [](const PingSettings& s) {
+    return static_cast<double>(s.beam_count) * s.range_bin_count * s.samples_per_row;
+  };
+  const auto [less, more] = std::minmax({values(a.settings), values(b.settings)});
+  return !a.switches.multipath && !b.switches.multipath && more <= 2 * less;
 }
 
 /// The options, with budgets that the device has room for. The rest is the kernels' own, other programs' and the scene's.
@@ -49,40 +50,98 @@ class DeviceEngine final : public PingEngine {
         kernels_(simd::kernels_for(options.simd)),
         rays_(scene, pool.threads()),
         preparer_(*machine_, scene, rays_, kernels_, pool, device_options_.cell_bytes, options.now_s),
-        batch_(static_cast<std::size_t>(std::max(1, device_options_.batch))),
+        batch_(static_cast<std::size_t>(device_options_.batch > 0 ? device_options_.batch : std::clamp(pool.threads(), 8, 32))),
         rooms_{BatchRoom(*machine_, 0, batch_), BatchRoom(*machine_, 1, batch_)},
         work_(options.now_s) {}
   ~DeviceEngine() override {
     for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);  // memory goes when nothing uses it any more
   }
 
-  std::vector<Ping> run(std::span<const PingRequest> asked) override {
-    std::vector<PingRequest> room;
-    const std::span<const PingRequest> requests = in_water(asked, *scene_, room);
-    for (const PingRequest& request : requests)
-      if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
-    std::vector<Ping> pings = computed(requests);
-    tell_as_asked(asked, pings);
-    return pings;
+  std::vector<Ping> run(std::span<const PingRequest> requests) override {
+    submit(requests);
+    return taken(calls_.size() - 1);
   }
+  void submit(std::span<const PingRequest> requests) override {
+    Call& call = calls_.emplace_back();
+    call.asked.assign(requests.begin(), requests.end());
+    std::vector<PingRequest> room;
+    const std::span<const PingRequest> to_compute = in_water(requests, *scene_, room);
+    for (const PingRequest& request : to_compute)
+      if (call.invalid = why_invalid(request); !call.invalid.empty()) return;
+    for (const PingRequest& request : to_compute) wanted_.push_back({request});
+    try {
+      on_device([this] { begin_open(); });
+    } catch (const std::bad_alloc&) {  // collect() tries again
+    }
+  }
+  std::vector<Ping> collect() override { return taken(0); }
 
   std::string description() const override {
     return (failed_ ? "cpu, after a failure of " : "cuda, ") + machine_->name() + ", " + kernels_.name + ", " +
            std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
   }
+  std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
+    // As many as are prepared at once: then one waits for the others' steps on the device only.
+    const std::size_t most = std::min(batch_, static_cast<std::size_t>(pool_.threads()));
+    return !failed_ && are_alike(a, b) && why_by_cpu(a).empty() && why_by_cpu(b).empty() ? most : 1;
+  }
   PingStatistics statistics() const override { return statistics_; }
   std::vector<PingStatistics> statistics_of_each() const override { return each_; }
 
  private:
-  std::vector<Ping> computed(std::span<const PingRequest> requests) {
-    std::vector<Ping> pings(requests.size());
-    each_.assign(requests.size(), {});
-    done_.assign(requests.size(), false);
+  using State = WantedPing::State;
+  struct Call {
+    std::vector<PingRequest> asked;
+    std::string invalid;  // why; then none of its pings is computed
+  };
+
+  /// The pings of the first call or of the last.
+  std::vector<Ping> taken(std::size_t which) {
+    const Call call = std::move(calls_[which]);
+    calls_.erase(calls_.begin() + static_cast<std::ptrdiff_t>(which));
+    if (!call.invalid.empty()) throw std::invalid_argument(call.invalid);
+    const auto begin = which == 0 ? wanted_.begin() : wanted_.end() - static_cast<std::ptrdiff_t>(call.asked.size());
+    const auto end = begin + static_cast<std::ptrdiff_t>(call.asked.size());
+    std::vector<Ping> pings;
+    pings.reserve(call.asked.size());
+    each_.clear();
+    try {
+      complete(begin, end);
+      for (auto it = begin; it != end; ++it) {
+        pings.push_back(std::move(it->ping));
+        each_.push_back(it->statistics);
+      }
+    } catch (...) {  // nothing is under way: on_device() has seen to it
+      wanted_.erase(begin, end);
+      throw;
+    }
+    wanted_.erase(begin, end);
+    if (!each_.empty()) statistics_ = each_.back();
+    tell_as_asked(call.asked, pings);
+    return pings;
+  }
+
+  void complete(std::deque<WantedPing>::iterator begin, std::deque<WantedPing>::iterator end) {
+    const auto is_open = [&] { return std::any_of(begin, end, [](const WantedPing& w) { return w.state != State::done; }); };
+    on_device([&] {
+      begin_open();  // after lack of memory; else it has been done
+      for (const std::size_t older : {which_, 1 - which_})
+        if (is_open()) finish(rooms_[older]);
+    });
+    if (!failed_) return;
+    // After a failure the device is not used again, and the pings of a call are of one engine.
+    if (!device_options_.cpu_after_failure) throw EngineUnavailable(*failed_ + "; use --engine cpu or auto");
+    for (auto it = begin; it != end; ++it) compute_by_cpu(*it);
+  }
+
+  /// Does the work, again with less where the device's memory is full, unless the device fails. What was under way is open again
+  /// where this did not go well.
+  template <class Work>
+  void on_device(const Work& work) {
     if (!failed_) try {
-        while (!tried_on_device(requests, pings)) {
+        while (!has_room_for(work)) {
         }
-        return pings;
-      } catch (const std::bad_alloc&) {  // of the computer's memory: what was begun is forgotten, the next ping begins anew
+      } catch (const std::bad_alloc&) {  // of the computer's memory: what was begun is forgotten
         for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);
         for (BatchRoom& room : rooms_) empty(room);
         preparer_.forget_cells();
@@ -92,19 +151,14 @@ class DeviceEngine final : public PingEngine {
         for (BatchRoom& room : rooms_) empty(room);
         if (device_options_.cpu_after_failure) say(*failed_ + "; from here on the CPU computes");
       }
-    // After a failure the device is not used again.
-    if (!device_options_.cpu_after_failure) throw EngineUnavailable(*failed_ + "; use --engine cpu or auto");
-    for (std::size_t i = 0; i < requests.size(); ++i) {
-      pings[i] = by_cpu(requests[i]);
-      each_[i] = statistics_;
-    }
-    return pings;
   }
 
   /// False: the device's memory was full. What it took has been given back, and what is not done may be tried again.
-  bool tried_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
+  template <class Work>
+  bool has_room_for(const Work& work) {
     try {
-      run_on_device(requests, pings);
+      work();
+      all_given_back_ = false;
       return true;
     } catch (const DeviceMemoryFull&) {
       for (int lane = 0; lane < Machine::lanes; ++lane) machine_->wait(lane);
@@ -124,30 +178,29 @@ class DeviceEngine final : public PingEngine {
     }
   }
 
-  void run_on_device(std::span<const PingRequest> requests, std::vector<Ping>& pings) {
-    std::size_t which = 0;
-    for (std::size_t i = 0; i < requests.size();) {
-      if (done_[i]) {
+  /// Launches all that is open. Two rooms take turns: the CPU prepares one batch, or the caller uses the pings of an earlier
+  /// call, while the device computes the other.
+  void begin_open() {
+    for (std::size_t i = 0; i < wanted_.size();) {
+      if (wanted_[i].state != State::open) {
         ++i;
         continue;
       }
-      if (const std::string why = why_by_cpu(requests[i]); !why.empty()) {
+      if (const std::string why = why_by_cpu(wanted_[i].request); !why.empty()) {
         if (told_.insert(why).second) say("CUDA: " + why);
-        pings[i] = by_cpu(requests[i]);
-        each_[i] = statistics_;
-        done_[i++] = true;
+        compute_by_cpu(wanted_[i++]);
         continue;
       }
-      // Two rooms take turns: the CPU prepares one batch while the device computes the other.
-      BatchRoom& room = rooms_[which];
-      std::vector<AskedPing> asked = some_from(requests, i, room);
+      BatchRoom& room = rooms_[which_];
+      if (room.launched) finish(room);
+      std::vector<AskedPing> asked = some_from(i, room);
       i += asked.size();
       for (bool forgotten = false;;) {
         std::vector<AskedPing> left = preparer_.add(asked, *cells_, keeping_lane, room);
         if (left.empty()) break;
         if (forgotten && left.size() == asked.size()) throw std::runtime_error("the tiles of one ping do not fit an empty store");
         launch(room);
-        for (BatchRoom& r : rooms_) finish(r, pings);
+        for (BatchRoom& r : rooms_) finish(r);
         preparer_.forget_cells();
         forgotten = true;
         asked = std::move(left);
@@ -155,27 +208,29 @@ class DeviceEngine final : public PingEngine {
       work_a_ping_ = room.work.taken_bytes() / room.pings.size();
       // A batch is full by number, or by memory [bytes].
       if (room.pings.size() < batch_ && room.work.taken_bytes() < device_options_.work_bytes) continue;
-      launch(room);
-      if (!one_room_) which = 1 - which;
-      finish(rooms_[which], pings);  // the other one: it has had the time it took to prepare this one
+      launch_next();
     }
-    launch(rooms_[which]);
-    finish(rooms_[1 - which], pings);
-    finish(rooms_[which], pings);
-    all_given_back_ = false;
+    launch_next();
+  }
+  void launch_next() {
+    BatchRoom& room = rooms_[which_];
+    if (room.launched || room.pings.empty()) return;
+    launch(room);
+    if (!one_room_) which_ = 1 - which_;
   }
 
   /// The next requests, from `first` on, that can be prepared together, as many as the room has place for: by number, and by
   /// memory as far as it is known what a ping takes.
-  std::vector<AskedPing> some_from(std::span<const PingRequest> requests, std::size_t first, const BatchRoom& room) {
-    place(requests[first]);
-    std::vector<AskedPing> some{{&requests[first], first, plan_for(requests[first])}};
+  std::vector<AskedPing> some_from(std::size_t first, const BatchRoom& room) {
+    place(wanted_[first].request);
+    std::vector<AskedPing> some{{&wanted_[first], plan_for(wanted_[first].request)}};
     const std::size_t bytes = device_options_.work_bytes - std::min(device_options_.work_bytes, room.work.taken_bytes());
     const std::size_t most = std::min(batch_ - room.pings.size(), work_a_ping_ > 0 ? bytes / work_a_ping_ : 1);
-    for (std::size_t i = first + 1; i < requests.size() && some.size() < most; ++i) {
-      const PingRequest& request = requests[i];
-      if (done_[i] || !why_by_cpu(request).empty() || !cells_->serves(request.seed, request.switches.texture)) break;
-      AskedPing next{&request, i, plan_for(request)};
+    for (std::size_t i = first + 1; i < wanted_.size() && some.size() < most; ++i) {
+      const PingRequest& request = wanted_[i].request;
+      if (wanted_[i].state != State::open || !why_by_cpu(request).empty()) break;
+      if (!cells_->serves(request.seed, request.switches.texture)) break;
+      AskedPing next{&wanted_[i], plan_for(request)};
       if (!std::all_of(some.begin(), some.end(), [&](const AskedPing& a) { return PingPreparer::may_go_together(a, next); }))
         break;
       some.push_back(std::move(next));
@@ -198,11 +253,11 @@ class DeviceEngine final : public PingEngine {
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
   }
-  Ping by_cpu(const PingRequest& request) {
-    place(request);
-    Ping ping = simulate(rays_, *cells_, request, kernels_, work_, pool_);
-    statistics_ = work_.statistics();
-    return ping;
+  void compute_by_cpu(WantedPing& wanted) {
+    place(wanted.request);
+    wanted.ping = simulate(rays_, *cells_, wanted.request, kernels_, work_, pool_);
+    wanted.statistics = work_.statistics();
+    wanted.state = State::done;
   }
 
   std::shared_ptr<PlanTables> plan_for(const PingRequest& request) {
@@ -229,6 +284,7 @@ class DeviceEngine final : public PingEngine {
     for (int step = 0; step < step_count; ++step)
       for (const PingView& view : room.views)
         launch.largest[step] = std::max(launch.largest[step], step_size(static_cast<Step>(step), view));
+    room.launched = true;
     run_steps(room, launch);
     room.results.download(room.lane);
   }
@@ -255,54 +311,18 @@ class DeviceEngine final : public PingEngine {
     run_to(step_count);
   }
 
-  void finish(BatchRoom& room, std::vector<Ping>& pings) {
+  void finish(BatchRoom& room) {
     if (room.pings.empty()) return;
     machine_->wait(room.lane);
-    if (options_.now_s) share_times(room);
-    pool_.for_each(room.pings.size(), [&](std::size_t i, int) {
-      const std::size_t index = room.pings[i].index;
-      pings[index] = ping_from(room.pings[i], room.views[i]);
-      each_[index] = room.pings[i].statistics;
-    });
-    for (const BatchRoom::Ping& ping : room.pings) done_[ping.index] = true;
-    statistics_ = room.pings.back().statistics;
+    if (options_.now_s) share_times(machine_->step_seconds(room.lane), room);
+    pool_.for_each(room.pings.size(), [&](std::size_t i, int) { take_results(room.pings[i], room.views[i]); });
     empty(room);
-  }
-  /// Every ping of a batch took as long as the others.
-  void share_times(BatchRoom& room) {
-    const StepSeconds seconds = machine_->step_seconds(room.lane);
-    const auto pings = static_cast<double>(room.pings.size());
-    for (BatchRoom::Ping& ping : room.pings) {
-      ping.statistics.seconds[static_cast<std::size_t>(Stage::synthesize)] += seconds.transforms / pings;
-      for (int step = 0; step < step_count; ++step)
-        ping.statistics.seconds[static_cast<std::size_t>(stage_of(static_cast<Step>(step)))] += seconds.of[step] / pings;
-    }
-  }
-  static Ping ping_from(BatchRoom::Ping& from, const PingView& view) {
-    Ping ping = std::move(from.ping);
-    const auto copy = [](void* to, const void* host, std::size_t bytes) {
-      if (bytes > 0) std::memcpy(to, host, bytes);
-    };
-    copy(ping.samples.data(), from.codes.host, ping.samples.size());
-    copy(ping.pressure_upa.data(), from.pressure.host, ping.pressure_upa.size() * sizeof(float));
-    copy(ping.beam_signal_upa.data(), from.beams.host, ping.beam_signal_upa.size() * sizeof(std::complex<float>));
-    if (ping.request.switches.keep_truth) {
-      std::vector<BeamTruth> by_column(static_cast<std::size_t>(view.sea.columns));
-      if (view.first_hits)
-        for (std::size_t k = 0; k < by_column.size(); ++k)
-          if (from.truth.host[k].object != no_object) by_column[k] = {from.truth.host[k].range_m, from.truth.host[k].object};
-      ping.truth = truth_of_beams(from.plan->plan(), by_column);
-    }
-    // Rays and echoes are counted on the device; base rays are known beforehand.
-    if (view.has_scene != 0) {
-      from.statistics.rays +=
-          from.counters.host[0] + static_cast<std::size_t>(view.sea.columns) * static_cast<std::size_t>(view.sea.elevations);
-      from.statistics.echoes += from.counters.host[1];
-    }
-    return ping;
   }
   /// Arenas keep their memory.
   static void empty(BatchRoom& room) {
+    for (const BatchRoom::Ping& ping : room.pings)
+      if (ping.wanted->state == State::under_way) ping.wanted->state = State::open;
+    room.launched = false;
     room.views.clear();
     room.pings.clear();
     for (Arena* arena : room.arenas()) arena->clear();
@@ -331,11 +351,13 @@ class DeviceEngine final : public PingEngine {
   std::size_t batch_;            // pings that are launched together
   std::size_t work_a_ping_ = 0;  // bytes, of the last batch
   BatchRoom rooms_[2];
-  Workspace work_;  // of the CPU
+  std::size_t which_ = 0;          // of them is filled next; of two launched ones it is the older
+  std::deque<Call> calls_;         // that were not collected, in order
+  std::deque<WantedPing> wanted_;  // theirs
+  Workspace work_;                 // of the CPU
   std::set<std::string> told_;
   PingStatistics statistics_;
-  std::vector<PingStatistics> each_;   // of the last run
-  std::vector<bool> done_;             // which of its pings
+  std::vector<PingStatistics> each_;   // of the last call that was collected
   bool one_room_ = false;              // for lack of memory: nothing is prepared while the device computes
   bool all_given_back_ = false;        // since the last run that had memory enough
   std::optional<std::string> failed_;  // why

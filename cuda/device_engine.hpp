@@ -17,7 +17,7 @@ namespace sonar::cuda {
 /// the end one ping without another beside it; the engine fails when that does not fit.
 struct DeviceEngineOptions {
   std::size_t cell_bytes = std::size_t{2} << 30;  // of the device's memory for surface cells; what one ping needs, it gets
-  int batch = 8;                                  // pings that are launched together
+  int batch = 0;                                  // pings that are launched together; 0 = 8, more with more threads, at most 32
   std::size_t work_bytes = std::size_t{1} << 30;  // of a batch on the device: where pings are large, fewer go together
   bool cpu_after_failure = true;                  // else a device that fails is the end: run() throws EngineUnavailable
   /// Called once for each reason: what the CPU computes instead, and why. May be empty.

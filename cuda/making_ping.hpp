@@ -14,12 +14,12 @@ struct PingPreparer::Making {
   std::span<const Pose> bodies;
   std::vector<LawTable> laws = {};
   CellView looks_at = {};
-  CellsInView seen = {};
+  const CellsInView* seen = nullptr;  // of PingPreparer::found_
   PingView view{};
   BatchRoom::Ping ping{};
   bool fits = true;
 
-  const PingRequest& request() const { return *asked.request; }
+  const PingRequest& request() const { return asked.wanted->request; }
   double& seconds(Stage s) { return ping.statistics.seconds[static_cast<std::size_t>(s)]; }
   std::size_t columns() const { return static_cast<std::size_t>(plan.columns.count); }
   std::size_t samples() const { return static_cast<std::size_t>(plan.samples); }

@@ -55,12 +55,12 @@ PingPreparer::PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene,
 
 bool PingPreparer::may_go_together(const AskedPing& a, const AskedPing& b) {
   const auto same_places = [](const std::vector<Pose>& x, const std::vector<Pose>& y) {
-    return x.size() == y.size() && std::memcmp(x.data(), y.data(), x.size() * sizeof(Pose)) == 0;
+    return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(Pose)) == 0);
   };
   // Ghosts are made by all threads.
-  return !a.request->switches.multipath && !b.request->switches.multipath &&
-         (a.plan != b.plan || a.request->settings.gain_db == b.request->settings.gain_db) &&
-         same_places(a.request->bodies_in_world, b.request->bodies_in_world);
+  const PingRequest &x = a.wanted->request, &y = b.wanted->request;
+  return !x.switches.multipath && !y.switches.multipath && (a.plan != b.plan || x.settings.gain_db == y.settings.gain_db) &&
+         same_places(x.bodies_in_world, y.bodies_in_world);
 }
 
 std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, SurfaceCells& cells, int lane, BatchRoom& room) {
@@ -69,7 +69,8 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
   for (const AskedPing& asked : pings) all.push_back(begin(asked, lane, room));
   const bool alone = all.size() == 1;
   Parallel& pool = alone ? pool_ : one_thread_;  // of the loops within a ping
-  const auto context_of = [&](const Making& m) -> PingContext {
+  const auto context_of = [&](Making& m) -> PingContext {
+    if (m.laws.empty() && !m.request().blank) m.laws = laws_of(*scene_, m.plan, m.scalars);
     return {rays_, cells, m.bodies, m.laws, m.plan, m.scalars, kernels_, pool};
   };
   // Ghosts look at cells of their own, before these.
@@ -77,8 +78,9 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
   look(all, cells);
   pool_.for_each(all.size(), [&](std::size_t i, int thread) {
     Worker& worker = workers_[static_cast<std::size_t>(thread)];
-    if (!alone) find_points(all[i], context_of(all[i]), worker);
-    complete(all[i], context_of(all[i]), lane, worker);
+    const PingContext context = context_of(all[i]);
+    if (!alone) find_points(all[i], context, worker);
+    complete(all[i], context, lane, worker);
   });
   std::vector<AskedPing> left;
   for (Making& m : all) {
@@ -86,7 +88,8 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
       left.push_back(m.asked);
       continue;
     }
-    m.ping.index = m.asked.index;
+    m.ping.wanted = m.asked.wanted;
+    m.ping.wanted->state = WantedPing::State::under_way;
     m.ping.plan = m.asked.plan;
     room.views.push_back(m.view);
     room.pings.push_back(std::move(m.ping));
@@ -96,7 +99,7 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
 
 /// What must be done one after the other: the plan's gain and noise, and the number of the view.
 PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, BatchRoom& room) {
-  const PingRequest& request = *asked.request;
+  const PingRequest& request = asked.wanted->request;
   PlanTables& plan = *asked.plan;
   // Noise, leak and volume read one table of shaped noise (section 5).
   const bool leak = request.switches.leak && plan.plan().mode.receiver.leak_upa > 0;
@@ -107,7 +110,6 @@ PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, Batch
            request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world};
   // Constants of the settings first, then those of the ping.
   plan.fill(m.view);
-  if (!request.blank) m.laws = laws_of(*scene_, m.plan, m.scalars);
   return m;
 }
 
@@ -127,9 +129,11 @@ void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
     in.levels = m.plan.levels;
   }
   if (views.empty()) return;
-  std::vector<CellsInView> found(views.size());
+  if (found_.size() < views.size()) found_.resize(views.size());
+  const std::span<CellsInView> found(found_.data(), views.size());
   if (views.size() == 1) {  // by all threads
-    found[0] = {cells.in_view(views[0], pool_), {}, cells.built_last_time()};
+    found[0].tiles = cells.in_view(views[0], pool_);
+    found[0].built = cells.built_last_time();
     found[0].sonar_from_object.assign(cells.sonar_from_objects().begin(), cells.sonar_from_objects().end());
   } else {
     cells.in_views(views, pool_, found);
@@ -139,9 +143,9 @@ void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
   for (Making& m : all) {
     if (m.request().blank) continue;
     m.looks_at = std::move(views[next]);  // whose levels the tiles refer to, and which lie where they lay
-    m.seen = std::move(found[next++]);
+    m.seen = &found[next++];
     m.ping.statistics.cell_bytes = cells.cached_bytes();
-    m.seconds(m.seen.built > 0 ? Stage::build_cells : Stage::cull) += took;
+    m.seconds(m.seen->built > 0 ? Stage::build_cells : Stage::cull) += took;
   }
 }
 
@@ -151,7 +155,7 @@ void PingPreparer::complete(Making& m, const PingContext& context, int lane, Wor
     const double begin = now();
     m.fits = find_tiles(m, context, lane, worker);
     if (!m.fits) return;
-    m.seconds(m.seen.built > 0 ? Stage::build_cells : Stage::cull) += now() - begin;
+    m.seconds(m.seen->built > 0 ? Stage::build_cells : Stage::cull) += now() - begin;
     add_water(m);
     if (m.plan.spectral) {
       SpectralView& v = m.view.spectral;
@@ -213,10 +217,10 @@ void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std:
 
 bool PingPreparer::find_tiles(Making& m, const PingContext& context, int lane, Worker& worker) {
   // False: the store is full. The caller lets the device finish, empties it and begins this ping again.
-  if (!store_.find(m.seen.tiles, lane, m.room.cells, worker.tile_cells, context.pool)) return false;
-  prepare_tiles(context, m.seen.tiles, m.seen.sonar_from_object, worker.tiles);
-  m.ping.statistics.tiles = m.seen.tiles.size();
-  m.ping.statistics.tiles_built = m.seen.built;
+  if (!store_.find(m.seen->tiles, lane, m.room.cells, worker.tile_cells, context.pool)) return false;
+  prepare_tiles(context, m.seen->tiles, m.seen->sonar_from_object, worker.tiles);
+  m.ping.statistics.tiles = m.seen->tiles.size();
+  m.ping.statistics.tiles_built = m.seen->built;
   lay_out_tiles(m, worker, context.pool);
   return true;
 }

@@ -21,13 +21,22 @@
 
 namespace sonar::cuda {
 
+/// A ping that was asked for, until it is taken.
+struct WantedPing {
+  enum class State { open, under_way, done };
+  PingRequest request;
+  Ping ping = {};
+  PingStatistics statistics = {};
+  State state = State::open;
+};
+
 /// A batch's place: its memory, its lane, its pings.
 struct BatchRoom {
   BatchRoom(Machine& machine, int which_lane, std::size_t most_pings);
 
   struct Ping {
-    sonar::Ping ping;   // sized, not filled
-    std::size_t index;  // of its request
+    sonar::Ping ping;  // sized, not filled
+    WantedPing* wanted;
     std::shared_ptr<const PlanTables> plan;
     Arena::Slice<std::uint8_t> codes;
     Arena::Slice<float> pressure, beams;
@@ -39,6 +48,7 @@ struct BatchRoom {
   Arena tables, work, results, cells;
   std::vector<PingView> views;
   std::vector<Ping> pings;
+  bool launched = false;
 
   /// All that a batch fills.
   std::array<Arena*, 4> arenas() { return {&tables, &work, &results, &cells}; }
@@ -53,8 +63,7 @@ struct BatchRoom {
 
 /// A ping that is to be added to a batch.
 struct AskedPing {
-  const PingRequest* request;
-  std::size_t index;
+  WantedPing* wanted;
   std::shared_ptr<PlanTables> plan;
 };
 
@@ -106,7 +115,8 @@ class PingPreparer {
   TracerView tracer_;
   CellStore store_;
   MultipathWork multipath_;
-  std::vector<Worker> workers_;  // by number of the thread
+  std::vector<CellsInView> found_;  // of the pings that are being added
+  std::vector<Worker> workers_;     // by number of the thread
 };
 
 }  // namespace sonar::cuda

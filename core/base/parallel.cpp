@@ -1,5 +1,6 @@
 #include "core/base/parallel.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <exception>
@@ -16,8 +17,7 @@ struct Parallel::Pool {
   std::mutex mutex;
   std::condition_variable start, finished;
   std::vector<std::thread> workers;
-  std::uint64_t round = 0;
-  int busy = 0;
+  int free_places = 0, busy = 0;  // of the round: workers that it still has work for, that are at it
   bool stop = false;
 
   std::atomic<std::size_t> next{0};
@@ -44,13 +44,13 @@ struct Parallel::Pool {
     // On Linux niceness belongs to the thread; a refusal costs only smoothness.
     if (nice_by != 0 && ::nice(nice_by) == -1) {
     }
-    std::uint64_t seen = 0;
     while (true) {
       {
         std::unique_lock lock(mutex);
-        start.wait(lock, [&] { return stop || round != seen; });
+        start.wait(lock, [&] { return stop || free_places > 0; });
         if (stop) return;
-        seen = round;
+        --free_places;
+        ++busy;
       }
       run_items(worker);
       {
@@ -84,18 +84,19 @@ void Parallel::run(std::size_t count, void* body, Call call) {
     return;
   }
   Pool& p = *pool_;
+  const int places = static_cast<int>(std::min(static_cast<std::size_t>(threads_ - 1), count - 1));
   {
     std::lock_guard lock(p.mutex);
     p.count = count;
     p.body = body;
     p.call = call;
     p.next.store(0, std::memory_order_relaxed);
-    p.busy = threads_ - 1;
-    ++p.round;
+    p.free_places = places;
   }
-  p.start.notify_all();
+  for (int i = 0; i < places; ++i) p.start.notify_one();
   p.run_items(0);
   std::unique_lock lock(p.mutex);
+  p.free_places = 0;  // all items are taken: who has not woken up yet need not
   p.finished.wait(lock, [&] { return p.busy == 0; });
   if (p.fault) std::rethrow_exception(std::exchange(p.fault, nullptr));
 }

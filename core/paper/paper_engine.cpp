@@ -1,5 +1,7 @@
 #include "core/paper/paper_engine.hpp"
 
+#include <algorithm>
+#include <deque>
 #include <functional>
 #include <stdexcept>
 #include <utility>
@@ -76,6 +78,22 @@ class ModeRouter final : public PingEngine {
     return pings;
   }
 
+  void submit(std::span<const PingRequest> requests) override {
+    passed_on_.push_back(std::all_of(requests.begin(), requests.end(), is_canonical));
+    passed_on_.back() ? canonical_->submit(requests) : PingEngine::submit(requests);
+  }
+  std::vector<Ping> collect() override {
+    const bool passed_on = passed_on_.front();
+    passed_on_.pop_front();
+    if (!passed_on) return PingEngine::collect();
+    std::vector<Ping> pings = canonical_->collect();
+    each_ = canonical_->statistics_of_each();
+    last_was_canonical_ = true;
+    return pings;
+  }
+  std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
+    return is_canonical(a) && is_canonical(b) ? canonical_->most_together(a, b) : 1;
+  }
   void set_interruption(Interruption* interruption) override { canonical_->set_interruption(interruption); }
   std::string description() const override { return canonical_->description(); }
   PingStatistics statistics() const override {
@@ -89,6 +107,7 @@ class ModeRouter final : public PingEngine {
   std::unique_ptr<PingEngine> canonical_;
   std::function<std::unique_ptr<ComparisonEngine>()> make_comparison_;
   std::unique_ptr<ComparisonEngine> comparison_;  // made for its first ping: it needs a scene of rays of its own
+  std::deque<bool> passed_on_;                    // of what was submitted: to the canonical engine
   std::vector<PingStatistics> each_;              // of the last run
   bool last_was_canonical_ = true;
 };

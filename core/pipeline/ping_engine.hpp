@@ -3,12 +3,14 @@
 
 #include <array>
 #include <cstddef>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/base/parallel.hpp"
@@ -59,13 +61,30 @@ class PingEngine {
   /// A request that cannot be simulated (why_invalid in core/pipeline/check_request.hpp) throws std::invalid_argument with the
   /// reason. One caller at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
+  /// run() in two halves: an engine with a device of its own works on the requests while its caller uses the pings of an earlier
+  /// submit(). Requests are copied; what run() would throw for them, collect() throws.
+  virtual void submit(std::span<const PingRequest> requests) { submitted_.emplace_back(requests.begin(), requests.end()); }
+  /// The pings of the oldest submit() that was not collected; there must be one.
+  virtual std::vector<Ping> collect() {
+    const std::vector<PingRequest> requests = std::move(submitted_.front());
+    submitted_.pop_front();
+    return run(requests);
+  }
+  /// How many requests that are like these two one run() computes sooner than several; 1 = none, or one of the two would take
+  /// much longer beside the other than alone.
+  virtual std::size_t most_together(const PingRequest& a, const PingRequest& b) const {
+    return static_cast<void>(a), static_cast<void>(b), 1;
+  }
   /// Engines that cannot be interrupted ignore it. Null = none; no ping may be under way.
   virtual void set_interruption(Interruption* interruption) { static_cast<void>(interruption); }
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
   /// Of the last ping.
   virtual PingStatistics statistics() const { return {}; }
-  /// Of every ping of the last run(), in its order.
+  /// Of every ping of the last run() or collect(), in its order.
   virtual std::vector<PingStatistics> statistics_of_each() const { return {statistics()}; }
+
+ private:
+  std::deque<std::vector<PingRequest>> submitted_;  // of engines that compute when they are collected from
 };
 
 /// Builds the acceleration structures; the pool must outlive the engine.

@@ -13,7 +13,6 @@ namespace {
 using nlohmann::json;
 
 constexpr double published_reference_ms = 36;  // a frame, P1's size: IOES-Lab/dave, issue 44; on a device of its author's
-constexpr int calls_in_batches = 4;            // batches in one call: two are under way at a time
 constexpr double most_warm_up_s = 1, most_rounds_s = 3;  // of one size of a batch; less for few pings
 constexpr std::size_t rounds = 5;
 
@@ -32,11 +31,11 @@ struct BatchRate {
 };
 
 /// Warm: an idle device runs at a fraction of its clock and takes about a second to rise. Then the median of several rounds.
-double rate(PingEngine& engine, Pinger& pinger, const std::vector<PingRequest>& requests, std::size_t a_call) {
+double rate(PingEngine& engine, Parallel& pool, Pinger& pinger, const std::vector<PingRequest>& requests, std::size_t batch) {
   const auto round = [&] {
-    double seconds = 0;
-    for (std::size_t i = 0; i < requests.size(); i += a_call)
-      seconds += pinger.fire(engine, std::span(requests).subspan(i, std::min(a_call, requests.size() - i)));
+    if (batch > 1) return pinger.fire(engine, pool, requests, batch);
+    double seconds = 0;  // one ping at a time, as a driver asks for them
+    for (const PingRequest& request : requests) seconds += pinger.fire(engine, request);
     return seconds;
   };
   const double share = std::min(1.0, static_cast<double>(requests.size()) / 100);
@@ -50,17 +49,17 @@ double rate(PingEngine& engine, Pinger& pinger, const std::vector<PingRequest>& 
 
 Result<BatchRate> rate_of(const ScenePointer& scene, Parallel& pool, Pinger& pinger, const std::vector<PingRequest>& requests,
                           int batch, const BenchOptions& options) {
-  const std::size_t a_call = static_cast<std::size_t>(batch == 1 ? 1 : calls_in_batches * batch);
+  const auto a_call = static_cast<std::size_t>(batch);
   auto engine = engine_of(scene, pool, options, batch, false);
   if (!engine) return tl::make_unexpected(engine.error());
   BatchRate found;
-  found.pings_per_second = rate(**engine, pinger, requests, a_call);
+  found.pings_per_second = rate(**engine, pool, pinger, requests, a_call);
   engine->reset();  // its memory is the next one's
   engine = engine_of(scene, pool, options, batch, true);
   if (!engine) return tl::make_unexpected(engine.error());
-  const auto few = std::span(requests).first(std::min(requests.size(), 2 * a_call));
-  pinger.fire(**engine, few);
-  pinger.fire(**engine, few);
+  const auto few = std::span(requests).first(std::min(requests.size(), 8 * a_call));
+  pinger.fire(**engine, pool, few, few.size());
+  pinger.fire(**engine, pool, few, few.size());
   const std::vector<PingStatistics> each = (*engine)->statistics_of_each();
   const auto mean_ms = [&](std::initializer_list<Stage> stages) {
     double seconds = 0;

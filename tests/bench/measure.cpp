@@ -99,10 +99,18 @@ double Pinger::fire(PingEngine& engine, const PingRequest& request, Ping* ping) 
   return end - begin;
 }
 
-double Pinger::fire(PingEngine& engine, std::span<const PingRequest> requests) {
+double Pinger::fire(PingEngine& engine, Parallel& pool, std::span<const PingRequest> requests, std::size_t a_call) {
   const double begin = now_s();
-  for (const Ping& ping : engine.run(requests))
-    if (case_.profile.vendor) static_cast<void>(case_.profile.vendor->frame(ping, device_));
+  const auto collect = [&] {
+    const std::vector<Ping> pings = engine.collect();
+    if (!case_.profile.vendor) return;
+    pool.for_each(pings.size(), [&](std::size_t i, int) { static_cast<void>(case_.profile.vendor->frame(pings[i], device_)); });
+  };
+  for (std::size_t i = 0; i < requests.size(); i += a_call) {
+    engine.submit(requests.subspan(i, std::min(a_call, requests.size() - i)));
+    if (i > 0) collect();
+  }
+  collect();
   return now_s() - begin;
 }
 

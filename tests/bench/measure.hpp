@@ -60,8 +60,8 @@ class Pinger {
   /// Seconds it took; `ping` gets the picture when it is wanted.
   double fire(PingEngine& engine, const PingRequest& request, Ping* ping = nullptr);
   double last_frame_s() const { return frame_s_; }
-  /// Seconds that all of them took in one call, framed too.
-  double fire(PingEngine& engine, std::span<const PingRequest> requests);
+  /// Seconds that all of them took, `a_call` submitted at a time and framed side by side while the engine is at the next ones.
+  double fire(PingEngine& engine, Parallel& pool, std::span<const PingRequest> requests, std::size_t a_call);
   const Switches& switches() const { return config_.engine.switches; }
   const SonarModel& model() const { return *model_; }
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "core/pipeline/pulses/spectral_transform.hpp"
@@ -57,6 +58,19 @@ class LostDevice : public ::testing::Test {
     device.say = [this](const std::string& what) { said_.push_back(what); };
     return cuda::make_device_engine(scene_, pool_, options_, std::make_unique<FailingMachine>(calls_, last_call), device);
   }
+  /// In calls of two, each submitted before the one before it is collected.
+  static std::vector<Ping> pipelined(PingEngine& engine, std::span<const PingRequest> requests) {
+    std::vector<Ping> pings;
+    const auto collect = [&] {
+      for (Ping& ping : engine.collect()) pings.push_back(std::move(ping));
+    };
+    for (std::size_t i = 0; i < requests.size(); i += 2) {
+      engine.submit(requests.subspan(i, std::min<std::size_t>(2, requests.size() - i)));
+      if (i > 0) collect();
+    }
+    collect();
+    return pings;
+  }
   Parallel pool_{1};
   EngineOptions options_{.simd = SimdLevel::portable, .now_s = no_time};
   std::shared_ptr<const Scene> scene_;
@@ -92,6 +106,29 @@ TEST_F(LostDevice, IsReplacedByTheCpuFromThePingItLost) {
     EXPECT_EQ(said_[0], "the CUDA engine stopped: the device is lost; from here on the CPU computes");
     EXPECT_THAT(lost->description(), StartsWith("cpu, after a failure of a device that fails"));
   }
+}
+
+// Calls that were collected are the device's, all others the CPU's.
+TEST_F(LostDevice, LosesNoPingOfCallsThatAreUnderWay) {
+  const int first = (engine(never, true), calls_);
+  const auto sound = engine(never, true);
+  const std::vector<Ping> there = pipelined(*sound, requests_);
+  const int all = calls_;
+  std::size_t most = 0;
+  for (int last = first; last < all; ++last) {
+    const auto lost = engine(last, true);
+    const auto pings = pipelined(*lost, requests_);
+    ASSERT_EQ(pings.size(), requests_.size());
+    std::size_t collected = 0;
+    while (collected < pings.size() && pings[collected].samples == there[collected].samples) ++collected;
+    most = std::max(most, collected);
+    for (std::size_t i = collected; i < pings.size(); ++i)
+      ASSERT_EQ(pings[i].samples, samples_[i]) << "lost at " << last << ", ping " << i;
+    ASSERT_EQ(said_.size(), 1u) << last;
+    const auto end = engine(last, false);
+    EXPECT_THROW(pipelined(*end, requests_), EngineUnavailable) << last;
+  }
+  EXPECT_GE(most, 4u) << "two calls of two were not collected before the last was";
 }
 
 TEST_F(LostDevice, IsTheEndWhereNothingMayTakeItsPlace) {
@@ -141,7 +178,8 @@ TEST_F(LostDevice, IsNotWhatAFullOneIs) {
     const auto full = cuda::make_device_engine(scene_, pool_, options_, std::move(machine), device);
     try {
       for (int again = 0; again < 2; ++again) {
-        const auto pings = full->run(requests_);
+        const auto pings = again > 0 ? pipelined(*full, requests_) : full->run(requests_);
+        ASSERT_EQ(pings.size(), there.size());
         for (std::size_t i = 0; i < pings.size(); ++i) EXPECT_EQ(pings[i].samples, there[i].samples) << room_bytes << ", " << i;
       }
       all_fit = said_.empty();

@@ -2,7 +2,9 @@
 // and no step reads what none has written.
 #include <gtest/gtest.h>
 
+#include <iterator>
 #include <set>
+#include <stdexcept>
 
 #include "tests/core/pipeline/basin.hpp"
 #include "tests/cuda/comparing.hpp"
@@ -112,6 +114,90 @@ TEST(DeferringDevice, FindsEverythingAsItWasQueued) {
   const auto there = pings_of(cuda::make_host_loops(), scene, all);
   for (const auto& options : {cuda::DeviceEngineOptions{.cell_bytes = 1, .batch = 2}, cuda::DeviceEngineOptions{.batch = 5}})
     expect_same(there, pings_of(std::make_unique<DeferringMachine>(), scene, all, options));
+}
+
+// Of several sonars, in calls of every size, one after the other and submitted before the one before it is collected.
+class Grouped : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(Grouped, MakesTheSameBytes) {
+  const auto scene = basin();
+  std::vector<PingRequest> all = requests();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    all[i].sonar_id = static_cast<std::uint32_t>(i % 3);
+    all[i].switches.multipath = false;
+  }
+  for (const std::size_t again : {0u, 2u}) all.push_back(PingRequest(all[again]));
+  const std::vector<Ping> there = pings_of(cuda::make_host_loops(), scene, all, {.batch = 1});
+  Parallel pool(2);
+  const auto engine = cuda::make_device_engine(scene, pool, {.simd = SimdLevel::portable}, std::make_unique<DeferringMachine>(),
+                                               {.batch = 2, .cpu_after_failure = false});
+  for (const bool pipelined : {false, true}) {
+    std::vector<Ping> pings;
+    const auto add = [&](std::vector<Ping> more) {
+      EXPECT_EQ(engine->statistics_of_each().size(), more.size());
+      std::move(more.begin(), more.end(), std::back_inserter(pings));
+    };
+    std::size_t under_way = 0;
+    for (std::span<const PingRequest> left = all; !left.empty();) {
+      const auto some = left.first(std::min(GetParam(), left.size()));
+      left = left.subspan(some.size());
+      if (!pipelined) {
+        add(engine->run(some));
+        continue;
+      }
+      engine->submit(some);
+      if (++under_way < 3) continue;
+      add(engine->collect());
+      --under_way;
+    }
+    for (; under_way > 0; --under_way) add(engine->collect());
+    expect_same(there, pings);
+  }
+}
+INSTANTIATE_TEST_SUITE_P(BySize, Grouped, ::testing::Values(1, 3), ::testing::PrintToStringParamName());
+
+TEST(DeviceEngine, TakesPingsOfOneSizeTogether) {
+  Parallel two(2), many(16);
+  const auto scene = basin();
+  const auto most = [&](Parallel& pool, const PingRequest& a, const PingRequest& b, int batch = 4) {
+    return cuda::make_device_engine(scene, pool, {}, cuda::make_host_loops(), {.batch = batch})->most_together(a, b);
+  };
+  PingRequest a = requests().at(1);
+  a.switches.multipath = false;
+  PingRequest b = a;
+  b.sonar_id = 7;
+  EXPECT_EQ(most(two, a, b), 2u);
+  EXPECT_EQ(most(many, a, b), 4u);
+  EXPECT_EQ(most(many, a, b, 0), 16u);
+  EXPECT_EQ(make_cpu_engine(scene, two)->most_together(a, b), 1u);
+  b.settings.beam_count *= 3;
+  EXPECT_EQ(most(many, a, b), 1u) << "one would wait for the other";
+  b = a;
+  b.switches.fixed_fan = 40;
+  EXPECT_EQ(most(many, a, b), 1u) << "the CPU computes it";
+  b = a;
+  b.switches.multipath = true;
+  EXPECT_EQ(most(many, a, b), 1u);
+}
+
+TEST(DeferringDevice, AnswersACallBesideThoseThatAreUnderWay) {
+  const auto scene = basin();
+  const std::vector<PingRequest> all = requests();
+  const std::span<const PingRequest> first(all.data(), 2), second(all.data() + 2, 3);
+  Parallel pool(1);
+  const auto engine = cuda::make_device_engine(scene, pool, {.simd = SimdLevel::portable}, std::make_unique<DeferringMachine>(),
+                                               {.batch = 2, .cpu_after_failure = false});
+  PingRequest wrong = all[0];
+  wrong.settings.beam_count = 0;
+  engine->submit(first);
+  engine->submit({&wrong, 1});
+  const std::vector<Ping> between = engine->run(second);
+  engine->submit(second);
+  const std::vector<Ping> collected = engine->collect();
+  EXPECT_THROW(engine->collect(), std::invalid_argument);
+  EXPECT_THROW(engine->run({&wrong, 1}), std::invalid_argument);
+  expect_same(between, engine->collect());
+  expect_same(collected, engine->run(first));
 }
 
 }  // namespace

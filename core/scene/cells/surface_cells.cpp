@@ -55,6 +55,8 @@ Cube cube_of(const TileAddress& a) {
 }
 bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lattice::may_touch(f, c.u, c.v, c.w, c.half); }
 
+bool is_empty(const TileInView& t) { return t.tile->count == 0; }
+
 /// The finest level at which few enough cubes cover the triangles.
 int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles) {
   Vec3 lo = mesh.vertices[mesh.triangles[triangles.front()][0]], hi = lo;
@@ -219,8 +221,8 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
     const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
     if (!overlaps) continue;
     if (level.level == node.address.level) {
-      found.wanted.push_back(&node);
-      found.in_view.push_back({&node.tile, &level, q, p, patch.object});
+      if (!node.built) found.missing.push_back(&node);
+      if (!node.built || node.tile.count > 0) found.in_view.push_back({&node.tile, &level, q, p, patch.object});
     } else if (level.level > node.address.level) {
       finer = true;
     }
@@ -240,11 +242,11 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
     if (child) visit(patch, *child, look, found);
 }
 
-void SurfaceCells::prepare(const CellView& view, Look& look) {
+void SurfaceCells::prepare(const CellView& view, std::uint64_t number, Look& look) const {
   assert(!view.levels.empty());
   const std::size_t objects = scene_->objects.size();
   look.view = &view;
-  look.number = ++now_;
+  look.number = number;
   look.fan_cosine = std::cos(static_cast<double>(view.max_elevation_rad));
   look.fan_sine = std::sin(static_cast<double>(view.max_elevation_rad));
   look.rotations.resize(objects);
@@ -257,7 +259,7 @@ void SurfaceCells::prepare(const CellView& view, Look& look) {
 
 void SurfaceCells::look_through(const Look& look, std::size_t from, std::size_t to, Found& found) {
   found.in_view.clear();
-  found.wanted.clear();
+  found.missing.clear();
   found.new_bytes = 0;
   for (std::size_t r = from; r < to; ++r) visit(*roots_[r].patch, *roots_[r].node, look, found);
 }
@@ -277,7 +279,7 @@ void SurfaceCells::build(std::vector<Node*>& missing, Parallel& pool) {
 const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
   // Stretches of roots side by side; what each finds stays apart, so that the order does not depend on who looked.
   constexpr std::size_t stretch = 16;
-  prepare(view, looked_);
+  prepare(view, ++now_, looked_);
   found_.resize((roots_.size() + stretch - 1) / stretch);
   pool.for_each(found_.size(), [&](std::size_t s, int) {
     look_through(looked_, s * stretch, std::min(roots_.size(), (s + 1) * stretch), found_[s]);
@@ -287,31 +289,34 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
   for (const Found& found : found_) {
     cached_bytes_ += found.new_bytes;
     in_view_.insert(in_view_.end(), found.in_view.begin(), found.in_view.end());
-    for (Node* node : found.wanted)
-      if (!node->built) missing.push_back(node);
+    missing.insert(missing.end(), found.missing.begin(), found.missing.end());
   }
   build(missing, pool);
   built_ = missing.size();
   keep_within_budget();
 
-  std::erase_if(in_view_, [](const TileInView& t) { return t.tile->count == 0; });
+  if (!missing.empty()) std::erase_if(in_view_, is_empty);
   return in_view_;
 }
 
 void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std::span<CellsInView> found) {
   assert(found.size() == views.size());
   const std::uint64_t first = now_ + 1;
+  now_ += views.size();
   looks_.resize(views.size());
   found_.resize(views.size());
-  for (std::size_t v = 0; v < views.size(); ++v) prepare(views[v], looks_[v]);
-  pool.for_each(views.size(), [&](std::size_t v, int) { look_through(looks_[v], 0, roots_.size(), found_[v]); });
+  pool.for_each(views.size(), [&](std::size_t v, int) {
+    found_[v].in_view.swap(found[v].tiles);  // as much room as it had the last time
+    prepare(views[v], first + v, looks_[v]);
+    look_through(looks_[v], 0, roots_.size(), found_[v]);
+    found[v].tiles.swap(found_[v].in_view);
+    found[v].sonar_from_object = looks_[v].rotations;
+  });
   std::vector<Node*> missing;
   for (std::size_t v = 0; v < views.size(); ++v) {
     cached_bytes_ += found_[v].new_bytes;
-    const std::size_t before = missing.size();
-    for (Node* node : found_[v].wanted)
-      if (!node->built) missing.push_back(node);
-    found[v].built = missing.size() - before;
+    missing.insert(missing.end(), found_[v].missing.begin(), found_[v].missing.end());
+    found[v].built = found_[v].missing.size();
   }
   std::sort(missing.begin(), missing.end());
   missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
@@ -321,11 +326,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
   kept_since_ = kept > 0 ? std::min(kept, first) : first;
   keep_within_budget();
   kept_since_ = kept;
-  pool.for_each(views.size(), [&](std::size_t v, int) {
-    found[v].tiles.assign(found_[v].in_view.begin(), found_[v].in_view.end());
-    std::erase_if(found[v].tiles, [](const TileInView& t) { return t.tile->count == 0; });
-    found[v].sonar_from_object = looks_[v].rotations;
-  });
+  pool.for_each(missing.empty() ? 0 : views.size(), [&](std::size_t v, int) { std::erase_if(found[v].tiles, is_empty); });
 }
 
 /// Forgets what was not looked at for longest; it comes back identical when wanted again.

@@ -123,7 +123,7 @@ class SurfaceCells {
   };
   struct Found {  // by those who look through some of the roots
     std::vector<TileInView> in_view;
-    std::vector<Node*> wanted;  // the nodes of in_view
+    std::vector<Node*> missing;  // those of them without a tile
     std::size_t new_bytes = 0;
   };
   struct Look {  // a view as the cubes are compared with it
@@ -133,7 +133,7 @@ class SurfaceCells {
     std::vector<Pose> sonar_in_object;    // per object
     std::vector<Rotation> rotations;
   };
-  void prepare(const CellView& view, Look& look);
+  void prepare(const CellView& view, std::uint64_t number, Look& look) const;
   /// Through the roots [from, to).
   void look_through(const Look& look, std::size_t from, std::size_t to, Found& found);
   void visit(SurfacePatch& patch, Node& node, const Look& look, Found& found);

@@ -69,34 +69,101 @@ Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, con
   return folder.size_of(made.number);
 }
 
-/// Makes the pings in one go, which is what a device wants; the CPU takes them one after the other, each by all threads. They are
-/// written side by side.
-Result<void> render_batch(const RenderJob& job, PingEngine& engine, const OutputFolder& folder, Parallel& pool,
-                          std::vector<MadePing>& batch, Progress& progress) {
-  std::vector<PingRequest> requests;
-  for (const MadePing& made : batch) requests.push_back(made.request);
-  std::vector<Ping> pings = engine.run(requests);
-  const std::vector<PingStatistics> counts = engine.statistics_of_each();
-  for (std::size_t i = 0; i < batch.size(); ++i) {
-    batch[i].ping = std::move(pings.at(i));
-    batch[i].count = counts.at(i);
-  }
-  const std::string description = engine.description();  // of all: what a device that fails had begun is made again
-  pool.for_each(batch.size(), [&](std::size_t i, int) { batch[i].written = write_ping(job, batch[i], description, folder); });
-  for (const MadePing& made : batch) {
-    if (!made.written) return tl::make_unexpected(made.written.error());
-    progress.bytes += *made.written;
-  }
-  batch.clear();
-  return {};
-}
-
 Result<std::unique_ptr<PingEngine>> engine_for(const RenderJob& job, Parallel& pool) {
   const auto make = [&](std::shared_ptr<const Scene> s) {
     return choose_engine(job.config.engine.device, std::move(s), pool, {.simd = job.config.engine.simd},
                          [](const std::string& what) { std::fprintf(stderr, "sonard: %s\n", what.c_str()); });
   };
   return start_engine(make, job.scene);
+}
+
+/// The pings of one job, in batches. A batch comes in one go, which is what a device wants; the CPU takes them one after the
+/// other, each by all threads. While a batch is written, its pings side by side, the device is at the next.
+class JobRun {
+ public:
+  JobRun(const std::string& source, const RenderJob& job, const OutputFolder& folder, Parallel& pool, Progress& progress,
+         const std::function<void(const Progress&)>& on_progress)
+      : source_(source), job_(job), folder_(folder), pool_(pool), progress_(progress), on_progress_(on_progress) {}
+
+  Result<void> make(std::uint64_t number, PingRequest request) {
+    batch_.push_back({number, std::move(request), {}, {}, {}});
+    return batch_.size() < static_cast<std::size_t>(folder_.options().batch) ? Result<void>{} : take_turns();
+  }
+  /// One that is there already ends a batch.
+  Result<void> keep() {
+    if (!batch_.empty())
+      if (auto done = take_turns(); !done) return done;
+    ++progress_.kept;
+    ++progress_.done;
+    on_progress_(progress_);
+    return {};
+  }
+  Result<void> finish() {
+    auto done = batch_.empty() ? Result<void>{} : take_turns();
+    return done ? take_turns() : done;
+  }
+
+ private:
+  /// Submits the batch and writes the one before.
+  Result<void> take_turns() {
+    try {
+      if (!batch_.empty())
+        if (auto begun = submit(); !begun) return begun;
+      std::swap(batch_, under_way_);
+      return batch_.empty() ? Result<void>{} : write();
+    } catch (const std::invalid_argument& refused) {
+      return failure(ErrorKind::config, source_ + ": " + refused.what());
+    } catch (const EngineUnavailable& gone) {
+      return failure(ErrorKind::unavailable, gone.what());
+    }
+  }
+  Result<void> submit() {
+    if (!engine_) {  // not before it is needed: a finished folder costs no scene
+      auto started = engine_for(job_, pool_);
+      if (!started) return tl::make_unexpected(started.error());
+      engine_ = *std::move(started);
+    }
+    std::vector<PingRequest> requests;
+    for (const MadePing& made : batch_) requests.push_back(made.request);
+    engine_->submit(requests);
+    return {};
+  }
+  Result<void> write() {
+    std::vector<Ping> pings = engine_->collect();
+    const std::vector<PingStatistics> counts = engine_->statistics_of_each();
+    for (std::size_t i = 0; i < batch_.size(); ++i) {
+      batch_[i].ping = std::move(pings.at(i));
+      batch_[i].count = counts.at(i);
+    }
+    const std::string description = engine_->description();  // of all: what a device that fails had begun is made again
+    pool_.for_each(batch_.size(),
+                   [&](std::size_t i, int) { batch_[i].written = write_ping(job_, batch_[i], description, folder_); });
+    for (const MadePing& made : batch_) {
+      if (!made.written) return tl::make_unexpected(made.written.error());
+      progress_.bytes += *made.written;
+    }
+    progress_.done += batch_.size();
+    batch_.clear();
+    on_progress_(progress_);
+    return {};
+  }
+
+  const std::string& source_;
+  const RenderJob& job_;
+  const OutputFolder& folder_;
+  Parallel& pool_;
+  Progress& progress_;
+  const std::function<void(const Progress&)>& on_progress_;
+  std::unique_ptr<PingEngine> engine_;
+  std::vector<MadePing> batch_, under_way_;  // that is filled, or written; that the engine is at
+};
+
+PingRequest request_of(const RenderJob& job, const World& world, std::uint64_t number, Time at, const OutputOptions& o) {
+  PingRequest request = make_request(job, world, PingNumber{static_cast<std::uint32_t>(number)}, at);
+  request.switches.keep_pressure = o.npy;
+  request.switches.keep_beams = o.complex;
+  request.switches.keep_truth = true;
+  return request;
 }
 
 }  // namespace
@@ -166,47 +233,17 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
   }
   const auto folder = OutputFolder::claim(input, o, digest_of(input, o.rate_hz.value_or(0), o.png && !o.rings));
   if (!folder) return tl::make_unexpected(folder.error());
+  std::uint64_t number = o.first;
   for (std::size_t j = 0; j < input.jobs.size(); ++j) {
     const RenderJob& job = input.jobs[j];
     const World world = world_of(job);
-    std::unique_ptr<PingEngine> engine;  // not before it is needed: a finished folder costs no scene
-    std::vector<MadePing> batch;
-    for (std::size_t i = 0; i < times[j].size(); ++i) {
-      const std::uint64_t number = o.first + progress.done + batch.size();
-      const bool is_there = folder->holds(number);
-      if (!is_there) {
-        MadePing& made = batch.emplace_back();
-        made.number = number;
-        made.request = make_request(job, world, PingNumber{static_cast<std::uint32_t>(number)}, times[j][i]);
-        made.request.switches.keep_pressure = o.npy;
-        made.request.switches.keep_beams = o.complex;
-        made.request.switches.keep_truth = true;
-      }
-      const bool full = batch.size() >= static_cast<std::size_t>(o.batch) || i + 1 == times[j].size() || is_there;
-      if (full && !batch.empty()) {
-        if (!engine) {
-          auto started = engine_for(job, pool);
-          if (!started) return tl::make_unexpected(started.error());
-          engine = *std::move(started);
-        }
-        const std::size_t made = batch.size();
-        try {
-          if (auto done = render_batch(job, *engine, *folder, pool, batch, progress); !done)
-            return tl::make_unexpected(done.error());
-        } catch (const std::invalid_argument& refused) {
-          return failure(ErrorKind::config, input.source + ": " + refused.what());
-        } catch (const EngineUnavailable& gone) {
-          return failure(ErrorKind::unavailable, gone.what());
-        }
-        progress.done += made;
-        on_progress(progress);
-      }
-      if (is_there) {
-        ++progress.kept;
-        ++progress.done;
-        on_progress(progress);
-      }
+    JobRun run(input.source, job, *folder, pool, progress, on_progress);
+    for (const Time at : times[j]) {
+      const auto done = folder->holds(number) ? run.keep() : run.make(number, request_of(job, world, number, at, o));
+      if (!done) return tl::make_unexpected(done.error());
+      ++number;
     }
+    if (const auto done = run.finish(); !done) return tl::make_unexpected(done.error());
   }
   return progress;
 }

@@ -66,13 +66,22 @@ void Simulator::work_off() {
       change_engine(std::move(job));
       continue;
     }
-    const auto next = next_to_run();
-    Job job = std::move(*next);
-    waiting_.erase(next);
-    simulate(std::move(job));
+    simulate(take_together());
     queue_.poll();  // requests that arrived meanwhile take part in the choice
   }
   working_ = false;
+}
+
+/// The next, and those after it that go with it. None waits for others to come.
+std::vector<Simulator::Job> Simulator::take_together() {
+  std::vector<Job> jobs;
+  while (!waiting_.empty() && !waiting_.front().engine) {
+    const auto next = next_to_run();
+    if (!jobs.empty() && jobs.size() >= engine_->most_together(jobs.front().request, next->request)) break;
+    jobs.push_back(std::move(*next));
+    waiting_.erase(next);
+  }
+  return jobs;
 }
 
 /// Who has had least, of those whose requests are for the present engine; of equals who has waited longest.
@@ -89,7 +98,8 @@ void Simulator::run_other() {
   if (under_way_ > 1 || waiting_.empty() || waiting_.front().engine) return;
   const auto next = next_to_run();
   if (!turns_.goes_first(next->request.sonar_id, running_, seconds_since(running_since_) - let_in_s_)) return;
-  Job job = std::move(*next);
+  std::vector<Job> job;
+  job.push_back(std::move(*next));
   waiting_.erase(next);
   const auto begin = Steady::now();
   const auto since = running_since_;
@@ -101,22 +111,41 @@ void Simulator::run_other() {
   let_in_s_ = let_in_s + seconds_since(begin);
 }
 
-void Simulator::simulate(Job job) {
-  const std::uint32_t sonar = job.request.sonar_id;
-  turns_.begin(sonar);
-  running_ = sonar;
+/// Several only with an engine that computes them together: the time counts for each of them with its share.
+void Simulator::simulate(std::vector<Job> jobs) {
+  for (const Job& job : jobs) turns_.begin(job.request.sonar_id);
+  running_ = jobs.front().request.sonar_id;
   running_since_ = Steady::now();
   let_in_s_ = 0;
   ++under_way_;
-  Outcome outcome = run(job.request);
+  std::vector<Outcome> outcomes = run(jobs);
   --under_way_;
-  outcome.seconds = seconds_since(running_since_) - let_in_s_;
-  turns_.end(sonar, outcome.seconds);
-  asio::post(io_, [this, outcome = std::move(outcome), done = std::move(job.done), stays = std::move(job.io_stays)]() mutable {
-    --unanswered_;
-    begun_ = Steady::now();
-    done(std::move(outcome));
-  });
+  const double share_s = (seconds_since(running_since_) - let_in_s_) / static_cast<double>(jobs.size());
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    outcomes[i].seconds = share_s;
+    turns_.end(jobs[i].request.sonar_id, share_s);
+    asio::post(io_, [this, outcome = std::move(outcomes[i]), done = std::move(jobs[i].done),
+                     stays = std::move(jobs[i].io_stays)]() mutable {
+      --unanswered_;
+      begun_ = Steady::now();
+      done(std::move(outcome));
+    });
+  }
+}
+
+std::vector<Simulator::Outcome> Simulator::run(const std::vector<Job>& jobs) {
+  if (jobs.size() == 1) return {run(jobs[0].request)};
+  std::vector<Outcome> outcomes(jobs.size());
+  std::vector<PingRequest> requests;
+  for (const Job& job : jobs) requests.push_back(job.request);
+  try {
+    std::vector<Ping> pings = engine_->run(requests);
+    for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i].ping = std::make_shared<const Ping>(std::move(pings.at(i)));
+    return outcomes;
+  } catch (const std::exception&) {  // of one of them: the others get theirs, and it its reason
+  }
+  for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i] = run(requests[i]);
+  return outcomes;
 }
 
 Simulator::Outcome Simulator::run(const PingRequest& request) {

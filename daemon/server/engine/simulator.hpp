@@ -1,5 +1,6 @@
 // The simulation thread: one thread that owns the ping engine and computes requests, those of several sonars in turns by the time
-// they take. Requests go over by value, finished pings come back on the I/O thread; nothing else is shared.
+// they take, or together where the engine is faster so (PingEngine::most_together). Requests go over by value, finished pings
+// come back on the I/O thread; nothing else is shared.
 #pragma once
 
 #include <chrono>
@@ -8,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "core/base/result.hpp"
 #include "core/pipeline/ping_engine.hpp"
@@ -51,8 +53,10 @@ class Simulator : private Interruption {
   void arrive(Job job);
   void work_off();
   void change_engine(Job job);
-  void simulate(Job job);
+  void simulate(std::vector<Job> jobs);
+  std::vector<Outcome> run(const std::vector<Job>& jobs);
   Outcome run(const PingRequest& request);
+  std::vector<Job> take_together();
   std::list<Job>::iterator next_to_run();
   bool expected() const override { return turns_.several(); }
   void run_other() override;

@@ -164,6 +164,15 @@ TEST(PaperEngine, ACanonicalPingIsTheCpuEnginesToTheByte) {
   EXPECT_EQ(pings[3].samples, s.last().samples);
   EXPECT_EQ(pings[1].samples, pings[2].samples);
   EXPECT_NE(pings[1].samples, pings[0].samples);
+  // In two halves: calls of either kind come back in their order.
+  const std::span<const PingRequest> all(batch);
+  for (const std::size_t first : {0u, 1u, 3u}) c.engine->submit(all.subspan(first, 1));
+  c.engine->submit(all);
+  for (const std::size_t which : {0u, 1u, 3u}) EXPECT_EQ(c.engine->collect().at(0).samples, pings[which].samples) << which;
+  const std::vector<Ping> again = c.engine->collect();
+  ASSERT_EQ(again.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(again[i].samples, pings[i].samples) << i;
+  EXPECT_EQ(c.engine->statistics_of_each().size(), 4u);
 }
 
 TEST(PaperEngine, SumsAndThreadsDoNotMatter) {

@@ -5,6 +5,7 @@
 
 #include <condition_variable>
 #include <mutex>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -88,6 +89,56 @@ TEST(Simulator, AQuickSonarKeepsItsRateBesideASlowOne) {
   EXPECT_GE(slow_pings, 5);
   EXPECT_GE(quick_pings, 25) << "one after the other they would be 5; the slow one's parts leave room for 100";
   EXPECT_LT(quick_seconds, 0.05);
+}
+
+constexpr std::uint32_t wrong = 99, large = 98;
+
+/// Up to three of a size together; a wrong one spoils the call.
+class Together final : public PingEngine {
+ public:
+  explicit Together(std::vector<std::vector<std::uint32_t>>& calls) : calls_(calls) {}
+  std::vector<Ping> run(std::span<const PingRequest> requests) override {
+    calls_.emplace_back();
+    // Time for the others to arrive.
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    std::vector<Ping> pings(requests.size());
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+      calls_.back().push_back(requests[i].sonar_id);
+      if (requests[i].sonar_id == wrong) throw std::invalid_argument("wrong");
+      pings[i].request = requests[i];
+    }
+    return pings;
+  }
+  std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
+    return a.settings.beam_count == b.settings.beam_count ? 3 : 1;
+  }
+  std::string description() const override { return "together"; }
+
+ private:
+  std::vector<std::vector<std::uint32_t>>& calls_;
+};
+
+TEST(Simulator, GivesAnEngineThatTakesThemTheRequestsOfSeveralSonars) {
+  asio::io_context io;
+  std::vector<std::vector<std::uint32_t>> calls;
+  std::vector<std::uint32_t> answered;
+  {
+    Simulator simulator(io, std::make_unique<Together>(calls), 0);
+    for (const std::uint32_t sonar : {0u, 1u, 2u, 3u, 4u, wrong, large}) {
+      PingRequest request;
+      request.sonar_id = sonar;
+      if (sonar == large) request.settings.beam_count *= 4;
+      simulator.submit(request, [&, sonar](Simulator::Outcome outcome) {
+        EXPECT_EQ(outcome.refused, sonar == wrong);
+        EXPECT_EQ(outcome.failure, sonar == wrong ? "wrong" : "");
+        if (outcome.ping) answered.push_back(outcome.ping->request.sonar_id);
+      });
+    }
+    io.run();
+  }
+  EXPECT_EQ(answered, (std::vector<std::uint32_t>{0, 1, 2, 3, 4, large}));
+  const std::vector<std::vector<std::uint32_t>> expected{{0}, {1, 2, 3}, {4, wrong}, {4}, {wrong}, {large}};
+  EXPECT_EQ(calls, expected) << "two that one of them spoils are tried alone; a large one keeps none waiting";
 }
 
 }  // namespace

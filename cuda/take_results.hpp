@@ -1,0 +1,13 @@
+// What a batch has brought back from the device, as pings.
+#pragma once
+
+#include "cuda/prepare_ping.hpp"
+
+namespace sonar::cuda {
+
+/// Adds the times of a batch's steps to the statistics of its pings, in equal shares.
+void share_times(const StepSeconds& seconds, BatchRoom& room);
+/// Completes the ping that was wanted from its results, which have been downloaded.
+void take_results(BatchRoom::Ping& from, const PingView& view);
+
+}  // namespace sonar::cuda
