@@ -25,7 +25,7 @@ class Listener {
   Listener(const ListenOptions& options, OpenedStream opened)
       : options_(options),
         stream_(std::move(opened.stream)),
-        asked_(stream_.is_blueview() ? std::nullopt : options.source.asked),
+        asked_(stream_.is_oculus() ? options.source.asked : std::nullopt),
         received_(stream_.is_blueview()),
         log_(asked_),
         start_(opened.connected_at) {}
