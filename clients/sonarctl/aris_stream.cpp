@@ -62,12 +62,9 @@ Result<ArisStream> ArisStream::open(Socket commands, const HeadRequest& request)
   if (!frames) return tl::unexpected(frames.error());
   ::setsockopt(frames->fd(), SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
   ArisStream stream(std::move(commands), std::move(*frames));
-  aris::Command command;
-  command.type = aris::CommandType::set_receiver;
-  command.receiver = aris::Receiver{local_port_of(stream.frames_), ""};
-  if (auto sent = stream.send(command); !sent) return tl::unexpected(sent.error());
   // The device does not say what it is, except in beacons that may not come here. It refuses the settings of other products; the
-  // order matters to an ARIS 1800, which also takes those of a 1200.
+  // order matters to an ARIS 1800, which also takes those of a 1200. Frames begin with the receiver.
+  aris::Command command;
   std::uint32_t cookie = 0;
   for (const auto& model : aris::models()) {
     auto acoustics = acoustics_for(aris::product_of(*model), request);
@@ -79,6 +76,10 @@ Result<ArisStream> ArisStream::open(Socket commands, const HeadRequest& request)
     if (auto sent = stream.send(command); !sent) return tl::unexpected(sent.error());
   }
   if (cookie == 0) return failure(ErrorKind::usage, "no ARIS reaches so far: the ARIS 1200 shows up to 100 m");
+  command = {};
+  command.type = aris::CommandType::set_receiver;
+  command.receiver = aris::Receiver{local_port_of(stream.frames_), ""};
+  if (auto sent = stream.send(command); !sent) return tl::unexpected(sent.error());
   return stream;
 }
 

@@ -9,7 +9,7 @@ import unittest
 import tshark as shark
 from aris_controller import BEACONS, COMMANDS, PING, RECEIVER, SALINITY, Beacons, Controller, field, fields
 from pcap_writer import Capture
-from running_sonard import ROOT, Sonard
+from running_sonard import ROOT, SONARCTL, Sonard, run
 
 DISSECTOR = ROOT / "clients/wireshark/aris.lua"
 STARBOARD, PORT = range(0, 64), range(64, 128)  # beam 0 is the right-most
@@ -79,7 +79,7 @@ class ArisLink(unittest.TestCase):
 
     def test_targets_are_where_they_are(self):
         with self.controller() as link:
-            link.set(1)
+            link.set(1, gain=0.0)
             frame = link.frame()
         for (range_m, bearing), beams in ((B, STARBOARD), (C, PORT)):
             near = [b for b in beams if abs(bearing_deg(b) - bearing) < 4]
@@ -151,7 +151,7 @@ class EveryMode(unittest.TestCase):
             with Sonard(scene="l-targets.yaml", profile=profile, pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}") as daemon:
                 with Controller(daemon.address) as link:
                     for cookie, (mode, frequency) in enumerate([(m, f) for m in modes for f in (0, 1)], 1):
-                        link.set(cookie, mode=mode, frequency=frequency, rate=8.0)
+                        link.set(cookie, mode=mode, frequency=frequency, rate=8.0, gain=0.0)  # below full scale
                         frame = link.frame()
                         while frame.u32(680) != cookie:
                             frame = link.frame()
@@ -165,6 +165,44 @@ class EveryMode(unittest.TestCase):
             found_m, beam = frame.brightest(near, range_m - 0.7, range_m + 0.7)
             self.assertAlmostEqual(found_m, range_m, delta=0.1)
             self.assertAlmostEqual(bearing_deg(beam, frame.beams), bearing, delta=0.7 + spacing)
+
+
+class Tools(unittest.TestCase):
+    def test_listen_view_and_a_recording(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with Sonard(profile="aris-1800", more=f"recording: {{folder: {folder}}}") as daemon:
+                control = ("--control", f"{daemon.address}:14770")
+                begun = run(SONARCTL, "recording", "start", "run.aris", *control)
+                self.assertEqual(begun.returncode, 0, begun.stderr)
+                listened = daemon.ctl("listen", "--pings", 5, "--range", 6)
+                self.assertEqual(listened.returncode, 0, listened.stderr)
+                self.assertRegex(listened.stdout, r"x 96  8 bit  6\.\d+ m  1\.8000 MHz")
+                run(SONARCTL, "recording", "stop", *control)
+                picture = pathlib.Path(folder) / "fan.png"
+                viewed = daemon.ctl("view", "--png", picture)
+                self.assertEqual(viewed.returncode, 0, viewed.stderr)
+                self.assertTrue(picture.exists())
+            recorded = (pathlib.Path(folder) / "run.aris").read_bytes()
+        _, frames, beams, samples = (struct.unpack_from("<I", recorded, at)[0] for at in (0, 4, 16, 24))
+        self.assertEqual((recorded[:4], beams), (b"DDF\x05", 96))
+        self.assertEqual(len(recorded), 1024 + frames * (1024 + beams * samples))
+        self.assertGreaterEqual(frames, 5)
+
+    def test_faults_on_purpose(self):
+        with Sonard(scene="l-targets.yaml", profile="aris-3000", arguments=("--faults",)) as daemon:
+            control = ("--control", f"{daemon.address}:14770")
+            with Controller(daemon.address) as link:
+                link.set(1, samples=200)
+                link.frame()
+                run(SONARCTL, "fault", "add", "G01", "--pings", "1", *control)
+                frames = [link.frame() for _ in range(6)]
+                self.assertEqual(frames[-1].index - frames[0].index, 6, "one frame lost a part")
+                self.assertEqual(link.incomplete, 1)
+                run(SONARCTL, "fault", "add", "P15", "--pings", "1", *control)
+                headings = [link.frame().f32(160) for _ in range(6)]
+                self.assertEqual(sum(heading != heading for heading in headings), 1, headings)
+            refused = run(SONARCTL, "fault", "add", "S01", *control)
+            self.assertIn("sends pings by datagrams alone", refused.stderr)
 
 
 @unittest.skipIf(shark.why_not(), shark.why_not())
