@@ -26,7 +26,7 @@ class Listener {
       : options_(options),
         stream_(std::move(opened.stream)),
         asked_(stream_.is_oculus() ? options.source.asked : std::nullopt),
-        received_(stream_.is_blueview()),
+        received_(!stream_.is_oculus()),
         log_(asked_),
         start_(opened.connected_at) {}
 
