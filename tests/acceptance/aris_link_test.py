@@ -1,7 +1,9 @@
 """An emulated ARIS as a controller meets it: beacons, frames, cookies, one controller at a time; and under tshark."""
 import pathlib
+import shutil
 import socket
 import struct
+import subprocess
 import tempfile
 import time
 import unittest
@@ -106,6 +108,28 @@ class ArisLink(unittest.TestCase):
             link.set(4, rate=15.0, samples=200, period=4, pulse=20)
             frame = [link.frame() for _ in range(4)][-1]
             self.assertEqual((frame.u32(684), frame.u32(444), frame.samples), (4, 16, 200))
+
+    @unittest.skipUnless(shutil.which("protoc"), "protoc is not installed")
+    def test_the_proto_file_describes_them(self):
+        def decoded(kind, data):
+            done = subprocess.run(["protoc", f"--decode=sonar.aris.{kind}", f"--proto_path={ROOT / 'protocol/aris'}", "aris.proto"],
+                                  input=data, capture_output=True, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            return done.stdout.decode()
+
+        beacons = Beacons(self.daemon.address)
+        self.addCleanup(beacons.close)
+        beacon = decoded("Availability", beacons.next()[2])
+        for line in ("serialNumber: 7001", "systemType: 1", "connectionState: ", "major: 2", 'enabled: "KA"', "isDiverHeld: false"):
+            self.assertIn(line, beacon)
+        with self.controller() as link:
+            link.set(7)
+            link.frame()
+            self.assertIn("cookie: 7", decoded("Command", link.sent[-1][4:]))
+            part = decoded("FramePart", link.datagrams[0])
+        self.assertRegex(part, f"^frame_index: 1\ntotal_data_size: {128 * 1600}\nheader: ")
+        self.assertRegex(part, r"data_offset: 0\n$")
+        self.assertNotRegex(beacon + part, r"(?m)^\d+:", "fields that the file does not know")
 
     def test_one_controller_at_a_time(self):
         with self.controller() as first:
