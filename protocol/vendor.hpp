@@ -65,6 +65,7 @@ struct DeviceState {
   double depth_m = 0;
   OptionValues options;                            // complete: defaults filled in by check_options
   std::shared_ptr<const VendorSettings> settings;  // now; null = Vendor::initial_settings
+  std::uint32_t last_ping = 0;                     // number of the ping that was fired last
   bool simulated_time = false;                     // it may stop while clients wait
   struct StoredAddress {                           // what a client wrote; stored, never applied
     std::uint32_t ip = 0, netmask = 0;
@@ -246,6 +247,8 @@ class Vendor {
   /// The settings that a client of this vendor would have requested: those that hold now (DeviceState::settings) with the
   /// override applied. A refusal states what the product can do.
   virtual Result<ChangeSettings> apply_override(const SettingsOverride& wanted, const DeviceState& device) const = 0;
+  /// The gain as SettingsOverride::gain_percent has it: 0 to 100 of what a client can turn it.
+  virtual double gain_percent(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;
   /// Empty when the vendor has no beacon.
   virtual Bytes beacon(const DeviceState& device, Time now) const = 0;
@@ -261,8 +264,9 @@ class Vendor {
   }
   /// Of a port of kind tcp_stream. The state must outlive the dialogue.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
-  /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings). Null:
-  /// pings do not travel over TCP.
+  /// Whether pings travel over TCP; else frame() returns null.
+  virtual bool pings_over_tcp() const { return true; }
+  /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings).
   virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const = 0;
   /// Of a port of kind udp_stream with receivers: the datagrams of a ping in order, at most 65,507 bytes each.
   virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/text/nearest.hpp"
+#include "protocol/aris/aris.hpp"
 #include "protocol/blueview/blueview.hpp"
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/vendor.hpp"
@@ -53,7 +54,7 @@ Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& giv
 }
 
 std::span<const Vendor* const> vendors() {
-  static const std::array<const Vendor*, 2> all{&oculus::vendor(), &blueview::vendor()};
+  static const std::array<const Vendor*, 3> all{&oculus::vendor(), &blueview::vendor(), &aris::vendor()};
   return all;
 }
 

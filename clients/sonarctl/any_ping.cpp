@@ -14,6 +14,17 @@ PingFacts facts_of(const AnyPing& any) {
              f.row_count * f.range_resolution_m,
              f.frequency_hz,
              ping->message.size()};
+  } else if (const auto* aris = std::get_if<ArisPing>(&any)) {
+    const aris::FrameHeader& h = aris->frame.header;
+    const double length_m = static_cast<double>(h.window_length_m);
+    facts = {static_cast<std::uint32_t>(aris->frame.index),
+             static_cast<unsigned>(aris->frame.beams),
+             static_cast<unsigned>(aris->frame.samples),
+             8,
+             length_m / static_cast<double>(aris->frame.samples),
+             static_cast<double>(h.window_start_m) + length_m,
+             aris->frequency_hz,
+             aris->message_size};
   } else {
     const auto& [polar, frequency_hz, size] = std::get<BlueViewPing>(any);
     facts = {polar.number,

@@ -1,10 +1,12 @@
-// A ping of either kind of sonar, and the facts that listen, view and stats print. Facts of one kind only are read from its type.
+// A ping of any kind of sonar, and the facts that listen, view and stats print. Facts of one kind only are read from its type.
 #pragma once
 
 #include <cstdint>
 #include <variant>
+#include <vector>
 
 #include "clients/bvtsdk/core/polar_ping.hpp"
+#include "protocol/aris/encode_frame.hpp"
 #include "protocol/oculus/decode.hpp"
 
 namespace sonar::clients {
@@ -14,7 +16,13 @@ struct BlueViewPing {
   double frequency_hz = 0;       // of the head, from the greeting of its sonar
   std::size_t message_size = 0;  // bytes
 };
-using AnyPing = std::variant<oculus::DecodedPing, BlueViewPing>;
+struct ArisPing {
+  aris::DecodedFrame frame;         // beam 0 is the right-most
+  std::vector<double> azimuth_rad;  // most to port first
+  double frequency_hz = 0;
+  std::size_t message_size = 0;  // bytes of all its datagrams
+};
+using AnyPing = std::variant<oculus::DecodedPing, BlueViewPing, ArisPing>;
 
 struct PingFacts {
   std::uint32_t number = 0;

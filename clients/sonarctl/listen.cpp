@@ -25,8 +25,8 @@ class Listener {
   Listener(const ListenOptions& options, OpenedStream opened)
       : options_(options),
         stream_(std::move(opened.stream)),
-        asked_(stream_.is_blueview() ? std::nullopt : options.source.asked),
-        received_(stream_.is_blueview()),
+        asked_(stream_.is_oculus() ? options.source.asked : std::nullopt),
+        received_(!stream_.is_oculus()),
         log_(asked_),
         start_(opened.connected_at) {}
 

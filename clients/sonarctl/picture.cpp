@@ -48,9 +48,26 @@ Result<PolarImage> picture_of(const bvt::PolarPing& ping) {
   return image;
 }
 
+PolarImage picture_of(const ArisPing& ping) {
+  const aris::DecodedFrame& frame = ping.frame;
+  PolarImage image;
+  image.rows = frame.samples;
+  image.beams = frame.beams;
+  image.row_spacing_m = static_cast<double>(frame.header.window_length_m) / static_cast<double>(frame.samples);
+  image.start_m = static_cast<double>(frame.header.window_start_m);
+  image.azimuth_rad = ping.azimuth_rad;
+  image.samples.reserve(image.rows * image.beams);
+  for (std::size_t row = 0; row < image.rows; ++row)
+    for (std::size_t beam = image.beams; beam > 0; --beam)
+      image.samples.push_back(static_cast<float>(std::to_integer<int>(frame.picture[row * image.beams + beam - 1])));
+  image.full_scale = 255;
+  return image;
+}
+
 }  // namespace
 
 Result<PolarImage> picture_of(const AnyPing& ping) {
+  if (const auto* of_aris = std::get_if<ArisPing>(&ping)) return picture_of(*of_aris);
   if (const auto* of_oculus = std::get_if<oculus::DecodedPing>(&ping)) return picture_of(*of_oculus);
   return picture_of(std::get<BlueViewPing>(ping).polar);
 }

@@ -17,7 +17,10 @@ constexpr std::chrono::milliseconds answer_patience(3000);  // minimum for a hea
 Result<PingStream> PingStream::open(const Endpoint& device, SonarKind kind, Settings settings,
                                     std::chrono::milliseconds patience) {
   std::vector<Endpoint> places{device};
-  if (kind == SonarKind::either) places.push_back({device.host, blueview::tcp_port});
+  if (kind == SonarKind::either) {
+    places.push_back({device.host, blueview::tcp_port});
+    places.push_back({device.host, aris::command_port});
+  }
   auto connected = connect_first(places, patience);
   if (!connected) return tl::unexpected(connected.error());
   const Endpoint& place = places[connected->which];
@@ -27,19 +30,28 @@ Result<PingStream> PingStream::open(const Endpoint& device, SonarKind kind, Sett
     const Error& error = head.error();
     return failure(error.kind, error.kind == ErrorKind::usage ? error.text : "tcp " + text_from(place) + " " + error.text);
   }
+  if (kind == SonarKind::aris || connected->which == 2) {
+    auto controller = ArisStream::open(std::move(connected->socket), settings.head);
+    if (!controller) return tl::unexpected(controller.error());
+    return PingStream(place, *std::move(controller));
+  }
   PingStream stream(place, std::move(connected->socket), std::move(settings.oculus));
   if (stream.asked_)
     if (Result<void> sent = stream.ask_again(); !sent) return tl::unexpected(sent.error());
   return stream;
 }
 
-Result<void> PingStream::ask_again() { return asked_ ? write_all(socket_, oculus::make_fire(*asked_)) : Result<void>{}; }
+Result<void> PingStream::ask_again() {
+  return asked_ && is_oculus() ? write_all(socket_, oculus::make_fire(*asked_)) : Result<void>{};
+}
 
 bool PingStream::is_rejected(std::chrono::milliseconds patience) const {
+  if (aris_) return aris_->is_rejected(patience);
   return !blueview_ && ends_without_a_byte(socket_, patience);
 }
 
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
+  if (aris_) return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is an ARIS at " + text_from(device_));
   if (blueview_)
     return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is a BlueView head at " + text_from(device_) +
                                          "; hosts record it with BVTSonar_CreateFile");
@@ -51,6 +63,12 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
 PingStream::Item PingStream::next(std::chrono::milliseconds patience) {
   if (blueview_) {
     BlueViewStream::Item item = blueview_->next(patience);
+    Item out{item.what, {}, {}, std::move(item.error)};
+    if (item.ping) out.ping = *std::move(item.ping);
+    return out;
+  }
+  if (aris_) {
+    ArisStream::Item item = aris_->next(patience);
     Item out{item.what, {}, {}, std::move(item.error)};
     if (item.ping) out.ping = *std::move(item.ping);
     return out;

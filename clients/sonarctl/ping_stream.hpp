@@ -1,5 +1,5 @@
 // Sources of decoded pings: the TCP stream of a device (after sending settings), a recording of one, and the status datagrams
-// that announce a device. Both kinds of sonars. Shared by listen, view, stats and doctor.
+// that announce a device. All kinds of sonars. Shared by listen, view, stats and doctor.
 #pragma once
 
 #include <chrono>
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "clients/sonarctl/any_ping.hpp"
+#include "clients/sonarctl/aris_stream.hpp"
 #include "clients/sonarctl/blueview_stream.hpp"
 #include "clients/sonarctl/net.hpp"
 #include "core/base/result.hpp"
@@ -18,8 +19,8 @@
 
 namespace sonar::clients {
 
-/// Kind of sonar at an address; either: an Oculus there or a BlueView head at its own port, the first that answers.
-enum class SonarKind { oculus, blueview, either };
+/// Kind of sonar at an address; either: an Oculus there, or a BlueView head or an ARIS at its own port, the first that answers.
+enum class SonarKind { oculus, blueview, either, aris };
 
 /// Settings to send, by kind of sonar.
 struct Settings {
@@ -45,13 +46,14 @@ class PingStream {
   /// True when the sonar closes the connection before the first byte; waits for that byte, at most `patience`. Never true of a
   /// head, which has greeted.
   bool is_rejected(std::chrono::milliseconds patience) const;
-  /// Also writes every received byte to this file. usage: of a BlueView head.
+  /// Also writes every received byte to this file. usage: of another sonar than an Oculus.
   Result<void> record_to(const std::filesystem::path& file);
   std::uint64_t junk_bytes() const { return decoder_.skipped_bytes(); }
   const Endpoint& device() const { return device_; }
   bool is_blueview() const { return blueview_.has_value(); }
+  bool is_oculus() const { return !blueview_ && !aris_; }
   /// "127.0.0.2:14750, BlueView P900-90, serial 7001"
-  std::string about() const { return text_from(device_) + (blueview_ ? ", " + blueview_->about() : ""); }
+  std::string about() const { return text_from(device_) + (blueview_ ? ", " + blueview_->about() : aris_ ? ", an ARIS" : ""); }
 
  private:
   PingStream(Endpoint device, Socket socket, std::optional<oculus::FireRequest> asked)
@@ -59,9 +61,12 @@ class PingStream {
   PingStream(Endpoint device, BlueViewStream blueview)
       : device_(std::move(device)), socket_(-1), blueview_(std::move(blueview)) {}
 
+  PingStream(Endpoint device, ArisStream aris) : device_(std::move(device)), socket_(-1), aris_(std::move(aris)) {}
+
   Endpoint device_;
   Socket socket_;  // of an Oculus
   std::optional<BlueViewStream> blueview_;
+  std::optional<ArisStream> aris_;
   std::optional<oculus::FireRequest> asked_;
   oculus::Decoder decoder_;
   std::ofstream record_;

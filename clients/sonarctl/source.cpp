@@ -76,7 +76,7 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
   PingStream* const stream = &opened->stream;
   if (opened->observes) source.asked.reset();
   const auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
-  bool received = stream->is_blueview();  // it greeted
+  bool received = !stream->is_oculus();  // a head greeted; an ARIS has only pings
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
     PingStream::Item item = stream->next(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(500)));
@@ -87,9 +87,9 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
                            "(clients.max)"
                          : "no ping arrived: " + item.error);
     if (item.what != Wait::data && left.count() <= 0) {
-      const char* const hint = stream->is_blueview() ? "is the daemon's clock stopped (clock), or the daemon stuck?"
-                               : opened->observes    ? "the sonar has no client that requests pings"
-                                                     : "is the sonar in standby?";
+      const char* const hint = !stream->is_oculus() ? "is the daemon's clock stopped (clock), or the daemon stuck?"
+                               : opened->observes   ? "the sonar has no client that requests pings"
+                                                    : "is the sonar in standby?";
       return tl::unexpected(silence(source, *device, received, "no ping", hint));
     }
     received = received || item.what == Wait::data;

@@ -70,7 +70,7 @@ class LiveView {
   Result<void> run() {
     const LiveScreen screen(options_.terminal && terminal_facts().is_terminal);
     double heard_s = now_s();
-    bool received = stream_.is_blueview();  // it greeted
+    bool received = !stream_.is_oculus();  // a head greeted; an ARIS has only pings
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
       PingStream::Item item = stream_.next(std::chrono::milliseconds(500));
       if (item.what == Wait::closed)

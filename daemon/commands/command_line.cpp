@@ -19,16 +19,18 @@ using text::number;
 using text::one_of;
 using text::whole_number;
 
-constexpr std::uint64_t most_rendered_pings = 999999;      // six digits in the names of the files
-constexpr const char* blueview_demo = "blueview-p900-90";  // the best documented of them
+constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the names of the files
+/// Makers of the demo's sonar, and the product that stands for each; empty = the demo's own.
+constexpr std::pair<std::string_view, std::string_view> demos[] = {
+    {"oculus", ""}, {"blueview", "blueview-p900-90"}, {"aris", "aris-3000"}};
 
 void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("config", run.config, "configuration file; without one sonard looks in the usual places, then runs the demo");
   app.add_option_function<std::string>(
          "--demo", [&run](const std::string& maker) { run.demo = true, run.demo_of = maker; },
-         "run the built-in demo, whatever files there are; --demo blueview: with a BlueView head instead of an Oculus")
+         "run the built-in demo, whatever files there are; --demo blueview, --demo aris: with such a sonar instead of an Oculus")
       ->expected(0, 1)
-      ->type_name("TEXT:oculus|blueview");  // complaint() judges it: a file is not meant for a maker
+      ->type_name("TEXT:oculus|blueview|aris");  // complaint() judges it: a file is not meant for a maker
   app.add_option("--profile", run.profile, "run the demo with this product, as blueview-m900-130 (docs/configuration.md)");
   app.add_option(
          "--clock", run.clock,
@@ -117,11 +119,12 @@ bool is_like_a_file(std::string_view word) {
 
 /// What makes no sense together; empty = nothing.
 std::string complaint(const RunCommand& run) {
-  const bool known = run.demo_of.empty() || run.demo_of == "oculus" || run.demo_of == "blueview";
+  const bool known = run.demo_of.empty() ||
+                     std::any_of(std::begin(demos), std::end(demos), [&](const auto& demo) { return demo.first == run.demo_of; });
   const std::string file = !known && is_like_a_file(run.demo_of) ? run.demo_of : run.config;
   if (run.demo && !file.empty()) return "--demo runs the built-in demo, not " + file + ": leave out one of the two";
   if (!known)
-    return "there is no demo \"" + run.demo_of + "\"; there are oculus and blueview, and --profile NAME for any product";
+    return "there is no demo \"" + run.demo_of + "\"; there are oculus, blueview and aris, and --profile NAME for any product";
   if (!run.profile.empty() && !file.empty())
     return "--profile chooses the demo's sonar, and " + file + " says itself what its sonars are: leave out one of the two";
   if (!run.profile.empty() && !run.demo_of.empty())
@@ -156,11 +159,12 @@ Command parse_command_line(int argc, char** argv) {
     app.footer(
         "examples:\n"
         "  sonard                           the configuration found in the usual places, else the demo\n"
-        "  sonard --demo blueview           the demo with a BlueView head; --profile NAME: with any product\n"
+        "  sonard --demo blueview           the demo with a BlueView head; aris: with an ARIS; --profile NAME: with any product\n"
         "  sonard my.yaml --log-level debug\n"
         "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, replay FILE; each has --help.\n"
-        "Oculus sonars are wire-compatible. BlueView sonars are compatible with the vendor's SDK by libraries of our own, not on "
-        "the wire. Not affiliated with either vendor.");
+        "Oculus and ARIS sonars are wire-compatible. BlueView sonars are compatible with the vendor's SDK by libraries of our "
+        "own, not on "
+        "the wire. Not affiliated with any vendor.");
   } else {
     app.require_subcommand(1);
     CLI::App& run_app = *app.add_subcommand("run", "serve the sonars of a configuration");
@@ -194,7 +198,8 @@ Command parse_command_line(int argc, char** argv) {
     return complain(wrong + text::where_help_is(app));
   }
   if (const std::string wrong = complaint(run); !wrong.empty()) return complain(wrong + text::where_help_is(app));
-  if (run.demo_of == "blueview") run.profile = blueview_demo;
+  for (const auto& [maker, product] : demos)
+    if (run.demo_of == maker && !product.empty()) run.profile = product;
   run.demo = run.demo || !run.profile.empty();
   return run;
 }

@@ -17,7 +17,7 @@ namespace sonar {
 struct RunCommand {
   std::string config;  // empty = search
   bool demo = false;
-  std::string demo_of;  // whose sonar the demo has, "oculus" or "blueview"; empty = its own
+  std::string demo_of;  // whose sonar the demo has, as "blueview"; empty = its own
   std::string profile;  // of the demo's sonar; empty = its own
   std::uint64_t exit_after_pings = 0;
   bool digest = false;

@@ -24,7 +24,9 @@ std::string title_of(const protocol::Vendor& vendor) {
   return product.substr(0, product.find(' '));
 }
 
-int default_max_observers(const protocol::Vendor& vendor) { return vendor.default_max_clients() > 1 ? 0 : 4; }
+int default_max_observers(const protocol::Vendor& vendor) {
+  return vendor.default_max_clients() > 1 || !vendor.pings_over_tcp() ? 0 : 4;
+}
 
 std::vector<std::string> notes_of_options(const Config& config) {
   std::vector<std::string> notes;

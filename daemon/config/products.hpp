@@ -10,10 +10,10 @@
 
 namespace sonar {
 
-/// "Oculus", "BlueView": the first word of the vendor's product names.
+/// "Oculus", "BlueView", "ARIS": the first word of the vendor's product names.
 std::string title_of(const protocol::Vendor& vendor);
 
-/// Default number of observers: 0 for a product that accepts several clients.
+/// Default number of observers: 0 for a product that accepts several clients or sends pings by datagrams alone.
 int default_max_observers(const protocol::Vendor& vendor);
 
 /// A sentence for each option that the configuration gives to a sonar of another vendor. Such options have no effect: a

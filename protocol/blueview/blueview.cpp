@@ -36,6 +36,10 @@ class BlueViewVendor final : public protocol::Vendor {
                                                   const protocol::DeviceState& device) const override {
     return blueview::apply_override(wanted, device);
   }
+  double gain_percent(const protocol::DeviceState& device) const override {
+    const SonarSettings settings = settings_from(device.settings.get(), device);
+    return gain_percent_from(static_cast<double>(settings.heads[static_cast<std::size_t>(settings.active_head)].gain_db));
+  }
   bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
   protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
   protocol::Reaction on_datagram(const protocol::Port&, protocol::BytesView datagram, const protocol::DeviceState& device,

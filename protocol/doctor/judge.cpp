@@ -166,13 +166,15 @@ class SonarJudge {
   }
 
   void check_what_it_sent(const v1::ClientStatus& client) {
-    const bool blueview = sonar_.profile().starts_with("blueview-");
-    const std::string wanted = blueview ? "request for a ping" : "fire message";
+    const bool blueview = sonar_.profile().starts_with("blueview-"), aris = sonar_.profile().starts_with("aris-");
+    const std::string wanted = blueview ? "request for a ping" : aris ? "command" : "fire message";
     std::string sent = "it has sent nothing";
     if (client.bytes_read() > 0)
       sent = "it has sent " + counted(client.bytes_read(), "byte") + ", no valid " + wanted + " among them";
     if (!client.complaint().empty()) sent += " (" + client.complaint() + ")";
-    const std::string cure = blueview ? "send a request for a ping, or a subscription" : "send a fire message (type 0x15)";
+    const std::string cure = blueview ? "send a request for a ping, or a subscription"
+                             : aris   ? "send SET_FRAMESTREAM_RECEIVER and SET_ACOUSTICS"
+                                      : "send a fire message (type 0x15)";
     add(sonar_.pinging() ? Level::warn : Level::fail, "driver",
         client.address() + " is connected to " + sonar_.name() + " and has not fired: " + sent, cure, client.address());
   }

@@ -40,6 +40,9 @@ class OculusVendor final : public protocol::Vendor {
                                                   const protocol::DeviceState& device) const override {
     return oculus::apply_override(wanted, device);
   }
+  double gain_percent(const protocol::DeviceState& device) const override {
+    return fire_of(device.settings.get()).settings.gain_percent;
+  }
   bool pings_before_first_request(const protocol::DeviceState& device) const override {
     return text_option(device.options, option_name::before_first_fire) == "pings";
   }

@@ -84,6 +84,12 @@ class FileSink final : public Sink {
     return {};
   }
 
+  Result<void> overwrite(std::uint64_t offset, BytesView bytes) override {
+    if (::pwrite(file_.fd(), bytes.data(), bytes.size(), static_cast<off_t>(offset)) == static_cast<ssize_t>(bytes.size()))
+      return {};
+    return failure(ErrorKind::io, "cannot finish " + name_ + ": " + std::strerror(errno));
+  }
+
   void try_again() override { broken_.reset(); }
 
   Result<void> close() override {
@@ -113,6 +119,10 @@ class MemorySink final : public Sink {
   explicit MemorySink(Bytes& bytes) : bytes_(bytes) {}
   Result<void> append(BytesView record) override {
     bytes_.insert(bytes_.end(), record.begin(), record.end());
+    return {};
+  }
+  Result<void> overwrite(std::uint64_t offset, BytesView bytes) override {
+    std::copy(bytes.begin(), bytes.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(offset));
     return {};
   }
   Result<void> close() override { return {}; }

@@ -35,6 +35,8 @@ class Sink {
   /// All or nothing: a partial write on a full disk is undone, so that the file ends with a whole record. io; then every later
   /// call fails the same way.
   virtual Result<void> append(BytesView record) = 0;
+  /// Replaces bytes that were appended before. io.
+  virtual Result<void> overwrite(std::uint64_t offset, BytesView bytes) = 0;
   /// After a failure: one more record may be tried, a smaller one.
   virtual void try_again() {}
   /// Late errors of the file system. io.

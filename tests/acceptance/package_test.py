@@ -20,6 +20,7 @@ WANTED = {
                "usr/share/man/man1/sonarctl.1.gz", "usr/share/man/man5/sonard.yaml.5.gz", "usr/share/sonard/scenes/demo.yaml",
                "usr/share/sonard/scenes/meshes/wreck.obj", "usr/share/doc/sonard/copyright", DOCUMENTS + "CHANGELOG.md",
                DOCUMENTS + "examples/sonard.yaml", DOCUMENTS + "examples/sonard-blueview.yaml",
+               DOCUMENTS + "examples/sonard-aris.yaml",
                "usr/share/sonard/python/sonard_client/__init__.py",
                "usr/share/sonard/python/sonard_client/convert/__main__.py",
                "usr/share/sonard/ros2_bridge/package.xml",

@@ -26,8 +26,9 @@ FLOORS = {
     "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/"],
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
     "protocol/oculus": ["core/base/", "core/sonar/", "core/text/", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
+    "protocol/aris": ["core/base/", "core/sonar/", "core/text/", "protocol/vendor.hpp", "protocol/wire/", "protocol/aris/"],
     "protocol/blueview": ["core/base/", "core/sonar/", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
-    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/wire/", "protocol/oculus/", "protocol/recording/"],
+    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/wire/", "protocol/aris/", "protocol/oculus/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     # Within the daemon: files of configuration < what is emulated < sockets, threads and clocks < commands.
     "daemon/config": ["core/", "protocol/", "daemon/config/"],

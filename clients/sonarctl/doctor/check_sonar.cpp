@@ -49,7 +49,7 @@ class SonarChecks {
     if (sonar_.out_of_time)
       return add(Level::warn, "ping", sonar_.at.host + " was not examined: the time limit was reached",
                  "raise it with --within SECONDS, or give the address of this sonar alone");
-    if (!sonar_.blueview) check_status();
+    if (!sonar_.blueview && !sonar_.aris) check_status();
     check_connection();
     if (sonar_.stream.outcome == Outcome::pings) check_rate();
     if (sonar_.stream.outcome == Outcome::not_tried) check_rate_of_others();
@@ -237,7 +237,9 @@ class SonarChecks {
                  format("%.1f", s.rate_hz) +
                      " pings per second of this computer's clock; the daemon uses another (clock: " + clock() + ")",
                  "");
-    const double expected_hz = s.asked && !sonar_.blueview ? s.asked_hz : sonar_.reported ? sonar_.reported->rate_hz() : 0;
+    const double expected_hz = s.asked && !sonar_.blueview && !sonar_.aris ? s.asked_hz
+                               : sonar_.reported                           ? sonar_.reported->rate_hz()
+                                                                           : 0;
     std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
     if (expected_hz > 0) text += (sonar_.blueview ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
     text += latency_text();

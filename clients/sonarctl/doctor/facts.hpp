@@ -58,6 +58,7 @@ struct StreamFacts {
 struct SonarFacts {
   Endpoint at;
   bool blueview = false;   // a BlueView head, no Oculus
+  bool aris = false;       // an ARIS
   std::string name;        // from the control stream; empty = not known
   std::string unresolved;  // why its name has no address
   bool on_this_host = false;

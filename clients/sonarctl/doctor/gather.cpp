@@ -5,6 +5,7 @@
 #include "clients/sonarctl/doctor/probes.hpp"
 #include "clients/sonarctl/doctor/proc_net.hpp"
 #include "clients/sonarctl/doctor/watch_pings.hpp"
+#include "protocol/aris/messages.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/oculus/messages.hpp"
@@ -95,7 +96,8 @@ class Gathering {
   /// The sonard processes that listen on ports of sonars.
   void note_daemons(const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
     for (const SocketLine& socket : sockets) {
-      const bool of_sonars = socket.local_port == oculus::tcp_port || socket.local_port == blueview::tcp_port;
+      const bool of_sonars = socket.local_port == oculus::tcp_port || socket.local_port == blueview::tcp_port ||
+                             socket.local_port == aris::command_port;
       if (socket.state != listening || !of_sonars) continue;
       PortHolder holder = holder_of(socket, programs);
       if (holder.program == "sonard") facts_.daemons.push_back(std::move(holder));
@@ -120,10 +122,11 @@ class Gathering {
   }
 
   static std::uint16_t port_of(const v1::SonarStatus& s) {
-    const std::uint16_t usual = is_blueview(s) ? blueview::tcp_port : oculus::tcp_port;
+    const std::uint16_t usual = is_blueview(s) ? blueview::tcp_port : is_aris(s) ? aris::command_port : oculus::tcp_port;
     return parse_endpoint(s.listens(), {"", usual}).value_or(Endpoint{"", usual}).port;
   }
   static bool is_blueview(const v1::SonarStatus& s) { return s.profile().starts_with("blueview-"); }
+  static bool is_aris(const v1::SonarStatus& s) { return s.profile().starts_with("aris-"); }
   static bool is_at(const v1::SonarStatus& s, const std::string& host) {
     return s.advertised() == host || s.listens().starts_with(host + ":");
   }
@@ -150,6 +153,7 @@ class Gathering {
     SonarFacts sonar;
     sonar.at = at;
     sonar.blueview = is_blueview(at);
+    sonar.aris = at.port == aris::command_port;
     sonar.name = name;
     facts_.sonars.push_back(std::move(sonar));
   }
@@ -173,7 +177,7 @@ class Gathering {
     for (const SocketLine& socket : sockets)
       if (socket.state == established && socket.local_port == sonar.at.port && socket.local_host == sonar.at.host)
         sonar.clients.push_back(socket.remote_host + ":" + std::to_string(socket.remote_port));
-    if (!sonar.clients.empty() || sonar.blueview) return;
+    if (!sonar.clients.empty() || sonar.blueview || sonar.aris) return;
     status_.listen(sonar.at.host, no_later_than(start_ + first_status));
     for (const ReceivedStatus& received : status_.facts().received)
       if (!received.client.empty() && (received.advertised == sonar.at.host || received.from == sonar.at.host))
@@ -211,8 +215,8 @@ class Gathering {
   }
 
   void listen_to_all() {
-    for (const SonarFacts& sonar : facts_.sonars)  // BlueView heads send nothing unless asked
-      if (!sonar.blueview) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
+    for (const SonarFacts& sonar : facts_.sonars)  // the others have no such message
+      if (!sonar.blueview && !sonar.aris) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
     status_.finish();
     facts_.status = status_.facts();
   }

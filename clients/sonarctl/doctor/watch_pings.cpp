@@ -138,10 +138,14 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
   Settings settings;
   if (sonar.clients.empty()) settings.oculus = usual_request();
   facts.asked = sonar.blueview || settings.oculus.has_value();  // heads are asked for every ping
-  facts.asked_hz = settings.oculus && !sonar.blueview ? 10 : 0;
+  facts.asked_hz = settings.oculus && !sonar.blueview && !sonar.aris ? 10 : 0;
   Watch watch(facts, deadline);
-  auto stream = PingStream::open(sonar.at, sonar.blueview ? SonarKind::blueview : SonarKind::oculus, std::move(settings),
-                                 std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
+  auto stream =
+      PingStream::open(sonar.at,
+                       sonar.blueview ? SonarKind::blueview
+                       : sonar.aris   ? SonarKind::aris
+                                      : SonarKind::oculus,
+                       std::move(settings), std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
   if (!stream) {
     facts.error = stream.error().text;
     facts.outcome = outcome_of(stream.error());

@@ -331,6 +331,15 @@ bool same_word(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](char x, char y) { return lower(x) == lower(y); });
 }
 
+/// Of a sonar whose pings travel as datagrams alone: what changes the first of them, or no ping.
+bool acts_without_stream(const FaultKind& kind) {
+  if (kind.stage == S::stream) return false;
+  if (kind.stage == S::framing)
+    return kind.effect == E::set_field || kind.effect == E::add_to_field || kind.effect == E::flip || kind.effect == E::drop;
+  constexpr E of_streams[] = {E::end, E::thin_link, E::delay, E::jitter, E::outbox_policy};
+  return std::find(std::begin(of_streams), std::end(of_streams), kind.effect) == std::end(of_streams);
+}
+
 }  // namespace
 
 std::span<const FaultParameter> FaultKind::given() const {
@@ -354,7 +363,10 @@ std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& ve
   if (kind.effect == E::harness) return "needs two network namespaces: sonarctl lab";
   const bool blueview_only = kind.code.front() == 'B';
   if (blueview_only && vendor.name() != "blueview") return "only the BlueView link has it";
-  if (kind.stage == S::datagrams) return vendor.port(Port::udp_stream) ? "" : "sends no datagrams of pings";
+  if (const protocol::Port* const stream = vendor.port(Port::udp_stream); kind.stage == S::datagrams) {
+    if (stream == nullptr) return "sends no datagrams of pings";
+    return kind.effect == E::leave_group && stream->group.port == 0 ? "has no group of its own" : "";
+  }
   const bool of_beacon = kind.stage == S::status || kind.effect == E::heat;
   if (of_beacon && vendor.port(Port::udp_beacon) == nullptr) return "has no status message";
   if (kind.field && !vendor.field(of_beacon ? protocol::Part::beacon : protocol::Part::ping, *kind.field, {}))
@@ -362,6 +374,7 @@ std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& ve
   if (kind.effect == E::bearings && !vendor.region(protocol::Region::bearings, {})) return "sends no bearings";
   const bool of_stream = kind.stage == S::framing || kind.stage == S::stream || kind.stage == S::link || kind.stage == S::clients;
   if (of_stream && vendor.port(Port::tcp_stream) == nullptr) return "has no TCP stream";
+  if (!vendor.pings_over_tcp() && !acts_without_stream(kind)) return "sends pings by datagrams alone";
   if (kind.effect == E::change_settings && (kind.code == "D12" || kind.code == "D11") && vendor.name() != "oculus")
     return "has one type of samples";
   return {};

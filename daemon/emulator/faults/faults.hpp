@@ -152,6 +152,7 @@ class Faults {
   void step(Entry& entry, Time now);
   void count_ping(Entry& entry, Time now);
   void note(Entry& entry, FaultEntry::What what, Time now, FaultEntry more = {});
+  void alter_first_datagram(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
   void note_message(Entry& entry, const Connection& to, std::uint32_t ping, const protocol::Bytes& before,
                     const protocol::Bytes& after, Time now, std::optional<std::size_t> place = {});
   std::uint32_t draw(const Entry& entry, std::uint32_t a, std::uint32_t b, std::uint32_t c) const;

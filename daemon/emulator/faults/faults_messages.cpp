@@ -115,7 +115,21 @@ void Faults::note_message(Entry& e, const Connection& to, std::uint32_t ping, co
   note(e, FaultEntry::What::injected, now, std::move(more));
 }
 
+/// Where pings travel as datagrams alone: kinds that change bytes change the first, which has the fields of the ping.
+void Faults::alter_first_datagram(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
+  for (Entry& e : entries_) {
+    if (e.fault.kind->stage != FaultStage::framing || datagrams.empty() || !met(e, ping)) continue;
+    MessageEdit edit{datagrams.front(), {}, Outbox::Shape::End::none, false};
+    const FaultDraws draws{around_.seed, e.key, around_.index, ping, 0};
+    const Touch touch = alter_message(e.fault, {around_.vendor, draws, e.first_number.value_or(ping), nullptr}, edit);
+    if (touch.acted) note_message(e, stream, ping, datagrams.front(), edit.bytes, now, touch.place);
+    datagrams.front() = std::move(edit.bytes);
+    if (edit.dropped) datagrams.clear();
+  }
+}
+
 void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
+  if (!around_.vendor.pings_over_tcp()) alter_first_datagram(datagrams, stream, ping, now);
   for (Entry& e : entries_) {
     if (e.fault.kind->stage != FaultStage::datagrams || datagrams.empty() || (e.over && e.hits.empty())) continue;
     const bool older = e.fault.kind->effect == Effect::older_part;

@@ -191,7 +191,7 @@ PingNumber Sonar::next_number() {
   const std::uint64_t lost = skipped.late + skipped.busy;
   const std::uint64_t since = lost - std::exchange(numbered_skips_, lost);
   if (config_.overload == Overload::count && ping_number_ > 0) ping_number_ += static_cast<std::uint32_t>(since);
-  return PingNumber(++ping_number_);
+  return PingNumber(state_.last_ping = ++ping_number_);
 }
 
 /// But for its number.

@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "protocol/recording/aris_file.hpp"
 #include "protocol/recording/oculus_log.hpp"
 #include "protocol/recording/raw_dump.hpp"
 
@@ -15,8 +16,11 @@ using Kind = RecordingFile::Kind;
 
 constexpr std::size_t longest_name = 128;
 constexpr auto status_period = std::chrono::seconds(1);
-constexpr std::array<std::pair<std::string_view, Kind>, 4> endings{
-    {{".mcap", Kind::mcap}, {".pcap", Kind::pcap}, {".oculus", Kind::oculus_log}, {".raw", Kind::raw_dump}}};
+constexpr std::array<std::pair<std::string_view, Kind>, 5> endings{{{".mcap", Kind::mcap},
+                                                                    {".pcap", Kind::pcap},
+                                                                    {".oculus", Kind::oculus_log},
+                                                                    {".raw", Kind::raw_dump},
+                                                                    {".aris", Kind::aris}}};
 
 bool may_stand_in_name(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
@@ -32,6 +36,7 @@ class CountedSink final : public recording::Sink {
     if (appended) *bytes_ += record.size();
     return appended;
   }
+  Result<void> overwrite(std::uint64_t offset, recording::BytesView bytes) override { return sink_->overwrite(offset, bytes); }
   void try_again() override { sink_->try_again(); }
   Result<void> close() override { return sink_->close(); }
 
@@ -62,8 +67,11 @@ Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vend
     return refuse("the name of a recording has letters, digits, - _ and . only, 128 at most, and no folder: run-1.mcap");
   if (name.front() == '-')
     return refuse("the name of a recording does not begin with -, which every program takes for an option: run-1.mcap");
-  if (ending == endings.end()) return refuse("name the kind of file by its end: .mcap, .pcap, .oculus or .raw");
-  if (ending->second != Kind::mcap && vendor != "oculus")
+  if (ending == endings.end()) return refuse("name the kind of file by its end: .mcap, .pcap, .oculus, .raw or .aris");
+  if (ending->second == Kind::mcap) return ending->second;
+  if (ending->second == Kind::aris && vendor != "aris")
+    return refuse("such files hold frames of an ARIS, and this is a sonar of another kind: end the name in .mcap");
+  if (ending->second != Kind::aris && vendor != "oculus")
     return refuse("such files hold Oculus messages, and this is a sonar of another kind: end the name in .mcap");
   return ending->second;
 }
@@ -82,6 +90,8 @@ RecordingFile::RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, c
     writer_ = recording::write_pcap(std::move(counted), sonar.ends);
   } else if (kind == Kind::oculus_log) {
     writer_ = recording::write_oculus_log(std::move(counted));
+  } else if (kind == Kind::aris) {
+    writer_ = recording::write_aris_file(std::move(counted));
   } else if (kind == Kind::raw_dump) {
     writer_ = recording::write_raw_dump(std::move(counted));
   } else {

@@ -40,10 +40,10 @@ struct RecordedSonar {
 
 class RecordingFile {
  public:
-  enum class Kind { mcap, pcap, oculus_log, raw_dump };
+  enum class Kind { mcap, pcap, oculus_log, raw_dump, aris };
 
-  /// Of a name in the folder: letters, digits, - _ and . that does not begin it, at most 128, ending in .mcap, .pcap, .oculus or
-  /// .raw. A sentence where it is none; all but .mcap are of the Oculus family only.
+  /// Of a name in the folder: letters, digits, - _ and . that does not begin it, at most 128, ending in .mcap, .pcap, .oculus,
+  /// .raw or .aris. A sentence where it is none; .aris is of the ARIS family only, the others but .mcap of the Oculus family.
   static Result<Kind> kind_of(std::string_view name, std::string_view vendor);
   /// io; a file that is there already is not touched.
   static Result<std::unique_ptr<RecordingFile>> create(const std::filesystem::path& file, Kind kind, const RecordedSonar& sonar);

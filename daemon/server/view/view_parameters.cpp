@@ -6,8 +6,6 @@
 
 #include "daemon/config/faults/fault.hpp"
 #include "daemon/config/faults/kinds.hpp"
-#include "protocol/blueview/settings_override.hpp"
-#include "protocol/oculus/fire.hpp"
 
 namespace sonar {
 namespace {
@@ -37,19 +35,12 @@ double seconds_left(const Device& device, const std::string& fault, Time now) {
   return std::ceil(left * 10) / 10;
 }
 
-/// As it was asked for.
-double gain_percent(const Device& device) {
-  if (device.config().profile.vendor->name() == "oculus")
-    return oculus::fire_of(device.sonar().state().settings.get()).settings.gain_percent;
-  return blueview::gain_percent_from(static_cast<double>(device.sonar().settings().gain_db));
-}
-
 void add_sonar(std::vector<Parameter>& all, const Device& device, bool has_preview) {
   const PingSettings& s = device.sonar().settings();
   const std::string at = "/" + device.config().name + "/";
   all.push_back({at + "range_m", s.range_m});
   all.push_back({at + "rate_hz", static_cast<double>(s.rate_hz)});
-  all.push_back({at + "gain_percent", gain_percent(device)});
+  all.push_back({at + "gain_percent", device.config().profile.vendor->gain_percent(device.sonar().state())});
   all.push_back({at + "mode", std::int64_t{s.mode}});
   all.push_back({at + "beams", std::int64_t{s.beam_count}});
   all.push_back({at + "transmit", device.sonar().transmits()});

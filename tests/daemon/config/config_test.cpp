@@ -306,6 +306,10 @@ TEST(Config, TheShippedExampleIsValid) {
   ASSERT_TRUE(blueview) << blueview.error().text;
   EXPECT_EQ(blueview->sonars.at(0).profile.model->profile, "blueview-p900-90");
   EXPECT_TRUE(notes_of_options(*blueview).empty());
+  const auto aris = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/sonard-aris.yaml");
+  ASSERT_TRUE(aris) << aris.error().text;
+  EXPECT_EQ(aris->sonars.at(0).profile.model->profile, "aris-3000");
+  EXPECT_TRUE(notes_of_options(*aris).empty());
   const auto demo = demo_config();
   ASSERT_TRUE(demo) << demo.error().text;
   EXPECT_EQ(text_of(demo->sonars.at(0).bind_ip), "127.0.0.2");

@@ -97,6 +97,9 @@ TEST(FaultKinds, TakeEffectOrSayWhyNot) {
   std::cout << table;
   EXPECT_THAT(table, HasSubstr("| L05 | silent-open | 1 | takes effect | takes effect |"));
   EXPECT_THAT(table, HasSubstr("| U02 | status-gap | 1 | takes effect | has no status message |"));
+  EXPECT_THAT(table,
+              HasSubstr("| G01 | part-lost | 1 | sends no datagrams of pings | sends no datagrams of pings | takes effect |"));
+  EXPECT_THAT(table, HasSubstr("| S01 | slices | 1 | takes effect | takes effect | sends pings by datagrams alone |"));
   EXPECT_THAT(table, HasSubstr("| L06 | vanished-peer | 1 | needs two network namespaces"));
   EXPECT_THAT(table, HasSubstr("| B13 | bad-compression | 1 | only the BlueView link has it | takes effect |"));
 }

@@ -53,6 +53,9 @@ TEST(RecordingName, SaysTheKindAndNoFolder) {
   EXPECT_EQ(*RecordingFile::kind_of("r.oculus", "oculus"), Kind::oculus_log);
   EXPECT_EQ(*RecordingFile::kind_of("r.raw", "oculus"), Kind::raw_dump);
   EXPECT_EQ(*RecordingFile::kind_of("head.mcap", "blueview"), Kind::mcap);
+  EXPECT_EQ(*RecordingFile::kind_of("a.aris", "aris"), Kind::aris);
+  EXPECT_THAT(RecordingFile::kind_of("a.aris", "oculus").error().text, HasSubstr("frames of an ARIS"));
+  EXPECT_THAT(RecordingFile::kind_of("a.raw", "aris").error().text, HasSubstr("Oculus messages"));
   EXPECT_THAT(RecordingFile::kind_of("head.pcap", "blueview").error().text, HasSubstr("end the name in .mcap"));
   const std::string longest = std::string(123, 'a') + ".mcap";
   EXPECT_TRUE(RecordingFile::kind_of(longest, "oculus"));

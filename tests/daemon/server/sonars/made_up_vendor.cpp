@@ -145,6 +145,7 @@ class MadeUpVendor final : public protocol::Vendor {
                                                   const DeviceState& device) const override {
     return settings_at(wanted.range_m.value_or(range_of(device)));
   }
+  double gain_percent(const DeviceState&) const override { return 50; }
   bool pings_before_first_request(const DeviceState&) const override { return true; }
   Bytes beacon(const DeviceState& device, Time) const override {
     return bytes_of(device.name + (device.connected_client == protocol::Ipv4{} ? " free" : " busy"));

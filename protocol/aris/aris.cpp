@@ -1,0 +1,71 @@
+#include "protocol/aris/aris.hpp"
+
+#include "protocol/aris/dialogue.hpp"
+#include "protocol/aris/encode_frame.hpp"
+#include "protocol/aris/messages.hpp"
+#include "protocol/aris/models.hpp"
+#include "protocol/aris/options.hpp"
+#include "protocol/aris/settings.hpp"
+
+namespace sonar::aris {
+namespace {
+
+using namespace std::chrono_literals;
+
+using PortKind = protocol::Port::Kind;
+// The gap between the parts of a frame is chosen: a receive buffer of 64 kB must not overflow.
+constexpr std::array<protocol::Port, 3> port_table{
+    {{.kind = PortKind::tcp_stream, .number = command_port},
+     {.kind = PortKind::udp_beacon, .number = beacon_port, .period = 1000ms, .on_change = true},
+     {.kind = PortKind::udp_stream, .gap = 20us}}};
+
+class ArisVendor final : public protocol::Vendor {
+ public:
+  std::string_view name() const override { return "aris"; }
+  std::span<const std::shared_ptr<const SonarModel>> models() const override { return aris::models(); }
+  std::span<const protocol::Port> ports() const override { return port_table; }
+  std::span<const protocol::Option> options() const override { return aris::options(); }
+  int default_max_clients() const override { return 1; }  // one controller at a time
+  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
+                                                  const protocol::OptionValues&) const override {
+    return model;
+  }
+
+  protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
+    return change_to(aris::initial_settings(device), device);
+  }
+  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
+                                                  const protocol::DeviceState& device) const override {
+    return aris::apply_override(wanted, device);
+  }
+  double gain_percent(const protocol::DeviceState& device) const override {
+    return 100 / highest_gain_db * static_cast<double>(settings_from(device.settings.get(), device).acoustics.gain_db);
+  }
+  bool pings_over_tcp() const override { return false; }
+  bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
+  protocol::Bytes beacon(const protocol::DeviceState& device, Time) const override { return make_beacon(device); }
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState& device, Time) const override {
+    return make_dialogue(device);
+  }
+  std::shared_ptr<const protocol::Bytes> frame(const Ping&, const protocol::DeviceState&) const override { return nullptr; }
+  std::vector<protocol::Bytes> datagrams(const protocol::Port&, const Ping& ping,
+                                         const protocol::DeviceState& device) const override {
+    return encode_frame(ping, device, settings_from(ping.request.vendor_settings.get(), device));
+  }
+  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
+                                       protocol::BytesView message) const override {
+    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // the beacon is of varints
+  }
+  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
+    return locate(region, ping);
+  }
+};
+
+}  // namespace
+
+const protocol::Vendor& vendor() {
+  static const ArisVendor only;
+  return only;
+}
+
+}  // namespace sonar::aris

@@ -1,0 +1,10 @@
+// Sound Metrics ARIS as a Vendor.
+#pragma once
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::aris {
+
+const protocol::Vendor& vendor();
+
+}  // namespace sonar::aris

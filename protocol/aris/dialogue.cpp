@@ -1,0 +1,167 @@
+#include "protocol/aris/dialogue.hpp"
+
+#include <cstdio>
+#include <string_view>
+
+#include "core/text/ipv4.hpp"
+#include "protocol/aris/messages.hpp"
+#include "protocol/aris/options.hpp"
+#include "protocol/aris/settings.hpp"
+
+namespace sonar::aris {
+namespace {
+
+using protocol::DeviceState;
+using protocol::Notice;
+using protocol::Reaction;
+
+constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hostile controller can cause
+
+bool is_multicast(protocol::Ipv4 ip) { return ip[0] >= 224 && ip[0] < 240; }
+
+class ArisDialogue final : public protocol::Dialogue {
+ public:
+  explicit ArisDialogue(const DeviceState& device) : device_(device), first_ping_(device.last_ping) {}
+
+  Reaction on_bytes(protocol::BytesView received, Time now) override {
+    Reaction reaction;
+    notices_ = 0;
+    settings_ = settings_from(device_.settings.get(), device_);
+    settings_.first_ping = first_ping_;
+    changed_ = false;
+    framer_.append(received);
+    while (const auto message = framer_.next()) on_message(*message, now, reaction);
+    if (changed_) reaction.events.emplace_back(change_to(settings_, device_));
+    if (framer_.broken()) reaction.events.emplace_back(protocol::Close{"states a command longer than 4096 bytes"});
+    return reaction;
+  }
+  Reaction on_tick(Time, bool) override { return {}; }
+  Time next_tick() const override { return Time::max(); }
+  std::optional<std::chrono::milliseconds> longest_silence() const override {
+    return std::chrono::milliseconds(static_cast<int>(1000 * number_option(device_.options, option_name::silence_s)));
+  }
+  void on_ping_queued(Time) override {}
+
+ private:
+  void on_message(BytesView message, Time now, Reaction& reaction) {
+    Command command;
+    if (!protobuf::read(message, command))
+      return notice(reaction, "ignored a command of " + std::to_string(message.size()) + " bytes that cannot be read");
+    switch (command.type) {
+      case CommandType::set_date_time:
+        return on_date_time(command, now, reaction);
+      case CommandType::set_receiver:
+        return on_receiver(command, reaction);
+      case CommandType::set_stream:
+        return on_stream(command);
+      case CommandType::set_acoustics:
+        return on_acoustics(command, reaction);
+      case CommandType::set_salinity:
+        return on_salinity(command, reaction);
+      case CommandType::set_telephoto:
+        settings_.telephoto = command.telephoto && command.telephoto->value != 0;
+        changed_ = true;
+        return;
+      case CommandType::set_focus:
+        return on_focus(command.focus.value_or(Focus{}), now);
+      case CommandType::home_focus:
+        return move_focus(0, now);
+      default:
+        break;  // keep-alives, and commands to a rotator and a log receiver that are not there
+    }
+    if (command.type > CommandType::set_syslog_receiver)
+      notice(reaction, "ignored a command of type " + std::to_string(static_cast<unsigned>(command.type)));
+  }
+
+  void on_date_time(const Command& command, Time now, Reaction& reaction) {
+    const auto told = parse_date_time(command.date_time ? command.date_time->text : std::string());
+    if (!told) return notice(reaction, "ignored a date and time that cannot be read");
+    settings_.clock_offset = *told - now;
+    changed_ = true;
+  }
+
+  void on_receiver(const Command& command, Reaction& reaction) {
+    const Receiver wanted = command.receiver.value_or(Receiver{});
+    protocol::SetReceivers receivers;
+    protocol::Endpoint to{{}, static_cast<std::uint16_t>(wanted.port)};
+    settings_.streaming = wanted.ip != "0.0.0.0";
+    if (settings_.streaming) {
+      if (wanted.port == 0 || wanted.port > 65535) return notice(reaction, "ignored a receiver without a port");
+      if (!wanted.ip.empty()) {
+        const auto ip = text::parse_ipv4(wanted.ip);
+        if (!ip) return notice(reaction, "ignored a receiver whose address is none");
+        to.ip = *ip;
+        const bool own = *ip == device_.connected_client || is_multicast(*ip);
+        if (!own && text_option(device_.options, option_name::receivers) == "controller")
+          return notice(reaction, "ignored a receiver at another host (option receivers: controller)");
+      }
+      receivers.to.push_back(to);
+    }
+    reaction.events.emplace_back(receivers);
+    changed_ = true;
+  }
+
+  void on_stream(const Command& command) {
+    if (!command.stream || !command.stream->delay) return;
+    settings_.delays_packets = command.stream->delay->enable;
+    settings_.packet_delay_us = command.stream->delay->microseconds;
+    changed_ = true;
+  }
+
+  void on_acoustics(const Command& command, Reaction& reaction) {
+    const Verdict verdict = apply(settings_, command.acoustics.value_or(Acoustics{}), device_);
+    if (!verdict.refusal.empty()) notice(reaction, "refused acoustic settings: " + verdict.refusal);
+    changed_ = true;
+  }
+
+  void on_salinity(const Command& command, Reaction& reaction) {
+    const std::uint32_t salinity = command.salinity.value_or(Choice{}).value;  // an empty message is 0, fresh
+    if (salinity != 0 && salinity != 15 && salinity != 35)
+      return notice(reaction, "ignored a salinity of " + std::to_string(salinity));
+    settings_.salinity = salinity;
+    changed_ = true;
+  }
+
+  void on_focus(const Focus& wanted, Time now) {
+    if (wanted.position != 0) return move_focus(std::min(wanted.position, 1000u), now);
+    if (wanted.range_m > 0) move_focus(focus_position(static_cast<double>(wanted.range_m), product_of(*device_.model)), now);
+  }
+  void move_focus(std::uint32_t to, Time now) {
+    settings_.focus_from = focus_at(settings_, now).position;
+    settings_.focus_to = to;
+    settings_.focus_set_at = now;
+    changed_ = true;
+  }
+
+  void notice(Reaction& reaction, std::string text) {
+    if (notices_++ < notices_per_call) reaction.events.emplace_back(Notice{std::move(text)});
+  }
+
+  const DeviceState& device_;
+  std::uint32_t first_ping_;
+  CommandFramer framer_;
+  Settings settings_;  // as of this call
+  bool changed_ = false;
+  std::size_t notices_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<protocol::Dialogue> make_dialogue(const DeviceState& device) { return std::make_unique<ArisDialogue>(device); }
+
+std::optional<Time> parse_date_time(const std::string& text) {
+  constexpr std::string_view months = "JanFebMarAprMayJunJulAugSepOctNovDec";
+  int year = 0, hour = 0, minute = 0, second = 0;
+  unsigned day = 0;
+  char month[4] = "";
+  if (std::sscanf(text.c_str(), "%4d-%3[A-Za-z]-%2u %2d:%2d:%2d", &year, month, &day, &hour, &minute, &second) != 6) return {};
+  const std::size_t at = months.find(month);
+  const std::chrono::year_month_day date(std::chrono::year(year), std::chrono::month(static_cast<unsigned>(at / 3) + 1),
+                                         std::chrono::day(day));
+  const bool fits = at != std::string_view::npos && at % 3 == 0 && year >= 1970 && year < 2200 && date.ok();
+  if (!fits || hour < 0 || hour > 23 || minute < 0 || minute > 59 || second < 0 || second > 60) return {};
+  return Time(std::chrono::sys_days(date)) + std::chrono::hours(hour) + std::chrono::minutes(minute) +
+         std::chrono::seconds(second);
+}
+
+}  // namespace sonar::aris

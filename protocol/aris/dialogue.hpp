@@ -1,0 +1,16 @@
+// One controller's connection to an emulated ARIS: commands in, settings and receivers out. The device answers nothing.
+#pragma once
+
+#include <memory>
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::aris {
+
+/// The state must outlive the dialogue.
+std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device);
+
+/// Time since 1970 of "2014-Jan-31 23:58:15", taken as UTC. Nothing: another text.
+std::optional<Time> parse_date_time(const std::string& text);
+
+}  // namespace sonar::aris

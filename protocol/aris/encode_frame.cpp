@@ -1,0 +1,187 @@
+#include "protocol/aris/encode_frame.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+
+#include "core/base/geometry.hpp"
+#include "protocol/aris/options.hpp"
+
+namespace sonar::aris {
+namespace {
+
+/// Which sixteenth of the beams a channel of the digitiser holds: a fact of the hardware, as the vendor's library has it.
+constexpr std::array<std::size_t, channels> sixteenth{10, 2, 14, 6, 8, 0, 12, 4, 11, 3, 15, 7, 9, 1, 13, 5};
+constexpr std::size_t first_part_samples = 620, part_samples = 1370;
+constexpr std::size_t largest_picture = std::size_t{most_samples} * 128;
+constexpr double surface_psi = 14.6959, psi_per_m = 1 / 0.702398;
+
+std::uint64_t microseconds(std::chrono::nanoseconds t) {
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(std::chrono::floor<std::chrono::microseconds>(t).count(), 0));
+}
+
+/// Calls `copy(raw index, picture index)` for each sample.
+template <class F>
+void for_each_sample(std::size_t samples, int pings, F copy) {
+  const auto n = static_cast<std::size_t>(pings), beams = n * channels;
+  std::size_t raw = 0;
+  for (std::size_t ping = 0; ping < n; ++ping)
+    for (std::size_t sample = 0; sample < samples; ++sample)
+      for (std::size_t channel = 0; channel < channels; ++channel) copy(raw++, sample * beams + sixteenth[channel] * n + ping);
+}
+
+void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used) {
+  const Acoustics& a = s.acoustics;
+  h.window_start_m = static_cast<float>(used.range_start_m);
+  h.window_length_m = static_cast<float>(used.range_bin_count * used.range_bin_m);
+  h.receiver_gain_db = static_cast<std::uint32_t>(a.gain_db + 0.5f);
+  h.sample_rate_hz = 1e6f / static_cast<float>(a.sample_period_us);
+  h.ping_mode = a.ping_mode;
+  h.frequency = static_cast<std::uint32_t>(a.frequency);
+  h.pulse_us = a.pulse_us;
+  h.cycle_us = a.cycle_us;
+  h.sample_period_us = a.sample_period_us;
+  h.transmit = a.transmit;
+  h.frame_rate_hz = a.frame_rate_hz;
+  h.sound_speed_mps = used.device_sound_speed_mps;
+  h.samples_per_beam = a.samples_per_beam;
+  h.high_voltage = a.high_voltage;
+  h.start_delay_us = a.start_delay_us;
+  h.large_lens = s.telephoto;
+  h.salinity = s.salinity;
+  h.applied_cookie = s.applied;
+  h.constrained_cookie = s.constrained;
+  h.invalid_cookie = s.invalid;
+  h.interpacket_delay = s.delays_packets;
+  h.interpacket_delay_us = s.packet_delay_us;
+}
+
+/// Compass and accelerometer are in the sonar.
+void set_attitude(FrameHeader& h, const Quatd& sonar_in_world) {
+  const RollPitchYaw angles = rpy_from_quat(sonar_in_world);
+  h.compass_heading_deg = static_cast<float>(deg_from_rad(heading_rad(sonar_in_world)));
+  h.compass_pitch_deg = static_cast<float>(-deg_from_rad(angles.pitch_rad));  // about y to port, positive is bow down
+  h.compass_roll_deg = static_cast<float>(deg_from_rad(angles.roll_rad));
+  const Vec3d down = rotate(conjugate(sonar_in_world), Vec3d{0, 0, -1});
+  h.acceleration_g = {static_cast<float>(down.x), static_cast<float>(down.y), static_cast<float>(down.z)};
+}
+
+FrameHeader header_of(const Ping& ping, const protocol::DeviceState& device, const Settings& settings, std::int32_t index) {
+  const PingRequest& request = ping.request;
+  FrameHeader h;
+  h.frame_index = static_cast<std::uint32_t>(index - 1);
+  h.frame_time_us = h.sonar_time_us = h.go_time_us = microseconds((request.fired_at + settings.clock_offset).time_since_epoch());
+  h.uptime_s = static_cast<std::uint32_t>(std::max(seconds(request.fired_at - device.powered_up_at), 0.0));
+  h.system = static_cast<std::uint32_t>(product_of(*device.model).system);
+  h.serial = device.id;
+  h.water_c = static_cast<float>(request.water.temperature_c);
+  h.pressure_psi = static_cast<float>(surface_psi + psi_per_m * depth_from_z(request.sonar_in_world.position_m.z));
+  const FocusNow focus = focus_at(settings, request.fired_at);
+  h.focus = h.focus_position = focus.position;
+  h.focus_motor_moving = focus.moves;
+  set_settings(h, settings, request.settings);
+  set_attitude(h, request.sonar_in_world.orientation);
+  return h;
+}
+
+/// Rows as they are, beams from starboard.
+Bytes mirrored(const Ping& ping) {
+  const auto beams = static_cast<std::ptrdiff_t>(ping.request.settings.beam_count);
+  Bytes out(ping.samples);
+  for (auto row = out.begin(); row != out.end(); row += beams) std::reverse(row, row + beams);
+  return out;
+}
+
+}  // namespace
+
+Bytes raw_from_picture(BytesView picture, std::size_t samples, int pings) {
+  Bytes raw(picture.size());
+  for_each_sample(samples, pings, [&](std::size_t to, std::size_t from) { raw[to] = picture[from]; });
+  return raw;
+}
+
+Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings) {
+  Bytes picture(raw.size());
+  for_each_sample(samples, pings, [&](std::size_t from, std::size_t to) { picture[to] = raw[from]; });
+  return picture;
+}
+
+std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples) {
+  std::vector<Bytes> parts;
+  for (std::size_t at = 0; at < samples.size() || parts.empty();) {
+    FramePart part{frame_index, static_cast<std::int32_t>(samples.size()), {}, {}, static_cast<std::int32_t>(at)};
+    if (at == 0) part.header = header;
+    part.data = samples.subspan(at, std::min(at == 0 ? first_part_samples : part_samples, samples.size() - at));
+    at += part.data.size();
+    parts.push_back(protobuf::bytes_of(part));
+    assert(parts.back().size() <= longest_datagram);
+  }
+  return parts;
+}
+
+std::vector<Bytes> encode_frame(const Ping& ping, const protocol::DeviceState& device, const Settings& settings) {
+  const auto number = static_cast<std::uint32_t>(ping.request.number);
+  const auto index = static_cast<std::int32_t>(number > settings.first_ping ? number - settings.first_ping : number);
+  FrameHeader header = header_of(ping, device, settings, index);
+  Bytes samples = mirrored(ping);
+  header.reordered = text_option(device.options, option_name::reordered) == "true";
+  if (!header.reordered)
+    samples = raw_from_picture(samples, header.samples_per_beam, ping.request.settings.beam_count / channels);
+  return parts_of(index, wire::bytes_of(header), samples);
+}
+
+Bytes make_beacon(const protocol::DeviceState& device) {
+  Availability a;
+  a.serial = device.id;
+  a.system = product_of(*device.model).system;
+  a.busy = device.connected_client != protocol::Ipv4{};
+  a.capabilities.enabled = {"KA"};  // keep-alives
+  a.cpu_c = 30;
+  a.hot_limit_c = 70;  // unknown: chosen
+  a.hot_limit_s = 60;
+  return protobuf::bytes_of(a);
+}
+
+std::optional<DecodedFrame> FrameAssembler::add(BytesView datagram) {
+  FramePart part;
+  if (!protobuf::read(datagram, part) || part.total_size <= 0 || part.data_offset < 0) return std::nullopt;
+  const auto total = static_cast<std::size_t>(part.total_size), at = static_cast<std::size_t>(part.data_offset);
+  if (total > largest_picture || at + part.data.size() > total) return std::nullopt;
+  if (part.frame_index != index_ || done_ || total != total_) {
+    if (part.frame_index == index_ && total == total_) return std::nullopt;  // a part that came twice
+    incomplete_ += done_ ? 0 : 1;
+    index_ = part.frame_index;
+    total_ = total;
+    received_ = 0;
+    done_ = false;
+    header_.clear();
+    samples_.assign(total, std::byte{});
+    has_.assign(total, false);
+  }
+  if (part.header) header_.assign(part.header->begin(), part.header->end());
+  for (std::size_t i = 0; i < part.data.size(); ++i) {
+    samples_[at + i] = part.data[i];
+    received_ += has_[at + i] ? 0 : 1;
+    has_[at + i] = true;
+  }
+  return received_ == total_ && !header_.empty() ? whole() : std::nullopt;
+}
+
+std::optional<DecodedFrame> FrameAssembler::whole() {
+  done_ = true;
+  DecodedFrame frame;
+  frame.index = index_;
+  header_.resize(std::max(header_.size(), header_size));
+  wire::Reader reader(header_);
+  fields(reader, frame.header);
+  frame.samples = frame.header.samples_per_beam;
+  if (frame.samples == 0 || total_ % frame.samples != 0) return std::nullopt;
+  frame.beams = total_ / frame.samples;
+  if (frame.beams == 0 || frame.beams % channels != 0) return std::nullopt;
+  frame.picture = frame.header.reordered != 0
+                      ? samples_
+                      : picture_from_raw(samples_, frame.samples, static_cast<int>(frame.beams / channels));
+  return frame;
+}
+
+}  // namespace sonar::aris

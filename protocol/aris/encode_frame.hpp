@@ -1,0 +1,55 @@
+// A Ping as the datagrams of a frame: header, channel order, parts. And the way back, for tools and tests.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "protocol/aris/frame_header.hpp"
+#include "protocol/aris/settings.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::aris {
+
+inline constexpr std::size_t longest_datagram = 1400;  // an older sample program has a buffer of that size
+
+/// From the picture, [samples][beams] with beam 0 most to starboard, to the order in which the device digitises: by ping, sample
+/// and channel. Sizes: samples x 16 x pings.
+Bytes raw_from_picture(BytesView picture, std::size_t samples, int pings);
+Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings);
+
+/// Datagrams of a frame: the header is in the first, the samples in all.
+std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples);
+std::vector<Bytes> encode_frame(const Ping& ping, const protocol::DeviceState& device, const Settings& settings);
+
+/// The first datagram of a frame.
+std::optional<protocol::Field> locate(protocol::FieldName name, BytesView first_part);
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView first_part);
+
+Bytes make_beacon(const protocol::DeviceState& device);
+
+/// A whole frame, as its parts say.
+struct DecodedFrame {
+  std::int32_t index = 0;
+  FrameHeader header;
+  Bytes picture;  // [samples][beams], beam 0 most to starboard
+  std::size_t samples = 0, beams = 0;
+};
+/// Puts datagrams together; a frame that lacks a part is dropped when the next one begins.
+class FrameAssembler {
+ public:
+  std::optional<DecodedFrame> add(BytesView datagram);
+  std::uint64_t incomplete() const { return incomplete_; }
+
+ private:
+  std::optional<DecodedFrame> whole();
+  std::int32_t index_ = 0;
+  std::size_t total_ = 0, received_ = 0;
+  bool done_ = true;
+  Bytes header_, samples_;
+  std::vector<bool> has_;  // bytes of the samples
+  std::uint64_t incomplete_ = 0;
+};
+
+}  // namespace sonar::aris

@@ -1,0 +1,55 @@
+// The ARIS products as SonarModel rows, one mode per ping mode, frequency and lens, and the limits of their settings. Sources:
+// docs/protocols/aris.md.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "core/sonar/sonar_model.hpp"
+#include "protocol/aris/messages.hpp"
+
+namespace sonar::aris {
+
+inline constexpr int channels = 16;  // beams that one ping of a frame forms
+
+/// How the beams of a frame are formed: `pings` pings of 16 interleaved beams.
+struct PingMode {
+  std::uint32_t number = 0;
+  int pings = 0;
+  int beams() const { return channels * pings; }
+};
+
+struct Product {
+  std::string_view profile;
+  SystemType system{};
+  std::vector<PingMode> ping_modes;
+  bool has_telephoto = false;
+  std::array<double, 2> pulse_limit_us{};  // low, high frequency
+  double pulse_energy_us_hz = 0;           // longest pulse times frame rate
+  double window_end_m = 0;
+  double small_period_margin = 0, period_margin = 0;  // of a cycle, with sample periods up to 4 us and above
+  Acoustics initial;                                  // before a controller spoke, as the vendor's sample program has them
+};
+
+std::span<const std::shared_ptr<const SonarModel>> models();
+const Product& product_of(const SonarModel& model);
+
+/// Which mode of the model; nothing: the product has no such ping mode.
+struct ModeChoice {
+  std::uint32_t ping_mode = 0;
+  Frequency frequency{};
+  bool telephoto = false;
+  bool operator==(const ModeChoice&) const = default;
+};
+std::optional<int> mode_index(const Product& product, const ModeChoice& choice);
+ModeChoice choice_of(const Product& product, int mode_index);
+const PingMode* find_ping_mode(const Product& product, std::uint32_t number);
+
+/// Azimuths of the beams' centres, most to port first [rad].
+std::vector<double> beam_azimuths(const Product& product, int beams, bool telephoto);
+
+}  // namespace sonar::aris

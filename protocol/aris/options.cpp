@@ -1,0 +1,39 @@
+#include "protocol/aris/options.hpp"
+
+#include <array>
+#include <charconv>
+
+namespace sonar::aris {
+
+std::span<const protocol::Option> options() {
+  static const std::array<protocol::Option, 4> all{{
+      {option_name::cycle,
+       {"lenient", "documented"},
+       "lenient",
+       "a cycle period up to 5 % too short: raise it and report the settings as constrained, or refuse them"},
+      {option_name::reordered, {"false", "true"}, "false", "true: frames carry the picture, not the channels of each ping"},
+      {option_name::receivers,
+       {"any", "controller"},
+       "any",
+       "where a controller may have frames sent: to any address, or only to its own and to multicast groups"},
+      {option_name::silence_s, {}, "10", "a controller that sends no command for so long is disconnected, seconds", 5, 600},
+  }};
+  return all;
+}
+
+std::string_view text_option(const protocol::OptionValues& values, std::string_view name) {
+  const auto found = values.find(std::string(name));
+  if (found != values.end()) return found->second;
+  for (const protocol::Option& option : options())
+    if (option.name == name) return option.default_value;
+  return {};
+}
+
+double number_option(const protocol::OptionValues& values, std::string_view name) {
+  const std::string_view text = text_option(values, name);
+  double value = 0;
+  std::from_chars(text.data(), text.data() + text.size(), value);
+  return value;
+}
+
+}  // namespace sonar::aris

@@ -1,0 +1,20 @@
+// What the public sources leave unknown about an ARIS, as options of a sonar's configuration.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::aris {
+
+namespace option_name {
+inline constexpr std::string_view cycle = "cycle", reordered = "reordered", receivers = "receivers", silence_s = "silence_s";
+}
+
+std::span<const protocol::Option> options();
+/// The configured value, or the default.
+std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
+double number_option(const protocol::OptionValues& values, std::string_view name);
+
+}  // namespace sonar::aris

@@ -1,0 +1,174 @@
+#include "protocol/aris/settings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "protocol/aris/options.hpp"
+
+namespace sonar::aris {
+namespace {
+
+constexpr std::uint32_t rest_us = 360;                  // of a cycle, after its last sample
+constexpr double lenient_share = 0.05;                  // chosen: option cycle
+constexpr auto focus_travel = std::chrono::seconds(1);  // whole way; the device's log has about a second
+
+struct Limits {
+  const char* name;
+  double low, high;
+};
+
+/// Empty, or why a value is out of the vendor's documented range.
+std::string out_of_range(const Acoustics& a, const Product& product) {
+  if (find_ping_mode(product, a.ping_mode) == nullptr) return "has no ping mode " + std::to_string(a.ping_mode);
+  if (a.frequency != Frequency::low && a.frequency != Frequency::high) return "frequency must be 0 or 1";
+  const std::pair<double, Limits> values[] = {
+      {static_cast<double>(a.cookie), {"cookie", 1, 4294967295.0}},
+      {static_cast<double>(a.frame_rate_hz), {"frame rate", 1, highest_rate_hz}},
+      {static_cast<double>(a.samples_per_beam), {"samples per beam", least_samples, most_samples}},
+      {static_cast<double>(a.start_delay_us), {"sample start delay", 930, 60000}},
+      {static_cast<double>(a.cycle_us), {"cycle period", 1802, 150000}},
+      {static_cast<double>(a.sample_period_us), {"sample period", 4, 100}},
+      {static_cast<double>(a.pulse_us), {"pulse width", 5, 80}},
+      {static_cast<double>(a.gain_db), {"receiver gain", 0, highest_gain_db}},
+  };
+  for (const auto& [value, limits] : values)
+    if (!(value >= limits.low && value <= limits.high)) {
+      char text[96];
+      std::snprintf(text, sizeof text, "%s %g is outside %g..%g", limits.name, value, limits.low, limits.high);
+      return text;
+    }
+  return {};
+}
+
+}  // namespace
+
+bool HeldSettings::equals(const VendorSettings& other) const {
+  const auto* of = dynamic_cast<const HeldSettings*>(&other);
+  return of != nullptr && settings == of->settings;
+}
+
+Settings initial_settings(const protocol::DeviceState& device) {
+  Settings s;
+  const Product& product = product_of(*device.model);
+  s.acoustics = product.initial;
+  s.salinity = device.water.salinity_psu < 7 ? 0 : device.water.salinity_psu < 25 ? 15 : 35;
+  s.focus_from = s.focus_to = focus_position(product.window_end_m / 8, product);
+  s.first_ping = device.last_ping;
+  return s;
+}
+
+Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device) {
+  const auto* of = dynamic_cast<const HeldSettings*>(held);
+  return of != nullptr ? of->settings : initial_settings(device);
+}
+
+double sound_speed_mps(double t, double s, double z) {
+  return 1402.5 + 5 * t - 5.44e-2 * t * t + 2.1e-4 * t * t * t + 1.33 * s - 1.23e-2 * s * t + 8.7e-5 * s * t * t + 1.56e-2 * z +
+         2.55e-7 * z * z - 7.3e-12 * z * z * z;
+}
+
+std::uint32_t shortest_cycle_us(const Acoustics& a) {
+  return a.start_delay_us + a.sample_period_us * a.samples_per_beam + rest_us;
+}
+
+double highest_frame_rate_hz(const Product& product, const Acoustics& a, std::optional<std::uint32_t> packet_delay_us) {
+  constexpr double overhead_us = 420, per_packet_us = 16.6;
+  const PingMode& mode = *find_ping_mode(product, a.ping_mode);
+  const double margin = a.sample_period_us <= 4 ? product.small_period_margin : product.period_margin;
+  const double shortest_us = a.start_delay_us + a.sample_period_us * static_cast<double>(a.samples_per_beam) + overhead_us;
+  const double beyond_us = a.cycle_us > shortest_cycle_us(a) ? a.cycle_us - shortest_cycle_us(a) : 0;
+  double frame_us = mode.pings * (shortest_us * (1 + margin) + beyond_us);
+  if (packet_delay_us) {
+    const auto packets = (static_cast<std::uint32_t>(mode.beams()) * a.samples_per_beam + 1024) / 1392;
+    frame_us += packets * (per_packet_us + *packet_delay_us);
+  }
+  return std::clamp(1e6 / frame_us, 1.0, highest_rate_hz);
+}
+
+Verdict judge(const Acoustics& asked, const Product& product, bool lenient_cycle, std::optional<std::uint32_t> packet_delay_us) {
+  Verdict verdict{out_of_range(asked, product), asked, false};
+  if (!verdict.refusal.empty()) return verdict;
+  Acoustics& used = verdict.used;
+  const std::uint32_t needed_us = shortest_cycle_us(asked);
+  const double accepted_us = needed_us * (lenient_cycle ? 1 - lenient_share : 1.0);
+  char text[128] = "";
+  if (asked.cycle_us < accepted_us)
+    std::snprintf(text, sizeof text, "cycle period %u us is too short: %u us are needed", asked.cycle_us, needed_us);
+  const int pings = find_ping_mode(product, asked.ping_mode)->pings;
+  const double frame_us = std::ceil(1e6 / static_cast<double>(asked.frame_rate_hz));
+  if (frame_us <= static_cast<double>(asked.cycle_us) * pings)
+    std::snprintf(text, sizeof text, "%d cycles of %u us do not fit a frame of %g us", pings, asked.cycle_us, frame_us);
+  verdict.refusal = text;
+  if (!verdict.refusal.empty()) return verdict;
+  used.cycle_us = std::max(asked.cycle_us, needed_us);
+  used.frame_rate_hz = std::min(asked.frame_rate_hz, static_cast<float>(highest_frame_rate_hz(product, used, packet_delay_us)));
+  const double limit_us = product.pulse_limit_us[static_cast<std::size_t>(asked.frequency)];
+  const double longest_us = std::min(limit_us, product.pulse_energy_us_hz / static_cast<double>(used.frame_rate_hz));
+  used.pulse_us = std::min(asked.pulse_us, static_cast<std::uint32_t>(longest_us));
+  verdict.constrained = used != asked;
+  return verdict;
+}
+
+Verdict apply(Settings& settings, const Acoustics& asked, const protocol::DeviceState& device) {
+  const auto delay = settings.delays_packets ? std::optional(settings.packet_delay_us) : std::nullopt;
+  const bool lenient = text_option(device.options, option_name::cycle) == "lenient";
+  const Verdict verdict = judge(asked, product_of(*device.model), lenient, delay);
+  if (!verdict.refusal.empty()) {
+    settings.invalid = asked.cookie;
+    return verdict;
+  }
+  settings.acoustics = verdict.used;
+  settings.valid = true;
+  (verdict.constrained ? settings.constrained : settings.applied) = asked.cookie;
+  return verdict;
+}
+
+std::uint32_t focus_position(double range_m, const Product& product) {
+  return static_cast<std::uint32_t>(std::lround(1000 * std::clamp(range_m / product.window_end_m, 0.0, 1.0)));
+}
+
+FocusNow focus_at(const Settings& s, Time at) {
+  const double way = std::abs(static_cast<double>(s.focus_to) - s.focus_from) / 1000;
+  const double gone = std::max(seconds(at - s.focus_set_at) / seconds(focus_travel), 0.0);
+  if (gone >= way) return {s.focus_to, false};
+  const double step = std::copysign(1000 * gone, static_cast<double>(s.focus_to) - s.focus_from);
+  return {static_cast<std::uint32_t>(std::lround(s.focus_from + step)), true};
+}
+
+PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
+  const Acoustics& a = settings.acoustics;
+  const Product& product = product_of(*device.model);
+  const bool telephoto = settings.telephoto && product.has_telephoto;
+  PingSettings s;
+  s.mode = mode_index(product, {a.ping_mode, a.frequency, telephoto}).value_or(0);
+  const FrequencyMode& mode = device.model->modes[static_cast<std::size_t>(s.mode)];
+  const double speed = sound_speed_mps(device.water.temperature_c, settings.salinity, device.depth_m);
+  const double m_per_us = speed * 1e-6 / 2;
+  s.beam_count = static_cast<int>(mode.beam_azimuths_rad.size());
+  s.range_bin_count = static_cast<int>(a.samples_per_beam);
+  s.range_bin_m = a.sample_period_us * m_per_us;
+  s.range_start_m = a.start_delay_us * m_per_us;
+  s.range_m = s.range_start_m + s.range_bin_count * s.range_bin_m;
+  s.row_centre = 0;  // sample i lies at the start delay and i sample periods
+  s.pulse_width_m = static_cast<float>(a.pulse_us * m_per_us);
+  s.rate_hz = settings.valid && settings.streaming ? a.frame_rate_hz : 0;
+  s.gain_db = a.gain_db;
+  s.transmit = a.transmit;
+  s.device_sound_speed_mps = static_cast<float>(speed);
+  s.device_absorption_db_per_m = 0;  // unknown: chosen, since the level of a real recording falls with range all the way
+  s.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = 0, .ceiling_db = 80};
+  return s;
+}
+
+protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device) {
+  const Acoustics& a = settings.acoustics;
+  const PingSettings s = ping_settings(settings, device);
+  char text[200];
+  std::snprintf(text, sizeof text, "%s, %d beams, %g Hz, window %.2f to %.2f m, %u samples, pulse %u us, gain %g dB, salinity %u",
+                device.model->modes[static_cast<std::size_t>(s.mode)].name.c_str(), s.beam_count, static_cast<double>(s.rate_hz),
+                s.range_start_m, s.range_m, a.samples_per_beam, a.pulse_us, static_cast<double>(a.gain_db), settings.salinity);
+  return {s, std::make_shared<HeldSettings>(settings), text};
+}
+
+}  // namespace sonar::aris

@@ -1,0 +1,77 @@
+// The laws of an ARIS: which acoustic settings are valid, what the device makes of them, and the PingSettings they mean. Pure
+// functions; formulas and sources: docs/protocols/aris.md.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/sonar/ping_settings.hpp"
+#include "protocol/aris/models.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::aris {
+
+inline constexpr double highest_rate_hz = 15, highest_gain_db = 24;
+inline constexpr std::uint32_t least_samples = 128, most_samples = 4096;  // per beam
+
+/// All that a controller has set, kept beside PingSettings: frames echo it.
+struct Settings {
+  Acoustics acoustics;
+  bool valid = false;                                       // a SET_ACOUSTICS was accepted
+  bool streaming = false;                                   // a receiver is set
+  std::uint32_t applied = 0, constrained = 0, invalid = 0;  // the last cookie of each kind
+  std::uint32_t salinity = 35;                              // 0, 15, 35: what the device believes
+  bool telephoto = false;
+  std::uint32_t focus_from = 0, focus_to = 0;  // 0 to 1000
+  Time focus_set_at{};
+  bool delays_packets = false;
+  std::uint32_t packet_delay_us = 0;
+  std::chrono::nanoseconds clock_offset{0};  // of the device's clock, from SET_DATETIME
+  std::uint32_t first_ping = 0;              // number of the last ping before the controller connected
+  bool operator==(const Settings&) const = default;
+};
+struct HeldSettings final : VendorSettings {
+  explicit HeldSettings(const Settings& s) : settings(s) {}
+  bool equals(const VendorSettings& other) const override;
+  Settings settings;
+};
+Settings initial_settings(const protocol::DeviceState& device);
+/// initial_settings() for null.
+Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device);
+
+/// What the device believes: its water's temperature and depth, and the salinity that it was told [m/s].
+double sound_speed_mps(double temperature_c, double salinity_psu, double depth_m);
+
+/// Highest frame rate with these settings, 1 to 15 [Hz].
+double highest_frame_rate_hz(const Product& product, const Acoustics& acoustics, std::optional<std::uint32_t> packet_delay_us);
+
+/// Start delay, samples and a rest [us].
+std::uint32_t shortest_cycle_us(const Acoustics& acoustics);
+
+/// What the device makes of a SET_ACOUSTICS.
+struct Verdict {
+  std::string refusal;  // empty = valid
+  Acoustics used;
+  bool constrained = false;
+};
+Verdict judge(const Acoustics& asked, const Product& product, bool lenient_cycle,
+              std::optional<std::uint32_t> packet_delay_us = std::nullopt);
+/// The same, noted in the settings: the cookie under its kind, and the settings used unless they were refused.
+Verdict apply(Settings& settings, const Acoustics& asked, const protocol::DeviceState& device);
+
+/// 0 to 1000 over the window of the product.
+std::uint32_t focus_position(double range_m, const Product& product);
+/// Where the focus motor is, which takes a second for the whole way.
+struct FocusNow {
+  std::uint32_t position = 0;
+  bool moves = false;
+};
+FocusNow focus_at(const Settings& settings, Time at);
+
+PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
+protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
+
+/// The change that a controller would have caused by a SET_ACOUSTICS of the override's values.
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+}  // namespace sonar::aris

@@ -1,0 +1,16 @@
+// Recordings of ARIS sonars, .aris: a file header, then header and picture of each frame, headers 1024 bytes each. All frames
+// have the shape of the first, as the format wants it (docs/protocols/aris.md).
+#pragma once
+
+#include <memory>
+
+#include "protocol/recording/byte_source.hpp"
+#include "protocol/recording/recorded_message.hpp"
+
+namespace sonar::recording {
+
+/// Takes the datagrams of frames and keeps whole ones; other messages are left out. bad_data: a frame of another shape, since the
+/// settings have changed.
+std::unique_ptr<RecordingWriter> write_aris_file(std::unique_ptr<Sink> sink);
+
+}  // namespace sonar::recording

@@ -1,0 +1,146 @@
+// A controller's conversation with an emulated ARIS, without a socket.
+#include <gmock/gmock.h>
+
+#include "protocol/aris/dialogue.hpp"
+#include "tests/protocol/aris/aris_testing.hpp"
+
+namespace sonar::aris {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct Talk {
+  explicit Talk(const char* profile = "aris-3000", protocol::OptionValues options = {})
+      : state(testing::device(profile, options)) {
+    state.last_ping = 17;
+    state.connected_client = {10, 0, 0, 7};
+    dialogue = vendor().converse(vendor().ports().front(), state, testing::at_s(0));
+  }
+  /// Obeys what it asks for, as the daemon does.
+  void say(const Bytes& bytes, double at = 0) {
+    const protocol::Reaction reaction = dialogue->on_bytes(bytes, testing::at_s(at));
+    EXPECT_TRUE(reaction.replies.empty()) << "the device never answers";
+    for (const protocol::Event& event : reaction.events) {
+      if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
+        state.settings = change->vendor_settings;
+        settings = change->settings;
+      } else if (const auto* to = std::get_if<protocol::SetReceivers>(&event)) {
+        receivers = to->to;
+      } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
+        notices.push_back(notice->text);
+      } else if (const auto* close = std::get_if<protocol::Close>(&event)) {
+        closed = close->why;
+      }
+    }
+  }
+  void say(const Command& command, double at = 0) { say(framed(command), at); }
+  Settings held() const { return settings_from(state.settings.get(), state); }
+
+  protocol::DeviceState state;
+  std::unique_ptr<protocol::Dialogue> dialogue;
+  PingSettings settings = vendor().initial_settings(testing::device()).settings;
+  std::vector<protocol::Endpoint> receivers;
+  std::vector<std::string> notices;
+  std::string closed;
+};
+
+TEST(ArisDialogue, FramesFlowOnceReceiverAndValidSettingsAreThere) {
+  for (const bool receiver_first : {true, false}) {
+    Talk talk;
+    if (receiver_first) talk.say(testing::set_receiver(56444));
+    EXPECT_EQ(talk.settings.rate_hz, 0);
+    talk.say(testing::set_acoustics(testing::acoustics()));
+    if (!receiver_first) {
+      EXPECT_EQ(talk.settings.rate_hz, 0);
+      talk.say(testing::set_receiver(56444));
+    }
+    EXPECT_EQ(talk.settings.rate_hz, 12);
+    ASSERT_EQ(talk.receivers.size(), 1u);
+    EXPECT_EQ(talk.receivers[0], (protocol::Endpoint{{}, 56444})) << "no address: the controller's own";
+    EXPECT_EQ(talk.held().first_ping, 17u);
+    EXPECT_EQ(talk.held().applied, 1u);
+    EXPECT_EQ(talk.settings.beam_count, 128);
+    talk.say(testing::set_receiver(1, "0.0.0.0"));
+    EXPECT_EQ(talk.settings.rate_hz, 0);
+    EXPECT_TRUE(talk.receivers.empty());
+  }
+}
+
+TEST(ArisDialogue, RefusedSettingsChangeNothingButTheCookie) {
+  Talk talk;
+  talk.say(testing::set_receiver(56444, "239.0.0.42"));
+  EXPECT_EQ(talk.receivers.at(0), (protocol::Endpoint{{239, 0, 0, 42}, 56444}));
+  talk.say(testing::set_acoustics(testing::acoustics(1)));
+  const PingSettings before = talk.settings;
+  Acoustics bad = testing::acoustics(2);
+  bad.ping_mode = 1;
+  talk.say(testing::set_acoustics(bad));
+  EXPECT_EQ(talk.settings, before);
+  EXPECT_EQ(talk.held().invalid, 2u);
+  EXPECT_EQ(talk.held().applied, 1u);
+  EXPECT_THAT(talk.notices.at(0), HasSubstr("ping mode 1"));
+}
+
+TEST(ArisDialogue, SalinityFocusClockAndLens) {
+  Talk talk("aris-1800");
+  talk.say(testing::set_acoustics({1, 12, 1000, 1360, 5720, 4, 6, 3, true, Frequency::high, true, 18}));
+  const float salt = talk.settings.device_sound_speed_mps;
+  talk.say(testing::hex("00000004 08 04 32 00"));
+  EXPECT_EQ(talk.held().salinity, 0u);
+  EXPECT_LT(talk.settings.device_sound_speed_mps, salt - 30);
+  Command command;
+  command.type = CommandType::set_salinity;
+  command.salinity = Choice{20};
+  talk.say(command);
+  EXPECT_EQ(talk.held().salinity, 0u);
+  EXPECT_THAT(talk.notices.back(), HasSubstr("salinity of 20"));
+  command = {};
+  command.type = CommandType::set_focus;
+  command.focus = Focus{0, 5};
+  talk.say(command, 3);
+  EXPECT_EQ(talk.held().focus_to, 100u);
+  EXPECT_EQ(talk.held().focus_set_at, testing::at_s(3));
+  command = {};
+  command.type = CommandType::set_telephoto;
+  command.telephoto = Choice{1};
+  talk.say(command);
+  EXPECT_NEAR(talk.state.model->modes[static_cast<std::size_t>(talk.settings.mode)].beam_azimuths_rad[0], 0.1296, 1e-3);
+  command = {};
+  command.date_time = DateTime{"2014-Jan-31 23:58:15"};
+  talk.say(command, 10);
+  EXPECT_EQ(testing::at_s(10) + talk.held().clock_offset, Time(std::chrono::seconds(1391212695)));
+}
+
+TEST(ArisDialogue, DatesThatAreNone) {
+  EXPECT_EQ(parse_date_time("1970-Jan-01 00:00:01"), Time(std::chrono::seconds(1)));
+  for (const char* bad : {"", "2014-01-31 23:58:15", "2014-anF-31 23:58:15", "2014-Feb-30 00:00:00", "2014-Jan-31 24:00:00"})
+    EXPECT_FALSE(parse_date_time(bad)) << bad;
+}
+
+TEST(ArisDialogue, JunkIsReportedAndALyingLengthEndsIt) {
+  Talk talk;
+  talk.say(testing::hex("00000002 FF FF 00000005 08 0E 82 01 00"));
+  EXPECT_EQ(talk.notices.size(), 1u);
+  EXPECT_EQ(talk.closed, "");
+  talk.say(testing::hex("00000002 08 28"));
+  EXPECT_THAT(talk.notices.back(), HasSubstr("type 40"));
+  talk.say(testing::set_receiver(0));
+  talk.say(testing::set_receiver(5, "nowhere"));
+  EXPECT_EQ(talk.notices.size(), 4u);
+  EXPECT_TRUE(talk.receivers.empty());
+  talk.say(testing::hex("7FFFFFFF"));
+  EXPECT_THAT(talk.closed, HasSubstr("longer than 4096"));
+}
+
+TEST(ArisDialogue, OptionsOfReceiversAndSilence) {
+  Talk talk("aris-3000", {{"receivers", "controller"}, {"silence_s", "5"}});
+  talk.say(testing::set_receiver(5, "10.0.0.8"));
+  EXPECT_TRUE(talk.receivers.empty());
+  talk.say(testing::set_receiver(5, "10.0.0.7"));
+  EXPECT_EQ(talk.receivers.size(), 1u);
+  EXPECT_EQ(talk.dialogue->longest_silence(), std::chrono::milliseconds(5000));
+  EXPECT_EQ(Talk().dialogue->longest_silence(), std::chrono::milliseconds(10000));
+}
+
+}  // namespace
+}  // namespace sonar::aris
