@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "cuda/counting.hpp"
 #include "cuda/trace_ray.hpp"
 
@@ -72,10 +73,21 @@ SONAR_HD inline bool interpolates(const FanRay& a, const FanRay& m, const FanRay
   return plane_is_near(a, along, m, tolerance_m) && plane_is_near(b, along, m, tolerance_m);
 }
 
+/// As FanTracer::per_column (core/pipeline/trace_fan.cpp).
+SONAR_HD inline float per_column(const SeaView& s, const FanRay& a, ColumnSine column) {
+  if (a.object == no_object || a.offset == 0) return 0;
+  const float* m = s.world_from_sonar;
+  const float to_port = a.normal.x * m[1] + a.normal.y * m[4] + a.normal.z * m[7];
+  if (s.conical != 0) return -s.column_spacing * to_port / (a.offset * column.across * column.across * a.forward);
+  const float forward = a.normal.x * m[0] + a.normal.y * m[3] + a.normal.z * m[6];
+  return -s.column_spacing * (to_port - forward * column.along / column.across) / a.offset;
+}
+
 /// Draws one column's depth map from below to above.
 struct DepthPen {
   const SeaView* sea;
-  float* map;  // [bins + 1]
+  ColumnSine column;
+  float *map, *slope;  // [bins + 1]
   int bin;
 
   SONAR_HD static int bin_below(const SeaView& s, float tangent) {
@@ -86,10 +98,14 @@ struct DepthPen {
     const int end = last ? sea->bins : bin_below(*sea, b.tangent);
     const float farther = b.inverse_x < a.inverse_x ? b.inverse_x : a.inverse_x;
     const float per_tangent = (b.inverse_x - a.inverse_x) / (b.tangent - a.tangent);
+    const FanRay& of = b.inverse_x < a.inverse_x ? b : a;
+    const std::int32_t mark = surface_mark(of.object);
+    const float aside = per_column(*sea, of, column);
     for (; bin <= end; ++bin) {
       const float tangent = sea->first_tangent + static_cast<float>(bin) / sea->bins_per_tangent;
       const float between = a.inverse_x + per_tangent * (tangent - a.tangent);
-      map[bin] = edge ? farther : (0.0f < between ? between : 0.0f);
+      map[bin] = with_mark(edge ? farther : (0.0f < between ? between : 0.0f), mark);
+      slope[bin] = aside;
     }
   }
 };
@@ -116,8 +132,8 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   int waiting = 1;
   FanRay below = p.fan_rays[i];
   above[0] = {p.fan_rays[i + columns], 0, false};
-  DepthPen pen{&s, p.depth + static_cast<std::int64_t>(column) * (s.bins + 1),
-               e == 0 ? 0 : DepthPen::bin_below(s, below.tangent) + 1};
+  const std::int64_t of_column = static_cast<std::int64_t>(column) * (s.bins + 1);
+  DepthPen pen{&s, sine, p.depth + of_column, p.depth_slope + of_column, e == 0 ? 0 : DepthPen::bin_below(s, below.tangent) + 1};
   FirstHit nearest{0, no_object};
   if (e == 0) note(below, s.truth_half_width_rad, nearest);
   std::uint32_t rays = 0;

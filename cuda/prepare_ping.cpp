@@ -125,6 +125,7 @@ void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
     in.max_sine = static_cast<float>(std::min(1.0, m.plan.columns.first_sine + m.plan.columns.spacing));
     in.max_elevation_rad = static_cast<float>(m.plan.widest_about_axis_rad());
     in.levels = m.plan.levels;
+    in.exact_small = m.plan.expected_power;
   }
   if (views.empty()) return;
   std::vector<CellsInView> found(views.size());
@@ -244,6 +245,13 @@ TileView PingPreparer::view_of(const PreparedTile& prepared, const std::int16_t*
   t.fade_in_per_m = seen.fade_in_per_m;
   t.fade_out_to_m = seen.fade_out_to_m;
   t.fade_out_per_m = seen.fade_out_per_m;
+  t.turned_away = seen.turned_away;
+  t.mark = seen.mark;
+  t.moves = seen.moves ? 1 : 0;
+  if (seen.moves) {
+    std::copy_n(seen.seen_turn, 9, t.seen_turn);
+    std::copy_n(seen.seen_place, 3, t.seen_place);
+  }
   return t;
 }
 

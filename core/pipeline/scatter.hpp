@@ -32,7 +32,8 @@ std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const Pi
 void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles);
 
-simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen);
+/// Of columns [first, last); the map may hold more.
+simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen, int first, int last);
 
 /// For each group of `group_columns` columns, the tiles that reach into it, in order.
 void sort_tiles(const std::vector<PreparedTile>& tiles, int group_columns, int groups,

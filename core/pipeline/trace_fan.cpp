@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 
 namespace sonar {
 namespace {
@@ -78,6 +79,10 @@ class FanTracer {
         first_(first),
         last_(last),
         s_(scratch) {
+    for (int i = 0; i < 3; ++i) {
+      ahead_[i] = static_cast<float>(scalars.world_from_sonar.m[i][0]);
+      port_[i] = static_cast<float>(scalars.world_from_sonar.m[i][1]);
+    }
     // One pulse width [m]: the depth map need not follow a surface any closer (section 2).
     tolerance_m_ = static_cast<float>(plan.pulse_width_m);
     columns_ = column_sines(plan.columns, first, last);
@@ -152,12 +157,24 @@ class FanTracer {
     refinement.run(trace, [this](std::size_t lane, int) { return SurfaceHit::direction(filler_.packet, lane); });
   }
 
+  /// Of the map from this column to the next, along the plane n . p = o of the facet that was hit: of 1 / x = (n_x + n_y u / (s
+  /// cos psi) + n_z tan psi) / o with s^2 = 1 - u^2; of flat beams 1 / h = (n_x s + n_y u + n_z tan psi) / o.
+  float per_column(const Sample& a, ColumnSine column) const {
+    const SurfaceHit& hit = a.surface;
+    if (hit.object == RayPacket::miss || hit.offset == 0) return 0;
+    const float to_port = hit.normal.x * port_[0] + hit.normal.y * port_[1] + hit.normal.z * port_[2];
+    const auto spacing = static_cast<float>(plan_.columns.spacing);
+    if (plan_.switches.conical) return -spacing * to_port / (hit.offset * column.across * column.across * a.forward);
+    const float forward = hit.normal.x * ahead_[0] + hit.normal.y * ahead_[1] + hit.normal.z * ahead_[2];
+    return -spacing * (to_port - forward * column.along / column.across) / hit.offset;
+  }
+
   /// Linear between hits of one surface, the farther value across edges.
   void draw(DepthMap& seen) {
     const Fan& fan = plan_.fan;
     const int n = elevations();
     for (int k = 0; k < last_ - first_; ++k) {
-      float* map = seen.column(first_ + k);
+      float *map = seen.column(first_ + k), *slope = seen.per_column.data() + seen.at(first_ + k);
       int bin = 0;
       for (std::int32_t i = k * n; at(i).next >= 0; i = at(i).next) {
         const Sample &a = at(i), &b = at(at(i).next);
@@ -168,13 +185,16 @@ class FanTracer {
         const float inverse_a = a.surface.inverse_x, inverse_b = b.surface.inverse_x, farther = std::min(inverse_a, inverse_b);
         const float per_tangent = (inverse_b - inverse_a) / (b.tangent - a.tangent);
         if (bin > end) continue;
+        const Sample& of = inverse_b < inverse_a ? b : a;
+        const std::int32_t mark = surface_mark(of.surface.object);
+        std::fill(slope + bin, slope + end + 1, per_column(of, column(k)));
         if (a.edge_above) {
-          std::fill(map + bin, map + end + 1, farther);
+          std::fill(map + bin, map + end + 1, with_mark(farther, mark));
         } else {
           const float* __restrict tangent = fan.tangent.data();
           // A bin may lie a rounding error outside of [a, b]: 1 / x must not become negative there.
           for (int place = bin; place <= end; ++place)
-            map[place] = std::max(0.0f, inverse_a + per_tangent * (tangent[place] - a.tangent));
+            map[place] = with_mark(std::max(0.0f, inverse_a + per_tangent * (tangent[place] - a.tangent)), mark);
         }
         bin = end + 1;
       }
@@ -186,7 +206,7 @@ class FanTracer {
   PacketFiller filler_;
   int first_, last_;
   FanScratch& s_;
-  float tolerance_m_ = 0;
+  float tolerance_m_ = 0, ahead_[3], port_[3];  // m; axes of the sonar in the world
   std::vector<ColumnSine> columns_;
   std::vector<Elevation> base_;
 };

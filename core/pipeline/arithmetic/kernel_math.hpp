@@ -11,6 +11,11 @@ namespace sonar {
 
 /// Terms of the even polynomial that stands for the elevation pattern, in w = sin^2(elevation angle).
 inline constexpr int elevation_terms = 9;
+/// Which object a value of the depth map is of, in its last bits: objects are told apart by their number modulo 64.
+inline constexpr std::int32_t surface_marks = 63;
+SONAR_HD constexpr std::int32_t surface_mark(std::uint32_t object) { return static_cast<std::int32_t>(object) & surface_marks; }
+/// A cell of another object is hidden from so much behind the surface that was hit [m], and this share of its range.
+inline constexpr float contact_m = 1e-3f, contact_share = 2e-5f;
 /// Intervals of a tabulated scattering law; the table has law_steps + 2 values.
 inline constexpr int law_steps = 128;
 
@@ -23,6 +28,12 @@ SONAR_HD inline float float_of(std::uint32_t bits) {
   float x;
   std::memcpy(&x, &bits, sizeof x);
   return x;
+}
+
+/// 0, nothing, stays as it is.
+SONAR_HD inline float with_mark(float inverse_x, std::int32_t mark) {
+  const std::uint32_t marks = static_cast<std::uint32_t>(surface_marks);
+  return inverse_x > 0 ? float_of((bits_of(inverse_x) & ~marks) | static_cast<std::uint32_t>(mark)) : inverse_x;
 }
 
 #include "core/pipeline/arithmetic/kernel_math.inl"

@@ -27,6 +27,10 @@ struct TileSeen {
   const float* law;            // root of the scattering strength over sqrt(1 - cosine), law_steps + 2 values; null = cosine
   float area_amplitude;        // the same with the cell size in place of the speckle (expected power)
   float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
+  float turned_away;  // the side of its facets that scatters nothing: cells with normal * direction * turned_away > 0; 0: none
+  std::int32_t mark;  // surface_mark of its object
+  bool moves;  // while the ping is under way: the depth map is looked up with the cells' place in the axes it was traced in
+  float seen_turn[9], seen_place[3];  // there = seen_turn * place + seen_place, row-major
 };
 
 /// What holds for all tiles of one column group.
@@ -36,7 +40,9 @@ struct GroupView {
   int first_column, last_column;            // half-open
   float first_tangent, bins_per_tangent;    // depth map axis t
   int bins;                                 // values per column of the depth map; the map has bins + 1
-  const float* inverse_depth;               // [last - first][bins + 1], 1 / x (or 1 / h) of what the rays saw, 0 = nothing
+  int map_first_column, map_last_column;    // half-open; of the depth map, which reaches farther where the sonar moves
+  const float* inverse_depth;               // DepthMap::inverse_x
+  const float* depth_slope;                 // DepthMap::per_column
   float depth_tolerance_m;
   float turns_per_m;                                              // 2 f / c
   float decay_per_m;                                              // 2 alpha [Np/m]

@@ -17,6 +17,11 @@ inline __m512 native(Lanes v) { return reinterpret_cast<__m512>(v); }
 inline LaneMask below(Lanes a, Lanes b) { return _mm512_cmp_ps_mask(native(a), native(b), _CMP_LT_OQ); }
 inline LaneMask not_below(Lanes a, Lanes b) { return _mm512_cmp_ps_mask(native(a), native(b), _CMP_GE_OQ); }
 inline LaneMask both(LaneMask a, LaneMask b) { return static_cast<LaneMask>(a & b); }
+inline LaneMask less(LaneMask a, LaneMask b) { return static_cast<LaneMask>(a & ~b); }
+inline LaneMask bits_differ(Lanes v, std::int32_t bits, std::int32_t among) {
+  const __m512i x = _mm512_xor_si512(_mm512_castps_si512(native(v)), _mm512_set1_epi32(bits));
+  return _mm512_test_epi32_mask(x, _mm512_set1_epi32(among));
+}
 inline bool any(LaneMask m) { return m != 0; }
 inline Lanes choose(LaneMask m, Lanes a, Lanes b) { return Lanes(_mm512_mask_blend_ps(m, native(b), native(a))); }
 inline Lanes larger(Lanes a, Lanes b) { return Lanes(_mm512_max_ps(native(a), native(b))); }
@@ -65,6 +70,10 @@ using LaneMask = LaneNumbers;
 inline LaneMask below(Lanes a, Lanes b) { return a < b; }
 inline LaneMask not_below(Lanes a, Lanes b) { return a >= b; }
 inline LaneMask both(LaneMask a, LaneMask b) { return a & b; }
+inline LaneMask less(LaneMask a, LaneMask b) { return a & ~b; }
+inline LaneMask bits_differ(Lanes v, std::int32_t bits, std::int32_t among) {
+  return ((reinterpret_cast<LaneNumbers>(v) ^ bits) & among) != 0;
+}
 inline Lanes choose(LaneMask m, Lanes a, Lanes b) { return m ? a : b; }
 inline Lanes larger(Lanes a, Lanes b) { return a > b ? a : b; }
 inline Lanes smaller(Lanes a, Lanes b) { return a < b ? a : b; }

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cassert>
+#include <cmath>
 #include <map>
 #include <tuple>
 
@@ -32,6 +33,7 @@ class SurfaceCells::SurfacePatch {
  public:
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
+  int coarsest = 0;  // level that gives the object its fewest cells, where asked for
   std::shared_ptr<const Mesh> mesh;
   std::vector<std::unique_ptr<Node>> roots;
 
@@ -45,6 +47,7 @@ class SurfaceCells::SurfacePatch {
 namespace {
 
 constexpr int most_roots_along_an_axis = 16;
+constexpr double fewest_cells = 3000;  // of an object, with CellView::exact_small
 
 struct Cube {
   double u, v, w, half;
@@ -165,6 +168,11 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
   }
   for (std::size_t o = 0; o < scene_->objects.size(); ++o) {
     const Object& object = scene_->objects[o];
+    // Objects often share a mesh.
+    const auto alike = std::find_if(scene_->objects.begin(), scene_->objects.begin() + static_cast<std::ptrdiff_t>(o),
+                                    [&](const Object& other) { return other.mesh == object.mesh; });
+    const auto same = static_cast<std::size_t>(alike - scene_->objects.begin());
+    skins_.push_back(same < o ? skins_[same] : skin_of(*object.mesh));
     if (!object.visible) continue;
     std::map<std::tuple<int, int, bool>, std::vector<std::uint32_t>> sorted;  // material, axis, side
     for (std::uint32_t t = 0; t < object.mesh->triangles.size(); ++t) {
@@ -178,6 +186,7 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
       auto patch = std::make_unique<SurfacePatch>();
       patch->object = static_cast<int>(o);
       std::tie(patch->material, patch->axis, patch->negative_side) = key;
+      patch->coarsest = static_cast<int>(std::ceil(-0.5 * std::log2(skins_[o].area_m2 / fewest_cells)));
       patch->mesh = object.mesh;
       patch->plant(triangles);
       for (auto& root : patch->roots) roots_.push_back({patch.get(), root.get()});
@@ -214,14 +223,15 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
   if (seen.farthest_m < static_cast<double>(view.min_range_m)) return;
 
   node.last_visited.store(look.number, std::memory_order_relaxed);
-  bool finer = node.address.level < view.levels.front().level;
+  const auto level_of = [&](const CellLevel& l) { return view.exact_small ? std::max(l.level, patch.coarsest) : l.level; };
+  bool finer = node.address.level < level_of(view.levels.front());
   for (const CellLevel& level : view.levels) {
     const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
     if (!overlaps) continue;
-    if (level.level == node.address.level) {
+    if (level_of(level) == node.address.level) {
       found.wanted.push_back(&node);
       found.in_view.push_back({&node.tile, &level, q, p, patch.object});
-    } else if (level.level > node.address.level) {
+    } else if (level_of(level) > node.address.level) {
       finer = true;
     }
   }

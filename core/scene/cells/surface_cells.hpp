@@ -16,6 +16,7 @@
 #include "core/base/geometry.hpp"
 #include "core/base/parallel.hpp"
 #include "core/base/units.hpp"
+#include "core/scene/closed_mesh.hpp"
 #include "core/scene/scene.hpp"
 
 namespace sonar {
@@ -63,6 +64,7 @@ struct CellView {
   float max_sine = 1;             // |y / r| of the outermost column
   float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first
+  bool exact_small = false;       // objects of few cells get finer ones: where no speckle hides which place each has
   /// When set, stands for the bounds of the fan: between which distances a ball about a place in the sonar's axes is seen, which
   /// mirrors can make farther than it is; nothing when it is not.
   std::function<std::optional<DistanceSpan>(Vec3d from_sonar_m, double radius_m)> seen_between;
@@ -105,6 +107,8 @@ class SurfaceCells {
   /// Rotation from object to sonar axes of the last view of in_view(), per object.
   const Rotation& sonar_from_object(int object) const { return looked_.rotations[static_cast<std::size_t>(object)]; }
   std::span<const Rotation> sonar_from_objects() const { return looked_.rotations; }
+  /// Of every object's mesh.
+  std::span<const Skin> skins() const { return skins_; }
   /// Views so far.
   std::uint64_t views() const { return now_; }
   /// From now on nothing is forgotten of that view and later ones: others may be asked for while its tiles are in use. 0 = of
@@ -143,6 +147,7 @@ class SurfaceCells {
   std::shared_ptr<const Scene> scene_;
   Seed seed_{};
   bool textured_ = true, has_texture_ = false;
+  std::vector<Skin> skins_;                                    // per object
   std::vector<std::unique_ptr<const TextureField>> textures_;  // per material, null = none
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
