@@ -38,25 +38,6 @@ void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotatio
   out.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(plan.columns.count)));
 }
 
-/// Which way the normals of an object point that are turned away from the sonar and hidden by the object itself: of closed
-/// meshes seen from outside, 1 or -1; else 0.
-std::vector<float> turned_away(const PingContext& context) {
-  constexpr std::size_t most_triangles = 5000;  // beyond, a sonar within an object's box is taken to be within the object
-  const Scene& scene = context.scene();
-  std::vector<float> away;
-  for (std::size_t o = 0; o < scene.objects.size(); ++o) {
-    const Skin& skin = context.cells.skins()[o];
-    away.push_back(static_cast<float>(skin.outward));
-    if (skin.outward == 0) continue;
-    const Object& object = scene.objects[o];
-    const Vec3d p = transform(inverse(scene.in_world(object, context.bodies_in_world)), context.scalars.seen_from.position_m);
-    const bool in_box = p.x >= skin.low.x && p.x <= skin.high.x && p.y >= skin.low.y && p.y <= skin.high.y && p.z >= skin.low.z &&
-                        p.z <= skin.high.z;
-    if (in_box && (object.mesh->triangles.size() > most_triangles || encloses(*object.mesh, p))) away.back() = 0;
-  }
-  return away;
-}
-
 PreparedTile prepare(const PingContext& context, const TileInView& t, const Rotation& seen_from_object,
                      const BubbleLayer& bubbles, float turned_away) {
   const PingScalars& s = context.scalars;
@@ -122,6 +103,23 @@ void fetch_cells(const CellTile& tile) {
 }
 
 }  // namespace
+
+std::vector<float> turned_away(const PingContext& context) {
+  constexpr std::size_t most_triangles = 5000;  // beyond, a sonar within an object's box is taken to be within the object
+  const Scene& scene = context.scene();
+  std::vector<float> away;
+  for (std::size_t o = 0; o < scene.objects.size(); ++o) {
+    const Skin& skin = context.cells.skins()[o];
+    away.push_back(static_cast<float>(skin.outward));
+    if (skin.outward == 0) continue;
+    const Object& object = scene.objects[o];
+    const Vec3d p = transform(inverse(scene.in_world(object, context.bodies_in_world)), context.scalars.seen_from.position_m);
+    const bool in_box = p.x >= skin.low.x && p.x <= skin.high.x && p.y >= skin.low.y && p.y <= skin.high.y && p.z >= skin.low.z &&
+                        p.z <= skin.high.z;
+    if (in_box && (object.mesh->triangles.size() > most_triangles || encloses(*object.mesh, p))) away.back() = 0;
+  }
+  return away;
+}
 
 /// One table a material, at this ping's frequency and sound speed.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& s) {

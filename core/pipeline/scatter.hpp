@@ -27,6 +27,10 @@ struct PreparedTile {
 /// The scattering law of every material of the scene, at this ping's frequency.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& scalars);
 
+/// Which way the normals of an object point that are turned away from the sonar and hidden by the object itself: of closed meshes
+/// seen from outside, 1 or -1; else 0. Per object.
+std::vector<float> turned_away(const PingContext& context);
+
 /// Prepares the tiles in view, in parallel; the order is kept. The tiles point into the laws, which must outlive them.
 /// `sonar_from_object`: of the view, per object.
 void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
