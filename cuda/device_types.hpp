@@ -89,8 +89,8 @@ struct TileView {
   float from_sonar_object[3], from_sonar[3], turn[9];
   float range_m, sample_shift, phase_turns, amplitude, area_amplitude;
   float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
-  float turned_away;
-  std::int32_t mark, moves;
+  float from_tangent, to_tangent, tolerance_share, turned_away;
+  std::int32_t mark, moves, in_side_lobes;
   float seen_turn[9], seen_place[3];
 };
 
@@ -101,10 +101,12 @@ struct alignas(16) Echo {
 
 /// simd::GroupView for all columns at once, and the fan.
 struct SeaView {
-  std::int32_t conical, columns, elevations, bins, expected_power, unused;
-  float first_edge_sine, columns_per_sine, first_tangent, bins_per_tangent, depth_tolerance_m;
+  std::int32_t conical, columns, elevations, bins, expected_power;
+  std::int32_t side_elevations, side_columns;  // PingPlan::side_column
+  float first_edge_sine, columns_per_sine, depth_tolerance_m;
+  TangentAxis axis;
   float turns_per_m, decay_per_m, samples_per_m, sample_offset, first_sample, last_sample;
-  float elevation[elevation_terms];
+  float elevation[elevation_terms], elevation_aperture;
   // the fan
   float origin[3], world_from_sonar[9], far_m, pulse_width_m, truth_half_width_rad, column_spacing;
 };

@@ -47,8 +47,15 @@ SONAR_HD inline FanRay look(const PingView& p, ColumnSine column, BaseElevation 
 /// Base ray `i` of [elevations][columns].
 SONAR_HD inline void trace_base(const PingView& p, std::uint32_t i) {
   const std::uint32_t columns = static_cast<std::uint32_t>(p.sea.columns);
+  const auto e = static_cast<std::int32_t>(i / columns), sides = p.sea.side_elevations, step = p.sea.side_columns;
+  auto column = static_cast<std::int32_t>(i % columns);
+  // In the side lobes a few columns share a ray.
+  if (e < sides || e >= p.sea.elevations - sides) {
+    column = column - column % step + step / 2;
+    if (column >= p.sea.columns) column = p.sea.columns - 1;
+  }
   Vec3 along;
-  p.fan_rays[i] = look(p, p.column_sines[i % columns], p.base_elevations[i / columns], along);
+  p.fan_rays[i] = look(p, p.column_sines[column], p.base_elevations[e], along);
 }
 
 SONAR_HD inline bool far_apart(const FanRay& a, const FanRay& b, float tolerance_m) {
@@ -91,7 +98,7 @@ struct DepthPen {
   int bin;
 
   SONAR_HD static int bin_below(const SeaView& s, float tangent) {
-    const int bin = static_cast<int>((tangent - s.first_tangent) * s.bins_per_tangent);
+    const int bin = static_cast<int>(bin_of_tangent(s.axis, tangent));
     return bin < s.bins ? bin : s.bins;
   }
   SONAR_HD void draw(const FanRay& a, const FanRay& b, bool edge, bool last) {
@@ -102,7 +109,7 @@ struct DepthPen {
     const std::int32_t mark = surface_mark(of.object);
     const float aside = per_column(*sea, of, column);
     for (; bin <= end; ++bin) {
-      const float tangent = sea->first_tangent + static_cast<float>(bin) / sea->bins_per_tangent;
+      const float tangent = tangent_of_bin(sea->axis, static_cast<float>(bin));
       const float between = a.inverse_x + per_tangent * (tangent - a.tangent);
       map[bin] = with_mark(edge ? farther : (0.0f < between ? between : 0.0f), mark);
       slope[bin] = aside;
@@ -123,6 +130,8 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   const auto columns = static_cast<std::uint32_t>(s.columns);
   const std::uint32_t e = i / columns, column = i % columns;
   const ColumnSine sine = p.column_sines[column];
+  const auto sides = static_cast<std::uint32_t>(s.side_elevations);
+  const bool side = e < sides || e + 1 + sides >= static_cast<std::uint32_t>(s.elevations);
   struct Above {
     FanRay ray;
     int depth;
@@ -142,8 +151,8 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
     bool edge = false;
     if (!top.settled) {
       const bool same = below.object == top.ray.object;
-      const bool open = !same || far_apart(below, top.ray, s.pulse_width_m);
-      if (open && top.depth < (same ? fan::deepest : fan::edge_depth)) {
+      const bool open = !same || (!side && far_apart(below, top.ray, s.pulse_width_m));
+      if (open && !side && top.depth < (same ? fan::deepest : fan::edge_depth)) {
         const BaseElevation middle = elevation_at(middle_rad(below, top.ray, static_cast<int>(column), top.depth));
         Vec3 along;
         const FanRay between = look(p, sine, middle, along);

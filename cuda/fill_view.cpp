@@ -26,8 +26,10 @@ void PingPreparer::place_fan(Making& m) {
   sea.expected_power = g.expected_power ? 1 : 0;
   sea.first_edge_sine = g.first_edge_sine;
   sea.columns_per_sine = g.columns_per_sine;
-  sea.first_tangent = g.first_tangent;
-  sea.bins_per_tangent = g.bins_per_tangent;
+  sea.axis = g.axis;
+  sea.side_elevations = plan.fan.side_elevations;
+  sea.side_columns = PingPlan::side_columns;
+  sea.elevation_aperture = g.elevation_aperture;
   sea.depth_tolerance_m = g.depth_tolerance_m;
   sea.turns_per_m = g.turns_per_m;
   sea.decay_per_m = g.decay_per_m;

@@ -122,10 +122,7 @@ void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
     in.bodies_in_world = m.bodies;
     in.min_range_m = static_cast<float>(m.scalars.min_range_m);
     in.max_range_m = static_cast<float>(m.scalars.max_range_m);
-    in.max_sine = static_cast<float>(std::min(1.0, m.plan.columns.first_sine + m.plan.columns.spacing));
-    in.max_elevation_rad = static_cast<float>(m.plan.widest_about_axis_rad());
-    in.levels = m.plan.levels;
-    in.exact_small = m.plan.expected_power;
+    m.plan.aim(in);
   }
   if (views.empty()) return;
   std::vector<CellsInView> found(views.size());
@@ -245,6 +242,10 @@ TileView PingPreparer::view_of(const PreparedTile& prepared, const std::int16_t*
   t.fade_in_per_m = seen.fade_in_per_m;
   t.fade_out_to_m = seen.fade_out_to_m;
   t.fade_out_per_m = seen.fade_out_per_m;
+  t.from_tangent = seen.from_tangent;
+  t.to_tangent = seen.to_tangent;
+  t.in_side_lobes = seen.in_side_lobes ? 1 : 0;
+  t.tolerance_share = seen.tolerance_share;
   t.turned_away = seen.turned_away;
   t.mark = seen.mark;
   t.moves = seen.moves ? 1 : 0;

@@ -81,6 +81,12 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   seen.fade_out_to_m = t.level->fade_out_to_m;
   seen.fade_out_per_m = per_metre(t.level->full_to_m, t.level->fade_out_to_m);
 
+  const Fan& fan = context.plan.fan;
+  seen.in_side_lobes = t.in_side_lobes;
+  seen.from_tangent = t.in_side_lobes ? fan.axis.edge_tangent : 0;
+  seen.to_tangent = t.in_side_lobes ? fan.tangent.back() : fan.axis.edge_tangent;
+  // Rays are sparse in the side lobes.
+  seen.tolerance_share = t.in_side_lobes ? 0.1f : 0;
   seen.turned_away = turned_away;
   seen.mark = surface_mark(static_cast<std::uint32_t>(t.object));
   seen.moves = s.moves;
@@ -155,8 +161,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.last_column = last;
   g.map_first_column = seen.first_column;
   g.map_last_column = seen.first_column + seen.columns;
-  g.first_tangent = plan.fan.first_tangent;
-  g.bins_per_tangent = plan.fan.bins_per_tangent;
+  g.axis = plan.fan.axis;
   g.bins = seen.bins;
   g.inverse_depth = seen.inverse_x.data();
   g.depth_slope = seen.per_column.data();
@@ -169,6 +174,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.first_sample = static_cast<float>(-plan.taps / 2);
   g.last_sample = static_cast<float>(plan.samples + plan.taps / 2 - 1);
   std::copy(plan.elevation.begin(), plan.elevation.end(), g.elevation);
+  g.elevation_aperture = static_cast<float>(elevation_aperture_in_wavelengths(plan.mode.pattern));
   g.expected_power = plan.expected_power;
   return g;
 }
@@ -226,7 +232,7 @@ std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> str
   const double at_sample = s.sample_of(r) + s.doppler_samples(p);
   if (r < nearest_scatterer_m || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) return {};
   const ConicalDirection direction = plan.direction_of(p);
-  const std::optional<std::size_t> column = plan.column_of(direction, plan.fan.half_angle_rad);
+  const std::optional<std::size_t> column = plan.column_of(direction, plan.fan.reach_rad);
   if (!column) return {};
   // 10^(SL/20) e^{-2 a r} / r^2 D_v T [uPa per m]; the phase is (12).
   const double transmit = static_cast<double>(plan.columns.transmit[*column]);

@@ -221,10 +221,7 @@ void PingSimulation::find_echo_sources() {
   view.bodies_in_world = bodies_;
   view.min_range_m = static_cast<float>(scalars_.min_range_m);
   view.max_range_m = static_cast<float>(scalars_.max_range_m);
-  view.max_sine = static_cast<float>(std::min(1.0, plan_.columns.first_sine + plan_.columns.spacing));
-  view.max_elevation_rad = static_cast<float>(plan_.widest_about_axis_rad());
-  view.levels = plan_.levels;
-  view.exact_small = plan_.expected_power;
+  plan_.aim(view);
   const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
   prepare_tiles(context_, in_view, cells_.sonar_from_objects(), w_.tiles);

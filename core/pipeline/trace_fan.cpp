@@ -121,6 +121,10 @@ class FanTracer {
     s_.samples.resize(static_cast<std::size_t>(last_ - first_) * static_cast<std::size_t>(n));
     for (int e = 0; e < n; ++e) {
       const Elevation elevation = base_[static_cast<std::size_t>(e)];
+      if (e < plan_.fan.side_elevations || e >= n - plan_.fan.side_elevations) {
+        trace_side(e, elevation);
+        continue;
+      }
       for (int from = first_; from < last_; from += RayPacket::size) {
         const int to = std::min(from + RayPacket::size, last_);
         filler_.clear();
@@ -136,12 +140,44 @@ class FanTracer {
     }
   }
 
+  /// In the side lobes a few columns share a ray, whichever group they are in: what it met is of all of them.
+  void trace_side(int e, Elevation elevation) {
+    const int n = elevations(), step = PingPlan::side_columns;
+    for (int from = first_; from < last_;) {
+      filler_.clear();
+      ColumnSine sines[RayPacket::size];
+      int lanes = 0, to = from;
+      for (; lanes < RayPacket::size && to < last_; ++lanes, to += step - to % step) {
+        const double u = plan_.columns.sine(plan_.side_column(to));
+        sines[lanes] = {static_cast<float>(u), static_cast<float>(std::sqrt(std::max(0.0, 1 - u * u)))};
+        filler_.add(sines[lanes], elevation);
+      }
+      filler_.trace(scene_);
+      // Counted once, by the group of the first of its columns.
+      if (from % step != 0) --filler_.traced;
+      for (int k = from; k < std::min(to, last_); ++k) {
+        const int lane = k / step - from / step;
+        const std::int32_t index = (k - first_) * n + e;
+        store(lane, elevation, sines[lane], at(index));
+        at(index).next = e + 1 < n ? index + 1 : -1;
+        at(index).edge_above = false;
+      }
+      from = to;
+    }
+  }
+
   void refine() {
     FanRefinement<Sample> refinement(s_.samples, s_.open, s_.halves, tolerance_m_, first_);
     // Elevation by elevation over all columns: a packet of middles holds neighbouring directions, too.
     const int n = elevations();
     for (int e = 0; e + 1 < n; ++e)
-      for (int k = 0; k < last_ - first_; ++k) refinement.consider_base(k * n + e, k * n + e + 1, k);
+      for (int k = 0; k < last_ - first_; ++k) {
+        const std::int32_t below = k * n + e;
+        if (plan_.fan.is_side(e))
+          at(below).edge_above = at(below).surface.object != at(below + 1).surface.object;
+        else
+          refinement.consider_base(below, below + 1, k);
+      }
     std::array<Elevation, RayPacket::size> middle;
     const auto trace = [&](std::span<const FanInterval> intervals) {
       // FanRefinement expects the samples of the middles behind all others, in the order of the intervals.
@@ -179,7 +215,7 @@ class FanTracer {
       for (std::int32_t i = k * n; at(i).next >= 0; i = at(i).next) {
         const Sample &a = at(i), &b = at(at(i).next);
         // Bins up to `end` lie between a and b; the last interval takes what rounding left over.
-        const float top = (b.tangent - fan.first_tangent) * fan.bins_per_tangent;
+        const float top = bin_of_tangent(fan.axis, b.tangent);
         const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
         // 1 / x is linear in tan psi along a plane (section 2); 0 is infinitely far, so the smaller value is the farther surface.
         const float inverse_a = a.surface.inverse_x, inverse_b = b.surface.inverse_x, farther = std::min(inverse_a, inverse_b);

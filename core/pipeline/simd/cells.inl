@@ -56,7 +56,8 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
   const float m20 = s.turn[6], m21 = s.turn[7], m22 = s.turn[8];
   const RangeWindow window = range_window(s, g);
   const Lanes first_column = all(static_cast<float>(g.first_column)), end_column = all(static_cast<float>(g.last_column));
-  const Lanes bins = all(static_cast<float>(g.bins)), nearest = all(window.from_m), farthest = all(window.to_m);
+  const Lanes lowest = all(s.from_tangent), highest = all(s.to_tangent), nearest = all(window.from_m),
+              farthest = all(window.to_m);
   const int row = g.bins + 1;
   const Lanes map_first = all(static_cast<float>(g.map_first_column)), map_last = all(static_cast<float>(g.map_last_column - 1));
   int m = 0;
@@ -84,21 +85,22 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
       const Lanes wanted = (g.first_edge_sine - there_y * over_range) * g.columns_per_sine;
       seen_column = smaller(larger(wanted, map_first), map_last);
     }
-    const Lanes bin = (seen_z * seen_inverse_h - g.first_tangent) * g.bins_per_tangent;
+    const Lanes tangent = seen_z * seen_inverse_h, steepness = magnitude(tangent);
     LaneMask keep = both(not_below(column, first_column), below(column, end_column));
-    keep = both(keep, both(not_below(bin, all(0)), below(bin, bins)));
+    keep = both(keep, both(not_below(steepness, lowest), below(steepness, highest)));
     keep = both(keep, both(not_below(r, nearest), below(r, farthest)));
     keep = both(keep, below(all(1e-6f), x));
     if (!any(keep)) continue;
 
     // Depth map between two bins, against the cell's own 1 / x with the tolerances of section 3.
-    const Lanes bin_here = choose(keep, bin, all(0));
+    // In parentheses: of this instruction set, not found by the type of the axis.
+    const Lanes bin_here = (bin_of_tangent<Lanes>)(g.axis, choose(keep, tangent, all(0)));
     const LaneNumbers bin_below = whole_part(bin_here);
     const Lanes column_here = choose(keep, seen_column, map_first);
     const LaneNumbers at = (whole_part(column_here) - g.map_first_column) * row + bin_below;
     const Lanes a = gather(g.inverse_depth, at), b = gather(g.inverse_depth + 1, at);
     const Lanes seen = a + (bin_here - as_floats(bin_below)) * (b - a);
-    const Lanes tolerance = seen_inverse_h * (g.depth_tolerance_m * inverse_r);
+    const Lanes tolerance = seen_inverse_h * (g.depth_tolerance_m * inverse_r + s.tolerance_share);
     keep = both(keep, not_below(seen_inverse_h + tolerance, seen));
     // r cos(alpha): normal times the vector from sonar to cell, object axes.
     const Lanes along = counts(nx + i) * (qx0 + dx) + counts(ny + i) * (qy0 + dy) + counts(nz + i) * (qz0 + dz);
@@ -138,13 +140,21 @@ inline Lanes sine_of_turns(Lanes turns) {
   return y + y * y2 * p;
 }
 
+/// Two-way pattern of cells at the squared sines w; of those in the side lobes as it is, where a polynomial would have many
+/// terms.
+inline Lanes pattern_of(const TileSeen& s, const GroupView& g, Lanes w) {
+  if (!s.in_side_lobes) return elevation_pattern(g.elevation, w);
+  const Lanes x = g.elevation_aperture * root_of(w);
+  return side_lobe_pattern(x, sine_of_turns(0.5f * x));
+}
+
 /// Amplitude and carrier of every visible cell, times its speckle.
 __attribute__((noinline)) void scatter_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
   for (int i = 0; i < n; i += lanes) {
     const Lanes r = load(c.range + i), offset = load(c.offset + i), d = -g.decay_per_m * offset;
     // Eq. 6 for a cell: level weight, law, D_v, absorption relative to the centre, 1 / r^2; then its phase and its xi.
-    const Lanes amplitude = s.amplitude * root_of(level_weight(s, r)) * load(c.cosine + i) *
-                            elevation_pattern(g.elevation, load(c.sine2 + i)) * exp_near_0(d) * reciprocal(r * r);
+    const Lanes amplitude = s.amplitude * root_of(level_weight(s, r)) * load(c.cosine + i) * pattern_of(s, g, load(c.sine2 + i)) *
+                            exp_near_0(d) * reciprocal(r * r);
     const Lanes turns = -(s.phase_turns + g.turns_per_m * offset);
     const Lanes cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
     const Lanes a = load(c.weight_re + i), b = load(c.weight_im + i);
@@ -162,7 +172,7 @@ inline void power_of_cells(const TileSeen& s, const GroupView& g, int n, const C
     Lanes loss;
     for (int l = 0; l < lanes; ++l) loss[l] = std::exp(-g.decay_per_m * c.offset[i + l]);
     const Lanes amplitude =
-        s.area_amplitude * load(c.cosine + i) * elevation_pattern(g.elevation, load(c.sine2 + i)) * loss * reciprocal(r * r);
+        s.area_amplitude * load(c.cosine + i) * pattern_of(s, g, load(c.sine2 + i)) * loss * reciprocal(r * r);
     store(out.re + i, amplitude * amplitude * level_weight(s, r) * load(c.weight_re + i));
     store(out.im + i, Lanes{});
     store(out.sample + i, r * g.samples_per_m - (g.sample_offset - s.sample_shift));

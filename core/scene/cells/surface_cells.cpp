@@ -217,22 +217,31 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
     if (!span) return;
     seen = *span;
   } else {
-    if (std::abs(p.z) * look.fan_cosine - p.x * look.fan_sine > radius) return;
+    if (look.fan.outside(p) > radius) return;
     if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
   }
   if (seen.farthest_m < static_cast<double>(view.min_range_m)) return;
 
   node.last_visited.store(look.number, std::memory_order_relaxed);
   const auto level_of = [&](const CellLevel& l) { return view.exact_small ? std::max(l.level, patch.coarsest) : l.level; };
-  bool finer = node.address.level < level_of(view.levels.front());
+  const bool has_sides = !view.seen_between && view.side_from_rad < view.max_elevation_rad;
+  const bool in_main = !has_sides || look.main.outside(p) <= radius;
+  const bool in_side = has_sides && look.before_side.outside(p) >= -radius;
+  const int coarsest_wanted = level_of(view.levels.front());
+  bool finer =
+      (in_main && node.address.level < coarsest_wanted) || (in_side && node.address.level < coarsest_wanted - view.side_coarser);
   for (const CellLevel& level : view.levels) {
     const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
     if (!overlaps) continue;
-    if (level_of(level) == node.address.level) {
-      found.wanted.push_back(&node);
-      found.in_view.push_back({&node.tile, &level, q, p, patch.object});
-    } else if (level_of(level) > node.address.level) {
-      finer = true;
+    for (const bool side : {false, true}) {
+      if (!(side ? in_side : in_main)) continue;
+      const int wanted = level_of(level) - (side ? view.side_coarser : 0);
+      if (wanted == node.address.level) {
+        found.wanted.push_back(&node);
+        found.in_view.push_back({&node.tile, &level, q, p, patch.object, side});
+      } else if (wanted > node.address.level) {
+        finer = true;
+      }
     }
   }
   if (!finer) return;
@@ -255,8 +264,12 @@ void SurfaceCells::prepare(const CellView& view, Look& look) {
   const std::size_t objects = scene_->objects.size();
   look.view = &view;
   look.number = ++now_;
-  look.fan_cosine = std::cos(static_cast<double>(view.max_elevation_rad));
-  look.fan_sine = std::sin(static_cast<double>(view.max_elevation_rad));
+  const auto wedge = [](float angle) {
+    return Look::Wedge{std::cos(static_cast<double>(angle)), std::sin(static_cast<double>(angle))};
+  };
+  look.fan = wedge(view.max_elevation_rad);
+  look.main = wedge(view.main_elevation_rad);
+  look.before_side = wedge(view.side_from_rad);
   look.rotations.resize(objects);
   look.sonar_in_object.resize(objects);
   for (std::size_t o = 0; o < objects; ++o) {
