@@ -38,19 +38,43 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float h = g.conical != 0 ? x : std::sqrt(x * x + y * y);
   const float inverse_h = 1.0f / larger(h, 1e-6f);
   const float column = (g.first_edge_sine - y * (g.conical != 0 ? inverse_r : inverse_h)) * g.columns_per_sine;
-  const float bin = (z * inverse_h - g.first_tangent) * g.bins_per_tangent;
+  // Where the rays looked for it: the sonar may have turned since.
+  float seen_column = column, seen_z = z, seen_inverse_h = inverse_h;
+  if (t.moves != 0) {
+    const float *w = t.seen_turn, *o = t.seen_place;
+    const float there_x = o[0] + w[0] * x + w[1] * y + w[2] * z, there_y = o[1] + w[3] * x + w[4] * y + w[5] * z;
+    seen_z = o[2] + w[6] * x + w[7] * y + w[8] * z;
+    const float flat = std::sqrt(there_x * there_x + there_y * there_y);
+    seen_inverse_h = 1.0f / larger(g.conical != 0 ? there_x : flat, 1e-6f);
+    const float over_range = g.conical != 0 ? 1.0f / larger(std::sqrt(flat * flat + seen_z * seen_z), 1e-6f) : seen_inverse_h;
+    const float wanted = (g.first_edge_sine - there_y * over_range) * g.columns_per_sine;
+    seen_column = smaller(larger(wanted, 0.0f), static_cast<float>(g.columns - 1));
+  }
+  const float tangent = seen_z * seen_inverse_h, steepness = std::fabs(tangent);
   const float sample = r * g.samples_per_m - g.sample_offset + t.sample_shift;
-  if (!(column >= 0 && column < static_cast<float>(g.columns) && bin >= 0 && bin < static_cast<float>(g.bins) && x > 1e-6f &&
-        sample > g.first_sample && sample < g.last_sample && r >= t.fade_in_from_m && r < t.fade_out_to_m))
+  if (!(column >= 0 && column < static_cast<float>(g.columns) && steepness >= t.from_tangent && steepness < t.to_tangent &&
+        x > 1e-6f && sample > g.first_sample && sample < g.last_sample && r >= t.fade_in_from_m && r < t.fade_out_to_m))
     return false;
   at.column = static_cast<std::int32_t>(column);
-  // Depth map between two bins, with the tolerance of docs/acoustics.md, section 3.
+  // Depth map between two bins, with the tolerances of docs/acoustics.md, section 3.
+  const float bin = bin_of_tangent(g.axis, tangent);
   const auto below = static_cast<std::int32_t>(bin);
-  const float* map = p.depth + static_cast<std::int64_t>(at.column) * (g.bins + 1) + below;
+  const auto map_column = static_cast<std::int32_t>(seen_column);
+  const std::int64_t map_at = static_cast<std::int64_t>(map_column) * (g.bins + 1) + below;
+  const float* map = p.depth + map_at;
   const float seen = map[0] + (bin - static_cast<float>(below)) * (map[1] - map[0]);
-  if (!(inverse_h * (1.0f + g.depth_tolerance_m * inverse_r) >= seen)) return false;
+  const float tolerance = seen_inverse_h * (g.depth_tolerance_m * inverse_r + t.tolerance_share);
+  if (!(seen_inverse_h + tolerance >= seen)) return false;
   const float along = cell_value(t, cell_normal_x, cell) * (qx + dx) + cell_value(t, cell_normal_y, cell) * (qy + dy) +
                       cell_value(t, cell_normal_z, cell) * (qz + dz);
+  if (!(along * t.turned_away <= 0)) return false;
+  // What lies behind another object's facet, followed from the ray's place in the column to the cell's.
+  const auto differs = [&](float of) { return ((static_cast<std::int32_t>(bits_of(of)) ^ t.mark) & surface_marks) != 0; };
+  if (seen_inverse_h - tolerance < seen && differs(map[0]) && differs(map[1])) {
+    const float nearness = seen_inverse_h * (1.0f + contact_share + contact_m * inverse_r);
+    const float beside = seen_column - static_cast<float>(map_column) - 0.5f;
+    if (nearness < seen + beside * p.depth_slope[map_at]) return false;
+  }
   at.range = r;
   at.offset = e / (t.range_m + r);
   at.cosine = std::fabs(along) * (cell_normal_unit * inverse_r);
@@ -67,19 +91,21 @@ SONAR_HD inline Echo scatter_cell(const PingView& p, const TileView& t, int cell
   // Eq. 6 of docs/acoustics.md, as scatter_cells has it.
   const float law = t.law != nullptr ? law_root(t.law, at.cosine) : at.cosine;
   const float re = cell_value(t, cell_weight_re, cell), im = cell_value(t, cell_weight_im, cell);
+  const float x = g.elevation_aperture * std::sqrt(at.sine2);
+  const float pattern =
+      t.in_side_lobes != 0 ? side_lobe_pattern(x, sine_of_turns(0.5f * x)) : elevation_pattern(g.elevation, at.sine2);
   echo.sample = at.sample;
   echo.column = at.column;
   if (g.expected_power != 0) {
     const float slope = std::fabs(cell_value(t, cell_normal_x + t.axis, cell)) * cell_normal_unit;
     const float per_area = re != 0 || im != 0 ? 1.0f / slope : 0.0f;  // padding is no cell
-    const float amplitude = t.area_amplitude * law * elevation_pattern(g.elevation, at.sine2) *
-                            std::exp(-g.decay_per_m * at.offset) / (at.range * at.range);
+    const float amplitude = t.area_amplitude * law * pattern * std::exp(-g.decay_per_m * at.offset) / (at.range * at.range);
     echo.re = amplitude * amplitude * level_weight(t, at.range) * per_area;
     return echo;
   }
   const float d = -g.decay_per_m * at.offset;
-  const float amplitude = t.amplitude * std::sqrt(level_weight(t, at.range)) * law * elevation_pattern(g.elevation, at.sine2) *
-                          exp_near_0(d) / (at.range * at.range);
+  const float amplitude =
+      t.amplitude * std::sqrt(level_weight(t, at.range)) * law * pattern * exp_near_0(d) / (at.range * at.range);
   const float turns = -(t.phase_turns + g.turns_per_m * at.offset);
   const float cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
   echo.re = re * cs - im * sn;

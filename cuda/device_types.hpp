@@ -89,7 +89,9 @@ struct TileView {
   float from_sonar_object[3], from_sonar[3], turn[9];
   float range_m, sample_shift, phase_turns, amplitude, area_amplitude;
   float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
-  float unused;
+  float from_tangent, to_tangent, tolerance_share, turned_away;
+  std::int32_t mark, moves, in_side_lobes;
+  float seen_turn[9], seen_place[3];
 };
 
 struct alignas(16) Echo {
@@ -99,12 +101,14 @@ struct alignas(16) Echo {
 
 /// simd::GroupView for all columns at once, and the fan.
 struct SeaView {
-  std::int32_t conical, columns, elevations, bins, expected_power, unused;
-  float first_edge_sine, columns_per_sine, first_tangent, bins_per_tangent, depth_tolerance_m;
+  std::int32_t conical, columns, elevations, bins, expected_power;
+  std::int32_t side_elevations, side_columns;  // PingPlan::side_column
+  float first_edge_sine, columns_per_sine, depth_tolerance_m;
+  TangentAxis axis;
   float turns_per_m, decay_per_m, samples_per_m, sample_offset, first_sample, last_sample;
-  float elevation[elevation_terms];
+  float elevation[elevation_terms], elevation_aperture;
   // the fan
-  float origin[3], world_from_sonar[9], far_m, pulse_width_m, truth_half_width_rad;
+  float origin[3], world_from_sonar[9], far_m, pulse_width_m, truth_half_width_rad, column_spacing;
 };
 
 struct BeamWeightRow {  // beams_a_panel beams, see BeamPanel
@@ -160,6 +164,7 @@ struct PingView {
   std::uint32_t tile_count, slots, chunks, has_scene;
   FanRay* fan_rays;          // [elevations][columns]
   float* depth;              // [columns][bins + 1]
+  float* depth_slope;        // [columns][bins + 1], DepthMap::per_column
   FirstHit* first_hits;      // [elevations - 1][columns], null = not wanted
   FirstHit* column_truth;    // [columns], a result
   Echo* echoes;              // [slots]

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "cuda/counting.hpp"
 #include "cuda/trace_ray.hpp"
 
@@ -46,8 +47,15 @@ SONAR_HD inline FanRay look(const PingView& p, ColumnSine column, BaseElevation 
 /// Base ray `i` of [elevations][columns].
 SONAR_HD inline void trace_base(const PingView& p, std::uint32_t i) {
   const std::uint32_t columns = static_cast<std::uint32_t>(p.sea.columns);
+  const auto e = static_cast<std::int32_t>(i / columns), sides = p.sea.side_elevations, step = p.sea.side_columns;
+  auto column = static_cast<std::int32_t>(i % columns);
+  // In the side lobes a few columns share a ray.
+  if (e < sides || e >= p.sea.elevations - sides) {
+    column = column - column % step + step / 2;
+    if (column >= p.sea.columns) column = p.sea.columns - 1;
+  }
   Vec3 along;
-  p.fan_rays[i] = look(p, p.column_sines[i % columns], p.base_elevations[i / columns], along);
+  p.fan_rays[i] = look(p, p.column_sines[column], p.base_elevations[e], along);
 }
 
 SONAR_HD inline bool far_apart(const FanRay& a, const FanRay& b, float tolerance_m) {
@@ -72,24 +80,39 @@ SONAR_HD inline bool interpolates(const FanRay& a, const FanRay& m, const FanRay
   return plane_is_near(a, along, m, tolerance_m) && plane_is_near(b, along, m, tolerance_m);
 }
 
+/// As FanTracer::per_column (core/pipeline/trace_fan.cpp).
+SONAR_HD inline float per_column(const SeaView& s, const FanRay& a, ColumnSine column) {
+  if (a.object == no_object || a.offset == 0) return 0;
+  const float* m = s.world_from_sonar;
+  const float to_port = a.normal.x * m[1] + a.normal.y * m[4] + a.normal.z * m[7];
+  if (s.conical != 0) return -s.column_spacing * to_port / (a.offset * column.across * column.across * a.forward);
+  const float forward = a.normal.x * m[0] + a.normal.y * m[3] + a.normal.z * m[6];
+  return -s.column_spacing * (to_port - forward * column.along / column.across) / a.offset;
+}
+
 /// Draws one column's depth map from below to above.
 struct DepthPen {
   const SeaView* sea;
-  float* map;  // [bins + 1]
+  ColumnSine column;
+  float *map, *slope;  // [bins + 1]
   int bin;
 
   SONAR_HD static int bin_below(const SeaView& s, float tangent) {
-    const int bin = static_cast<int>((tangent - s.first_tangent) * s.bins_per_tangent);
+    const int bin = static_cast<int>(bin_of_tangent(s.axis, tangent));
     return bin < s.bins ? bin : s.bins;
   }
   SONAR_HD void draw(const FanRay& a, const FanRay& b, bool edge, bool last) {
     const int end = last ? sea->bins : bin_below(*sea, b.tangent);
     const float farther = b.inverse_x < a.inverse_x ? b.inverse_x : a.inverse_x;
     const float per_tangent = (b.inverse_x - a.inverse_x) / (b.tangent - a.tangent);
+    const FanRay& of = b.inverse_x < a.inverse_x ? b : a;
+    const std::int32_t mark = surface_mark(of.object);
+    const float aside = per_column(*sea, of, column);
     for (; bin <= end; ++bin) {
-      const float tangent = sea->first_tangent + static_cast<float>(bin) / sea->bins_per_tangent;
+      const float tangent = tangent_of_bin(sea->axis, static_cast<float>(bin));
       const float between = a.inverse_x + per_tangent * (tangent - a.tangent);
-      map[bin] = edge ? farther : (0.0f < between ? between : 0.0f);
+      map[bin] = with_mark(edge ? farther : (0.0f < between ? between : 0.0f), mark);
+      slope[bin] = aside;
     }
   }
 };
@@ -107,6 +130,8 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   const auto columns = static_cast<std::uint32_t>(s.columns);
   const std::uint32_t e = i / columns, column = i % columns;
   const ColumnSine sine = p.column_sines[column];
+  const auto sides = static_cast<std::uint32_t>(s.side_elevations);
+  const bool side = e < sides || e + 1 + sides >= static_cast<std::uint32_t>(s.elevations);
   struct Above {
     FanRay ray;
     int depth;
@@ -116,8 +141,8 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   int waiting = 1;
   FanRay below = p.fan_rays[i];
   above[0] = {p.fan_rays[i + columns], 0, false};
-  DepthPen pen{&s, p.depth + static_cast<std::int64_t>(column) * (s.bins + 1),
-               e == 0 ? 0 : DepthPen::bin_below(s, below.tangent) + 1};
+  const std::int64_t of_column = static_cast<std::int64_t>(column) * (s.bins + 1);
+  DepthPen pen{&s, sine, p.depth + of_column, p.depth_slope + of_column, e == 0 ? 0 : DepthPen::bin_below(s, below.tangent) + 1};
   FirstHit nearest{0, no_object};
   if (e == 0) note(below, s.truth_half_width_rad, nearest);
   std::uint32_t rays = 0;
@@ -126,8 +151,8 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
     bool edge = false;
     if (!top.settled) {
       const bool same = below.object == top.ray.object;
-      const bool open = !same || far_apart(below, top.ray, s.pulse_width_m);
-      if (open && top.depth < (same ? fan::deepest : fan::edge_depth)) {
+      const bool open = !same || (!side && far_apart(below, top.ray, s.pulse_width_m));
+      if (open && !side && top.depth < (same ? fan::deepest : fan::edge_depth)) {
         const BaseElevation middle = elevation_at(middle_rad(below, top.ray, static_cast<int>(column), top.depth));
         Vec3 along;
         const FanRay between = look(p, sine, middle, along);

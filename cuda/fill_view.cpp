@@ -17,7 +17,7 @@ void PingPreparer::place_fan(Making& m) {
   DepthMap all_columns;
   all_columns.columns = plan.columns.count;
   all_columns.bins = plan.fan.bins;
-  const simd::GroupView g = make_group_view(plan, s, all_columns);
+  const simd::GroupView g = make_group_view(plan, s, all_columns, 0, plan.columns.count);
   SeaView& sea = m.view.sea;
   sea.conical = g.conical ? 1 : 0;
   sea.columns = plan.columns.count;
@@ -26,8 +26,10 @@ void PingPreparer::place_fan(Making& m) {
   sea.expected_power = g.expected_power ? 1 : 0;
   sea.first_edge_sine = g.first_edge_sine;
   sea.columns_per_sine = g.columns_per_sine;
-  sea.first_tangent = g.first_tangent;
-  sea.bins_per_tangent = g.bins_per_tangent;
+  sea.axis = g.axis;
+  sea.side_elevations = plan.fan.side_elevations;
+  sea.side_columns = PingPlan::side_columns;
+  sea.elevation_aperture = g.elevation_aperture;
   sea.depth_tolerance_m = g.depth_tolerance_m;
   sea.turns_per_m = g.turns_per_m;
   sea.decay_per_m = g.decay_per_m;
@@ -42,6 +44,7 @@ void PingPreparer::place_fan(Making& m) {
   sea.far_m = static_cast<float>(s.max_range_m);
   // Tolerance of the refinement (section 2) [m].
   sea.pulse_width_m = static_cast<float>(plan.pulse_width_m);
+  sea.column_spacing = static_cast<float>(plan.columns.spacing);
   sea.truth_half_width_rad = truth_half_width_rad(plan);
 
   m.view.has_scene = m.request().blank ? 0 : 1;
@@ -55,6 +58,7 @@ void PingPreparer::place_fan(Making& m) {
   // Base rays of all columns; each interval between two is refined by itself, so it needs no list.
   const auto elevations = static_cast<std::size_t>(sea.elevations);
   m.view.fan_rays = m.room.work.allocate<FanRay>(elevations * m.columns()).device;
+  m.view.depth_slope = m.room.work.allocate<float>(m.columns() * static_cast<std::size_t>(sea.bins + 1)).device;
   m.view.depth = m.room.work.allocate<float>(m.columns() * static_cast<std::size_t>(sea.bins + 1)).device;
   if (m.request().switches.keep_truth) m.view.first_hits = m.room.work.allocate<FirstHit>((elevations - 1) * m.columns()).device;
 }

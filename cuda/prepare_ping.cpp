@@ -124,9 +124,7 @@ void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
     in.bodies_in_world = m.bodies;
     in.min_range_m = static_cast<float>(m.scalars.min_range_m);
     in.max_range_m = static_cast<float>(m.scalars.max_range_m);
-    in.max_sine = static_cast<float>(std::min(1.0, m.plan.columns.first_sine + m.plan.columns.spacing));
-    in.max_elevation_rad = static_cast<float>(m.plan.widest_about_axis_rad());
-    in.levels = m.plan.levels;
+    m.plan.aim(in);
   }
   if (views.empty()) return;
   if (found_.size() < views.size()) found_.resize(views.size());
@@ -248,6 +246,17 @@ TileView PingPreparer::view_of(const PreparedTile& prepared, const std::int16_t*
   t.fade_in_per_m = seen.fade_in_per_m;
   t.fade_out_to_m = seen.fade_out_to_m;
   t.fade_out_per_m = seen.fade_out_per_m;
+  t.from_tangent = seen.from_tangent;
+  t.to_tangent = seen.to_tangent;
+  t.in_side_lobes = seen.in_side_lobes ? 1 : 0;
+  t.tolerance_share = seen.tolerance_share;
+  t.turned_away = seen.turned_away;
+  t.mark = seen.mark;
+  t.moves = seen.moves ? 1 : 0;
+  if (seen.moves) {
+    std::copy_n(seen.seen_turn, 9, t.seen_turn);
+    std::copy_n(seen.seen_place, 3, t.seen_place);
+  }
   return t;
 }
 

@@ -46,8 +46,11 @@ void take_results(BatchRoom::Ping& from, const PingView& view) {
   }
   // Rays and echoes are counted on the device; base rays are known beforehand.
   if (view.has_scene != 0) {
+    const SeaView& sea = view.sea;
+    // Those of the side lobes serve several columns.
+    const int sides = 2 * sea.side_elevations, shared = (sea.columns + sea.side_columns - 1) / sea.side_columns;
     from.statistics.rays +=
-        from.counters.host[0] + static_cast<std::size_t>(view.sea.columns) * static_cast<std::size_t>(view.sea.elevations);
+        from.counters.host[0] + static_cast<std::size_t>(sea.columns * (sea.elevations - sides) + shared * sides);
     from.statistics.echoes += from.counters.host[1];
   }
   from.wanted->statistics = from.statistics;

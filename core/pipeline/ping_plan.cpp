@@ -18,6 +18,9 @@ constexpr double margin_in_beams = 3.0;          // columns beyond the sector, o
 constexpr double flat_margin_in_beams = 1.5;     // of which the transmitter lights this much fully
 constexpr int base_elevations = 48;              // docs/acoustics.md, section 2
 constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
+constexpr double side_lobe_two_way = 5.62e-3;    // -45 dB: lower side lobes are left out
+constexpr double side_step_rad = 0.19;           // between rays in them; a plane is exact between any two
+constexpr int side_bins = 64;                    // of the depth map on either side
 constexpr double unit_fan_over_width = 2.3;      // where there is no pattern to end it
 constexpr double widest_fan_rad = 1.4;
 constexpr double level_fade = 1.15;  // cell levels cross-fade over 15 % of range
@@ -39,7 +42,13 @@ BeamWidths beam_width_sines(const FrequencyMode& mode) {
   return widths;
 }
 
-Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pulse_width_m) {
+/// Where the peaks of the two-way pattern, 1 / (pi x)^2 at x = L_v / lambda sin psi, have fallen below what is audible.
+double side_lobe_reach_rad(const BeamPattern& pattern) {
+  const double sine = 1 / (pi * std::sqrt(side_lobe_two_way) * elevation_aperture_in_wavelengths(pattern));
+  return sine < 1 ? std::min(std::asin(sine), widest_fan_rad) : widest_fan_rad;
+}
+
+Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pulse_width_m, bool side_lobes) {
   Fan fan;
   const bool has_pattern = mode.pattern.elevation_taper != Taper::unit;
   const double reach = has_pattern ? elevation_reach_rad(mode.pattern, fan_edge_amplitude)
@@ -50,14 +59,25 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pul
   const double wanted = settings.range_m * 2 * tangent / (0.7 * pulse_width_m);
   fan.bins = 256;
   while (fan.bins < 2048 && fan.bins < wanted) fan.bins *= 2;
-  fan.first_tangent = static_cast<float>(-tangent);
-  fan.bins_per_tangent = static_cast<float>(fan.bins / (2 * tangent));
-  for (int bin = 0; bin <= fan.bins; ++bin)
-    fan.tangent.push_back(fan.first_tangent + static_cast<float>(bin) / fan.bins_per_tangent);
-  for (int e = 0; e < base_elevations; ++e) {
+  fan.axis.edge_tangent = static_cast<float>(tangent);
+  fan.axis.bins_per_tangent = fan.axis.side_bins_per_tangent = static_cast<float>(fan.bins / (2 * tangent));
+  fan.reach_rad =
+      side_lobes && has_pattern ? std::max(side_lobe_reach_rad(mode.pattern), fan.half_angle_rad) : fan.half_angle_rad;
+  const double side_rad = fan.reach_rad - fan.half_angle_rad;
+  if (side_rad > 0) {
+    fan.axis.side_bins_per_tangent = static_cast<float>(side_bins / (std::tan(fan.reach_rad) - tangent));
+    fan.bins += 2 * side_bins;
+    fan.side_elevations = static_cast<int>(std::ceil(side_rad / side_step_rad));
+  }
+  fan.axis.middle_bin = static_cast<float>(fan.bins) / 2;
+  for (int bin = 0; bin <= fan.bins; ++bin) fan.tangent.push_back(tangent_of_bin(fan.axis, static_cast<float>(bin)));
+  for (int e = -fan.side_elevations; e < base_elevations + fan.side_elevations; ++e) {
     // Nudged off round angles: a ray that lies exactly on the edge between two triangles can slip through.
     const double nudge = e == 0 || e == base_elevations - 1 ? 0 : 0.0137;
-    fan.elevation_rad.push_back(static_cast<float>(fan.half_angle_rad * (2 * (e + nudge) / (base_elevations - 1) - 1)));
+    double angle = fan.half_angle_rad * (2 * (std::clamp(e, 0, base_elevations - 1) + nudge) / (base_elevations - 1) - 1);
+    const double step = side_rad / std::max(fan.side_elevations, 1);
+    angle += step * (std::min(e, 0) + std::max(e - (base_elevations - 1), 0));
+    fan.elevation_rad.push_back(static_cast<float>(std::clamp(angle, -fan.reach_rad, fan.reach_rad)));
   }
   return fan;
 }
@@ -302,10 +322,22 @@ std::optional<std::size_t> PingPlan::column_of(const ConicalDirection& direction
   return static_cast<std::size_t>(column);
 }
 
-double PingPlan::widest_about_axis_rad() const {
-  if (switches.conical) return fan.half_angle_rad;
+double PingPlan::widest_about_axis_rad(double half_angle_rad) const {
+  if (switches.conical) return half_angle_rad;
   const double sine = std::min(columns.first_sine + columns.spacing, 0.9999);
-  return std::atan(std::tan(fan.half_angle_rad) / std::sqrt(1 - sine * sine));
+  return std::atan(std::tan(half_angle_rad) / std::sqrt(1 - sine * sine));
+}
+
+void PingPlan::aim(CellView& view) const {
+  view.max_sine = static_cast<float>(std::min(1.0, columns.first_sine + columns.spacing));
+  view.max_elevation_rad = static_cast<float>(widest_about_axis_rad(fan.reach_rad));
+  view.levels = levels;
+  view.exact_small = expected_power;
+  if (fan.side_elevations == 0) return;
+  view.main_elevation_rad = static_cast<float>(widest_about_axis_rad(fan.half_angle_rad));
+  view.side_from_rad = static_cast<float>(fan.half_angle_rad);
+  // 20 dB down, a quarter of the cells will do.
+  view.side_coarser = expected_power ? 0 : 1;
 }
 
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
@@ -321,7 +353,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   for (std::size_t j = 0; j < p.beam_sine.size(); ++j) p.beam_pattern.push_back(receive_pattern(mode, j));
   p.beam_weights = make_beam_weights(mode, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);
-  p.fan = make_fan(mode, settings, p.pulse_width_m);
+  p.fan = make_fan(mode, settings, p.pulse_width_m, switches.side_lobes);
   lay_out_fixed_fan(p);
   p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
   // The mean over speckle hides no chance in where cells lie: smaller cells leave a tenth of a decibel of it.

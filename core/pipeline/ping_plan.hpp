@@ -2,12 +2,14 @@
 // beamforming tables, noise filter, gains. Made when settings change, used by every stage until they change again.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/pulses/pulse.hpp"
 #include "core/pipeline/pulses/spectral_columns.hpp"
@@ -20,11 +22,16 @@ namespace sonar {
 
 /// What the rays look at: angles about the array axis, and the tangent axis of the depth map.
 struct Fan {
-  double half_angle_rad = 0;
-  float first_tangent = 0, bins_per_tangent = 0;
+  double half_angle_rad = 0;  // of the main part; the fixed fan and paths by mirrors know no more
+  double reach_rad = 0;       // with the side lobes
+  TangentAxis axis{};
   int bins = 0;
   std::vector<float> tangent;        // of every bin's lower edge, and of the end: bins + 1
   std::vector<float> elevation_rad;  // the base fan, from below to above
+  int side_elevations = 0;           // so many at either end of them lie in side lobes: not refined, shared by some columns
+  bool is_side(int interval) const {
+    return interval < side_elevations || interval + 1 >= static_cast<int>(elevation_rad.size()) - side_elevations;
+  }
 };
 
 /// A ray of the fixed fan: its elevation about the array axis, and pattern times root of the solid angle, of flat beams but for
@@ -96,8 +103,14 @@ struct PingPlan {
   /// How far behind the depth map a cell may lie and be seen: covers the straight lines between rays.
   float depth_tolerance_m() const { return depth_tolerance_in_pulses * static_cast<float>(pulse_width_m); }
   static constexpr float depth_tolerance_in_pulses = 1.5f;  // docs/acoustics.md, section 3
-  /// Largest angle about the array's axis that the fan reaches: flat beams off the middle reach farther round it than they rise.
-  double widest_about_axis_rad() const;
+  /// Largest angle about the array's axis that a fan of that half angle reaches: flat beams off the middle reach farther round it
+  /// than they rise.
+  double widest_about_axis_rad(double half_angle_rad) const;
+  /// The column that is traced for a column in the side lobes.
+  int side_column(int k) const { return std::min(k - k % side_columns + side_columns / 2, columns.count - 1); }
+  static constexpr int side_columns = 4;
+  /// What the fan and the levels of cells look at.
+  void aim(CellView& view) const;
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
 };
 

@@ -21,6 +21,16 @@ EchoGeometry PingScalars::echo_geometry(Vec3d from_sonar_m) const {
   return {turn * (from_sonar_m - moved), moved, turn};
 }
 
+int PingScalars::columns_turned(const PingPlan& plan) const {
+  if (!moves) return 0;
+  // Echoes return at 2 r / c, up to as long after `seen_from` as it is after firing; they scatter within half of that time. u
+  // changes at most as fast as the angle; nearer than 1 m there is little to be hidden.
+  constexpr double nearest_m = 1, most = 64;
+  const double late_s = std::max(seen_at_s, 2 * max_range_m / sound_speed_mps - seen_at_s);
+  const double sine = late_s * (length(twist.angular_rate_radps) + length(twist.velocity_mps) / nearest_m);
+  return static_cast<int>(std::min(std::ceil(sine / plan.columns.spacing), most));
+}
+
 double PingScalars::doppler_samples(Vec3d from_sonar_m) const {
   if (doppler_m_per_mps == 0) return 0;
   // The component of the velocity toward the place shifts the pulse by (f / B) T v (docs/acoustics.md, eq. 27).

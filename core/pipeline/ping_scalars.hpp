@@ -37,6 +37,8 @@ struct PingScalars {
 
   /// Of a place in the axes of `seen_from`.
   EchoGeometry echo_geometry(Vec3d from_sonar_m) const;
+  /// How many columns may lie between where a place was looked for and where its echo is received.
+  int columns_turned(const PingPlan& plan) const;
   /// By how many samples the Doppler shift of a sweep delays the echo from a place in the sonar's axes.
   double doppler_samples(Vec3d from_sonar_m) const;
   double sample_of(double range_m) const { return range_m * samples_per_m - sample_offset; }

@@ -39,7 +39,7 @@ void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotatio
 }
 
 PreparedTile prepare(const PingContext& context, const TileInView& t, const Rotation& seen_from_object,
-                     const BubbleLayer& bubbles) {
+                     const BubbleLayer& bubbles, float turned_away) {
   const PingScalars& s = context.scalars;
   PreparedTile out;
   simd::TileSeen& seen = out.seen;
@@ -81,6 +81,22 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   seen.fade_out_to_m = t.level->fade_out_to_m;
   seen.fade_out_per_m = per_metre(t.level->full_to_m, t.level->fade_out_to_m);
 
+  const Fan& fan = context.plan.fan;
+  seen.in_side_lobes = t.in_side_lobes;
+  seen.from_tangent = t.in_side_lobes ? fan.axis.edge_tangent : 0;
+  seen.to_tangent = t.in_side_lobes ? fan.tangent.back() : fan.axis.edge_tangent;
+  // Rays are sparse in the side lobes.
+  seen.tolerance_share = t.in_side_lobes ? 0.1f : 0;
+  seen.turned_away = turned_away;
+  seen.mark = surface_mark(static_cast<std::uint32_t>(t.object));
+  seen.moves = s.moves;
+  if (s.moves) {
+    // Back from the axes of reception to those that the rays were traced in.
+    const Rotation back = transposed(at.turn);
+    for (int i = 0; i < 9; ++i) seen.seen_turn[i] = static_cast<float>(back.m[i / 3][i % 3]);
+    const Vec3 moved = to_float(at.moved_m);
+    seen.seen_place[0] = moved.x, seen.seen_place[1] = moved.y, seen.seen_place[2] = moved.z;
+  }
   find_columns(tile, at.from_sonar_m, sonar_from_object, context.plan, out);
   return out;
 }
@@ -94,6 +110,23 @@ void fetch_cells(const CellTile& tile) {
 
 }  // namespace
 
+std::vector<float> turned_away(const PingContext& context) {
+  constexpr std::size_t most_triangles = 5000;  // beyond, a sonar within an object's box is taken to be within the object
+  const Scene& scene = context.scene();
+  std::vector<float> away;
+  for (std::size_t o = 0; o < scene.objects.size(); ++o) {
+    const Skin& skin = context.cells.skins()[o];
+    away.push_back(static_cast<float>(skin.outward));
+    if (skin.outward == 0) continue;
+    const Object& object = scene.objects[o];
+    const Vec3d p = transform(inverse(scene.in_world(object, context.bodies_in_world)), context.scalars.seen_from.position_m);
+    const bool in_box = p.x >= skin.low.x && p.x <= skin.high.x && p.y >= skin.low.y && p.y <= skin.high.y && p.z >= skin.low.z &&
+                        p.z <= skin.high.z;
+    if (in_box && (object.mesh->triangles.size() > most_triangles || encloses(*object.mesh, p))) away.back() = 0;
+  }
+  return away;
+}
+
 /// One table a material, at this ping's frequency and sound speed.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& s) {
   std::vector<LawTable> laws;
@@ -105,28 +138,33 @@ std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const Pi
 void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles) {
   const BubbleLayer bubbles(context.scene().sea_surface);
+  const std::vector<float> away = turned_away(context);
   tiles.resize(in_view.size());
   // Tiles a task. Each writes its own place, so the order of the tiles, and of every sum, is that of one thread.
   constexpr std::size_t batch = 256;
   context.pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);
-    for (std::size_t i = b * batch; i < end; ++i)
-      tiles[i] = prepare(context, in_view[i], sonar_from_object[static_cast<std::size_t>(in_view[i].object)], bubbles);
+    for (std::size_t i = b * batch; i < end; ++i) {
+      const auto object = static_cast<std::size_t>(in_view[i].object);
+      tiles[i] = prepare(context, in_view[i], sonar_from_object[object], bubbles, away[object]);
+    }
   });
 }
 
-simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, const DepthMap& seen) {
+simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, const DepthMap& seen, int first, int last) {
   simd::GroupView g{};
   g.conical = plan.switches.conical;
   // Column k holds the directions u in [first_edge - (k + 1) du, first_edge - k du).
   g.first_edge_sine = static_cast<float>(plan.columns.first_sine + plan.columns.spacing / 2);
   g.columns_per_sine = static_cast<float>(1 / plan.columns.spacing);
-  g.first_column = seen.first_column;
-  g.last_column = seen.first_column + seen.columns;
-  g.first_tangent = plan.fan.first_tangent;
-  g.bins_per_tangent = plan.fan.bins_per_tangent;
+  g.first_column = first;
+  g.last_column = last;
+  g.map_first_column = seen.first_column;
+  g.map_last_column = seen.first_column + seen.columns;
+  g.axis = plan.fan.axis;
   g.bins = seen.bins;
   g.inverse_depth = seen.inverse_x.data();
+  g.depth_slope = seen.per_column.data();
   g.depth_tolerance_m = plan.depth_tolerance_m();
   g.turns_per_m = static_cast<float>(s.turns_per_m);
   g.decay_per_m = static_cast<float>(2 * s.absorption_np_per_m);
@@ -136,6 +174,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.first_sample = static_cast<float>(-plan.taps / 2);
   g.last_sample = static_cast<float>(plan.samples + plan.taps / 2 - 1);
   std::copy(plan.elevation.begin(), plan.elevation.end(), g.elevation);
+  g.elevation_aperture = static_cast<float>(elevation_aperture_in_wavelengths(plan.mode.pattern));
   g.expected_power = plan.expected_power;
   return g;
 }
@@ -193,7 +232,7 @@ std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> str
   const double at_sample = s.sample_of(r) + s.doppler_samples(p);
   if (r < nearest_scatterer_m || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) return {};
   const ConicalDirection direction = plan.direction_of(p);
-  const std::optional<std::size_t> column = plan.column_of(direction, plan.fan.half_angle_rad);
+  const std::optional<std::size_t> column = plan.column_of(direction, plan.fan.reach_rad);
   if (!column) return {};
   // 10^(SL/20) e^{-2 a r} / r^2 D_v T [uPa per m]; the phase is (12).
   const double transmit = static_cast<double>(plan.columns.transmit[*column]);

@@ -27,12 +27,17 @@ struct PreparedTile {
 /// The scattering law of every material of the scene, at this ping's frequency.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& scalars);
 
+/// Which way the normals of an object point that are turned away from the sonar and hidden by the object itself: of closed meshes
+/// seen from outside, 1 or -1; else 0. Per object.
+std::vector<float> turned_away(const PingContext& context);
+
 /// Prepares the tiles in view, in parallel; the order is kept. The tiles point into the laws, which must outlive them.
 /// `sonar_from_object`: of the view, per object.
 void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles);
 
-simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen);
+/// Of columns [first, last); the map may hold more.
+simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen, int first, int last);
 
 /// For each group of `group_columns` columns, the tiles that reach into it, in order.
 void sort_tiles(const std::vector<PreparedTile>& tiles, int group_columns, int groups,

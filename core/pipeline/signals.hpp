@@ -25,14 +25,17 @@ struct Columns {
 /// beams (conical off) the horizontal distance stands in for x.
 struct DepthMap {
   int first_column = 0, columns = 0, bins = 0;
-  std::vector<float> inverse_x;  // [columns][bins + 1], 0 = nothing was hit
+  std::vector<float> inverse_x;   // [columns][bins + 1], 0 = nothing was hit; its last bits are the surface_mark
+  std::vector<float> per_column;  // [columns][bins + 1]: by how much it changes from column to column along the facet hit
 
   /// Of columns [first, last), to be drawn.
   void shape(int first, int last, int bin_count) {
     first_column = first, columns = last - first, bins = bin_count;
     inverse_x.resize(static_cast<std::size_t>(columns) * static_cast<std::size_t>(bins + 1));
+    per_column.resize(inverse_x.size());
   }
-  float* column(int k) { return inverse_x.data() + static_cast<std::ptrdiff_t>(k - first_column) * (bins + 1); }
+  std::ptrdiff_t at(int k) const { return static_cast<std::ptrdiff_t>(k - first_column) * (bins + 1); }
+  float* column(int k) { return inverse_x.data() + at(k); }
 };
 
 /// One hit of the fixed fan (paper-style sampling: a ray is a scatterer).

@@ -221,9 +221,7 @@ void PingSimulation::find_echo_sources() {
   view.bodies_in_world = bodies_;
   view.min_range_m = static_cast<float>(scalars_.min_range_m);
   view.max_range_m = static_cast<float>(scalars_.max_range_m);
-  view.max_sine = static_cast<float>(std::min(1.0, plan_.columns.first_sine + plan_.columns.spacing));
-  view.max_elevation_rad = static_cast<float>(plan_.widest_about_axis_rad());
-  view.levels = plan_.levels;
+  plan_.aim(view);
   const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
   prepare_tiles(context_, in_view, cells_.sonar_from_objects(), w_.tiles);
@@ -294,15 +292,23 @@ void PingSimulation::scatter_hits_of(int first, int last, Workspace::Buffers::Pe
 }
 
 void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::PerWorker& mine, Stopwatch& watch) {
-  mine.seen.shape(first, last, plan_.fan.bins);
+  // What a moving sonar receives in a column it may have passed in another when it looked.
+  const int beside = scalars_.columns_turned(plan_);
+  const int map_first = std::max(first - beside, 0), map_last = std::min(last + beside, plan_.columns.count);
+  mine.seen.shape(map_first, map_last, plan_.fan.bins);
+  const auto trace = [&](int from, int to) {
+    if (from < to) mine.statistics.rays += trace_fan(scene_, plan_, scalars_, from, to, mine.fan, mine.seen);
+  };
   for (int from = first; from < last; from += traced_columns()) {
     // Rays draw the depth map of these columns (section 2).
     const int to = std::min(from + traced_columns(), last);
-    mine.statistics.rays += trace_fan(scene_, plan_, scalars_, from, to, mine.fan, mine.seen);
+    trace(from, to);
     if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, from, to, w_.first_hits);
   }
+  trace(map_first, first);
+  trace(last, map_last);
   watch.lap(Stage::trace);
-  const simd::GroupView group = make_group_view(plan_, scalars_, mine.seen);
+  const simd::GroupView group = make_group_view(plan_, scalars_, mine.seen, first, last);
   const auto& wanted = w_.tiles_by_group[static_cast<std::size_t>(first / group_columns_)];
   // scatter() stops when its buffer is full; the tiles' order stays.
   for (std::size_t next = 0; next < wanted.size();) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 
 namespace sonar {
 namespace {
@@ -79,6 +80,10 @@ class FanTracer {
         first_(first),
         last_(last),
         s_(scratch) {
+    for (int i = 0; i < 3; ++i) {
+      ahead_[i] = static_cast<float>(scalars.world_from_sonar.m[i][0]);
+      port_[i] = static_cast<float>(scalars.world_from_sonar.m[i][1]);
+    }
     // One pulse width [m]: the depth map need not follow a surface any closer (section 2).
     tolerance_m_ = static_cast<float>(plan.pulse_width_m);
     columns_ = column_sines(plan.columns, first, last);
@@ -117,6 +122,10 @@ class FanTracer {
     s_.samples.resize(static_cast<std::size_t>(last_ - first_) * static_cast<std::size_t>(n));
     for (int e = 0; e < n; ++e) {
       const Elevation elevation = base_[static_cast<std::size_t>(e)];
+      if (e < plan_.fan.side_elevations || e >= n - plan_.fan.side_elevations) {
+        trace_side(e, elevation);
+        continue;
+      }
       for (int from = first_; from < last_; from += RayPacket::size) {
         const int to = std::min(from + RayPacket::size, last_);
         filler_.clear();
@@ -132,12 +141,44 @@ class FanTracer {
     }
   }
 
+  /// In the side lobes a few columns share a ray, whichever group they are in: what it met is of all of them.
+  void trace_side(int e, Elevation elevation) {
+    const int n = elevations(), step = PingPlan::side_columns;
+    for (int from = first_; from < last_;) {
+      filler_.clear();
+      ColumnSine sines[RayPacket::size];
+      int lanes = 0, to = from;
+      for (; lanes < RayPacket::size && to < last_; ++lanes, to += step - to % step) {
+        const double u = plan_.columns.sine(plan_.side_column(to));
+        sines[lanes] = {static_cast<float>(u), static_cast<float>(std::sqrt(std::max(0.0, 1 - u * u)))};
+        filler_.add(sines[lanes], elevation);
+      }
+      filler_.trace(scene_);
+      // Counted once, by the group of the first of its columns.
+      if (from % step != 0) --filler_.traced;
+      for (int k = from; k < std::min(to, last_); ++k) {
+        const int lane = k / step - from / step;
+        const std::int32_t index = (k - first_) * n + e;
+        store(lane, elevation, sines[lane], at(index));
+        at(index).next = e + 1 < n ? index + 1 : -1;
+        at(index).edge_above = false;
+      }
+      from = to;
+    }
+  }
+
   void refine() {
     FanRefinement<Sample> refinement(s_.samples, s_.open, s_.halves, tolerance_m_, first_);
     // Elevation by elevation over all columns: a packet of middles holds neighbouring directions, too.
     const int n = elevations();
     for (int e = 0; e + 1 < n; ++e)
-      for (int k = 0; k < last_ - first_; ++k) refinement.consider_base(k * n + e, k * n + e + 1, k);
+      for (int k = 0; k < last_ - first_; ++k) {
+        const std::int32_t below = k * n + e;
+        if (plan_.fan.is_side(e))
+          at(below).edge_above = at(below).surface.object != at(below + 1).surface.object;
+        else
+          refinement.consider_base(below, below + 1, k);
+      }
     // Rays of neighbouring columns that end farther apart than this share too few triangles to be traced as one bundle.
     constexpr double bundled_m = 0.06;
     const bool bundled = plan_.columns.spacing * static_cast<double>(filler_.far_m()) < bundled_m;
@@ -156,29 +197,44 @@ class FanTracer {
     refinement.run(trace, [this](std::size_t lane, int) { return SurfaceHit::direction(filler_.packet, lane); });
   }
 
+  /// Of the map from this column to the next, along the plane n . p = o of the facet that was hit: of 1 / x = (n_x + n_y u / (s
+  /// cos psi) + n_z tan psi) / o with s^2 = 1 - u^2; of flat beams 1 / h = (n_x s + n_y u + n_z tan psi) / o.
+  float per_column(const Sample& a, ColumnSine column) const {
+    const SurfaceHit& hit = a.surface;
+    if (hit.object == RayPacket::miss || hit.offset == 0) return 0;
+    const float to_port = hit.normal.x * port_[0] + hit.normal.y * port_[1] + hit.normal.z * port_[2];
+    const auto spacing = static_cast<float>(plan_.columns.spacing);
+    if (plan_.switches.conical) return -spacing * to_port / (hit.offset * column.across * column.across * a.forward);
+    const float forward = hit.normal.x * ahead_[0] + hit.normal.y * ahead_[1] + hit.normal.z * ahead_[2];
+    return -spacing * (to_port - forward * column.along / column.across) / hit.offset;
+  }
+
   /// Linear between hits of one surface, the farther value across edges.
   void draw(DepthMap& seen) {
     const Fan& fan = plan_.fan;
     const int n = elevations();
     for (int k = 0; k < last_ - first_; ++k) {
-      float* map = seen.column(first_ + k);
+      float *map = seen.column(first_ + k), *slope = seen.per_column.data() + seen.at(first_ + k);
       int bin = 0;
       for (std::int32_t i = k * n; at(i).next >= 0; i = at(i).next) {
         const Sample &a = at(i), &b = at(at(i).next);
         // Bins up to `end` lie between a and b; the last interval takes what rounding left over.
-        const float top = (b.tangent - fan.first_tangent) * fan.bins_per_tangent;
+        const float top = bin_of_tangent(fan.axis, b.tangent);
         const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
         // 1 / x is linear in tan psi along a plane (section 2); 0 is infinitely far, so the smaller value is the farther surface.
         const float inverse_a = a.surface.inverse_x, inverse_b = b.surface.inverse_x, farther = std::min(inverse_a, inverse_b);
         const float per_tangent = (inverse_b - inverse_a) / (b.tangent - a.tangent);
         if (bin > end) continue;
+        const Sample& of = inverse_b < inverse_a ? b : a;
+        const std::int32_t mark = surface_mark(of.surface.object);
+        std::fill(slope + bin, slope + end + 1, per_column(of, column(k)));
         if (a.edge_above) {
-          std::fill(map + bin, map + end + 1, farther);
+          std::fill(map + bin, map + end + 1, with_mark(farther, mark));
         } else {
           const float* __restrict tangent = fan.tangent.data();
           // A bin may lie a rounding error outside of [a, b]: 1 / x must not become negative there.
           for (int place = bin; place <= end; ++place)
-            map[place] = std::max(0.0f, inverse_a + per_tangent * (tangent[place] - a.tangent));
+            map[place] = with_mark(std::max(0.0f, inverse_a + per_tangent * (tangent[place] - a.tangent)), mark);
         }
         bin = end + 1;
       }
@@ -190,7 +246,7 @@ class FanTracer {
   PacketFiller filler_;
   int first_, last_;
   FanScratch& s_;
-  float tolerance_m_ = 0;
+  float tolerance_m_ = 0, ahead_[3], port_[3];  // m; axes of the sonar in the world
   std::vector<ColumnSine> columns_;
   std::vector<Elevation> base_;
 };

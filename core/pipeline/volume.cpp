@@ -5,6 +5,7 @@
 
 #include "core/base/units.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/pipeline/arithmetic/noise_place.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 
@@ -32,7 +33,7 @@ Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars
   const int bins_a_slice = std::max(1, fan.bins / most_slices);
   for (int from = 0; from < fan.bins; from += bins_a_slice) {
     const auto angle = [&](double bin) {
-      return std::atan(static_cast<double>(fan.first_tangent) + bin / static_cast<double>(fan.bins_per_tangent));
+      return std::atan(static_cast<double>(tangent_of_bin(fan.axis, static_cast<float>(bin))));
     };
     // D_v^2 dpsi [rad] by the midpoint rule; dOmega of flat beams has a further cos(psi).
     const double psi = angle(from + 0.5 * bins_a_slice), amplitude = has_pattern ? elevation_two_way(aperture, psi) : 1;

@@ -49,6 +49,7 @@ struct Switches {
   bool conical = true;
   bool crosstalk = true;
   bool leak = true;
+  bool side_lobes = false;  // costs 10 to 30 %
   bool interference = true;
 
   bool operator==(const Switches&) const = default;
@@ -60,7 +61,7 @@ struct NamedSwitch {
   bool Switches::*is_on;
   const char* meaning;
 };
-inline constexpr std::array<NamedSwitch, 11> named_switches{{
+inline constexpr std::array<NamedSwitch, 12> named_switches{{
     {"noise", &Switches::noise, "receiver noise"},
     {"specular", &Switches::specular, "specular echoes of smooth surfaces"},
     {"texture", &Switches::texture, "patchiness of materials that have a texture"},
@@ -71,6 +72,7 @@ inline constexpr std::array<NamedSwitch, 11> named_switches{{
     {"conical", &Switches::conical, "beams as cones about the array; off: flat beams of constant azimuth"},
     {"crosstalk", &Switches::crosstalk, "leakage between receive channels"},
     {"leak", &Switches::leak, "the transmitter heard directly in the first rows"},
+    {"side_lobes", &Switches::side_lobes, "what the elevation pattern's side lobes hear, from -20 to -45 dB"},
     {"interference", &Switches::interference, "pulses of other sonars nearby"},
 }};
 

@@ -1,6 +1,7 @@
 #include "daemon/commands/engine_options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 
 #include "core/base/enum_names.hpp"
 #include "core/text/arguments.hpp"
@@ -29,11 +30,17 @@ void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
   app.add_flag("--expected-power", given.expected_power, "mean echo power instead of speckle")->group(parts);
   for (std::size_t i = 0; i < named_switches.size(); ++i) {
     const NamedSwitch& part = named_switches[i];
-    app.add_option(std::string("--") + part.name, given.switches[i],
+    app.add_option(option_of(part), given.switches[i],
                    std::string(part.meaning) + " (default " + (defaults.*part.is_on ? "on)" : "off)"))
         ->check(one_of({"on", "off"}))
         ->group(parts);
   }
+}
+
+std::string option_of(const NamedSwitch& part) {
+  std::string option = std::string("--") + part.name;
+  std::replace(option.begin(), option.end(), '_', '-');
+  return option;
 }
 
 void add_device_option(CLI::App& app, EngineOptionsGiven& given) {
@@ -66,7 +73,7 @@ Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const En
     engine.switches.*part.is_on = given.switches[i] == "on";
     const std::string why = why_without_effect(engine.switches, part);
     if (engine.switches.*part.is_on && !why.empty())
-      return failure(ErrorKind::usage, std::string("--") + part.name + " on has no effect: " + why + "; leave out one of them");
+      return failure(ErrorKind::usage, option_of(part) + " on has no effect: " + why + "; leave out one of them");
   }
   return {};
 }

@@ -27,6 +27,9 @@ struct EngineOptionsGiven {
   std::array<std::string, named_switches.size()> switches;  // "on", "off", in the order of named_switches
 };
 
+/// --side-lobes of `side_lobes`.
+std::string option_of(const NamedSwitch& part);
+
 void add_device_option(CLI::App& app, EngineOptionsGiven& given);
 /// Everything but the threads, which a benchmark varies, and the device.
 void add_model_options(CLI::App& app, EngineOptionsGiven& given);

@@ -11,6 +11,15 @@ namespace sonar {
 
 /// Terms of the even polynomial that stands for the elevation pattern, in w = sin^2(elevation angle).
 inline constexpr int elevation_terms = 9;
+/// Which object a value of the depth map is of, in its last bits: objects are told apart by their number modulo 64.
+inline constexpr std::int32_t surface_marks = 63;
+SONAR_HD constexpr std::int32_t surface_mark(std::uint32_t object) { return static_cast<std::int32_t>(object) & surface_marks; }
+/// A cell of another object is hidden from so much behind the surface that was hit [m], and this share of its range.
+inline constexpr float contact_m = 1e-3f, contact_share = 2e-5f;
+/// The depth map's axis: bins even in the tangent, narrow up to an edge on either side and wide in the side lobes beyond.
+struct TangentAxis {
+  float middle_bin, edge_tangent, bins_per_tangent, side_bins_per_tangent;
+};
 /// Intervals of a tabulated scattering law; the table has law_steps + 2 values.
 inline constexpr int law_steps = 128;
 
@@ -23,6 +32,18 @@ SONAR_HD inline float float_of(std::uint32_t bits) {
   float x;
   std::memcpy(&x, &bits, sizeof x);
   return x;
+}
+
+SONAR_HD inline float tangent_of_bin(const TangentAxis& a, float bin) {
+  const float from_middle = bin - a.middle_bin, edge = a.edge_tangent * a.bins_per_tangent;
+  const float held = from_middle < -edge ? -edge : (from_middle > edge ? edge : from_middle);
+  return held / a.bins_per_tangent + (from_middle - held) / a.side_bins_per_tangent;
+}
+
+/// 0, nothing, stays as it is.
+SONAR_HD inline float with_mark(float inverse_x, std::int32_t mark) {
+  const std::uint32_t marks = static_cast<std::uint32_t>(surface_marks);
+  return inverse_x > 0 ? float_of((bits_of(inverse_x) & ~marks) | static_cast<std::uint32_t>(mark)) : inverse_x;
 }
 
 #include "core/pipeline/arithmetic/kernel_math.inl"

@@ -67,6 +67,21 @@ SONAR_HD inline V level_weight(const Tile& t, V r) {
   return cross_fade<V>((r - t.fade_in_from_m) * t.fade_in_per_m, (t.fade_out_to_m - r) * t.fade_out_per_m);
 }
 
+/// Bin of the depth map at a tangent.
+template <class V>
+SONAR_HD inline V bin_of_tangent(const TangentAxis& a, V t) {
+  const V edge = V{} + a.edge_tangent, held = larger(smaller(t, edge), -edge);
+  return a.middle_bin + held * a.bins_per_tangent + (t - held) * a.side_bins_per_tangent;
+}
+
+/// Two-way elevation pattern in the side lobes: sinc^2 at x, the aperture in wavelengths times the sine of the angle, from sin(pi
+/// x).
+template <class V>
+SONAR_HD inline V side_lobe_pattern(V x, V sine) {
+  const V d = sine / (3.14159265f * x);
+  return d * d;
+}
+
 /// Two-way elevation pattern: polynomial with coefficients e in w = sin^2 of the elevation.
 template <class V>
 SONAR_HD inline V elevation_pattern(const float* e, V w) {

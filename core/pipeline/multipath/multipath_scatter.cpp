@@ -5,6 +5,7 @@
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
+#include "core/pipeline/scatter.hpp"
 #include "core/scene/cells/cell_lattice.hpp"
 
 namespace sonar {
@@ -109,7 +110,8 @@ MultipathScatterer::MultipathScatterer(const PingContext& context, const ImagePa
       columns_per_sine_(static_cast<float>(1 / plan_.columns.spacing)),
       tolerance_m_(plan_.depth_tolerance_m()),
       absorption_np_per_m_(static_cast<float>(s_.absorption_np_per_m)),
-      half_turns_per_m_(static_cast<float>(0.5 * s_.turns_per_m)) {}
+      half_turns_per_m_(static_cast<float>(0.5 * s_.turns_per_m)),
+      turned_away_(turned_away(context)) {}
 
 MultipathScatterer::TilePath MultipathScatterer::look_at(const TileInView& tile, const Path& path) const {
   TilePath tile_path{};
@@ -156,6 +158,7 @@ void MultipathScatterer::scatter(const TileInView& tile, std::vector<Echoes>& by
     if (reach_[l].seen_between(tile.from_sonar_m, radius)) tile_paths_.push_back(look_at(tile, image_paths_.paths[l]));
   if (tile_paths_.size() == 1) return;
 
+  away_ = turned_away_[static_cast<std::size_t>(tile.object)];
   const CellTile& t = *tile.tile;
   const LawTable& law = laws_[static_cast<std::size_t>(t.material)];
   // Constant over a tile in (10): 10^(SL/20) sqrt(mu). Weights as in scatter.cpp.
@@ -252,6 +255,7 @@ bool MultipathScatterer::arrive(const TilePath& w, const Cell& cell, float r, fl
   const float* q = w.from_sonar_object;
   // cos(alpha) at the cell from the image's direction; its sign names the side of the surface.
   const float along = cell.normal[0] * (q[0] + cell.x) + cell.normal[1] * (q[1] + cell.y) + cell.normal[2] * (q[2] + cell.z);
+  if (along * away_ > 0) return false;
   // One-way factor m_i / r_i D(psi_i) e^{-a r_i} (sigma_b)^(1/4): the product of two is the geometric mean of eq. 10.
   out.range_m = r;
   out.sample_shift = w.sample_shift;

@@ -253,11 +253,12 @@ BounceFan make_bounce_fan(const PingPlan& plan) {
     fan.half_angle_rad = std::max(fan.half_angle_rad, std::min(elevation_reach_rad(plan.mode.pattern, fan_edge_two_way), 1.4));
   // The same bins a tangent as the direct fan, over its own wider angle.
   const double tangent = std::tan(fan.half_angle_rad);
-  fan.bins_per_tangent = plan.fan.bins_per_tangent;
+  fan.bins_per_tangent = plan.fan.axis.bins_per_tangent;
   fan.bins = static_cast<int>(std::ceil(2 * tangent * static_cast<double>(fan.bins_per_tangent)));
   fan.first_tangent = static_cast<float>(-tangent);
   // As dense in elevation as the direct fan.
-  const double step = 2 * plan.fan.half_angle_rad / static_cast<double>(plan.fan.elevation_rad.size());
+  const double step =
+      2 * plan.fan.half_angle_rad / (static_cast<double>(plan.fan.elevation_rad.size()) - 2 * plan.fan.side_elevations);
   const int n = static_cast<int>(std::ceil(2 * fan.half_angle_rad / step)) + 1;
   for (int e = 0; e < n; ++e) {
     const double nudge = e == 0 || e == n - 1 ? 0 : 0.0137;  // off the edges between triangles, as in make_plan

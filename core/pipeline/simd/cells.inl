@@ -34,9 +34,16 @@ inline __attribute__((always_inline)) void pack_weights(const CellTile& t, int i
   pack(c.weight_im + m, keep, im);
 }
 
-/// Where the cells are: range, column, elevation, cosine of incidence; which lie in the group's window; and which of them the
-/// depth map shows: a cell no farther than what the rays saw along its direction. Returns how many there are.
-template <bool conical>
+/// Cells of other objects than the one that was hit in their direction: hidden when behind its facet, which is followed from the
+/// ray's place in the column to the cell's. `at`: of the map; `nearness`: 1 / x of the cells with the tolerance for contact.
+inline __attribute__((noinline)) LaneMask hidden(const GroupView& g, LaneNumbers at, Lanes seen, Lanes column, Lanes nearness) {
+  const Lanes beside = column - as_floats(whole_part(column)) - 0.5f;
+  return below(nearness, seen + beside * gather(g.depth_slope, at));
+}
+
+/// Where the cells are: range, column, elevation, cosine of incidence; which lie in the group's window and do not look away; and
+/// which of them the depth map shows: a cell no farther than what the rays saw along its direction. Returns how many there are.
+template <bool conical, bool moves>
 __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, int from, int n, Chunk& c) {
   const CellTile& t = *s.tile;
   const std::int16_t *tx = t.column(CellTile::x), *ty = t.column(CellTile::y), *tz = t.column(CellTile::z);
@@ -49,8 +56,10 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
   const float m20 = s.turn[6], m21 = s.turn[7], m22 = s.turn[8];
   const RangeWindow window = range_window(s, g);
   const Lanes first_column = all(static_cast<float>(g.first_column)), end_column = all(static_cast<float>(g.last_column));
-  const Lanes bins = all(static_cast<float>(g.bins)), nearest = all(window.from_m), farthest = all(window.to_m);
+  const Lanes lowest = all(s.from_tangent), highest = all(s.to_tangent), nearest = all(window.from_m),
+              farthest = all(window.to_m);
   const int row = g.bins + 1;
+  const Lanes map_first = all(static_cast<float>(g.map_first_column)), map_last = all(static_cast<float>(g.map_last_column - 1));
   int m = 0;
   // r^2 = r0^2 + e with e = d . (2 q + d), d the cell's offset from the tile's centre: no difference of large numbers.
   for (int i = from; i < from + n; i += lanes) {
@@ -64,25 +73,48 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
     // What elevations are measured against.
     const Lanes inverse_h = conical ? reciprocal(larger(x, all(1e-6f))) : inverse_root(larger(x * x + y * y, all(1e-12f)));
     const Lanes column = (g.first_edge_sine - y * (conical ? inverse_r : inverse_h)) * g.columns_per_sine;
-    const Lanes bin = (z * inverse_h - g.first_tangent) * g.bins_per_tangent;
+    // Where the rays looked for it: the sonar may have turned since.
+    Lanes seen_column = column, seen_z = z, seen_inverse_h = inverse_h;
+    if (moves) {
+      const float *w = s.seen_turn, *o = s.seen_place;
+      const Lanes there_x = o[0] + w[0] * x + w[1] * y + w[2] * z, there_y = o[1] + w[3] * x + w[4] * y + w[5] * z;
+      seen_z = o[2] + w[6] * x + w[7] * y + w[8] * z;
+      const Lanes across = there_x * there_x + there_y * there_y;
+      seen_inverse_h = conical ? reciprocal(larger(there_x, all(1e-6f))) : inverse_root(larger(across, all(1e-12f)));
+      const Lanes over_range = conical ? inverse_root(larger(across + seen_z * seen_z, all(1e-12f))) : seen_inverse_h;
+      const Lanes wanted = (g.first_edge_sine - there_y * over_range) * g.columns_per_sine;
+      seen_column = smaller(larger(wanted, map_first), map_last);
+    }
+    const Lanes tangent = seen_z * seen_inverse_h, steepness = magnitude(tangent);
     LaneMask keep = both(not_below(column, first_column), below(column, end_column));
-    keep = both(keep, both(not_below(bin, all(0)), below(bin, bins)));
+    keep = both(keep, both(not_below(steepness, lowest), below(steepness, highest)));
     keep = both(keep, both(not_below(r, nearest), below(r, farthest)));
     keep = both(keep, below(all(1e-6f), x));
     if (!any(keep)) continue;
 
-    // Depth map between two bins, against the cell's own 1 / x with the tolerance of section 3.
-    const Lanes bin_here = choose(keep, bin, all(0));
+    // Depth map between two bins, against the cell's own 1 / x with the tolerances of section 3.
+    // In parentheses: of this instruction set, not found by the type of the axis.
+    const Lanes bin_here = (bin_of_tangent<Lanes>)(g.axis, choose(keep, tangent, all(0)));
     const LaneNumbers bin_below = whole_part(bin_here);
-    const LaneNumbers at = (whole_part(choose(keep, column, first_column)) - g.first_column) * row + bin_below;
+    const Lanes column_here = choose(keep, seen_column, map_first);
+    const LaneNumbers at = (whole_part(column_here) - g.map_first_column) * row + bin_below;
     Lanes a, b;
     gather_pairs(g.inverse_depth, at, a, b);
     const Lanes seen = a + (bin_here - as_floats(bin_below)) * (b - a);
-    keep = both(keep, not_below(inverse_h * (1.0f + g.depth_tolerance_m * inverse_r), seen));
-    if (!any(keep)) continue;
-
+    const Lanes tolerance = seen_inverse_h * (g.depth_tolerance_m * inverse_r + s.tolerance_share);
+    keep = both(keep, not_below(seen_inverse_h + tolerance, seen));
     // r cos(alpha): normal times the vector from sonar to cell, object axes.
     const Lanes along = counts(nx + i) * (qx0 + dx) + counts(ny + i) * (qy0 + dy) + counts(nz + i) * (qz0 + dz);
+    keep = both(keep, not_below(all(0), along * s.turned_away));
+    if (!any(keep)) continue;
+    const LaneMask foreign = both(both(keep, below(seen_inverse_h - tolerance, seen)),
+                                  both(bits_differ(a, s.mark, surface_marks), bits_differ(b, s.mark, surface_marks)));
+    if (any(foreign)) {
+      const Lanes nearness = seen_inverse_h * (1.0f + contact_share + contact_m * inverse_r);
+      keep = less(keep, both(foreign, hidden(g, at, seen, column_here, nearness)));
+      if (!any(keep)) continue;
+    }
+
     pack(c.range + m, keep, r);
     pack(c.offset + m, keep, quotient(e, r0 + r));
     pack(c.cosine + m, keep, magnitude(along) * (CellTile::normal_unit * inverse_r));
@@ -109,13 +141,21 @@ inline Lanes sine_of_turns(Lanes turns) {
   return y + y * y2 * p;
 }
 
+/// Two-way pattern of cells at the squared sines w; of those in the side lobes as it is, where a polynomial would have many
+/// terms.
+inline Lanes pattern_of(const TileSeen& s, const GroupView& g, Lanes w) {
+  if (!s.in_side_lobes) return elevation_pattern(g.elevation, w);
+  const Lanes x = g.elevation_aperture * root_of(w);
+  return side_lobe_pattern(x, sine_of_turns(0.5f * x));
+}
+
 /// Amplitude and carrier of every visible cell, times its speckle.
 __attribute__((noinline)) void scatter_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
   for (int i = 0; i < n; i += lanes) {
     const Lanes r = load(c.range + i), offset = load(c.offset + i), d = -g.decay_per_m * offset;
     // Eq. 6 for a cell: level weight, law, D_v, absorption relative to the centre, 1 / r^2; then its phase and its xi.
-    const Lanes amplitude = s.amplitude * root_of(level_weight(s, r)) * load(c.cosine + i) *
-                            elevation_pattern(g.elevation, load(c.sine2 + i)) * exp_near_0(d) * reciprocal(r * r);
+    const Lanes amplitude = s.amplitude * root_of(level_weight(s, r)) * load(c.cosine + i) * pattern_of(s, g, load(c.sine2 + i)) *
+                            exp_near_0(d) * reciprocal(r * r);
     const Lanes turns = -(s.phase_turns + g.turns_per_m * offset);
     const Lanes cs = amplitude * sine_of_turns(turns + 0.25f), sn = amplitude * sine_of_turns(turns);
     const Lanes a = load(c.weight_re + i), b = load(c.weight_im + i);
@@ -133,7 +173,7 @@ inline void power_of_cells(const TileSeen& s, const GroupView& g, int n, const C
     Lanes loss;
     for (int l = 0; l < lanes; ++l) loss[l] = std::exp(-g.decay_per_m * c.offset[i + l]);
     const Lanes amplitude =
-        s.area_amplitude * load(c.cosine + i) * elevation_pattern(g.elevation, load(c.sine2 + i)) * loss * reciprocal(r * r);
+        s.area_amplitude * load(c.cosine + i) * pattern_of(s, g, load(c.sine2 + i)) * loss * reciprocal(r * r);
     store(out.re + i, amplitude * amplitude * level_weight(s, r) * load(c.weight_re + i));
     store(out.im + i, Lanes{});
     store(out.sample + i, r * g.samples_per_m - (g.sample_offset - s.sample_shift));
@@ -146,7 +186,8 @@ int scatter_tile(const TileSeen& s, const GroupView& g, EchoArrays out) {
   int appended = 0;
   for (int from = 0; from < s.tile->count; from += chunk) {
     const int n = s.tile->count - from < chunk ? s.tile->count - from : chunk;
-    const int m = g.conical ? see_cells<true>(s, g, from, n, c) : see_cells<false>(s, g, from, n, c);
+    const int m = g.conical ? (s.moves ? see_cells<true, true>(s, g, from, n, c) : see_cells<true, false>(s, g, from, n, c))
+                            : (s.moves ? see_cells<false, true>(s, g, from, n, c) : see_cells<false, false>(s, g, from, n, c));
     if (m == 0) continue;
     if (s.law != nullptr) apply_law(s.law, m, c);
     if (g.expected_power)

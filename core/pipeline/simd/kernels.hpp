@@ -27,6 +27,14 @@ struct TileSeen {
   const float* law;            // root of the scattering strength over sqrt(1 - cosine), law_steps + 2 values; null = cosine
   float area_amplitude;        // the same with the cell size in place of the speckle (expected power)
   float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
+  // Which tangents its cells count at, from 0: those of the fan's main part, or those of the side lobes, where cells are coarser.
+  float from_tangent, to_tangent;
+  bool in_side_lobes;
+  float tolerance_share;  // of the range, beside GroupView::depth_tolerance_m
+  float turned_away;  // the side of its facets that scatters nothing: cells with normal * direction * turned_away > 0; 0: none
+  std::int32_t mark;  // surface_mark of its object
+  bool moves;  // while the ping is under way: the depth map is looked up with the cells' place in the axes it was traced in
+  float seen_turn[9], seen_place[3];  // there = seen_turn * place + seen_place, row-major
 };
 
 /// What holds for all tiles of one column group.
@@ -34,14 +42,17 @@ struct GroupView {
   bool conical;  // cones about the array: u = y / r, t = z / x; else flat beams: u = y / h, t = z / h, h^2 = x^2 + y^2
   float first_edge_sine, columns_per_sine;  // column = (first_edge_sine - u) * columns_per_sine
   int first_column, last_column;            // half-open
-  float first_tangent, bins_per_tangent;    // depth map axis t
+  TangentAxis axis;                         // of the depth map, t
   int bins;                                 // values per column of the depth map; the map has bins + 1
-  const float* inverse_depth;               // [last - first][bins + 1], 1 / x (or 1 / h) of what the rays saw, 0 = nothing
+  int map_first_column, map_last_column;    // half-open; of the depth map, which reaches farther where the sonar moves
+  const float* inverse_depth;               // DepthMap::inverse_x
+  const float* depth_slope;                 // DepthMap::per_column
   float depth_tolerance_m;
   float turns_per_m;                                              // 2 f / c
   float decay_per_m;                                              // 2 alpha [Np/m]
   float samples_per_m, sample_offset, first_sample, last_sample;  // range window: s = r * samples_per_m - sample_offset
   float elevation[elevation_terms];                               // two-way pattern, polynomial in w
+  float elevation_aperture;                                       // [wavelengths]
   bool expected_power;
 };
 

@@ -17,6 +17,11 @@ inline __m512 native(Lanes v) { return reinterpret_cast<__m512>(v); }
 inline LaneMask below(Lanes a, Lanes b) { return _mm512_cmp_ps_mask(native(a), native(b), _CMP_LT_OQ); }
 inline LaneMask not_below(Lanes a, Lanes b) { return _mm512_cmp_ps_mask(native(a), native(b), _CMP_GE_OQ); }
 inline LaneMask both(LaneMask a, LaneMask b) { return static_cast<LaneMask>(a & b); }
+inline LaneMask less(LaneMask a, LaneMask b) { return static_cast<LaneMask>(a & ~b); }
+inline LaneMask bits_differ(Lanes v, std::int32_t bits, std::int32_t among) {
+  const __m512i x = _mm512_xor_si512(_mm512_castps_si512(native(v)), _mm512_set1_epi32(bits));
+  return _mm512_test_epi32_mask(x, _mm512_set1_epi32(among));
+}
 inline bool any(LaneMask m) { return m != 0; }
 inline Lanes choose(LaneMask m, Lanes a, Lanes b) { return Lanes(_mm512_mask_blend_ps(m, native(b), native(a))); }
 inline Lanes larger(Lanes a, Lanes b) { return Lanes(_mm512_max_ps(native(a), native(b))); }
@@ -28,10 +33,12 @@ inline Lanes as_floats(LaneNumbers n) { return Lanes(_mm512_cvtepi32_ps(reinterp
 inline Lanes counts(const std::int16_t* at) {
   return Lanes(_mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(at)))));
 }
+inline Lanes gather(const float* table, LaneNumbers at) {
+  return Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table, 4));
+}
 /// table[at] and table[at + 1].
 inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
-  first = Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table, 4));
-  second = Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table + 1, 4));
+  first = gather(table, at), second = gather(table + 1, at);
 }
 inline Lanes reciprocal(Lanes x) {
   // Newton: g + g (1 - x g).
@@ -67,6 +74,10 @@ using LaneMask = LaneNumbers;
 inline LaneMask below(Lanes a, Lanes b) { return a < b; }
 inline LaneMask not_below(Lanes a, Lanes b) { return a >= b; }
 inline LaneMask both(LaneMask a, LaneMask b) { return a & b; }
+inline LaneMask less(LaneMask a, LaneMask b) { return a & ~b; }
+inline LaneMask bits_differ(Lanes v, std::int32_t bits, std::int32_t among) {
+  return ((reinterpret_cast<LaneNumbers>(v) ^ bits) & among) != 0;
+}
 inline Lanes choose(LaneMask m, Lanes a, Lanes b) { return m ? a : b; }
 inline Lanes larger(Lanes a, Lanes b) { return a > b ? a : b; }
 inline Lanes smaller(Lanes a, Lanes b) { return a < b ? a : b; }
@@ -86,6 +97,9 @@ inline Lanes nearest_whole(Lanes v) { return Lanes(_mm256_round_ps(native(v), _M
 inline Lanes square_root(Lanes x) { return Lanes(_mm256_sqrt_ps(native(x))); }
 inline Lanes counts(const std::int16_t* at) {
   return Lanes(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at)))));
+}
+inline Lanes gather(const float* table, LaneNumbers at) {
+  return Lanes(_mm256_i32gather_ps(table, reinterpret_cast<__m256i>(at), 4));
 }
 /// table[at] and table[at + 1]: eight loads of both take half as long as two gathers.
 inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
@@ -135,6 +149,11 @@ inline Lanes square_root(Lanes x) {
 inline Lanes counts(const std::int16_t* at) {
   Lanes v;
   for (int l = 0; l < lanes; ++l) v[l] = static_cast<float>(at[l]);
+  return v;
+}
+inline Lanes gather(const float* table, LaneNumbers at) {
+  Lanes v;
+  for (int l = 0; l < lanes; ++l) v[l] = table[at[l]];
   return v;
 }
 /// table[at] and table[at + 1].

@@ -134,7 +134,8 @@ double widest_direction_rad(const PingPlan& plan) {
   // Bearings are measured at reception, (29): a turning sonar reaches farther, by this much at most [rad].
   constexpr double while_turning_rad = 0.05;
   const double sine = std::min(1.0, plan.columns.first_sine + plan.columns.spacing);
-  return std::acos(std::sqrt(1 - sine * sine) * std::cos(std::min(plan.widest_about_axis_rad(), pi / 2))) + while_turning_rad;
+  return std::acos(std::sqrt(1 - sine * sine) * std::cos(std::min(plan.widest_about_axis_rad(plan.fan.reach_rad), pi / 2))) +
+         while_turning_rad;
 }
 
 }  // namespace

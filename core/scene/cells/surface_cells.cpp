@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cassert>
+#include <cmath>
 #include <map>
 #include <tuple>
 
@@ -32,6 +33,7 @@ class SurfaceCells::SurfacePatch {
  public:
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
+  int coarsest = 0;  // level that gives the object its fewest cells, where asked for
   std::shared_ptr<const Mesh> mesh;
   std::vector<std::unique_ptr<Node>> roots;
 
@@ -45,6 +47,7 @@ class SurfaceCells::SurfacePatch {
 namespace {
 
 constexpr int most_roots_along_an_axis = 16;
+constexpr double fewest_cells = 3000;  // of an object, with CellView::exact_small
 
 struct Cube {
   double u, v, w, half;
@@ -167,6 +170,11 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
   }
   for (std::size_t o = 0; o < scene_->objects.size(); ++o) {
     const Object& object = scene_->objects[o];
+    // Objects often share a mesh.
+    const auto alike = std::find_if(scene_->objects.begin(), scene_->objects.begin() + static_cast<std::ptrdiff_t>(o),
+                                    [&](const Object& other) { return other.mesh == object.mesh; });
+    const auto same = static_cast<std::size_t>(alike - scene_->objects.begin());
+    skins_.push_back(same < o ? skins_[same] : skin_of(*object.mesh));
     if (!object.visible) continue;
     std::map<std::tuple<int, int, bool>, std::vector<std::uint32_t>> sorted;  // material, axis, side
     for (std::uint32_t t = 0; t < object.mesh->triangles.size(); ++t) {
@@ -180,6 +188,7 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
       auto patch = std::make_unique<SurfacePatch>();
       patch->object = static_cast<int>(o);
       std::tie(patch->material, patch->axis, patch->negative_side) = key;
+      patch->coarsest = static_cast<int>(std::ceil(-0.5 * std::log2(skins_[o].area_m2 / fewest_cells)));
       patch->mesh = object.mesh;
       patch->plant(triangles);
       for (auto& root : patch->roots) roots_.push_back({patch.get(), root.get()});
@@ -210,21 +219,32 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
     if (!span) return;
     seen = *span;
   } else {
-    if (std::abs(p.z) * look.fan_cosine - p.x * look.fan_sine > radius) return;
+    if (look.fan.outside(p) > radius) return;
     if (std::abs(p.y) - radius > view.max_sine * (range + radius)) return;
   }
   if (seen.farthest_m < static_cast<double>(view.min_range_m)) return;
 
   node.last_visited.store(look.number, std::memory_order_relaxed);
-  bool finer = node.address.level < view.levels.front().level;
+  const auto level_of = [&](const CellLevel& l) { return view.exact_small ? std::max(l.level, patch.coarsest) : l.level; };
+  const bool has_sides = !view.seen_between && view.side_from_rad < view.max_elevation_rad;
+  const bool in_main = !has_sides || look.main.outside(p) <= radius;
+  const bool in_side = has_sides && look.before_side.outside(p) >= -radius;
+  const int coarsest_wanted = level_of(view.levels.front());
+  bool finer =
+      (in_main && node.address.level < coarsest_wanted) || (in_side && node.address.level < coarsest_wanted - view.side_coarser);
   for (const CellLevel& level : view.levels) {
     const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
     if (!overlaps) continue;
-    if (level.level == node.address.level) {
-      if (!node.built) found.missing.push_back(&node);
-      if (!node.built || node.tile.count > 0) found.in_view.push_back({&node.tile, &level, q, p, patch.object});
-    } else if (level.level > node.address.level) {
-      finer = true;
+    for (const bool side : {false, true}) {
+      if (!(side ? in_side : in_main)) continue;
+      const int wanted = level_of(level) - (side ? view.side_coarser : 0);
+      if (wanted == node.address.level) {
+        // Once, also when one level's main fan and another's side lobes both want it.
+        if (!node.built && (found.missing.empty() || found.missing.back() != &node)) found.missing.push_back(&node);
+        if (!node.built || node.tile.count > 0) found.in_view.push_back({&node.tile, &level, q, p, patch.object, side});
+      } else if (wanted > node.address.level) {
+        finer = true;
+      }
     }
   }
   if (!finer) return;
@@ -247,8 +267,12 @@ void SurfaceCells::prepare(const CellView& view, std::uint64_t number, Look& loo
   const std::size_t objects = scene_->objects.size();
   look.view = &view;
   look.number = number;
-  look.fan_cosine = std::cos(static_cast<double>(view.max_elevation_rad));
-  look.fan_sine = std::sin(static_cast<double>(view.max_elevation_rad));
+  const auto wedge = [](float angle) {
+    return Look::Wedge{std::cos(static_cast<double>(angle)), std::sin(static_cast<double>(angle))};
+  };
+  look.fan = wedge(view.max_elevation_rad);
+  look.main = wedge(view.main_elevation_rad);
+  look.before_side = wedge(view.side_from_rad);
   look.rotations.resize(objects);
   look.sonar_in_object.resize(objects);
   for (std::size_t o = 0; o < objects; ++o) {

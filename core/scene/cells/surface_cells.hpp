@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -16,6 +17,7 @@
 #include "core/base/geometry.hpp"
 #include "core/base/parallel.hpp"
 #include "core/base/units.hpp"
+#include "core/scene/closed_mesh.hpp"
 #include "core/scene/scene.hpp"
 
 namespace sonar {
@@ -63,6 +65,10 @@ struct CellView {
   float max_sine = 1;             // |y / r| of the outermost column
   float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first
+  // Fans with side lobes: the main part, about the array axis, and where the rest begins, whose cells are so many levels coarser.
+  float main_elevation_rad = 2, side_from_rad = 2;
+  int side_coarser = 0;
+  bool exact_small = false;  // objects of few cells get finer ones: where no speckle hides which place each has
   /// When set, stands for the bounds of the fan: between which distances a ball about a place in the sonar's axes is seen, which
   /// mirrors can make farther than it is; nothing when it is not.
   std::function<std::optional<DistanceSpan>(Vec3d from_sonar_m, double radius_m)> seen_between;
@@ -75,6 +81,7 @@ struct TileInView {
   Vec3d from_sonar_object_m;  // tile centre minus sonar, object axes
   Vec3d from_sonar_m;         // the same in the sonar's axes
   int object = 0;
+  bool in_side_lobes = false;  // for its cells there; those of the fan's main part are another tile's
 };
 
 /// What a view shows. Valid until the next call of in_view() or in_views().
@@ -105,6 +112,8 @@ class SurfaceCells {
   /// Rotation from object to sonar axes of the last view of in_view(), per object.
   const Rotation& sonar_from_object(int object) const { return looked_.rotations[static_cast<std::size_t>(object)]; }
   std::span<const Rotation> sonar_from_objects() const { return looked_.rotations; }
+  /// Of every object's mesh.
+  std::span<const Skin> skins() const { return skins_; }
   /// Views so far.
   std::uint64_t views() const { return now_; }
   /// From now on nothing is forgotten of that view and later ones: others may be asked for while its tiles are in use. 0 = of
@@ -129,8 +138,13 @@ class SurfaceCells {
   struct Look {  // a view as the cubes are compared with it
     const CellView* view = nullptr;
     std::uint64_t number = 0;
-    double fan_cosine = 1, fan_sine = 0;  // of its half angle
-    std::vector<Pose> sonar_in_object;    // per object
+    struct Wedge {  // |angle about the array axis| below a half angle
+      double cosine = 0, sine = 1;
+      /// How far a place is outside of it; where it is inside, minus how far it is to its edge.
+      double outside(Vec3d p) const { return std::abs(p.z) * cosine - p.x * sine; }
+    };
+    Wedge fan, main, before_side;
+    std::vector<Pose> sonar_in_object;  // per object
     std::vector<Rotation> rotations;
   };
   void prepare(const CellView& view, std::uint64_t number, Look& look) const;
@@ -143,6 +157,7 @@ class SurfaceCells {
   std::shared_ptr<const Scene> scene_;
   Seed seed_{};
   bool textured_ = true, has_texture_ = false;
+  std::vector<Skin> skins_;                                    // per object
   std::vector<std::unique_ptr<const TextureField>> textures_;  // per material, null = none
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing

@@ -20,6 +20,31 @@ double bearing_deg(const Sounding& s, double range_m) {
   return deg_from_rad(std::asin(s.beam_sine(beam) + peak.offset * step));
 }
 
+/// Mean azimuth of all power from a little before a range on, degrees.
+double centroid_deg(const Sounding& s, double range_m) {
+  double sum = 0, turned = 0;
+  for (int row = static_cast<int>(s.row_of_range(range_m - 0.1)); row < s.row_of_range(range_m + 0.3); ++row)
+    for (int j = 0; j < s.beams(); ++j) sum += s.power(row, j), turned += s.power(row, j) * std::asin(s.beam_sine(j));
+  return deg_from_rad(turned / sum);
+}
+
+/// Upright, round and closed, about the origin.
+Mesh pole(double radius_m, double half_height_m) {
+  constexpr std::uint32_t sides = 64;
+  Mesh mesh;
+  for (std::uint32_t i = 0; i < sides; ++i)
+    for (const double z : {-half_height_m, half_height_m}) {
+      const double a = 2 * pi * i / sides;
+      mesh.vertices.push_back(to_float({radius_m * std::cos(a), radius_m * std::sin(a), z}));
+    }
+  for (std::uint32_t i = 0; i < 2 * sides; i += 2) {
+    const std::uint32_t n = (i + 2) % (2 * sides);
+    mesh.triangles.insert(mesh.triangles.end(), {{i, n, n + 1}, {i, n + 1, i + 1}});
+    if (i > 0 && n > 0) mesh.triangles.insert(mesh.triangles.end(), {{n, i, 0}, {i + 1, n + 1, 1}});
+  }
+  return mesh;
+}
+
 /// Two upright poles 2 cm thick on boresight at 2 and 10 m, the far one looking out above the near one.
 std::shared_ptr<const Scene> two_poles() {
   SceneMaker maker;
@@ -53,6 +78,26 @@ TEST(Motion, O40APoleFartherAwayIsTurnedFartherByAYaw) {
     record_oracle(40, points ? "yaw during the ping, points at 2 and 10 m" : "yaw during the ping, poles at 2 and 10 m", expected,
                   bearing_deg(s, 2) - bearing_deg(s, 10), 0.1 * expected, "deg");
     EXPECT_NEAR(bearing_deg(s, 10), -yaw_rate_deg_per_s * 2 * 10 / 1500, 0.1 * expected);
+  }
+}
+
+// What hides what is looked up where the rays saw it, not where the echo is received.
+TEST(Motion, O40TurnsShowNoFarSides) {
+  constexpr double near_m = 2, far_m = 10;
+  for (const double deg_per_s : {-40.0, 40.0, 60.0, 120.0}) {
+    for (const double radius : {0.01, 0.025, 0.05, 0.1, 0.2}) {
+      SceneMaker maker;
+      maker.add(pole(radius, 0.1), -10, {near_m + radius, 0, -0.15});
+      maker.add(pole(radius, 0.3), -10, {far_m + radius, 0, 0.35});
+      Sounding s = looking_at(maker.make());
+      s.request.switches.expected_power = true;
+      s.request.sonar_moves = {{}, {0, 0, rad_from_deg(deg_per_s)}};
+      s.ping();
+      const double expected = deg_per_s * 2 * (far_m - near_m) / 1500;
+      record_oracle(40, "poles of 2 to 40 cm, yaw of 40 to 120 degrees/s", expected,
+                    centroid_deg(s, near_m) - centroid_deg(s, far_m),
+                    std::abs(deg_per_s) > 100 ? 0.05 : 0.05 * std::abs(expected), "deg");
+    }
   }
 }
 

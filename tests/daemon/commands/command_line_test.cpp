@@ -78,7 +78,7 @@ TEST(CommandLine, EveryNamedPartIsSwitchedByItsNameAndNothingElse) {
       const std::string file = std::string("{") + part.name + (on ? ": off}" : ": on}");
       Switches expected;
       expected.*part.is_on = on;
-      EXPECT_EQ(overridden({"run", "x.yaml", std::string("--") + part.name, on ? "on" : "off"}, file).engine.switches, expected);
+      EXPECT_EQ(overridden({"run", "x.yaml", option_of(part), on ? "on" : "off"}, file).engine.switches, expected);
     }
 }
 
@@ -123,7 +123,7 @@ TEST(CommandLine, TheModeReachesTheEngine) {
 
 TEST(CommandLine, PartsThatTheModeLeavesOutAreNotSwitchedOn) {
   for (const NamedSwitch& part : named_switches) {
-    const std::string option = std::string("--") + part.name;
+    const std::string option = option_of(part);
     EXPECT_THROW(overridden({"--mode", "paper", option, "on"}), std::runtime_error) << option;
     EXPECT_THROW(overridden({option, "on"}, "{mode: raster}"), std::runtime_error) << option;
     EXPECT_NO_THROW(overridden({"--mode", "paper", option, "off"})) << option;

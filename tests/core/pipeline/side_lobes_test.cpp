@@ -1,0 +1,85 @@
+// The elevation pattern's side lobes: points, beds and walls far off the main lobe, as loud as the closed forms say.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "core/pipeline/arithmetic/scattering.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+#include "tests/oracles/record.hpp"
+
+namespace sonar::test {
+namespace {
+
+double db(double power_ratio) { return 10 * std::log10(power_ratio); }
+
+/// sinc^2 of transmitter and receiver with an aperture that puts half of the two-way power at half the quoted width, in dB.
+double two_way_db(const FrequencyMode& mode, double psi_rad) {
+  // sinc(x) = 2^(-1/4) at x = 0.3189.
+  const double x = 0.31888 * std::sin(psi_rad) / std::sin(static_cast<double>(mode.pattern.elevation_width_rad) / 2);
+  return 40 * std::log10(std::abs(std::sin(pi * x) / (pi * x)));
+}
+
+TEST(SideLobes, PointsAreHeardAllAround) {
+  for (const FrequencyMode& mode : {p900(), oculus_high()}) {
+    double loudest = 0;
+    for (const double deg : {0.01, 10.0, 14.0, 20.0, 25.0, 35.0, 50.0, -20.0, -50.0, 75.0, -78.0}) {
+      const double psi = rad_from_deg(deg);
+      if (two_way_db(mode, psi) < -60) continue;  // about a zero of the pattern
+      Sounding s(SceneMaker().add_point({5 * std::cos(psi), 0, 5 * std::sin(psi)}, 0).make(), mode, native_rows(6, 0.0254));
+      s.request.switches.side_lobes = true;
+      s.ping();
+      double peak = 0;
+      for (int j = 0; j < s.beams(); ++j) peak = std::max(peak, s.power(static_cast<int>(std::lround(s.row_of_range(5))), j));
+      if (loudest == 0) loudest = peak;
+      record_oracle(no_number, "point in a side lobe, two-way pattern", two_way_db(mode, psi), db(peak / loudest), 0.1, "dB");
+    }
+  }
+}
+
+/// Of a bed 2 m below, looked at with the nose down: the mean over beams about the middle, over blocks of rows, re the closed
+/// form.
+void expect_bed(const FrequencyMode& mode, bool side_lobes, bool speckle) {
+  constexpr double height = 2, tilt = 0.1, lambert_db = -20;
+  Sounding s(SceneMaker().add(height_field(-1, 14, -12, 12, 1, [](double, double) { return 0.0; }), lambert_db).make(), mode,
+             native_rows(12, 0.0254));
+  s.request.switches.expected_power = !speckle;
+  s.request.switches.side_lobes = side_lobes;
+  s.ping_from({0, 0, height}, {0, tilt, 0});
+  const reference::SeabedLevel bed(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, tilt);
+  int lobes = 0;
+  double sum = 0;
+  for (double r = 2.15; r < 11; r += 0.1) {
+    const double psi = bed.psi_rad(r), level = two_way_db(mode, psi);
+    // Away from the zeros, where the pattern changes within a pulse, and from 80 degrees on.
+    const double near = two_way_db(mode, bed.psi_rad(r - 0.05)), far = two_way_db(mode, bed.psi_rad(r + 0.05));
+    if (level < -45 || std::abs(near - far) > 3 || psi < -1.3) continue;
+    double ratio = 0;
+    int n = 0;
+    for (int row = static_cast<int>(s.row_of_range(r - 0.03)); row <= s.row_of_range(r + 0.03); ++row)
+      for (int j = 200; j < 312; ++j, ++n) ratio += s.power(row, j) / power_from_db(bed.db(s.range_of_row(row), s.beam_sine(j)));
+    if (!side_lobes) {
+      if (level < -22) {
+        EXPECT_LT(db(ratio / n + 1e-30), -20) << r;
+      }
+      continue;
+    }
+    if (level < -20) sum += ratio / n, ++lobes;
+    if (!speckle) record_oracle(8, "bed in the side lobes, expected power", 0, db(ratio / n), 0.5, "dB");
+  }
+  // Each block has some forty independent looks.
+  if (speckle) record_oracle(8, "bed in the side lobes, speckle, mean of all ranges", 0, db(sum / lobes), 0.5, "dB");
+  if (side_lobes) {
+    EXPECT_GT(lobes, 5) << mode.name;
+  }
+}
+
+TEST(SideLobes, ABedIsAsLoudAsTheClosedFormDownTo45Db) {
+  for (const FrequencyMode& mode : {p900(), oculus_high()}) expect_bed(mode, true, false);
+}
+TEST(SideLobes, CoarserCellsKeepItsLevel) { expect_bed(p900(), true, true); }
+TEST(SideLobes, SwitchedOffNothingIsHeardThere) { expect_bed(p900(), false, false); }
+
+}  // namespace
+}  // namespace sonar::test
