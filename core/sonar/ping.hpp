@@ -50,6 +50,10 @@ struct Switches {
   bool crosstalk = true;
   bool leak = true;
   bool interference = true;
+  bool grain = true;
+  bool bandwidth = true;
+  bool uneven = true;
+  bool defocus = true;
 
   bool operator==(const Switches&) const = default;
 };
@@ -60,7 +64,7 @@ struct NamedSwitch {
   bool Switches::*is_on;
   const char* meaning;
 };
-inline constexpr std::array<NamedSwitch, 11> named_switches{{
+inline constexpr std::array<NamedSwitch, 15> named_switches{{
     {"noise", &Switches::noise, "receiver noise"},
     {"specular", &Switches::specular, "specular echoes of smooth surfaces"},
     {"texture", &Switches::texture, "patchiness of materials that have a texture"},
@@ -72,6 +76,10 @@ inline constexpr std::array<NamedSwitch, 11> named_switches{{
     {"crosstalk", &Switches::crosstalk, "leakage between receive channels"},
     {"leak", &Switches::leak, "the transmitter heard directly in the first rows"},
     {"interference", &Switches::interference, "pulses of other sonars nearby"},
+    {"grain", &Switches::grain, "sparse strong scatterers of materials that have a grain"},
+    {"bandwidth", &Switches::bandwidth, "noise of the receiver's own bandwidth; off: of the pulse's"},
+    {"uneven", &Switches::uneven, "noise and width that differ from beam to beam"},
+    {"defocus", &Switches::defocus, "blur of near echoes off broadside"},
 }};
 
 /// How the sonar moves while a ping is under way.
