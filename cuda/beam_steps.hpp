@@ -111,6 +111,31 @@ SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
   }
 }
 
+/// Sample `i` of [beams][samples]: from the beams into `mixed`.
+SONAR_HD inline void refocus(const PingView& p, std::uint32_t i) {
+  const auto j = static_cast<std::int32_t>(i / static_cast<std::uint32_t>(p.samples));
+  const auto n = static_cast<std::int32_t>(i % static_cast<std::uint32_t>(p.samples));
+  const float* from = p.beam_signals + 2 * static_cast<std::int64_t>(i);
+  MixedSample s{from[0], from[1]};
+  if (p.mix.turn_m != nullptr)
+    if (const std::int32_t set = focus_set(p.mix, j, n); set > 0)
+      s = refocused(p.mix, p.beam_signals, 2 * static_cast<std::int64_t>(p.samples), j, n, set);
+  float* to = p.mixed + 2 * static_cast<std::int64_t>(i);
+  to[0] = s.re;
+  to[1] = s.im;
+}
+/// And back.
+SONAR_HD inline void blend(const PingView& p, std::uint32_t i) {
+  const auto j = static_cast<std::int32_t>(i / static_cast<std::uint32_t>(p.samples));
+  const auto n = static_cast<std::int32_t>(i % static_cast<std::uint32_t>(p.samples));
+  const float* from = p.mixed + 2 * static_cast<std::int64_t>(i);
+  MixedSample s{from[0], from[1]};
+  if (p.mix.own != nullptr) s = blended(p.mix, p.mixed, 2 * static_cast<std::int64_t>(p.samples), j, n);
+  float* to = p.beam_signals + 2 * static_cast<std::int64_t>(i);
+  to[0] = s.re;
+  to[1] = s.im;
+}
+
 /// Sample `n`: the sum over all beams.
 SONAR_HD inline void crosstalk_sum(const PingView& p, std::uint32_t n) {
   float re = 0, im = 0;

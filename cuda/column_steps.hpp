@@ -68,7 +68,7 @@ SONAR_HD inline void volume(const PingView& p, std::uint32_t k) {
       continue;
     }
     Complex grain;
-    add_noise(p.noise_table, place, static_cast<std::uint32_t>(n), 1, grain);
+    add_noise(p.grain_table, place, static_cast<std::uint32_t>(n), 1, grain);
     const auto rms = static_cast<float>(std::sqrt(power));
     signal[2 * n] += rms * grain.re;
     signal[2 * n + 1] += rms * grain.im;
@@ -90,10 +90,14 @@ SONAR_HD inline void finish_columns(const PingView& p, std::uint32_t i) {
   }
   const NoiseKey& key = p.noise_key;
   if (p.has_noise != 0) {
+    float rms = p.noise_rms;
+    if (p.noise_far != nullptr)
+      rms *= std::sqrt(p.noise_far[k] +
+                       (static_cast<std::int64_t>(n) < p.noise_decays ? p.noise_near_less_far[k] * p.noise_decay[n] : 0.0f));
     if (power)
-      s.re += p.noise_rms * p.noise_rms;
+      s.re += rms * rms;
     else
-      add_noise(p.noise_table, place_of(key, key.sonar, key.ping, k), n, p.noise_rms, s);
+      add_noise(p.noise_table, place_of(key, key.sonar, key.ping, k), n, rms, s);
   }
   if (static_cast<std::int32_t>(n) < p.leak_samples) {
     const float rms = p.leak_rms[n];
@@ -101,8 +105,8 @@ SONAR_HD inline void finish_columns(const PingView& p, std::uint32_t i) {
       s.re += rms * rms;
     } else {
       Complex grain;
-      add_noise(p.noise_table, place_of(key, leak_sonar(key.sonar), every_ping, k), n, p.leak_steady, grain);
-      add_noise(p.noise_table, place_of(key, leak_sonar(key.sonar), key.ping, k), n, p.leak_changing, grain);
+      add_noise(p.grain_table, place_of(key, leak_sonar(key.sonar), every_ping, k), n, p.leak_steady, grain);
+      add_noise(p.grain_table, place_of(key, leak_sonar(key.sonar), key.ping, k), n, p.leak_changing, grain);
       s.re += rms * grain.re;
       s.im += rms * grain.im;
     }

@@ -229,7 +229,7 @@ class DeviceEngine final : public PingEngine {
     for (std::size_t i = first + 1; i < wanted_.size() && some.size() < most; ++i) {
       const PingRequest& request = wanted_[i].request;
       if (wanted_[i].state != State::open || !why_by_cpu(request).empty()) break;
-      if (!cells_->serves(request.seed, request.switches.texture)) break;
+      if (!cells_->serves(request.seed, fields_of(request))) break;
       AskedPing next{&wanted_[i], plan_for(request)};
       if (!std::all_of(some.begin(), some.end(), [&](const AskedPing& a) { return PingPreparer::may_go_together(a, next); }))
         break;
@@ -245,11 +245,12 @@ class DeviceEngine final : public PingEngine {
     const std::string missing = without.empty() ? "" : machine_->why_no_transforms();  // not asked about without need
     return missing.empty() ? "" : without + " are computed by the CPU (" + missing + ")";
   }
+  static CellFields fields_of(const PingRequest& request) { return {request.switches.texture, request.switches.grain}; }
   /// What device and CPU share: the scene as this request finds it.
   void place(const PingRequest& request) {
-    if (!cells_ || !cells_->serves(request.seed, request.switches.texture))
+    if (!cells_ || !cells_->serves(request.seed, fields_of(request)))
       // Weights of cells are drawn from the seed: another seed needs other tiles.
-      cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, request.switches.texture);
+      cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, fields_of(request));
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
   }

@@ -7,6 +7,7 @@
 #include "core/base/geometry.hpp"
 #include "core/base/host_device.hpp"
 #include "core/base/random.hpp"
+#include "core/pipeline/arithmetic/beam_mix.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/kernel_math.hpp"
 
@@ -156,6 +157,7 @@ struct PingView {
   const ReceivePattern* beam_patterns;  // [beams]
   const double* column_u;               // [columns], in double
   const float* noise_table;             // complex, table_samples of them
+  const float* grain_table;             // the same of leak and volume, with the pulse's correlation
   std::int32_t taps, pulse_steps, samples, per_row, rows, beams;
   SpectralView spectral;  // grids and folded are the ping's own
   // surfaces
@@ -184,6 +186,8 @@ struct PingView {
   double open_fan, volume_samples_per_m, volume_sample_offset;
   const float* leak_rms;  // [leak_samples]
   std::int32_t slice_count, leak_samples, has_noise, unused;
+  const float *noise_far, *noise_near_less_far, *noise_decay;  // NoiseProfile, null = even
+  std::int64_t noise_decays;                                   // samples
   float noise_rms, leak_steady, leak_changing, crosstalk_own, crosstalk_leaked;
   NoiseKey noise_key;
   // beams
@@ -192,6 +196,8 @@ struct PingView {
   const PulseInBeams* pulses;  // [pulse_count], of other sonars
   double* point_weights;       // [point_count + pulse_count][beams]
   float* crosstalk;            // complex [samples], null = none
+  float* mixed;                // complex [beams][samples], null = beams keep to themselves
+  BeamMixView mix;
   std::int32_t point_count, pulse_count;
   // samples
   const float* row_power_factor;                // [rows]
@@ -224,6 +230,8 @@ enum class Step : std::int32_t {
   finish_columns,
   point_weights,
   form_beams,
+  refocus,
+  blend,
   crosstalk_sum,
   crosstalk_add,
   receive,

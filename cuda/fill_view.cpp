@@ -108,6 +108,8 @@ void PingPreparer::add_receiver(Making& m) {
     view.crosstalk_leaked = mix.leaked;
     view.crosstalk = m.room.work.allocate<float>(2 * m.samples()).device;
   }
+  if (m.plan.beam_mix.blurs() || m.plan.beam_mix.blends())
+    view.mixed = m.room.work.allocate<float>(2 * m.samples() * m.beams()).device;
   // (36), (37): gain TVG / full scale, squared, since the receiver works on powers.
   view.row_power_factor = m.room.tables.put(m.plan.row_power_factor);
   // Complex: columns before beamforming, beams after it [uPa].

@@ -55,6 +55,18 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.at_full_scale = static_cast<float>(line.at_full_scale);
   view_.logarithmic = p.settings.format.scale == SampleFormat::Scale::logarithmic ? 1 : 0;
   view_.bytes_a_sample = p.settings.format.bits / 8;
+  if (!p.noise_profile.is_even()) {
+    view_.noise_far = memory_.put(p.noise_profile.far);
+    view_.noise_near_less_far = memory_.put(p.noise_profile.near_less_far);
+    view_.noise_decay = memory_.put(p.noise_profile.decay);
+    view_.noise_decays = static_cast<std::int64_t>(p.noise_profile.decay.size());
+  }
+  view_.mix = p.beam_mix.view();
+  if (p.beam_mix.blurs()) view_.mix.turn_m = memory_.put(p.beam_mix.turn_m());
+  view_.mix.taps = memory_.put(p.beam_mix.taps());
+  view_.mix.reach = memory_.put(p.beam_mix.reach());
+  if (p.beam_mix.blends()) view_.mix.own = memory_.put(p.beam_mix.own());
+  view_.mix.share = memory_.put(p.beam_mix.share());
   // Pulses without a table of rows, (25).
   if (p.spectral) add_spectrum(*p.spectral);
   memory_.upload(lane);
@@ -82,10 +94,14 @@ bool PlanTables::serves(const PingRequest& request) const {
 }
 
 void PlanTables::need_noise(int lane) {
-  // The table is made for the first ping that needs it, and stays on the device with the plan.
+  // The tables are made for the first ping that needs them, and stay on the device with the plan.
   if (view_.noise_table) return;
   noise_.prepare(seed_, plan_.noise_filter);
-  view_.noise_table = noise_memory_.put(noise_.shaped());
+  view_.noise_table = view_.grain_table = noise_memory_.put(noise_.shaped());
+  if (plan_.pulse_filter != plan_.noise_filter) {
+    grains_.prepare(seed_, plan_.pulse_filter);
+    view_.grain_table = noise_memory_.put(grains_.shaped());
+  }
   noise_memory_.upload(lane);
 }
 

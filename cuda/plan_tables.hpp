@@ -19,7 +19,7 @@ class PlanTables {
   bool serves(const PingRequest& request) const;
   PingPlan& plan() { return plan_; }
   const PingPlan& plan() const { return plan_; }
-  /// Noise of any kind: drawn when a ping first needs it. Queues the table on `lane`.
+  /// Noise, or what has the pulse's correlation: drawn when a ping first needs it. Queues the tables on `lane`.
   void need_noise(int lane);
   /// The part of a ping's view that is the plan's.
   void fill(PingView& view) const;
@@ -30,7 +30,7 @@ class PlanTables {
   std::shared_ptr<const SonarModel> model_;
   Seed seed_;
   PingPlan plan_;
-  NoiseTable noise_;
+  NoiseTable noise_, grains_;
   Arena memory_, noise_memory_;
   PingView view_{};
 };

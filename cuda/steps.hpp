@@ -54,6 +54,9 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
       return static_cast<std::uint32_t>(p.point_count + p.pulse_count) * beams;
     case Step::form_beams:
       return (beams + panels_at_once * beams_a_panel - 1) / (panels_at_once * beams_a_panel) * samples;
+    case Step::refocus:
+    case Step::blend:
+      return p.mixed != nullptr ? beams * samples : 0;
     case Step::crosstalk_sum:
       return p.crosstalk != nullptr ? samples : 0;
     case Step::crosstalk_add:
@@ -87,6 +90,8 @@ SONAR_HD inline void run_step(const PingView& p, std::uint32_t i) {
   if constexpr (step == Step::finish_columns) finish_columns(p, i);
   if constexpr (step == Step::point_weights) point_weights(p, i);
   if constexpr (step == Step::form_beams) form_beams(p, i);
+  if constexpr (step == Step::refocus) refocus(p, i);
+  if constexpr (step == Step::blend) blend(p, i);
   if constexpr (step == Step::crosstalk_sum) crosstalk_sum(p, i);
   if constexpr (step == Step::crosstalk_add) crosstalk_add(p, i);
   if constexpr (step == Step::receive) receive(p, i);

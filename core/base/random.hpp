@@ -42,6 +42,7 @@ enum class Domain : std::uint32_t {
   cells = 0,                // speckle and places of surface cells; the counter's last word is the level
   cell_blocks = 0x6e6574u,  // places within blocks of cells: in the key's low word
   texture = 0x74657874u,    // combined with the object's index
+  grain = 0x67726169u,      // the same
   noise_table = 0x6e6f6973u,
   noise_place = 0x706c6163u,
   leak = 0x6c65616bu,           // in the sonar's number, of noise_place

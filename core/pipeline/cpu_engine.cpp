@@ -48,8 +48,9 @@ class CpuEngine final : public PingEngine, private Interruption {
 
  private:
   Ping run(const PingRequest& request) {
-    if (!cells_ || !cells_->serves(request.seed, request.switches.texture))
-      cells_ = std::make_shared<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, request.switches.texture);
+    const CellFields fields{request.switches.texture, request.switches.grain};
+    if (!cells_ || !cells_->serves(request.seed, fields))
+      cells_ = std::make_shared<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, fields);
     place_bodies(request);
     if (under_way_.request != nullptr) return simulate(rays_, *cells_, request, kernels_, work_[1], pool_);
     under_way_ = {&request, cells_, 0};

@@ -25,14 +25,22 @@ double rise(double x) { return 0.5 * (1 + std::erf(x)); }
 
 }  // namespace
 
-/// docs/acoustics.md, eq. 31: rms(r) = leak_upa 10^(-decay r / 20) at a beam's output; per column over sqrt(sum_k W_jk^2), as for
-/// the noise.
+/// docs/acoustics.md, eq. 31: rms(r) = leak_upa 10^(-decay r / 20), or by a table, at a beam's output; per column over sqrt(sum_k
+/// W_jk^2), as for the noise.
 Leak::Leak(const PingPlan& plan, const Switches& switches) {
   const ReceiverModel& law = plan.mode.receiver;
   if (!switches.leak || !(law.leak_upa > 0)) return;
   const double per_column = static_cast<double>(law.leak_upa) / std::sqrt(plan.beam_weights.weight_energy);
   for (int n = 0; n < plan.samples; ++n) {
-    const double down_db = static_cast<double>(law.leak_decay_db_per_m) * (n + plan.sample_offset) * plan.sample_spacing_m;
+    const double range_m = (n + plan.sample_offset) * plan.sample_spacing_m;
+    double down_db = static_cast<double>(law.leak_decay_db_per_m) * range_m;
+    if (!law.leak_ring_db.empty()) {
+      const double at = range_m / static_cast<double>(law.leak_ring_step_m);
+      const auto i = static_cast<std::size_t>(at);
+      if (i + 1 >= law.leak_ring_db.size()) break;
+      down_db = -std::lerp(static_cast<double>(law.leak_ring_db[i]), static_cast<double>(law.leak_ring_db[i + 1]),
+                           at - static_cast<double>(i));
+    }
     if (down_db > forgotten_db) break;
     rms_upa_.push_back(static_cast<float>(per_column * amplitude_from_db(-down_db)));
   }

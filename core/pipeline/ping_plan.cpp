@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/units.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
@@ -157,6 +158,25 @@ void fill_row_gains(PingPlan& plan) {
     // Eq. 36 and 37: (gain TVG / full scale)^2, since the receiver works on powers.
     const double factor = full_scale_factor(plan.mode.receiver, gain_db);
     plan.row_power_factor.push_back(static_cast<float>(factor * factor * extra));
+  }
+}
+
+void lay_out_noise_profile(PingPlan& p) {
+  const BeamProfile& profile = p.mode.receiver.profile;
+  if (!p.switches.uneven || profile.noise_db.empty()) return;
+  const double top = half_aperture_sine(p.mode);
+  for (int k = 0; k < p.columns.count; ++k) {
+    const double far = power_from_db(at_sine(profile.noise_db, p.columns.sine(k), top));
+    const double near =
+        profile.near_noise_db.empty() ? far : power_from_db(at_sine(profile.near_noise_db, p.columns.sine(k), top));
+    p.noise_profile.far.push_back(static_cast<float>(far));
+    p.noise_profile.near_less_far.push_back(static_cast<float>(near - far));
+  }
+  constexpr double least = 1e-4;
+  for (int n = 0; n < p.samples && !profile.near_noise_db.empty(); ++n) {
+    const double decay = std::exp(-(n + p.sample_offset) * p.sample_spacing_m / static_cast<double>(profile.near_m));
+    if (decay < least) break;
+    p.noise_profile.decay.push_back(static_cast<float>(decay));
   }
 }
 
@@ -361,9 +381,17 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   const double narrowest_rad =
       mode.has_own_widths() ? beam_width_sines(mode).narrowest : static_cast<double>(mode.pattern.azimuth_width_rad);
   p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * narrowest_rad, settings.range_m * 1.1);
-  p.noise_filter = make_noise_filter(p.pulse_shape, p.sample_time_s);
+  p.pulse_filter = p.noise_filter = make_noise_filter(p.pulse_shape, p.sample_time_s);
+  double bandwidth_hz = p.pulse_shape.noise_bandwidth_hz();
+  if (const auto width = static_cast<double>(mode.receiver.noise_width); switches.bandwidth && width != 1) {
+    const Pulse passed(mode.waveform, width * 2 * p.pulse_width_m / static_cast<double>(settings.device_sound_speed_mps));
+    p.noise_filter = make_noise_filter(passed, p.sample_time_s);
+    bandwidth_hz = passed.noise_bandwidth_hz();
+  }
   // sum_k W_jk^2 column powers make a beam's: NL (eq. 30) at its output.
-  p.column_noise_upa = noise_rms_upa(mode, p.pulse_shape.noise_bandwidth_hz()) / std::sqrt(p.beam_weights.weight_energy);
+  p.column_noise_upa = noise_rms_upa(mode, bandwidth_hz) / std::sqrt(p.beam_weights.weight_energy);
+  lay_out_noise_profile(p);
+  p.beam_mix = BeamMix(p);
   fill_row_gains(p);
   return p;
 }

@@ -10,6 +10,7 @@
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/kernel_math.hpp"
+#include "core/pipeline/beam_mix.hpp"
 #include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/pulses/pulse.hpp"
 #include "core/pipeline/pulses/spectral_columns.hpp"
@@ -59,6 +60,14 @@ struct BeamWeights {
   double weight_energy = 1;                              // sum_k W_jk^2 of a beam of the pattern's width
 };
 
+/// Power of a column's noise at a sample over column_noise_upa squared: far + near_less_far decay (docs/acoustics.md, section 5).
+struct NoiseProfile {
+  std::vector<float> far, near_less_far;  // [columns]; empty = even
+  std::vector<float> decay;               // [samples], as far as it is not nothing
+
+  bool is_even() const { return far.empty(); }
+};
+
 struct PingPlan {
   FrequencyMode mode;
   PingSettings settings;
@@ -87,10 +96,13 @@ struct PingPlan {
   double envelope_hz = 0;                           // b of the Gaussian of that width
   std::shared_ptr<const SpectralColumns> spectral;  // takes the place of pulse_rows when set
 
-  std::vector<CellLevel> levels;        // coarsest first
-  std::vector<float> elevation;         // polynomial of the two-way pattern in sin^2(angle)
-  std::vector<float> noise_filter;      // minimum-phase taps that give white noise the pulse's correlation on this grid
-  double column_noise_upa = 0;          // rms of one column
+  std::vector<CellLevel> levels;    // coarsest first
+  std::vector<float> elevation;     // polynomial of the two-way pattern in sin^2(angle)
+  std::vector<float> pulse_filter;  // minimum-phase taps that give white noise the pulse's correlation on this grid
+  std::vector<float> noise_filter;  // the same of the receiver's noise, whose filter may be wider
+  double column_noise_upa = 0;      // rms of one column
+  NoiseProfile noise_profile;
+  BeamMix beam_mix;
   std::vector<float> row_power_factor;  // per row: (gain * TVG / full scale)^2
   std::vector<std::uint32_t> row_gain;  // when settings.format.row_gains
 

@@ -22,8 +22,10 @@ namespace sonar {
 struct PreparedSettings {
   std::shared_ptr<const SonarModel> model;
   PingPlan plan;
-  NoiseTable noise;
+  NoiseTable noise, grains;  // of the receiver; of the pulse's correlation, where that is another
   std::uint64_t last_used = 0;
+
+  bool one_table() const { return plan.noise_filter == plan.pulse_filter; }
 };
 
 /// Buffers reused from ping to ping.
@@ -46,6 +48,7 @@ struct Workspace::Buffers {
     SpectralScratch spectral;
     BeamScratch beam_scratch;
     BeamSignals beams;
+    std::vector<float> mixed;
     ReceiveScratch receive;
     PingStatistics statistics;
   };
@@ -107,10 +110,12 @@ PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, B
   PreparedSettings& p = **it;
   p.last_used = w.pings;
   set_gain(p.plan, request.settings.gain_db);
-  // Noise, leak and volume read one table; it is drawn anew for another seed or filter only.
+  // Leak and volume have the pulse's correlation. A table is drawn anew for another seed or filter only.
   const bool volume = request.switches.volume && scene.water_column.has_volume();
   const bool leak = request.switches.leak && p.plan.mode.receiver.leak_upa > 0;
-  if ((request.switches.noise || leak || volume) && !p.plan.expected_power) p.noise.prepare(request.seed, p.plan.noise_filter);
+  if (p.plan.expected_power) return p;
+  if (request.switches.noise || ((leak || volume) && p.one_table())) p.noise.prepare(request.seed, p.plan.noise_filter);
+  if ((leak || volume) && !p.one_table()) p.grains.prepare(request.seed, p.plan.pulse_filter);
   return p;
 }
 
@@ -257,8 +262,9 @@ void PingSimulation::simulate_columns() {
 void PingSimulation::simulate_group(int first, int last, Workspace::Buffers::PerWorker& mine) {
   Stopwatch watch(w_.now_s, mine.statistics);
   // Draws depend on (seed, sonar, ping, column) alone: equal on every thread count.
-  const PingNoise draws{&prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number)};
-  const PingNoise noise{request_.switches.noise ? draws.table : nullptr, draws.sonar, draws.ping};
+  const PingNoise draws{prepared_.one_table() ? &prepared_.noise : &prepared_.grains, request_.sonar_id,
+                        static_cast<std::uint32_t>(request_.number)};
+  const PingNoise noise{request_.switches.noise ? &prepared_.noise : nullptr, draws.sonar, draws.ping};
   // Order of a column's sums: noise, echoes, multipath, volume, T(u), leak; outside the sector the noise follows T(u).
   begin_columns(plan_, noise, first, last, w_.columns);
   watch.lap(Stage::noise);
@@ -354,9 +360,10 @@ void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWork
   // A window is 64 samples of whole rows: its beams stay in cache until they are codes.
   mine.beams.shape(plan_.settings.beam_count, first * per_row, (last - first) * per_row);
   form_beams(w_.columns, plan_.beam_weights, kernels_, mine.beam_scratch, mine.beams);
-  // On top of the beams at exact directions: points and other sonars; then crosstalk between the beams.
+  // On top of the beams at exact directions: points and other sonars; then what beams take of each other.
   add_points(points_, plan_, mine.beams);
   add_pulses(other_sonars_, plan_, mine.beams);
+  if (plan_.beam_mix.blurs() || plan_.beam_mix.blends()) plan_.beam_mix.apply(mine.beams, mine.mixed);
   if (crosstalk_.is_audible()) crosstalk_.add(plan_, mine.beams);
   watch.lap(Stage::form_beams);
   receive(mine.beams, plan_, kernels_, mine.receive, ping);

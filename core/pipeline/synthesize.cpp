@@ -1,6 +1,8 @@
 #include "core/pipeline/synthesize.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 namespace sonar {
 
@@ -23,6 +25,24 @@ bool begins_with_noise(const PingPlan& plan, const PingNoise& noise, int column)
 
 }  // namespace
 
+namespace {
+
+/// Column `k`'s noise times the root of its profile, (46).
+void level_noise(const NoiseProfile& profile, int k, int count, float* noise) {
+  if (profile.is_even()) return;
+  const float far = profile.far[static_cast<std::size_t>(k)], more = profile.near_less_far[static_cast<std::size_t>(k)];
+  const int near = std::min(count, static_cast<int>(profile.decay.size()));
+  for (int n = 0; n < near; ++n) {
+    const float root = std::sqrt(far + more * profile.decay[static_cast<std::size_t>(n)]);
+    noise[2 * n] *= root;
+    noise[2 * n + 1] *= root;
+  }
+  const float root = std::sqrt(far);
+  for (int i = 2 * near; i < 2 * count; ++i) noise[i] *= root;
+}
+
+}  // namespace
+
 void begin_columns(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) {
   // rms of one column: the level at a beam's output over sqrt(sum_k W_jk^2) (section 5).
   const auto rms = static_cast<float>(plan.column_noise_upa);
@@ -35,11 +55,13 @@ void begin_columns(const PingPlan& plan, const PingNoise& noise, int first, int 
     float* samples = at + 2 * signals.lead;
     std::fill(at, samples, 0.0f);
     noise.table->set(noise.sonar, noise.ping, k, rms, signals.samples, samples);
+    level_noise(plan.noise_profile, k, signals.samples, samples);
     std::fill(samples + 2 * signals.samples, end, 0.0f);
   }
 }
 
 void finish_columns(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) {
+  std::vector<float> levelled;
   const auto rms = static_cast<float>(plan.column_noise_upa);
   for (int k = first; k < last; ++k) {
     if (begins_with_noise(plan, noise, k)) continue;
@@ -52,11 +74,18 @@ void finish_columns(const PingPlan& plan, const PingNoise& noise, int first, int
     }
     float* samples = at + 2 * signals.lead;
     if (!noise.table) continue;
-    // Expected power: E|n|^2 = rms^2 in every sample.
-    if (plan.expected_power)
-      for (int n = 0; n < signals.samples; ++n) samples[2 * n] += rms * rms;
-    else
+    if (!plan.expected_power && plan.noise_profile.is_even()) {
       noise.table->add(noise.sonar, noise.ping, k, rms, signals.samples, samples);
+      continue;
+    }
+    levelled.assign(2 * static_cast<std::size_t>(signals.samples), rms);
+    if (!plan.expected_power) noise.table->set(noise.sonar, noise.ping, k, rms, signals.samples, levelled.data());
+    level_noise(plan.noise_profile, k, signals.samples, levelled.data());
+    // Expected power: E|n|^2 is the level's square in every sample.
+    for (int n = 0; n < 2 * signals.samples; ++n)
+      samples[n] += !plan.expected_power ? levelled[static_cast<std::size_t>(n)]
+                    : n % 2 == 0         ? levelled[static_cast<std::size_t>(n)] * levelled[static_cast<std::size_t>(n)]
+                                         : 0.0f;
   }
 }
 

@@ -45,6 +45,7 @@ struct Material {
   float roughness_m = 1e-3f;  // rms; decides how much mirrors and how much scatters
   float reflection = 0.5f;    // pressure reflection coefficient at normal incidence, water-referenced, -1..1
   Texture texture = {};
+  Texture grain = {};  // the same of shells and stones: shorter than a beam is wide
   std::uint32_t texture_seed = 0;
   bool operator==(const Material&) const = default;
 };

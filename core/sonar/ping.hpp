@@ -51,6 +51,10 @@ struct Switches {
   bool leak = true;
   bool side_lobes = false;  // costs 10 to 30 %
   bool interference = true;
+  bool grain = true;
+  bool bandwidth = true;
+  bool uneven = true;
+  bool defocus = true;
 
   bool operator==(const Switches&) const = default;
 };
@@ -61,7 +65,7 @@ struct NamedSwitch {
   bool Switches::*is_on;
   const char* meaning;
 };
-inline constexpr std::array<NamedSwitch, 12> named_switches{{
+inline constexpr std::array<NamedSwitch, 16> named_switches{{
     {"noise", &Switches::noise, "receiver noise"},
     {"specular", &Switches::specular, "specular echoes of smooth surfaces"},
     {"texture", &Switches::texture, "patchiness of materials that have a texture"},
@@ -74,6 +78,10 @@ inline constexpr std::array<NamedSwitch, 12> named_switches{{
     {"leak", &Switches::leak, "the transmitter heard directly in the first rows"},
     {"side_lobes", &Switches::side_lobes, "what the elevation pattern's side lobes hear, from -20 to -45 dB"},
     {"interference", &Switches::interference, "pulses of other sonars nearby"},
+    {"grain", &Switches::grain, "sparse strong scatterers of materials that have a grain"},
+    {"bandwidth", &Switches::bandwidth, "noise of the receiver's own bandwidth; off: of the pulse's"},
+    {"uneven", &Switches::uneven, "noise and width that differ from beam to beam"},
+    {"defocus", &Switches::defocus, "blur of near echoes off broadside"},
 }};
 
 /// How the sonar moves while a ping is under way.

@@ -27,6 +27,17 @@ struct BeamPattern {
   ElevationWidthIs elevation_width_is = ElevationWidthIs::two_way;
 };
 
+/// What differs from beam to beam, as far as a recording shows it (docs/acoustics.md, sections 5 and 6). Tables at sines that are
+/// even over the sector, from its port edge to the other; empty = no difference.
+struct BeamProfile {
+  std::vector<float> noise_db;       // receiver noise re (30), far from the sonar
+  std::vector<float> near_noise_db;  // and at range 0; as long as noise_db
+  float near_m = 0.2f;               // the far one's share grows as 1 - e^{-r / near_m}
+  std::vector<float> blend;          // amplitude that a beam receives of either neighbour half a beam width away, re its own
+
+  bool operator==(const BeamProfile&) const = default;
+};
+
 /// How the receiver turns pressure into samples (docs/acoustics.md, section 7); constants of the product.
 struct ReceiverModel {
   float tvg_slope_db = 30;  // X of X log10 r
@@ -34,9 +45,17 @@ struct ReceiverModel {
   float tvg_ceiling_db = 80;  // infinity switches it off
   float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
+  float noise_width = 1;  // -3 dB width of the noise's filter in range over the pulse's; a measured pulse's noise has the pulse's
   float crosstalk_db = -200;  // amplitude that every channel leaks to every beam, re the channel; below -150 = none
   float leak_upa = 0;         // rms pressure of the transmitter's direct leakage, at range 0; 0 = none
   float leak_decay_db_per_m = 30;
+  std::vector<float>
+      leak_ring_db;  // of a ringing leak: re leak_upa at 0, 1, 2 .. leak_ring_step_m, then over; takes the decay's place
+  float leak_ring_step_m = 0.003f;
+  BeamProfile profile;
+  /// 0: receive beams are focused at every range and bearing; 1: with the delays of broadside, which leave near beams off it
+  /// blurred (docs/acoustics.md, section 6).
+  float defocus = 0;
 };
 
 struct FrequencyMode {

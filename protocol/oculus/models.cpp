@@ -36,10 +36,29 @@ constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;
 // m is 30 dB above the noise. Other modes: chosen.
 constexpr float noise_figure_db = 10, m1200d_high_noise_figure_db = 15;
 
+/// unknown: fitted to the first two captured M1200d pings and kept by the third (docs/acoustics.md, section 9); of their mode
+/// only.
+void fit_to_recording(ReceiverModel& receiver) {
+  // Neighbouring rows of the far noise are uncorrelated (0.02), those of the bed are as with a pulse of 0.9 rows.
+  receiver.noise_width = 0.66f / 0.9f;
+  // Small echoes within 0.5 m are 3 beams wide at half their amplitude ahead, 5 to 7 at 20 degrees.
+  receiver.defocus = 0.4f;
+  // The noise of rows 620 to 702 and 20 to 150, and its neighbouring beams.
+  receiver.profile.noise_db = {-4.8f, -3.8f, -1.6f, 0.4f, 1.8f, 1.0f, -1.0f, -3.2f, -4.3f};
+  receiver.profile.near_noise_db = {11, 4, -5, -12, -14, -13, -6, 2, 10};
+  receiver.profile.near_m = 0.25f;
+  receiver.profile.blend = {-0.1f, 0.07f, 0.1f, 0.13f, 0.13f, 0.13f, 0.13f, 0.06f, -0.1f};
+  // The medians of rows 0 to 8: it rings, with a null in row 2. By half a row.
+  receiver.leak_ring_db = {-5.4f, -5.4f,  -5.2f, -5.1f,  -15, -26,    -24, -22.7f, -21, -19.4f,
+                           -21,   -22.6f, -26,   -30.5f, -35, -38.7f, -43, -47,    -60};
+  receiver.leak_ring_step_m = 0.001421f;
+}
+
 struct ModeRow {
   double centre_hz = 0, aperture_deg = 0, azimuth_width_deg = 0, elevation_width_deg = 0, max_range_m = 0;
   float full_scale_upa = 0;
   float noise_db = noise_figure_db;
+  bool recorded = false;
 };
 struct FamilyRow {
   double min_range_m = 0.1;  // BAS
@@ -66,7 +85,7 @@ constexpr FamilyRow m750d_old{0.1, m750d_low, {1.2e6, 70, 0.6, 12, 40, fitted_fu
 // Low: BAS, APL, VND. High: frequency 140.625 MHz / 67 and aperture 60 from CAP, widths and range APL.
 constexpr ModeRow m1200d_low{1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m1200d_low};
 constexpr FamilyRow m1200d{
-    0.1, m1200d_low, {140.625e6 / 67, 60, 0.4, 12, 10, fitted_full_scale_upa::m1200d_high, m1200d_high_noise_figure_db}};
+    0.1, m1200d_low, {140.625e6 / 67, 60, 0.4, 12, 10, fitted_full_scale_upa::m1200d_high, m1200d_high_noise_figure_db, true}};
 // unknown: a single-frequency product by its name; the low mode of the M1200d is assumed.
 constexpr FamilyRow n1200s{0.1, m1200d_low, {}};
 // Frequencies, ranges, widths low: APL, VND; apertures: CAT. Azimuth width high: CAT has 0.25, what the array that has 0.6 at 1.2
@@ -133,6 +152,7 @@ FrequencyMode mode_from(const ModeRow& row, double min_range_m, const char* name
   mode.receiver.leak_upa = leak_upa;
   mode.receiver.leak_decay_db_per_m = leak_decay_db_per_m;
   mode.receiver.full_scale_upa = row.full_scale_upa;
+  if (row.recorded) fit_to_recording(mode.receiver);
   return mode;
 }
 

@@ -38,7 +38,7 @@ class Statistics(unittest.TestCase):
         self.assertIn("not explained", text)
 
     def test_reasons_are_bounded_and_used(self):
-        self.assertTrue(all(comparison.TOLERANCE < most < 1 for _, most in comparison.REASONS.values()))
+        self.assertTrue(all(comparison.TOLERANCE < most < 1.5 for _, most in comparison.REASONS.values()))
         real = {name: 1.0 for name in comparison.REASONS} | {"mean": 1.0}
         as_explained = {name: 1 + most - 0.001 for name, (_, most) in comparison.REASONS.items()} | {"mean": 1.1}
         self.assertEqual(comparison.faults(real, as_explained), [])
@@ -55,7 +55,7 @@ class BesideTheDevice(unittest.TestCase):
         ours = comparison.statistics(comparison.images_of_render(SONARD.resolve(), comparison.SCENE))
         text, within = comparison.table(real, ours)
         self.assertEqual(comparison.faults(real, ours), [], text)
-        self.assertGreaterEqual(within, 33, text)
+        self.assertGreaterEqual(within, 53, text)
 
 
 if __name__ == "__main__":

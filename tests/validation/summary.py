@@ -105,8 +105,16 @@ def capture(text):
            f"{worst[3]} ({worst[0]}: {worst[4] or 'within'})", f"{within[2]}, or explained"]
 
 
+def tell_apart(text):
+    (_, judged), (_, features) = tables_of(text)
+    by_sector = next(r for r in judged if r[0] == "unseen sector, texture")
+    control = next(r for r in judged if r[0].startswith("control"))
+    yield ["the same: patches that a classifier tells apart", f"guessing; ours against ours {control[1]} %",
+           f"{by_sector[1]} % ({by_sector[2]}; most by: {features[0][0]})", "60 % is the aim"]
+
+
 CASES = {"tank": tank, "two-cylinders": two_cylinders, "local-search": local_search, "differences": differences, "coverage": coverage,
-         "capture": capture}
+         "capture": capture, "tell-apart": tell_apart}
 
 
 def cost(text):

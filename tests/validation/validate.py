@@ -58,6 +58,18 @@ def capture(program, folder):
     return done.stdout.strip() + "\n"
 
 
+def tell_apart(program):
+    """The chapter of the classifier, or None where it has nothing to tell; the script says why."""
+    done = subprocess.run([sys.executable, str(HERE / "tell_apart.py"), "--program", str(program)], capture_output=True, text=True,
+                          check=False)
+    if done.returncode == 0:
+        return done.stdout.strip() + "\n"
+    if "skipped:" not in done.stderr:
+        raise RuntimeError(f"tell_apart.py failed: {done.stderr.strip()}")
+    print(done.stderr.strip(), flush=True)
+    return None
+
+
 def makers_of(sonard, pictures, table_of_oracles):
     """Chapter -> what makes it, in the order of the tables. The chapters draw with matplotlib, the summary does without."""
     import cost
@@ -72,7 +84,8 @@ def makers_of(sonard, pictures, table_of_oracles):
     modules = {"tank": tank, "tilted-tank": tilted_tank, "two-cylinders": two_cylinders, "local-search": local_search,
                "differences": differences, "coverage": coverage, "cost": cost, "parts": parts}
     makers = {name: functools.partial(module.chapter, sonard, pictures) for name, module in modules.items()}
-    return makers | {"capture": lambda: capture(sonard.program, pictures), "oracles": lambda: table_of_oracles}
+    return makers | {"capture": lambda: capture(sonard.program, pictures), "tell-apart": lambda: tell_apart(sonard.program),
+                     "oracles": lambda: table_of_oracles}
 
 
 def make(options):

@@ -1,16 +1,17 @@
 #!/usr/bin/env bash
 # Writes docs/validation/tables.md with its pictures, and its summary docs/validation.md: builds sonard, renders the experiments.
 # usage: tests/validation/validate.sh [--partial] [--only CHAPTER ...] | --summary
-# Chapters: tank two-cylinders local-search differences coverage cost parts capture oracles. Costs need an otherwise idle machine.
+# Chapters: tank two-cylinders local-search differences coverage cost parts capture tell-apart oracles. Costs need an otherwise idle machine.
 # Takes under fifteen minutes on two cores; --summary rewrites the summary from the tables in a moment. The table of oracles is that
-# of the last ./test.sh, complete unless --partial is given; the recorded ping needs SONARD_CAPTURES. Chapters without data are kept.
+# of the last ./test.sh, complete unless --partial is given; capture and tell-apart need SONARD_CAPTURES. Chapters without data are
+# kept.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
 . tests/tools/setup.sh
 
 case "${1:-}" in
-  -h | --help) sed -n '2,6s/^# //p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,7s/^# //p' "$0"; exit 0 ;;
   --summary) exec python3 tests/validation/validate.py --summary ;;
 esac
 
@@ -25,6 +26,10 @@ python_with_matplotlib() {
 if ! python=$(python_with_matplotlib); then
   need_packages python3-matplotlib python3-pil || exit
   python=$(python_with_matplotlib) || { echo "no python3 that finds matplotlib, numpy and PIL" >&2; exit 69; }
+fi
+# The classifier alone needs it; without it that chapter is skipped.
+if [ -n "${SONARD_CAPTURES:-}" ] && ! "$python" -c 'import sklearn' 2>/dev/null; then
+  need_packages python3-sklearn || echo "going on without python3-sklearn"
 fi
 if [ -z "${SONARD_PROGRAM:-}" ]; then
   setup_and_build sonard sonard_bench || exit

@@ -156,12 +156,15 @@ CellList list_cells(Ownership& all) {
   return cells;
 }
 
-void find_roots(const Ownership& all, const TileAddress& a, const TextureField* texture, const CellList& cells) {
+void find_roots(const Ownership& all, const TileAddress& a, const TextureField* texture, const TextureField* grain,
+                const CellList& cells) {
   for (int n = 0; n < cells.size; ++n) cells.root[n] = all.facets[cells.facet[n]].root_area;
-  if (!texture) return;
-  TexturePatch patch(*texture, a.object);
-  for (int n = 0; n < cells.size; ++n)
-    cells.root[n] *= static_cast<double>(patch.root_at(lattice::from_permuted(cells.u[n], cells.v[n], cells.w[n], a.axis)));
+  for (const TextureField* field : {texture, grain}) {
+    if (!field) continue;
+    TexturePatch patch(*field, a.object);
+    for (int n = 0; n < cells.size; ++n)
+      cells.root[n] *= static_cast<double>(patch.root_at(lattice::from_permuted(cells.u[n], cells.v[n], cells.w[n], a.axis)));
+  }
 }
 
 void pack(const Ownership& all, const TileAddress& a, const CellList& cells, CellTile& tile) {
@@ -205,7 +208,7 @@ cell_lanes::DrawKey draw_key(const TileAddress& a, std::uint32_t texture_seed, S
 }  // namespace
 
 CellTile build_tile(const TileAddress& a, const Mesh& mesh, std::span<const std::uint32_t> triangles, std::uint32_t texture_seed,
-                    Seed seed, const TextureField* texture) {
+                    Seed seed, const TextureField* texture, const TextureField* grain) {
   const double edge = lattice::tile_edge_m(a.level);
   CellTile tile;
   tile.object = a.object;
@@ -223,7 +226,7 @@ CellTile build_tile(const TileAddress& a, const Mesh& mesh, std::span<const std:
   for (const std::uint32_t t : triangles) own(lattice::facet_of(mesh, t, a.axis), a, all);
   const CellList cells = list_cells(all);
   if (cells.size == 0) return tile;
-  find_roots(all, a, texture, cells);
+  find_roots(all, a, texture, grain, cells);
   pack(all, a, cells, tile);
   return tile;
 }

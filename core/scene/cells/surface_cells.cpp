@@ -161,12 +161,16 @@ std::size_t SurfaceCells::SurfacePatch::forget_below(Node& node, std::uint64_t t
   return freed;
 }
 
-SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, bool textured)
-    : scene_(std::move(scene)), seed_(seed), textured_(textured), cache_bytes_(cache_bytes) {
+SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, CellFields fields)
+    : scene_(std::move(scene)), seed_(seed), fields_(fields), cache_bytes_(cache_bytes) {
   for (const Material& m : scene_->materials) {
-    const bool has = m.texture.shape > 0;
-    has_texture_ = has_texture_ || has;
-    textures_.push_back(has && textured ? std::make_unique<TextureField>(m.texture, m.texture_seed, seed) : nullptr);
+    const auto add = [&](const Texture& of, bool wanted, Domain domain, auto& to, bool& there) {
+      const bool has = of.shape > 0;
+      there = there || has;
+      to.push_back(has && wanted ? std::make_unique<TextureField>(of, m.texture_seed, seed, domain) : nullptr);
+    };
+    add(m.texture, fields.texture, Domain::texture, textures_, there_.texture);
+    add(m.grain, fields.grain, Domain::grain, grains_, there_.grain);
   }
   for (std::size_t o = 0; o < scene_->objects.size(); ++o) {
     const Object& object = scene_->objects[o];
@@ -294,7 +298,7 @@ void SurfaceCells::build(std::vector<Node*>& missing, Parallel& pool) {
     const TileAddress& a = node.address;
     const auto material = static_cast<std::size_t>(a.material);
     node.tile = build_tile(a, *scene_->objects[static_cast<std::size_t>(a.object)].mesh, node.triangles,
-                           scene_->materials[material].texture_seed, seed_, textures_[material].get());
+                           scene_->materials[material].texture_seed, seed_, textures_[material].get(), grains_[material].get());
     node.built = true;
   });
   for (const Node* node : missing) cached_bytes_ += node->tile.bytes();

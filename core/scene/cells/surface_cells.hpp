@@ -93,17 +93,24 @@ struct CellsInView {
 
 class TextureField;
 
+/// Which random fields of the materials the cells carry.
+struct CellFields {
+  bool texture = true, grain = true;
+};
+
 class SurfaceCells {
  public:
-  /// `textured`: with the patches of the materials that have a texture.
-  SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, bool textured = true);
+  SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, CellFields fields = {});
   ~SurfaceCells();
   SurfaceCells(const SurfaceCells&) = delete;
   SurfaceCells& operator=(const SurfaceCells&) = delete;
 
   Seed seed() const { return seed_; }
-  /// Whether these are the cells of that seed, with or without texture; where no material has one, both are the same.
-  bool serves(Seed seed, bool textured) const { return seed == seed_ && (textured == textured_ || !has_texture_); }
+  /// Whether these are the cells of that seed, with or without a field; where no material has it, both are the same.
+  bool serves(Seed seed, CellFields fields) const {
+    return seed == seed_ && (fields.texture == fields_.texture || !there_.texture) &&
+           (fields.grain == fields_.grain || !there_.grain);
+  }
   /// Tiles that may lie in the view, missing ones built first, in an order that does not depend on the pool.
   /// Valid until the next call. `view` must outlive the result.
   const std::vector<TileInView>& in_view(const CellView& view, Parallel& pool);
@@ -156,9 +163,9 @@ class SurfaceCells {
 
   std::shared_ptr<const Scene> scene_;
   Seed seed_{};
-  bool textured_ = true, has_texture_ = false;
-  std::vector<Skin> skins_;                                    // per object
-  std::vector<std::unique_ptr<const TextureField>> textures_;  // per material, null = none
+  std::vector<Skin> skins_;                                             // per object
+  CellFields fields_, there_{false, false};                             // wanted; that some material has
+  std::vector<std::unique_ptr<const TextureField>> textures_, grains_;  // per material, null = none
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
   std::vector<std::unique_ptr<SurfacePatch>> patches_;

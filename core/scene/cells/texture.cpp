@@ -70,8 +70,8 @@ Blend blend_at(double x) {
 
 }  // namespace
 
-TextureField::TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed)
-    : lattice_m_(static_cast<double>(texture.correlation_m)), key_(key_of(seed, Domain::texture)) {
+TextureField::TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed, Domain domain)
+    : lattice_m_(static_cast<double>(texture.correlation_m)), key_(key_of(seed, domain)) {
   key_.high ^= texture_seed;
   const double nu = static_cast<double>(texture.shape), log_gamma_nu = std::lgamma(nu);
   double mean = 0, weight = 0;

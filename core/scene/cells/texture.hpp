@@ -18,7 +18,7 @@ namespace sonar {
 class TextureField {
  public:
   /// texture.shape > 0; texture.correlation_m: where the correlation of the field has fallen to about 1 / e.
-  TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed);
+  TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed, Domain domain = Domain::texture);
 
   double lattice_m() const { return lattice_m_; }
   /// Standard normal of a lattice point; a function of (seed, texture seed, object, point) alone.

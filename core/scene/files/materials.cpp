@@ -39,10 +39,10 @@ GsabLaw read_gsab(const text::Node& node, GsabLaw law) {
   return law;
 }
 
-Texture read_texture(const text::Node& node, Texture texture) {
+Texture read_texture(const text::Node& node, Texture texture, double shortest_m) {
   text::Map keys = node.map();
   texture.shape = read_number(keys, "shape", texture.shape, Range::between(0, 100));
-  texture.correlation_m = read_number(keys, "correlation_m", texture.correlation_m, Range::between(0.02, 100));
+  texture.correlation_m = read_number(keys, "correlation_m", texture.correlation_m, Range::between(shortest_m, 100));
   if (texture.shape != 0 && texture.shape < 0.2f) node.fail("shape is 0 (no texture) or at least 0.2");
   return texture;
 }
@@ -83,7 +83,8 @@ void MaterialTable::read_one(const std::string& name, text::Map keys) {
   m.trend_reference_hz = read_number(keys, "trend_reference_hz", m.trend_reference_hz, Range::between(1e4, 1e7));
   m.roughness_m = read_number(keys, "roughness_m", m.roughness_m, Range::between(0, 1));
   m.reflection = read_number(keys, "reflection", m.reflection, Range::between(-1, 1));
-  if (const text::Node node = keys.optional("texture")) m.texture = read_texture(node, m.texture);
+  if (const text::Node node = keys.optional("texture")) m.texture = read_texture(node, m.texture, 0.02);
+  if (const text::Node node = keys.optional("grain")) m.grain = read_texture(node, m.grain, 0.002);
   m.texture_seed = static_cast<std::uint32_t>(keys.optional("texture_seed").unsigned_integer_or(m.texture_seed, 0xFFFFFFFFu));
   if (Material* known = definition(name)) {
     *known = m;

@@ -64,7 +64,16 @@ json json_of(const SonarModel& model, const FrequencyMode& mode) {
             {"full_scale_upa", law.full_scale_upa},
             {"noise_figure_db", law.noise_figure_db},
             {"crosstalk_db", law.crosstalk_db},
+            {"noise_width", law.noise_width},
+            {"defocus", law.defocus},
+            {"profile",
+             {{"noise_db", law.profile.noise_db},
+              {"near_noise_db", law.profile.near_noise_db},
+              {"near_m", law.profile.near_m},
+              {"blend", law.profile.blend}}},
             {"leak_upa", law.leak_upa},
+            {"leak_ring_db", law.leak_ring_db},
+            {"leak_ring_step_m", law.leak_ring_step_m},
             {"leak_decay_db_per_m", law.leak_decay_db_per_m}}}};
 }
 

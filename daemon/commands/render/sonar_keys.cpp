@@ -40,6 +40,23 @@ void read_waveform(const Node& node, Waveform& waveform) {
   }
 }
 
+void read_table(const Node& node, const Range& range, std::vector<float>& table) {
+  if (!node.present()) return;
+  table.clear();
+  for (const Node& value : node.items(2, 512)) table.push_back(static_cast<float>(value.number(range)));
+}
+
+void read_profile(const Node& node, BeamProfile& profile) {
+  if (!node.present()) return;
+  Map keys = node.map();
+  read_table(keys.optional("noise_db"), Range::between(-100, 100), profile.noise_db);
+  const Node near = keys.optional("near_noise_db");
+  read_table(near, Range::between(-100, 100), profile.near_noise_db);
+  set(keys.optional("near_m"), Range::between(1e-3, 1000), profile.near_m);
+  read_table(keys.optional("blend"), Range::between(-0.5, 1), profile.blend);
+  if (near.present() && profile.noise_db.empty()) near.fail("needs noise_db");
+}
+
 void read_receiver(const Node& node, ReceiverModel& law) {
   if (!node.present()) return;
   Map keys = node.map();
@@ -54,7 +71,12 @@ void read_receiver(const Node& node, ReceiverModel& law) {
   set(keys.optional("full_scale_upa"), {.min = 0, .min_excluded = true}, law.full_scale_upa);
   set(keys.optional("noise_figure_db"), Range::between(-100, 200), law.noise_figure_db);
   set(keys.optional("crosstalk_db"), Range::between(-300, 0), law.crosstalk_db);
+  set(keys.optional("noise_width"), Range::between(0.2, 5), law.noise_width);
+  set(keys.optional("defocus"), Range::between(0, 1), law.defocus);
+  read_profile(keys.optional("profile"), law.profile);
   set(keys.optional("leak_upa"), Range::at_least(0), law.leak_upa);
+  read_table(keys.optional("leak_ring_db"), Range::between(-300, 100), law.leak_ring_db);
+  set(keys.optional("leak_ring_step_m"), Range::between(1e-5, 10), law.leak_ring_step_m);
   set(keys.optional("leak_decay_db_per_m"), Range::between(0, 1e4), law.leak_decay_db_per_m);
 }
 

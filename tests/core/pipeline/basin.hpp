@@ -18,7 +18,7 @@ namespace sonar::test {
 // A basin with something of everything: texture, a bed by another law, smooth walls, smooth primitives and meshes, bubbles.
 inline constexpr const char* basin_yaml = R"(
 materials:
-  patchy: {law: gsab, texture: {shape: 2, correlation_m: 0.3}, trend_db_per_decade: 10}
+  patchy: {law: gsab, texture: {shape: 2, correlation_m: 0.3}, grain: {shape: 1, correlation_m: 0.01}, trend_db_per_decade: 10}
   polished: {lambert_db: -20, roughness_m: 1.0e-5, reflection: 0.8}
   worn: {lambert_db: -20, roughness_m: 2.0e-4, reflection: 0.6}
 objects:
@@ -45,6 +45,9 @@ inline std::shared_ptr<const SonarModel> model_of(FrequencyMode mode, Waveform::
   mode.waveform.exact = exact && spectral::have_transform;
   mode.receiver.crosstalk_db = -45;
   mode.receiver.leak_upa = 1e7f;
+  mode.receiver.noise_width = 0.8f;
+  mode.receiver.defocus = 1;
+  mode.receiver.profile = {{-3, 1, -2}, {6, -4, 5}, 0.3f, {-0.1f, 0.2f, 0}};
   SonarModel model;
   model.name = "test";
   model.modes = {mode};

@@ -61,6 +61,7 @@ TEST(Everything, LacksSomethingWithoutAnyOneOfItsParts) {
     const std::string with_all = bytes_of(engine.ping(whole));
     for (const NamedSwitch& part : named_switches) {
       if (part.is_on == &Switches::doppler && whole.model->modes[0].waveform.shape != Waveform::Shape::lfm) continue;
+      if (part.is_on == &Switches::defocus && whole.model->modes[0].beam_spacing != BeamSpacing::uniform_in_sine) continue;
       PingRequest without = whole;
       without.switches.*part.is_on = false;
       EXPECT_TRUE(with_all != bytes_of(engine.ping(without))) << part.name;
@@ -98,10 +99,19 @@ TEST(Everything, SwitchedOffIsAsIfItsDataWereNotThere) {
       },
       as_it_is);
   same(
+      &Switches::grain,
+      [](Scene& s) {
+        for (Material& m : s.materials) m.grain = {};
+      },
+      as_it_is);
+  same(
       &Switches::volume, [](Scene& s) { s.water_column = {}; }, as_it_is);
   same(
       &Switches::interference, [](Scene& s) { s.other_sonars.clear(); }, as_it_is);
   same(&Switches::leak, as_it_is, receiver([](ReceiverModel& law) { law.leak_upa = 0; }));
+  same(&Switches::bandwidth, as_it_is, receiver([](ReceiverModel& law) { law.noise_width = 1; }));
+  same(&Switches::uneven, as_it_is, receiver([](ReceiverModel& law) { law.profile = {}; }));
+  same(&Switches::defocus, as_it_is, receiver([](ReceiverModel& law) { law.defocus = 0; }));
   same(&Switches::crosstalk, as_it_is, receiver([](ReceiverModel& law) { law.crosstalk_db = -200; }));
 }
 

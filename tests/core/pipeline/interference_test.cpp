@@ -118,6 +118,25 @@ TEST(Leak, IsPresentThoughTheNoiseIsOffAndDoesNotChangeTheNoise) {
   EXPECT_EQ(noise.back(), both.back());
 }
 
+TEST(Leak, RingsByItsTable) {
+  ReceiverModel law = leaking();
+  law.leak_ring_db = {0, -20, -5, -30};
+  law.leak_ring_step_m = 0.1f;
+  Sounding s(SceneMaker().make(), oculus_high(), default_rows(2, 700));
+  give_receiver(s, law);
+  s.request.switches.expected_power = true;
+  s.ping();
+  for (const int row : {0, 20, 35, 60, 90}) {
+    const double at = s.range_of_row(row) / static_cast<double>(0.1f);
+    const double expected = at < 1 ? -20 * at : at < 2 ? -20 + 15 * (at - 1) : -5 - 25 * (at - 2);
+    EXPECT_NEAR(db(mean_row_power(s, row)), 160 + expected, 0.1) << row;
+  }
+  EXPECT_EQ(s.power(110, 100), 0) << "over";
+  const std::vector<float> first = s.last().pressure_upa;
+  ++s.request.sonar_id;
+  EXPECT_EQ(s.ping().pressure_upa, first) << "in expected power it is its mean";
+}
+
 /// The record of a ping fired `after_s` after the epoch.
 const Ping& ping_at(Sounding& s, double after_s) {
   s.request.fired_at = Time(std::chrono::nanoseconds(static_cast<std::int64_t>(after_s * 1e9)));

@@ -106,9 +106,9 @@ TEST(Texture, IsContinuousAndBelongsToSeedMaterialAndObject) {
 
 TEST(Texture, CellsOfEveryLevelCarryTheSameField) {
   const auto scene = bed({0.8f, 0.4f});
-  SurfaceCells with(scene, Seed{3}, 1u << 30), without(scene, Seed{3}, 1u << 30, false);
-  EXPECT_TRUE(with.serves(Seed{3}, true));
-  EXPECT_FALSE(with.serves(Seed{3}, false));
+  SurfaceCells with(scene, Seed{3}, 1u << 30), without(scene, Seed{3}, 1u << 30, {.texture = false});
+  EXPECT_TRUE(with.serves(Seed{3}, {}));
+  EXPECT_FALSE(with.serves(Seed{3}, {.texture = false}));
   const TextureField field(scene->materials[0].texture, 0, Seed{3});
   Parallel pool(2);
   for (const int level : {3, 4, 5}) {
@@ -186,6 +186,30 @@ TEST(Texture, EchoesAreKDistributed) {
     record_oracle(no_number, name + ", scintillation index", 1 + 2 / static_cast<double>(shape), index, shape < 4 ? 0.2 : 0.1,
                   "");
   }
+}
+
+// A grain is a field of its own: with one as long as a patch, echoes are as with a texture, and both multiply.
+TEST(Grain, IsATextureBesideTheTexture) {
+  const FrequencyMode mode = oculus_high();
+  Scene scene = *bed({});
+  scene.materials[0].grain = {2, 0.35f};
+  Sounding s(std::make_shared<const Scene>(scene), mode, default_rows(8, 640));
+  double sum = 0, squares = 0;
+  int n = 0;
+  for (std::uint64_t seed = 1; seed <= 14; ++seed) {
+    s.request.seed = Seed{seed};
+    s.ping_from({0, 0, height_m}, {0, tilt_rad, 0});
+    const reference::SeabedLevel level(mode, s.medium(), s.envelope_hz(), bed_db, height_m, tilt_rad);
+    visit_intensities(s, level, 8, 3, [&](int, int, double i) { sum += i, squares += i * i, ++n; });
+  }
+  record_oracle(no_number, "grain of shape 2, mean level", 0, 10 * std::log10(sum / n), 0.2, "dB");
+  record_oracle(no_number, "grain of shape 2, scintillation index", 2, squares / n / std::pow(sum / n, 2) - 1, 0.2, "");
+  const std::vector<float> grain = s.last().pressure_upa;
+  Sounding texture(bed({2, 0.35f}), mode, default_rows(8, 640)), plain(bed({}), mode, default_rows(8, 640));
+  texture.request.seed = plain.request.seed = s.request.seed;
+  EXPECT_NE(texture.ping_from({0, 0, height_m}, {0, tilt_rad, 0}).pressure_upa, grain) << "draws of its own";
+  s.request.switches.grain = false;
+  EXPECT_EQ(s.ping().pressure_upa, plain.ping_from({0, 0, height_m}, {0, tilt_rad, 0}).pressure_upa);
 }
 
 // The patches lie on the bed: seen from elsewhere, where no speckle is the same any more, they are where they were.

@@ -1,0 +1,61 @@
+// What beams take of their neighbours: the blur of a focus that fits broadside only, and a fitted share of the next beams
+// (docs/acoustics.md, section 6). C++17-clean, standard library only.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.hpp"
+
+namespace sonar {
+
+/// Tables of BeamMix; null = that part is absent. Signals are complex [beams][stride / 2], interleaved; in expected power, re is
+/// a power and taps and shares are squared.
+struct BeamMixView {
+  const float* turn_m;                          // [beams]: phase error at the aperture's ends times range [rad m]
+  const float* taps;                            // complex [sets][2 reach + 1], beams j - reach to j + reach
+  const std::int32_t* reach;                    // [sets]: how many on either side are not 0
+  const float *own, *share;                     // [beams]: of the beam, of either neighbour
+  std::int32_t beams, sets, widest, step;       // widest: reach of the table; step: beams to the neighbour
+  float sets_per_rad, first_range_m, sample_m;  // of sample 0; spacing
+};
+
+/// Which set of taps serves this beam and sample; 0 leaves it as it is.
+SONAR_HD inline std::int32_t focus_set(const BeamMixView& v, std::int32_t beam, std::int32_t sample) {
+  const float range_m = v.first_range_m + v.sample_m * static_cast<float>(sample);
+  const float set = v.turn_m[beam] * v.sets_per_rad / (range_m > v.sample_m ? range_m : v.sample_m) + 0.5f;
+  return set < static_cast<float>(v.sets - 1) ? static_cast<std::int32_t>(set) : v.sets - 1;
+}
+
+struct MixedSample {
+  float re, im;
+};
+/// Sample at `from + 2 column` of beam `j` as it arrives under a wrong focus; `set` from focus_set.
+SONAR_HD inline MixedSample refocused(const BeamMixView& v, const float* from, std::int64_t stride, std::int32_t j,
+                                      std::int32_t column, std::int32_t set) {
+  const std::int32_t reach = v.reach[set];
+  const float* tap = v.taps + 2 * (static_cast<std::int64_t>(set) * (2 * v.widest + 1) + v.widest);
+  MixedSample sum{0, 0};
+  for (std::int32_t d = -reach; d <= reach; ++d) {
+    if (j + d < 0 || j + d >= v.beams) continue;
+    const float* s = from + (j + d) * stride + 2 * static_cast<std::int64_t>(column);
+    const float re = tap[2 * d], im = tap[2 * d + 1];
+    sum.re += re * s[0] - im * s[1];
+    sum.im += re * s[1] + im * s[0];
+  }
+  return sum;
+}
+
+/// The same with a share of both neighbours; the outermost beams have one.
+SONAR_HD inline MixedSample blended(const BeamMixView& v, const float* from, std::int64_t stride, std::int32_t j,
+                                    std::int32_t column) {
+  const float* s = from + j * stride + 2 * static_cast<std::int64_t>(column);
+  MixedSample sum{v.own[j] * s[0], v.own[j] * s[1]};
+  for (std::int32_t side = -v.step; side <= v.step; side += 2 * v.step) {
+    if (j + side < 0 || j + side >= v.beams) continue;
+    sum.re += v.share[j] * s[side * stride];
+    sum.im += v.share[j] * s[side * stride + 1];
+  }
+  return sum;
+}
+
+}  // namespace sonar

@@ -1,0 +1,149 @@
+#include "core/pipeline/beam_mix.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+#include "core/pipeline/ping_plan.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr double set_rad = 0.25;  // between neighbouring sets of taps: -18 dB of the signal at most, between exact phases
+constexpr double most_rad = 16;   // nearer, the error is held
+constexpr int aperture_points = 512;
+constexpr double neighbour_in_beams = 0.56;  // how far a neighbour is, in -3 dB widths: 1 of 256 beams of the M1200d
+
+}  // namespace
+
+double at_sine(const std::vector<float>& table, double sine, double top) {
+  if (table.size() < 2) return table.empty() ? 0 : static_cast<double>(table.front());
+  const double at = std::clamp(0.5 * (1 - sine / top), 0.0, 1.0) * static_cast<double>(table.size() - 1);
+  const std::size_t i = std::min(static_cast<std::size_t>(at), table.size() - 2);
+  const double t = at - static_cast<double>(i);
+  return (1 - t) * static_cast<double>(table[i]) + t * static_cast<double>(table[i + 1]);
+}
+
+BeamMix::BeamMix(const PingPlan& plan) {
+  const FrequencyMode& mode = plan.mode;
+  const std::size_t beams = plan.beam_sine.size();
+  if (mode.beam_spacing != BeamSpacing::uniform_in_sine || beams < 3 || mode.pattern.azimuth_taper == Taper::unit) return;
+  const double spacing = plan.beam_sine[0] - plan.beam_sine[1];
+  if (plan.switches.defocus && mode.receiver.defocus > 0) lay_out_focus(plan, spacing);
+  if (plan.switches.uneven && !mode.receiver.profile.blend.empty()) lay_out_blend(plan, spacing);
+}
+
+/// Delays of broadside leave, at the place x on the aperture L, the phase pi x^2 sin^2(theta) / (lambda r) (eq. 44). Beams even
+/// in the sine are samples of the aperture's transform, so that a factor on the aperture is a convolution across the beams.
+void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
+  const double wavelengths = plan.beam_pattern[0].aperture_wavelengths;
+  const double wavelength_m =
+      static_cast<double>(plan.settings.device_sound_speed_mps) / static_cast<double>(plan.mode.centre_hz);
+  const double edge_rad_m = static_cast<double>(plan.mode.receiver.defocus) * pi * wavelengths * wavelengths * wavelength_m / 4;
+  for (const double u : plan.beam_sine) turn_m_.push_back(static_cast<float>(edge_rad_m * u * u));
+  largest_turn_m_ = *std::max_element(turn_m_.begin(), turn_m_.end());
+  first_range_m_ = static_cast<float>(plan.sample_offset * plan.sample_spacing_m);
+  sample_m_ = static_cast<float>(plan.sample_spacing_m);
+  const int sets = static_cast<int>(most_rad / set_rad) + 1;
+  // The largest slope of the phase, 4 edge / L, displaces by 2 edge / (pi L) in sine.
+  const auto reach_of = [&](int set) {
+    return set == 0 ? 0 : static_cast<int>(std::ceil(2 * set_rad * set / (pi * wavelengths * spacing))) + 3;
+  };
+  widest_ = reach_of(sets - 1);
+  taps_.assign(2 * static_cast<std::size_t>(sets * (2 * widest_ + 1)), 0.0f);
+  for (int set = 0; set < sets; ++set) {
+    reach_.push_back(reach_of(set));
+    double energy = 0;
+    std::vector<std::complex<double>> taps;
+    for (int d = -reach_.back(); d <= reach_.back(); ++d) {
+      std::complex<double> sum = 0;
+      // One period of what beams of this spacing tell apart; beyond the aperture, where nothing is, the phase stays.
+      for (int i = 0; i < aperture_points; ++i) {
+        const double turns = (i + 0.5) / aperture_points - 0.5;
+        const double place = std::min(2 * std::abs(turns) / (wavelengths * spacing), 1.0);
+        sum += std::polar(1.0 / aperture_points, set_rad * set * place * place - 2 * pi * d * turns);
+      }
+      energy += std::norm(sum);
+      taps.push_back(sum);
+    }
+    float* to = taps_.data() + 2 * (set * (2 * widest_ + 1) + widest_ - reach_.back());
+    for (const std::complex<double>& tap : taps) {
+      // Diffuse power stays as it is.
+      const std::complex<double> t = plan.expected_power ? std::norm(tap) / energy : tap / std::sqrt(energy);
+      *to++ = static_cast<float>(t.real());
+      *to++ = static_cast<float>(t.imag());
+    }
+  }
+}
+
+void BeamMix::lay_out_blend(const PingPlan& plan, double spacing) {
+  const ReceivePattern& pattern = plan.beam_pattern[0];
+  const double width = 2 * std::sin(static_cast<double>(plan.mode.pattern.azimuth_width_rad) / 2);
+  step_ = std::max(1, static_cast<std::int32_t>(std::lround(neighbour_in_beams * width / spacing)));
+  // gamma: how much of a diffuse field beams so far apart have in common.
+  const auto common = [&](int apart) {
+    double product = 0, power = 0;
+    for (int k = -plan.columns.count; k <= plan.columns.count; ++k) {
+      const double u = k * plan.columns.spacing;
+      product += pattern(u) * pattern(u + apart * spacing);
+      power += pattern(u) * pattern(u);
+    }
+    return product / power;
+  };
+  const double one = common(step_), two = common(2 * step_), top = plan.beam_sine.front();
+  for (const double u : plan.beam_sine) {
+    // Eq. 45: diffuse power stays as it is.
+    const double b = at_sine(plan.mode.receiver.profile.blend, u, top);
+    const double own = plan.expected_power ? 1 / (1 + 2 * b * b) : 1 / std::sqrt(1 + 2 * b * b * (1 + two) + 4 * b * one);
+    own_.push_back(static_cast<float>(own));
+    share_.push_back(static_cast<float>(own * (plan.expected_power ? b * b : b)));
+  }
+}
+
+BeamMixView BeamMix::view() const {
+  BeamMixView v{};
+  v.turn_m = blurs() ? turn_m_.data() : nullptr;
+  v.taps = taps_.data();
+  v.reach = reach_.data();
+  v.own = blends() ? own_.data() : nullptr;
+  v.share = share_.data();
+  v.beams = static_cast<std::int32_t>(std::max(turn_m_.size(), own_.size()));
+  v.sets = static_cast<std::int32_t>(reach_.size());
+  v.widest = widest_;
+  v.step = step_;
+  v.sets_per_rad = static_cast<float>(1 / set_rad);
+  v.first_range_m = first_range_m_;
+  v.sample_m = sample_m_;
+  return v;
+}
+
+void BeamMix::apply(BeamSignals& beams, std::vector<float>& scratch) const {
+  BeamMixView v = view();
+  const float nearest_m = std::max(v.first_range_m + v.sample_m * static_cast<float>(beams.first_sample), v.sample_m);
+  if (blurs() && largest_turn_m_ * v.sets_per_rad >= 0.5f * nearest_m) {
+    scratch.assign(beams.data.begin(), beams.data.end());
+    for (int j = 0; j < beams.beams; ++j)
+      for (int n = 0; n < beams.samples; ++n) {
+        const std::int32_t set = focus_set(v, j, beams.first_sample + n);
+        if (set == 0) continue;
+        const MixedSample s = refocused(v, scratch.data(), beams.stride, j, n, set);
+        beams.beam(j)[2 * n] = s.re;
+        beams.beam(j)[2 * n + 1] = s.im;
+      }
+  }
+  if (!blends()) return;
+  scratch.assign(beams.data.begin(), beams.data.end());
+  const std::ptrdiff_t aside = v.step * beams.stride;
+  for (int j = 0; j < beams.beams; ++j) {
+    const float own = v.own[j], share = v.share[j];
+    const float* from = scratch.data() + j * beams.stride;
+    float* to = beams.beam(j);
+    for (int i = 0; i < 2 * beams.samples; ++i) to[i] = own * from[i];
+    if (j >= v.step)
+      for (int i = 0; i < 2 * beams.samples; ++i) to[i] += share * from[i - aside];
+    if (j + v.step < beams.beams)
+      for (int i = 0; i < 2 * beams.samples; ++i) to[i] += share * from[i + aside];
+  }
+}
+
+}  // namespace sonar

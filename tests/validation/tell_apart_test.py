@@ -1,0 +1,66 @@
+"""The classifier of captured and simulated pings, on made pictures: what differs is told, what does not is not."""
+import os
+import random
+import unittest
+from unittest import mock
+
+import capture_comparison as comparison
+import tell_apart
+
+try:
+    import numpy
+    import sklearn  # noqa: F401
+except ImportError:
+    numpy = None
+
+
+def pings(seed, smooth=False):
+    """Three pictures of noise; smooth: a sample is the mean of two rows."""
+    draw = numpy.random.default_rng(seed)
+    out = []
+    for _ in range(comparison.PINGS):
+        image = draw.rayleigh(30, (comparison.ROWS + 1, comparison.BEAMS))
+        image = (image[1:] + image[:-1]) / 2 if smooth else image[1:]
+        out.append(image.clip(0, comparison.FULL).astype(numpy.uint8).tobytes())
+    return out
+
+
+class Skipping(unittest.TestCase):
+    def test_says_what_is_missing(self):
+        with mock.patch.dict(os.environ):
+            os.environ.pop("SONARD_CAPTURES", None)
+            self.assertIn("SONARD_CAPTURES", tell_apart.missing())
+
+
+@unittest.skipIf(numpy is None, "no python3-sklearn")
+class Classifier(unittest.TestCase):
+    def test_local_means(self):
+        image = numpy.array([[random.Random(i * 9 + j).random() for j in range(9)] for i in range(9)])
+        self.assertAlmostEqual(tell_apart.box_mean(image, 4)[4, 4], image.mean())
+        self.assertAlmostEqual(tell_apart.box_mean(image, 1)[0, 0], (4 * image[0, 0] + 2 * image[0, 1] + 2 * image[1, 0] +
+                                                                    image[1, 1]) / 9)
+
+    def test_shifts(self):
+        patch = numpy.arange(16).reshape(4, 4)
+        for down, right, step in ((0, 1, 1), (1, 0, 4), (1, 1, 5), (1, -1, 3)):
+            a, b = tell_apart.shifted(patch, down, right)
+            self.assertTrue((b - a == step).all(), (down, right))
+
+    def test_texture_does_not_see_brightness(self):
+        patch = numpy.random.default_rng(1).rayleigh(1, (32, 32))
+        at, twice = (tell_apart.texture_features(scale * patch / (scale * patch).mean()) for scale in (1, 2))
+        for name, value in at.items():
+            self.assertAlmostEqual(value, twice[name], places=9, msg=name)
+
+    def test_tells_what_differs_and_no_more(self):
+        with mock.patch.object(tell_apart, "TREES", 20):
+            rows, best = tell_apart.results(pings(1, smooth=True), pings(2), pings(3))
+        shares = {name: (low, high) for name, _, low, high in rows}
+        self.assertGreater(shares["unseen sector, texture"][0], 0.95)
+        low, high = shares["control: sonard against sonard, unseen sector, texture"]
+        self.assertTrue(low - 0.05 < 0.5 < high + 0.05, (low, high))
+        self.assertGreater(best[0][0], 0.95)
+
+
+if __name__ == "__main__":
+    unittest.main()
