@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/base/load_step.hpp"
 #include "core/scene/ray_origin.hpp"
 #include "core/scene/ray_scene.hpp"
 
@@ -98,13 +99,10 @@ struct Group {
   std::size_t triangles = 0;
 };
 
-// From so many triangles on the tree's leaves hold indices instead of copies of the corners: 60 bytes a triangle less, and the
-// same hits.
-constexpr std::size_t compact_from_triangles = 2'000'000;
-
 RTCSceneFlags flags_for(std::size_t triangles) {
   const int robust = RTC_SCENE_FLAG_ROBUST;  // a ray along the edge of two triangles must not slip through
-  return static_cast<RTCSceneFlags>(triangles >= compact_from_triangles ? robust | RTC_SCENE_FLAG_COMPACT : robust);
+  const bool compact = triangles >= RayScene::compact_from_triangles;
+  return static_cast<RTCSceneFlags>(compact ? robust | RTC_SCENE_FLAG_COMPACT : robust);
 }
 
 void add_object(const Device& device, Group& group, const Mesh& mesh, const Pose& placed, std::uint32_t object) {
@@ -167,12 +165,16 @@ struct RayScene::Impl {
       add_object(device, groups[static_cast<std::size_t>(object.body + 1)], *object.mesh, placed_in_group,
                  static_cast<std::uint32_t>(i));
     }
+    begin_load_step("building the ray tracer's tree");
     for (Group& group : groups) {
       rtcSetSceneBuildQuality(group.scene.handle, RTC_BUILD_QUALITY_HIGH);
       rtcSetSceneFlags(group.scene.handle, flags_for(group.triangles));
+      const auto tell = [](void*, double part) { return load_step_reached(part), true; };
+      rtcSetSceneProgressMonitorFunction(group.scene.handle, tell, nullptr);
       rtcCommitScene(group.scene.handle);
       device.check();
     }
+    begin_load_step("preparing for pings");
     traced = groups[0].scene.handle;
     if (bodies > 0) make_top();
   }

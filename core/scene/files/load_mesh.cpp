@@ -10,6 +10,7 @@
 #include <array>
 #include <assimp/Importer.hpp>
 
+#include "core/base/load_step.hpp"
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
 #include "core/scene/files/binary_stl.hpp"
@@ -114,8 +115,11 @@ Result<LoadedMesh> clean(const MeshFile& request, bool y_up_by_default, std::uin
     return tl::make_unexpected(room.error());
   const bool y_up = request.up ? *request.up == UpAxis::y : y_up_by_default;
   const auto in_metres = [&](Vec3d p) { return request.scale * (y_up ? z_up_from_y_up(p) : p); };
+  begin_load_step("triangles of " + request.file.filename().string());
+  std::uint64_t given = 0;
   auto cleaned = clean_triangles([&](const TriangleSink& take) {
     source([&](std::span<const Vec3d, 3> p, std::uint16_t material) {
+      if (++given % 65536 == 0) load_step_reached(static_cast<double>(given) / static_cast<double>(2 * triangles));
       take(std::array{in_metres(p[0]), in_metres(p[1]), in_metres(p[2])}, material);
     });
   });
@@ -134,6 +138,7 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const std::string& exten
     if (extension == ".ply" && !has_ply_header(request.file))
       return bad(request, "cannot be read: not a PLY file with a whole header");
   }
+  begin_load_step("reading " + request.file.filename().string());
   Assimp::Importer importer;
   importer.SetIOHandler(new RegularFiles);  // is the importer's then
   const bool dae = extension == ".dae";
