@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/base/load_step.hpp"
 #include "core/scene/ray_origin.hpp"
 #include "core/scene/ray_scene.hpp"
 
@@ -95,16 +96,25 @@ struct SceneHandle {
 struct Group {
   SceneHandle scene;
   std::vector<std::uint32_t> objects;
+  std::size_t triangles = 0;
 };
+
+RTCSceneFlags flags_for(std::size_t triangles) {
+  const int robust = RTC_SCENE_FLAG_ROBUST;  // a ray along the edge of two triangles must not slip through
+  const bool compact = triangles >= RayScene::compact_from_triangles;
+  return static_cast<RTCSceneFlags>(compact ? robust | RTC_SCENE_FLAG_COMPACT : robust);
+}
 
 void add_object(const Device& device, Group& group, const Mesh& mesh, const Pose& placed, std::uint32_t object) {
   RTCGeometry geometry = rtcNewGeometry(device.handle, RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
   auto* vertices = static_cast<float*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh.vertices.size()));
-  auto* triangles = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                        3 * sizeof(std::uint32_t), mesh.triangles.size()));
-  if (vertices && triangles) {
+  // The mesh is part of the scene, which outlives this geometry; Embree only reads it.
+  static_assert(sizeof(mesh.triangles[0]) == 3 * sizeof(std::uint32_t));
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
+                             sizeof(mesh.triangles[0]), mesh.triangles.size());
+  if (vertices) {
     const Rotation turn = rotation_from(placed.orientation);
     for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
       const Vec3d v = to_double(mesh.vertices[i]);
@@ -114,11 +124,10 @@ void add_object(const Device& device, Group& group, const Mesh& mesh, const Pose
             static_cast<float>(turn.m[k][0] * v.x + turn.m[k][1] * v.y + turn.m[k][2] * v.z + p[k]);
       }
     }
-    static_assert(sizeof(mesh.triangles[0]) == 3 * sizeof(std::uint32_t));
-    std::memcpy(triangles, mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(group.scene.handle, geometry, static_cast<unsigned>(group.objects.size()));
     group.objects.push_back(object);
+    group.triangles += mesh.triangles.size();
   }
   rtcReleaseGeometry(geometry);
   device.check();
@@ -147,7 +156,7 @@ struct RayScene::Impl {
         rays_at_once(device.widest_packet()),
         origin(ray_origin_of(*scene)) {
     const std::size_t bodies = scene->bodies_in_world.size();
-    for (std::size_t i = 0; i <= bodies; ++i) groups.push_back(Group{SceneHandle(device), {}});
+    for (std::size_t i = 0; i <= bodies; ++i) groups.push_back(Group{SceneHandle(device), {}, 0});
     for (std::size_t i = 0; i < scene->objects.size(); ++i) {
       const Object& object = scene->objects[i];
       if (!object.visible || object.mesh->triangles.empty()) continue;
@@ -156,12 +165,16 @@ struct RayScene::Impl {
       add_object(device, groups[static_cast<std::size_t>(object.body + 1)], *object.mesh, placed_in_group,
                  static_cast<std::uint32_t>(i));
     }
+    begin_load_step("building the ray tracer's tree");
     for (Group& group : groups) {
       rtcSetSceneBuildQuality(group.scene.handle, RTC_BUILD_QUALITY_HIGH);
-      rtcSetSceneFlags(group.scene.handle, RTC_SCENE_FLAG_ROBUST);  // a ray along the edge of two triangles must not slip through
+      rtcSetSceneFlags(group.scene.handle, flags_for(group.triangles));
+      const auto tell = [](void*, double part) { return load_step_reached(part), true; };
+      rtcSetSceneProgressMonitorFunction(group.scene.handle, tell, nullptr);
       rtcCommitScene(group.scene.handle);
       device.check();
     }
+    begin_load_step("preparing for pings");
     traced = groups[0].scene.handle;
     if (bodies > 0) make_top();
   }

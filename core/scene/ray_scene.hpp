@@ -45,6 +45,10 @@ class RayScene {
   int rays_at_once() const;
   static std::string version();  // "Embree 3.13.5"
 
+  /// What stands still, and each body, is kept in a smaller form from so many triangles on: indices instead of copies of the
+  /// corners, some 65 bytes a triangle less. The hits are the same.
+  static constexpr std::size_t compact_from_triangles = 2'000'000;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

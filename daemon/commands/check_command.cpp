@@ -1,7 +1,9 @@
 #include "daemon/commands/check_command.hpp"
 
 #include <cstdio>
+#include <optional>
 
+#include "daemon/commands/load_progress.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
@@ -18,7 +20,9 @@ Result<void> run_check(const CheckCommand& command) {
     if (const auto token = Token::read(config->control.token_file, warning); !token) return tl::make_unexpected(token.error());
     if (!warning.empty()) std::fprintf(stderr, "sonard: %s\n", warning.c_str());
   }
+  std::optional<LoadProgress> loading(LoadProgress::to_console);
   const auto scene = load_scene(config->scene);
+  loading.reset();
   if (!scene) return tl::make_unexpected(scene.error());
   if (std::string why = why_not_movable(**scene, *config); !why.empty()) return failure(ErrorKind::config, std::move(why));
   std::printf("%s: ok, %zu sonar%s; scene %s: ok, %zu triangles\n", command.config.c_str(), config->sonars.size(),

@@ -2,6 +2,7 @@
 #include "core/scene/files/load_mesh.hpp"
 
 #include <assimp/config.h>
+#include <assimp/material.h>
 #include <assimp/scene.h>
 
 #include <assimp/DefaultIOSystem.h>
@@ -9,16 +10,18 @@
 #include <array>
 #include <assimp/Importer.hpp>
 
+#include "core/base/load_step.hpp"
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
+#include "core/scene/files/binary_stl.hpp"
 #include "core/scene/shapes/polygon.hpp"
 
 namespace sonar {
 namespace {
 
 constexpr std::uintmax_t max_file_bytes = std::uintmax_t{2} << 30;
-constexpr std::uintmax_t memory_of_a_byte = 8;  // of a file while it is read; measured: 5 of STL, and other formats are denser
-constexpr std::uint64_t memory_of_a_triangle = 200;  // bytes, while they are gathered and cleaned
+constexpr std::uintmax_t memory_of_a_byte = 8;       // of a file while the importer holds it; measured: 4 of PLY, 6 of OBJ
+constexpr std::uint64_t memory_of_a_triangle = 150;  // bytes, while they are cleaned, if no two of them share a corner
 constexpr int deepest_node = 200;
 
 std::string extension_of(const std::filesystem::path& file) {
@@ -69,61 +72,73 @@ std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint
   return triangles;
 }
 
-struct Corners {
-  std::vector<Vec3d> at;
-  std::vector<std::uint16_t> material;
-};
-
 // Node transforms in double: far offsets in a node must not cost the vertices their millimetres.
-void gather(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>& parent, int depth, Corners& out) {
+void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>& parent, int depth,
+                   const TriangleSink& take) {
   if (depth > deepest_node) return;
   const aiMatrix4x4t<double> here = parent * aiMatrix4x4t<double>(node.mTransformation);
+  std::vector<Vec3d> polygon;
   for (unsigned m = 0; m < node.mNumMeshes; ++m) {
     const aiMesh& mesh = *scene.mMeshes[node.mMeshes[m]];
+    const auto material = static_cast<std::uint16_t>(std::min(mesh.mMaterialIndex, 65535u));
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
       if (face.mNumIndices < 3) continue;  // points and lines
-      std::vector<Vec3d> polygon;
+      polygon.clear();
       for (unsigned k = 0; k < face.mNumIndices; ++k) {
         if (face.mIndices[k] >= mesh.mNumVertices) return;
         const aiVector3D& p = mesh.mVertices[face.mIndices[k]];
         const aiVector3t<double> v = here * aiVector3t<double>(p.x, p.y, p.z);
         polygon.push_back({v.x, v.y, v.z});
       }
-      for (const auto& triangle : triangulate(polygon)) {
-        for (const std::uint32_t k : triangle) out.at.push_back(polygon[k]);
-        out.material.push_back(static_cast<std::uint16_t>(std::min(mesh.mMaterialIndex, 65535u)));
+      if (polygon.size() == 3) {
+        take(std::span<const Vec3d, 3>(polygon), material);
+        continue;
       }
+      for (const auto& triangle : triangulate(polygon))
+        take(std::array{polygon[triangle[0]], polygon[triangle[1]], polygon[triangle[2]]}, material);
     }
   }
-  for (unsigned c = 0; c < node.mNumChildren; ++c) gather(scene, *node.mChildren[c], here, depth + 1, out);
+  for (unsigned c = 0; c < node.mNumChildren; ++c) each_triangle(scene, *node.mChildren[c], here, depth + 1, take);
 }
 
-}  // namespace
+tl::unexpected<Error> bad(const MeshFile& request, const std::string& what) {
+  return failure(ErrorKind::bad_data, request.file.filename().string() + ": " + what);
+}
 
-Result<LoadedMesh> load_mesh(const MeshFile& request) {
-  const std::string name = request.file.filename().string();
-  const auto bad = [&](std::string what) { return failure(ErrorKind::bad_data, name + ": " + std::move(what)); };
+/// `source` gives the corners in units and axes of the file, `triangles` of them at most.
+Result<LoadedMesh> clean(const MeshFile& request, bool y_up_by_default, std::uint64_t triangles, std::vector<std::string> names,
+                         const TriangleSource& source) {
+  if (triangles > max_mesh_triangles)
+    return bad(request, "has more than " + std::to_string(max_mesh_triangles) + " triangles; simplify it");
+  if (auto room = check_memory_for(request.file.filename().string(), memory_of_a_triangle * triangles); !room)
+    return tl::make_unexpected(room.error());
+  const bool y_up = request.up ? *request.up == UpAxis::y : y_up_by_default;
+  const auto in_metres = [&](Vec3d p) { return request.scale * (y_up ? z_up_from_y_up(p) : p); };
+  begin_load_step("triangles of " + request.file.filename().string());
+  std::uint64_t given = 0;
+  auto cleaned = clean_triangles([&](const TriangleSink& take) {
+    source([&](std::span<const Vec3d, 3> p, std::uint16_t material) {
+      if (++given % 65536 == 0) load_step_reached(static_cast<double>(given) / static_cast<double>(2 * triangles));
+      take(std::array{in_metres(p[0]), in_metres(p[1]), in_metres(p[2])}, material);
+    });
+  });
+  if (!cleaned) return bad(request, cleaned.error().text);
+  for (const std::uint16_t m : cleaned->mesh.material)
+    if (m >= names.size()) return bad(request, "uses a material that it does not define");
+  return LoadedMesh{std::move(*cleaned), std::move(names)};
+}
+
+Result<LoadedMesh> import_mesh(const MeshFile& request, const std::string& extension) {
   const bool on_disk = request.in_memory.empty();
-  std::error_code error;
-  if (on_disk && !std::filesystem::exists(request.file, error)) {
-    return failure(ErrorKind::missing_file,
-                   "no mesh file at " + request.file.string() + "; paths are relative to the scene file");
+  if (on_disk) {
+    std::error_code error;
+    const std::uintmax_t bytes = memory_of_a_byte * std::filesystem::file_size(request.file, error);
+    if (auto room = check_memory_for(request.file.filename().string(), bytes); !room) return tl::make_unexpected(room.error());
+    if (extension == ".ply" && !has_ply_header(request.file))
+      return bad(request, "cannot be read: not a PLY file with a whole header");
   }
-  if (const auto opened = on_disk ? open_regular(request.file) : OpenFile(); !opened) return tl::make_unexpected(opened.error());
-  if (on_disk && std::filesystem::file_size(request.file, error) > max_file_bytes)
-    return bad("is larger than 2 GiB; simplify it");
-  if (on_disk)
-    if (auto room = check_memory_for(name, memory_of_a_byte * std::filesystem::file_size(request.file, error)); !room)
-      return tl::make_unexpected(room.error());
-  const std::string extension = extension_of(request.file);
-  static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
-  if (std::find(known.begin(), known.end(), extension) == known.end()) {
-    return bad("unknown mesh format; use OBJ, STL, PLY, glTF, GLB or DAE");
-  }
-  if (on_disk && extension == ".ply" && !has_ply_header(request.file))
-    return bad("cannot be read: not a PLY file with a whole header");
-
+  begin_load_step("reading " + request.file.filename().string());
   Assimp::Importer importer;
   importer.SetIOHandler(new RegularFiles);  // is the importer's then
   const bool dae = extension == ".dae";
@@ -132,31 +147,41 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
   const aiScene* scene =  // without its post-processing, which asserts on odd files
       on_disk ? importer.ReadFile(request.file.string(), 0)
               : importer.ReadFileFromMemory(request.in_memory.data(), request.in_memory.size(), 0, extension.c_str() + 1);
-  if (!scene || !scene->mRootNode) return bad("cannot be read: " + first_line(importer.GetErrorString()));
-
-  const std::uint64_t triangles = triangles_of_nodes(*scene->mRootNode, triangles_of_meshes(*scene));
-  if (triangles > max_mesh_triangles)
-    return bad("has more than " + std::to_string(max_mesh_triangles) + " triangles; simplify it");
-  if (auto room = check_memory_for(name, memory_of_a_triangle * triangles); !room) return tl::make_unexpected(room.error());
-  Corners corners;
-  corners.at.reserve(3 * triangles);
-  corners.material.reserve(triangles);
-  gather(*scene, *scene->mRootNode, aiMatrix4x4t<double>(), 0, corners);
-  const bool y_up = request.up ? *request.up == UpAxis::y : y_up_by_default;
-  for (Vec3d& p : corners.at) p = request.scale * (y_up ? z_up_from_y_up(p) : p);
-  auto cleaned = clean_mesh(corners.at, corners.material);
-  if (!cleaned) return bad(cleaned.error().text);
-  LoadedMesh out;
-  out.centred = std::move(*cleaned);
+  if (!scene || !scene->mRootNode) return bad(request, "cannot be read: " + first_line(importer.GetErrorString()));
+  std::vector<std::string> names;
   for (unsigned i = 0; i < scene->mNumMaterials; ++i) {
     aiString label;
     scene->mMaterials[i]->Get(AI_MATKEY_NAME, label);
-    out.material_names.emplace_back(label.C_Str());
+    names.emplace_back(label.C_Str());
   }
-  for (std::uint16_t& m : out.centred.mesh.material) {
-    if (m >= out.material_names.size()) return bad("uses a material that it does not define");
+  const std::uint64_t triangles = triangles_of_nodes(*scene->mRootNode, triangles_of_meshes(*scene));
+  return clean(request, y_up_by_default, triangles, std::move(names),
+               [&](const TriangleSink& take) { each_triangle(*scene, *scene->mRootNode, aiMatrix4x4t<double>(), 0, take); });
+}
+
+}  // namespace
+
+Result<LoadedMesh> load_mesh(const MeshFile& request) {
+  const bool on_disk = request.in_memory.empty();
+  std::error_code error;
+  if (on_disk && !std::filesystem::exists(request.file, error)) {
+    return failure(ErrorKind::missing_file,
+                   "no mesh file at " + request.file.string() + "; paths are relative to the scene file");
   }
-  return out;
+  auto opened = on_disk ? open_regular(request.file) : OpenFile();
+  if (!opened) return tl::make_unexpected(opened.error());
+  if (on_disk && std::filesystem::file_size(request.file, error) > max_file_bytes)
+    return bad(request, "is larger than 2 GiB; simplify it");
+  const std::string extension = extension_of(request.file);
+  static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
+  if (std::find(known.begin(), known.end(), extension) == known.end())
+    return bad(request, "unknown mesh format; use OBJ, STL, PLY, glTF, GLB or DAE");
+  if (on_disk && extension == ".stl")
+    if (const auto triangles = triangles_of_binary_stl(opened->get()))
+      return clean(request, false, *triangles, {AI_DEFAULT_MATERIAL_NAME},
+                   [&](const TriangleSink& take) { each_triangle_of_binary_stl(opened->get(), take); });
+  opened->reset();
+  return import_mesh(request, extension);
 }
 
 }  // namespace sonar

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,8 +31,15 @@ struct LoadedMesh {
 /// triangles, no triangle with an area. y up becomes z up by (x, y, z) -> (x, -z, y).
 Result<LoadedMesh> load_mesh(const MeshFile& request);
 
-/// Shared checks of all meshes: finite, within 1e7 m; drops triangles without area and merges equal vertices, recentres.
-/// `positions` are triangle corners, three a triangle. Errors lack the file name.
+/// Takes the corners of a triangle and its material.
+using TriangleSink = std::function<void(std::span<const Vec3d, 3>, std::uint16_t)>;
+/// Gives every triangle to the sink, each time it is called the same ones in the same order.
+using TriangleSource = std::function<void(const TriangleSink&)>;
+
+/// Shared checks of all meshes: finite, within 1e7 m; drops triangles without area and merges equal vertices, recentres. Asks for
+/// the triangles twice, so that no copy of their corners is held. Errors lack the file name.
+Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t most = max_mesh_triangles);
+/// The same of corners, three a triangle.
 Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material,
                                std::size_t most = max_mesh_triangles);
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/load_step.hpp"
 #include "core/base/memory_left.hpp"
 #include "core/scene/shapes/primitives.hpp"
 
@@ -145,11 +146,13 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
     if (seabed_triangles(shape) > max_mesh_triangles) {
       return size.fail("makes more than 20 million triangles; raise spacing_m or set fine_size_m"), Shape{};
     }
+    begin_load_step("making the seabed");
     return from_grid(make_seabed(shape), material, size, false);
   }
   const Node file = keys.required("file");
   const std::filesystem::path path = folder / file.text(1024);
   const std::string extension = path.extension().string();
+  begin_load_step("reading " + path.filename().string());
   if (extension == ".png") {
     const auto size = keys.required("size_m").numbers<2>(a_size);
     const auto height = keys.required("height_m").numbers<2>(Range::between(-1e5, 1e5));

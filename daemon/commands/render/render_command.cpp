@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <thread>
 
 #include "core/paper/paper_engine.hpp"
+#include "daemon/commands/load_progress.hpp"
 #include "daemon/commands/render/coverage.hpp"
 #include "daemon/commands/render/render_pings.hpp"
 #include "daemon/commands/render/snapshots.hpp"
@@ -179,8 +181,11 @@ Result<int> run_render(const RenderCommand& command) {
         return tl::make_unexpected(r.error());
     return report_coverage(jobs);
   }
+  std::optional<LoadProgress> loading;
+  if (!command.quiet) loading.emplace(LoadProgress::to_console);
   auto input = input_of(command);
   if (!input) return tl::make_unexpected(input.error());
+  if (!command.report.empty() || command.check_expectations) loading.reset();
   if (!command.report.empty()) return report_coverage(input->jobs);
   if (command.check_expectations) return check(*input);
   if (std::string note = note_of_air(*input, output_options(command)); !note.empty()) input->notes.push_back(std::move(note));
@@ -188,7 +193,11 @@ Result<int> run_render(const RenderCommand& command) {
   for (const std::string& note : input->notes) std::fprintf(stderr, "sonard: %s\n", note.c_str());
   ProgressLine line(command.quiet);
   Parallel pool(threads_of(input->jobs.front().config.engine));
-  const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) { line.show(p); });
+  const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) {
+    loading.reset();  // the first ping is there
+    line.show(p);
+  });
+  loading.reset();
   if (!done) return tl::make_unexpected(done.error());
   line.conclude(*done);
   return 0;

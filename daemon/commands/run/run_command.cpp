@@ -4,8 +4,10 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <thread>
 
+#include "daemon/commands/load_progress.hpp"
 #include "daemon/commands/run/banner.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/config/find_config.hpp"
@@ -92,6 +94,8 @@ Result<int> run_daemon(const RunCommand& command, Steady::time_point begin, bool
   if (!found) return tl::make_unexpected(found.error());
   Config& config = found->config;
   const auto scene_begin = Steady::now();
+  std::optional<LoadProgress> loading(std::in_place,
+                                      [own = std::make_shared<Log>(config.log)](const std::string& line) { own->info(line); });
   const auto scene = load_scene(config.scene);
   if (!scene) return tl::make_unexpected(scene.error());
   if (std::string why = why_not_movable(**scene, config); !why.empty()) return failure(ErrorKind::config, std::move(why));
@@ -102,6 +106,7 @@ Result<int> run_daemon(const RunCommand& command, Steady::time_point begin, bool
   const EngineFactory make = engine_factory(config, pool);
   Result<std::unique_ptr<PingEngine>> engine;
   compute_apart([&] { engine = start_engine(make, *scene); });
+  loading.reset();
   if (!engine) return tl::make_unexpected(engine.error());
   const auto make_engine_for = [&](ScenePointer s) -> std::unique_ptr<PingEngine> {
     if (*engine) return *std::move(engine);  // the first

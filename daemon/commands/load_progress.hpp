@@ -1,0 +1,30 @@
+// Lines about a load that takes long, for a console or the log.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <future>
+#include <string>
+#include <thread>
+
+namespace sonar {
+
+/// While it lives it says every so often what the load is at: "loading the scene: reading wreck.ply, 45 %, 12 s". Nothing of a
+/// load that ends before.
+class LoadProgress {
+ public:
+  using Say = std::function<void(const std::string& line)>;  // called on a thread of its own
+  explicit LoadProgress(Say say, std::chrono::milliseconds every = std::chrono::seconds(2));
+  ~LoadProgress();
+  LoadProgress(const LoadProgress&) = delete;
+  LoadProgress& operator=(const LoadProgress&) = delete;
+
+  /// To standard error, as commands speak.
+  static void to_console(const std::string& line);
+
+ private:
+  std::promise<void> ended_;
+  std::thread thread_;
+};
+
+}  // namespace sonar
