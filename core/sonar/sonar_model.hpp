@@ -34,8 +34,6 @@ struct BeamProfile {
   std::vector<float> near_noise_db;  // and at range 0; as long as noise_db
   float near_m = 0.2f;               // the far one's share grows as 1 - e^{-r / near_m}
   std::vector<float> blend;          // amplitude that a beam receives of either neighbour half a beam width away, re its own
-
-  bool operator==(const BeamProfile&) const = default;
 };
 
 /// How the receiver turns pressure into samples (docs/acoustics.md, section 7); constants of the product.
