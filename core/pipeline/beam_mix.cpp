@@ -9,10 +9,26 @@
 namespace sonar {
 namespace {
 
-constexpr double set_rad = 0.25;  // between neighbouring sets of taps: -18 dB of the signal at most, between exact phases
-constexpr double most_rad = 16;   // nearer, the error is held
+constexpr double set_rad = 0.5;  // between neighbouring sets of taps: at most half of it off, at the ends of the aperture
+constexpr double most_rad = 16;  // nearer, the error is held
 constexpr int aperture_points = 512;
 constexpr double neighbour_in_beams = 0.56;  // how far a neighbour is, in -3 dB widths: 1 of 256 beams of the M1200d
+
+/// refocused() of the samples [n, end).
+void refocus_run(const BeamMixView& v, const float* from, int j, std::int32_t set, int n, int end, BeamSignals& beams) {
+  const std::int32_t reach = v.reach[set];
+  const float* tap = v.taps + 2 * (static_cast<std::ptrdiff_t>(set) * (2 * v.widest + 1) + v.widest);
+  float* const to = beams.beam(j);
+  std::fill(to + 2 * n, to + 2 * end, 0.0f);
+  for (std::int32_t d = std::max(-reach, -j); d <= std::min(reach, v.beams - 1 - j); ++d) {
+    const float re = tap[2 * d], im = tap[2 * d + 1];
+    const float* const s = from + (j + d) * beams.stride;
+    for (int i = n; i < end; ++i) {
+      to[2 * i] += re * s[2 * i] - im * s[2 * i + 1];
+      to[2 * i + 1] += re * s[2 * i + 1] + im * s[2 * i];
+    }
+  }
+}
 
 }  // namespace
 
@@ -47,7 +63,7 @@ void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
   const int sets = static_cast<int>(most_rad / set_rad) + 1;
   // The largest slope of the phase, 4 edge / L, displaces by 2 edge / (pi L) in sine.
   const auto reach_of = [&](int set) {
-    return set == 0 ? 0 : static_cast<int>(std::ceil(2 * set_rad * set / (pi * wavelengths * spacing))) + 3;
+    return set == 0 ? 0 : static_cast<int>(std::ceil(2 * set_rad * set / (pi * wavelengths * spacing))) + 2;
   };
   widest_ = reach_of(sets - 1);
   taps_.assign(2 * static_cast<std::size_t>(sets * (2 * widest_ + 1)), 0.0f);
@@ -123,12 +139,14 @@ void BeamMix::apply(BeamSignals& beams, std::vector<float>& scratch) const {
   if (blurs() && largest_turn_m_ * v.sets_per_rad >= 0.5f * nearest_m) {
     scratch.assign(beams.data.begin(), beams.data.end());
     for (int j = 0; j < beams.beams; ++j)
-      for (int n = 0; n < beams.samples; ++n) {
+      // Samples that share their taps, side by side; with the range the set falls to 0 and stays.
+      for (int n = 0; n < beams.samples;) {
         const std::int32_t set = focus_set(v, j, beams.first_sample + n);
-        if (set == 0) continue;
-        const MixedSample s = refocused(v, scratch.data(), beams.stride, j, n, set);
-        beams.beam(j)[2 * n] = s.re;
-        beams.beam(j)[2 * n + 1] = s.im;
+        if (set == 0) break;
+        int end = n + 1;
+        while (end < beams.samples && focus_set(v, j, beams.first_sample + end) == set) ++end;
+        refocus_run(v, scratch.data(), j, set, n, end, beams);
+        n = end;
       }
   }
   if (!blends()) return;
