@@ -14,7 +14,8 @@ struct {
 
 }  // namespace
 
-void begin_load_step(std::string what) {
+void begin_load_step(std::string what, std::uint64_t triangles) {
+  if (triangles < 300'000) return;
   const std::lock_guard lock(step.mutex);
   step.what = std::move(what);
   step.part.store(0, std::memory_order_relaxed);

@@ -165,7 +165,7 @@ struct RayScene::Impl {
       add_object(device, groups[static_cast<std::size_t>(object.body + 1)], *object.mesh, placed_in_group,
                  static_cast<std::uint32_t>(i));
     }
-    begin_load_step("building the ray tracer's tree");
+    begin_load_step("building the ray tracer's tree", scene->triangle_count());
     for (Group& group : groups) {
       rtcSetSceneBuildQuality(group.scene.handle, RTC_BUILD_QUALITY_HIGH);
       rtcSetSceneFlags(group.scene.handle, flags_for(group.triangles));
@@ -174,7 +174,7 @@ struct RayScene::Impl {
       rtcCommitScene(group.scene.handle);
       device.check();
     }
-    begin_load_step("preparing for pings");
+    begin_load_step("preparing for pings", scene->triangle_count());
     traced = groups[0].scene.handle;
     if (bodies > 0) make_top();
   }

@@ -11,7 +11,8 @@ LoadProgress::LoadProgress(Say say, std::chrono::milliseconds every)
         const auto begin = std::chrono::steady_clock::now();
         while (ended.wait_for(every) == std::future_status::timeout) {
           const LoadStep step = load_step();
-          std::string line = "loading the scene: " + (step.what.empty() ? "" : step.what + ", ");
+          if (step.what.empty()) continue;  // a small scene
+          std::string line = "loading the scene: " + step.what + ", ";
           if (step.part > 0) line += std::to_string(static_cast<int>(100 * step.part)) + " %, ";
           const auto passed = std::chrono::steady_clock::now() - begin;
           say(line + std::to_string(std::chrono::duration_cast<std::chrono::seconds>(passed).count()) + " s");

@@ -10,7 +10,7 @@
 namespace sonar {
 
 /// While it lives it says every so often what the load is at: "loading the scene: reading wreck.ply, 45 %, 12 s". Nothing of a
-/// load that ends before.
+/// load that ends before, and nothing of small scenes.
 class LoadProgress {
  public:
   using Say = std::function<void(const std::string& line)>;  // called on a thread of its own

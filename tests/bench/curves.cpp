@@ -78,6 +78,20 @@ json sonars(int count, const ScenePointer& scene, const BenchScene& where, const
 
 }  // namespace
 
+json find_rates_of_threads(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options) {
+  json found = json::array();
+  for (const char* name : {"P1", "P3a", "P3d"})
+    for (const int threads : {1, 2, 4}) {
+      const BenchCase c = *find_case(name);
+      const Figures f = measure(c, where, *scene, *Bench(scene, threads, options).engine, threads, options);
+      std::printf("P13  %-4s %d threads: %.1f pings/s\n", name, threads, f.pings_per_second());
+      std::fflush(stdout);
+      found.push_back(
+          {{"case", name}, {"description", c.description}, {"threads", threads}, {"pings_per_second", f.pings_per_second()}});
+    }
+  return found;
+}
+
 json find_curves(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options) {
   json curves = json::array();
   json points = json::array();

@@ -32,5 +32,10 @@ nlohmann::json find_curves(const ScenePointer& scene, const BenchScene& where, c
 Result<nlohmann::json> find_latency(const ScenePointer& scene, const BenchOptions& options);
 /// P8: clients that take every ping of a whole daemon; dropped pings, and what sending takes of one processor.
 Result<nlohmann::json> find_cost_of_clients(const ScenePointer& scene, int clients, double seconds, const BenchOptions& options);
+/// P13: rates of P1, P3a and P3d with 1, 2 and 4 threads.
+nlohmann::json find_rates_of_threads(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
+/// P13: pings a second of so many P900-90 (2 to 10 m) in one daemon, each with a client that requests the next ping when it has
+/// the last: of all, of the slowest and of the fastest.
+Result<nlohmann::json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double seconds, const BenchOptions& options);
 
 }  // namespace sonar::bench

@@ -23,7 +23,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* other_cases[] = {"P3e", "P5", "P6", "P7", "P8", "P9", "P10", "P12"};  // beside bench_cases()
+constexpr const char* other_cases[] = {"P3e", "P5", "P6", "P7", "P8", "P9", "P10", "P12", "P13"};  // beside bench_cases()
 constexpr int ratios_missed = 1;
 
 template <class Items>
@@ -133,6 +133,15 @@ Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, c
     if (!empty) return tl::make_unexpected(empty.error());
     report["empty_bins"] = *std::move(empty);
   }
+  if (asked("P13")) {
+    report["threads"] = find_rates_of_threads(scene, where, options);
+    report["sonars"] = json::array();
+    for (const int sonars : {1, 2, 4, 8}) {
+      auto rates = find_rates_of_sonars(scene, sonars, 5, options);
+      if (!rates) return tl::make_unexpected(rates.error());
+      report["sonars"].push_back(*std::move(rates));
+    }
+  }
   if (options.curves) report["curves"] = find_curves(scene, where, options);
   return all_hold;
 }
@@ -188,7 +197,7 @@ int parse_and_run(int argc, char** argv) {
   EngineOptionsGiven model;
   CLI::App cli{
       "Times whole pings, stage by stage, warm: the cells of the scene are made already. The first ping, which makes them, is\n"
-      "the figure \"cold\" of every case; P3e jumps. P5 and P8 run a daemon on loopback, P6 compares the hot loops with the "
+      "the figure \"cold\" of every case; P3e jumps. P5, P8 and P13 run a daemon on loopback, P6 compares the hot loops with the "
       "plain\n"
       "ways of doing the same and exits with 1 when a ratio is missed.",
       "sonard_bench"};

@@ -3,15 +3,19 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <list>
+#include <numeric>
 #include <string>
 #include <thread>
 
+#include "clients/sonarctl/blueview_stream.hpp"
 #include "daemon/server/app.hpp"
 #include "daemon/server/engine/choose_engine.hpp"
+#include "protocol/blueview/link.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "tests/bench/findings.hpp"
 
@@ -23,10 +27,28 @@ using nlohmann::json;
 constexpr std::uint16_t data_port = 52100;
 constexpr int patience_s = 20;
 
-/// One of 127.64..127.191, from the number of this process.
-std::string own_address() {
+/// In one of the networks 127.64..127.191, from the number of this process.
+std::string own_address(int sonar = 0) {
   const auto process = static_cast<unsigned>(::getpid());
-  return "127." + std::to_string(64 + process / 250 % 128) + "." + std::to_string(1 + process % 250) + ".99";
+  return "127." + std::to_string(64 + process / 250 % 128) + "." + std::to_string(1 + process % 250) + "." +
+         std::to_string(99 + sonar);
+}
+
+/// `count` sonars of a product side by side on one vehicle, as a configuration lists them.
+std::string sonars_of(const std::string& profile, int count) {
+  std::string list;
+  for (int i = 0; i < count; ++i)
+    list += "  - {name: sonar" + std::to_string(i) + ", profile: " + profile +
+            ", clients: {max: 16}, bind_ip: " + own_address(i) + ", status_to: ['" + own_address(i) +
+            ":9'], mount: {frame: FLU, xyz_m: [0, " + std::to_string(i) + ", 0]}}\n";
+  return list;
+}
+
+/// Pings follow each other as fast as the engine and the sound's way allow: the product's own limit is lifted.
+void lift_rate(SonarConfig& sonar) {
+  auto model = std::make_shared<SonarModel>(*sonar.profile.model);
+  model->max_rate_hz = 1000;
+  sonar.profile.model = std::move(model);
 }
 
 oculus::FireRequest fire_p3a(bool triggered) {
@@ -42,17 +64,19 @@ oculus::FireRequest fire_p3a(bool triggered) {
 
 class Service {
  public:
-  static Result<std::unique_ptr<Service>> start(const ScenePointer& scene, const BenchOptions& options) {
+  static Result<std::unique_ptr<Service>> start(const ScenePointer& scene, const BenchOptions& options,
+                                                const std::string& sonars = sonars_of("oculus-m1200d", 1),
+                                                bool at_any_rate = false) {
     const std::string address = own_address();
     auto config = parse_config(
         "world: {scene: local-search.yaml}\n"
         "vehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -8], rpy_deg: [0, 14.3, 0]}}\n"
-        "sonars:\n  - {name: front, profile: oculus-m1200d, clients: {max: 16}, bind_ip: " +
-            address + ", status_to: ['" + address + ":9']}\n" + "poses: {protobuf: '" + address + ":0', json: '" + address +
-            ":0'}\ncontrol: {stream: off, http: off}\n",
+        "sonars:\n" +
+            sonars + "poses: {protobuf: '" + address + ":0', json: '" + address + ":0'}\ncontrol: {stream: off, http: off}\n",
         "bench", options.scene_folder);
     if (!config) return tl::make_unexpected(config.error());
     config->engine = options.engine;
+    if (at_any_rate) std::for_each(config->sonars.begin(), config->sonars.end(), lift_rate);
     auto service = std::unique_ptr<Service>(new Service(*std::move(config), scene, options));
     if (auto opened = service->app_.open(); !opened) return tl::make_unexpected(opened.error());
     service->address_ = address;
@@ -202,6 +226,47 @@ Result<json> find_cost_of_clients(const ScenePointer& scene, int clients, double
   return json{{"clients", clients},    {"pings_per_second", rate_hz},
               {"dropped", slow},       {"skipped_ticks", f.skipped_ticks},
               {"sender_share", share}, {"seconds", took_s}};
+}
+
+Result<json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double seconds, const BenchOptions& options) {
+  using clients::BlueViewStream;
+  constexpr std::chrono::seconds patience(patience_s);
+  auto service = Service::start(scene, options, sonars_of("blueview-p900-90", sonars), true);
+  if (!service) return tl::make_unexpected(service.error());
+  std::vector<BlueViewStream> streams;
+  for (int i = 0; i < sonars; ++i) {
+    auto socket = clients::connect_tcp({own_address(i), blueview::tcp_port}, patience);
+    if (!socket) return tl::make_unexpected(socket.error());
+    auto stream = BlueViewStream::open(*std::move(socket), {}, patience);
+    if (!stream) return tl::make_unexpected(stream.error());
+    streams.push_back(*std::move(stream));
+  }
+  std::vector<std::atomic<std::uint64_t>> received(streams.size());
+  std::atomic<bool> enough = false;
+  std::vector<std::thread> readers;
+  for (std::size_t i = 0; i < streams.size(); ++i)
+    readers.emplace_back([&, i] {
+      while (!enough && streams[i].next(patience).what == clients::Wait::data) ++received[i];
+    });
+  const auto counts = [&] { return std::vector<std::uint64_t>(received.begin(), received.end()); };
+  const auto wait_s = [](double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); };
+  wait_s(1);
+  const double begin = now_s();
+  const std::vector<std::uint64_t> before = counts();
+  wait_s(seconds);
+  const double took_s = now_s() - begin;
+  std::vector<double> rates;
+  for (const std::uint64_t n : counts()) rates.push_back(static_cast<double>(n - before[rates.size()]) / took_s);
+  enough = true;
+  for (std::thread& reader : readers) reader.join();
+  const auto [lowest, highest] = std::minmax_element(rates.begin(), rates.end());
+  const double total = std::accumulate(rates.begin(), rates.end(), 0.0);
+  if (total == 0) return tl::make_unexpected(broken("sent no pings"));
+  std::printf("P13  %d sonars of P1, %d threads: %.1f pings/s together, the slowest %.1f, the fastest %.1f\n", sonars,
+              options.threads.back(), total, *lowest, *highest);
+  std::fflush(stdout);
+  return json{
+      {"sonars", sonars}, {"threads", options.threads.back()}, {"total", total}, {"lowest", *lowest}, {"highest", *highest}};
 }
 
 }  // namespace sonar::bench

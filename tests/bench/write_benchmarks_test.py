@@ -53,6 +53,15 @@ class Page(unittest.TestCase):
         for words in ("31.000 %", "| 500 |", "400: 5.00 ms"):
             self.assertIn(words, tables)
 
+    def test_threads_and_sonars_have_a_table_each(self):
+        report = {"processor": "test", "results": [result("P1", 2, 80)],
+                  "threads": [{"case": "P1", "description": "P1 described", "threads": n, "pings_per_second": 50.0 * n} for n in (1, 2)],
+                  "sonars": [{"sonars": 8, "threads": 2, "total": 160.0, "lowest": 18.0, "highest": 24.0}]}
+        tables = write_benchmarks.tables(report)
+        for words in ("| case | what | 1 thread | 2 threads |", "| P1 | P1 described | 50 | 100 (2.00) |",
+                      "| 8 | 2 | 160 | 18.0 | 24.0 | 0.75 |"):
+            self.assertIn(words, tables)
+
     def test_instruction_sets_stand_beside_each_other(self):
         sets = [{"processor": "test", "results": [dict(result("P1", 2, rate), engine=f"cpu, {name}, 2 threads, Embree")]}
                 for name, rate in (("avx2", 100), ("portable", 40))]

@@ -115,7 +115,7 @@ Result<LoadedMesh> clean(const MeshFile& request, bool y_up_by_default, std::uin
     return tl::make_unexpected(room.error());
   const bool y_up = request.up ? *request.up == UpAxis::y : y_up_by_default;
   const auto in_metres = [&](Vec3d p) { return request.scale * (y_up ? z_up_from_y_up(p) : p); };
-  begin_load_step("triangles of " + request.file.filename().string());
+  begin_load_step("triangles of " + request.file.filename().string(), triangles);
   std::uint64_t given = 0;
   auto cleaned = clean_triangles([&](const TriangleSink& take) {
     source([&](std::span<const Vec3d, 3> p, std::uint16_t material) {
@@ -135,10 +135,10 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const std::string& exten
     std::error_code error;
     const std::uintmax_t bytes = memory_of_a_byte * std::filesystem::file_size(request.file, error);
     if (auto room = check_memory_for(request.file.filename().string(), bytes); !room) return tl::make_unexpected(room.error());
+    begin_load_step("reading " + request.file.filename().string(), bytes / memory_of_a_byte / 20);  // of PLY; others are longer
     if (extension == ".ply" && !has_ply_header(request.file))
       return bad(request, "cannot be read: not a PLY file with a whole header");
   }
-  begin_load_step("reading " + request.file.filename().string());
   Assimp::Importer importer;
   importer.SetIOHandler(new RegularFiles);  // is the importer's then
   const bool dae = extension == ".dae";

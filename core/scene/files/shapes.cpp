@@ -146,13 +146,15 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
     if (seabed_triangles(shape) > max_mesh_triangles) {
       return size.fail("makes more than 20 million triangles; raise spacing_m or set fine_size_m"), Shape{};
     }
-    begin_load_step("making the seabed");
+    begin_load_step("making the seabed", seabed_triangles(shape));
     return from_grid(make_seabed(shape), material, size, false);
   }
   const Node file = keys.required("file");
   const std::filesystem::path path = folder / file.text(1024);
   const std::string extension = path.extension().string();
-  begin_load_step("reading " + path.filename().string());
+  std::error_code no_size;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, no_size);
+  begin_load_step("reading " + path.filename().string(), no_size ? 0 : bytes / 4);
   if (extension == ".png") {
     const auto size = keys.required("size_m").numbers<2>(a_size);
     const auto height = keys.required("height_m").numbers<2>(Range::between(-1e5, 1e5));

@@ -35,7 +35,8 @@ TEST(LoadProgress, ALongOneTellsItsStepItsPartAndTheSeconds) {
     said.wait(lock, [&] { return lines.size() > before + 1; });  // the next may have been under way
     return lines.back();
   };
-  begin_load_step("reading wreck.ply");
+  begin_load_step("reading wreck.ply", 1'000'000);
+  begin_load_step("a crate, which is small", 12);
   const LoadProgress progress(
       [&](const std::string& line) {
         const std::lock_guard lock(mutex);
@@ -46,7 +47,7 @@ TEST(LoadProgress, ALongOneTellsItsStepItsPartAndTheSeconds) {
   EXPECT_THAT(wait_for_a_line(), StartsWith("loading the scene: reading wreck.ply, 0 s"));
   load_step_reached(0.456);
   EXPECT_THAT(wait_for_a_line(), HasSubstr("reading wreck.ply, 45 %, "));
-  begin_load_step("building");
+  begin_load_step("building", 1'000'000);
   EXPECT_THAT(wait_for_a_line(), StartsWith("loading the scene: building, "));
 }
 
