@@ -24,7 +24,6 @@ constexpr double side_step_rad = 0.19;           // between rays in them; a plan
 constexpr int side_bins = 64;                    // of the depth map on either side
 constexpr double unit_fan_over_width = 2.3;      // where there is no pattern to end it
 constexpr double widest_fan_rad = 1.4;
-constexpr double level_fade = 1.15;  // cell levels cross-fade over 15 % of range
 
 double half_aperture_sine(const FrequencyMode& mode) { return std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2); }
 
@@ -312,28 +311,6 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
     }
   }
   return c;
-}
-
-std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m) {
-  const int coarsest = static_cast<int>(std::ceil(-std::log2(pulse_width_m) - 1e-9));
-  constexpr double nearest_m = 0.2;  // no image begins nearer; one level serves the rest
-  std::vector<CellLevel> levels;
-  double coarser_begins = 2 * max_range_m;  // where the level above takes over
-  for (int level = coarsest;; ++level) {
-    // A cell is at most a third of a beam wide from here on: 2^-level <= r theta / 3.
-    const double begins = 3 * std::ldexp(1.0, -level) / beam_width_rad;
-    const bool finest = begins < nearest_m || level - coarsest > 10;
-    CellLevel l;
-    l.level = level;
-    l.fade_in_from_m = finest ? 0.0f : static_cast<float>(begins);
-    l.full_from_m = finest ? 0.0f : static_cast<float>(begins * level_fade);
-    l.full_to_m = static_cast<float>(coarser_begins);
-    l.fade_out_to_m = static_cast<float>(coarser_begins * level_fade);
-    if (begins < max_range_m || finest) levels.push_back(l);
-    if (finest) break;
-    if (begins < max_range_m) coarser_begins = begins;
-  }
-  return levels;
 }
 
 std::optional<std::size_t> PingPlan::column_of(const ConicalDirection& direction, double half_angle_rad) const {
