@@ -30,6 +30,24 @@ void refocus_run(const BeamMixView& v, const float* from, int j, std::int32_t se
   }
 }
 
+/// blended() of all beams in place: what a beam was before waits in `before`, a ring, for the one `step` further on.
+void blend(const BeamMixView& v, BeamSignals& beams, std::vector<float>& before) {
+  const int floats = 2 * beams.samples;
+  before.assign(static_cast<std::size_t>(v.step + 1) * static_cast<std::size_t>(floats), 0.0f);
+  const float* nothing = before.data() + static_cast<std::ptrdiff_t>(v.step) * floats;  // beyond the last beam
+  for (int j = 0; j < beams.beams; ++j) {
+    const float own = v.own[j], share = v.share[j];
+    float* __restrict to = beams.beam(j);
+    float* __restrict port = before.data() + static_cast<std::ptrdiff_t>(j % v.step) * floats;
+    const float* starboard = j + v.step < beams.beams ? beams.beam(j + v.step) : nothing;
+    for (int i = 0; i < floats; ++i) {
+      const float here = to[i];
+      to[i] = own * here + share * port[i] + share * starboard[i];
+      port[i] = here;
+    }
+  }
+}
+
 }  // namespace
 
 double at_sine(const std::vector<float>& table, double sine, double top) {
@@ -149,19 +167,7 @@ void BeamMix::apply(BeamSignals& beams, std::vector<float>& scratch) const {
         n = end;
       }
   }
-  if (!blends()) return;
-  scratch.assign(beams.data.begin(), beams.data.end());
-  const std::ptrdiff_t aside = v.step * beams.stride;
-  for (int j = 0; j < beams.beams; ++j) {
-    const float own = v.own[j], share = v.share[j];
-    const float* from = scratch.data() + j * beams.stride;
-    float* to = beams.beam(j);
-    for (int i = 0; i < 2 * beams.samples; ++i) to[i] = own * from[i];
-    if (j >= v.step)
-      for (int i = 0; i < 2 * beams.samples; ++i) to[i] += share * from[i - aside];
-    if (j + v.step < beams.beams)
-      for (int i = 0; i < 2 * beams.samples; ++i) to[i] += share * from[i + aside];
-  }
+  if (blends()) blend(v, beams, scratch);
 }
 
 }  // namespace sonar
