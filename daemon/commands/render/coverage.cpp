@@ -188,6 +188,8 @@ std::vector<RenderJob> shipped_sonars_over_a_bed() {
         job.settings = device_settings(job);
         const double stored_m = job.settings.range_m;
         job.settings.mode = static_cast<int>(mode);
+        if (!job.mode().beam_azimuths_rad.empty())
+          job.settings.beam_count = static_cast<int>(job.mode().beam_azimuths_rad.size());
         job.settings.range_m = std::min(stored_m, static_cast<double>(job.mode().max_range_m));
         job.settings.range_bin_m *= job.settings.range_m / stored_m;
         job.settings.pulse_width_m *= static_cast<float>(job.settings.range_m / stored_m);
