@@ -105,8 +105,8 @@ inline Lanes gather(const float* table, LaneNumbers at) {
 inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
   alignas(32) std::int32_t place[lanes];
   *reinterpret_cast<LaneNumbers*>(place) = at;
-  const auto pair = [&](int l) { return reinterpret_cast<const double*>(table + place[l]); };
-  const auto two = [&](int l) { return _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(pair(l)), pair(l + 1))); };
+  const auto pair = [&](int l) { return reinterpret_cast<const __m64*>(table + place[l]); };
+  const auto two = [&](int l) { return _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), pair(l)), pair(l + 1)); };
   const __m256 a = _mm256_set_m128(two(4), two(0)), b = _mm256_set_m128(two(6), two(2));
   first = Lanes(_mm256_shuffle_ps(a, b, 0x88)), second = Lanes(_mm256_shuffle_ps(a, b, 0xDD));
 }
