@@ -48,7 +48,9 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
     seen_inverse_h = 1.0f / larger(g.conical != 0 ? there_x : flat, 1e-6f);
     const float over_range = g.conical != 0 ? 1.0f / larger(std::sqrt(flat * flat + seen_z * seen_z), 1e-6f) : seen_inverse_h;
     const float wanted = (g.first_edge_sine - there_y * over_range) * g.columns_per_sine;
-    seen_column = smaller(larger(wanted, 0.0f), static_cast<float>(g.columns - 1));
+    const float own = static_cast<float>(static_cast<std::int32_t>(larger(column, 0.0f))),
+                beside = static_cast<float>(g.columns_beside);
+    seen_column = smaller(larger(wanted, larger(own - beside, 0.0f)), smaller(own + beside, static_cast<float>(g.columns - 1)));
   }
   const float tangent = seen_z * seen_inverse_h, steepness = std::fabs(tangent);
   const float sample = r * g.samples_per_m - g.sample_offset + t.sample_shift;
@@ -57,7 +59,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
     return false;
   at.column = static_cast<std::int32_t>(column);
   // Depth map between two bins, with the tolerances of docs/acoustics.md, section 3.
-  const float bin = bin_of_tangent(g.axis, tangent);
+  const float bin = smaller(bin_of_tangent(g.axis, tangent), static_cast<float>(g.bins) - bin_rounding);
   const auto below = static_cast<std::int32_t>(bin);
   const auto map_column = static_cast<std::int32_t>(seen_column);
   const std::int64_t map_at = static_cast<std::int64_t>(map_column) * (g.bins + 1) + below;

@@ -29,6 +29,7 @@ void PingPreparer::place_fan(Making& m) {
   sea.axis = g.axis;
   sea.side_elevations = plan.fan.side_elevations;
   sea.side_columns = PingPlan::side_columns;
+  sea.columns_beside = g.columns_beside;
   sea.elevation_aperture = g.elevation_aperture;
   sea.depth_tolerance_m = g.depth_tolerance_m;
   sea.turns_per_m = g.turns_per_m;

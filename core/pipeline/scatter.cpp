@@ -160,7 +160,8 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.first_column = first;
   g.last_column = last;
   g.map_first_column = seen.first_column;
-  g.map_last_column = seen.first_column + seen.columns;
+  g.fan_columns = plan.columns.count;
+  g.columns_beside = s.columns_turned(plan);
   g.axis = plan.fan.axis;
   g.bins = seen.bins;
   g.inverse_depth = seen.inverse_x.data();

@@ -303,12 +303,12 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
   const int map_first = std::max(first - beside, 0), map_last = std::min(last + beside, plan_.columns.count);
   mine.seen.shape(map_first, map_last, plan_.fan.bins);
   const auto trace = [&](int from, int to) {
-    if (from < to) mine.statistics.rays += trace_fan(scene_, plan_, scalars_, from, to, mine.fan, mine.seen);
+    return from < to ? trace_fan(scene_, plan_, scalars_, from, to, mine.fan, mine.seen) : 0;
   };
   for (int from = first; from < last; from += traced_columns()) {
     // Rays draw the depth map of these columns (section 2).
     const int to = std::min(from + traced_columns(), last);
-    trace(from, to);
+    mine.statistics.rays += trace(from, to);  // those beside are counted where they belong
     if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, from, to, w_.first_hits);
   }
   trace(map_first, first);

@@ -126,19 +126,40 @@ class FanTracer {
         trace_side(e, elevation);
         continue;
       }
+      if (last_ - first_ <= RayPacket::size / 2) {
+        trace_few(e);
+        e = n - plan_.fan.side_elevations - 1;
+        continue;
+      }
       for (int from = first_; from < last_; from += RayPacket::size) {
         const int to = std::min(from + RayPacket::size, last_);
         filler_.clear();
         for (int k = from; k < to; ++k) filler_.add(column(k - first_), elevation);
         filler_.trace(scene_);
-        for (int k = from; k < to; ++k) {
-          const std::int32_t index = (k - first_) * n + e;
-          store(k - from, elevation, column(k - first_), at(index));
-          at(index).next = e + 1 < n ? index + 1 : -1;
-          at(index).edge_above = false;
-        }
+        for (int k = from; k < to; ++k) store_base(k - from, k - first_, e);
       }
     }
+  }
+
+  /// Of few columns, all elevations from `e` on: several elevations a packet.
+  void trace_few(int e) {
+    const int n = elevations(), end = n - plan_.fan.side_elevations, columns = last_ - first_;
+    for (const int rows = RayPacket::size / columns; e < end; e += rows) {
+      const int to = std::min(e + rows, end);
+      filler_.clear();
+      for (int row = e; row < to; ++row)
+        for (int k = 0; k < columns; ++k) filler_.add(column(k), base_[static_cast<std::size_t>(row)]);
+      filler_.trace(scene_);
+      for (int row = e; row < to; ++row)
+        for (int k = 0; k < columns; ++k) store_base((row - e) * columns + k, k, row);
+    }
+  }
+  void store_base(int lane, int k, int e) {
+    const int n = elevations();
+    const std::int32_t index = k * n + e;
+    store(lane, base_[static_cast<std::size_t>(e)], column(k), at(index));
+    at(index).next = e + 1 < n ? index + 1 : -1;
+    at(index).edge_above = false;
   }
 
   /// In the side lobes a few columns share a ray, whichever group they are in: what it met is of all of them.

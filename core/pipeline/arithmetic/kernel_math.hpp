@@ -20,6 +20,8 @@ inline constexpr float contact_m = 1e-3f, contact_share = 2e-5f;
 struct TangentAxis {
   float middle_bin, edge_tangent, bins_per_tangent, side_bins_per_tangent;
 };
+/// Bins are looked up so far below the last at most: a tangent just below the fan's edge may be rounded onto it.
+inline constexpr float bin_rounding = 1.0f / 1024;
 /// Intervals of a tabulated scattering law; the table has law_steps + 2 values.
 inline constexpr int law_steps = 128;
 

@@ -59,7 +59,10 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
   const Lanes lowest = all(s.from_tangent), highest = all(s.to_tangent), nearest = all(window.from_m),
               farthest = all(window.to_m);
   const int row = g.bins + 1;
-  const Lanes map_first = all(static_cast<float>(g.map_first_column)), map_last = all(static_cast<float>(g.map_last_column - 1));
+  const Lanes last_bin = all(static_cast<float>(g.bins) - bin_rounding);
+  // Bounds of the cell's own column, not of the group: what is seen must not depend on how columns are grouped.
+  const Lanes map_first = all(static_cast<float>(g.map_first_column)), last_in_fan = all(static_cast<float>(g.fan_columns - 1));
+  const float beside = static_cast<float>(g.columns_beside);
   int m = 0;
   // r^2 = r0^2 + e with e = d . (2 q + d), d the cell's offset from the tile's centre: no difference of large numbers.
   for (int i = from; i < from + n; i += lanes) {
@@ -83,7 +86,8 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
       seen_inverse_h = conical ? reciprocal(larger(there_x, all(1e-6f))) : inverse_root(larger(across, all(1e-12f)));
       const Lanes over_range = conical ? inverse_root(larger(across + seen_z * seen_z, all(1e-12f))) : seen_inverse_h;
       const Lanes wanted = (g.first_edge_sine - there_y * over_range) * g.columns_per_sine;
-      seen_column = smaller(larger(wanted, map_first), map_last);
+      const Lanes own = as_floats(whole_part(larger(column, all(0))));
+      seen_column = smaller(larger(wanted, larger(own - beside, all(0))), smaller(own + beside, last_in_fan));
     }
     const Lanes tangent = seen_z * seen_inverse_h, steepness = magnitude(tangent);
     LaneMask keep = both(not_below(column, first_column), below(column, end_column));
@@ -94,7 +98,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
 
     // Depth map between two bins, against the cell's own 1 / x with the tolerances of section 3.
     // In parentheses: of this instruction set, not found by the type of the axis.
-    const Lanes bin_here = (bin_of_tangent<Lanes>)(g.axis, choose(keep, tangent, all(0)));
+    const Lanes bin_here = smaller((bin_of_tangent<Lanes>)(g.axis, choose(keep, tangent, all(0))), last_bin);
     const LaneNumbers bin_below = whole_part(bin_here);
     const Lanes column_here = choose(keep, seen_column, map_first);
     const LaneNumbers at = (whole_part(column_here) - g.map_first_column) * row + bin_below;

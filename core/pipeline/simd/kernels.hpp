@@ -44,7 +44,8 @@ struct GroupView {
   int first_column, last_column;            // half-open
   TangentAxis axis;                         // of the depth map, t
   int bins;                                 // values per column of the depth map; the map has bins + 1
-  int map_first_column, map_last_column;    // half-open; of the depth map, which reaches farther where the sonar moves
+  int map_first_column, fan_columns;        // first of the depth map; of the whole fan
+  int columns_beside;                       // so far from its own column a cell is looked up, where the sonar moves
   const float* inverse_depth;               // DepthMap::inverse_x
   const float* depth_slope;                 // DepthMap::per_column
   float depth_tolerance_m;
@@ -104,8 +105,8 @@ struct Kernels {
   void (*scatter_hits)(const HitsToScatter&, int n, float* re, float* im);
   /// Adds the echoes' kernels to grid[2 (points + width)].
   void (*spread)(const SpreadGrid&, const SpreadEchoes&, int count, double* grid);
-  /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im). Reads and
-  /// writes the two aligned vectors that a pulse reaches into: 16 samples from that of a multiple of 8 at or before its first.
+  /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im). Reads the echoes in whole vectors;
+  /// reads and writes at most 16 samples from that of a multiple of 8 at or before the pulse's first.
   void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column,
                      int lead);
   /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
 #include <vector>
 
 #include "tests/core/pipeline/scenes.hpp"
@@ -98,6 +99,21 @@ TEST(Motion, O40TurnsShowNoFarSides) {
                     centroid_deg(s, near_m) - centroid_deg(s, far_m),
                     std::abs(deg_per_s) > 100 ? 0.05 : 0.05 * std::abs(expected), "deg");
     }
+  }
+}
+
+// Near cells in a quick turn were seen from directions far from those they are received from, outside of their group's map.
+TEST(Motion, IsTheSameForAnyNumberOfThreads) {
+  SceneMaker maker;
+  for (const double y : {-0.15, -0.05, 0.05, 0.15}) maker.add(pole(0.02, 0.05), -10, {0.3, y, 0});
+  maker.add(wall(6, 6), -15, {3, 0, 0});
+  std::vector<std::byte> first;
+  for (const int threads : {1, 2, 3}) {
+    Sounding s(maker.make(), oculus_high(), native_rows(10, 0.1), {.threads = threads, .engine = {}});
+    s.request.sonar_moves = {{0, 3, 0}, {0, 0, rad_from_deg(60)}};
+    const Ping& ping = s.ping();
+    if (first.empty()) first = ping.samples;
+    EXPECT_TRUE(first == ping.samples) << threads << " threads";
   }
 }
 
