@@ -238,7 +238,9 @@ Result<json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double 
     auto socket = clients::connect_tcp({own_address(i), blueview::tcp_port}, patience);
     if (!socket) return tl::make_unexpected(socket.error());
     // A head's own interval is 1 s; sound alone sets the limit then.
-    auto stream = BlueViewStream::open(*std::move(socket), {.rate_hz = 1000}, patience);
+    clients::HeadRequest fast;
+    fast.rate_hz = 1000;
+    auto stream = BlueViewStream::open(*std::move(socket), fast, patience);
     if (!stream) return tl::make_unexpected(stream.error());
     streams.push_back(*std::move(stream));
   }
