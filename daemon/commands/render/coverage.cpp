@@ -111,17 +111,21 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
   const ClosedForm expected(job, ping, *bed);
   const PingSettings& s = job.settings;
   const double pulse_m = cell_of(job).pulse_width_m;
-  const double beam_sine = 2 * std::sin(static_cast<double>(job.mode().pattern.azimuth_width_rad) / 2);
+  const auto sine_of_width = [](float width_rad) { return 2 * std::sin(static_cast<double>(width_rad) / 2); };
+  const std::vector<float>& widths = job.mode().beam_widths_rad;  // of listed beams
+  const double common_sine = sine_of_width(job.mode().pattern.azimuth_width_rad);
   Coverage coverage;
   double ratios = 0;
   for (int j = 0; j < s.beam_count; ++j) {
-    const double sine = std::sin(static_cast<double>(ping.beam_azimuth_rad[static_cast<std::size_t>(j)]));
+    const auto beam = static_cast<std::size_t>(j);
+    const double sine = std::sin(static_cast<double>(ping.beam_azimuth_rad[beam]));
+    const double beam_sine = beam < widths.size() ? sine_of_width(widths[beam]) * std::sqrt(1 - sine * sine) : common_sine;
     for (int row = 0; row < s.range_bin_count; ++row) {
       const double r = expected.true_range_m(s.range_of_row(row));
       if (!expected.holds(r, sine, 2 * pulse_m, beam_sine)) continue;
       const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(s.beam_count) + static_cast<std::size_t>(j);
       const double pressure = static_cast<double>(ping.pressure_upa[at]);
-      const double ratio = pressure * pressure / expected.power(r, sine);
+      const double ratio = pressure * pressure / (expected.power(r, sine) * beam_sine / common_sine);
       const double off_db = ratio > 0 ? db_from_power(ratio) : -999;
       ratios += ratio;
       ++coverage.bins;
