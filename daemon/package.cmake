@@ -42,6 +42,7 @@ install(FILES README.md CONTRIBUTING.md LICENSE DESTINATION ${documents} COMPONE
 install(DIRECTORY tests/judge DESTINATION ${documents}/tests COMPONENT sonard PATTERN "__pycache__" EXCLUDE)  # examples of docs/judge.md
 install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT sonard PATTERN "man" EXCLUDE PATTERN "__pycache__" EXCLUDE)
 install(FILES protocol/oculus/README.md DESTINATION ${documents}/protocol/oculus COMPONENT sonard)
+install(FILES protocol/aris/README.md DESTINATION ${documents}/protocol/aris COMPONENT sonard)
 install(FILES protocol/control/control.proto DESTINATION ${CMAKE_INSTALL_DATADIR}/sonard/protocol/control COMPONENT sonard)
 # What pages link to beyond the documents is installed below share/sonard; symbolic links lead there from where it lies in the
 # source tree. tests/acceptance/package_test.py follows every link.

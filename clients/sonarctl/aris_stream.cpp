@@ -1,9 +1,11 @@
 #include "clients/sonarctl/aris_stream.hpp"
 
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 
@@ -15,6 +17,7 @@ namespace {
 constexpr auto ping_after = std::chrono::seconds(1);
 constexpr int receive_buffer_bytes = 4 << 20;  // a few frames
 constexpr double nominal_sound_speed_mps = 1490;
+constexpr std::uint32_t longest_pulse_us = 80;
 
 /// The settings for a product, or none: it does not reach the range.
 std::optional<aris::Acoustics> acoustics_for(const aris::Product& product, const HeadRequest& request) {
@@ -27,10 +30,19 @@ std::optional<aris::Acoustics> acoustics_for(const aris::Product& product, const
     a.samples_per_beam =
         static_cast<std::uint32_t>(std::clamp<double>(window_us / a.sample_period_us, aris::least_samples, aris::most_samples));
     a.cycle_us = aris::shortest_cycle_us(a);
+    a.pulse_us = std::max(a.pulse_us, std::min(a.sample_period_us, longest_pulse_us));
   }
   const double rate_hz = request.rate_hz.value_or(static_cast<double>(a.frame_rate_hz));
   a.frame_rate_hz = static_cast<float>(std::clamp(rate_hz, 1.0, aris::highest_frame_rate_hz(product, a, std::nullopt)));
-  return a;
+  a.cookie = 1;
+  return aris::judge(a, product, false).used;  // with the longest pulse of the product
+}
+
+std::uint32_t peer_ip_of(const Socket& socket) {
+  sockaddr_in at{};
+  socklen_t size = sizeof at;
+  ::getpeername(socket.fd(), reinterpret_cast<sockaddr*>(&at), &size);
+  return at.sin_addr.s_addr;
 }
 
 std::uint16_t local_port_of(const Socket& socket) {
@@ -57,17 +69,18 @@ std::optional<ArisPing> ping_from(aris::DecodedFrame frame, std::size_t bytes) {
 
 }  // namespace
 
-Result<ArisStream> ArisStream::open(Socket commands, const HeadRequest& request) {
+Result<ArisStream> ArisStream::open(Socket commands, const std::optional<HeadRequest>& request) {
   auto frames = listen_udp(Endpoint{"0.0.0.0", 0});
   if (!frames) return tl::unexpected(frames.error());
   ::setsockopt(frames->fd(), SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
   ArisStream stream(std::move(commands), std::move(*frames));
+  stream.sonar_ip_ = peer_ip_of(stream.commands_);
   // The device does not say what it is, except in beacons that may not come here. It refuses the settings of other products; the
   // order matters to an ARIS 1800, which also takes those of a 1200. Frames begin with the receiver.
   aris::Command command;
   std::uint32_t cookie = 0;
   for (const auto& model : aris::models()) {
-    auto acoustics = acoustics_for(aris::product_of(*model), request);
+    auto acoustics = request ? acoustics_for(aris::product_of(*model), *request) : std::nullopt;
     if (!acoustics) continue;
     acoustics->cookie = ++cookie;
     command = {};
@@ -75,7 +88,7 @@ Result<ArisStream> ArisStream::open(Socket commands, const HeadRequest& request)
     command.acoustics = *acoustics;
     if (auto sent = stream.send(command); !sent) return tl::unexpected(sent.error());
   }
-  if (cookie == 0) return failure(ErrorKind::usage, "no ARIS reaches so far: the ARIS 1200 shows up to 100 m");
+  if (request && cookie == 0) return failure(ErrorKind::usage, "no ARIS reaches so far: the ARIS 1200 shows up to 100 m");
   command = {};
   command.type = aris::CommandType::set_receiver;
   command.receiver = aris::Receiver{local_port_of(stream.frames_), ""};
@@ -88,6 +101,21 @@ Result<void> ArisStream::send(const aris::Command& command) {
   return write_all(commands_, aris::framed(command));
 }
 
+/// A datagram of the sonar; others have no bytes.
+Read ArisStream::receive(std::chrono::milliseconds patience) {
+  pollfd ready{frames_.fd(), POLLIN, 0};
+  const int polled = ::poll(&ready, 1, static_cast<int>(patience.count()));
+  if (polled == 0) return {Wait::timed_out, 0, {}};
+  sockaddr_in from{};
+  socklen_t length = sizeof from;
+  const ssize_t size = polled < 0 ? -1
+                                  : ::recvfrom(frames_.fd(), chunk_.data(), chunk_.size(), MSG_DONTWAIT,
+                                               reinterpret_cast<sockaddr*>(&from), &length);
+  if (size < 0 && errno == EAGAIN) return {Wait::timed_out, 0, {}};  // its checksum was wrong
+  if (size < 0) return errno == EINTR ? Read{Wait::interrupted, 0, {}} : Read{Wait::closed, 0, std::strerror(errno)};
+  return {Wait::data, from.sin_addr.s_addr == sonar_ip_ ? static_cast<std::size_t>(size) : 0, {}};
+}
+
 ArisStream::Item ArisStream::next(std::chrono::milliseconds patience) {
   const auto deadline = Clock::now() + patience;
   for (;;) {
@@ -98,18 +126,13 @@ ArisStream::Item ArisStream::next(std::chrono::milliseconds patience) {
       if (const auto sent = send(command); !sent) return {Wait::closed, {}, sent.error().text};
     }
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-    const Read read = read_some(frames_, chunk_, std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(200)));
+    const Read read = receive(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(200)));
     if (read.what == Wait::interrupted || read.what == Wait::closed) return {read.what, {}, read.error};
-    if (read.what == Wait::timed_out) {
-      if (ends_without_a_byte(commands_, std::chrono::milliseconds(0))) return {Wait::closed, {}, {}};
-      if (Clock::now() >= deadline) return {Wait::timed_out, {}, {}};
-      continue;
-    }
     bytes_ += read.size;
-    auto frame = assembler_.add(std::span<const std::byte>(chunk_).first(read.size));
-    if (!frame) continue;
-    auto ping = ping_from(std::move(*frame), std::exchange(bytes_, 0));
-    if (ping) return {Wait::data, std::move(ping), {}};
+    if (auto frame = assembler_.add(std::span<const std::byte>(chunk_).first(read.size)))
+      if (auto ping = ping_from(std::move(*frame), std::exchange(bytes_, 0))) return {Wait::data, std::move(ping), {}};
+    if (ends_without_a_byte(commands_, std::chrono::milliseconds(0))) return {Wait::closed, {}, {}};
+    if (Clock::now() >= deadline) return {Wait::timed_out, {}, {}};
   }
 }
 

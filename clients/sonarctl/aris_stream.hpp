@@ -15,8 +15,8 @@ namespace sonar::clients {
 
 class ArisStream {
  public:
-  /// Asks for frames with these settings: range, rate and gain.
-  static Result<ArisStream> open(Socket commands, const HeadRequest& request);
+  /// Asks for frames with these settings: range, rate and gain; nothing: with the settings that the sonar has.
+  static Result<ArisStream> open(Socket commands, const std::optional<HeadRequest>& request);
 
   struct Item {
     Wait what = Wait::timed_out;
@@ -31,8 +31,10 @@ class ArisStream {
   using Clock = std::chrono::steady_clock;
   ArisStream(Socket commands, Socket frames) : commands_(std::move(commands)), frames_(std::move(frames)) {}
   Result<void> send(const aris::Command& command);
+  Read receive(std::chrono::milliseconds patience);
 
   Socket commands_, frames_;
+  std::uint32_t sonar_ip_ = 0;  // in network order
   aris::FrameAssembler assembler_;
   Clock::time_point sent_at_{};
   std::size_t bytes_ = 0;  // received since the last whole frame

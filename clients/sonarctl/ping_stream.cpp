@@ -31,7 +31,8 @@ Result<PingStream> PingStream::open(const Endpoint& device, SonarKind kind, Sett
     return failure(error.kind, error.kind == ErrorKind::usage ? error.text : "tcp " + text_from(place) + " " + error.text);
   }
   if (kind == SonarKind::aris || connected->which == 2) {
-    auto controller = ArisStream::open(std::move(connected->socket), settings.head);
+    auto controller =
+        ArisStream::open(std::move(connected->socket), settings.oculus ? std::optional(settings.head) : std::nullopt);
     if (!controller) return tl::unexpected(controller.error());
     return PingStream(place, *std::move(controller));
   }

@@ -22,7 +22,7 @@ namespace sonar::clients {
 /// Kind of sonar at an address; either: an Oculus there, or a BlueView head or an ARIS at its own port, the first that answers.
 enum class SonarKind { oculus, blueview, either, aris };
 
-/// Settings to send, by kind of sonar.
+/// Settings to send, by kind of sonar. Without `oculus` none: an ARIS is not sent `head` either.
 struct Settings {
   std::optional<oculus::FireRequest> oculus;
   HeadRequest head;

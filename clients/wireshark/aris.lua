@@ -172,7 +172,8 @@ local function command_text(values)
     local ip = values["receiver.ip"] or ""
     text = text .. " " .. (ip ~= "" and ip or "controller") .. ":" .. short(values["receiver.port"])
   elseif kind == 3 then
-    text = string.format("%s %s: mode %s, %s Hz, %s samples of %s us from %s us, gain %s dB", text, short(values["acoustics.cookie"]),
+    text = string.format("%s %s: mode %s, %s Hz, %s samples of %s us from %s us, gain %s dB", text,
+      short(values["acoustics.cookie"]),
       short(values["acoustics.pingMode"]), short(values["acoustics.frameRate"]), short(values["acoustics.samplesPerBeam"]),
       short(values["acoustics.samplePeriod"]), short(values["acoustics.sampleStartDelay"]), short(values["acoustics.receiverGain"]))
   elseif kind == 4 then

@@ -1,6 +1,9 @@
 #include "protocol/aris/dialogue.hpp"
 
+#include <algorithm>
 #include <cstdio>
+#include <deque>
+#include <iterator>
 #include <string_view>
 
 #include "core/text/ipv4.hpp"
@@ -15,23 +18,25 @@ using protocol::DeviceState;
 using protocol::Notice;
 using protocol::Reaction;
 
+constexpr std::size_t most_waiting = 256;    // changes of settings that a fault holds back
 constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hostile controller can cause
 
 bool is_multicast(protocol::Ipv4 ip) { return ip[0] >= 224 && ip[0] < 240; }
 
 class ArisDialogue final : public protocol::Dialogue {
  public:
-  explicit ArisDialogue(const DeviceState& device) : device_(device), first_ping_(device.last_ping) {}
+  explicit ArisDialogue(const DeviceState& device) : device_(device), seen_(device.settings), first_ping_(device.last_ping) {}
 
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
-    settings_ = settings_from(device_.settings.get(), device_);
-    settings_.first_ping = first_ping_;
+    settings_ = base();
+    settings_.streaming |= streaming_;
+    settings_.first_ping = std::min(settings_.first_ping, first_ping_);  // of the controller that connected first
     changed_ = false;
     framer_.append(received);
     while (const auto message = framer_.next()) on_message(*message, now, reaction);
-    if (changed_) reaction.events.emplace_back(change_to(settings_, device_));
+    if (changed_) command_change(reaction);
     if (framer_.broken()) reaction.events.emplace_back(protocol::Close{"states a command longer than 4096 bytes"});
     return reaction;
   }
@@ -43,6 +48,22 @@ class ArisDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  private:
+  /// What commands change: the settings commanded last, which a fault may hold back, or others that replaced them.
+  Settings base() {
+    if (device_.settings != seen_) {
+      const auto applied = std::find(waiting_.begin(), waiting_.end(), device_.settings);
+      waiting_.erase(waiting_.begin(), applied == waiting_.end() ? applied : std::next(applied));
+      seen_ = device_.settings;
+    }
+    return settings_from((waiting_.empty() ? seen_ : waiting_.back()).get(), device_);
+  }
+  void command_change(Reaction& reaction) {
+    protocol::ChangeSettings change = change_to(settings_, device_);
+    waiting_.push_back(change.vendor_settings);
+    if (waiting_.size() > most_waiting) waiting_.pop_front();
+    reaction.events.emplace_back(std::move(change));
+  }
+
   void on_message(BytesView message, Time now, Reaction& reaction) {
     Command command;
     if (!protobuf::read(message, command))
@@ -84,8 +105,8 @@ class ArisDialogue final : public protocol::Dialogue {
     const Receiver wanted = command.receiver.value_or(Receiver{});
     protocol::SetReceivers receivers;
     protocol::Endpoint to{{}, static_cast<std::uint16_t>(wanted.port)};
-    settings_.streaming = wanted.ip != "0.0.0.0";
-    if (settings_.streaming) {
+    const bool starts = wanted.ip != "0.0.0.0";
+    if (starts) {
       if (wanted.port == 0 || wanted.port > 65535) return notice(reaction, "ignored a receiver without a port");
       if (!wanted.ip.empty()) {
         const auto ip = text::parse_ipv4(wanted.ip);
@@ -97,6 +118,7 @@ class ArisDialogue final : public protocol::Dialogue {
       }
       receivers.to.push_back(to);
     }
+    settings_.streaming = streaming_ = starts;
     reaction.events.emplace_back(receivers);
     changed_ = true;
   }
@@ -138,7 +160,10 @@ class ArisDialogue final : public protocol::Dialogue {
   }
 
   const DeviceState& device_;
+  std::shared_ptr<const VendorSettings> seen_;                 // the device's, at the last call
+  std::deque<std::shared_ptr<const VendorSettings>> waiting_;  // commanded since, oldest first
   std::uint32_t first_ping_;
+  bool streaming_ = false;  // this controller has set a receiver
   CommandFramer framer_;
   Settings settings_;  // as of this call
   bool changed_ = false;

@@ -30,7 +30,7 @@ void for_each_sample(std::size_t samples, int pings, F copy) {
       for (std::size_t channel = 0; channel < channels; ++channel) copy(raw++, sample * beams + sixteenth[channel] * n + ping);
 }
 
-void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used) {
+void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used, const Product& product) {
   const Acoustics& a = s.acoustics;
   h.window_start_m = static_cast<float>(used.range_start_m);
   h.window_length_m = static_cast<float>(used.range_bin_count * used.range_bin_m);
@@ -47,7 +47,7 @@ void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used) {
   h.samples_per_beam = a.samples_per_beam;
   h.high_voltage = a.high_voltage;
   h.start_delay_us = a.start_delay_us;
-  h.large_lens = s.telephoto;
+  h.large_lens = s.telephoto && product.has_telephoto;
   h.salinity = s.salinity;
   h.applied_cookie = s.applied;
   h.constrained_cookie = s.constrained;
@@ -79,7 +79,7 @@ FrameHeader header_of(const Ping& ping, const protocol::DeviceState& device, con
   const FocusNow focus = focus_at(settings, request.fired_at);
   h.focus = h.focus_position = focus.position;
   h.focus_motor_moving = focus.moves;
-  set_settings(h, settings, request.settings);
+  set_settings(h, settings, request.settings, product_of(*device.model));
   set_attitude(h, request.sonar_in_world.orientation);
   return h;
 }

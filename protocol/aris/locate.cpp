@@ -45,34 +45,38 @@ std::string_view header_name(FieldName name) {
   }
 }
 
-/// {offset, size} of the frame header in the first part.
-std::optional<std::pair<std::size_t, std::size_t>> header_at(BytesView first_part) {
-  if (first_part.empty()) return std::pair<std::size_t, std::size_t>{0, header_size};
+using Place = std::pair<std::size_t, std::size_t>;  // offset, size
+
+Place place_of(BytesView inside, BytesView whole) {
+  return {inside.empty() ? whole.size() : static_cast<std::size_t>(inside.data() - whole.data()), inside.size()};
+}
+
+/// Nothing: the part has no whole frame header.
+std::optional<FramePart> first_of(BytesView first_part) {
   FramePart part;
   protobuf::read(first_part, part);
-  if (!part.header || part.header->size() < header_size) return std::nullopt;
-  return std::pair{static_cast<std::size_t>(part.header->data() - first_part.data()), part.header->size()};
+  return part.header && part.header->size() >= header_size ? std::optional(part) : std::nullopt;
 }
 
 }  // namespace
 
 std::optional<Field> locate(FieldName name, BytesView first_part) {
-  const auto at = header_at(first_part);
   auto found = wire::locate<FrameHeader>(header_name(name));
-  if (!at || !found) return std::nullopt;
-  found->offset += at->first;
+  if (!found || first_part.empty()) return found;
+  const auto part = first_of(first_part);
+  if (!part) return std::nullopt;
+  found->offset += place_of(*part->header, first_part).first;
   return found;
 }
 
-std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView first_part) {
+std::optional<Place> locate(protocol::Region region, BytesView first_part) {
   if (region == protocol::Region::bearings) return std::nullopt;  // a table of the ping mode
-  if (first_part.empty()) return std::pair<std::size_t, std::size_t>{};
-  const auto at = header_at(first_part);
-  if (!at) return std::nullopt;
-  const std::size_t end = at->first + at->second;
-  if (region == protocol::Region::header) return std::pair{std::size_t{0}, at->first};
-  if (region == protocol::Region::metadata) return *at;
-  return std::pair{end, first_part.size() - end};
+  if (first_part.empty()) return Place{};
+  const auto part = first_of(first_part);
+  if (!part) return std::nullopt;
+  const Place header = place_of(*part->header, first_part);
+  if (region == protocol::Region::header) return Place{0, header.first};
+  return region == protocol::Region::metadata ? header : place_of(part->data, first_part);
 }
 
 }  // namespace sonar::aris

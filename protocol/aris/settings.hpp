@@ -20,7 +20,7 @@ struct Settings {
   bool valid = false;                                       // a SET_ACOUSTICS was accepted
   bool streaming = false;                                   // a receiver is set
   std::uint32_t applied = 0, constrained = 0, invalid = 0;  // the last cookie of each kind
-  std::uint32_t salinity = 35;                              // 0, 15, 35: what the device believes
+  std::uint32_t salinity = 35;                              // 0, 15, 35, as the device was told
   bool telephoto = false;
   std::uint32_t focus_from = 0, focus_to = 0;  // 0 to 1000
   Time focus_set_at{};
@@ -39,7 +39,7 @@ Settings initial_settings(const protocol::DeviceState& device);
 /// initial_settings() for null.
 Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device);
 
-/// What the device believes: its water's temperature and depth, and the salinity that it was told [m/s].
+/// From the temperature and depth of the water at the device, and the salinity that it was told [m/s].
 double sound_speed_mps(double temperature_c, double salinity_psu, double depth_m);
 
 /// Highest frame rate with these settings, 1 to 15 [Hz].

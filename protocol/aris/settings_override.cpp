@@ -7,7 +7,7 @@
 namespace sonar::aris {
 namespace {
 
-constexpr std::uint32_t shortest_period_us = 4, longest_period_us = 100;
+constexpr std::uint32_t shortest_period_us = 4, longest_period_us = 100, longest_pulse_us = 80;
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
@@ -33,7 +33,7 @@ Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, con
   return refused(device.model->name + " forms " + counts + " beams, as its mode says, not " + std::to_string(*wanted.beams));
 }
 
-/// Keeps the start of the window, and the sample period where it can.
+/// Keeps the start of the window, the sample period where it can, and a pulse that is not shorter than it.
 Result<void> set_range(Settings& s, double range_m, const protocol::DeviceState& device) {
   const PingSettings now = ping_settings(s, device);
   const double speed = static_cast<double>(now.device_sound_speed_mps), end_m = product_of(*device.model).window_end_m;
@@ -51,6 +51,7 @@ Result<void> set_range(Settings& s, double range_m, const protocol::DeviceState&
       std::clamp(period_us, static_cast<double>(shortest_period_us), static_cast<double>(longest_period_us)));
   a.samples_per_beam =
       std::clamp(static_cast<std::uint32_t>(std::lround(window_us / a.sample_period_us)), least_samples, most_samples);
+  a.pulse_us = std::max(a.pulse_us, std::min(a.sample_period_us, longest_pulse_us));  // judge() shortens it
   return {};
 }
 

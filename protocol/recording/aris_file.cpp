@@ -49,16 +49,12 @@ class ArisFileWriter final : public RecordingWriter {
     wire::append(record, frame->header);
     record.resize(at + aris::padded_header_size);
     record.insert(record.end(), frame->picture.begin(), frame->picture.end());
-    const Result<void> written = sink_->append(record);
-    if (written) ++header_.frames;
-    return written;
+    if (auto written = sink_->append(record); !written) return written;
+    ++header_.frames;
+    return sink_->overwrite(0, wire::bytes_of(header_));  // a file that is cut off says what it holds
   }
 
-  Result<void> close() override {
-    const Result<void> counted = header_.frames > 0 ? sink_->overwrite(0, wire::bytes_of(header_)) : Result<void>{};
-    const Result<void> closed = sink_->close();
-    return counted ? closed : counted;
-  }
+  Result<void> close() override { return sink_->close(); }
 
  private:
   std::unique_ptr<Sink> sink_;

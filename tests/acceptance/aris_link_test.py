@@ -227,6 +227,12 @@ class Tools(unittest.TestCase):
                 self.assertTrue(any(link.frame() and link.incomplete == 1 for _ in range(40)), "one frame lost a part")
                 run(SONARCTL, "fault", "add", "P15", "--pings", "1", *control)
                 self.assertTrue(any(math.isnan(link.frame().f32(160)) for _ in range(40)))
+            self.assertNotEqual(daemon.ctl("listen", "--as-it-is", "--seconds", 2).returncode, 0, "no settings, no frames")
+            self.assertEqual(daemon.ctl("listen", "--pings", 2).returncode, 0)
+            run(SONARCTL, "fault", "add", "G01", "--pings", "1000", *control)
+            start = time.monotonic()
+            self.assertNotEqual(daemon.ctl("listen", "--seconds", 3).returncode, 0)
+            self.assertLess(time.monotonic() - start, 12, "frames that lack parts do not prolong it")
             refused = run(SONARCTL, "fault", "add", "S01", *control)
             self.assertIn("sends pings by datagrams alone", refused.stderr)
 

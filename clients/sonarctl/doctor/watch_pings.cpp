@@ -152,7 +152,7 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
     return;
   }
   watch.run(std::move(*stream));
-  if (control == nullptr) return;
+  if (control == nullptr || sonar.aris) return;  // frames of an ARIS are counted from 1 in each connection
   const Watch::DaemonTimes daemon_times = watch.daemon_times(*control, sonar.name);
   if (!daemon_times.computing_ms.empty()) facts.computing_ms = percentile(daemon_times.computing_ms, 0.5);
   set_latency(sonar, daemon_times.delays_s, clocks);

@@ -41,7 +41,8 @@ std::string sonar_lines(const Device& device) {
   const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
   std::string text = "sonar     " + device.config().name + "  " + model.name + "  " +
                      text::frequency_text(static_cast<double>(mode.centre_hz)) +
-                     format("  %d beams  %g m  %g Hz\n", s.beam_count, s.range_m, static_cast<double>(s.rate_hz));
+                     format("  %d beams  %g m", s.beam_count, s.range_m) +
+                     (s.rate_hz > 0 ? format("  %g Hz\n", static_cast<double>(s.rate_hz)) : "\n");
   const Endpoint data = device.data_endpoint();
   text += data.port == 0 ? "  data    by datagrams" : "  data    tcp " + text_of(data);
   const protocol::Port* const beacon = device.sonar().vendor().port(protocol::Port::Kind::udp_beacon);

@@ -283,8 +283,9 @@ void Sonar::offer_datagrams(Connection& stream, const Ping& ping, Time now, Ping
   if (stream.finishing || receivers(stream.id).empty()) return;
   try {
     std::vector<protocol::Bytes> made = vendor_.datagrams(*stream.port, ping, state_);
-    faults_.alter_datagrams(made, stream, static_cast<std::uint32_t>(ping.request.number), now);
     if (made.empty()) return;
+    faults_.alter_datagrams(made, stream, static_cast<std::uint32_t>(ping.request.number), now);
+    if (made.empty()) return stream.outbox.drop_offered(DropReason::fault);
     const auto datagrams = std::make_shared<const std::vector<protocol::Bytes>>(std::move(made));
     queued.datagrams.push_back(datagrams);
     stream.outbox.push_ping({.bytes = nullptr,

@@ -10,6 +10,12 @@ namespace {
 
 constexpr std::size_t most_receivers = 16;  // of one list
 
+/// The next receiver of a stream is not sent pings that were made for the last one.
+void drop_unreceived(Connections& connections) {
+  for (Connection& c : connections.all())
+    if (c.role == Role::stream && connections.receivers(c).empty()) c.outbox.drop_waiting_pings(DropReason::gone);
+}
+
 }  // namespace
 
 Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port) {
@@ -59,6 +65,7 @@ void Sonar::on_membership(Time now, Actions& actions) {
   const Connection* const oldest = connections_.oldest_client();
   state_.connected_client = oldest == nullptr ? protocol::Ipv4{} : oldest->peer.ip;
   if (!connections_.has_audience()) use_initial_settings();
+  drop_unreceived(connections_);
   update_pacer(now);
   const protocol::Port* const beacon = vendor_.port(protocol::Port::Kind::udp_beacon);
   if (beacon != nullptr && beacon->on_change) actions.emplace_back(Announce{});
@@ -105,6 +112,7 @@ void Sonar::set_receivers(const Source& from, protocol::SetReceivers wanted, Tim
     lists.push_back(std::move(wanted));
   else
     *same = std::move(wanted);
+  drop_unreceived(connections_);
   update_pacer(now);
 }
 

@@ -85,7 +85,7 @@ void Sonar::obey(const FaultOrder& order, Time now, Actions& actions) {
   } else if (const auto* restart = std::get_if<RestartDevice>(&order)) {
     state_.powered_up_at = now;
     if (restart->clock_only) return;
-    ping_number_ = 0;
+    state_.last_ping = ping_number_ = 0;
     last_served_ = {};
     use_initial_settings();
     update_pacer(now);

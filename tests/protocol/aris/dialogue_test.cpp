@@ -1,6 +1,8 @@
 // A controller's conversation with an emulated ARIS, without a socket.
 #include <gmock/gmock.h>
 
+#include <deque>
+
 #include "protocol/aris/dialogue.hpp"
 #include "tests/protocol/aris/aris_testing.hpp"
 
@@ -13,6 +15,7 @@ struct Talk {
   explicit Talk(const char* profile = "aris-3000", protocol::OptionValues options = {})
       : state(testing::device(profile, options)) {
     state.last_ping = 17;
+    state.settings = vendor().initial_settings(state).vendor_settings;
     state.connected_client = {10, 0, 0, 7};
     dialogue = vendor().converse(vendor().ports().front(), state, testing::at_s(0));
   }
@@ -22,8 +25,8 @@ struct Talk {
     EXPECT_TRUE(reaction.replies.empty()) << "the device never answers";
     for (const protocol::Event& event : reaction.events) {
       if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
-        state.settings = change->vendor_settings;
-        settings = change->settings;
+        changes.push_back(*change);
+        if (!late) apply_next();
       } else if (const auto* to = std::get_if<protocol::SetReceivers>(&event)) {
         receivers = to->to;
       } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
@@ -34,11 +37,18 @@ struct Talk {
     }
   }
   void say(const Command& command, double at = 0) { say(framed(command), at); }
+  void apply_next() {
+    state.settings = changes.front().vendor_settings;
+    settings = changes.front().settings;
+    changes.pop_front();
+  }
   Settings held() const { return settings_from(state.settings.get(), state); }
 
   protocol::DeviceState state;
   std::unique_ptr<protocol::Dialogue> dialogue;
   PingSettings settings = vendor().initial_settings(testing::device()).settings;
+  bool late = false;  // changes of settings wait for apply_next()
+  std::deque<protocol::ChangeSettings> changes;
   std::vector<protocol::Endpoint> receivers;
   std::vector<std::string> notices;
   std::string closed;
@@ -64,6 +74,53 @@ TEST(ArisDialogue, FramesFlowOnceReceiverAndValidSettingsAreThere) {
     EXPECT_EQ(talk.settings.rate_hz, 0);
     EXPECT_TRUE(talk.receivers.empty());
   }
+}
+
+Command set_salinity(std::uint32_t psu) {
+  Command command;
+  command.type = CommandType::set_salinity;
+  command.salinity = Choice{psu};
+  return command;
+}
+
+TEST(ArisDialogue, CommandsAddUpWhileAFaultHoldsThemBack) {
+  Talk talk;
+  talk.late = true;
+  talk.say(testing::set_receiver(56444));
+  talk.say(testing::set_acoustics(testing::acoustics()));
+  talk.apply_next();
+  talk.say(set_salinity(15));
+  while (!talk.changes.empty()) talk.apply_next();
+  EXPECT_EQ(talk.settings.rate_hz, 12);
+  EXPECT_EQ(talk.held().salinity, 15u);
+  talk.late = false;
+  protocol::SettingsOverride wanted;
+  wanted.gain_percent = 0;
+  talk.state.settings = vendor().apply_override(wanted, talk.state)->vendor_settings;
+  talk.say(set_salinity(0));
+  EXPECT_EQ(talk.held().acoustics.gain_db, 0) << "of the override, not of the last command";
+  talk.state.settings = vendor().initial_settings(talk.state).vendor_settings;
+  talk.say(testing::set_acoustics(testing::acoustics()));
+  EXPECT_EQ(talk.settings.rate_hz, 12) << "the receiver belongs to the connection";
+}
+
+TEST(ArisDialogue, AFurtherControllerNeitherRenumbersNorStopsTheFrames) {
+  Talk talk;
+  talk.say(testing::set_receiver(56444));
+  talk.say(testing::set_acoustics(testing::acoustics()));
+  talk.state.last_ping = 30;
+  const auto first = std::exchange(talk.dialogue, vendor().converse(vendor().ports().front(), talk.state, testing::at_s(0)));
+  talk.say(set_salinity(0));
+  EXPECT_EQ(talk.held().first_ping, 17u);
+  EXPECT_EQ(talk.settings.rate_hz, 12);
+}
+
+TEST(ArisDialogue, RefusedReceiversStartNothing) {
+  Talk talk;
+  talk.say(testing::set_receiver(0));
+  talk.say(testing::set_receiver(5, "nowhere"));
+  talk.say(testing::set_acoustics(testing::acoustics()));
+  EXPECT_EQ(talk.settings.rate_hz, 0);
 }
 
 TEST(ArisDialogue, RefusedSettingsChangeNothingButTheCookie) {

@@ -46,6 +46,7 @@ TEST(ArisFrame, HeaderFieldsAreAtTheVendorsOffsets) {
   Settings s = initial_settings(state);
   s.first_ping = 40;
   s.clock_offset = std::chrono::seconds(100);
+  s.telephoto = true;  // a 3000 has no such lens
   apply(s, testing::acoustics(9), state);
   const auto datagrams = vendor().datagrams(vendor().ports()[2], ping_of(state, s, 42), state);
   FramePart part;
@@ -83,6 +84,7 @@ TEST(ArisFrame, HeaderFieldsAreAtTheVendorsOffsets) {
   EXPECT_EQ(u32(484), 1u);
   EXPECT_EQ(u32(488), 7001u);
   EXPECT_EQ(u32(508), 8711u);
+  EXPECT_EQ(u32(480), 0u);
   EXPECT_EQ(u32(516), 0u);
   EXPECT_EQ(u32(520), 35u);
   EXPECT_NEAR((f32(524) - 14.6959f) * 0.702398f, 10, 1e-3) << "clients compute the depth from it";
@@ -142,7 +144,8 @@ TEST(ArisFrame, FieldsAndRegionsOfTheFirstPart) {
   const auto header = vendor().region(protocol::Region::metadata, first), image = vendor().region(protocol::Region::image, first);
   ASSERT_TRUE(header && image);
   EXPECT_EQ(header->second, 744u);
-  EXPECT_EQ(image->first, header->first + 744);
+  EXPECT_EQ(image->second, 620u);
+  EXPECT_EQ(image->first, header->first + 744 + 3) << "behind its field number and length";
   EXPECT_FALSE(vendor().region(protocol::Region::bearings, first));
   EXPECT_FALSE(vendor().field(protocol::Part::beacon, protocol::FieldName::magic, {}));
   EXPECT_FALSE(vendor().field(protocol::Part::ping, protocol::FieldName::rows, BytesView(first).first(100)));

@@ -134,6 +134,9 @@ TEST(ArisOverride, IsWhatAControllerWouldHaveSet) {
   EXPECT_NEAR(far->settings.range_m, 12, 0.01);
   EXPECT_EQ(far->settings.gain_db, 12);
   EXPECT_EQ(far->settings.beam_count, 128);
+  const auto long_range = change({20, 5, {}, {}, {}});
+  ASSERT_TRUE(long_range) << long_range.error().text;
+  EXPECT_GE(static_cast<double>(long_range->settings.pulse_width_m), 0.99 * long_range->settings.range_bin_m);
   const auto few = change({{}, {}, {}, {}, 64u});
   ASSERT_TRUE(few) << few.error().text;
   EXPECT_EQ(few->settings.beam_count, 64);

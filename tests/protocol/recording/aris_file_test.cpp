@@ -44,6 +44,7 @@ TEST(ArisFile, HoldsWholeFramesInTheVendorsLayout) {
   const auto changed = write(*writer, datagrams(4, 300));
   ASSERT_FALSE(changed);
   EXPECT_THAT(changed.error().text, ::testing::HasSubstr("settings have changed"));
+  EXPECT_EQ(u32(file, 4), 2u) << "before it is closed";
   ASSERT_TRUE(writer->close());
   ASSERT_EQ(file.size(), 1024 + 2 * (1024 + 48 * 200u));
   EXPECT_EQ(u32(file, 0), 0x05464444u);
