@@ -1,8 +1,6 @@
 #include "core/scene/cells/surface_cells.hpp"
 
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <cassert>
 #include <cmath>
 #include <map>
@@ -10,159 +8,24 @@
 
 #include "core/scene/cells/cell_lattice.hpp"
 #include "core/scene/cells/cell_tile.hpp"
+#include "core/scene/cells/surface_patch.hpp"
 #include "core/scene/cells/texture.hpp"
 
 namespace sonar {
-
-/// A cube of the lattice: the triangles that may own points in it, the tile of its level once wanted, the eight cubes inside.
-struct SurfaceCells::Node {
-  // What every visit asks comes first, side by side.
-  TileAddress address;
-  std::atomic<bool> divided = false;  // children are there for those who read true
-  bool built = false;
-  std::atomic<std::uint64_t> last_visited = 0;
-  std::array<std::unique_ptr<Node>, 8> children;  // null where no triangle goes
-  std::vector<std::uint32_t> triangles;
-  CellTile tile;
-
-  std::size_t own_bytes() const { return sizeof(Node) + triangles.capacity() * sizeof(std::uint32_t) + tile.bytes(); }
-};
-
-/// The triangles of one object that share material, dominant axis and side of the normal: one lattice.
-class SurfaceCells::SurfacePatch {
- public:
-  int object = 0, material = 0, axis = 0;
-  bool negative_side = false;
-  int coarsest = 0;  // level that gives the object its fewest cells, where asked for
-  std::shared_ptr<const Mesh> mesh;
-  std::vector<std::unique_ptr<Node>> roots;
-
-  void plant(const std::vector<std::uint32_t>& triangles);
-  /// Returns the bytes that the new cubes take.
-  std::size_t divide(Node& node) const;
-  /// Forgets all cubes below `node` that were last visited before `then`; returns the bytes that frees.
-  static std::size_t forget_below(Node& node, std::uint64_t then);
-};
-
 namespace {
 
-constexpr int most_roots_along_an_axis = 16;
 constexpr double fewest_cells = 3000;  // of an object, with CellView::exact_small
-
-struct Cube {
-  double u, v, w, half;
-};
-Cube cube_of(const TileAddress& a) {
-  const double e = lattice::tile_edge_m(a.level);
-  return {(a.i + 0.5) * e, (a.j + 0.5) * e, (a.k + 0.5) * e, e / 2};
-}
-bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lattice::may_touch(f, c.u, c.v, c.w, c.half); }
 
 bool is_empty(const TileInView& t) { return t.tile->count == 0; }
 
-/// The finest level at which few enough cubes cover the triangles.
-int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles) {
-  Vec3 lo = mesh.vertices[mesh.triangles[triangles.front()][0]], hi = lo;
-  for (const std::uint32_t t : triangles)
-    for (const std::uint32_t index : mesh.triangles[t]) {
-      const Vec3 p = mesh.vertices[index];
-      lo = {std::min(lo.x, p.x), std::min(lo.y, p.y), std::min(lo.z, p.z)};
-      hi = {std::max(hi.x, p.x), std::max(hi.y, p.y), std::max(hi.z, p.z)};
-    }
-  const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
-  int level = 4;
-  while (lattice::tile_edge_m(level) * most_roots_along_an_axis < extent) --level;
-  return level;
+int coarsest_wanted(const CellView& view) {
+  return view.levels.front().level - (view.side_from_rad < view.max_elevation_rad ? view.side_coarser : 0);
 }
 
 }  // namespace
 
-void SurfaceCells::SurfacePatch::plant(const std::vector<std::uint32_t>& triangles) {
-  const int level = root_level(*mesh, triangles);
-  const double e = lattice::tile_edge_m(level);
-  std::map<std::tuple<std::int32_t, std::int32_t, std::int32_t>, std::unique_ptr<Node>> planted;
-  const auto index = [&](double x) { return static_cast<std::int32_t>(std::floor(x / e)); };
-  for (const std::uint32_t t : triangles) {
-    const lattice::Facet f = lattice::facet_of(*mesh, t, axis);
-    const auto [u_lo, u_hi] = std::minmax({f.u[0], f.u[1], f.u[2]});
-    const auto [v_lo, v_hi] = std::minmax({f.v[0], f.v[1], f.v[2]});
-    const auto [w_lo, w_hi] = std::minmax({f.w[0], f.w[1], f.w[2]});
-    const double slack = e * 1e-6;
-    const lattice::FacetBounds bounds = lattice::bounds_of(f);
-    for (std::int32_t i = index(u_lo - slack); i <= index(u_hi + slack); ++i)
-      for (std::int32_t j = index(v_lo - slack); j <= index(v_hi + slack); ++j)
-        for (std::int32_t k = index(w_lo - slack); k <= index(w_hi + slack); ++k) {
-          const TileAddress a{object, material, axis, negative_side, level, i, j, k};
-          if (!may_touch(bounds, cube_of(a))) continue;
-          auto& node = planted[{i, j, k}];
-          if (!node) {
-            node = std::make_unique<Node>();
-            node->address = a;
-          }
-          node->triangles.push_back(t);
-        }
-  }
-  for (auto& [where, node] : planted) roots.push_back(std::move(node));
-}
-
-std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
-  std::array<TileAddress, 8> inside;
-  std::array<Cube, 8> cubes;
-  for (int c = 0; c < 8; ++c) {
-    TileAddress& a = inside[static_cast<std::size_t>(c)] = node.address;
-    ++a.level;
-    a.i = a.i * 2 + (c & 1);
-    a.j = a.j * 2 + (c >> 1 & 1);
-    a.k = a.k * 2 + (c >> 2 & 1);
-    cubes[static_cast<std::size_t>(c)] = cube_of(a);
-  }
-  std::vector<std::uint8_t> touched(node.triangles.size());  // which cubes, as bits
-  std::array<std::size_t, 8> how_many{};
-  for (std::size_t n = 0; n < touched.size(); ++n) {
-    const lattice::FacetBounds f = lattice::bounds_of(lattice::facet_of(*mesh, node.triangles[n], axis));
-    unsigned bits = 0;
-    for (std::size_t c = 0; c < 8; ++c) {
-      const bool touches = may_touch(f, cubes[c]);
-      bits |= static_cast<unsigned>(touches) << c;
-      how_many[c] += touches;
-    }
-    touched[n] = static_cast<std::uint8_t>(bits);
-  }
-  std::size_t bytes = 0;
-  for (std::size_t c = 0; c < 8; ++c) {
-    if (how_many[c] == 0) continue;
-    node.children[c] = std::make_unique<Node>();
-    node.children[c]->address = inside[c];
-    node.children[c]->triangles.reserve(how_many[c]);
-    for (std::size_t n = 0; n < touched.size(); ++n)
-      if (touched[n] >> c & 1) node.children[c]->triangles.push_back(node.triangles[n]);
-  }
-  for (const auto& child : node.children)
-    if (child) bytes += child->own_bytes();
-  node.divided.store(true, std::memory_order_release);
-  return bytes;
-}
-
-std::size_t SurfaceCells::SurfacePatch::forget_below(Node& node, std::uint64_t then) {
-  std::size_t freed = 0;
-  bool stale = node.divided;
-  for (const auto& child : node.children) {
-    if (!child) continue;
-    freed += forget_below(*child, then);
-    stale = stale && child->last_visited < then;
-  }
-  if (!stale) return freed;  // cubes come and go eight at a time, so that `divided` stays true or false
-  for (auto& child : node.children) {
-    if (!child) continue;
-    freed += child->own_bytes();
-    child.reset();
-  }
-  node.divided = false;
-  return freed;
-}
-
 SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, CellFields fields)
-    : scene_(std::move(scene)), seed_(seed), fields_(fields), cache_bytes_(cache_bytes) {
+    : scene_(std::move(scene)), seed_(seed), fields_(fields), cache_bytes_(cache_bytes), raised_(SurfacePatch::finest_root) {
   for (const Material& m : scene_->materials) {
     const auto add = [&](const Texture& of, bool wanted, Domain domain, auto& to, bool& there) {
       const bool has = of.shape > 0;
@@ -172,14 +35,16 @@ SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::s
     add(m.texture, fields.texture, Domain::texture, textures_, there_.texture);
     add(m.grain, fields.grain, Domain::grain, grains_, there_.grain);
   }
+  std::map<const Mesh*, Skin> skins;  // objects often share a mesh
   for (std::size_t o = 0; o < scene_->objects.size(); ++o) {
     const Object& object = scene_->objects[o];
-    // Objects often share a mesh.
-    const auto alike = std::find_if(scene_->objects.begin(), scene_->objects.begin() + static_cast<std::ptrdiff_t>(o),
-                                    [&](const Object& other) { return other.mesh == object.mesh; });
-    const auto same = static_cast<std::size_t>(alike - scene_->objects.begin());
-    skins_.push_back(same < o ? skins_[same] : skin_of(*object.mesh));
-    if (!object.visible) continue;
+    if (!object.visible) {
+      skins_.emplace_back();
+      continue;
+    }
+    const auto [skin, is_new] = skins.try_emplace(object.mesh.get());
+    if (is_new) skin->second = skin_of(*object.mesh);
+    skins_.push_back(skin->second);
     std::map<std::tuple<int, int, bool>, std::vector<std::uint32_t>> sorted;  // material, axis, side
     for (std::uint32_t t = 0; t < object.mesh->triangles.size(); ++t) {
       const Vec3d n = lattice::normal_of(*object.mesh, t);
@@ -251,7 +116,7 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
       }
     }
   }
-  if (!finer) return;
+  if (!finer || node.alone) return;
   if (!node.divided.load(std::memory_order_acquire)) {
     const std::lock_guard lock(dividing_[reinterpret_cast<std::uintptr_t>(&node) / sizeof(Node) % dividing_.size()]);
     if (!node.divided.load(std::memory_order_relaxed)) found.new_bytes += patch.divide(node);
@@ -264,6 +129,17 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
   }
   for (auto& child : node.children)
     if (child) visit(patch, *child, look, found);
+}
+
+/// Cells of long pulses may be coarser than the planted roots. Level by level, so that the order of the roots does not depend on
+/// what was looked at before.
+void SurfaceCells::raise_roots(const CellView& view) {
+  for (; raised_ > coarsest_wanted(view); --raised_)
+    for (auto& patch : patches_) {
+      const std::size_t planted = patch->roots.size();
+      patch->raise(raised_ - 1);
+      for (std::size_t r = planted; r < patch->roots.size(); ++r) roots_.push_back({patch.get(), patch->roots[r].get()});
+    }
 }
 
 void SurfaceCells::prepare(const CellView& view, std::uint64_t number, Look& look) const {
@@ -289,7 +165,11 @@ void SurfaceCells::look_through(const Look& look, std::size_t from, std::size_t 
   found.in_view.clear();
   found.missing.clear();
   found.new_bytes = 0;
-  for (std::size_t r = from; r < to; ++r) visit(*roots_[r].patch, *roots_[r].node, look, found);
+  const int coarsest = coarsest_wanted(*look.view);
+  for (std::size_t r = from; r < to; ++r) {
+    Node& root = *roots_[r].node;
+    if (!root.alone || root.address.level >= coarsest) visit(*roots_[r].patch, root, look, found);
+  }
 }
 
 void SurfaceCells::build(std::vector<Node*>& missing, Parallel& pool) {
@@ -307,6 +187,7 @@ void SurfaceCells::build(std::vector<Node*>& missing, Parallel& pool) {
 const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
   // Stretches of roots side by side; what each finds stays apart, so that the order does not depend on who looked.
   constexpr std::size_t stretch = 16;
+  raise_roots(view);
   prepare(view, ++now_, looked_);
   found_.resize((roots_.size() + stretch - 1) / stretch);
   pool.for_each(found_.size(), [&](std::size_t s, int) {
@@ -329,6 +210,7 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
 
 void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std::span<CellsInView> found) {
   assert(found.size() == views.size());
+  for (const CellView& view : views) raise_roots(view);
   const std::uint64_t first = now_ + 1;
   now_ += views.size();
   looks_.resize(views.size());

@@ -119,7 +119,7 @@ class SurfaceCells {
   /// Rotation from object to sonar axes of the last view of in_view(), per object.
   const Rotation& sonar_from_object(int object) const { return looked_.rotations[static_cast<std::size_t>(object)]; }
   std::span<const Rotation> sonar_from_objects() const { return looked_.rotations; }
-  /// Of every object's mesh.
+  /// Of every object's mesh; of objects that are not visible, no skin.
   std::span<const Skin> skins() const { return skins_; }
   /// Views so far.
   std::uint64_t views() const { return now_; }
@@ -154,6 +154,7 @@ class SurfaceCells {
     std::vector<Pose> sonar_in_object;  // per object
     std::vector<Rotation> rotations;
   };
+  void raise_roots(const CellView& view);
   void prepare(const CellView& view, std::uint64_t number, Look& look) const;
   /// Through the roots [from, to).
   void look_through(const Look& look, std::size_t from, std::size_t to, Found& found);
@@ -169,7 +170,8 @@ class SurfaceCells {
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
   std::vector<std::unique_ptr<SurfacePatch>> patches_;
-  std::vector<Root> roots_;  // of all patches, in order
+  std::vector<Root> roots_;  // of all patches, in order; then, level by level, those of raise_roots()
+  int raised_;               // down to this level all patches have roots
   std::vector<TileInView> in_view_;
   Look looked_;                          // of in_view()
   std::vector<Look> looks_;              // of in_views()

@@ -349,5 +349,39 @@ TEST(CellLattice, SharedEdgesHaveOneOwner) {
   }
 }
 
+// Cells coarser than the cubes that a small body was planted in.
+TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
+  const auto scene = scene_of(sphere(1, 24));
+  SurfaceCells from_coarse(scene, Seed{9}, 1u << 30), from_fine(scene, Seed{9}, 1u << 30);
+  Parallel pool(2);
+  const auto counted = [&](SurfaceCells& cells, const CellView& view) {
+    int count = 0;
+    for (const TileInView& t : cells.in_view(view, pool))
+      for (int i = 0; i < t.tile->count; ++i) count += real(*t.tile, i);
+    return count;
+  };
+  const double shadows = 6 * 4 * std::asin(1 / std::sqrt(3)) / std::sqrt(2);  // of the six patches on their lattices, about [m^2]
+  const int coarse = counted(from_coarse, whole_scene(0));
+  for (int level = 6; level >= 1; --level) {
+    const double expected = shadows * std::ldexp(1.0, 2 * level);
+    EXPECT_NEAR(counted(from_fine, whole_scene(level)), expected, 0.1 * expected + 3 * std::sqrt(expected)) << level;
+  }
+  EXPECT_GT(coarse, 0);
+  // The order is the same whichever level was asked for first.
+  const CellView view = whole_scene(1);
+  counted(from_fine, whole_scene(0));
+  const auto first = from_coarse.in_view(view, pool), second = from_fine.in_view(view, pool);
+  ASSERT_EQ(first.size(), second.size());
+  for (std::size_t t = 0; t < first.size(); ++t) {
+    ASSERT_EQ(first[t].tile->bytes(), second[t].tile->bytes());
+    EXPECT_EQ(std::memcmp(first[t].tile->data.get(), second[t].tile->data.get(), first[t].tile->bytes()), 0);
+  }
+  // Also where only the side lobes want them so coarse, and beside a finer level.
+  CellView sides = whole_scene(4, {-10, 0, -10});
+  sides.main_elevation_rad = 0.1f, sides.side_from_rad = 0.1f, sides.side_coarser = 2;
+  SurfaceCells beside(scene, Seed{9}, 1u << 30);
+  EXPECT_EQ(counted(beside, sides), counted(from_fine, whole_scene(2)));
+}
+
 }  // namespace
 }  // namespace sonar

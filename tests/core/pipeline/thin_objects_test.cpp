@@ -102,6 +102,33 @@ TEST(ThinObjects, SpheresFromOneCentimetreEchoAsLambertSays) {
     }
 }
 
+// The pulses of long ranges make cells that are coarser than a small body's first cubes.
+TEST(ThinObjects, SpheresAreHeardInSpeckleWithLongPulses) {
+  for (const double range : {64.0, 120.0, 200.0}) {
+    const Look look{"long", oculus_low(), 30, 0.9 * range / 437};
+    for (const bool aside : {false, true}) {
+      const double down = aside ? 0.893 : 0;  // the first side lobe
+      const auto scene = SceneMaker().add(sphere(1, 5), lambert_db, {30 * std::cos(down), 0, 30 * std::sin(down)}).make();
+      Sounding s = looking_at(scene, look);
+      if (aside) s = Sounding(scene, silent(look.mode), s.request.settings);
+      s.request.switches.expected_power = true;
+      s.request.switches.side_lobes = aside;
+      double speckle = 0;
+      const auto echo = [&] {
+        s.ping();
+        return echo_per_m2(s);
+      };
+      const double expected = echo();
+      s.request.switches.expected_power = false;
+      for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+        s.request.seed = Seed{seed};
+        speckle += echo() / 12;
+      }
+      EXPECT_NEAR(db(speckle / expected), 0, 2) << range << (aside ? ", side lobe" : "");
+    }
+  }
+}
+
 TEST(ThinObjects, PolesFromOneCentimetreEchoAsLambertSays) {
   constexpr double half_height = 0.5;
   for (const Look& look : looks())

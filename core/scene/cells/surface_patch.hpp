@@ -1,0 +1,60 @@
+// The parts of SurfaceCells: cubes of the lattice, and the trees of cubes over a patch of an object's surface.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/scene/cells/cell_lattice.hpp"
+#include "core/scene/cells/cell_tile.hpp"
+#include "core/scene/cells/surface_cells.hpp"
+
+namespace sonar {
+
+struct Cube {
+  double u, v, w, half;
+};
+inline Cube cube_of(const TileAddress& a) {
+  const double e = lattice::tile_edge_m(a.level);
+  return {(a.i + 0.5) * e, (a.j + 0.5) * e, (a.k + 0.5) * e, e / 2};
+}
+inline bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lattice::may_touch(f, c.u, c.v, c.w, c.half); }
+
+/// A cube of the lattice: the triangles that may own points in it, the tile of its level once wanted, the eight cubes inside.
+struct SurfaceCells::Node {
+  // What every visit asks comes first, side by side.
+  TileAddress address;
+  std::atomic<bool> divided = false;  // children are there for those who read true
+  bool built = false, alone = false;  // alone: of SurfacePatch::raise, without cubes inside
+  std::atomic<std::uint64_t> last_visited = 0;
+  std::array<std::unique_ptr<Node>, 8> children;  // null where no triangle goes
+  std::vector<std::uint32_t> triangles;
+  CellTile tile;
+
+  std::size_t own_bytes() const { return sizeof(Node) + triangles.capacity() * sizeof(std::uint32_t) + tile.bytes(); }
+};
+
+/// The triangles of one object that share material, dominant axis and side of the normal: one lattice.
+class SurfaceCells::SurfacePatch {
+ public:
+  int object = 0, material = 0, axis = 0;
+  bool negative_side = false;
+  int coarsest = 0;  // level that gives the object its fewest cells, where asked for
+  std::shared_ptr<const Mesh> mesh;
+  std::vector<std::unique_ptr<Node>> roots;
+  std::size_t first_coarsest = 0;  // of the roots, from where on they have the coarsest level
+
+  void plant(const std::vector<std::uint32_t>& triangles);
+  static constexpr int finest_root = 4;  // level
+  /// Adds roots one level coarser than the coarsest, if those are finer than `level`. They carry tiles only: what is finer is
+  /// reached from the planted roots.
+  void raise(int level);
+  /// Returns the bytes that the new cubes take.
+  std::size_t divide(Node& node) const;
+  /// Forgets all cubes below `node` that were last visited before `then`; returns the bytes that frees.
+  static std::size_t forget_below(Node& node, std::uint64_t then);
+};
+
+}  // namespace sonar
