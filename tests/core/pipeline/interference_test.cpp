@@ -137,6 +137,19 @@ TEST(Leak, RingsByItsTable) {
   EXPECT_EQ(s.ping().pressure_upa, first) << "in expected power it is its mean";
 }
 
+TEST(Leak, GoesOnBehindANullOfItsTable) {
+  ReceiverModel law = leaking();
+  law.leak_ring_db = {0, -300, -5, -30};
+  law.leak_ring_step_m = 0.1f;
+  Sounding s(SceneMaker().make(), oculus_high(), default_rows(2, 700));
+  give_receiver(s, law);
+  s.request.switches.expected_power = true;
+  s.ping();
+  const int row = static_cast<int>(s.row_of_range(0.2)) + 2;
+  const double at = s.range_of_row(row) / static_cast<double>(0.1f);
+  EXPECT_NEAR(db(mean_row_power(s, row)), 160 - 5 - 25 * (at - 2), 0.1);
+}
+
 /// The record of a ping fired `after_s` after the epoch.
 const Ping& ping_at(Sounding& s, double after_s) {
   s.request.fired_at = Time(std::chrono::nanoseconds(static_cast<std::int64_t>(after_s * 1e9)));
