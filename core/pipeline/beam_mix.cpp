@@ -133,23 +133,26 @@ BeamMixView BeamMix::view() const {
   return v;
 }
 
-void BeamMix::apply(BeamSignals& beams, std::vector<float>& scratch) const {
-  BeamMixView v = view();
+void BeamMix::blur(BeamSignals& beams, std::vector<float>& scratch) const {
+  const BeamMixView v = view();
   const float nearest_m = std::max(v.first_range_m + v.sample_m * static_cast<float>(beams.first_sample), v.sample_m);
-  if (blurs() && largest_turn_m_ * v.sets_per_rad >= 0.5f * nearest_m) {
-    scratch.assign(beams.data.begin(), beams.data.end());
-    for (int j = 0; j < beams.beams; ++j)
-      // Samples that share their taps, side by side; with the range the set falls to 0 and stays.
-      for (int n = 0; n < beams.samples;) {
-        const std::int32_t set = focus_set(v, j, beams.first_sample + n);
-        if (set == 0) break;
-        int end = n + 1;
-        while (end < beams.samples && focus_set(v, j, beams.first_sample + end) == set) ++end;
-        refocus_run(v, scratch.data(), j, set, n, end, beams);
-        n = end;
-      }
-  }
+  if (!blurs() || largest_turn_m_ * v.sets_per_rad < 0.5f * nearest_m) return;
+  scratch.assign(beams.data.begin(), beams.data.end());
+  for (int j = 0; j < beams.beams; ++j)
+    // Samples that share their taps, side by side; with the range the set falls to 0 and stays.
+    for (int n = 0; n < beams.samples;) {
+      const std::int32_t set = focus_set(v, j, beams.first_sample + n);
+      if (set == 0) break;
+      int end = n + 1;
+      while (end < beams.samples && focus_set(v, j, beams.first_sample + end) == set) ++end;
+      refocus_run(v, scratch.data(), j, set, n, end, beams);
+      n = end;
+    }
+}
+
+void BeamMix::blend(BeamSignals& beams, std::vector<float>& scratch) const {
   if (!blends()) return;
+  const BeamMixView v = view();
   scratch.assign(beams.data.begin(), beams.data.end());
   const std::ptrdiff_t aside = v.step * beams.stride;
   for (int j = 0; j < beams.beams; ++j) {

@@ -216,6 +216,24 @@ TEST(Interference, IsAStreakOfItsPulseAtItsBearingAndLevel) {
   EXPECT_NEAR(db(s.power(middle, beam)), expected, 0.3);
 }
 
+TEST(Interference, IsNotBlurredByTheFocusOfItsRows) {
+  const double azimuth = rad_from_deg(25), range = 25;
+  Sounding s(with_other_sonar({range * std::cos(azimuth), range * std::sin(azimuth), 0}, 50), oculus_high(),
+             default_rows(5, 700));
+  ReceiverModel law;
+  law.defocus = 1;
+  give_receiver(s, law);
+  double near = 0;
+  for (double t = 0; t < 0.02; t += 3e-4) {  // shorter than the pulse
+    s.request.switches.defocus = false;
+    const std::vector<float> sharp = ping_at(s, t).pressure_upa;
+    s.request.switches.defocus = true;
+    EXPECT_EQ(ping_at(s, t).pressure_upa, sharp) << t;
+    near += mean_row_power(s, 30);  // at 0.2 m
+  }
+  EXPECT_GT(near, 0);
+}
+
 TEST(Interference, IsSilentWhenOffBehindOrHidden) {
   const auto received = [](const std::shared_ptr<const Scene>& scene, bool on) {
     Sounding s(scene, oculus_high(), default_rows(5, 700));
