@@ -37,7 +37,7 @@ SONAR_HD inline void point_weights(const PingView& p, std::uint32_t i) {
   p.point_weights[i] = p.beam_patterns[i % beams](from.sine - p.beam_sines[i % beams]);
 }
 
-/// Adds what points and other sonars are at sample `n` of beam `j`.
+/// Adds what points are at sample `n` of beam `j`.
 SONAR_HD inline void add_points(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
   const auto beams = static_cast<std::uint32_t>(p.beams);
   const bool power = p.sea.expected_power != 0;
@@ -51,6 +51,11 @@ SONAR_HD inline void add_points(const PingView& p, std::uint32_t j, std::int32_t
   }
   re += static_cast<float>(power ? sum_re * sum_re + sum_im * sum_im : sum_re);
   if (!power) im += static_cast<float>(sum_im);
+}
+/// The same of other sonars.
+SONAR_HD inline void add_pulses(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
+  const auto beams = static_cast<std::uint32_t>(p.beams);
+  const bool power = p.sea.expected_power != 0;
   for (int q = 0; q < p.pulse_count; ++q) {
     const PulseInBeams& pulse = p.pulses[q];
     if (n < pulse.from || n >= pulse.to) continue;
@@ -105,6 +110,7 @@ SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
     const std::uint32_t j = first * beams_a_panel + beam;
     if (j >= beams) break;
     add_points(p, j, n, re[beam], im[beam]);
+    if (p.mixed == nullptr) add_pulses(p, j, n, re[beam], im[beam]);  // else behind the blur, in refocus()
     float* to = p.beam_signals + 2 * (static_cast<std::int64_t>(j) * p.samples + n);
     to[0] = re[beam];
     to[1] = im[beam];
@@ -120,6 +126,7 @@ SONAR_HD inline void refocus(const PingView& p, std::uint32_t i) {
   if (p.mix.turn_m != nullptr)
     if (const std::int32_t set = focus_set(p.mix, j, n); set > 0)
       s = refocused(p.mix, p.beam_signals, 2 * static_cast<std::int64_t>(p.samples), j, n, set);
+  add_pulses(p, static_cast<std::uint32_t>(j), n, s.re, s.im);
   float* to = p.mixed + 2 * static_cast<std::int64_t>(i);
   to[0] = s.re;
   to[1] = s.im;

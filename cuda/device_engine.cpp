@@ -71,7 +71,7 @@ class DeviceEngine final : public PingEngine {
     for (const PingRequest& request : to_compute) wanted_.push_back({request});
     try {
       on_device([this] { begin_open(); });
-    } catch (const std::bad_alloc&) {  // collect() tries again
+    } catch (...) {  // collect() tries again, and throws if it has to
     }
   }
   std::vector<Ping> collect() override { return taken(0); }
@@ -141,15 +141,16 @@ class DeviceEngine final : public PingEngine {
     if (!failed_) try {
         while (!has_room_for(work)) {
         }
-      } catch (const std::bad_alloc&) {  // of the computer's memory: what was begun is forgotten
-        for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);
-        for (BatchRoom& room : rooms_) empty(room);
-        preparer_.forget_cells();
-        throw;
       } catch (const std::runtime_error& e) {
         failed_ = std::string("the CUDA engine stopped: ") + e.what();
         for (BatchRoom& room : rooms_) empty(room);
         if (device_options_.cpu_after_failure) say(*failed_ + "; from here on the CPU computes");
+      } catch (...) {  // the computer's memory is full, or a fault of the program: what was begun is forgotten
+        for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);
+        for (BatchRoom& room : rooms_) empty(room);
+        preparer_.forget_cells();
+        plans_.clear();  // one may have been sent in part
+        throw;
       }
   }
 
@@ -335,7 +336,7 @@ class DeviceEngine final : public PingEngine {
   void try_to_wait(int lane) const {
     try {
       machine_->wait(lane);
-    } catch (const std::runtime_error&) {  // it has failed, and what it had to do with it
+    } catch (const std::exception&) {  // it has failed, and what it had to do with it
     }
   }
 

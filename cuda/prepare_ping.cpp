@@ -101,7 +101,7 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
 PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, BatchRoom& room) {
   const PingRequest& request = asked.wanted->request;
   PlanTables& plan = *asked.plan;
-  // Noise, leak and volume read one table of shaped noise (section 5).
+  // Leak and volume read a table of shaped noise too: the noise's, or one with the pulse's correlation (section 5).
   const bool leak = request.switches.leak && plan.plan().mode.receiver.leak_upa > 0;
   const bool wants_noise = request.switches.noise || leak || (request.switches.volume && scene_->water_column.has_volume());
   set_gain(plan.plan(), request.settings.gain_db);

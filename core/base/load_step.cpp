@@ -15,9 +15,8 @@ struct {
 }  // namespace
 
 void begin_load_step(std::string what, std::uint64_t triangles) {
-  if (triangles < 300'000) return;
   const std::lock_guard lock(step.mutex);
-  step.what = std::move(what);
+  step.what = triangles < 300'000 ? "" : std::move(what);
   step.part.store(0, std::memory_order_relaxed);
 }
 void load_step_reached(double part) { step.part.store(part, std::memory_order_relaxed); }

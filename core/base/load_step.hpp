@@ -1,5 +1,4 @@
-// What a long load is at: the readers and builders of scenes tell it, a console asks for it, and neither knows the other.
-// One for the process.
+// The step that a long load is at: the readers and builders of scenes set it, a console reads it. One for the process.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +7,11 @@
 namespace sonar {
 
 struct LoadStep {
-  std::string what;  // "reading wreck.ply"; empty before the first
+  std::string what;  // "reading wreck.ply"; empty before the first, and while a step is short
   double part = 0;   // of it that is done, 0 to 1; 0 = not known
 };
 
-/// From any thread. `triangles`: about how many it is for; a step for fewer than 300,000 is not worth telling.
+/// From any thread. `triangles`: about how many it is for; a step for fewer than 300,000 is short, and leaves `what` empty.
 void begin_load_step(std::string what, std::uint64_t triangles);
 void load_step_reached(double part);
 LoadStep load_step();

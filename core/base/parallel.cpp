@@ -96,7 +96,7 @@ void Parallel::run(std::size_t count, void* body, Call call) {
   for (int i = 0; i < places; ++i) p.start.notify_one();
   p.run_items(0);
   std::unique_lock lock(p.mutex);
-  p.free_places = 0;  // all items are taken: who has not woken up yet need not
+  p.free_places = 0;  // all items are taken: a thread that has not woken up yet takes no place
   p.finished.wait(lock, [&] { return p.busy == 0; });
   if (p.fault) std::rethrow_exception(std::exchange(p.fault, nullptr));
 }

@@ -31,7 +31,7 @@ void refocus_run(const BeamMixView& v, const float* from, int j, std::int32_t se
 }
 
 /// blended() of all beams in place: what a beam was before waits in `before`, a ring, for the one `step` further on.
-void blend(const BeamMixView& v, BeamSignals& beams, std::vector<float>& before) {
+void blend_in_place(const BeamMixView& v, BeamSignals& beams, std::vector<float>& before) {
   const int floats = 2 * beams.samples;
   before.assign(static_cast<std::size_t>(v.step + 1) * static_cast<std::size_t>(floats), 0.0f);
   const float* nothing = before.data() + static_cast<std::ptrdiff_t>(v.step) * floats;  // beyond the last beam
@@ -151,23 +151,25 @@ BeamMixView BeamMix::view() const {
   return v;
 }
 
-void BeamMix::apply(BeamSignals& beams, std::vector<float>& scratch) const {
-  BeamMixView v = view();
+void BeamMix::blur(BeamSignals& beams, std::vector<float>& scratch) const {
+  const BeamMixView v = view();
   const float nearest_m = std::max(v.first_range_m + v.sample_m * static_cast<float>(beams.first_sample), v.sample_m);
-  if (blurs() && largest_turn_m_ * v.sets_per_rad >= 0.5f * nearest_m) {
-    scratch.assign(beams.data.begin(), beams.data.end());
-    for (int j = 0; j < beams.beams; ++j)
-      // Samples that share their taps, side by side; with the range the set falls to 0 and stays.
-      for (int n = 0; n < beams.samples;) {
-        const std::int32_t set = focus_set(v, j, beams.first_sample + n);
-        if (set == 0) break;
-        int end = n + 1;
-        while (end < beams.samples && focus_set(v, j, beams.first_sample + end) == set) ++end;
-        refocus_run(v, scratch.data(), j, set, n, end, beams);
-        n = end;
-      }
-  }
-  if (blends()) blend(v, beams, scratch);
+  if (!blurs() || largest_turn_m_ * v.sets_per_rad < 0.5f * nearest_m) return;
+  scratch.assign(beams.data.begin(), beams.data.end());
+  for (int j = 0; j < beams.beams; ++j)
+    // Samples that share their taps, side by side; with the range the set falls to 0 and stays.
+    for (int n = 0; n < beams.samples;) {
+      const std::int32_t set = focus_set(v, j, beams.first_sample + n);
+      if (set == 0) break;
+      int end = n + 1;
+      while (end < beams.samples && focus_set(v, j, beams.first_sample + end) == set) ++end;
+      refocus_run(v, scratch.data(), j, set, n, end, beams);
+      n = end;
+    }
+}
+
+void BeamMix::blend(BeamSignals& beams, std::vector<float>& scratch) const {
+  if (blends()) blend_in_place(view(), beams, scratch);
 }
 
 }  // namespace sonar

@@ -28,8 +28,9 @@ class BeamMix {
   const std::vector<float>& own() const { return own_; }
   const std::vector<float>& share() const { return share_; }
   BeamMixView view() const;
-  /// In place; `scratch` keeps its memory.
-  void apply(BeamSignals& beams, std::vector<float>& scratch) const;
+  /// In place; `scratch` keeps its memory. Nothing where blurs() or blends() is false.
+  void blur(BeamSignals& beams, std::vector<float>& scratch) const;
+  void blend(BeamSignals& beams, std::vector<float>& scratch) const;
 
  private:
   void lay_out_focus(const PingPlan& plan, double spacing);

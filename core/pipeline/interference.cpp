@@ -40,8 +40,9 @@ Leak::Leak(const PingPlan& plan, const Switches& switches) {
       if (i + 1 >= law.leak_ring_db.size()) break;
       down_db = -std::lerp(static_cast<double>(law.leak_ring_db[i]), static_cast<double>(law.leak_ring_db[i + 1]),
                            at - static_cast<double>(i));
+    } else if (down_db > forgotten_db) {
+      break;
     }
-    if (down_db > forgotten_db) break;
     rms_upa_.push_back(static_cast<float>(per_column * amplitude_from_db(-down_db)));
   }
 }

@@ -19,7 +19,7 @@ namespace sonar {
 /// the device's range r, complex Gaussian with the pulse's correlation, per column like the noise. Nearly the same in every ping.
 class Leak {
  public:
-  /// Powers of ten in pressure after which it is forgotten.
+  /// How far it may decay before it is left out [dB]. A table ends with its last entry, and may have nulls.
   static constexpr double forgotten_db = 100;
   /// unknown: chosen. Share of its power that is new in every ping; in the captured M1200d pings 0.2 % in the first two rows,
   /// about a quarter in the next five.

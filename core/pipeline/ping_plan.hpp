@@ -23,7 +23,7 @@ namespace sonar {
 
 /// What the rays look at: angles about the array axis, and the tangent axis of the depth map.
 struct Fan {
-  double half_angle_rad = 0;  // of the main part; the fixed fan and paths by mirrors know no more
+  double half_angle_rad = 0;  // of the main part; the fixed fan and paths by mirrors cover no more
   double reach_rad = 0;       // with the side lobes
   TangentAxis axis{};
   int bins = 0;

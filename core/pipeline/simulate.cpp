@@ -360,10 +360,12 @@ void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWork
   // A window is 64 samples of whole rows: its beams stay in cache until they are codes.
   mine.beams.shape(plan_.settings.beam_count, first * per_row, (last - first) * per_row);
   form_beams(w_.columns, plan_.beam_weights, kernels_, mine.beam_scratch, mine.beams);
-  // On top of the beams at exact directions: points and other sonars; then what beams take of each other.
+  // On top of the beams at exact directions: points and other sonars; then what beams take of each other. Another sonar's
+  // pulse does not come from the range of its rows: the blur is not its.
   add_points(points_, plan_, mine.beams);
+  plan_.beam_mix.blur(mine.beams, mine.mixed);
   add_pulses(other_sonars_, plan_, mine.beams);
-  if (plan_.beam_mix.blurs() || plan_.beam_mix.blends()) plan_.beam_mix.apply(mine.beams, mine.mixed);
+  plan_.beam_mix.blend(mine.beams, mine.mixed);
   if (crosstalk_.is_audible()) crosstalk_.add(plan_, mine.beams);
   watch.lap(Stage::form_beams);
   receive(mine.beams, plan_, kernels_, mine.receive, ping);

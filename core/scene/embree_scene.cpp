@@ -165,15 +165,7 @@ struct RayScene::Impl {
       add_object(device, groups[static_cast<std::size_t>(object.body + 1)], *object.mesh, placed_in_group,
                  static_cast<std::uint32_t>(i));
     }
-    begin_load_step("building the ray tracer's tree", scene->triangle_count());
-    for (Group& group : groups) {
-      rtcSetSceneBuildQuality(group.scene.handle, RTC_BUILD_QUALITY_HIGH);
-      rtcSetSceneFlags(group.scene.handle, flags_for(group.triangles));
-      const auto tell = [](void*, double part) { return load_step_reached(part), true; };
-      rtcSetSceneProgressMonitorFunction(group.scene.handle, tell, nullptr);
-      rtcCommitScene(group.scene.handle);
-      device.check();
-    }
+    build_trees();
     begin_load_step("preparing for pings", scene->triangle_count());
     traced = groups[0].scene.handle;
     if (bodies > 0) make_top();
@@ -182,6 +174,28 @@ struct RayScene::Impl {
     for (RTCGeometry instance : instances) rtcReleaseGeometry(instance);
   }
 
+  void build_trees() {
+    begin_load_step("building the ray tracer's tree", scene->triangle_count());
+    double all = 1;
+    for (const Group& group : groups) all += static_cast<double>(group.triangles);
+    struct {
+      double before, share;  // of the groups that are built, of the one under way
+    } parts{0, 0};
+    const auto tell = [](void* of, double part) {
+      const auto& p = *static_cast<decltype(parts)*>(of);
+      return load_step_reached(p.before + p.share * part), true;
+    };
+    for (Group& group : groups) {
+      const RTCScene tree = group.scene.handle;
+      parts = {parts.before + parts.share, static_cast<double>(group.triangles) / all};
+      rtcSetSceneBuildQuality(tree, RTC_BUILD_QUALITY_HIGH);
+      rtcSetSceneFlags(tree, flags_for(group.triangles));
+      rtcSetSceneProgressMonitorFunction(tree, tell, &parts);
+      rtcCommitScene(tree);
+      rtcSetSceneProgressMonitorFunction(tree, nullptr, nullptr);
+      device.check();
+    }
+  }
   // The static group becomes an instance too: then moving a body rebuilds a handful of boxes and nothing else.
   void make_top() {
     top = SceneHandle(device);

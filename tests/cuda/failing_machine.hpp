@@ -18,6 +18,8 @@ class FailingMachine final : public cuda::Machine {
   std::string no_transforms;
   /// Bytes of the device; more is DeviceMemoryFull. `tells_bytes`: what it claims to have free at the start.
   std::size_t room_bytes = std::numeric_limits<std::size_t>::max(), tells_bytes = room_bytes;
+  /// A fault of the program instead of a lost device: std::logic_error at the call `last`, and none after it.
+  bool has_fault = false;
   /// `calls` is counted up, and outlives this; the call that finds it at `last` fails, as do all that follow.
   FailingMachine(int& calls, int last) : calls_(calls), last_(last) {}
 
@@ -52,7 +54,9 @@ class FailingMachine final : public cuda::Machine {
 
  private:
   void called() {
-    if (std::atomic_ref(calls_)++ >= last_) throw std::runtime_error("the device is lost");
+    const int call = std::atomic_ref(calls_)++;
+    if (has_fault && call == last_) throw std::logic_error("a fault of the program");
+    if (!has_fault && call >= last_) throw std::runtime_error("the device is lost");
   }
   int& calls_;
   int last_;

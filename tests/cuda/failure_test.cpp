@@ -147,6 +147,31 @@ TEST_F(LostDevice, IsTheEndWhereNothingMayTakeItsPlace) {
   }
 }
 
+TEST_F(LostDevice, GoesOnAfterAFaultOfTheProgram) {
+  const auto sound = engine(never, true);
+  const int first = calls_;
+  const std::vector<Ping> there = sound->run(requests_);
+  const int all = calls_;
+  int thrown = 0;
+  for (int last = first; last < all; ++last) {
+    calls_ = 0;
+    auto machine = std::make_unique<FailingMachine>(calls_, last);
+    machine->has_fault = true;
+    cuda::DeviceEngineOptions device;
+    device.batch = 2;
+    const auto faulty = cuda::make_device_engine(scene_, pool_, options_, std::move(machine), device);
+    try {
+      faulty->run(requests_);
+    } catch (const std::logic_error&) {
+      ++thrown;
+    }
+    const std::vector<Ping> pings = faulty->run(requests_);
+    ASSERT_EQ(pings.size(), there.size());
+    for (std::size_t i = 0; i < pings.size(); ++i) ASSERT_EQ(pings[i].samples, there[i].samples) << last << ", ping " << i;
+  }
+  EXPECT_GT(thrown, 0);
+}
+
 TEST_F(LostDevice, IsNotAskedForTransformsThatItDoesNotHave) {
   if (!spectral::have_transform) GTEST_SKIP() << "no exact pulses in this build";
   auto machine = std::make_unique<FailingMachine>(calls_, never);

@@ -105,8 +105,9 @@ struct Kernels {
   void (*scatter_hits)(const HitsToScatter&, int n, float* re, float* im);
   /// Adds the echoes' kernels to grid[2 (points + width)].
   void (*spread)(const SpreadGrid&, const SpreadEchoes&, int count, double* grid);
-  /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im). Reads the echoes in whole vectors;
-  /// reads and writes at most 16 samples from that of a multiple of 8 at or before the pulse's first.
+  /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im). Reads and
+  /// writes the aligned vectors that a pulse reaches into: two of 8 samples or three of 4, at most 16 samples from that of a
+  /// multiple of 8 at or before its first. Reads up to a whole vector of echoes past `count`, whatever they are.
   void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column,
                      int lead);
   /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.

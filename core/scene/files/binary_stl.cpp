@@ -2,6 +2,7 @@
 // little-endian.
 #include "core/scene/files/binary_stl.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
@@ -32,11 +33,14 @@ std::optional<std::uint64_t> triangles_of_binary_stl(std::FILE* file) {
   return count;
 }
 
-void each_triangle_of_binary_stl(std::FILE* file, const TriangleSink& take) {
-  std::vector<char> block(triangle_bytes * 4096);
-  if (std::fseek(file, header_bytes, SEEK_SET) != 0) return;
-  while (const std::size_t read = std::fread(block.data(), triangle_bytes, block.size() / triangle_bytes, file)) {
-    for (std::size_t t = 0; t < read; ++t) {
+bool each_triangle_of_binary_stl(std::FILE* file, std::uint64_t count, const TriangleSink& take) {
+  constexpr std::uint64_t at_once = 4096;
+  std::vector<char> block(triangle_bytes * at_once);
+  if (std::fseek(file, header_bytes, SEEK_SET) != 0) return false;
+  for (std::uint64_t given = 0; given < count; given += at_once) {
+    const std::size_t wanted = std::min(at_once, count - given);
+    if (std::fread(block.data(), triangle_bytes, wanted, file) != wanted) return false;
+    for (std::size_t t = 0; t < wanted; ++t) {
       std::array<Vec3d, 3> corners;
       for (std::size_t k = 0; k < 3; ++k) {
         const auto p = value_at<std::array<float, 3>>(&block[triangle_bytes * t + 12 + 12 * k]);
@@ -45,6 +49,7 @@ void each_triangle_of_binary_stl(std::FILE* file, const TriangleSink& take) {
       take(corners, 0);
     }
   }
+  return true;
 }
 
 }  // namespace sonar

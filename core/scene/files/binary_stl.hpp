@@ -11,7 +11,7 @@ namespace sonar {
 
 /// How many triangles the file holds; nothing when its length says that it is not binary STL.
 std::optional<std::uint64_t> triangles_of_binary_stl(std::FILE* file);
-/// Every triangle as it stands in the file, material 0. Ends early where the file does.
-void each_triangle_of_binary_stl(std::FILE* file, const TriangleSink& take);
+/// Gives `count` triangles as they stand in the file, material 0. False: the file could not be read so far.
+bool each_triangle_of_binary_stl(std::FILE* file, std::uint64_t count, const TriangleSink& take);
 
 }  // namespace sonar

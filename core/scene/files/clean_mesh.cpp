@@ -15,6 +15,10 @@ bool has_area(Vec3 a, Vec3 b, Vec3 c) {
   return length(cross(ab, ac)) > 1e-6 * longest && longest > 1e-12;
 }
 
+bool is_within(Vec3d p, Vec3d low, Vec3d high) {  // false of what is not a number
+  return p.x >= low.x && p.y >= low.y && p.z >= low.z && p.x <= high.x && p.y <= high.y && p.z <= high.z;
+}
+
 }  // namespace
 
 Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t most) {
@@ -42,10 +46,17 @@ Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t mo
   VertexTable vertices(out.mesh.vertices, count / 2);  // as a closed surface has
   out.mesh.triangles.reserve(count);
   out.mesh.material.reserve(count);
+  // A file may change between the passes.
+  std::size_t again = 0;
+  bool same = true;
   source([&](std::span<const Vec3d, 3> corners, std::uint16_t material) {
-    if (out.mesh.triangles.size() + out.left_out == count) return;  // a file that grew since the first pass
     Vec3 p[3];
-    for (std::size_t k = 0; k < 3; ++k) p[k] = to_float(corners[k] - out.centre_m);
+    for (std::size_t k = 0; k < 3; ++k) {
+      same = same && is_within(corners[k], low, high);
+      p[k] = to_float(corners[k] - out.centre_m);
+    }
+    same = same && ++again <= count;
+    if (!same) return;
     if (!has_area(p[0], p[1], p[2])) {
       ++out.left_out;
       return;
@@ -53,6 +64,7 @@ Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t mo
     out.mesh.triangles.push_back({vertices.index_of(p[0]), vertices.index_of(p[1]), vertices.index_of(p[2])});
     out.mesh.material.push_back(material);
   });
+  if (!same || again != count) return bad("changed while it was read; load it again");
   if (out.mesh.triangles.empty()) return bad("has only triangles without area; check its units and \"scale\"");
   return out;
 }

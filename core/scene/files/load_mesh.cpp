@@ -177,9 +177,14 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
   if (std::find(known.begin(), known.end(), extension) == known.end())
     return bad(request, "unknown mesh format; use OBJ, STL, PLY, glTF, GLB or DAE");
   if (on_disk && extension == ".stl")
-    if (const auto triangles = triangles_of_binary_stl(opened->get()))
-      return clean(request, false, *triangles, {AI_DEFAULT_MATERIAL_NAME},
-                   [&](const TriangleSink& take) { each_triangle_of_binary_stl(opened->get(), take); });
+    if (const auto triangles = triangles_of_binary_stl(opened->get())) {
+      bool whole = true;
+      auto mesh = clean(request, false, *triangles, {AI_DEFAULT_MATERIAL_NAME}, [&](const TriangleSink& take) {
+        whole = whole && each_triangle_of_binary_stl(opened->get(), *triangles, take);
+      });
+      if (!whole) return bad(request, "cannot be read to its end");
+      return mesh;
+    }
   opened->reset();
   return import_mesh(request, extension);
 }

@@ -137,6 +137,19 @@ TEST(Leak, RingsByItsTable) {
   EXPECT_EQ(s.ping().pressure_upa, first) << "in expected power it is its mean";
 }
 
+TEST(Leak, GoesOnBehindANullOfItsTable) {
+  ReceiverModel law = leaking();
+  law.leak_ring_db = {0, -300, -5, -30};
+  law.leak_ring_step_m = 0.1f;
+  Sounding s(SceneMaker().make(), oculus_high(), default_rows(2, 700));
+  give_receiver(s, law);
+  s.request.switches.expected_power = true;
+  s.ping();
+  const int row = static_cast<int>(s.row_of_range(0.2)) + 2;
+  const double at = s.range_of_row(row) / static_cast<double>(0.1f);
+  EXPECT_NEAR(db(mean_row_power(s, row)), 160 - 5 - 25 * (at - 2), 0.1);
+}
+
 /// The record of a ping fired `after_s` after the epoch.
 const Ping& ping_at(Sounding& s, double after_s) {
   s.request.fired_at = Time(std::chrono::nanoseconds(static_cast<std::int64_t>(after_s * 1e9)));
@@ -201,6 +214,24 @@ TEST(Interference, IsAStreakOfItsPulseAtItsBearingAndLevel) {
   s.request.switches.expected_power = true;
   ping_at(s, fired_s);
   EXPECT_NEAR(db(s.power(middle, beam)), expected, 0.3);
+}
+
+TEST(Interference, IsNotBlurredByTheFocusOfItsRows) {
+  const double azimuth = rad_from_deg(25), range = 25;
+  Sounding s(with_other_sonar({range * std::cos(azimuth), range * std::sin(azimuth), 0}, 50), oculus_high(),
+             default_rows(5, 700));
+  ReceiverModel law;
+  law.defocus = 1;
+  give_receiver(s, law);
+  double near = 0;
+  for (double t = 0; t < 0.02; t += 3e-4) {  // shorter than the pulse
+    s.request.switches.defocus = false;
+    const std::vector<float> sharp = ping_at(s, t).pressure_upa;
+    s.request.switches.defocus = true;
+    EXPECT_EQ(ping_at(s, t).pressure_upa, sharp) << t;
+    near += mean_row_power(s, 30);  // at 0.2 m
+  }
+  EXPECT_GT(near, 0);
 }
 
 TEST(Interference, IsSilentWhenOffBehindOrHidden) {

@@ -4,10 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstring>
 #include <limits>
 
 #include "core/base/memory_left.hpp"
+#include "core/base/regular_file.hpp"
+#include "core/scene/files/binary_stl.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/temporary_files.hpp"
 
@@ -171,6 +174,36 @@ TEST_F(LoadMesh, BinaryStlOnDiskIsWhatTheImporterMakesOfIt) {
   EXPECT_EQ(ours.centred.mesh, theirs->centred.mesh);
   EXPECT_EQ(ours.centred.centre_m.z, theirs->centred.centre_m.z);
   EXPECT_EQ(ours.material_names, theirs->material_names);
+}
+
+TEST_F(LoadMesh, BinaryStlThatEndsBeforeItsLastTriangleIsRefused) {
+  const auto opened = open_regular(files_.write("b.stl", binary_stl()));
+  ASSERT_TRUE(opened);
+  std::size_t given = 0;
+  const TriangleSink count = [&](std::span<const Vec3d, 3>, std::uint16_t) { ++given; };
+  EXPECT_TRUE(each_triangle_of_binary_stl(opened->get(), 4, count));
+  EXPECT_EQ(given, 4u);
+  EXPECT_FALSE(each_triangle_of_binary_stl(opened->get(), 5, count));
+}
+
+TEST_F(LoadMesh, TrianglesThatChangeBetweenThePassesAreRefused) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  // How many triangles the second pass gives, and a coordinate of the last.
+  for (const auto& [count, x] : {std::pair{2, 1.0}, {1, 1.0}, {3, 1.0}, {2, nan}, {2, 9.0}}) {
+    int pass = 0;
+    const auto mesh = clean_triangles([&](const TriangleSink& take) {
+      const bool second = pass++ > 0;
+      const int n = second ? count : 2;
+      for (int i = 0; i < n; ++i)
+        take(std::array{Vec3d{0, 0, 0}, Vec3d{second && i + 1 == n ? x : 1.0, 0, 0}, Vec3d{0, 1, 0}}, 0);
+    });
+    if (count == 2 && x == 1.0) {
+      EXPECT_TRUE(mesh);
+    } else {
+      ASSERT_FALSE(mesh) << count << " " << x;
+      EXPECT_THAT(mesh.error().text, HasSubstr("changed while it was read"));
+    }
+  }
 }
 
 TEST_F(LoadMesh, UpAndScaleAsAsked) {

@@ -36,7 +36,6 @@ TEST(LoadProgress, ALongOneTellsItsStepItsPartAndTheSeconds) {
     return lines.back();
   };
   begin_load_step("reading wreck.ply", 1'000'000);
-  begin_load_step("a crate, which is small", 12);
   const LoadProgress progress(
       [&](const std::string& line) {
         const std::lock_guard lock(mutex);
@@ -49,6 +48,13 @@ TEST(LoadProgress, ALongOneTellsItsStepItsPartAndTheSeconds) {
   EXPECT_THAT(wait_for_a_line(), HasSubstr("reading wreck.ply, 45 %, "));
   begin_load_step("building", 1'000'000);
   EXPECT_THAT(wait_for_a_line(), StartsWith("loading the scene: building, "));
+}
+
+TEST(LoadProgress, AShortStepAfterALongOneIsSilent) {
+  begin_load_step("reading wreck.ply", 1'000'000);
+  EXPECT_EQ(load_step().what, "reading wreck.ply");
+  begin_load_step("a crate, which is small", 12);
+  EXPECT_EQ(load_step().what, "");
 }
 
 }  // namespace
