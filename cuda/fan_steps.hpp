@@ -13,7 +13,7 @@
 namespace sonar::cuda {
 
 namespace fan {
-inline constexpr int edge_depth = 4, deepest = 4;  // as in FanRefinement
+inline constexpr int deepest = 4;  // as in FanRefinement
 inline constexpr float slope_tolerance_in_pulses = 4, golden_turn = 0.61803399f, widest_skew = 0.15f;
 }  // namespace fan
 
@@ -152,7 +152,7 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
     if (!top.settled) {
       const bool same = below.object == top.ray.object;
       const bool open = !same || (!side && far_apart(below, top.ray, s.pulse_width_m));
-      if (open && !side && top.depth < (same ? fan::deepest : fan::edge_depth)) {
+      if (open && !side && top.depth < fan::deepest) {
         const BaseElevation middle = elevation_at(middle_rad(below, top.ray, static_cast<int>(column), top.depth));
         Vec3 along;
         const FanRay between = look(p, sine, middle, along);

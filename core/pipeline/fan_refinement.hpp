@@ -93,8 +93,8 @@ class FanRefinement {
   }
 
  private:
-  static constexpr int edge_depth = 4;  // edges are found to 1/16 of a base interval
-  static constexpr int deepest = 4;     // a surface that still will not interpolate hides itself
+  // Edges are found to 1/16 of a base interval; a surface that still will not interpolate hides itself.
+  static constexpr int deepest = 4;
   // A surface strays from the straight line between two hits by about a quarter of what its slopes promise; beyond a pulse width
   // of that a middle that happens to lie on the line proves nothing: the rays may fall in step with ripples.
   static constexpr float slope_tolerance_in_pulses = 4;
@@ -115,7 +115,7 @@ class FanRefinement {
     Sample &a = at(below), &b = at(above);
     const bool same = hit_the_same(a, b);
     if (same && !far_apart(a, b)) return;
-    if (depth < (same ? deepest : edge_depth)) list.push_back({below, above, column, depth});
+    if (depth < deepest) list.push_back({below, above, column, depth});
     if (!same || depth >= deepest) a.edge_above = true;
   }
   bool far_apart(const Sample& a, const Sample& b) const {
