@@ -88,10 +88,12 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
   const float steps = static_cast<float>(pulse.steps);
   for (int from = 0; from < count; from += at_once) {
     const int n = count - from < at_once ? count - from : at_once;
-    for (int i = 0; i < n; i += lanes) {  // what lies behind the last may be any number
+    for (int i = 0; i < n; i += lanes) {
       alignas(32) float part[lanes];
       alignas(32) std::int32_t row_at[lanes];
-      const Lanes sample = load(e.sample + from + i), whole = Lanes(_mm256_floor_ps(native(sample)));
+      // What lies behind the last may be any number.
+      const LaneNumbers there = LaneNumbers{0, 1, 2, 3, 4, 5, 6, 7} < n - i;
+      const Lanes sample = choose(there, load(e.sample + from + i), all(0)), whole = Lanes(_mm256_floor_ps(native(sample)));
       const Lanes position = (sample - whole) * steps;
       const LaneNumbers step = whole_part(position);
       store(part, position - as_floats(step));
