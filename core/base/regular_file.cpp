@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "core/base/confined_reads.hpp"
 #include "core/base/memory_left.hpp"
 
 namespace sonar {
@@ -25,9 +26,27 @@ tl::unexpected<Error> not_opened(const std::filesystem::path& file) {
   return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + std::strerror(errno));
 }
 
+std::filesystem::path& readable_folder() {  // empty = all
+  static std::filesystem::path folder;
+  return folder;
+}
+
+bool is_readable(const std::filesystem::path& file) {
+  const std::filesystem::path& folder = readable_folder();
+  if (folder.empty()) return true;
+  std::error_code ec;
+  const std::filesystem::path place = std::filesystem::canonical(file, ec);
+  return ec || std::mismatch(folder.begin(), folder.end(), place.begin(), place.end()).first == folder.end();
+}
+
 }  // namespace
 
+void confine_reads(const std::filesystem::path& folder) { readable_folder() = std::filesystem::canonical(folder); }
+
 Result<OpenFile> open_regular(const std::filesystem::path& file) {
+  if (!is_readable(file))
+    return failure(ErrorKind::missing_file, file.string() + ": is outside of " + readable_folder().string() +
+                                                ", and this program reads no other files; put a copy there");
   struct stat status {};
   const auto is_other = [&] {
     return failure(ErrorKind::missing_file,

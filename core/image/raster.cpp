@@ -1,6 +1,10 @@
 #include "core/image/raster.hpp"
 
+#include <fcntl.h>
 #include <png.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -28,6 +32,24 @@ std::uint16_t glyph(char c) {
 
 std::uint8_t mix(std::uint8_t under, std::uint8_t over, float opacity) {
   return static_cast<std::uint8_t>(std::lround(static_cast<float>(under) * (1 - opacity) + static_cast<float>(over) * opacity));
+}
+
+/// An empty file that no other process or thread writes until it is closed, nor renames; -1 and errno.
+int open_alone(const std::filesystem::path& file) {
+  while (true) {
+    const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+    if (descriptor < 0) return -1;
+    ::flock(descriptor, LOCK_EX);  // a file system without locks: as if alone
+    struct stat opened {
+    }, named{};
+    const bool is_named = ::fstat(descriptor, &opened) == 0 && ::stat(file.c_str(), &named) == 0 &&
+                          opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+    if (is_named && (!S_ISREG(opened.st_mode) || ::ftruncate(descriptor, 0) == 0)) return descriptor;
+    const int why = errno;
+    ::close(descriptor);
+    errno = why;
+    if (is_named) return -1;  // else another has given it its final name
+  }
 }
 
 }  // namespace
@@ -71,12 +93,15 @@ Result<std::vector<std::byte>> encode_png(const Raster& raster) {
 
 Result<void> write_whole_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts) {
   const std::filesystem::path unfinished = file.string() + ".tmp";
+  const int lock = open_alone(unfinished);
   const auto failed = [&](int why) {
     std::error_code ignored;
-    std::filesystem::remove(unfinished, ignored);
+    if (lock >= 0) std::filesystem::remove(unfinished, ignored), ::close(lock);
     return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(why));
   };
-  std::FILE* out = std::fopen(unfinished.c_str(), "wb");
+  if (lock < 0) return failed(errno);
+  const int descriptor = ::fcntl(lock, F_DUPFD_CLOEXEC, 0);
+  std::FILE* out = descriptor < 0 ? nullptr : ::fdopen(descriptor, "wb");
   if (out == nullptr) return failed(errno);
   int why = 0;
   for (const auto part : parts)
@@ -85,6 +110,7 @@ Result<void> write_whole_file(const std::filesystem::path& file, std::initialize
   std::error_code error;
   if (why == 0) std::filesystem::rename(unfinished, file, error);
   if (why != 0 || error) return failed(why != 0 ? why : error.value());
+  ::close(lock);
   return {};
 }
 

@@ -47,6 +47,7 @@ struct Material {
   Texture texture = {};
   Texture grain = {};  // the same of shells and stones: shorter than a beam is wide
   std::uint32_t texture_seed = 0;
+  std::string label = {};  // class of its surfaces in labels of samples; empty: its name
   bool operator==(const Material&) const = default;
 };
 
@@ -76,6 +77,7 @@ struct Object {
   int body = -1;  // index into PingRequest::bodies_in_world, -1 = static
   bool visible = true;
   Primitive primitive = {};
+  std::string label = {};  // its class in labels of samples; empty: an instance of no class, shown by its material's
   bool operator==(const Object&) const = default;  // of the same mesh, not of one that is equal
 };
 
@@ -85,6 +87,7 @@ struct PointTarget {
   Vec3d position_m;  // in the world, or in its body when body >= 0
   float target_strength_db = 0;
   int body = -1;
+  std::string label = {};  // as Object::label
   bool operator==(const PointTarget&) const = default;
 };
 

@@ -5,7 +5,7 @@
 build_packages=(
   g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libtinyxml2-dev libpng-dev zlib1g-dev
   libexpected-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libeigen3-dev libgtest-dev libgmock-dev
-  libfftw3-dev
+  libfftw3-dev libsnappy-dev libnats-dev
 )
 
 # For the page of the live view; without them the daemon is built without it.
@@ -13,7 +13,7 @@ page_packages=(esbuild libjs-three)
 
 # What only tests use: without it some are skipped, saying so.
 test_packages=(
-  tshark systemd dpkg-dev file strace python3-numpy
+  tshark systemd dpkg-dev file strace python3-numpy nats-server
 )
 browser_packages=(chromium)
 

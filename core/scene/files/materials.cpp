@@ -86,6 +86,7 @@ void MaterialTable::read_one(const std::string& name, text::Map keys) {
   if (const text::Node node = keys.optional("texture")) m.texture = read_texture(node, m.texture, 0.02);
   if (const text::Node node = keys.optional("grain")) m.grain = read_texture(node, m.grain, 0.002);
   m.texture_seed = static_cast<std::uint32_t>(keys.optional("texture_seed").unsigned_integer_or(m.texture_seed, 0xFFFFFFFFu));
+  m.label = keys.optional("label").text_or(m.label, 64);
   if (Material* known = definition(name)) {
     *known = m;
   } else {

@@ -36,6 +36,7 @@ class ObjectsReader {
     const Node name_node = keys.optional("name");
     const Node attached = keys.optional("attached_to");
     const bool moving = keys.optional("moving").boolean_or(false);
+    label_ = keys.optional("label").text_or({}, 64);
     if (!type_node.present()) return;
     std::vector<std::string_view> types = ShapeReader::types();
     types.push_back("point");
@@ -95,12 +96,14 @@ class ObjectsReader {
                                     .in_world = compose(in_world, Pose{shape.centre_m, {}}),
                                     .body = body,
                                     .visible = visible,
-                                    .primitive = shape.primitive});
+                                    .primitive = shape.primitive,
+                                    .label = label_});
   }
 
   void read_point(Map& keys, const std::string& name, int body, bool moving) {
     PointTarget target;
     target.name = name;
+    target.label = label_;
     target.target_strength_db = static_cast<float>(keys.required("target_strength_db").number(Range::between(-120, 60)));
     const Node pose_node = keys.optional("pose");
     const Pose pose = read_pose(pose_node);
@@ -119,6 +122,7 @@ class ObjectsReader {
   std::set<std::string> names_;
   std::size_t triangles_ = 0;
   int unnamed_ = 0;
+  std::string label_;  // of the entry that is being read
 };
 
 }  // namespace

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include "core/base/geometry.hpp"
 #include "tests/small_disk.hpp"
@@ -153,6 +156,28 @@ TEST(Png, IsWrittenWholeOrRefusedWithASentence) {
   EXPECT_FALSE(std::filesystem::exists(file.string() + ".tmp"));
   EXPECT_EQ(write_png(Raster(4, 4), "/dev/null/fan.png").error().kind, ErrorKind::io);
   std::filesystem::remove_all(folder);
+}
+
+TEST(Png, SeveralWritersOfOneFileDoNotMeet) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "fan_image_test_several";
+  std::filesystem::remove(file);
+  std::vector<std::thread> writers;
+  for (int writer = 0; writer < 4; ++writer)
+    writers.emplace_back([&, writer] {
+      const std::vector<std::byte> bytes(100'000 + 1000 * static_cast<std::size_t>(writer),
+                                         std::byte{static_cast<unsigned char>(writer)});
+      for (int i = 0; i < 50; ++i) EXPECT_TRUE(write_whole_file(file, {bytes, bytes}));
+    });
+  for (int i = 0; i < 50; ++i) {
+    std::ifstream in(file, std::ios::binary);
+    const std::string there{std::istreambuf_iterator<char>(in), {}};
+    if (there.empty()) continue;  // not yet
+    const auto writer = static_cast<std::size_t>(there[0]);
+    EXPECT_EQ(there, std::string(2 * (100'000 + 1000 * writer), there[0]));
+  }
+  for (std::thread& writer : writers) writer.join();
+  EXPECT_FALSE(std::filesystem::exists(file.string() + ".tmp"));
+  std::filesystem::remove(file);
 }
 
 TEST(Png, AFullDiskIsAnErrorThatNamesTheFileAndTheReason) {

@@ -1,0 +1,11 @@
+// For programs that load what strangers wrote: names in it cannot lead to other files of this machine.
+#pragma once
+
+#include <filesystem>
+
+namespace sonar {
+
+/// From now on open_regular() opens only what is below `folder`, links followed. Call it once, before there are threads.
+void confine_reads(const std::filesystem::path& folder);
+
+}  // namespace sonar

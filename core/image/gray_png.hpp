@@ -1,0 +1,16 @@
+// Grey PNG files of whole numbers, 8 or 16 bits: samples and labels as they are, without a colour map.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/result.hpp"
+
+namespace sonar {
+
+/// Little-endian values, `bits` / 8 bytes each, [height][width]; 8 or 16 bits. The same bytes for the same values.
+Result<std::vector<std::byte>> encode_gray_png(std::span<const std::byte> values, int width, int height, int bits);
+
+}  // namespace sonar
