@@ -71,11 +71,16 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
                       cell_value(t, cell_normal_z, cell) * (qz + dz);
   if (!(along * t.turned_away <= 0)) return false;
   // What lies behind another object's facet, followed from the ray's place in the column to the cell's.
-  const auto differs = [&](float of) { return ((static_cast<std::int32_t>(bits_of(of)) ^ t.mark) & surface_marks) != 0; };
-  if (seen_inverse_h - tolerance < seen && differs(map[0]) && differs(map[1])) {
+  const float* slope = p.depth_slope + map_at;
+  const auto differs = [&](std::int32_t i) {
+    const auto in_map = static_cast<std::int32_t>(bits_of(map[i])), in_slope = static_cast<std::int32_t>(bits_of(slope[i]));
+    return ((in_map ^ t.mark) & surface_marks) != 0 ||
+           (g.has_upper_marks != 0 && ((in_slope ^ upper_mark(t.mark)) & upper_marks) != 0);
+  };
+  if (seen_inverse_h - tolerance < seen && differs(0) && differs(1)) {
     const float nearness = seen_inverse_h * (1.0f + contact_share + contact_m * inverse_r);
     const float beside = seen_column - static_cast<float>(map_column) - 0.5f;
-    if (nearness < seen + beside * p.depth_slope[map_at]) return false;
+    if (nearness < seen + beside * slope[0]) return false;
   }
   at.range = r;
   at.offset = e / (t.range_m + r);

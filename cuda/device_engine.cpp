@@ -11,6 +11,7 @@
 #include "core/pipeline/check_request.hpp"
 #include "core/pipeline/simulate.hpp"
 #include "core/pipeline/water_line.hpp"
+#include "core/sonar/range_image.hpp"
 #include "cuda/prepare_ping.hpp"
 #include "cuda/steps.hpp"
 #include "cuda/take_results.hpp"
@@ -376,6 +377,7 @@ std::string why_not_on_device(const PingRequest& request, bool transforms) {
   const Waveform& w = request.model->modes[static_cast<std::size_t>(request.settings.mode)].waveform;
   if (request.switches.mode != Mode::canonical) return "pings of the comparison modes";
   if (request.switches.fixed_fan > 0) return "pings of a fixed fan";
+  if (range_image_of(request) != nullptr) return "range images";
   if (request.switches.expected_power || transforms) return "";
   if (w.shape == Waveform::Shape::measured) return "pings with a measured pulse";
   if (w.exact) return "pings with an exact pulse";

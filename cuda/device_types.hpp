@@ -68,6 +68,7 @@ struct FanRay {
   float range_m, inverse_x;
   Vec3 normal;
   float offset;
+  Vec3 direction;
 };
 struct ColumnSine {
   float along, across;
@@ -104,7 +105,7 @@ struct alignas(16) Echo {
 struct SeaView {
   std::int32_t conical, columns, elevations, bins, expected_power;
   std::int32_t side_elevations, side_columns;  // PingPlan::side_column
-  std::int32_t columns_beside;
+  std::int32_t columns_beside, has_upper_marks;
   float first_edge_sine, columns_per_sine, depth_tolerance_m;
   TangentAxis axis;
   float turns_per_m, decay_per_m, samples_per_m, sample_offset, first_sample, last_sample;

@@ -14,7 +14,7 @@ namespace sonar::cuda {
 
 namespace fan {
 inline constexpr int deepest = 4;  // as in FanRefinement
-inline constexpr float slope_tolerance_in_pulses = 4, golden_turn = 0.61803399f, widest_skew = 0.15f;
+inline constexpr float slope_tolerance_in_pulses = 2, golden_turn = 0.61803399f, widest_skew = 0.15f;
 }  // namespace fan
 
 /// Sine and cosine rounded from double: the same on host and device.
@@ -23,11 +23,12 @@ SONAR_HD inline BaseElevation elevation_at(float angle_rad) {
   return {angle_rad, static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle))};
 }
 
-SONAR_HD inline FanRay look(const PingView& p, ColumnSine column, BaseElevation e, Vec3& along) {
+SONAR_HD inline FanRay look(const PingView& p, ColumnSine column, BaseElevation e) {
   const SeaView& s = p.sea;
   const float* m = s.world_from_sonar;
   const Vec3 d = ray_in_sonar(s.conical != 0, column.along, column.across, e.cosine, e.sine);
-  along = {m[0] * d.x + m[1] * d.y + m[2] * d.z, m[3] * d.x + m[4] * d.y + m[5] * d.z, m[6] * d.x + m[7] * d.y + m[8] * d.z};
+  const Vec3 along{m[0] * d.x + m[1] * d.y + m[2] * d.z, m[3] * d.x + m[4] * d.y + m[5] * d.z,
+                   m[6] * d.x + m[7] * d.y + m[8] * d.z};
   const Ray ray{{s.origin[0], s.origin[1], s.origin[2]}, {along.x, along.y, along.z}};
   const RayHit hit = trace_ray(p.tracer, ray, s.far_m);
   FanRay r{};
@@ -35,6 +36,7 @@ SONAR_HD inline FanRay look(const PingView& p, ColumnSine column, BaseElevation 
   r.forward = s.conical != 0 ? column.across * e.cosine : e.cosine;
   r.tangent = e.sine / e.cosine;
   r.object = hit.object;
+  r.direction = along;
   if (hit.object == no_object) return r;
   r.range_m = hit.range_m;
   const float x = hit.range_m * r.forward;
@@ -54,8 +56,7 @@ SONAR_HD inline void trace_base(const PingView& p, std::uint32_t i) {
     column = column - column % step + step / 2;
     if (column >= p.sea.columns) column = p.sea.columns - 1;
   }
-  Vec3 along;
-  p.fan_rays[i] = look(p, p.column_sines[column], p.base_elevations[e], along);
+  p.fan_rays[i] = look(p, p.column_sines[column], p.base_elevations[e]);
 }
 
 SONAR_HD inline bool far_apart(const FanRay& a, const FanRay& b, float tolerance_m) {
@@ -68,16 +69,18 @@ SONAR_HD inline float middle_rad(const FanRay& a, const FanRay& b, int column, i
   const float part = 0.5f + fan::widest_skew * (2 * (turns - std::floor(turns)) - 1);
   return below + part * (above - below);
 }
-SONAR_HD inline bool plane_is_near(const FanRay& end, Vec3 along, const FanRay& middle, float tolerance_m) {
-  return std::fabs(end.offset / dot(end.normal, along) - middle.range_m) <= fan::slope_tolerance_in_pulses * tolerance_m;
+SONAR_HD inline bool planes_agree(const FanRay& a, const FanRay& b, float tolerance_m) {
+  const float most = fan::slope_tolerance_in_pulses * tolerance_m;
+  return std::fabs(a.offset / dot(a.normal, b.direction) - b.range_m) <= most &&
+         std::fabs(b.offset / dot(b.normal, a.direction) - a.range_m) <= most;
 }
-SONAR_HD inline bool interpolates(const FanRay& a, const FanRay& m, const FanRay& b, Vec3 along, float tolerance_m) {
+SONAR_HD inline bool interpolates(const FanRay& a, const FanRay& m, const FanRay& b, float tolerance_m) {
   if (a.object != m.object || a.object != b.object) return false;
   if (m.object == no_object) return true;
   const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
   const float expected_x = 1.0f / (a.inverse_x + part * (b.inverse_x - a.inverse_x));
   if (std::fabs(expected_x / m.forward - m.range_m) > tolerance_m) return false;
-  return plane_is_near(a, along, m, tolerance_m) && plane_is_near(b, along, m, tolerance_m);
+  return planes_agree(a, m, tolerance_m) && planes_agree(b, m, tolerance_m);
 }
 
 /// As FanTracer::per_column (core/pipeline/trace_fan.cpp).
@@ -112,7 +115,7 @@ struct DepthPen {
       const float tangent = tangent_of_bin(sea->axis, static_cast<float>(bin));
       const float between = a.inverse_x + per_tangent * (tangent - a.tangent);
       map[bin] = with_mark(edge ? farther : (0.0f < between ? between : 0.0f), mark);
-      slope[bin] = aside;
+      slope[bin] = sea->has_upper_marks != 0 ? with_upper_mark(aside, mark) : aside;
     }
   }
 };
@@ -154,10 +157,9 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
       const bool open = !same || (!side && far_apart(below, top.ray, s.pulse_width_m));
       if (open && !side && top.depth < fan::deepest) {
         const BaseElevation middle = elevation_at(middle_rad(below, top.ray, static_cast<int>(column), top.depth));
-        Vec3 along;
-        const FanRay between = look(p, sine, middle, along);
+        const FanRay between = look(p, sine, middle);
         ++rays;
-        top.settled = interpolates(below, between, top.ray, along, s.pulse_width_m);
+        top.settled = interpolates(below, between, top.ray, s.pulse_width_m);
         ++top.depth;
         above[waiting] = {between, top.depth, top.settled};
         ++waiting;

@@ -17,6 +17,7 @@ void PingPreparer::place_fan(Making& m) {
   DepthMap all_columns;
   all_columns.columns = plan.columns.count;
   all_columns.bins = plan.fan.bins;
+  all_columns.has_upper_marks = has_upper_marks(scene_->objects.size());
   const simd::GroupView g = make_group_view(plan, s, all_columns, 0, plan.columns.count);
   SeaView& sea = m.view.sea;
   sea.conical = g.conical ? 1 : 0;
@@ -30,6 +31,7 @@ void PingPreparer::place_fan(Making& m) {
   sea.side_elevations = plan.fan.side_elevations;
   sea.side_columns = PingPlan::side_columns;
   sea.columns_beside = g.columns_beside;
+  sea.has_upper_marks = g.has_upper_marks ? 1 : 0;
   sea.elevation_aperture = g.elevation_aperture;
   sea.depth_tolerance_m = g.depth_tolerance_m;
   sea.turns_per_m = g.turns_per_m;

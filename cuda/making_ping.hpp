@@ -13,6 +13,7 @@ struct PingPreparer::Making {
   PingScalars scalars;
   std::span<const Pose> bodies;
   std::vector<LawTable> laws = {};
+  std::vector<float> turned_away = {};
   CellView looks_at = {};
   const CellsInView* seen = nullptr;  // of PingPreparer::found_
   PingView view{};

@@ -70,8 +70,11 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
   const bool alone = all.size() == 1;
   Parallel& pool = alone ? pool_ : one_thread_;  // of the loops within a ping
   const auto context_of = [&](Making& m) -> PingContext {
-    if (m.laws.empty() && !m.request().blank) m.laws = laws_of(*scene_, m.plan, m.scalars);
-    return {rays_, cells, m.bodies, m.laws, m.plan, m.scalars, kernels_, pool};
+    if (m.laws.empty() && !m.request().blank) {
+      m.laws = laws_of(*scene_, m.plan, m.scalars);
+      m.turned_away = turned_away_of(*scene_, cells.skins(), m.bodies, m.scalars.seen_from.position_m);
+    }
+    return {rays_, cells, m.bodies, m.laws, m.turned_away, m.plan, m.scalars, kernels_, pool};
   };
   // Ghosts look at cells of their own, before these.
   if (alone) find_points(all[0], context_of(all[0]), workers_[0]);

@@ -14,20 +14,15 @@ constexpr double most_rad = 16;  // nearer, the error is held
 constexpr int aperture_points = 512;
 constexpr double neighbour_in_beams = 0.56;  // how far a neighbour is, in -3 dB widths: 1 of 256 beams of the M1200d
 
-/// refocused() of the samples [n, end).
-void refocus_run(const BeamMixView& v, const float* from, int j, std::int32_t set, int n, int end, BeamSignals& beams) {
-  const std::int32_t reach = v.reach[set];
-  const float* tap = v.taps + 2 * (static_cast<std::ptrdiff_t>(set) * (2 * v.widest + 1) + v.widest);
-  float* const to = beams.beam(j);
-  std::fill(to + 2 * n, to + 2 * end, 0.0f);
-  for (std::int32_t d = std::max(-reach, -j); d <= std::min(reach, v.beams - 1 - j); ++d) {
-    const float re = tap[2 * d], im = tap[2 * d + 1];
-    const float* const s = from + (j + d) * beams.stride;
-    for (int i = n; i < end; ++i) {
-      to[2 * i] += re * s[2 * i] - im * s[2 * i + 1];
-      to[2 * i + 1] += re * s[2 * i + 1] + im * s[2 * i];
-    }
-  }
+/// The first sample from `n` on that is served by another set of taps than `n`: they change as 1 / range.
+int end_of_set(const BeamMixView& v, int j, int first_sample, int n, std::int32_t set, int samples) {
+  const float until_m = v.turn_m[j] * v.sets_per_rad / (static_cast<float>(set) - 0.5f);
+  const float guess = std::clamp((until_m - v.first_range_m) / v.sample_m - static_cast<float>(first_sample),
+                                 static_cast<float>(n + 1), static_cast<float>(samples));
+  int end = static_cast<int>(guess);
+  while (end > n + 1 && focus_set(v, j, first_sample + end - 1) != set) --end;
+  while (end < samples && focus_set(v, j, first_sample + end) == set) ++end;
+  return end;
 }
 
 /// blended() of all beams in place: what a beam was before waits in `before`, a ring, for the one `step` further on.
@@ -151,19 +146,22 @@ BeamMixView BeamMix::view() const {
   return v;
 }
 
-void BeamMix::blur(BeamSignals& beams, std::vector<float>& scratch) const {
+void BeamMix::blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector<float>& scratch) const {
   const BeamMixView v = view();
   const float nearest_m = std::max(v.first_range_m + v.sample_m * static_cast<float>(beams.first_sample), v.sample_m);
   if (!blurs() || largest_turn_m_ * v.sets_per_rad < 0.5f * nearest_m) return;
-  scratch.assign(beams.data.begin(), beams.data.end());
+  constexpr std::size_t vector = 16;  // kernels read whole ones
+  scratch.resize(beams.data.size() + vector);
+  std::copy(beams.data.begin(), beams.data.end(), scratch.begin());
   for (int j = 0; j < beams.beams; ++j)
     // Samples that share their taps, side by side; with the range the set falls to 0 and stays.
     for (int n = 0; n < beams.samples;) {
       const std::int32_t set = focus_set(v, j, beams.first_sample + n);
       if (set == 0) break;
-      int end = n + 1;
-      while (end < beams.samples && focus_set(v, j, beams.first_sample + end) == set) ++end;
-      refocus_run(v, scratch.data(), j, set, n, end, beams);
+      const int end = end_of_set(v, j, beams.first_sample, n, set, beams.samples);
+      const float* taps = v.taps + 2 * (static_cast<std::ptrdiff_t>(set) * (2 * v.widest + 1) + v.widest);
+      const simd::FocusTaps both{taps, std::min(v.reach[set], j), std::min(v.reach[set], v.beams - 1 - j)};
+      kernels.refocus(scratch.data() + j * beams.stride + 2 * n, beams.stride, both, 2 * (end - n), beams.beam(j) + 2 * n);
       n = end;
     }
 }

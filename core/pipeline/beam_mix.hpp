@@ -29,7 +29,7 @@ class BeamMix {
   const std::vector<float>& share() const { return share_; }
   BeamMixView view() const;
   /// In place; `scratch` keeps its memory. Nothing where blurs() or blends() is false.
-  void blur(BeamSignals& beams, std::vector<float>& scratch) const;
+  void blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector<float>& scratch) const;
   void blend(BeamSignals& beams, std::vector<float>& scratch) const;
 
  private:

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/pipeline/ping_plan.hpp"
+#include "core/sonar/range_image.hpp"
 
 namespace sonar {
 namespace {
@@ -65,6 +66,13 @@ std::string why_unusable(const SampleFormat& f) {
   return {};
 }
 
+std::string why_unusable(const RangeImageSettings& image, const PingSettings& s) {
+  if (s.format.bits != 32 || s.format.max_code >> 16 == 0) return "range images have samples of 32 bits, half of them strength";
+  if (!(image.beam_height_rad > 0 && std::isfinite(image.beam_height_rad))) return "the height of a beam is impossible";
+  if (!(image.range_unit_m * RangePixel::most_range >= s.range_m)) return "the range does not fit its unit in 16 bits";
+  return {};
+}
+
 std::string why_impossible_motion(const PingRequest& r) {
   if (!is_finite(r.sonar_in_world.position_m) || !is_finite(r.sonar_in_world.orientation))
     return "the sonar's pose is not finite";
@@ -102,6 +110,9 @@ std::string why_invalid(const PingRequest& r) {
   const double sample_time_s = 2 * s.range_bin_m / s.samples_per_row / static_cast<double>(s.device_sound_speed_mps);
   if (std::string why = why_invalid(waveform, sample_time_s); !why.empty()) return why;
   if (std::string why = why_unusable(s.format); !why.empty()) return why;
+  if (const RangeImageSettings* const image = range_image_of(r))
+    if (std::string why = r.switches.keep_beams ? "range images have no beam signals" : why_unusable(*image, s); !why.empty())
+      return why;
   if (r.switches.fixed_fan < 0 || r.switches.fixed_fan > most_fixed_rays)
     return "fixed_fan " + std::to_string(r.switches.fixed_fan) + " is not in 0..100000";
   if (std::string why = why_out_of_proportion(mode, s); !why.empty()) return why;

@@ -20,6 +20,7 @@ struct SurfaceHit {
   float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = nothing met
   Vec3 normal;                       // of the facet, any length, world axes as seen along the last path of the path
   float offset = 0;                  // the facet's plane is normal . p = offset, p from the sonar's last image
+  Vec3 direction;                    // unit, of that last path, in the same axes
 
   /// Of a ray that has come `range_m` along the whole path; `forward`: x of the unit direction it left in.
   static SurfaceHit by(const RayPacket& rays, std::size_t lane, float range_m, float forward) {
@@ -29,11 +30,9 @@ struct SurfaceHit {
     surface.range_m = hit ? range_m : 0;
     surface.inverse_x = hit ? 1.0f / std::max(surface.range_m * forward, 1e-4f) : 0;
     surface.normal = {rays.normal_x[lane], rays.normal_y[lane], rays.normal_z[lane]};
-    surface.offset = surface.range_m * dot(surface.normal, direction(rays, lane));
+    surface.direction = {rays.direction_x[lane], rays.direction_y[lane], rays.direction_z[lane]};
+    surface.offset = surface.range_m * dot(surface.normal, surface.direction);
     return surface;
-  }
-  static Vec3 direction(const RayPacket& rays, std::size_t lane) {
-    return {rays.direction_x[lane], rays.direction_y[lane], rays.direction_z[lane]};
   }
 };
 
@@ -67,17 +66,16 @@ class FanRefinement {
   /// Opens the interval between two neighbours if it needs a look at its middle.
   void consider_base(std::int32_t below, std::int32_t above, std::int32_t column) { consider(below, above, column, 0, open_); }
 
-  /// trace(intervals): one packet, which appends the samples of their middles in order. direction(lane, stage): of those rays.
-  template <class Trace, class Direction>
-  void run(const Trace& trace, const Direction& direction) {
+  /// trace(intervals): one packet, which appends the samples of their middles in order.
+  template <class Trace>
+  void run(const Trace& trace) {
     for (int depth = 1; depth <= deepest && !open_.empty(); ++depth) {
       halves_.clear();
       for (std::size_t from = 0; from < open_.size(); from += RayPacket::size) {
         const std::size_t n = std::min<std::size_t>(RayPacket::size, open_.size() - from);
         const auto first = static_cast<std::int32_t>(samples_.size());
         trace(std::span<const FanInterval>(open_).subspan(from, n));
-        for (std::size_t i = 0; i < n; ++i)
-          insert(open_[from + i], first + static_cast<std::int32_t>(i), [&](int stage) { return direction(i, stage); });
+        for (std::size_t i = 0; i < n; ++i) insert(open_[from + i], first + static_cast<std::int32_t>(i));
       }
       std::swap(open_, halves_);
     }
@@ -95,9 +93,10 @@ class FanRefinement {
  private:
   // Edges are found to 1/16 of a base interval; a surface that still will not interpolate hides itself.
   static constexpr int deepest = 4;
-  // A surface strays from the straight line between two hits by about a quarter of what its slopes promise; beyond a pulse width
-  // of that a middle that happens to lie on the line proves nothing: the rays may fall in step with ripples.
-  static constexpr float slope_tolerance_in_pulses = 4;
+  // A surface strays from the straight line between two hits by about a quarter of what its slopes promise: half a pulse width.
+  // With the pulse width that the middle may be off it stays within the 1.5 of PingPlan::depth_tolerance_m. Beyond, a middle that
+  // happens to lie on the line proves nothing: the rays may fall in step with ripples.
+  static constexpr float slope_tolerance_in_pulses = 2;
   static constexpr float golden_turn = 0.61803399f;  // its multiples fill a turn evenly
   static constexpr float widest_skew = 0.15f;        // of an interval, to either side of its middle
 
@@ -124,19 +123,17 @@ class FanRefinement {
     return false;
   }
 
-  template <class Direction>
-  void insert(const FanInterval& v, std::int32_t middle, const Direction& direction) {
+  void insert(const FanInterval& v, std::int32_t middle) {
     at(middle).next = v.above;
     at(middle).edge_above = false;
     at(v.below).next = middle;
     at(v.below).edge_above = false;
-    if (interpolates(at(v.below), at(middle), at(v.above), direction)) return;
+    if (interpolates(at(v.below), at(middle), at(v.above))) return;
     consider(v.below, middle, v.column, v.depth + 1, halves_);
     consider(middle, v.above, v.column, v.depth + 1, halves_);
   }
 
-  template <class Direction>
-  bool interpolates(const Sample& a, const Sample& m, const Sample& b, const Direction& direction) const {
+  bool interpolates(const Sample& a, const Sample& m, const Sample& b) const {
     if (!hit_the_same(a, m) || !hit_the_same(a, b)) return false;
     const float part = (m.tangent - a.tangent) / (b.tangent - a.tangent);
     for (int stage = 0; stage < m.stages(); ++stage) {
@@ -144,14 +141,15 @@ class FanRefinement {
       if (middle.object == RayPacket::miss) continue;
       const float expected_x = 1.0f / (below.inverse_x + part * (above.inverse_x - below.inverse_x));
       if (std::abs(expected_x / m.forward - middle.range_m) > tolerance_m_) return false;
-      const Vec3 along = direction(stage);
-      if (!(plane_is_near(below, along, middle) && plane_is_near(above, along, middle))) return false;
+      if (!(planes_agree(below, middle) && planes_agree(above, middle))) return false;
     }
     return true;
   }
-  /// Whether the plane through one end meets the middle's ray about where it hit.
-  bool plane_is_near(const SurfaceHit& end, Vec3 along, const SurfaceHit& middle) const {
-    return std::abs(end.offset / dot(end.normal, along) - middle.range_m) <= slope_tolerance_in_pulses * tolerance_m_;
+  /// Whether the plane through either hit meets the other's ray about where that hit.
+  bool planes_agree(const SurfaceHit& a, const SurfaceHit& b) const {
+    const float most = slope_tolerance_in_pulses * tolerance_m_;
+    return std::abs(a.offset / dot(a.normal, b.direction) - b.range_m) <= most &&
+           std::abs(b.offset / dot(b.normal, a.direction) - a.range_m) <= most;
   }
 
   std::vector<Sample>& samples_;

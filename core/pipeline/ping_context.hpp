@@ -19,7 +19,8 @@ struct PingContext {
   const RayScene& rays;
   SurfaceCells& cells;  // builds the tiles that come into view
   std::span<const Pose> bodies_in_world;
-  const std::vector<LawTable>& laws;  // by material (laws_of)
+  const std::vector<LawTable>& laws;      // by material (laws_of)
+  const std::vector<float>& turned_away;  // by object (turned_away_of); neither is looked at by rays that are scatterers
   const PingPlan& plan;
   const PingScalars& scalars;
   const simd::Kernels& kernels;

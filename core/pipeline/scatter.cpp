@@ -110,16 +110,16 @@ void fetch_cells(const CellTile& tile) {
 
 }  // namespace
 
-std::vector<float> turned_away(const PingContext& context) {
+std::vector<float> turned_away_of(const Scene& scene, std::span<const Skin> skins, std::span<const Pose> bodies_in_world,
+                                  Vec3d sonar_m) {
   constexpr std::size_t most_triangles = 5000;  // beyond, a sonar within an object's box is taken to be within the object
-  const Scene& scene = context.scene();
   std::vector<float> away;
   for (std::size_t o = 0; o < scene.objects.size(); ++o) {
-    const Skin& skin = context.cells.skins()[o];
+    const Skin& skin = skins[o];
     away.push_back(static_cast<float>(skin.outward));
     if (skin.outward == 0) continue;
     const Object& object = scene.objects[o];
-    const Vec3d p = transform(inverse(scene.in_world(object, context.bodies_in_world)), context.scalars.seen_from.position_m);
+    const Vec3d p = transform(inverse(scene.in_world(object, bodies_in_world)), sonar_m);
     const bool in_box = p.x >= skin.low.x && p.x <= skin.high.x && p.y >= skin.low.y && p.y <= skin.high.y && p.z >= skin.low.z &&
                         p.z <= skin.high.z;
     if (in_box && (object.mesh->triangles.size() > most_triangles || encloses(*object.mesh, p))) away.back() = 0;
@@ -138,7 +138,6 @@ std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const Pi
 void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles) {
   const BubbleLayer bubbles(context.scene().sea_surface);
-  const std::vector<float> away = turned_away(context);
   tiles.resize(in_view.size());
   // Tiles a task. Each writes its own place, so the order of the tiles, and of every sum, is that of one thread.
   constexpr std::size_t batch = 256;
@@ -146,7 +145,7 @@ void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);
     for (std::size_t i = b * batch; i < end; ++i) {
       const auto object = static_cast<std::size_t>(in_view[i].object);
-      tiles[i] = prepare(context, in_view[i], sonar_from_object[object], bubbles, away[object]);
+      tiles[i] = prepare(context, in_view[i], sonar_from_object[object], bubbles, context.turned_away[object]);
     }
   });
 }
@@ -166,6 +165,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.bins = seen.bins;
   g.inverse_depth = seen.inverse_x.data();
   g.depth_slope = seen.per_column.data();
+  g.has_upper_marks = seen.has_upper_marks;
   g.depth_tolerance_m = plan.depth_tolerance_m();
   g.turns_per_m = static_cast<float>(s.turns_per_m);
   g.decay_per_m = static_cast<float>(2 * s.absorption_np_per_m);
@@ -211,14 +211,17 @@ std::vector<PointEcho> scatter_points(const PingContext& context) {
   const PingScalars& s = context.scalars;
   std::vector<PointEcho> points;
   const Pose world_in_sonar = inverse(s.seen_from);
+  auto instance = static_cast<std::uint32_t>(scene.scene().objects.size());
   for (const PointTarget& target : scene.scene().point_targets) {
     const Vec3d in_world = scene.scene().in_world(target, context.bodies_in_world);
     const Vec3d seen = transform(world_in_sonar, in_world);
+    ++instance;
     // Within the housing 1 / r^2 has no meaning; behind the array nothing is received.
     if (length(seen) < nearest_scatterer_m || seen.x <= 0) continue;
     const double strength = amplitude_from_db(static_cast<double>(target.target_strength_db));
-    const std::optional<PointEcho> echo = point_echo(seen, strength, context.plan, s);
+    std::optional<PointEcho> echo = point_echo(seen, strength, context.plan, s);
     if (!echo) continue;
+    echo->instance = instance;
     if (!is_occluded(scene, s.seen_from.position_m, in_world)) points.push_back(*echo);
   }
   return points;

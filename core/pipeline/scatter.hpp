@@ -27,9 +27,10 @@ struct PreparedTile {
 /// The scattering law of every material of the scene, at this ping's frequency.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& scalars);
 
-/// Which way the normals of an object point that are turned away from the sonar and hidden by the object itself: of closed meshes
-/// seen from outside, 1 or -1; else 0. Per object.
-std::vector<float> turned_away(const PingContext& context);
+/// Which way the normals of an object point that are turned away from a sonar at `sonar_m` [m], world, and hidden by the object
+/// itself: of closed meshes seen from outside, 1 or -1; else 0. Per object, as `skins` are.
+std::vector<float> turned_away_of(const Scene& scene, std::span<const Skin> skins, std::span<const Pose> bodies_in_world,
+                                  Vec3d sonar_m);
 
 /// Prepares the tiles in view, in parallel; the order is kept. The tiles point into the laws, which must outlive them.
 /// `sonar_from_object`: of the view, per object.

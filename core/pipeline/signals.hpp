@@ -25,6 +25,7 @@ struct Columns {
 /// beams (conical off) the horizontal distance stands in for x.
 struct DepthMap {
   int first_column = 0, columns = 0, bins = 0;
+  bool has_upper_marks = false;
   std::vector<float> inverse_x;   // [columns][bins + 1], 0 = nothing was hit; its last bits are the surface_mark
   std::vector<float> per_column;  // [columns][bins + 1]: by how much it changes from column to column along the facet hit
 
@@ -63,6 +64,7 @@ struct PointEcho {
   double sine = 0;  // y / r
   double sample = 0;
   std::complex<double> amplitude;  // [uPa]
+  std::uint32_t instance = 0;      // of what sent it, in labels (core/pipeline/labels.hpp); 0 = of nothing that has one
 };
 
 /// A pulse on the sample grid: complex values of samples from first_sample on.

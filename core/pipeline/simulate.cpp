@@ -8,6 +8,7 @@
 #include "core/pipeline/interference.hpp"
 #include "core/pipeline/multipath/multipath.hpp"
 #include "core/pipeline/ping_context.hpp"
+#include "core/pipeline/range_image.hpp"
 #include "core/pipeline/receive.hpp"
 #include "core/pipeline/scatter.hpp"
 #include "core/pipeline/specular/specular.hpp"
@@ -34,11 +35,13 @@ struct Workspace::Buffers {
   std::uint64_t pings = 0;
   SpecularEchoes specular_echoes;
   std::vector<LawTable> laws;  // the tiles point into it
+  std::vector<float> turned_away;
   std::vector<PreparedTile> tiles;
   std::vector<std::vector<std::uint32_t>> tiles_by_group;
   MultipathWork multipath;
   ColumnSignals columns;
   std::vector<BeamTruth> first_hits;  // by column, when switches.keep_truth
+  LabelWork labels;
   struct PerWorker {
     FanScratch fan;
     DepthMap seen;
@@ -125,13 +128,14 @@ PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, B
 class PingSimulation {
  public:
   PingSimulation(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
-                 Workspace& work, Parallel& pool)
+                 Workspace& work, Parallel& pool, PingLabels* labels)
       : scene_(scene),
         cells_(cells),
         request_(request),
         kernels_(kernels),
         w_(*work.buffers_),
         pool_(pool),
+        labels_(labels),
         prepared_(prepared_for(request, scene.scene(), w_)),
         plan_(prepared_.plan),
         scalars_(make_scalars(plan_, request, scene.origin())),
@@ -139,7 +143,7 @@ class PingSimulation {
         leak_(plan_, request.switches),
         crosstalk_(plan_, request.switches),
         bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world),
-        context_{scene, cells, bodies_, w_.laws, plan_, scalars_, kernels, pool} {
+        context_{scene, cells, bodies_, w_.laws, w_.turned_away, plan_, scalars_, kernels, pool} {
     // Buffers keep their memory from ping to ping; values of an earlier ping are never read.
     w_.columns.shape(plan_.columns.count, plan_.samples, plan_.taps);
     group_columns_ = group_columns();
@@ -178,6 +182,7 @@ class PingSimulation {
   const simd::Kernels& kernels_;
   Workspace::Buffers& w_;
   Parallel& pool_;
+  PingLabels* labels_;  // null = not wanted
   PreparedSettings& prepared_;
   const PingPlan& plan_;
   PingScalars scalars_;
@@ -218,6 +223,7 @@ void PingSimulation::find_echo_sources() {
   watch.lap(Stage::specular);
   w_.laws = laws_of(scene_.scene(), plan_, scalars_);
   if (ray_is_scatterer()) return;
+  w_.turned_away = turned_away_of(scene_.scene(), cells_.skins(), bodies_, scalars_.seen_from.position_m);
   if (request_.switches.multipath) find_multipath_echoes();
   watch.lap(Stage::multipath);
   // Surface cells within range and fan; their level follows the distance.
@@ -231,6 +237,7 @@ void PingSimulation::find_echo_sources() {
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
   prepare_tiles(context_, in_view, cells_.sonar_from_objects(), w_.tiles);
   sort_tiles(w_.tiles, group_columns_, groups(), w_.tiles_by_group);
+  if (labels_) w_.labels.begin(context_, w_.tiles, w_.tiles_by_group, group_columns_);
   watch.lap(Stage::cull);
   w_.statistics.tiles = in_view.size();
   w_.statistics.tiles_built = cells_.built_last_time();
@@ -310,6 +317,7 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
     const int to = std::min(from + traced_columns(), last);
     mine.statistics.rays += trace(from, to);  // those beside are counted where they belong
     if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, from, to, w_.first_hits);
+    if (labels_) w_.labels.note_shadows(mine.fan, from, to);
   }
   trace(map_first, first);
   trace(last, map_last);
@@ -324,6 +332,7 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
     sum_pulses(first, mine);
     watch.lap(Stage::synthesize);
   }
+  if (labels_) w_.labels.add_cells(group, mine.echoes);
 }
 
 /// In time where the pulse is real and tabulated, else by way of the spectrum.
@@ -340,6 +349,7 @@ Ping PingSimulation::image() {
   ping.request = request_;
   shape_ping(plan_, request_.switches, ping);
   if (!w_.first_hits.empty()) ping.truth = truth_of_beams(plan_, w_.first_hits);
+  if (labels_ && !request_.blank) *labels_ = w_.labels.finish(points_);
   const int rows = plan_.settings.range_bin_count, rows_at_once = std::max(1, window_samples / plan_.settings.samples_per_row);
   pool_.for_each(static_cast<std::size_t>((rows + rows_at_once - 1) / rows_at_once), [&](std::size_t window, int worker) {
     const int first = static_cast<int>(window) * rows_at_once;
@@ -363,7 +373,7 @@ void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWork
   // On top of the beams at exact directions: points and other sonars; then what beams take of each other. Another sonar's
   // pulse does not come from the range of its rows: the blur is not its.
   add_points(points_, plan_, mine.beams);
-  plan_.beam_mix.blur(mine.beams, mine.mixed);
+  plan_.beam_mix.blur(kernels_, mine.beams, mine.mixed);
   add_pulses(other_sonars_, plan_, mine.beams);
   plan_.beam_mix.blend(mine.beams, mine.mixed);
   if (crosstalk_.is_audible()) crosstalk_.add(plan_, mine.beams);
@@ -373,8 +383,9 @@ void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWork
 }
 
 Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
-              Workspace& work, Parallel& pool) {
-  PingSimulation ping(scene, cells, request, kernels, work, pool);
+              Workspace& work, Parallel& pool, PingLabels* labels) {
+  if (const RangeImageSettings* const image = range_image_of(request)) return make_range_image(scene, request, *image, pool);
+  PingSimulation ping(scene, cells, request, kernels, work, pool, labels);
   ping.find_echo_sources();  // surface cells in view and point echoes
   ping.simulate_columns();   // per column: depth map, echoes (eq. 6), pulses (eq. 8), receiver noise
   return ping.image();       // form_beams: columns to beams; receive: envelope, TVG, samples

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/base/parallel.hpp"
+#include "core/pipeline/labels.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/scene/cells/surface_cells.hpp"
@@ -28,8 +29,9 @@ class Workspace {
   std::unique_ptr<Buffers> buffers_;
 };
 
-/// `cells` must belong to the scene of `scene` and to the request's seed; bodies must have been placed.
+/// `cells` must belong to the scene of `scene` and to the request's seed; bodies must have been placed. `labels`, when given, are
+/// filled; the ping is the same without.
 Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
-              Workspace& work, Parallel& pool);
+              Workspace& work, Parallel& pool, PingLabels* labels = nullptr);
 
 }  // namespace sonar

@@ -215,7 +215,7 @@ class FanTracer {
       for (std::size_t i = 0; i < intervals.size(); ++i)
         store(static_cast<int>(i), middle[i], column(intervals[i].column), s_.samples.emplace_back());
     };
-    refinement.run(trace, [this](std::size_t lane, int) { return SurfaceHit::direction(filler_.packet, lane); });
+    refinement.run(trace);
   }
 
   /// Of the map from this column to the next, along the plane n . p = o of the facet that was hit: of 1 / x = (n_x + n_y u / (s
@@ -234,6 +234,7 @@ class FanTracer {
   void draw(DepthMap& seen) {
     const Fan& fan = plan_.fan;
     const int n = elevations();
+    seen.has_upper_marks = has_upper_marks(scene_.scene().objects.size());
     for (int k = 0; k < last_ - first_; ++k) {
       float *map = seen.column(first_ + k), *slope = seen.per_column.data() + seen.at(first_ + k);
       int bin = 0;
@@ -248,7 +249,8 @@ class FanTracer {
         if (bin > end) continue;
         const Sample& of = inverse_b < inverse_a ? b : a;
         const std::int32_t mark = surface_mark(of.surface.object);
-        std::fill(slope + bin, slope + end + 1, per_column(of, column(k)));
+        const float aside = per_column(of, column(k));
+        std::fill(slope + bin, slope + end + 1, seen.has_upper_marks ? with_upper_mark(aside, mark) : aside);
         if (a.edge_above) {
           std::fill(map + bin, map + end + 1, with_mark(farther, mark));
         } else {

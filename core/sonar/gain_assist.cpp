@@ -8,6 +8,8 @@ namespace sonar {
 
 namespace {
 
+constexpr double saturated_level = 0.999;
+
 /// The rule of next_gain_db takes codes for a power of the amplitude.
 bool is_assisted(const PingSettings& s) { return s.gain_assist && s.format.scale == SampleFormat::Scale::linear; }
 
@@ -33,10 +35,10 @@ double percentile_of_full_scale(const Ping& ping, double share) {
   return std::min(1.0, static_cast<double>(code) * unit / static_cast<double>(format.max_code));
 }
 
-double next_gain_db(double gain_db, double level, double gamma, double passed_s) {
+double next_gain_db(double gain_db, double level, double gamma, double passed_s, double overload_db) {
   const double least_level = 1e-3;  // a black picture raises the gain, but in steps
   double wanted_db = 20 / gamma * std::log10(assisted_level / std::max(level, least_level));
-  if (level >= 0.999) wanted_db -= assumed_overload_db;
+  if (level >= saturated_level) wanted_db -= overload_db;
   const double part = 1 - std::exp(-std::max(passed_s, 0.0) / assist_time_s);
   return std::clamp(gain_db + part * wanted_db, least_assisted_gain_db, most_assisted_gain_db);
 }
@@ -51,8 +53,12 @@ float GainAssist::gain_db(const PingSettings& settings, Time at) {
     has_seen_ = false;
     mode_ = settings.mode;
     gain_db_ = static_cast<double>(settings.gain_db);
+    overload_db_ = 0;
   }
-  if (has_seen_) gain_db_ = next_gain_db(gain_db_, level_, gamma_, seconds(at - seen_at_));
+  if (has_seen_) {
+    overload_db_ = level_ >= saturated_level ? std::clamp(2 * overload_db_, least_overload_db, most_overload_db) : 0;
+    gain_db_ = next_gain_db(gain_db_, level_, gamma_, seconds(at - seen_at_), overload_db_);
+  }
   has_seen_ = false;  // each picture counts once
   return static_cast<float>(gain_db_);
 }

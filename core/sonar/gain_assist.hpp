@@ -6,10 +6,12 @@
 
 namespace sonar {
 
-/// The loud part of a picture and where it should lie: 99 % of the samples at most 80 % of full scale. unknown: chosen.
-inline constexpr double assisted_share = 0.99, assisted_level = 0.8, assist_time_s = 0.3;
-/// How far above full scale a saturated picture is taken to be: it does not say [dB].
-inline constexpr double assumed_overload_db = 12;
+/// The loud part of a picture and where it should lie: 99 % of the samples at most 97 % of full scale. unknown: fitted to the
+/// first two captured pings of an M1200d (246 and 247 of 254); the third has 243. The time: chosen.
+inline constexpr double assisted_share = 0.99, assisted_level = 0.97, assist_time_s = 0.3;
+/// How far above full scale a saturated picture is taken to be, which it does not say [dB]: the first little, so that a scene
+/// that grows louder causes no steps; each further one in a row twice as far.
+inline constexpr double least_overload_db = 1, most_overload_db = 12;
 /// The knob's whole range, 0 to 100 % (docs/protocols/oculus.md) [dB].
 inline constexpr double least_assisted_gain_db = 0, most_assisted_gain_db = 96;
 
@@ -17,8 +19,8 @@ inline constexpr double least_assisted_gain_db = 0, most_assisted_gain_db = 96;
 double percentile_of_full_scale(const Ping& ping, double share = assisted_share);
 
 /// The gain `passed_s` after a picture made with `gain_db` whose loud part was `level` of full scale (after the power law
-/// `gamma`): a first-order approach to the gain that would have put it at assisted_level.
-double next_gain_db(double gain_db, double level, double gamma, double passed_s);
+/// `gamma`): a first-order approach to the gain that would have put it at assisted_level. `overload_db`: of a saturated picture.
+double next_gain_db(double gain_db, double level, double gamma, double passed_s, double overload_db = most_overload_db);
 
 /// What a device remembers. Starts from the client's gain, and again whenever the mode changes or the assist was off.
 class GainAssist {
@@ -32,7 +34,7 @@ class GainAssist {
  private:
   bool on_ = false, has_seen_ = false;
   int mode_ = 0;
-  double gain_db_ = 0, level_ = 0, gamma_ = 1;
+  double gain_db_ = 0, level_ = 0, gamma_ = 1, overload_db_ = 0;
   Time seen_at_{};
 };
 

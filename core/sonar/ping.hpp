@@ -91,7 +91,8 @@ struct Twist {
 };
 
 /// Base of what a vendor's protocol keeps beside PingSettings, such as the client's own request; core only carries it, so that a
-/// ping is framed with the settings it was made with.
+/// ping is framed with the settings it was made with; but those that are RangeImageSettings (core/sonar/range_image.hpp) make the
+/// ping a range image.
 struct VendorSettings {
   virtual ~VendorSettings() = default;
   /// Whether a client would see no difference; both are of the same vendor.

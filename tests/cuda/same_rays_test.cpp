@@ -193,6 +193,9 @@ TEST(DeviceEngine, DoesTheBenchmarksCases) {
   maker.add(height_field(-1, 12, -10, 10, 0.1, rough_relief(0.1, 30)), -25, {0, 0, -2});
   maker.add(sphere(0.5, 4), -15, {5, 0.7, -1.5});
   maker.add_body(box({0.4, 0.3, 0.3}), -15, {{4, -1, -1.4}, quat_from_rpy({0.1, 0.2, 0.7})});
+  // More objects than the marks of 1 / x tell apart: the last one, close before the sphere, has the sphere's.
+  for (int i = 3; i < 65; ++i) maker.add(wall(0.1, 0.1), -10, {-2.0 - i, 0, 0});
+  maker.add(wall(0.3, 0.3), -20, {4.48, 0.7, -1.5});
   const auto scene = maker.make();
   for (const Case& c : cases()) {
     SonarModel model;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 
@@ -11,9 +12,13 @@ namespace sonar {
 
 /// Terms of the even polynomial that stands for the elevation pattern, in w = sin^2(elevation angle).
 inline constexpr int elevation_terms = 9;
-/// Which object a value of the depth map is of, in its last bits: objects are told apart by their number modulo 64.
-inline constexpr std::int32_t surface_marks = 63;
-SONAR_HD constexpr std::int32_t surface_mark(std::uint32_t object) { return static_cast<std::int32_t>(object) & surface_marks; }
+/// Which object a place of the depth map is of: the last bits of 1 / x hold its number modulo 64; in a scene of more objects
+/// those of the slope, whose precision matters little, hold ten bits more.
+inline constexpr int surface_mark_bits = 6;
+inline constexpr std::int32_t surface_marks = (1 << surface_mark_bits) - 1, upper_marks = 1023;
+SONAR_HD constexpr std::int32_t surface_mark(std::uint32_t object) { return static_cast<std::int32_t>(object & 0xFFFFu); }
+SONAR_HD constexpr std::int32_t upper_mark(std::int32_t mark) { return mark >> surface_mark_bits; }
+SONAR_HD constexpr bool has_upper_marks(std::size_t objects) { return objects > static_cast<std::size_t>(surface_marks) + 1; }
 /// A cell of another object is hidden from so much behind the surface that was hit [m], and this share of its range.
 inline constexpr float contact_m = 1e-3f, contact_share = 2e-5f;
 /// The depth map's axis: bins even in the tangent, narrow up to an edge on either side and wide in the side lobes beyond.
@@ -42,10 +47,15 @@ SONAR_HD inline float tangent_of_bin(const TangentAxis& a, float bin) {
   return held / a.bins_per_tangent + (from_middle - held) / a.side_bins_per_tangent;
 }
 
+SONAR_HD inline float with_last_bits(float x, std::int32_t bits, std::int32_t among) {
+  return float_of((bits_of(x) & ~static_cast<std::uint32_t>(among)) | static_cast<std::uint32_t>(bits & among));
+}
 /// 0, nothing, stays as it is.
 SONAR_HD inline float with_mark(float inverse_x, std::int32_t mark) {
-  const std::uint32_t marks = static_cast<std::uint32_t>(surface_marks);
-  return inverse_x > 0 ? float_of((bits_of(inverse_x) & ~marks) | static_cast<std::uint32_t>(mark)) : inverse_x;
+  return inverse_x > 0 ? with_last_bits(inverse_x, mark, surface_marks) : inverse_x;
+}
+SONAR_HD inline float with_upper_mark(float slope, std::int32_t mark) {
+  return with_last_bits(slope, upper_mark(mark), upper_marks);
 }
 
 #include "core/pipeline/arithmetic/kernel_math.inl"

@@ -111,7 +111,7 @@ MultipathScatterer::MultipathScatterer(const PingContext& context, const ImagePa
       tolerance_m_(plan_.depth_tolerance_m()),
       absorption_np_per_m_(static_cast<float>(s_.absorption_np_per_m)),
       half_turns_per_m_(static_cast<float>(0.5 * s_.turns_per_m)),
-      turned_away_(turned_away(context)) {}
+      turned_away_(context.turned_away) {}
 
 MultipathScatterer::TilePath MultipathScatterer::look_at(const TileInView& tile, const Path& path) const {
   TilePath tile_path{};

@@ -94,7 +94,7 @@ class MultipathScatterer {
   const PingScalars& s_;
   OneWayPattern pattern_;
   float first_edge_sine_, columns_per_sine_, tolerance_m_, absorption_np_per_m_, half_turns_per_m_;
-  std::vector<float> turned_away_;
+  const std::vector<float>& turned_away_;
   float away_ = 0;     // of the tile's object
   Vec3d tile_middle_;  // one of its cells, in the axes of PingScalars::seen_from
   std::vector<TilePath> tile_paths_;

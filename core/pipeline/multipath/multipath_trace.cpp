@@ -138,7 +138,6 @@ class ColumnsTracer {
         if (!(active >> i & 1)) continue;
         Chain& chain = at(index[i]);
         chain.surface[stage] = SurfaceHit::by(rays_.packet, i, rays_.travelled[i], chain.forward);
-        direction_[stage][i] = SurfaceHit::direction(rays_.packet, i);
         if (stage < 2) chain.mirror[stage] = rays_.bounce(i);
         if (stage == 2 || chain.mirror[stage] == BounceMap::no_mirror) active &= ~(1u << i);
       }
@@ -176,7 +175,7 @@ class ColumnsTracer {
       }
       follow(index);
     };
-    refinement.run(trace, [this](std::size_t lane, int stage) { return direction_[static_cast<std::size_t>(stage)][lane]; });
+    refinement.run(trace);
   }
 
   void draw(int k) {
@@ -221,7 +220,6 @@ class ColumnsTracer {
   int first_, last_;
   std::vector<Chain> samples_;
   std::vector<FanInterval> open_, halves_;
-  std::array<std::array<Vec3, RayPacket::size>, 3> direction_;  // of the packet's rays at each stage
 };
 
 /// Which part of a block of columns each path owns.

@@ -41,6 +41,19 @@ inline __attribute__((noinline)) LaneMask hidden(const GroupView& g, LaneNumbers
   return below(nearness, seen + beside * gather(g.depth_slope, at));
 }
 
+/// Whether both values of the map beside a cell, with the marks a and b, are of other objects than the tile's.
+inline LaneMask foreign_marks(std::int32_t mark, Lanes a, Lanes b) {
+  return both(bits_differ(a, mark, surface_marks), bits_differ(b, mark, surface_marks));
+}
+/// The same where an object's number does not fit in the marks of 1 / x alone.
+inline __attribute__((noinline)) LaneMask foreign_numbers(const GroupView& g, std::int32_t mark, LaneNumbers at, Lanes a,
+                                                          Lanes b) {
+  Lanes upper_a, upper_b;
+  gather_pairs(g.depth_slope, at, upper_a, upper_b);
+  return both(either(bits_differ(a, mark, surface_marks), bits_differ(upper_a, upper_mark(mark), upper_marks)),
+              either(bits_differ(b, mark, surface_marks), bits_differ(upper_b, upper_mark(mark), upper_marks)));
+}
+
 /// Where the cells are: range, column, elevation, cosine of incidence; which lie in the group's window and do not look away; and
 /// which of them the depth map shows: a cell no farther than what the rays saw along its direction. Returns how many there are.
 template <bool conical, bool moves>
@@ -111,8 +124,8 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
     const Lanes along = counts(nx + i) * (qx0 + dx) + counts(ny + i) * (qy0 + dy) + counts(nz + i) * (qz0 + dz);
     keep = both(keep, not_below(all(0), along * s.turned_away));
     if (!any(keep)) continue;
-    const LaneMask foreign = both(both(keep, below(seen_inverse_h - tolerance, seen)),
-                                  both(bits_differ(a, s.mark, surface_marks), bits_differ(b, s.mark, surface_marks)));
+    const LaneMask others = g.has_upper_marks ? foreign_numbers(g, s.mark, at, a, b) : foreign_marks(s.mark, a, b);
+    const LaneMask foreign = both(both(keep, below(seen_inverse_h - tolerance, seen)), others);
     if (any(foreign)) {
       const Lanes nearness = seen_inverse_h * (1.0f + contact_share + contact_m * inverse_r);
       keep = less(keep, both(foreign, hidden(g, at, seen, column_here, nearness)));

@@ -48,6 +48,7 @@ struct GroupView {
   int columns_beside;                       // so far from its own column a cell is looked up, where the sonar moves
   const float* inverse_depth;               // DepthMap::inverse_x
   const float* depth_slope;                 // DepthMap::per_column
+  bool has_upper_marks;                     // in depth_slope
   float depth_tolerance_m;
   float turns_per_m;                                              // 2 f / c
   float decay_per_m;                                              // 2 alpha [Np/m]
@@ -97,6 +98,12 @@ struct PulseRows {
   int taps, steps;
 };
 
+/// Complex taps of a beam's neighbours, the same on either side, and how many neighbours there are.
+struct FocusTaps {
+  const float* taps;
+  int below, above;
+};
+
 struct Kernels {
   const char* name;
   /// Appends the visible cells of a tile; `out` has room for tile.count + 16 more. Returns how many were appended.
@@ -116,6 +123,9 @@ struct Kernels {
   /// BeamTransformTables::work_floats(), 64-byte aligned.
   void (*transform_beams)(const BeamTransform&, const float* columns, std::ptrdiff_t stride, int floats, float* work, float* out,
                           std::ptrdiff_t out_stride);
+  /// to[floats] = the complex samples at `from`, of rows `stride` floats apart, times tap 0, plus those of the rows d below and d
+  /// above, together times tap d. Reads up to a whole vector past the end of a row.
+  void (*refocus)(const float* from, std::ptrdiff_t stride, const FocusTaps&, int floats, float* to);
   /// power[row * width + beam] = |beams[beam * stride + 2 * row ...]|^2.
   void (*detect)(const float* beams, std::ptrdiff_t stride, int beam_count, int rows, float* power, int width);
   /// codes[i] = min(max_code, round(max_code * (power[i] * gain)^half_gamma)), as float; n is a multiple of 16.

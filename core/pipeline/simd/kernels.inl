@@ -155,6 +155,46 @@ void form_beam_panel(const float* in, std::ptrdiff_t in_stride, const float* pan
   }
 }
 
+/// Real and imaginary parts of the taps are summed apart and meet once at the end. `both`: rows on either side of the middle.
+template <int width>
+inline void refocus_block(const float* from, std::ptrdiff_t stride, const FocusTaps& t, int both, Lanes* out) {
+  Lanes re[width], im[width];
+  for (int v = 0; v < width; ++v) {
+    const Lanes s = load(from + v * lanes);
+    re[v] = t.taps[0] * s, im[v] = t.taps[1] * s;
+  }
+  const auto add = [&](int d, auto&& sample) {
+    const float tap_re = t.taps[2 * d], tap_im = t.taps[2 * d + 1];
+    for (int v = 0; v < width; ++v) {
+      const Lanes s = sample(v * lanes);
+      re[v] += tap_re * s, im[v] += tap_im * s;
+    }
+  };
+  for (int d = 1; d <= both; ++d)
+    add(d, [below = from - d * stride, above = from + d * stride](int f) { return load(below + f) + load(above + f); });
+  for (int d = both + 1; d <= t.below; ++d) add(d, [below = from - d * stride](int f) { return load(below + f); });
+  for (int d = both + 1; d <= t.above; ++d) add(d, [above = from + d * stride](int f) { return load(above + f); });
+  LaneNumbers swapped{};
+  Lanes sign{};
+  for (int l = 0; l < lanes; ++l) swapped[l] = l ^ 1, sign[l] = l % 2 == 0 ? -1.0f : 1.0f;
+  for (int v = 0; v < width; ++v) out[v] = re[v] + sign * __builtin_shuffle(im[v], swapped);
+}
+
+void refocus(const float* from, std::ptrdiff_t stride, const FocusTaps& t, int floats, float* to) {
+  constexpr int width = 2;  // vectors side by side: four sums in flight
+  const int both = t.below < t.above ? t.below : t.above;
+  Lanes out[width];
+  int f = 0;
+  for (; f + width * lanes <= floats; f += width * lanes) {
+    refocus_block<width>(from + f, stride, t, both, out);
+    for (int v = 0; v < width; ++v) store(to + f + v * lanes, out[v]);
+  }
+  for (; f < floats; f += lanes) {
+    refocus_block<1>(from + f, stride, t, both, out);
+    std::memcpy(to + f, out, sizeof(float) * static_cast<std::size_t>(floats - f < lanes ? floats - f : lanes));
+  }
+}
+
 #include "core/pipeline/simd/cells.inl"
 #include "core/pipeline/simd/hits.inl"
 #include "core/pipeline/simd/quantise.inl"

@@ -13,7 +13,7 @@ constexpr int lanes = 16;
 
 extern const Kernels avx512_kernels;
 const Kernels avx512_kernels{"avx512",           avx512::scatter_tile,    avx512::scatter_hits,    avx512::spread,
-                             avx512::accumulate, avx512::form_beam_panel, avx512::transform_beams, avx512::detect,
-                             avx512::quantise,   avx512::quantise_bytes,  avx512::quantise_levels};
+                             avx512::accumulate, avx512::form_beam_panel, avx512::transform_beams, avx512::refocus,
+                             avx512::detect,     avx512::quantise,        avx512::quantise_bytes,  avx512::quantise_levels};
 
 }  // namespace sonar::simd

@@ -12,8 +12,9 @@ constexpr int lanes = 4;
 }  // namespace portable
 
 extern const Kernels portable_kernels;
-const Kernels portable_kernels{"portable",           portable::scatter_tile,    portable::scatter_hits,    portable::spread,
-                               portable::accumulate, portable::form_beam_panel, portable::transform_beams, portable::detect,
-                               portable::quantise,   portable::quantise_bytes,  portable::quantise_levels};
+const Kernels portable_kernels{
+    "portable",           portable::scatter_tile,    portable::scatter_hits,    portable::spread,
+    portable::accumulate, portable::form_beam_panel, portable::transform_beams, portable::refocus,
+    portable::detect,     portable::quantise,        portable::quantise_bytes,  portable::quantise_levels};
 
 }  // namespace sonar::simd

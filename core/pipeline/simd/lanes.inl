@@ -17,6 +17,7 @@ inline __m512 native(Lanes v) { return reinterpret_cast<__m512>(v); }
 inline LaneMask below(Lanes a, Lanes b) { return _mm512_cmp_ps_mask(native(a), native(b), _CMP_LT_OQ); }
 inline LaneMask not_below(Lanes a, Lanes b) { return _mm512_cmp_ps_mask(native(a), native(b), _CMP_GE_OQ); }
 inline LaneMask both(LaneMask a, LaneMask b) { return static_cast<LaneMask>(a & b); }
+inline LaneMask either(LaneMask a, LaneMask b) { return static_cast<LaneMask>(a | b); }
 inline LaneMask less(LaneMask a, LaneMask b) { return static_cast<LaneMask>(a & ~b); }
 inline LaneMask bits_differ(Lanes v, std::int32_t bits, std::int32_t among) {
   const __m512i x = _mm512_xor_si512(_mm512_castps_si512(native(v)), _mm512_set1_epi32(bits));
@@ -74,6 +75,7 @@ using LaneMask = LaneNumbers;
 inline LaneMask below(Lanes a, Lanes b) { return a < b; }
 inline LaneMask not_below(Lanes a, Lanes b) { return a >= b; }
 inline LaneMask both(LaneMask a, LaneMask b) { return a & b; }
+inline LaneMask either(LaneMask a, LaneMask b) { return a | b; }
 inline LaneMask less(LaneMask a, LaneMask b) { return a & ~b; }
 inline LaneMask bits_differ(Lanes v, std::int32_t bits, std::int32_t among) {
   return ((reinterpret_cast<LaneNumbers>(v) ^ bits) & among) != 0;

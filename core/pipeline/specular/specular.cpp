@@ -234,6 +234,7 @@ void SpecularEchoes::find(const PingContext& context, std::vector<PointEcho>& ec
       const std::complex<double> factor = visible_factor(point, query.wavelength_m, sight);
       if (std::abs(factor) < least_factor) continue;
       echo->amplitude *= strength * factor;
+      echo->instance = static_cast<std::uint32_t>(i + 1);
       echoes.push_back(*echo);
     }
   }

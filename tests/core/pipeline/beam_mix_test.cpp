@@ -13,6 +13,8 @@
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
+#include "core/pipeline/ping_plan.hpp"
+#include "tests/core/pipeline/kernel_sets.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
@@ -85,6 +87,36 @@ TEST(Defocus, LeavesBroadsideAndFarEchoesAsTheyAre) {
     s.ping();
     EXPECT_EQ(on, s.pressure(row, beam));
   }
+}
+
+// Vectors of samples that share their taps, against the definition one sample at a time (refocused).
+TEST(Defocus, IsTheSumOverItsTapsInEveryInstructionSet) {
+  Sounding s = with([](ReceiverModel& law) { law.defocus = 1; }, {}, 4, 300, 90);
+  const PingPlan plan = make_plan(s.mode(), s.request.settings, s.request.switches);
+  const BeamMixView v = plan.beam_mix.view();
+  ASSERT_TRUE(plan.beam_mix.blurs());
+  for (const simd::Kernels* kernels : kernel_sets())
+    for (const int first : {0, 13, 64, 250}) {
+      BeamSignals beams;
+      beams.shape(90, first, 45);
+      for (std::size_t i = 0; i < beams.data.size(); ++i)
+        beams.data[i] = static_cast<float>(std::sin(static_cast<double>(i * i)));
+      const std::vector<float> before = beams.data;
+      std::vector<float> scratch;
+      plan.beam_mix.blur(*kernels, beams, scratch);
+      int blurred = 0;
+      float off = 0;
+      for (int j = 0; j < beams.beams; ++j)
+        for (int n = 0; n < beams.samples; ++n) {
+          const std::int32_t set = focus_set(v, j, first + n);
+          const float *is = beams.beam(j) + 2 * n, *was = before.data() + j * beams.stride + 2 * n;
+          blurred += set > 0;
+          const MixedSample wanted = set > 0 ? refocused(v, before.data(), beams.stride, j, n, set) : MixedSample{was[0], was[1]};
+          off = std::max({off, std::abs(is[0] - wanted.re), std::abs(is[1] - wanted.im)});
+        }
+      EXPECT_GT(blurred, 2000) << first;
+      EXPECT_LT(off, 2e-6f) << kernels->name << " " << first;
+    }
 }
 
 /// Correlation of two beams' complex noise, mean over all pairs so far apart.

@@ -99,7 +99,7 @@ TEST(KernelSets, HitsOfTheFixedFanScatterAsDefined) {
     ASSERT_EQ(laws[1].root.empty(), false) << "one of the two materials has a law that is tabulated";
     for (const simd::Kernels* kernels : kernel_sets()) {
       Echoes echoes;
-      scatter_hits({rays, cells, {}, laws, plan, scalars, *kernels, pool}, hits, Seed{77}, echoes);
+      scatter_hits({rays, cells, {}, laws, {}, plan, scalars, *kernels, pool}, hits, Seed{77}, echoes);
       ASSERT_EQ(echoes.count, 500);
       double off = 0, all = 0;
       for (std::size_t i = 0; i < hits.size(); ++i) {

@@ -300,7 +300,8 @@ TEST(StageOracles, Oracle44_AwkwardHitsGiveFiniteEchoes) {
       Echoes echoes;
       const PingScalars scalars = make_scalars(plan, request, {});
       const std::vector<LawTable> laws = laws_of(*scene, plan, scalars);
-      scatter_hits({rays, cells, {}, laws, plan, scalars, simd::kernels_for(SimdLevel::automatic), pool}, hits, Seed{1}, echoes);
+      scatter_hits({rays, cells, {}, laws, {}, plan, scalars, simd::kernels_for(SimdLevel::automatic), pool}, hits, Seed{1},
+                   echoes);
       for (int i = 0; i < echoes.count; ++i) {
         const auto at = static_cast<std::size_t>(i);
         bad += !(std::isfinite(echoes.sample[at]) && std::isfinite(echoes.re[at]) && std::isfinite(echoes.im[at]));

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace sonar {
@@ -32,10 +33,11 @@ TEST(GainAssist, PercentileOfEverySampleSize) {
 
 TEST(GainAssist, ApproachesWithItsTimeConstant) {
   // 6 dB below the wanted level (in amplitude): after one time constant 63 % of that is made up.
-  EXPECT_NEAR(next_gain_db(40, 0.4, 1, 0.3), 40 + (1 - std::exp(-1.0)) * 20 * std::log10(2.0), 1e-9);
+  EXPECT_NEAR(next_gain_db(40, assisted_level / 2, 1, 0.3), 40 + (1 - std::exp(-1.0)) * 20 * std::log10(2.0), 1e-9);
   EXPECT_NEAR(next_gain_db(40, assisted_level, 1, 0.1), 40, 1e-9);
-  EXPECT_NEAR(next_gain_db(40, 0.4, 0.5, 100), 40 + 40 * std::log10(2.0), 1e-9) << "the power law halves what a sample tells";
-  EXPECT_EQ(next_gain_db(40, 0.4, 1, 0), 40);
+  EXPECT_NEAR(next_gain_db(40, assisted_level / 2, 0.5, 100), 40 + 40 * std::log10(2.0), 1e-9)
+      << "the power law halves what a sample tells";
+  EXPECT_EQ(next_gain_db(40, assisted_level / 2, 1, 0), 40);
   EXPECT_EQ(next_gain_db(95, 0, 1, 10), most_assisted_gain_db);
   EXPECT_EQ(next_gain_db(1, 1, 1, 10), least_assisted_gain_db);
   EXPECT_LT(next_gain_db(40, 1, 1, 10), 30) << "a saturated picture does not say how far it is over";
@@ -72,12 +74,38 @@ TEST(GainAssist, IsOffForLogarithmicSamples) {
   EXPECT_EQ(assist.gain_db(settings, Time{} + milliseconds(500)), 40);
 }
 
-TEST(GainAssist, SettlesWhereTheLoudPartIsAtEightyPercent) {
+TEST(GainAssist, SettlesWhereTheLoudPartIsJustBelowFullScale) {
   for (const double gamma : {1.0, 0.5})
     for (const float from_db : {0.0f, 30.0f, 90.0f}) {
       const double wanted = 20 * std::log10(std::pow(assisted_level, 1 / gamma) / 1e-2);
       EXPECT_NEAR(settled_gain_db(1e-2, gamma, from_db, 100, milliseconds(100)), wanted, 0.1) << gamma << " " << from_db;
     }
+}
+
+/// A scene that grows louder by 3 dB a second: the gain follows without steps, and the picture saturates only now and then.
+TEST(GainAssist, FollowsAGrowingSceneWithoutSteps) {
+  for (const double gamma : {1.0, 0.5}) {
+    GainAssist assist;
+    PingSettings settings;
+    settings.gain_assist = true;
+    settings.gain_db = 40;
+    settings.format.gamma = static_cast<float>(gamma);
+    double before = 40, largest_step = 0;
+    for (int i = 0; i < 300; ++i) {
+      const Time at = Time{} + i * milliseconds(100);
+      const auto gain = static_cast<double>(assist.gain_db(settings, at));
+      if (i > 50) largest_step = std::max(largest_step, std::abs(gain - before));
+      before = gain;
+      const double level_db = gain - 40 - 10 + 0.3 * i;  // of the loud part, over full scale
+      const double v = std::min(1.0, std::pow(std::pow(10, level_db / 20), gamma));
+      Ping ping = picture(0.02, static_cast<std::uint32_t>(std::lround(v * 65535)), 16, 65535);
+      ping.request.settings.format.gamma = settings.format.gamma;
+      ping.request.fired_at = at;
+      assist.look_at(ping);
+    }
+    EXPECT_LT(largest_step, 1.5) << gamma;
+    EXPECT_GT(largest_step, 0) << gamma;
+  }
 }
 
 TEST(GainAssist, BelongsToItsModeAndLeavesOthersAlone) {
@@ -92,7 +120,7 @@ TEST(GainAssist, BelongsToItsModeAndLeavesOthersAlone) {
   Ping loud = picture(1, 254);
   loud.request.fired_at = Time{} + milliseconds(200);
   assist.look_at(loud);
-  EXPECT_LT(assist.gain_db(settings, Time{} + milliseconds(300)), 47);
+  EXPECT_LT(assist.gain_db(settings, Time{} + milliseconds(300)), 47.7);
   const float held = assist.gain_db(settings, Time{} + milliseconds(400));
   EXPECT_EQ(assist.gain_db(settings, Time{} + milliseconds(900)), held) << "no new picture, no change";
   settings.mode = 1;

@@ -1,0 +1,108 @@
+// The shadows of LabelWork: what the rays saw of a column's gaps, and where nothing is heard in them.
+#include <algorithm>
+#include <cmath>
+
+#include "core/pipeline/labels.hpp"
+
+namespace sonar {
+
+void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
+  const PingPlan& plan = context_->plan;
+  const auto elevations = static_cast<std::int32_t>(plan.fan.elevation_rad.size());
+  const auto at = [&](std::int32_t i) -> const FanScratch::Sample& { return fan.samples[static_cast<std::size_t>(i)]; };
+  const auto is_hit = [](const SurfaceHit& s) { return s.object != RayPacket::miss; };
+  const auto sample_of = [&](float range_m) {
+    return static_cast<float>(context_->scalars.sample_of(static_cast<double>(range_m)));
+  };
+  const auto end = static_cast<float>(plan.samples);
+  struct Behind {
+    std::uint32_t object;
+    float from_m;  // where what is beyond it is hidden from; 0: from the object on
+    bool goes_on;  // whether there is something beyond it
+  };
+  std::vector<Behind> behind;
+  for (int k = first; k < last; ++k) {
+    std::vector<Gap>& gaps = gaps_[static_cast<std::size_t>(k)];
+    const std::int32_t lowest = (k - first) * elevations;
+    // Upwards. An object hides what is beyond it: from where that is last seen, below the lower edge, to where it is seen again,
+    // above the upper edge. Of an object that stands on something, from the object itself.
+    behind.clear();
+    for (std::int32_t i = lowest, below = -1; i >= 0; below = i, i = at(i).next) {
+      const SurfaceHit& a = at(i).surface;
+      const SurfaceHit under = below < 0 ? SurfaceHit{} : at(below).surface;
+      if (is_hit(a) && under.object != a.object) {
+        const bool is_first = std::none_of(behind.begin(), behind.end(), [&](const Behind& b) { return b.object == a.object; });
+        const bool stands = is_hit(under) && under.range_m < a.range_m, hides = is_hit(under) && under.range_m > a.range_m;
+        if (is_first) behind.push_back({a.object, 0, false});
+        Behind& b = *std::find_if(behind.begin(), behind.end(), [&](const Behind& x) { return x.object == a.object; });
+        if (hides)
+          b.from_m = under.range_m, b.goes_on = true;
+        else if (is_first)
+          b.goes_on = stands;
+      }
+      const bool is_last = at(i).next < 0;
+      if (!is_hit(a) || (!is_last && !at(i).edge_above)) continue;
+      const SurfaceHit over = is_last ? SurfaceHit{} : at(at(i).next).surface;
+      Behind& b = *std::find_if(behind.begin(), behind.end(), [&](const Behind& x) { return x.object == a.object; });
+      if (is_hit(over) && over.range_m > a.range_m)
+        gaps.push_back({sample_of(std::max(a.range_m, b.from_m)), sample_of(over.range_m), a.object});
+      else if (is_hit(over) && over.object == a.object)
+        gaps.push_back({sample_of(over.range_m), sample_of(a.range_m), a.object});
+      else if (!is_hit(over) && b.goes_on)
+        gaps.push_back({sample_of(std::max(a.range_m, b.from_m)), end, a.object});
+    }
+    std::stable_sort(gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.from < b.from; });
+  }
+}
+
+/// In the column's gaps, as far as it has no echo above the noise: from another elevation, or the pulse's own length.
+void LabelWork::find_dark(int column) {
+  const PingPlan& plan = context_->plan;
+  const int rows = plan.settings.range_bin_count, per_row = plan.settings.samples_per_row;
+  std::uint16_t* dark = dark_.data() + static_cast<std::ptrdiff_t>(column) * rows;
+  const std::vector<Gap>& gaps = gaps_[static_cast<std::size_t>(column)];
+  if (gaps.empty()) return;
+  for (const Gap& gap : gaps) {
+    const int from = std::max(row_of(static_cast<double>(gap.from), per_row), 0);
+    const int to = std::min(row_of(static_cast<double>(gap.to), per_row), rows);
+    for (int row = from; row < to; ++row)
+      if (dark[row] == 0) dark[row] = static_cast<std::uint16_t>(gap.object + 1);
+  }
+  const auto noise = static_cast<float>(plan.column_noise_upa * plan.column_noise_upa);
+  for (const Part& part : groups_[static_cast<std::size_t>(column / group_columns_)].of_this_ping()) {
+    const int k = column - part.first_column;
+    if (k < 0 || k >= part.columns) continue;
+    const float* power = part.power.data() + static_cast<std::ptrdiff_t>(k) * part.rows;
+    for (int row = part.first_row; row < std::min(part.first_row + part.rows, rows); ++row)
+      if (power[row - part.first_row] > noise) dark[row] = 0;
+  }
+}
+
+/// Of the main lobe at -3 dB, as a sine.
+double LabelWork::half_width(std::size_t beam) const {
+  const ReceivePattern& pattern = context_->plan.beam_pattern[beam];
+  return pattern.unit ? 0 : 0.5 * width_factor(context_->plan.mode.pattern.azimuth_taper) / pattern.aperture_wavelengths;
+}
+
+void LabelWork::find_shadows(int beam, PingLabels& out) const {
+  const PingPlan& plan = context_->plan;
+  const auto j = static_cast<std::size_t>(beam);
+  const double middle = (plan.columns.first_sine - plan.beam_sine[j]) / plan.columns.spacing;
+  const double reach = half_width(j) / plan.columns.spacing;
+  const auto column_at = [&](double k) { return static_cast<int>(std::clamp(std::round(k), 0.0, plan.columns.count - 1.0)); };
+  const int first = column_at(middle - reach), last = column_at(middle + reach), nearest = column_at(middle);
+  const auto dark = [&](int column, int row) {
+    return dark_[static_cast<std::size_t>(column) * static_cast<std::size_t>(out.rows) + static_cast<std::size_t>(row)];
+  };
+  for (int row = 0; row < out.rows; ++row) {
+    if (dark(nearest, row) == 0) continue;
+    int column = first;
+    while (column <= last && dark(column, row) != 0) ++column;
+    if (column <= last) continue;
+    const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(out.beams) + j;
+    if (!from_points_.empty() && static_cast<double>(from_points_[at]) > noise_of(row, j)) continue;
+    out.instance[at] = 0, out.share[at] = 0, out.caster[at] = dark(nearest, row);
+  }
+}
+
+}  // namespace sonar

@@ -1,0 +1,34 @@
+// The CPU's engine with labels beside its pings: for data sets, which are made offline.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/pipeline/labels.hpp"
+#include "core/pipeline/ping_engine.hpp"
+
+namespace sonar {
+
+class LabellingEngine final : public PingEngine {
+ public:
+  /// The pool must outlive it.
+  LabellingEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options = {});
+  ~LabellingEngine() override;
+
+  /// The same pings as those of make_cpu_engine(). Beyond what that refuses: the fixed fan, whose rays belong to no cell, and
+  /// scenes of more instances than labels have numbers.
+  std::vector<Ping> run(std::span<const PingRequest> requests) override;
+  std::string description() const override;
+  PingStatistics statistics() const override;
+  std::vector<PingStatistics> statistics_of_each() const override;
+  /// Of every ping of the last run().
+  const std::vector<PingLabels>& labels() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace sonar

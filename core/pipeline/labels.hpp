@@ -1,0 +1,97 @@
+// Which object's echo each sample holds: expected energy per object, from the cells, columns, pulse and beams that the picture is
+// made of (docs/datasets.md). Multipath, crosstalk and defocus are not followed; what the water sends counts for nothing.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/pipeline/ping_context.hpp"
+#include "core/pipeline/scatter.hpp"
+#include "core/pipeline/signals.hpp"
+#include "core/pipeline/trace_fan.hpp"
+
+namespace sonar {
+
+/// Arrays are [rows][beams], as Ping::samples. Instance i + 1 is Scene::objects[i]; the point targets follow them.
+struct PingLabels {
+  int rows = 0, beams = 0;
+  std::vector<std::uint16_t> instance;  // whose energy is largest, and above the receiver's noise; 0 = none
+  std::vector<std::uint8_t> share;      // of that instance in the sample's energy, noise included, 255 = all
+  /// Where no instance is: the object that cuts the line of sight over all of the beam's -3 dB width, while what comes into it
+  /// from beside counts for nothing; 0 = no shadow.
+  std::vector<std::uint16_t> caster;
+  /// By instance, less 1, of objects with a label: energy that arrives over what would arrive were nothing in the way, 0 to 1;
+  /// of others -1.
+  std::vector<float> visible;
+
+  static constexpr std::size_t most_instances = 65535;
+};
+
+/// The labels of one ping while it is made. Kept from ping to ping for its buffers.
+class LabelWork {
+ public:
+  /// `context`, `tiles` and `by_group` must live until finish().
+  void begin(const PingContext& context, const std::vector<PreparedTile>& tiles,
+             const std::vector<std::vector<std::uint32_t>>& by_group, int group_columns);
+  /// What hides what in columns [first, last), which the fan has just traced. Any thread, each column once.
+  void note_shadows(const FanScratch& fan, int first, int last);
+  /// The energy of the group that begins at `group.first_column`, from its cells once more. Any thread, each group once.
+  void add_cells(const simd::GroupView& group, Echoes& scratch);
+  PingLabels finish(std::span<const PointEcho> points);
+
+ private:
+  /// An object within a group of columns.
+  struct Part {
+    std::size_t object = 0;
+    int first_column = 0, columns = 0;
+    int first_sample = 0, last_sample = 0;     // half-open
+    int first_row = 0, rows = 0;               // multiples of `window`
+    std::vector<float> power = {};             // [columns][rows], the pulse's length included
+    std::vector<double> seen = {}, open = {};  // by column: energy, of objects with a label; open: were nothing in the way
+  };
+  struct Gap {  // samples of a column that lie in an object's shadow, where nothing else is
+    float from = 0, to = 0;
+    std::uint32_t object = 0;
+  };
+  struct Point;  // an echo without surface: where its energy is
+
+  void add_tile(const PreparedTile& tile, Part& part, std::vector<float>& by_sample, const simd::GroupView& group, bool is_open,
+                Echoes& scratch) const;
+  void spread(Part& part, const std::vector<float>& by_sample) const;
+  static int row_of(double sample, int per_row);
+  void keep_weights();
+  void find_noise();
+  double noise_of(int row, std::size_t beam) const;
+  double half_width(std::size_t beam) const;
+  void label_window(std::size_t window_index, std::span<const Point> points, PingLabels& out) const;
+  void find_dark(int column);
+  void find_shadows(int beam, PingLabels& out) const;
+
+  static constexpr int window = 32;  // rows
+
+  const PingContext* context_ = nullptr;
+  const std::vector<PreparedTile>* tiles_ = nullptr;
+  const std::vector<std::vector<std::uint32_t>>* by_group_ = nullptr;
+  int group_columns_ = 1;
+  BeamWeights weights_;  // of powers, for these columns and beams
+  std::vector<double> beam_sine_;
+  std::vector<std::pair<Taper, double>> beam_widths_;  // taper and aperture of each
+  double first_sine_ = 0, spacing_ = 0;
+  std::vector<float> pulse_;  // |p|^2 at whole samples, the peak in the middle
+  struct Group {
+    std::vector<Part> parts;                    // the first `used` are of this ping; all keep their memory
+    std::vector<std::vector<float>> by_sample;  // of each part: [columns][samples], before the pulse
+    std::size_t used = 0;
+    std::span<const Part> of_this_ping() const { return std::span(parts).first(used); }
+  };
+  std::vector<Group> groups_;
+  std::vector<std::vector<Gap>> gaps_;          // by column
+  std::vector<std::uint16_t> dark_;             // [columns][rows]: instance that casts a shadow where nothing is heard
+  std::vector<float> nothing_;                  // a depth map in which nothing was hit
+  std::vector<float> from_points_;              // [rows][beams] of echoes without surface, in main lobes; empty without any
+  std::vector<double> noise_far_, noise_near_;  // by beam [uPa^2]
+};
+
+}  // namespace sonar

@@ -1,0 +1,15 @@
+// The ping of a sonar that reports ranges (core/sonar/range_image.hpp): a ray along each beam, the power of all rays within a
+// beam's pattern by range cell, and of its cells the strongest or the nearest that is detected.
+#pragma once
+
+#include "core/base/parallel.hpp"
+#include "core/scene/ray_scene.hpp"
+#include "core/sonar/range_image.hpp"
+
+namespace sonar {
+
+/// `wanted` is the request's; bodies must have been placed. The same bytes on any number of threads.
+/// Not simulated: motion while the sound travels, mirrors (specular echoes, multipath), texture, volume, other sonars.
+Ping make_range_image(const RayScene& scene, const PingRequest& request, const RangeImageSettings& wanted, Parallel& pool);
+
+}  // namespace sonar

@@ -1,0 +1,61 @@
+// Range images: one transmission lights the whole field of view, and each direction of a grid of beams reports one return, its
+// range and its strength. Such a ping's settings and samples. No vendor's format.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/base/geometry.hpp"
+#include "core/sonar/ping.hpp"
+
+namespace sonar {
+
+/// Vendor settings that are of this type make a ping a range image. PingSettings then mean: beam_count columns by range_bin_count
+/// rows, pulse_width_m the width of a range cell, samples of 32 bits whose full scale, format.max_code, is that of the strength.
+/// The mode's horizontal_aperture_rad and pattern.elevation_width_rad are the field of view, the centres of the outer beams lie
+/// on its edges; pattern.azimuth_width_rad is the two-way -3 dB width of a beam.
+struct RangeImageSettings : VendorSettings {
+  double beam_height_rad = 0;        // two-way -3 dB width of a beam in elevation
+  double range_unit_m = 0;           // of the ranges in samples; 65535 of them must reach range_m
+  std::uint32_t least_strength = 1;  // weaker returns are none
+  double detection = 16;             // returns below so many times the noise power are none
+  bool nearest = false;              // of a direction's returns the nearest, not the strongest
+};
+
+inline const RangeImageSettings* range_image_of(const PingRequest& request) {
+  return dynamic_cast<const RangeImageSettings*>(request.vendor_settings.get());
+}
+
+/// A pixel as it lies in Ping::samples, little-endian: the strength in the upper 16 bits, so that a sample is read as a level,
+/// the range in the lower. 0 = no return; row 0 is the lowest, column 0 the one most to port.
+struct RangePixel {
+  static constexpr std::uint32_t most_range = 0xFFFF, most_strength = 0x7FFF;
+  std::uint32_t strength = 0, range = 0;  // amplitude, linear; in range_unit_m
+  std::uint32_t code() const { return strength << 16 | range; }
+};
+constexpr std::uint32_t range_image_max_code(std::uint32_t full_scale_strength) { return full_scale_strength << 16 | 0xFFFFu; }
+
+inline RangePixel range_pixel(const Ping& ping, std::size_t index) {
+  std::uint32_t code = 0;
+  for (std::size_t b = 0; b < 4; ++b) code |= std::to_integer<std::uint32_t>(ping.samples[4 * index + b]) << (8 * b);
+  return {code >> 16, code & 0xFFFFu};
+}
+
+/// Where the beams look [rad]: azimuth positive to port, elevation positive up.
+struct RangeImageGrid {
+  int columns = 0, rows = 0;
+  double horizontal_rad = 0, vertical_rad = 0;
+
+  explicit RangeImageGrid(const PingRequest& r) : columns(r.settings.beam_count), rows(r.settings.range_bin_count) {
+    const FrequencyMode& mode = r.model->modes[static_cast<std::size_t>(r.settings.mode)];
+    horizontal_rad = static_cast<double>(mode.horizontal_aperture_rad);
+    vertical_rad = static_cast<double>(mode.pattern.elevation_width_rad);
+  }
+  double column_step_rad() const { return columns > 1 ? horizontal_rad / (columns - 1) : horizontal_rad; }
+  double row_step_rad() const { return rows > 1 ? vertical_rad / (rows - 1) : vertical_rad; }
+  double azimuth_rad(double column) const { return horizontal_rad / 2 - column * column_step_rad(); }
+  double elevation_rad(double row) const { return row * row_step_rad() - vertical_rad / 2; }
+};
+
+}  // namespace sonar

@@ -1,0 +1,247 @@
+// Range images against closed forms: where a plane, a sphere and a point are, which side is which, levels, sound speed, threads.
+#include "core/sonar/range_image.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/units.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+
+namespace sonar::test {
+namespace {
+
+constexpr std::uint32_t full_scale = 400;
+
+struct Wanted final : RangeImageSettings {
+  bool equals(const VendorSettings&) const override { return true; }
+};
+
+/// 256 x 64 beams of 1.5 degrees over 90 x 40 degrees, to 15 m.
+class RangeImageSounding {
+ public:
+  explicit RangeImageSounding(std::shared_ptr<const Scene> scene, int threads = 2)
+      : sounding_(std::move(scene), mode(), settings(), {.threads = threads, .engine = {}}), wanted(std::make_shared<Wanted>()) {
+    wanted->beam_height_rad = rad_from_deg(1.5);
+    wanted->range_unit_m = 50.0 / 65536;
+    wanted->least_strength = 31;
+    request().vendor_settings = wanted;
+    request().switches.keep_pressure = false;
+  }
+  PingRequest& request() { return sounding_.request; }
+  const Ping& ping() { return sounding_.ping(); }
+  const Ping& last() const { return sounding_.last(); }
+  RangeImageGrid grid() { return RangeImageGrid(request()); }
+  RangePixel at(int column, int row) const { return range_pixel(last(), static_cast<std::size_t>(row * 256 + column)); }
+  double range_m(int column, int row) const { return at(column, row).range * wanted->range_unit_m; }
+  /// Forward, left, up [m].
+  Vec3d place(int column, int row) {
+    const double a = grid().azimuth_rad(column), e = grid().elevation_rad(row), r = range_m(column, row);
+    return {r * std::cos(e) * std::cos(a), r * std::cos(e) * std::sin(a), r * std::sin(e)};
+  }
+  /// Of the pixels with a return: the mean column and row.
+  std::pair<double, double> middle() {
+    double columns = 0, rows = 0, n = 0;
+    for (int row = 0; row < 64; ++row)
+      for (int column = 0; column < 256; ++column)
+        if (at(column, row).range != 0) columns += column, rows += row, ++n;
+    return n > 0 ? std::pair(columns / n, rows / n) : std::pair(-1.0, -1.0);
+  }
+
+ private:
+  static FrequencyMode mode() {
+    FrequencyMode m;
+    m.name = "range image";
+    m.centre_hz = 1.2e6f;
+    m.horizontal_aperture_rad = static_cast<float>(rad_from_deg(90));
+    m.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(40));
+    m.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(1.5));
+    m.beam_spacing = BeamSpacing::uniform_in_angle;
+    m.max_range_m = 15;
+    m.source_level_db = 200;
+    m.receiver.tvg_slope_db = 20;
+    m.receiver.full_scale_upa = 1e9f;
+    return m;
+  }
+  static PingSettings settings() {
+    PingSettings s;
+    s.beam_count = 256;
+    s.range_bin_count = 64;
+    s.range_m = 15;
+    s.range_bin_m = 15.0 / 64;
+    s.pulse_width_m = 0.02f;
+    s.gain_db = 30;
+    s.device_sound_speed_mps = 1500;
+    s.format = {.bits = 32, .max_code = range_image_max_code(full_scale)};
+    return s;
+  }
+  Sounding sounding_;
+
+ public:
+  std::shared_ptr<Wanted> wanted;
+};
+
+std::shared_ptr<const Scene> plane_ahead(double x_m) { return SceneMaker().add(wall(40, 40), -20, {x_m, 0, 0}).make(); }
+
+/// Share of the pixels with a return that lie on the plane x = `x_m`, to 3 cm.
+double share_on_plane(RangeImageSounding& s, double x_m) {
+  int valid = 0, on = 0;
+  for (int row = 0; row < 64; ++row)
+    for (int column = 0; column < 256; ++column) {
+      if (s.at(column, row).range == 0) continue;
+      ++valid;
+      if (std::abs(s.place(column, row).x - x_m) < 0.03) ++on;
+    }
+  EXPECT_GT(valid, 16384 / 2);
+  return static_cast<double>(on) / valid;
+}
+
+TEST(RangeImage, PlaneIsFlat) {
+  RangeImageSounding s(plane_ahead(5));
+  s.ping();
+  EXPECT_GT(share_on_plane(s, 5), 0.99);
+  s.request().switches.noise = true;
+  s.ping();
+  EXPECT_GT(share_on_plane(s, 5), 0.99);
+}
+
+TEST(RangeImage, SphereIsWhereItIs) {
+  const Vec3d centre{6, -1.5, 0.8};
+  RangeImageSounding s(SceneMaker().add(sphere(0.5, 5), -10, centre).make());
+  s.request().switches.expected_power = true;
+  s.ping();
+  const auto [column, row] = s.middle();
+  EXPECT_NEAR(s.grid().azimuth_rad(column), std::atan2(centre.y, centre.x), rad_from_deg(0.3));
+  EXPECT_NEAR(s.grid().elevation_rad(row), std::atan2(centre.z, std::hypot(centre.x, centre.y)), rad_from_deg(0.4));
+  EXPECT_NEAR(s.range_m(static_cast<int>(std::lround(column)), static_cast<int>(std::lround(row))), length(centre) - 0.5, 0.02);
+}
+
+TEST(RangeImage, LeftIsTheFirstColumnAndUpTheLastRow) {
+  RangeImageSounding s(SceneMaker().add_point({6, 1, 1}, -20).make());
+  s.request().switches.expected_power = true;
+  s.ping();
+  const auto [column, row] = s.middle();
+  EXPECT_LT(column, 127.5);
+  EXPECT_GT(row, 31.5);
+  EXPECT_NEAR(s.grid().azimuth_rad(column), std::atan2(1, 6), rad_from_deg(0.2));
+  EXPECT_NEAR(s.range_m(static_cast<int>(std::lround(column)), static_cast<int>(std::lround(row))), std::sqrt(38.0), 0.005);
+}
+
+TEST(RangeImage, NearestOrStrongest) {
+  const auto scene = SceneMaker().add_point({5, 0, 0}, -40).add_point({8, 0, 0}, -20).make();
+  RangeImageSounding s(scene);
+  s.request().switches.expected_power = true;
+  s.ping();
+  EXPECT_NEAR(s.range_m(127, 32), 8, 0.02);
+  s.wanted->nearest = true;
+  s.ping();
+  EXPECT_NEAR(s.range_m(127, 32), 5, 0.02);
+}
+
+TEST(RangeImage, BelievedSoundSpeedScalesRanges) {
+  RangeImageSounding s(plane_ahead(5));
+  s.request().switches.expected_power = true;
+  s.ping();
+  const double right = s.range_m(127, 32);
+  s.request().settings.device_sound_speed_mps = 1450;
+  s.ping();
+  EXPECT_NEAR(s.range_m(127, 32) / right, 1450.0 / 1500, 1e-3);
+}
+
+TEST(RangeImage, StrengthIsProportionalToAmplitude) {
+  RangeImageSounding s(plane_ahead(5));
+  s.request().switches.expected_power = true;
+  s.ping();
+  const double before = s.at(127, 32).strength;
+  s.request().settings.gain_db += 20 * std::log10(2.0f);
+  s.ping();
+  EXPECT_NEAR(s.at(127, 32).strength / before, 2, 0.02);
+}
+
+/// An even, extended target: speckle has a mean power of 1 re the expected one, and neighbours within a beam share it.
+TEST(RangeImage, SpeckleHasTheExpectedPower) {
+  RangeImageSounding s(plane_ahead(5));
+  s.request().settings.gain_db = 40;
+  s.wanted->least_strength = 1;
+  s.request().switches.expected_power = true;
+  const Ping expected = s.ping();
+  s.request().switches.expected_power = false;
+  s.ping();
+  double ratio = 0, n = 0;
+  for (int row = 10; row < 54; ++row)
+    for (int column = 40; column < 216; ++column, ++n) {
+      const double e = range_pixel(expected, static_cast<std::size_t>(row * 256 + column)).strength;
+      ratio += std::pow(s.at(column, row).strength / e, 2);
+    }
+  EXPECT_NEAR(ratio / n, 1, 0.1);
+}
+
+TEST(RangeImage, NoiseAloneHasFewFalseAlarms) {
+  RangeImageSounding s(SceneMaker().make());
+  s.request().switches.noise = true;
+  s.request().settings.gain_db = 150;
+  s.ping();
+  int alarms = 0;
+  for (int i = 0; i < 16384; ++i) alarms += range_pixel(s.last(), static_cast<std::size_t>(i)).range != 0;
+  EXPECT_LT(alarms, 16);
+  s.wanted->detection = 8;  // 16384 pixels of about 776 cells, each above 8 times the mean with e^-8: a quarter of the pixels
+  s.ping();
+  for (int i = alarms = 0; i < 16384; ++i) alarms += range_pixel(s.last(), static_cast<std::size_t>(i)).range != 0;
+  EXPECT_NEAR(alarms / 16384.0, 1 - std::pow(1 - std::exp(-8), 777), 0.02);
+}
+
+TEST(RangeImage, SameBytesOnAnyNumberOfThreadsAndAnotherPingHasOtherNoise) {
+  const auto scene = SceneMaker().add(wall(3, 3), -20, {5, 0, 0}).add(sphere(0.5, 4), -15, {3, 1, 0}).make();
+  RangeImageSounding one(scene, 1), three(scene, 3);
+  one.request().switches.noise = three.request().switches.noise = true;
+  const Ping first = one.ping();
+  EXPECT_EQ(first.samples, three.ping().samples);
+  one.request().number = PingNumber{7};
+  EXPECT_NE(first.samples, one.ping().samples);
+}
+
+TEST(RangeImage, NothingBeyondTheRangeThatIsSet) {
+  RangeImageSounding s(plane_ahead(9));
+  s.request().settings.range_m = 10;
+  s.request().settings.range_bin_m = 10.0 / 64;
+  s.ping();
+  double farthest = 0;
+  for (int row = 0; row < 64; ++row)
+    for (int column = 0; column < 256; ++column) farthest = std::max(farthest, s.range_m(column, row));
+  EXPECT_LE(farthest, 10);
+  EXPECT_GT(farthest, 9.9);
+}
+
+TEST(RangeImage, AStrongerEchoOutsideTheRangesHidesNone) {
+  RangeImageSounding s(SceneMaker().add_point({1, 0, 0}, -10).add_point({5, 0, 0}, -30).add_point({8.2, 0, 0}, -10).make());
+  s.request().switches.noise = false;
+  s.request().settings.range_start_m = 2;
+  s.request().settings.range_m = 8;
+  s.ping();
+  EXPECT_NEAR(s.range_m(127, 31), 5.0, 0.02);
+}
+
+TEST(RangeImage, KeepsPressureAndTruthWhereAsked) {
+  RangeImageSounding s(plane_ahead(5));
+  s.request().switches.expected_power = s.request().switches.keep_pressure = s.request().switches.keep_truth = true;
+  const Ping& ping = s.ping();
+  ASSERT_EQ(ping.pressure_upa.size(), 16384u);
+  EXPECT_GT(ping.pressure_upa[32 * 256 + 128], ping.pressure_upa[32 * 256 + 250]);
+  ASSERT_EQ(ping.truth.size(), 256u);
+  EXPECT_NEAR(static_cast<double>(ping.truth[127].range_m), 5, 0.01);
+  EXPECT_EQ(ping.truth[127].object, 0u);
+  s.request().switches.keep_beams = true;
+  EXPECT_THROW(s.ping(), std::invalid_argument);
+}
+
+TEST(RangeImage, UnusableSettingsAreRefused) {
+  RangeImageSounding s(plane_ahead(5));
+  s.wanted->range_unit_m = 1e-4;
+  EXPECT_THROW(s.ping(), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sonar::test
