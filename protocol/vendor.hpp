@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -66,6 +67,8 @@ struct DeviceState {
   OptionValues options;                            // complete: defaults filled in by check_options
   std::shared_ptr<const VendorSettings> settings;  // now; null = Vendor::initial_settings
   std::uint32_t last_ping = 0;                     // number of the ping that was fired last
+  Time framed_at{};                                // stamp of the ping that was framed before; Time{} = there is none
+  std::chrono::nanoseconds skipped{0};             // by which stamps of pings are ahead of the time that dialogues are told
   bool simulated_time = false;                     // it may stop while clients wait
   struct StoredAddress {                           // what a client wrote; stored, never applied
     std::uint32_t ip = 0, netmask = 0;
@@ -73,11 +76,19 @@ struct DeviceState {
   } stored_address;
 };
 
+/// Where the device sends the datagrams of its pings from now on. Requested in a conversation: the list is that connection's,
+/// beside those of others, and ends with it. Requested by a datagram or over HTTP: the device's own list, which replaces
+/// Port::group.
+struct SetReceivers {
+  std::vector<Endpoint> to;  // address 0.0.0.0 = that of the host which requests it
+  std::size_t stream = 0;    // which of the vendor's ports of kind udp_stream, counted from 0
+};
 /// The client replaced the device's settings, perhaps by the same ones: some drivers repeat them at ping rate.
 struct ChangeSettings {
   PingSettings settings;
   std::shared_ptr<const VendorSettings> vendor_settings;
-  std::string summary;  // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
+  std::string summary;                         // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
+  std::optional<SetReceivers> receivers = {};  // the device's own list, where it is one of the settings
 };
 /// Settings override, from the control protocol or of a fault. Unset fields keep their value; all values must be finite.
 struct SettingsOverride {
@@ -88,16 +99,13 @@ struct SettingsOverride {
 };
 struct RequestPing {   // one ping now (network trigger, BlueView)
   bool joins = false;  // a ping that is under way already will do
+  /// Of a mechanical scan: the ping is fired with the sonar turned so far to port about its own z axis, and framed with `with` in
+  /// place of the device's settings. Both hold until the next request.
+  double head_rad = 0;
+  std::shared_ptr<const VendorSettings> with = nullptr;
 };
 struct StoreAddress {
   DeviceState::StoredAddress address;
-};
-/// Where the device sends the datagrams of its pings from now on. Requested in a conversation: the list is that connection's,
-/// beside those of others, and ends with it. Requested by a datagram or over HTTP: the device's own list, which replaces
-/// Port::group.
-struct SetReceivers {
-  std::vector<Endpoint> to;  // address 0.0.0.0 = that of the host which requests it
-  std::size_t stream = 0;    // which of the vendor's ports of kind udp_stream, counted from 0
 };
 struct Notice {  // worth one (rate-limited) log line, e.g. junk skipped or a request refused
   std::string text;
@@ -146,11 +154,12 @@ class Dialogue {
 /// A transport of the device. A vendor may have several of a kind, but one beacon.
 struct Port {
   enum class Kind {
-    tcp_stream,  // listens at `number`: one Dialogue for each connection; observers have those of the vendor's first
-    udp_beacon,  // sends Vendor::beacon to `number` of the configured addresses: broadcast, multicast or hosts
-    udp_answer,  // passes datagrams that arrive at `number`, broadcast ones too, to Vendor::on_datagram
-    udp_stream,  // sends Vendor::datagrams of each ping from `number` (0: any; may be that of a udp_answer) to the receivers
-    http,        // serves Vendor::on_http at `number`
+    tcp_stream,    // listens at `number`: one Dialogue for each connection; observers have those of the vendor's first
+    udp_beacon,    // sends Vendor::beacon to `number` of the configured addresses: broadcast, multicast or hosts
+    udp_answer,    // passes datagrams that arrive at `number`, broadcast ones too, to Vendor::on_datagram
+    udp_stream,    // sends Vendor::datagrams of each ping from `number` (0: any; may be that of a udp_answer) to the receivers
+    http,          // serves Vendor::on_http at `number`
+    udp_dialogue,  // one Dialogue at `number` with the host that sent the last request; it gets Vendor::datagrams of its pings
   } kind{};
   std::uint16_t number = 0;
   std::chrono::milliseconds period{0};  // of a beacon
@@ -262,13 +271,19 @@ class Vendor {
     static_cast<void>(port), static_cast<void>(request), static_cast<void>(device), static_cast<void>(now);
     return {404, "not found\n", "text/plain"};
   }
-  /// Of a port of kind tcp_stream. The state must outlive the dialogue.
+  /// Of a port of kind udp_dialogue: whether a datagram comes from a host that speaks the protocol. Others are dropped, so that
+  /// they neither open a dialogue nor take it over.
+  virtual bool is_request(const Port& port, BytesView datagram) const {
+    static_cast<void>(port), static_cast<void>(datagram);
+    return false;
+  }
+  /// Of a port of kind tcp_stream or udp_dialogue. The state must outlive the dialogue.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
   /// Whether pings travel over TCP; else frame() returns null.
   virtual bool pings_over_tcp() const { return true; }
   /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings).
   virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const = 0;
-  /// Of a port of kind udp_stream with receivers: the datagrams of a ping in order, at most 65,507 bytes each.
+  /// Of a port of kind udp_stream with receivers, or udp_dialogue: the datagrams of a ping in order, at most 65,507 bytes each.
   virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};
@@ -279,6 +294,15 @@ class Vendor {
     static_cast<void>(part), static_cast<void>(name), static_cast<void>(message);
     return {};
   }
+  /// Replaces an integer that has no fixed place in its message, such as a varint, by `change` of it. False: there is no such
+  /// integer; of an empty `message`: no message of that kind has it.
+  virtual bool change_integer(Part part, FieldName name, const std::function<std::int64_t(std::int64_t)>& change,
+                              Bytes& message) const {
+    static_cast<void>(part), static_cast<void>(name), static_cast<void>(change), static_cast<void>(message);
+    return false;
+  }
+  /// Of a ping whose fields were changed, of the same size as `before`: makes the checksums of what was changed right again.
+  virtual void reseal(BytesView before, Bytes& message) const { static_cast<void>(before), static_cast<void>(message); }
   /// {offset, size} of a region. Nothing: the vendor has no such region, or the ping is too short. Of an empty `ping`: {0, 0}
   /// when the vendor has such a region.
   virtual std::optional<std::pair<std::size_t, std::size_t>> region(Region region, BytesView ping) const {

@@ -7,7 +7,11 @@
 #include "protocol/aris/aris.hpp"
 #include "protocol/blueview/blueview.hpp"
 #include "protocol/oculus/oculus.hpp"
+#include "protocol/ping/omniscan.hpp"
+#include "protocol/ping/ping360.hpp"
+#include "protocol/ping/surveyor.hpp"
 #include "protocol/vendor.hpp"
+#include "protocol/waterlinked/waterlinked.hpp"
 
 namespace sonar::protocol {
 namespace {
@@ -54,7 +58,9 @@ Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& giv
 }
 
 std::span<const Vendor* const> vendors() {
-  static const std::array<const Vendor*, 3> all{&oculus::vendor(), &blueview::vendor(), &aris::vendor()};
+  static const std::array<const Vendor*, 7> all{&oculus::vendor(),        &blueview::vendor(),      &aris::vendor(),
+                                                &waterlinked::vendor(),   &ping::ping360::vendor(), &ping::surveyor::vendor(),
+                                                &ping::omniscan::vendor()};
   return all;
 }
 

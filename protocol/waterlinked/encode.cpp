@@ -1,0 +1,92 @@
+#include "protocol/waterlinked/encode.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "protocol/waterlinked/options.hpp"
+#include "protocol/waterlinked/rip.hpp"
+
+namespace sonar::waterlinked {
+namespace {
+
+constexpr double gravity_mps2 = 9.81;
+constexpr std::chrono::nanoseconds imu_period = std::chrono::milliseconds(10), longest_batch = std::chrono::seconds(1);
+
+/// So that both images have the same mask: a range beyond 16 bits or a strength below the first pixel value is no return.
+struct Pixel {
+  std::uint32_t range = 0;
+  std::uint8_t strength = 0;
+};
+Pixel pixel_at(const Ping& ping, std::size_t i) {
+  const RangePixel p = range_pixel(ping, i);
+  const std::uint8_t strength = strength_pixel(p.strength);
+  return p.range == 0 || strength == 0 ? Pixel{} : Pixel{p.range, strength};
+}
+
+Shot shot_of(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  const PingSettings& s = ping.request.settings;
+  const ModeRow& mode = mode_rows()[settings.mode];
+  Shot shot;
+  shot.at = device_time(ping.request.fired_at, settings, device);
+  shot.sequence = static_cast<std::uint32_t>(ping.request.number);
+  shot.speed_of_sound_mps = s.device_sound_speed_mps;
+  shot.range_m = static_cast<float>(s.range_m);
+  shot.frequency = static_cast<std::uint32_t>(mode.rate_hz);  // unknown: called a frequency, a real unit sends its rate
+  shot.width = columns;
+  shot.height = rows;
+  shot.horizontal_deg = static_cast<float>(mode.horizontal_deg);
+  shot.vertical_deg = static_cast<float>(mode.vertical_deg);
+  return shot;
+}
+
+std::array<float, 3> frd(Vec3d flu) {
+  return {static_cast<float>(flu.x), static_cast<float>(-flu.y), static_cast<float>(-flu.z)};
+}
+
+}  // namespace
+
+std::uint8_t strength_pixel(std::uint32_t linear) {
+  if (linear <= 30) return 0;
+  return static_cast<std::uint8_t>(std::clamp(std::lround(100 * std::log10(linear / 30.0)), 1L, 255L));
+}
+
+RangeMessage range_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  RangeMessage m{shot_of(ping, settings, device), static_cast<float>(pixel_scale_m), {}};
+  for (std::size_t i = 0; i < ping.samples.size() / 4; ++i) m.pixels.push_back(pixel_at(ping, i).range);
+  return m;
+}
+
+StrengthMessage strength_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  StrengthMessage m{shot_of(ping, settings, device), {}};
+  for (std::size_t i = 0; i < ping.samples.size() / 4; ++i) m.pixels.push_back(pixel_at(ping, i).strength);
+  return m;
+}
+
+/// At whole periods of the device's clock.
+ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  ImuMessage m;
+  m.sequence = static_cast<std::uint32_t>(ping.request.number);
+  const PingRequest& r = ping.request;
+  const auto since_last = r.fired_at - device.framed_at;
+  const bool goes_on = device.framed_at != Time{} && since_last.count() > 0 && since_last <= longest_batch;
+  const auto period = nanoseconds_from(1 / static_cast<double>(mode_rows()[settings.mode].rate_hz));
+  const Time shot = device_time(r.fired_at, settings, device);
+  const Time from = shot - (goes_on ? since_last : period);
+  for (Time at = from - from.time_since_epoch() % imu_period + imu_period; at <= shot; at += imu_period) {
+    // Turned back by the rate of turn; acceleration is not known and taken as none.
+    const double before_s = -seconds(shot - at);
+    const Quatd then = normalized(r.sonar_in_world.orientation * turned_by(before_s * r.sonar_moves.angular_rate_radps));
+    m.samples.push_back({at, frd(rotate(conjugate(then), Vec3d{0, 0, gravity_mps2})), frd(r.sonar_moves.angular_rate_radps)});
+  }
+  return m;
+}
+
+std::vector<Bytes> encode_shot(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  const Rip rip = text_option(device.options, option_name::rip) == "1" ? Rip::one : Rip::two;
+  std::vector<Bytes> datagrams{rip_packet(packet_of(range_message(ping, settings, device)), rip),
+                               rip_packet(packet_of(strength_message(ping, settings, device)), rip)};
+  if (settings.imu) datagrams.push_back(rip_packet(packet_of(imu_message(ping, settings, device)), rip));
+  return datagrams;
+}
+
+}  // namespace sonar::waterlinked

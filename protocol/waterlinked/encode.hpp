@@ -1,0 +1,23 @@
+// A Ping as the datagrams of a shot.
+#pragma once
+
+#include <vector>
+
+#include "protocol/vendor.hpp"
+#include "protocol/waterlinked/messages.hpp"
+#include "protocol/waterlinked/settings.hpp"
+
+namespace sonar::waterlinked {
+
+/// 100 log10(lin / 30), at most 255; 0 up to 30.
+std::uint8_t strength_pixel(std::uint32_t linear);
+
+RangeMessage range_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
+StrengthMessage strength_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
+/// What the inertial sensors measured since the shot before, or, where that is long ago, in one period of the mode.
+ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
+
+/// Range image, strength image and, where it is enabled, IMU samples.
+std::vector<Bytes> encode_shot(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
+
+}  // namespace sonar::waterlinked

@@ -1,0 +1,20 @@
+// What the public sources leave unknown about a Sonar 3D-15, as options of a sonar's configuration.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::waterlinked {
+
+namespace option_name {
+inline constexpr std::string_view release = "release", rip = "rip", acoustics_at_start = "acoustics_at_start",
+                                  udp_at_start = "udp_at_start", clock = "clock";
+}
+
+std::span<const protocol::Option> options();
+/// The configured value, or the default.
+std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
+
+}  // namespace sonar::waterlinked

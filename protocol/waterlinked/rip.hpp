@@ -1,0 +1,23 @@
+// The datagrams of the Range Image Protocol: "RIP2", length, Snappy block, CRC-32. "RIP1" is the same without Snappy.
+#pragma once
+
+#include <optional>
+
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::waterlinked {
+
+using wire::Bytes;
+using wire::BytesView;
+
+enum class Rip { one = 1, two = 2 };
+inline constexpr std::size_t rip_overhead = 12;    // bytes around the content
+inline constexpr std::size_t longest_rip = 65507;  // a packet is a datagram
+
+Bytes rip_packet(BytesView content, Rip version = Rip::two);
+/// The length that a packet states; 0: this is not the beginning of one.
+std::size_t rip_length(BytesView beginning);
+/// The content of a whole packet. Nothing: another length than it states, a wrong CRC, or a block that is not Snappy's.
+std::optional<Bytes> rip_content(BytesView packet);
+
+}  // namespace sonar::waterlinked

@@ -1,0 +1,61 @@
+#include "protocol/waterlinked/waterlinked.hpp"
+
+#include "protocol/waterlinked/encode.hpp"
+#include "protocol/waterlinked/http.hpp"
+#include "protocol/waterlinked/models.hpp"
+#include "protocol/waterlinked/options.hpp"
+#include "protocol/waterlinked/settings.hpp"
+
+namespace sonar::waterlinked {
+namespace {
+
+using PortKind = protocol::Port::Kind;
+// No gap between the two images: clients pair them within 25 ms.
+constexpr std::array<protocol::Port, 2> port_table{
+    {{.kind = PortKind::http, .number = 80}, {.kind = PortKind::udp_stream, .group = multicast_group}}};
+
+class WaterLinkedVendor final : public protocol::Vendor {
+ public:
+  std::string_view name() const override { return "waterlinked"; }
+  std::span<const std::shared_ptr<const SonarModel>> models() const override { return waterlinked::models(); }
+  std::span<const protocol::Port> ports() const override { return port_table; }
+  std::span<const protocol::Option> options() const override { return waterlinked::options(); }
+  int default_max_clients() const override { return 1; }  // of TCP streams, which it has none of
+  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
+                                                  const protocol::OptionValues&) const override {
+    return model;
+  }
+
+  protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
+    return change_to(waterlinked::initial_settings(device), device);
+  }
+  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
+                                                  const protocol::DeviceState& device) const override {
+    return waterlinked::apply_override(wanted, device);
+  }
+  double gain_percent(const protocol::DeviceState&) const override { return 0; }  // it turns its own
+  bool pings_before_first_request(const protocol::DeviceState&) const override { return true; }
+  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
+  protocol::ResourceReply on_http(const protocol::Port&, const protocol::ResourceRequest& request,
+                                  const protocol::DeviceState& device, Time now) const override {
+    return answer(request, device, now);
+  }
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState&, Time) const override {
+    return nullptr;
+  }
+  bool pings_over_tcp() const override { return false; }
+  std::shared_ptr<const protocol::Bytes> frame(const Ping&, const protocol::DeviceState&) const override { return nullptr; }
+  std::vector<protocol::Bytes> datagrams(const protocol::Port&, const Ping& ping,
+                                         const protocol::DeviceState& device) const override {
+    return encode_shot(ping, settings_from(ping.request.vendor_settings.get(), device), device);
+  }
+};
+
+}  // namespace
+
+const protocol::Vendor& vendor() {
+  static const WaterLinkedVendor only;
+  return only;
+}
+
+}  // namespace sonar::waterlinked
