@@ -1,0 +1,159 @@
+#include "protocol/ping/locate.hpp"
+
+#include "protocol/ping/omniscan_messages.hpp"
+
+namespace sonar::ping {
+namespace {
+
+using protocol::Field;
+using protocol::FieldName;
+using protocol::Region;
+
+template <class M>
+std::optional<Field> inside(std::string_view name, std::size_t offset, BytesView message) {
+  auto found = wire::locate<M>(name);
+  if (!found) return found;
+  found->offset += offset;
+  return message.empty() || found->offset + found->size <= message.size() ? found : std::nullopt;
+}
+
+/// In the first frame.
+std::optional<Field> in_header(FieldName name, BytesView message) {
+  const auto of = [&](std::string_view field) { return inside<Header>(field, 0, message); };
+  switch (name) {
+    case FieldName::magic:
+      return of("start");
+    case FieldName::payload_size:
+      return of("payload_length");
+    case FieldName::message_type:
+      return of("message_id");
+    case FieldName::source_id:
+      return of("src_device_id");
+    case FieldName::destination_id:
+      return of("dst_device_id");
+    default:
+      return std::nullopt;
+  }
+}
+
+bool is_of(Id id, BytesView frame) {
+  Header header;
+  wire::Reader reader(frame);
+  fields(reader, header);
+  return reader.ok() && header.id == id;
+}
+
+template <class M>
+std::optional<Field> of_ping360(FieldName name, BytesView frame) {
+  const auto of = [&](std::string_view field) { return inside<M>(field, header_size, frame); };
+  switch (name) {
+    case FieldName::gain:
+      return of("gain_setting");
+    case FieldName::heading:
+      return of("angle");
+    case FieldName::range_resolution:
+      return of("sample_period");
+    case FieldName::frequency:
+      return of("transmit_frequency");
+    case FieldName::rows:
+      return of("number_of_samples");
+    case FieldName::image_size:
+      return of("data_length");
+    default:
+      return std::nullopt;
+  }
+}
+
+/// Of a frame that is fields, then samples.
+std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields_size) {
+  if (region == Region::bearings) return std::nullopt;
+  if (frame.empty()) return Place{};
+  const std::size_t data = header_size + fields_size;
+  if (frame.size() < data + sum_size) return std::nullopt;
+  if (region == Region::header) return Place{0, header_size};
+  return region == Region::metadata ? Place{header_size, fields_size} : Place{data, frame.size() - sum_size - data};
+}
+
+constexpr std::size_t attitude_size = header_size + wire::wire_size<AttitudeReport>() + sum_size;
+
+/// Of a ping's frames together, or of the datagram that has this one.
+std::optional<std::size_t> atof_frame(BytesView frames) {
+  const std::size_t at = frames.empty() || is_of(Id::attitude_report, frames) ? attitude_size : 0;
+  const bool there = frames.empty() || (frames.size() > at && is_of(Id::atof_point_data, frames.subspan(at)));
+  return there ? std::optional(at) : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Field> locate_ping360(FieldName name, BytesView frame) {
+  if (const auto header = in_header(name, frame)) return header;
+  return is_of(Id::auto_device_data, frame) ? of_ping360<AutoDeviceData>(name, frame) : of_ping360<DeviceData>(name, frame);
+}
+
+std::optional<Place> locate_ping360(Region region, BytesView frame) {
+  const bool scan = is_of(Id::auto_device_data, frame);
+  return one_beam(region, frame, scan ? wire::wire_size<AutoDeviceData>() : wire::wire_size<DeviceData>());
+}
+
+std::optional<Field> locate_omniscan(FieldName name, BytesView frame) {
+  if (const auto header = in_header(name, frame)) return header;
+  const auto of = [&](std::string_view field) { return inside<OsMonoProfile>(field, header_size, frame); };
+  switch (name) {
+    case FieldName::ping_id:
+      return of("ping_number");
+    case FieldName::time:
+      return of("timestamp_ms");
+    case FieldName::frequency:
+      return of("ping_hz");
+    case FieldName::range:
+      return of("length_mm");
+    case FieldName::gain:
+      return of("gain_index");
+    case FieldName::rows:
+      return of("num_results");
+    case FieldName::sound_speed:
+      return of("sos_dmps");
+    case FieldName::heading:
+      return of("transducer_heading_deg");
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<Place> locate_omniscan(Region region, BytesView frame) {
+  return one_beam(region, frame, wire::wire_size<OsMonoProfile>());
+}
+
+std::optional<Field> locate_surveyor(FieldName name, BytesView frames) {
+  if (const auto header = in_header(name, frames)) return header;
+  const auto at = atof_frame(frames);
+  if (!at) return std::nullopt;
+  const auto of = [&](std::string_view field) { return inside<AtofPointData>(field, *at + header_size, frames); };
+  switch (name) {
+    case FieldName::ping_id:
+      return of("ping_number");
+    case FieldName::time:
+      return of("utc_msec");
+    case FieldName::sound_speed:
+      return of("sos_mps");
+    case FieldName::frequency:
+      return of("ping_hz");
+    case FieldName::beams:
+      return of("num_points");
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<Place> locate_surveyor(Region region, BytesView frames) {
+  if (region == Region::bearings) return std::nullopt;  // each point has its own
+  if (frames.empty()) return Place{};
+  const auto at = atof_frame(frames);
+  const std::size_t fields_end = at.value_or(0) + header_size + wire::wire_size<AtofPointData>();
+  if (!at || frames.size() < fields_end + sum_size) return std::nullopt;
+  if (region == Region::header) return Place{0, header_size};
+  return region == Region::metadata ? Place{header_size, fields_end - header_size}
+                                    : Place{fields_end, frames.size() - sum_size - fields_end};
+}
+
+}  // namespace sonar::ping

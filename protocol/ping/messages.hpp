@@ -1,0 +1,351 @@
+// The messages of the ping protocol that the emulated devices use, each described once, and their frames. Little-endian. Source:
+// the public definitions of bluerobotics/ping-protocol.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::ping {
+
+using wire::Bytes;
+using wire::BytesView;
+
+enum class Id : std::uint16_t {
+  ack = 1,
+  nack = 2,
+  ascii_text = 3,
+  device_information = 4,
+  protocol_version = 5,
+  general_request = 6,
+  json_wrapper = 10,
+  utc_request = 14,
+  utc_response = 15,
+  set_net_info = 17,
+  set_device_id = 100,
+  set_sound_speed = 116,
+  water_stats = 118,
+  attitude_report = 504,
+  set_sound_speed_before = 1002,  // of older definitions
+  ping360_set_device_id = 2000,
+  os_ping_params = 2197,
+  os_mono_profile = 2198,
+  device_data = 2300,
+  auto_device_data = 2301,
+  reset = 2600,
+  transducer = 2601,
+  auto_transmit = 2602,
+  motor_off = 2903,
+  yz_point_data = 3011,
+  atof_point_data = 3012,
+  set_ping_parameters = 3023,
+};
+
+inline constexpr std::size_t header_size = 8, sum_size = 2;
+inline constexpr std::size_t longest_request = 256;  // payload; the longest that a host has to send is 36
+
+struct Header {
+  std::array<std::uint8_t, 2> start{'B', 'R'};
+  std::uint16_t length = 0;
+  Id id{};
+  std::uint8_t source = 0, destination = 0;
+};
+template <class V, wire::Like<Header> M>
+constexpr void fields(V& visit, M& m) {
+  visit("start", m.start);
+  visit("payload_length", m.length);
+  visit("message_id", m.id);
+  visit("src_device_id", m.source);
+  visit("dst_device_id", m.destination);
+}
+
+/// The whole frame, of a device with that id to any host.
+Bytes framed(Id id, std::uint8_t source, BytesView payload);
+template <class M>
+Bytes framed_message(Id id, std::uint8_t source, const M& message) {
+  return framed(id, source, wire::bytes_of(message));
+}
+/// Frames whose fields were changed, of the same size as `before`: their sums are made right again.
+void reseal(BytesView before, Bytes& frames);
+Bytes ack(Id id, std::uint8_t source);
+Bytes nack(Id id, std::uint8_t source, std::string_view why);
+
+struct Frame {
+  Header header;
+  Bytes payload;
+  bool sum_is_right = true;
+};
+
+/// Frames of a byte stream, however it is split. A payload stated to be longer than `longest` is no frame, and after a wrong sum
+/// the search goes on behind the start: at most one frame waits to be whole. Of a datagram nothing more comes: with
+/// `all_is_there` the search goes on behind the start of what is not whole.
+class Framer {
+ public:
+  explicit Framer(std::size_t longest = longest_request, bool all_is_there = false)
+      : longest_(longest), all_is_there_(all_is_there) {}
+  void append(BytesView received) { buffer_.insert(buffer_.end(), received.begin(), received.end()); }
+  std::optional<Frame> next();
+  /// What is not whole yet.
+  void drop_rest() { buffer_.clear(); }
+  std::size_t waiting_bytes() const { return buffer_.size(); }
+
+ private:
+  std::size_t longest_;
+  bool all_is_there_;
+  Bytes buffer_;
+};
+
+/// What devices say alone. No answer to it: two devices would answer each other without end.
+constexpr bool is_of_device(Id id) { return id == Id::ack || id == Id::nack || id == Id::ascii_text; }
+
+/// A datagram that holds a whole frame of a host with the right sum.
+bool holds_frame(BytesView datagram);
+
+struct DeviceInformation {
+  std::uint8_t type = 0, revision = 0, major = 0, minor = 0, patch = 0, reserved = 0;
+};
+template <class V, wire::Like<DeviceInformation> M>
+constexpr void fields(V& visit, M& m) {
+  visit("device_type", m.type);
+  visit("device_revision", m.revision);
+  visit("firmware_version_major", m.major);
+  visit("firmware_version_minor", m.minor);
+  visit("firmware_version_patch", m.patch);
+  visit("reserved", m.reserved);
+}
+
+struct ProtocolVersion {
+  std::uint8_t major = 1, minor = 0, patch = 0, reserved = 0;
+};
+template <class V, wire::Like<ProtocolVersion> M>
+constexpr void fields(V& visit, M& m) {
+  visit("version_major", m.major);
+  visit("version_minor", m.minor);
+  visit("version_patch", m.patch);
+  visit("reserved", m.reserved);
+}
+
+// ---- Ping360
+
+struct Transducer {
+  std::uint8_t mode = 1, gain = 0;
+  std::uint16_t angle = 0;         // grad
+  std::uint16_t transmit_us = 32;  // duration of the pulse
+  std::uint16_t period = 80;       // of samples, 25 ns
+  std::uint16_t khz = 740;
+  std::uint16_t samples = 1024;
+  std::uint8_t transmit = 0, reserved = 0;
+  bool operator==(const Transducer&) const = default;
+};
+template <class V, wire::Like<Transducer> M>
+constexpr void fields(V& visit, M& m) {
+  visit("mode", m.mode);
+  visit("gain_setting", m.gain);
+  visit("angle", m.angle);
+  visit("transmit_duration", m.transmit_us);
+  visit("sample_period", m.period);
+  visit("transmit_frequency", m.khz);
+  visit("number_of_samples", m.samples);
+  visit("transmit", m.transmit);
+  visit("reserved", m.reserved);
+}
+
+/// Followed by `count` samples of a byte.
+struct DeviceData {
+  std::uint8_t mode = 1, gain = 0;
+  std::uint16_t angle = 0, transmit_us = 0, period = 0, khz = 0, samples = 0, count = 0;
+};
+template <class V, wire::Like<DeviceData> M>
+constexpr void fields(V& visit, M& m) {
+  visit("mode", m.mode);
+  visit("gain_setting", m.gain);
+  visit("angle", m.angle);
+  visit("transmit_duration", m.transmit_us);
+  visit("sample_period", m.period);
+  visit("transmit_frequency", m.khz);
+  visit("number_of_samples", m.samples);
+  visit("data_length", m.count);
+}
+
+struct AutoTransmit {
+  std::uint8_t mode = 1, gain = 0;
+  std::uint16_t transmit_us = 0, period = 0, khz = 0, samples = 0, start = 0, stop = 399;
+  std::uint8_t steps = 1, delay_ms = 0;
+};
+template <class V, wire::Like<AutoTransmit> M>
+constexpr void fields(V& visit, M& m) {
+  visit("mode", m.mode);
+  visit("gain_setting", m.gain);
+  visit("transmit_duration", m.transmit_us);
+  visit("sample_period", m.period);
+  visit("transmit_frequency", m.khz);
+  visit("number_of_samples", m.samples);
+  visit("start_angle", m.start);
+  visit("stop_angle", m.stop);
+  visit("num_steps", m.steps);
+  visit("delay", m.delay_ms);
+}
+
+/// Followed by `count` samples of a byte.
+struct AutoDeviceData {
+  std::uint8_t mode = 1, gain = 0;
+  std::uint16_t angle = 0, transmit_us = 0, period = 0, khz = 0, start = 0, stop = 0;
+  std::uint8_t steps = 0, delay_ms = 0;
+  std::uint16_t samples = 0, count = 0;
+};
+template <class V, wire::Like<AutoDeviceData> M>
+constexpr void fields(V& visit, M& m) {
+  visit("mode", m.mode);
+  visit("gain_setting", m.gain);
+  visit("angle", m.angle);
+  visit("transmit_duration", m.transmit_us);
+  visit("sample_period", m.period);
+  visit("transmit_frequency", m.khz);
+  visit("start_angle", m.start);
+  visit("stop_angle", m.stop);
+  visit("num_steps", m.steps);
+  visit("delay", m.delay_ms);
+  visit("number_of_samples", m.samples);
+  visit("data_length", m.count);
+}
+
+// ---- Surveyor 240
+
+struct PingParameters {
+  std::int32_t start_mm = 0, end_mm = 0;  // end 0: follow the bottom
+  float speed_mps = 1500;
+  std::int16_t gain = -1, period_ms = 100;
+  std::uint16_t reserved0 = 0;
+  std::uint8_t reserved1 = 0, enable = 0, channel_data = 0, reserved2 = 0, yz = 1, atof = 1;
+  std::int32_t hz = 240000;
+  std::uint16_t steps = 400, reserved3 = 0;
+  float pulse_steps = 1.5f;
+  bool operator==(const PingParameters&) const = default;
+};
+template <class V, wire::Like<PingParameters> M>
+constexpr void fields(V& visit, M& m) {
+  visit("start_mm", m.start_mm);
+  visit("end_mm", m.end_mm);
+  visit("sos_mps", m.speed_mps);
+  visit("gain_index", m.gain);
+  visit("msec_per_ping", m.period_ms);
+  visit("deprecated", m.reserved0);
+  visit("diagnostic_injected_signal", m.reserved1);
+  visit("ping_enable", m.enable);
+  visit("enable_channel_data", m.channel_data);
+  visit("reserved_for_raw_data", m.reserved2);
+  visit("enable_yz_point_data", m.yz);
+  visit("enable_atof_data", m.atof);
+  visit("target_ping_hz", m.hz);
+  visit("n_range_steps", m.steps);
+  visit("reserved", m.reserved3);
+  visit("pulse_len_steps", m.pulse_steps);
+}
+
+/// Followed by `points` AtofPoint.
+struct AtofPointData {
+  std::uint32_t power_up_ms = 0;
+  std::uint64_t utc_ms = 0;
+  float listening_s = 0, speed_mps = 0;
+  std::uint32_t ping = 0, hz = 0;
+  float pulse_s = 0;
+  std::uint32_t flags = 0;
+  std::uint16_t points = 0, reserved = 0;
+};
+template <class V, wire::Like<AtofPointData> M>
+constexpr void fields(V& visit, M& m) {
+  visit("pwr_up_msec", m.power_up_ms);
+  visit("utc_msec", m.utc_ms);
+  visit("listening_sec", m.listening_s);
+  visit("sos_mps", m.speed_mps);
+  visit("ping_number", m.ping);
+  visit("ping_hz", m.hz);
+  visit("pulse_sec", m.pulse_s);
+  visit("flags", m.flags);
+  visit("num_points", m.points);
+  visit("reserved", m.reserved);
+}
+struct AtofPoint {
+  float angle_rad = 0, two_way_s = 0;  // from straight down, positive to port
+  std::array<std::uint32_t, 2> reserved{};
+};
+template <class V, wire::Like<AtofPoint> M>
+constexpr void fields(V& visit, M& m) {
+  visit("angle", m.angle_rad);
+  visit("tof", m.two_way_s);
+  visit("reserved", m.reserved);
+}
+
+/// Followed by `points` pairs of y (to port) and z (up) [m].
+struct YzPointData {
+  std::uint32_t power_up_ms = 0, ping = 0;
+  float speed_mps = 0;
+  std::array<float, 3> up{}, reserved0{};
+  std::array<std::uint32_t, 10> reserved1{};
+  float temperature_c = -1000, pressure_bar = -1000, heave_m = 0, start_m = 0, end_m = 0;
+  std::uint16_t reserved2 = 0, points = 0;
+};
+template <class V, wire::Like<YzPointData> M>
+constexpr void fields(V& visit, M& m) {
+  visit("timestamp_msec", m.power_up_ms);
+  visit("ping_number", m.ping);
+  visit("sos_mps", m.speed_mps);
+  visit("up_vec", m.up);
+  visit("mag_vec", m.reserved0);
+  visit("reserved", m.reserved1);
+  visit("water_degC", m.temperature_c);
+  visit("water_bar", m.pressure_bar);
+  visit("heave_m", m.heave_m);
+  visit("start_m", m.start_m);
+  visit("end_m", m.end_m);
+  visit("unused", m.reserved2);
+  visit("num_points", m.points);
+}
+
+struct AttitudeReport {
+  std::array<float, 3> up{}, reserved{};
+  std::uint64_t utc_ms = 0;
+  std::uint32_t power_up_ms = 0;
+};
+template <class V, wire::Like<AttitudeReport> M>
+constexpr void fields(V& visit, M& m) {
+  visit("up_vec", m.up);
+  visit("reserved", m.reserved);
+  visit("utc_msec", m.utc_ms);
+  visit("pwr_up_msec", m.power_up_ms);
+}
+
+struct WaterStats {
+  float temperature_c = 0, pressure_bar = 0;
+};
+template <class V, wire::Like<WaterStats> M>
+constexpr void fields(V& visit, M& m) {
+  visit("temp_C", m.temperature_c);
+  visit("pressure_bar", m.pressure_bar);
+}
+
+struct UtcResponse {
+  std::uint64_t utc_ms = 0;
+  std::uint32_t accuracy_ms = 0;
+};
+template <class V, wire::Like<UtcResponse> M>
+constexpr void fields(V& visit, M& m) {
+  visit("utc_msec", m.utc_ms);
+  visit("accuracy_msec", m.accuracy_ms);
+}
+
+struct NetInfo {
+  std::uint32_t ntp_ip = 0, netmask = 0, gateway = 0;  // first octet in the lowest byte
+};
+template <class V, wire::Like<NetInfo> M>
+constexpr void fields(V& visit, M& m) {
+  visit("ntp_ip_address", m.ntp_ip);
+  visit("subnet_mask", m.netmask);
+  visit("gateway_ip", m.gateway);
+}
+
+}  // namespace sonar::ping

@@ -1,0 +1,81 @@
+#include "protocol/ping/omniscan.hpp"
+
+#include <algorithm>
+
+#include "protocol/ping/locate.hpp"
+#include "protocol/ping/omniscan_settings.hpp"
+#include "protocol/ping/streaming.hpp"
+
+namespace sonar::ping::omniscan {
+namespace {
+
+using protocol::Reaction;
+constexpr auto port_table = streaming_ports(51200);
+
+class OmniscanDialogue final : public StreamingConversation<Settings, settings_from> {
+ public:
+  using StreamingConversation::StreamingConversation;
+
+ protected:
+  bool on_request(const Frame& frame, Time, Reaction& reaction) override {
+    if (frame.header.id == Id::os_ping_params) {
+      OsPingParams parameters;
+      if (!read(frame, parameters, reaction)) return true;
+      if (const std::string why = complaint(parameters); !why.empty()) return refuse(frame, why, reaction), true;
+      change(reaction, [&](Settings& s) { s.parameters = parameters; });
+    } else if (frame.header.id == Id::set_sound_speed || frame.header.id == Id::set_sound_speed_before) {
+      SoundSpeed speed;
+      if (!read(frame, speed, reaction)) return true;
+      if (speed.mm_per_s < 1000000 || speed.mm_per_s > 2000000)
+        return refuse(frame, "speed_of_sound is not in 1000000..2000000", reaction), true;
+      change(reaction, [&](Settings& s) { s.speed_mps = static_cast<float>(1e-3 * speed.mm_per_s); });
+    } else {
+      return false;
+    }
+    return true;
+  }
+  Bytes message_now(Id, Time) override { return {}; }
+  bool comes_with_pings(Id wanted) const override { return wanted == Id::os_mono_profile && settings().parameters.enable != 0; }
+};
+
+class OmniscanVendor final : public StreamingVendor {
+ public:
+  std::string_view name() const override { return "omniscan450"; }
+  std::span<const std::shared_ptr<const SonarModel>> models() const override { return omniscan::models(); }
+  std::span<const protocol::Port> ports() const override { return port_table; }
+  std::span<const protocol::Option> options() const override { return streaming_options(); }
+  protocol::ChangeSettings initial_settings(const protocol::DeviceState&) const override { return change_to(Settings{}); }
+  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
+                                                  const protocol::DeviceState& device) const override {
+    return omniscan::apply_override(wanted, device);
+  }
+  double gain_percent(const protocol::DeviceState& device) const override {
+    return 100.0 / 7 * std::max<int>(settings_from(device.settings.get()).parameters.gain, 0);
+  }
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,
+                                               Time) const override {
+    return std::make_unique<OmniscanDialogue>(device, port);
+  }
+  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
+                                       protocol::BytesView message) const override {
+    return part == protocol::Part::ping ? locate_omniscan(name, message) : std::nullopt;
+  }
+  void reseal(protocol::BytesView before, protocol::Bytes& ping) const override { sonar::ping::reseal(before, ping); }
+  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
+    return locate_omniscan(region, ping);
+  }
+
+ protected:
+  std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) const override {
+    return {profile_of(ping, device)};
+  }
+};
+
+}  // namespace
+
+const protocol::Vendor& vendor() {
+  static const OmniscanVendor only;
+  return only;
+}
+
+}  // namespace sonar::ping::omniscan

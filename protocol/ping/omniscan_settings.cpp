@@ -1,0 +1,146 @@
+#include "protocol/ping/omniscan_settings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::ping::omniscan {
+namespace {
+
+constexpr double db_per_gain = 6;  // unknown: chosen, like full scale and the source level
+constexpr int most_gain = 7;
+constexpr double longest_m = 150;
+constexpr double processing_s = 0.01;
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
+
+SonarModel make_model() {
+  FrequencyMode mode;
+  mode.name = "450 kHz";
+  mode.centre_hz = 450e3f;
+  mode.min_range_m = 0.3f;
+  mode.max_range_m = static_cast<float>(longest_m);
+  mode.source_level_db = 205;
+  mode.beam_spacing = BeamSpacing::listed;
+  mode.beam_azimuths_rad = {0};
+  mode.pattern.azimuth_width_rad =
+      static_cast<float>(rad_from_deg(0.8));  // along the track: the maker's, of its 450 kHz transmitter
+  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(50));  // across it: recalled
+  mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;
+  mode.receiver.full_scale_upa = 1e5f;
+  SonarModel model;
+  model.profile = "omniscan-450";
+  model.name = "Omniscan 450";
+  model.max_rate_hz = 50;
+  model.modes = {mode};
+  return model;
+}
+
+/// Of the middle of the beam, clockwise from north.
+double heading_deg(const Pose& sonar_in_world) {
+  const Vec3d ahead = rotate(sonar_in_world.orientation, Vec3d{1, 0, 0});
+  const double deg = deg_from_rad(std::atan2(ahead.x, ahead.y));
+  return deg < 0 ? deg + 360 : deg;
+}
+
+}  // namespace
+
+std::span<const std::shared_ptr<const SonarModel>> models() {
+  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
+  return all;
+}
+
+bool HeldSettings::equals(const VendorSettings& other) const {
+  const auto* of = dynamic_cast<const HeldSettings*>(&other);
+  return of != nullptr && of->settings == settings;
+}
+
+Settings settings_from(const VendorSettings* held) {
+  const auto* of = dynamic_cast<const HeldSettings*>(held);
+  return of != nullptr ? of->settings : Settings{};
+}
+
+std::string complaint(const OsPingParams& p) {
+  if (p.length_mm < 100 || 1e-3 * p.start_mm + 1e-3 * p.length_mm > longest_m) return "length_mm is from 100, its end to 150000";
+  if (p.gain < -1 || p.gain > most_gain) return "gain_index is not in -1..7";
+  if (p.results < 200 || p.results > 1200) return "num_results is not in 200..1200";
+  if (!(p.pulse_part >= 0 && p.pulse_part <= 1)) return "pulse_len_percent is not in 0..1";
+  return {};
+}
+
+PingSettings ping_settings(const Settings& settings) {
+  const OsPingParams& p = settings.parameters;
+  const double length_m = 1e-3 * p.length_mm;
+  PingSettings s;
+  s.beam_count = 1;
+  s.range_start_m = 1e-3 * p.start_mm;
+  s.range_m = s.range_start_m + length_m;
+  s.range_bin_count = p.results;
+  s.range_bin_m = length_m / p.results;
+  s.pulse_width_m = static_cast<float>(std::max(static_cast<double>(p.pulse_part) * s.range_m, s.range_bin_m / 2));
+  const double shortest_s = 2 * s.range_m / static_cast<double>(settings.speed_mps) + processing_s;
+  s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
+  s.gain_db = static_cast<float>(db_per_gain * std::max<int>(p.gain, 0));
+  s.tvg = false;  // hosts do that
+  s.device_sound_speed_mps = settings.speed_mps;
+  s.format = {.bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -80, .ceiling_db = 80};
+  return s;
+}
+
+protocol::ChangeSettings change_to(const Settings& settings) {
+  const PingSettings s = ping_settings(settings);
+  char text[160];
+  std::snprintf(text, sizeof text, "%s, %.2f to %.2f m, %d results, %.4g Hz, sound speed %g m/s",
+                s.rate_hz > 0 ? "pings" : "standby", s.range_start_m, s.range_m, s.range_bin_count,
+                static_cast<double>(s.rate_hz), static_cast<double>(s.device_sound_speed_mps));
+  return {s, std::make_shared<HeldSettings>(settings), text};
+}
+
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
+  Settings s = settings_from(device.settings.get());
+  OsPingParams& p = s.parameters;
+  if (wanted.range_m)
+    p.length_mm = static_cast<std::uint32_t>(std::lround(std::clamp(1000 * *wanted.range_m - p.start_mm, 0.0, 1e6)));
+  if (wanted.rate_hz) {
+    p.enable = *wanted.rate_hz > 0 ? 1 : 0;
+    if (p.enable != 0) p.period_ms = static_cast<std::uint32_t>(std::lround(std::clamp(1000 / *wanted.rate_hz, 1.0, 30000.0)));
+  }
+  if (wanted.gain_percent) {
+    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
+    p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
+  }
+  if (wanted.mode && *wanted.mode != 0) return refused("an Omniscan has one mode, 0");
+  if (wanted.beams && *wanted.beams != 1) return refused("an Omniscan has one beam");
+  if (wanted.sample_bits && *wanted.sample_bits != 16) return refused("an Omniscan sends samples of 16 bits");
+  if (wanted.row_gains && *wanted.row_gains) return refused("an Omniscan sends no row gains");
+  if (const std::string why = complaint(p); !why.empty()) return refused("Omniscan: " + why);
+  return change_to(s);
+}
+
+Bytes profile_of(const Ping& ping, const protocol::DeviceState& device) {
+  const Settings s = settings_from(ping.request.vendor_settings.get());
+  const PingSettings& made = ping.request.settings;
+  OsMonoProfile profile;
+  profile.ping = static_cast<std::uint32_t>(ping.request.number) - 1;  // from 0
+  profile.start_mm = s.parameters.start_mm;
+  profile.length_mm = s.parameters.length_mm;
+  profile.power_up_ms = static_cast<std::uint32_t>(
+      std::chrono::duration_cast<std::chrono::milliseconds>(ping.request.fired_at - device.powered_up_at).count());
+  profile.hz = static_cast<std::uint32_t>(device.model->modes.front().centre_hz);
+  profile.gain = static_cast<std::uint16_t>(std::max<int>(s.parameters.gain, 0));
+  profile.results = static_cast<std::uint16_t>(made.range_bin_count);
+  profile.speed_dmps = static_cast<std::uint16_t>(std::lround(10 * s.speed_mps));
+  profile.pulse_s = 2 * made.pulse_width_m / s.speed_mps;
+  profile.analog_gain = made.gain_db;
+  profile.highest_db = made.format.ceiling_db;
+  profile.lowest_db = made.format.floor_db;
+  profile.transducer_heading_deg = static_cast<float>(heading_deg(ping.request.sonar_in_world));
+  Bytes payload = wire::bytes_of(profile);
+  payload.insert(payload.end(), ping.samples.begin(), ping.samples.end());
+  return framed(Id::os_mono_profile, s.id, payload);
+}
+
+}  // namespace sonar::ping::omniscan

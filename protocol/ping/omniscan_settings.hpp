@@ -1,0 +1,37 @@
+// The laws of an Omniscan 450: its settings, and the frame of a ping. Pure functions; sources: docs/protocols/ping.md.
+#pragma once
+
+#include <vector>
+
+#include "protocol/ping/omniscan_messages.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::ping::omniscan {
+
+std::span<const std::shared_ptr<const SonarModel>> models();
+
+/// What a host has set.
+struct Settings {
+  std::uint8_t id = 0;  // of the device; unknown: its number
+  OsPingParams parameters;
+  float speed_mps = 1500;
+  bool operator==(const Settings&) const = default;
+};
+struct HeldSettings final : VendorSettings {
+  explicit HeldSettings(const Settings& s) : settings(s) {}
+  bool equals(const VendorSettings& other) const override;
+  Settings settings;
+};
+/// As the device comes, for null.
+Settings settings_from(const VendorSettings* held);
+
+/// Why the device refuses it; empty = it does not.
+std::string complaint(const OsPingParams& parameters);
+PingSettings ping_settings(const Settings& settings);
+protocol::ChangeSettings change_to(const Settings& settings);
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+/// 2198.
+Bytes profile_of(const Ping& ping, const protocol::DeviceState& device);
+
+}  // namespace sonar::ping::omniscan

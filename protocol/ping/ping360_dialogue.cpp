@@ -1,0 +1,154 @@
+#include "protocol/ping/ping360_dialogue.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "protocol/ping/conversation.hpp"
+#include "protocol/ping/ping360_settings.hpp"
+
+namespace sonar::ping::ping360 {
+namespace {
+
+using protocol::Reaction;
+
+constexpr auto longest_wait = std::chrono::seconds(2);  // for a ping that could not be made
+
+DeviceInformation identity(const protocol::OptionValues& options) {
+  DeviceInformation info;
+  info.type = static_cast<std::uint8_t>(number_option(options, sonar::ping::option_name::device_type));
+  int major = 0, minor = 0, patch = 0;
+  std::sscanf(std::string(text_option(options, option_name::firmware)).c_str(), "%d.%d.%d", &major, &minor, &patch);
+  info.major = static_cast<std::uint8_t>(major);
+  info.minor = static_cast<std::uint8_t>(minor);
+  info.patch = static_cast<std::uint8_t>(patch);
+  return info;
+}
+
+class Ping360Dialogue final : public Conversation {
+ public:
+  Ping360Dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
+      : Conversation(device, port, identity(device.options), Settings{}.id), head_{0, 0, now} {}
+
+  Reaction on_tick(Time now, bool) override {
+    Reaction reaction;
+    if (now < next_tick()) return reaction;
+    if (fired_) return advance(now), reaction;  // no ping came of it
+    Settings s = settings();
+    s.id = id_;
+    s.ping.angle = head_.target();
+    if (task_ == Task::turn) {
+      reaction.replies.push_back(state_message(now));
+      task_ = Task::none;
+      return reaction;
+    }
+    fired_ = std::make_shared<HeldSettings>(s);
+    fired_at_ = now;
+    reaction.events.emplace_back(
+        protocol::RequestPing{.joins = false, .head_rad = ping360::head_rad(s.ping.angle, device_.options), .with = fired_});
+    return reaction;
+  }
+  Time next_tick() const override {
+    if (task_ == Task::none) return Time::max();
+    return fired_ ? fired_at_ + longest_wait : due_;
+  }
+  std::optional<Time> next_ping_request() const override {
+    return task_ != Task::none && !fired_ ? std::optional(due_) : std::nullopt;  // stepped time comes to a mere turn too
+  }
+  protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
+    if (!fired_ || made_with != fired_.get()) return {};  // of a request that another has replaced
+    advance(now);
+    return {{Bytes{}}, {}};
+  }
+
+ protected:
+  bool on_request(const Frame& frame, Time now, Reaction& reaction) override {
+    switch (frame.header.id) {
+      case Id::transducer: {
+        Transducer t;
+        if (read(frame, t, reaction)) begin(frame, t, now, reaction);
+        return true;
+      }
+      case Id::auto_transmit: {
+        AutoTransmit t;
+        if (read(frame, t, reaction)) begin(frame, t, now, reaction);
+        return true;
+      }
+      case Id::motor_off:
+        stop(now);
+        reaction.replies.push_back(ack(frame.header.id, id_));
+        return true;
+      case Id::reset:
+        stop(now);
+        reaction.events.emplace_back(change_to(Settings{}, device_));
+        reaction.replies.push_back(ack(frame.header.id, id_));
+        return true;
+      case Id::ping360_set_device_id:
+        set_id(frame, reaction);
+        return true;
+      default:
+        return false;
+    }
+  }
+
+  Bytes message_now(Id wanted, Time now) override { return wanted == Id::device_data ? state_message(now) : Bytes{}; }
+
+ private:
+  enum class Task { none, turn, ping, scan };
+
+  Settings settings() const { return settings_from(device_.settings.get()); }
+
+  /// 2300 without samples.
+  Bytes state_message(Time now) const {
+    const Transducer t = settings().ping;
+    return framed_message(Id::device_data, id_,
+                          DeviceData{t.mode, t.gain, head_.angle_at(now), t.transmit_us, t.period, t.khz, t.samples, 0});
+  }
+
+  template <class Request>
+  void begin(const Frame& frame, const Request& request, Time now, Reaction& reaction) {
+    if (const std::string why = complaint(request); !why.empty()) return refuse(frame, why, reaction);
+    const Settings s = settings_of(request);
+    stop(now);
+    task_ = s.scans ? Task::scan : s.ping.transmit != 0 ? Task::ping : Task::turn;
+    back_ = false;
+    head_.turn_to(s.ping.angle, now);
+    due_ = head_.arrives();
+    reaction.events.emplace_back(change_to(s, device_));
+  }
+
+  void stop(Time now) {
+    task_ = Task::none;
+    fired_.reset();
+    head_ = {head_.angle_at(now), head_.angle_at(now), now};
+  }
+
+  /// After a ping: a scan goes on when its samples were taken and sent, and the head has turned.
+  void advance(Time now) {
+    fired_.reset();
+    if (task_ != Task::scan) {
+      task_ = Task::none;
+      return;
+    }
+    const Settings s = settings();
+    const auto after = listening(s.ping) + transfer(s.ping, device_.options) + std::chrono::milliseconds(s.delay_ms);
+    const Time turns_at = fired_at_ + after;
+    const bool oscillates = text_option(device_.options, option_name::sector_scan) != "wrap";
+    head_.turn_to(next_angle(head_.target(), s, back_, oscillates), turns_at);
+    due_ = std::max(head_.arrives(), now);
+  }
+
+  Head head_;
+  Task task_ = Task::none;
+  bool back_ = false;  // of a scan that oscillates
+  Time due_{};
+  std::shared_ptr<const HeldSettings> fired_;  // the ping that is being made
+  Time fired_at_{};
+};
+
+}  // namespace
+
+std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now) {
+  return std::make_unique<Ping360Dialogue>(device, port, now);
+}
+
+}  // namespace sonar::ping::ping360

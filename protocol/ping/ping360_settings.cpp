@@ -1,0 +1,216 @@
+#include "protocol/ping/ping360_settings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "core/base/geometry.hpp"
+#include "protocol/ping/conversation.hpp"
+
+namespace sonar::ping::ping360 {
+namespace {
+
+constexpr double sample_unit_s = 25e-9;
+constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn in 2.4 s
+constexpr double db_per_gain = 6;                              // unknown: chosen
+constexpr double fastest_hz = 1000;                            // hosts set the rhythm
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
+
+std::string out_of_range(std::initializer_list<std::tuple<const char*, int, int, int>> values) {
+  for (const auto& [name, value, low, high] : values)
+    if (value < low || value > high) {
+      char text[80];
+      std::snprintf(text, sizeof text, "%s %d is not in %d..%d", name, value, low, high);
+      return text;
+    }
+  return {};
+}
+
+SonarModel make_model() {
+  FrequencyMode mode;
+  mode.name = "750 kHz";
+  mode.centre_hz = 750e3f;
+  mode.min_range_m = 0.15f;
+  mode.max_range_m = 50;
+  mode.source_level_db = 200;  // unknown: level and gains; chosen so that a wall near by is bright at gain 0
+  mode.beam_spacing = BeamSpacing::listed;
+  mode.beam_azimuths_rad = {0};
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(2));     // recalled from the data sheet
+  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(25));  // likewise
+  mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;
+  mode.receiver.tvg_slope_db = 20;
+  mode.receiver.tvg_ceiling_db = 60;
+  mode.receiver.full_scale_upa = 1e6f;
+  SonarModel model;
+  model.profile = "ping360";
+  model.name = "Ping360";
+  model.max_rate_hz = 100;
+  model.modes = {mode};
+  return model;
+}
+
+}  // namespace
+
+std::span<const protocol::Option> options() {
+  static const std::array<protocol::Option, 6> all{{
+      {option_name::firmware, {"3.3.8", "3.1.1"}, "3.3.8", "version it states: hosts request single pings of 3.3.0 and older"},
+      type_option("2", "number of the product in its device information"),
+      {option_name::mount_grad, {}, "0", "angle, in grads to starboard, at which its own angle 0 lies on the mount", 0, 399},
+      {option_name::sector_scan,
+       {"oscillate", "wrap"},
+       "oscillate",
+       "a scan of a sector that holds angle 0 turns around at its ends, or goes back to its start"},
+      {option_name::link_rate, {}, "unlimited", "bits a second of its link, which limits how fast it scans", 9600, 1e9},
+      silence_option(),
+  }};
+  return all;
+}
+
+std::span<const std::shared_ptr<const SonarModel>> models() {
+  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
+  return all;
+}
+
+bool HeldSettings::equals(const VendorSettings& other) const {
+  const auto* of = dynamic_cast<const HeldSettings*>(&other);
+  if (of == nullptr) return false;
+  Transducer theirs = of->settings.ping;
+  theirs.angle = settings.ping.angle;
+  const auto scan = [](const Settings& s) { return std::tuple(s.scans, s.start, s.stop, s.steps, s.delay_ms); };
+  return settings.ping == theirs && scan(settings) == scan(of->settings);
+}
+
+Settings settings_from(const VendorSettings* held) {
+  const auto* of = dynamic_cast<const HeldSettings*>(held);
+  return of != nullptr ? of->settings : Settings{};
+}
+
+std::string complaint(const Transducer& t) {
+  return out_of_range({{"mode", t.mode, 0, 1},
+                       {"gain_setting", t.gain, 0, 2},
+                       {"angle", t.angle, 0, grads},  // hosts send 400 for 0
+
+                       {"transmit_duration", t.transmit_us, 1, 1000},
+                       {"sample_period", t.period, 80, 40000},
+                       {"transmit_frequency", t.khz, 500, 1000},
+                       {"number_of_samples", t.samples, 200, 1200}});
+}
+
+std::string complaint(const AutoTransmit& t) {
+  if (std::string why = complaint(settings_of(t).ping); !why.empty()) return why;
+  return out_of_range({{"start_angle", t.start, 0, grads - 1},
+                       {"stop_angle", t.stop, 0, grads - 1},
+                       {"num_steps", t.steps, 1, 10},
+                       {"delay", t.delay_ms, 0, 100}});
+}
+
+Settings settings_of(const Transducer& t) {
+  Settings s{.ping = t};
+  s.ping.angle %= grads;
+  return s;
+}
+
+Settings settings_of(const AutoTransmit& t) {
+  const Transducer ping{t.mode, t.gain, t.start, t.transmit_us, t.period, t.khz, t.samples, 1, 0};
+  return {.ping = ping, .scans = true, .start = t.start, .stop = t.stop, .steps = t.steps, .delay_ms = t.delay_ms};
+}
+
+PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
+  const Transducer& t = settings.ping;
+  // The device counts time and knows no sound speed: rows are samples in time, placed with the true one.
+  const double speed = true_sound_speed_mps(device.water, device.depth_m);
+  PingSettings s;
+  s.beam_count = 1;
+  s.range_bin_count = t.samples;
+  s.range_bin_m = t.period * sample_unit_s * speed / 2;
+  s.range_m = s.range_bin_count * s.range_bin_m;
+  s.row_centre = 1;  // sample i is taken i + 1 periods after the pulse
+  s.pulse_width_m = static_cast<float>(std::max(t.transmit_us * 1e-6 * speed / 2, s.range_bin_m / 2));
+  s.rate_hz = fastest_hz;
+  s.triggered = true;
+  s.gain_db = static_cast<float>(db_per_gain * t.gain);
+  s.device_sound_speed_mps = static_cast<float>(speed);
+  // unknown: the law. Chosen: linear in dB over 60 dB.
+  s.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = 0, .ceiling_db = 60};
+  return s;
+}
+
+protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device) {
+  const PingSettings s = ping_settings(settings, device);
+  const Transducer& t = settings.ping;
+  char scan[80] = "single pings", text[200];
+  if (settings.scans)
+    std::snprintf(scan, sizeof scan, "scan from %d to %d by %d grad", settings.start, settings.stop, settings.steps);
+  std::snprintf(text, sizeof text, "%s, range %.2f m, %d samples of %d x 25 ns, pulse %d us, gain %d", scan, s.range_m, t.samples,
+                t.period, t.transmit_us, t.gain);
+  return {s, std::make_shared<HeldSettings>(settings), text};
+}
+
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
+  Settings s = settings_from(device.settings.get());
+  if (wanted.range_m) {
+    const double speed = true_sound_speed_mps(device.water, device.depth_m);
+    const double period = 2 * *wanted.range_m / speed / sample_unit_s / s.ping.samples;
+    if (!(period >= 80 && period <= 40000))
+      return refused("a Ping360 samples every 2 to 1000 us: that range does not fit its samples");
+    s.ping.period = static_cast<std::uint16_t>(std::lround(period));
+  }
+  if (wanted.rate_hz) return refused("a Ping360 pings as its host asks, and as fast as its head turns");
+  if (wanted.gain_percent) {
+    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
+    s.ping.gain = static_cast<std::uint8_t>(std::lround(*wanted.gain_percent / 50));
+  }
+  if (wanted.mode && *wanted.mode != 0) return refused("a Ping360 has one mode, 0");
+  if (wanted.beams && *wanted.beams != 1) return refused("a Ping360 has one beam");
+  if (wanted.sample_bits && *wanted.sample_bits != 8) return refused("a Ping360 sends samples of 8 bits");
+  if (wanted.row_gains && *wanted.row_gains) return refused("a Ping360 sends no row gains");
+  return change_to(s, device);
+}
+
+double head_rad(std::uint16_t angle, const protocol::OptionValues& options) {
+  return -(angle + number_option(options, option_name::mount_grad)) * 2 * pi / grads;  // unknown: to starboard, chosen
+}
+
+std::chrono::nanoseconds listening(const Transducer& t) { return nanoseconds_from(t.samples * t.period * sample_unit_s); }
+
+std::chrono::nanoseconds transfer(const Transducer& t, const protocol::OptionValues& options) {
+  constexpr double bits_of_byte = 10;  // with start and stop
+  const double rate = number_option(options, option_name::link_rate);
+  const double bytes = static_cast<double>(header_size + wire::wire_size<AutoDeviceData>() + t.samples + sum_size);
+  return rate > 0 ? nanoseconds_from(bits_of_byte * bytes / rate) : std::chrono::nanoseconds(0);
+}
+
+Time Head::arrives() const { return since + std::abs(to - from) * turn_of_a_grad; }
+
+std::uint16_t Head::angle_at(Time at) const {
+  const int way = std::abs(to - from);
+  const auto gone = static_cast<int>(std::clamp<std::int64_t>((at - since) / turn_of_a_grad, 0, way));
+  return static_cast<std::uint16_t>(((to > from ? from + gone : from - gone) % grads + grads) % grads);
+}
+
+void Head::turn_to(std::uint16_t angle, Time at) {
+  from = angle_at(at);
+  const int ahead = ((angle - from) % grads + grads) % grads;
+  to = from + (ahead <= grads / 2 ? ahead : ahead - grads);
+  since = at;
+}
+
+std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, bool oscillates) {
+  if (scan.start <= scan.stop) {
+    const int next = angle + scan.steps;
+    return next > scan.stop ? scan.start : static_cast<std::uint16_t>(next);
+  }
+  const int width = scan.stop - scan.start + grads;
+  const int at = ((angle - scan.start) % grads + grads) % grads;
+  int next = back ? at - scan.steps : at + scan.steps;
+  if (next > width || next < 0) {
+    if (oscillates) back = !back;
+    next = !oscillates ? 0 : back ? at - scan.steps : at + scan.steps;
+    if (next < 0 || next > width) next = 0;  // steps wider than the sector
+  }
+  return static_cast<std::uint16_t>((scan.start + next) % grads);
+}
+
+}  // namespace sonar::ping::ping360

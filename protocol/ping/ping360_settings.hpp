@@ -1,0 +1,70 @@
+// The laws of a Ping360: which settings are valid, what they mean for a ping, and where the head goes. Pure functions; sources:
+// docs/protocols/ping.md.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "protocol/ping/messages.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::ping::ping360 {
+
+inline constexpr int grads = 400;  // of a turn
+
+namespace option_name {
+inline constexpr std::string_view firmware = "firmware", mount_grad = "mount_grad", sector_scan = "sector_scan",
+                                  link_rate = "link_rate";
+}
+std::span<const protocol::Option> options();
+std::span<const std::shared_ptr<const SonarModel>> models();
+
+/// What a host has set: pings echo it. `ping.angle` is where the head looks.
+struct Settings {
+  std::uint8_t id = 2;  // of the device
+  Transducer ping;
+  bool scans = false;  // of 2602, whose other fields follow
+  std::uint16_t start = 0, stop = 399;
+  std::uint8_t steps = 1, delay_ms = 0;
+};
+struct HeldSettings final : VendorSettings {
+  explicit HeldSettings(const Settings& s) : settings(s) {}
+  /// But for the angle, which changes with every ping.
+  bool equals(const VendorSettings& other) const override;
+  Settings settings;
+};
+/// As the device comes, for null.
+Settings settings_from(const VendorSettings* held);
+
+/// Why the device refuses it; empty = it does not.
+std::string complaint(const Transducer& t);
+std::string complaint(const AutoTransmit& t);
+Settings settings_of(const Transducer& t);
+Settings settings_of(const AutoTransmit& t);
+
+PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
+protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+/// How far the sonar is turned to port for the head to look at that angle, which grows to starboard.
+double head_rad(std::uint16_t angle, const protocol::OptionValues& options);
+/// Time the samples of a ping take.
+std::chrono::nanoseconds listening(const Transducer& t);
+/// Time the answer of a ping takes on its link.
+std::chrono::nanoseconds transfer(const Transducer& t, const protocol::OptionValues& options);
+
+/// Where the head is: it turns by the shorter way, a grad in 6 ms.
+struct Head {
+  int from = 0, to = 0;  // grad; `to` may lie beyond a turn
+  Time since{};
+  Time arrives() const;
+  std::uint16_t target() const { return static_cast<std::uint16_t>((to % grads + grads) % grads); }
+  std::uint16_t angle_at(Time at) const;
+  /// From where it is then.
+  void turn_to(std::uint16_t angle, Time at);
+};
+
+/// The angle after `angle` in a scan. `back`: the way across a sector that holds angle 0, which option sector_scan decides.
+std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, bool oscillates);
+
+}  // namespace sonar::ping::ping360

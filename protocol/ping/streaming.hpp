@@ -1,0 +1,80 @@
+// What a Surveyor and an Omniscan have in common: a host sets everything in one request and enables pings, which come by TCP or
+// UDP until it disables them.
+#pragma once
+
+#include <array>
+
+#include "protocol/ping/conversation.hpp"
+
+namespace sonar::ping {
+
+constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number) {
+  return {{{.kind = protocol::Port::Kind::tcp_stream, .number = number},
+           {.kind = protocol::Port::Kind::udp_dialogue, .number = number}}};
+}
+
+/// `Settings` of a product have `id` and `parameters.enable`; its change_to() makes settings of pings of them.
+template <class Settings, Settings (*settings_from)(const VendorSettings*)>
+class StreamingConversation : public Conversation {
+ public:
+  StreamingConversation(const protocol::DeviceState& device, const protocol::Port& port)
+      : Conversation(device, port,
+                     {.type = static_cast<std::uint8_t>(number_option(device.options, option_name::device_type)), .major = 1},
+                     settings_from(device.settings.get()).id) {}
+
+  protocol::Reaction on_tick(Time, bool) override { return {}; }
+  Time next_tick() const override { return Time::max(); }
+  std::optional<std::chrono::milliseconds> longest_silence() const override {
+    if (by_datagrams_ && settings().parameters.enable == 0) return std::chrono::seconds(10);  // chosen
+    return Conversation::longest_silence();
+  }
+
+ protected:
+  void on_new_id(protocol::Reaction& reaction) override {
+    change(reaction, [](Settings&) {});
+  }
+  Settings settings() const { return settings_from(device_.settings.get()); }
+  template <class Change>
+  void change(protocol::Reaction& reaction, Change apply) {
+    Settings s = settings();
+    for (const protocol::Event& event : reaction.events)  // of the same call: not in force yet
+      if (const auto* earlier = std::get_if<protocol::ChangeSettings>(&event)) s = settings_from(earlier->vendor_settings.get());
+    apply(s);
+    s.id = id_;
+    reaction.events.emplace_back(change_to(s));
+  }
+};
+
+class StreamingVendor : public protocol::Vendor {
+ public:
+  int default_max_clients() const override { return 1; }
+  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
+                                                  const protocol::OptionValues&) const override {
+    return model;
+  }
+  bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
+  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
+  bool is_request(const protocol::Port&, protocol::BytesView datagram) const override { return holds_frame(datagram); }
+  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
+    protocol::Bytes all;
+    for (const Bytes& one : frames_of(ping, device)) all.insert(all.end(), one.begin(), one.end());
+    return std::make_shared<const protocol::Bytes>(std::move(all));
+  }
+  std::vector<protocol::Bytes> datagrams(const protocol::Port&, const Ping& ping,
+                                         const protocol::DeviceState& device) const override {
+    return frames_of(ping, device);
+  }
+
+ protected:
+  /// Of a ping, in the order they are sent.
+  virtual std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) const = 0;
+};
+
+/// Options of such products.
+inline std::span<const protocol::Option> streaming_options() {
+  static const std::array<protocol::Option, 2> all{
+      {type_option("0", "number of the product in its device information"), silence_option()}};
+  return all;
+}
+
+}  // namespace sonar::ping

@@ -1,0 +1,201 @@
+#include "protocol/ping/surveyor_settings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "core/base/geometry.hpp"
+#include "core/sonar/detections.hpp"
+#include "protocol/ping/conversation.hpp"
+
+namespace sonar::ping::surveyor {
+namespace {
+
+constexpr int beams = 64, directions = 16;  // directions: as many as receive elements
+constexpr double swath_deg = 80;            // recalled, like the width along the track and the number of elements
+constexpr double above_db = 15;             // unknown: chosen
+constexpr double usual_end_m = 20;          // chosen: of end 0, which the device sets by the bottom itself
+constexpr double db_per_gain = 0.4;         // unknown: chosen
+constexpr auto processing = std::chrono::milliseconds(10);
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
+
+SonarModel make_model() {
+  FrequencyMode mode;
+  mode.name = "240 kHz";
+  mode.centre_hz = 240e3f;
+  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(swath_deg));
+  mode.min_range_m = 0.25f;
+  mode.max_range_m = 100;
+  mode.source_level_db = 200;
+  mode.beam_spacing = BeamSpacing::uniform_in_angle;
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(7));  // 16 elements half a wavelength apart
+  mode.pattern.azimuth_taper = Taper::hamming;
+  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(4));
+  mode.receiver.tvg_slope_db = 20;
+  mode.receiver.full_scale_upa = 1e5f;
+  SonarModel model;
+  model.profile = "surveyor-240";
+  model.name = "Surveyor 240-16";
+  model.max_rate_hz = 50;
+  model.modes = {mode};
+  return model;
+}
+
+double end_m(const PingParameters& p) { return p.end_mm > 0 ? 1e-3 * p.end_mm : usual_end_m; }
+
+std::uint64_t milliseconds_of(std::chrono::nanoseconds t) {
+  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::milliseconds>(t).count());
+}
+
+/// The world's up in axes of the device: ahead, to port, up. Its fan looks down, so that up is behind the sonar's own axis.
+std::array<float, 3> up_of(const Pose& sonar_in_world) {
+  const Vec3d up = rotate(conjugate(sonar_in_world.orientation), Vec3d{0, 0, 1});
+  return {static_cast<float>(up.z), static_cast<float>(up.y), static_cast<float>(-up.x)};
+}
+
+template <class M>
+Bytes payload_of(const M& message, const std::vector<Bytes>& points) {
+  Bytes payload = wire::bytes_of(message);
+  for (const Bytes& point : points) payload.insert(payload.end(), point.begin(), point.end());
+  return payload;
+}
+
+}  // namespace
+
+std::span<const std::shared_ptr<const SonarModel>> models() {
+  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
+  return all;
+}
+
+bool HeldSettings::equals(const VendorSettings& other) const {
+  const auto* of = dynamic_cast<const HeldSettings*>(&other);
+  if (of == nullptr || of->settings.id != settings.id || of->settings.parameters != settings.parameters) return false;
+  const auto &a = settings.utc_ahead, &b = of->settings.utc_ahead;
+  return a.has_value() == b.has_value() && (!a || std::chrono::abs(*a - *b) < std::chrono::milliseconds(1));
+}
+
+Settings settings_from(const VendorSettings* held) {
+  const auto* of = dynamic_cast<const HeldSettings*>(held);
+  return of != nullptr ? of->settings : Settings{};
+}
+
+std::string complaint(const PingParameters& p) {
+  if (p.start_mm < 0 || p.end_mm < 0 || end_m(p) > 200) return "start_mm and end_mm are from 0 to 200000";
+  if (p.start_mm >= 1000 * end_m(p)) return "start_mm is not before end_mm";
+  if (!(p.speed_mps >= 1000 && p.speed_mps <= 2000)) return "sos_mps is not in 1000..2000";
+  if (p.gain < -1 || p.gain > 100) return "gain_index is not in -1..100";
+  if (p.period_ms < 0) return "msec_per_ping is negative";
+  if (p.steps < 200 || p.steps > 800) return "n_range_steps is not in 200..800";
+  if (!(p.pulse_steps > 0 && p.pulse_steps <= 20)) return "pulse_len_steps is not in 0..20";
+  return {};
+}
+
+PingSettings ping_settings(const Settings& settings) {
+  const PingParameters& p = settings.parameters;
+  const double speed = static_cast<double>(p.speed_mps);
+  PingSettings s;
+  s.beam_count = beams;
+  s.range_m = end_m(p);
+  s.range_start_m = std::max(1e-3 * p.start_mm, 0.05 * s.range_m);  // DEF: at least 5 % of the end
+  s.range_bin_count = p.steps;
+  s.range_bin_m = (s.range_m - s.range_start_m) / p.steps;
+  s.pulse_width_m = static_cast<float>(std::max(static_cast<double>(p.pulse_steps), 0.5) * s.range_bin_m);
+  const double shortest_s = 2 * s.range_m / speed + seconds(processing);
+  s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
+  s.gain_db = static_cast<float>(p.gain < 0 ? 0 : db_per_gain * p.gain);
+  s.tvg = false;  // detection wants noise that is the same at all ranges
+  s.device_sound_speed_mps = p.speed_mps;
+  s.format = {.bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -80, .ceiling_db = 80};
+  return s;
+}
+
+protocol::ChangeSettings change_to(const Settings& settings) {
+  const PingSettings s = ping_settings(settings);
+  char text[160];
+  std::snprintf(text, sizeof text, "%s, %.2f to %.2f m, %d steps, %.4g Hz, sound speed %g m/s",
+                s.rate_hz > 0 ? "pings" : "standby", s.range_start_m, s.range_m, s.range_bin_count,
+                static_cast<double>(s.rate_hz), static_cast<double>(s.device_sound_speed_mps));
+  return {s, std::make_shared<HeldSettings>(settings), text};
+}
+
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
+  Settings s = settings_from(device.settings.get());
+  PingParameters& p = s.parameters;
+  if (wanted.range_m) p.end_mm = static_cast<std::int32_t>(std::lround(1000 * std::clamp(*wanted.range_m, 0.0, 1e6)));
+  if (wanted.rate_hz) {
+    p.enable = *wanted.rate_hz > 0 ? 1 : 0;
+    if (p.enable != 0) p.period_ms = static_cast<std::int16_t>(std::lround(std::clamp(1000 / *wanted.rate_hz, 1.0, 30000.0)));
+  }
+  if (wanted.gain_percent) {
+    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
+    p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent));
+  }
+  if (wanted.mode && *wanted.mode != 0) return refused("a Surveyor has one mode, 0");
+  if (wanted.beams && *wanted.beams != beams) return refused("a Surveyor has as many beams as it has");
+  if (wanted.sample_bits || (wanted.row_gains && *wanted.row_gains)) return refused("a Surveyor sends points, no samples");
+  if (const std::string why = complaint(p); !why.empty()) return refused("Surveyor: " + why);
+  return change_to(s);
+}
+
+WaterStats water_stats(const protocol::DeviceState& device) {
+  return {static_cast<float>(device.water.temperature_c),
+          static_cast<float>(absolute_pressure_bar(device.water, device.depth_m))};
+}
+
+std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) {
+  const Settings s = settings_from(ping.request.vendor_settings.get());
+  const PingParameters& p = s.parameters;
+  const PingSettings& made = ping.request.settings;
+  const Time at = ping.request.fired_at;
+  const double speed = static_cast<double>(p.speed_mps);
+  const auto power_up_ms = static_cast<std::uint32_t>(milliseconds_of(at - device.powered_up_at));
+  const std::uint64_t utc_ms = s.utc_ahead ? milliseconds_of((at + *s.utc_ahead).time_since_epoch()) : 0;
+  const auto number = static_cast<std::uint32_t>(ping.request.number);
+  const std::array<float, 3> up = up_of(ping.request.sonar_in_world);
+  const WaterStats water = water_stats(device);
+
+  std::vector<Bytes> atof, yz;
+  for (const Detection& found : detect_points(ping, directions, above_db)) {
+    atof.push_back(
+        wire::bytes_of(AtofPoint{static_cast<float>(found.azimuth_rad), static_cast<float>(2 * found.range_m / speed), {}}));
+    Bytes& pair = yz.emplace_back();
+    wire::Writer write(pair);
+    const auto y = static_cast<float>(found.range_m * std::sin(found.azimuth_rad));
+    const auto z = static_cast<float>(-found.range_m * std::cos(found.azimuth_rad));
+    write("y", y);
+    write("z", z);
+  }
+  std::vector<Bytes> frames{framed_message(Id::attitude_report, s.id, AttitudeReport{up, {}, utc_ms, power_up_ms})};
+  if (p.atof != 0) {
+    AtofPointData data;
+    data.power_up_ms = power_up_ms;
+    data.utc_ms = utc_ms;
+    data.listening_s = static_cast<float>(2 * (made.range_m - made.range_start_m) / speed);
+    data.speed_mps = p.speed_mps;
+    data.ping = number;
+    data.hz = static_cast<std::uint32_t>(p.hz);
+    data.pulse_s = static_cast<float>(2 * static_cast<double>(made.pulse_width_m) / speed);
+    data.points = static_cast<std::uint16_t>(atof.size());
+    frames.push_back(framed(Id::atof_point_data, s.id, payload_of(data, atof)));
+  }
+  if (p.yz != 0) {
+    YzPointData data;
+    data.power_up_ms = power_up_ms;
+    data.ping = number;
+    data.speed_mps = p.speed_mps;
+    data.up = up;
+    data.temperature_c = water.temperature_c;
+    data.pressure_bar = water.pressure_bar;
+    data.start_m = static_cast<float>(made.range_start_m);
+    data.end_m = static_cast<float>(made.range_m);
+    data.points = static_cast<std::uint16_t>(yz.size());
+    frames.push_back(framed(Id::yz_point_data, s.id, payload_of(data, yz)));
+  }
+  const auto period_ms = static_cast<std::uint32_t>(std::lround(1000 / std::max(static_cast<double>(made.rate_hz), 1e-3)));
+  if (power_up_ms % 1000 < period_ms) frames.push_back(framed_message(Id::water_stats, s.id, water));
+  return frames;
+}
+
+}  // namespace sonar::ping::surveyor

@@ -1,0 +1,39 @@
+// The laws of a Surveyor 240: its settings, and the frames of a ping. Pure functions; sources: docs/protocols/ping.md.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "protocol/ping/messages.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::ping::surveyor {
+
+std::span<const std::shared_ptr<const SonarModel>> models();
+
+/// What a host has set.
+struct Settings {
+  std::uint8_t id = 0;  // of the device; unknown: its number
+  PingParameters parameters;
+  std::optional<std::chrono::nanoseconds> utc_ahead;  // of the device's clock, once a host told the time
+};
+struct HeldSettings final : VendorSettings {
+  explicit HeldSettings(const Settings& s) : settings(s) {}
+  /// Clocks that differ by less than a millisecond are the same.
+  bool equals(const VendorSettings& other) const override;
+  Settings settings;
+};
+/// As the device comes, for null.
+Settings settings_from(const VendorSettings* held);
+
+/// Why the device refuses it; empty = it does not.
+std::string complaint(const PingParameters& parameters);
+PingSettings ping_settings(const Settings& settings);
+protocol::ChangeSettings change_to(const Settings& settings);
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+WaterStats water_stats(const protocol::DeviceState& device);
+/// In the order they are sent: 504, then as the settings want 3012 and 3011, and once a second 118.
+std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device);
+
+}  // namespace sonar::ping::surveyor

@@ -1,0 +1,352 @@
+"""An emulated Ping360, Surveyor and Omniscan as hosts of the ping protocol meet them; and under tshark."""
+import math
+import pathlib
+import re
+import socket
+import struct
+import subprocess
+import tempfile
+import time
+import unittest
+
+import tshark as shark
+from pcap_writer import Capture
+from running_sonard import ROOT, SONARCTL, SONARD, Sonard, run
+
+DISSECTOR = ROOT / "clients/wireshark/ping.lua"
+PING360, DISCOVERY, SURVEYOR, OMNISCAN = 12345, 30303, 62312, 51200
+B, C = (3.9, 10), (6.9, -8)  # range m, bearing deg clockwise: points of scenes/l-targets.yaml
+SIDE = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -30, 90]}"
+DOWN = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}"
+
+
+def frame(number, payload=b""):
+    body = b"BR" + struct.pack("<HHBB", len(payload), number, 0, 0) + payload
+    return body + struct.pack("<H", sum(body) & 0xFFFF)
+
+
+def read(data):
+    """(id, payload) of each frame."""
+    frames = []
+    while data:
+        size, number = struct.unpack("<HH", data[2:6])
+        assert data[:2] == b"BR" and sum(data[:8 + size]) & 0xFFFF == struct.unpack("<H", data[8 + size:10 + size])[0], data
+        frames.append((number, data[8:8 + size]))
+        data = data[10 + size:]
+    return frames
+
+
+class Host:
+    def __init__(self, address, port):
+        self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.udp.connect((address, port))
+        self.datagrams = []
+
+    def __del__(self):
+        self.udp.close()
+
+    def send(self, data):
+        self.udp.send(data)
+
+    def next(self, wanted, patience_s=5):
+        """Payload and seconds until it came."""
+        start = time.monotonic()
+        self.udp.settimeout(patience_s)
+        while True:
+            datagram = self.udp.recv(4096)
+            self.datagrams.append(datagram)
+            frames = read(datagram)
+            assert len(frames) == 1, "one frame a datagram"
+            if frames[0][0] == wanted:
+                return frames[0][1], time.monotonic() - start
+
+    def ask(self, data, wanted):
+        self.send(data)
+        return self.next(wanted)
+
+
+def transducer(angle, samples=1200, transmit=1):
+    return frame(2601, struct.pack("<BBHHHHHBB", 1, 0, angle, 10, 88, 750, samples, transmit, 0))
+
+
+def scan(start, stop, period=80, samples=200):
+    return frame(2602, struct.pack("<BBHHHHHHBB", 1, 0, 80, period, 750, samples, start, stop, 1, 0))
+
+
+def general(wanted):
+    return frame(6, struct.pack("<H", wanted))
+
+
+def settings(enable):
+    return frame(3023, struct.pack("<iifhhHBBBBBBiHHf", 0, 10000, 1500, -1, 100, 0, 0, enable, 0, 0, 1, 1, 240000, 400, 0, 1.5))
+
+
+class Ping360Link(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Sonard(scene="l-targets.yaml", profile="ping360", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}").__enter__()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.daemon.__exit__()
+
+    def test_discovery_is_one_datagram_to_who_asks(self):
+        host = Host(self.daemon.address, DISCOVERY)
+        host.udp.settimeout(2)
+        for _ in range(100):
+            host.udp.send(b"Discovery")
+            parts = host.udp.recv(4096).decode().split("\r\n")
+            self.assertEqual(len(parts), 5)
+        self.assertTrue(parts[0].startswith("PING360"))
+        self.assertEqual([int(n) for n in parts[3].split(":- ")[1].split(".")], [int(n) for n in self.daemon.address.split(".")])
+        host.udp.send(b"discover")
+        host.udp.settimeout(0.2)
+        self.assertRaises(socket.timeout, host.udp.recv, 4096)
+
+    def test_the_head_takes_time_to_turn(self):
+        host = Host(self.daemon.address, PING360)
+        host.udp.send(b"\x00\xff")  # a host sends this first
+        host.ask(transducer(0), 2300)
+        data, took_s = host.ask(transducer(200), 2300)
+        self.assertAlmostEqual(took_s, 1.2, delta=0.4)
+        self.assertEqual(struct.unpack("<BBHHHHHH", data[:14]), (1, 0, 200, 10, 88, 750, 1200, 1200))
+        self.assertEqual(len(data), 14 + 1200)
+        still, _ = host.ask(transducer(200, transmit=0), 2300)
+        self.assertEqual(struct.unpack("<H", still[12:14])[0], 0)
+
+    def test_a_scan_has_every_angle_in_order_and_ends_with_the_motor(self):
+        host = Host(self.daemon.address, PING360)
+        host.send(scan(0, 399))
+        angles = [struct.unpack("<H", host.next(2301)[0][2:4])[0] for _ in range(60)]
+        self.assertEqual(angles, list(range(60)))
+        acked, took_s = host.ask(frame(2903), 1)
+        self.assertEqual(acked, struct.pack("<H", 2903))
+        self.assertLess(took_s, 0.5)
+        host.udp.settimeout(0.5)
+        self.assertRaises(socket.timeout, host.udp.recv, 4096)
+
+    def test_targets_are_at_their_bearings(self):
+        host = Host(self.daemon.address, PING360)
+        period, brightest = 352, {}
+        metres = period * 25e-9 * 1500 / 2
+        host.send(scan(385, 20, period, 1200))
+        for _ in range(36):
+            data, _ = host.next(2301)
+            angle = (struct.unpack("<H", data[2:4])[0] + 200) % 400 - 200
+            for range_m, _ in (B, C):
+                near = data[20 + int((range_m - 0.3) / metres):20 + int((range_m + 0.3) / metres)]
+                brightest.setdefault(range_m, {})[angle] = max(near)
+        host.ask(frame(2903), 1)
+        for range_m, bearing_deg in (B, C):
+            top = max(brightest[range_m], key=brightest[range_m].get)
+            self.assertAlmostEqual(top * 0.9, bearing_deg, delta=1.5)
+
+    def test_the_host_that_asked_last_has_the_dialogue(self):
+        one, other = Host(self.daemon.address, PING360), Host(self.daemon.address, PING360)
+        one.send(scan(0, 399))
+        one.next(2301)
+        self.assertEqual(other.ask(general(5), 5)[0][0], 1)
+        other.next(2301)
+        other.ask(frame(2903), 1)
+
+    def test_a_refusal_names_the_request(self):
+        host = Host(self.daemon.address, PING360)
+        self.assertEqual(host.ask(frame(2345), 2)[0][:2], struct.pack("<H", 2345))
+        self.assertIn(b"number_of_samples", host.ask(transducer(0, samples=1201), 2)[0])
+
+
+class SurveyorLink(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.daemon = Sonard(profile="surveyor-240", mount=DOWN, more=f"recording: {{folder: {cls.folder.name}}}").__enter__()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.daemon.__exit__()
+        cls.folder.cleanup()
+
+    def points(self, payload):
+        count = struct.unpack("<H", payload[98:100])[0]
+        self.assertEqual(len(payload), 100 + 8 * count)
+        return [struct.unpack_from("<ff", payload, 100 + 8 * i) for i in range(count)]
+
+    def test_points_come_by_tcp_and_by_udp_and_are_recorded(self):
+        control = ("--control", f"{self.daemon.address}:14770")
+        with socket.create_connection((self.daemon.address, SURVEYOR)) as tcp:
+            tcp.sendall(general(4) + settings(1))
+            begun = run(SONARCTL, "recording", "start", "run.svlog", *control)
+            self.assertEqual(begun.returncode, 0, begun.stderr)
+            received = b""
+            tcp.settimeout(10)
+            while received.count(b"BR") < 40:
+                received += tcp.recv(65536)
+            run(SONARCTL, "recording", "stop", *control)
+            tcp.sendall(settings(0))
+        self.assertIn(frame(14)[:6], received[:40], "it asks for the time")
+        recorded = read((pathlib.Path(self.folder.name) / "run.svlog").read_bytes())
+        self.assertEqual(recorded[0][0], 10)
+        self.assertLessEqual({504, 3011, 3012}, {number for number, _ in recorded})
+        for number, payload in recorded:
+            if number == 3011:
+                for y, z in self.points(payload):
+                    self.assertTrue(-12 < z < 0 and math.hypot(y, z) < 10.5, (y, z))
+        time.sleep(0.5)
+        host = Host(self.daemon.address, SURVEYOR)
+        self.assertEqual(host.ask(general(5), 5)[0][0], 1)
+        host.send(settings(1))
+        host.next(504)
+        first = struct.unpack_from("<I", host.next(3012)[0], 20)[0]
+        for step in range(1, 5):
+            self.assertEqual(struct.unpack_from("<I", host.next(3012)[0], 20)[0], first + step)
+        now = time.time()
+        host.send(frame(15, struct.pack("<QI", int(now * 1000), 0)))
+        host.next(3012)
+        told = struct.unpack_from("<Q", host.next(3012)[0], 4)[0]
+        self.assertAlmostEqual(told / 1000, time.time(), delta=1)
+        host.send(settings(0))
+        time.sleep(0.4)
+        host.udp.setblocking(False)
+        try:
+            while host.udp.recv(4096):
+                pass
+        except BlockingIOError:
+            pass
+        time.sleep(0.4)
+        self.assertRaises(BlockingIOError, host.udp.recv, 4096)
+
+
+def side_scan(enable, length_mm=10000, results=600):
+    return frame(2197, struct.pack("<IIIffffhHBB", 0, length_mm, 100, 0, 0, 0.002, 0.0015, -1, results, enable, 0))
+
+
+class OmniscanLink(unittest.TestCase):
+    def profile(self, payload):
+        """Ping number and powers [dB]."""
+        highest, lowest = struct.unpack_from("<ff", payload, 36)
+        count = struct.unpack_from("<H", payload, 22)[0]
+        self.assertEqual(len(payload), 52 + 2 * count)
+        powers = struct.unpack_from(f"<{count}H", payload, 52)
+        return struct.unpack_from("<I", payload)[0], [lowest + v / 65535 * (highest - lowest) for v in powers]
+
+    def test_profiles_come_by_udp_and_tcp_and_their_recording_is_served_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with Sonard(profile="omniscan-450", mount=SIDE, more=f"recording: {{folder: {folder}}}") as daemon:
+                control = ("--control", f"{daemon.address}:14770")
+                host = Host(daemon.address, OMNISCAN)
+                self.assertEqual(host.ask(general(2198), 2)[0][:2], struct.pack("<H", 2198), "no pings are enabled")
+                host.send(side_scan(1))
+                numbers = [self.profile(host.next(2198)[0])[0] for _ in range(5)]
+                self.assertEqual(numbers, list(range(numbers[0], numbers[0] + 5)))
+                _, powers = self.profile(host.ask(general(2198), 2198)[0])
+                self.assertEqual(len(powers), 600)
+                self.assertGreater(max(powers) - min(powers), 20, "a bed and water")
+                host.send(side_scan(0))
+                with self.connected_once_free(daemon.address) as tcp:
+                    tcp.sendall(side_scan(1, results=200))
+                    begun = run(SONARCTL, "recording", "start", "run.svlog", *control)
+                    self.assertEqual(begun.returncode, 0, begun.stderr)
+                    received = b""
+                    while received.count(b"BR") < 5:
+                        received += tcp.recv(65536)
+                    run(SONARCTL, "recording", "stop", *control)
+            file = pathlib.Path(folder) / "run.svlog"
+            recorded = file.read_bytes()
+            self.assertIn(b'"os450"', recorded[:200])
+            frames = recorded[recorded.index(b"BR", 2):]
+            self.assertEqual(self.served_again(file, daemon.address), frames)
+
+    def connected_once_free(self, address):
+        """The host by UDP is forgotten some time after it has disabled pings."""
+        give_up = time.monotonic() + 60
+        while time.monotonic() < give_up:
+            tcp = socket.create_connection((address, OMNISCAN))
+            tcp.settimeout(10)
+            try:
+                tcp.sendall(general(5))
+                if tcp.recv(65536):
+                    return tcp
+            except OSError:
+                pass
+            tcp.close()
+            time.sleep(0.5)
+        raise AssertionError("still held by a host that asks for no pings")
+
+    def served_again(self, file, address):
+        replay = subprocess.Popen([SONARD, "replay", file, "--ip", address], stderr=subprocess.PIPE, text=True)
+        try:
+            self.assertIn("as Omniscan 450 on tcp", replay.stderr.readline())
+            with socket.create_connection((address, OMNISCAN)) as tcp:
+                tcp.settimeout(10)
+                tcp.sendall(general(4))
+                self.assertEqual(read(tcp.recv(65536))[0][0], 4)
+                tcp.sendall(side_scan(1))
+                served = b""
+                while data := tcp.recv(65536):
+                    served += data
+            return served
+        finally:
+            replay.terminate()
+            replay.communicate(timeout=20)
+
+
+class Tools(unittest.TestCase):
+    def test_sonarctl_listens_views_and_examines(self):
+        for profile, port, mount, line in (("ping360", PING360, "{frame: FLU, xyz_m: [0, 0, 0]}", r"x 1  8 bit .* angle \d+ grad"),
+                                           ("surveyor-240", SURVEYOR, DOWN, r"points from \d+\.\d\d to \d+\.\d\d m"),
+                                           ("omniscan-450", OMNISCAN, SIDE, r"strongest -?\d+\.\d dB at \d+\.\d\d m")):
+            with self.subTest(profile), Sonard(profile=profile, mount=mount) as daemon, tempfile.TemporaryDirectory() as folder:
+                at = f"{daemon.address}:{port}"
+                examined = daemon.ctl("doctor", "--control", f"{daemon.address}:14770")
+                self.assertRegex(examined.stdout, rf"ok +(udp|tcp) {at} accepts, first ping decoded", examined.stdout + examined.stderr)
+                listened = run(SONARCTL, "listen", at, "--pings", 5, "--range", 8)
+                self.assertEqual(listened.returncode, 0, listened.stderr)
+                self.assertEqual(len(re.findall(line, listened.stdout)), 5, listened.stdout)
+                self.assertRegex(listened.stdout, r"  (8\.00|7\.99) m  0\.\d{4} MHz")
+                without_port = daemon.ctl("listen", "--pings", 1)
+                self.assertRegex(without_port.stdout, line, without_port.stderr)
+                picture = pathlib.Path(folder) / "fan.png"
+                viewed = run(SONARCTL, "view", at, "--png", picture, "--range", 4)
+                self.assertEqual((viewed.returncode == 0, picture.exists()), (profile != "omniscan-450",) * 2, viewed.stderr)
+
+
+@unittest.skipIf(shark.why_not(), shark.why_not())
+class Dissected(unittest.TestCase):
+    def test_a_conversation_is_read_as_it_was_sent(self):
+        with Sonard(scene="l-targets.yaml", profile="ping360", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}") as daemon:
+            host = Host(daemon.address, PING360)
+            host.ask(general(4), 4)
+            host.ask(transducer(17), 2300)
+        with Sonard(profile="omniscan-450", mount=SIDE) as daemon:
+            side = Host(daemon.address, OMNISCAN)
+            side.send(side_scan(1, results=200))
+            side.next(2198)
+        capture = Capture(device_port=SURVEYOR)
+        capture.connect()
+        whole = general(4) + settings(1)
+        for data in (whole[:7], whole[7:]):  # not at the edges of frames
+            capture.tcp("client", data)
+        for datagram in host.datagrams:
+            capture.udp(datagram, PING360)
+        capture.udp(side.datagrams[0], OMNISCAN)
+        capture.tcp("client", side_scan(1))
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "ping.pcap"
+            capture.write(path)
+            lines = shark.tshark("-r", path, "-Y", "brping", dissector=DISSECTOR)
+            values = shark.tshark("-r", path, "-Y", "brping.device_data.angle", "-T", "fields", "-e", "brping.device_data.angle", "-e",
+                                  "brping.device_data.data_length", "-e", "brping.src_device_id", dissector=DISSECTOR).split()
+            wrong = shark.tshark("-r", path, "-Y", "brping.expert.broken || brping.expert.checksum", dissector=DISSECTOR)
+            capture.udp(host.datagrams[0][:-1] + b"\x55", PING360)
+            capture.udp(host.datagrams[0][:-3], PING360)
+            capture.write(path)
+            broken = shark.tshark("-r", path, "-Y", "brping.expert.broken || brping.expert.checksum", dissector=DISSECTOR)
+        for name in ("general_request", "set_ping_parameters", "device_information", "device_data", "os_ping_params", "os_mono_profile"):
+            self.assertIn(name, lines)
+        self.assertEqual(values, ["17", "1200", "2"])
+        self.assertEqual(wrong.strip(), "")
+        self.assertEqual(len(broken.splitlines()), 2, broken)
+
+
+if __name__ == "__main__":
+    unittest.main()

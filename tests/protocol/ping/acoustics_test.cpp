@@ -1,0 +1,242 @@
+// What a Ping360, an Omniscan and a Surveyor see of bodies at known places, through the whole engine, in closed form.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <tuple>
+
+#include "protocol/ping/omniscan_settings.hpp"
+#include "protocol/ping/ping360_settings.hpp"
+#include "protocol/ping/surveyor_settings.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+#include "tests/protocol/ping/ping_testing.hpp"
+
+namespace sonar::ping {
+namespace {
+
+using namespace testing;
+using namespace sonar::test;
+
+struct Scanner {
+  explicit Scanner(std::shared_ptr<const Scene> scene, double speed_mps = 1500, protocol::OptionValues options = {})
+      : state(device("ping360", options)) {
+    state.water.sound_speed_mps = speed_mps;
+    const PingSettings s = ping360::ping_settings(ping360::settings_of(asked), state);
+    sounding = std::make_unique<Sounding>(scene, state.model->modes[0], s);
+    sounding->request.water = state.water;
+  }
+  /// Samples of a ping at that angle.
+  std::vector<int> at(std::uint16_t angle) {
+    const Ping& ping = sounding->ping_from({}, {0, 0, ping360::head_rad(angle, state.options)});
+    std::vector<int> samples;
+    for (const std::byte b : ping.samples) samples.push_back(std::to_integer<int>(b));
+    return samples;
+  }
+  std::uint16_t brightest_angle() {
+    std::uint16_t best = 0;
+    int top = -1;
+    for (std::uint16_t angle = 0; angle < 400; ++angle) {
+      const auto samples = at(angle);
+      if (const int most = *std::max_element(samples.begin(), samples.end()); most > top) top = most, best = angle;
+    }
+    return best;
+  }
+
+  Transducer asked{1, 0, 0, 10, 88, 750, 1200, 1, 0};  // 1.65 mm a sample at 1500 m/s
+  protocol::DeviceState state;
+  std::unique_ptr<Sounding> sounding;
+};
+
+/// First sample of at least half the amplitude of the highest: 6 dB of 60 dB.
+int half_maximum(const std::vector<int>& samples) {
+  const int top = *std::max_element(samples.begin(), samples.end());
+  EXPECT_GT(top, 60);
+  EXPECT_LT(top, 255) << "saturated";
+  const auto first = std::find_if(samples.begin(), samples.end(), [&](int v) { return v >= top - 6 * 255 / 60; });
+  return static_cast<int>(first - samples.begin());
+}
+
+std::shared_ptr<const Scene> wall_at(double x_m) { return SceneMaker().add(wall(1, 1), -25, {x_m, 0, 0}).make(); }
+std::shared_ptr<const Scene> ball_at(Vec3d at) { return SceneMaker().add(sphere(0.03, 4), -10, at).make(); }
+
+TEST(Ping360Acoustics, AWallIsWhereTheHostsSoundSpeedPutsIt) { EXPECT_NEAR(half_maximum(Scanner(wall_at(1.5)).at(0)), 908, 5); }
+
+TEST(Ping360Acoustics, AnotherSoundSpeedMovesIt) {
+  EXPECT_NEAR(half_maximum(Scanner(wall_at(1.5), 1450).at(0)), 1.5 / (88 * 25e-9 * 1450 / 2) - 1, 5);
+}
+
+TEST(Ping360Acoustics, ABallIsBrightestAtItsBearing) {
+  EXPECT_NEAR(Scanner(ball_at({0, -1.2, 0})).brightest_angle(), 100, 1) << "to starboard";
+  EXPECT_NEAR(Scanner(ball_at({0, 1.2, 0})).brightest_angle(), 300, 1) << "to port";
+  EXPECT_NEAR(Scanner(ball_at({0, -1.2, 0}), 1500, {{"mount_grad", "30"}}).brightest_angle(), 70, 1);
+  EXPECT_NEAR(Scanner(ball_at({-1, 1, 0})).brightest_angle(), 250, 1) << "astern to port";
+}
+
+TEST(Ping360Acoustics, ABallIsBrightestAtItsRange) {
+  for (const double range_m : {0.5, 1.0, 1.7}) {
+    const auto samples = Scanner(ball_at({range_m, 0, 0})).at(0);
+    const auto top = std::max_element(samples.begin(), samples.end()) - samples.begin();
+    EXPECT_NEAR((static_cast<double>(top) + 1) * 88 * 25e-9 * 750, range_m - 0.03, 0.015) << range_m;
+  }
+}
+
+TEST(Ping360Acoustics, GainIsSixDecibelsAStep) {
+  Scanner low(wall_at(1.5)), high(wall_at(1.5));
+  Transducer louder = low.asked;
+  louder.gain = 1;
+  high.sounding->request.settings.gain_db = ping360::ping_settings(ping360::settings_of(louder), high.state).gain_db;
+  const auto a = low.at(0), b = high.at(0);
+  EXPECT_NEAR(*std::max_element(b.begin(), b.end()) - *std::max_element(a.begin(), a.end()), 25.5, 1.5);
+}
+
+// ---- Omniscan
+
+/// A side-scan that looks to starboard, 30 degrees down, 3 m above a bed.
+struct SideScan {
+  explicit SideScan(std::shared_ptr<const Scene> scene) {
+    omniscan::Settings settings;
+    settings.parameters = {.length_mm = 10000, .results = 1000, .enable = 1};
+    sounding = std::make_unique<Sounding>(scene, state.model->modes[0], omniscan::ping_settings(settings));
+    sounding->request.vendor_settings = std::make_shared<omniscan::HeldSettings>(settings);
+  }
+  /// Powers [dB] of a ping, 10 mm a row.
+  std::vector<double> ping(double x_m = 0, double yaw_rad = -pi / 2) {
+    sounding->request.sonar_in_world = {{x_m, 0, 0}, quat_from_rpy({0, pi / 6, yaw_rad})};
+    sounding->request.number = PingNumber(1);
+    const Frame frame = frames_in({omniscan::profile_of(sounding->ping(), state)}).at(0);
+    const auto profile = message_in<OsMonoProfile>(frame);
+    wire::Reader reader(BytesView(frame.payload).subspan(wire::wire_size<OsMonoProfile>()));
+    std::vector<double> db;
+    for (std::uint16_t i = 0, v = 0; i < profile.results; ++i) {
+      reader("power", v);
+      db.push_back(static_cast<double>(profile.lowest_db) +
+                   v / 65535.0 * static_cast<double>(profile.highest_db - profile.lowest_db));
+    }
+    EXPECT_TRUE(reader.ok() && reader.remaining() == 0);
+    return db;
+  }
+  protocol::DeviceState state = device("omniscan-450");
+  std::unique_ptr<Sounding> sounding;
+};
+
+double loudest(const std::vector<double>& db) { return *std::max_element(db.begin(), db.end()); }
+
+TEST(OmniscanAcoustics, LeftIsLeft) {
+  SideScan side(ball_at({0, -4, -2}));
+  const double starboard = loudest(side.ping(0, -pi / 2)), port = loudest(side.ping(0, pi / 2));
+  EXPECT_GT(starboard, port + 40);
+  EXPECT_LT(starboard, 80) << "saturated";
+}
+
+TEST(OmniscanAcoustics, ABallIsAtItsRangeAndWithinTheNarrowBeam) {
+  for (const double y_m : {2.0, 4.0, 8.0}) {
+    SideScan side(ball_at({0, -y_m, -1}));
+    const auto db = side.ping();
+    const auto top = std::max_element(db.begin(), db.end()) - db.begin();
+    EXPECT_NEAR((static_cast<double>(top) + 0.5) * 0.01, std::hypot(y_m, 1.0) - 0.03, 0.03) << y_m;
+    EXPECT_LT(loudest(side.ping(y_m * std::tan(rad_from_deg(1.5)))), loudest(db) - 10) << "1.5 degrees along the track";
+  }
+}
+
+TEST(OmniscanAcoustics, WideAcrossTheTrack) {
+  const auto at = [](double down_deg) {
+    const double a = rad_from_deg(down_deg);
+    return loudest(SideScan(SceneMaker().add_point({0, -4 * std::cos(a), -4 * std::sin(a)}, -30).make()).ping());
+  };
+  EXPECT_NEAR(at(30 - 15), at(30 + 15), 1);
+  EXPECT_GT(at(10), at(30) - 8);
+  EXPECT_LT(at(85), at(30) - 8);
+}
+
+TEST(OmniscanAcoustics, TheBedBeginsUnderTheSonar) {
+  SideScan side(SceneMaker().add(height_field(-0.5, 0.5, -12, 1, 0.1, [](double, double) { return -3; }), -25).make());
+  const auto db = side.ping();
+  const auto loudest_from = [&](double from_m, double to_m) {
+    return *std::max_element(db.begin() + static_cast<int>(100 * from_m), db.begin() + static_cast<int>(100 * to_m));
+  };
+  EXPECT_GT(loudest_from(3.2, 6), loudest_from(0.5, 2.8) + 30);
+}
+
+// ---- Surveyor
+
+struct Sounder {
+  explicit Sounder(std::shared_ptr<const Scene> scene) {
+    surveyor::Settings settings;
+    settings.parameters = {.end_mm = 10000, .enable = 1};
+    sounding = std::make_unique<Sounding>(scene, state.model->modes[0], surveyor::ping_settings(settings));
+    sounding->request.switches.noise = true;
+    sounding->request.vendor_settings = std::make_shared<surveyor::HeldSettings>(settings);
+  }
+  std::vector<Frame> ping(std::uint32_t number, double roll_rad = 0, double x_m = 0) {
+    const Pose vehicle{{x_m, 0, 0}, quat_from_rpy({roll_rad, 0, 0})}, mount{{}, quat_from_rpy({0, pi / 2, 0})};
+    sounding->request.sonar_in_world = compose(vehicle, mount);
+    sounding->request.number = PingNumber(number);
+    return frames_in(surveyor::frames_of(sounding->ping(), state));
+  }
+  protocol::DeviceState state = device("surveyor-240");
+  std::unique_ptr<Sounding> sounding;
+};
+
+struct Points {
+  std::vector<double> y, z;
+};
+Points points_in(const Frame& frame) {
+  const auto data = message_in<YzPointData>(frame);
+  Points points;
+  wire::Reader reader(BytesView(frame.payload).subspan(wire::wire_size<YzPointData>()));
+  for (int i = 0; i < data.points; ++i) {
+    float y = 0, z = 0;
+    reader("y", y);
+    reader("z", z);
+    points.y.push_back(static_cast<double>(y));
+    points.z.push_back(static_cast<double>(z));
+  }
+  EXPECT_TRUE(reader.ok() && reader.remaining() == 0);
+  return points;
+}
+double slope_of(const Points& p) {
+  double n = 0, y = 0, z = 0, yy = 0, yz = 0;
+  for (std::size_t i = 0; i < p.y.size(); ++i) ++n, y += p.y[i], z += p.z[i], yy += p.y[i] * p.y[i], yz += p.y[i] * p.z[i];
+  return (n * yz - y * z) / (n * yy - y * y);
+}
+std::shared_ptr<const Scene> bed(double slope) {
+  return SceneMaker().add(height_field(-8, 8, -16, 16, 0.5, [=](double, double y) { return -5 + slope * y; }), -25).make();
+}
+
+TEST(SurveyorAcoustics, AFlatBottomIsFlat) {
+  Sounder sounder(bed(0));
+  for (std::uint32_t number = 1; number <= 20; ++number) {
+    const Points points = points_in(sounder.ping(number)[2]);
+    EXPECT_GE(points.y.size(), 10u);
+    EXPECT_GT(points.y.front(), 2.5) << "to port first";
+    EXPECT_LT(points.y.back(), -2.5);
+    for (std::size_t i = 0; i < points.z.size(); ++i) EXPECT_NEAR(points.z[i], -5, 0.05) << number << " y " << points.y[i];
+  }
+}
+
+TEST(SurveyorAcoustics, ASlopeIsASlope) {
+  Sounder sounder(bed(std::tan(rad_from_deg(10))));
+  for (std::uint32_t number = 1; number <= 5; ++number)
+    EXPECT_NEAR(deg_from_rad(std::atan(slope_of(points_in(sounder.ping(number)[2])))), 10, 0.5);
+}
+
+TEST(SurveyorAcoustics, RollIsInTheUpVectorAndInThePoints) {
+  Sounder sounder(bed(0));
+  const double roll_rad = rad_from_deg(5);
+  const auto frames = sounder.ping(1, roll_rad);
+  const auto up = message_in<AttitudeReport>(frames[0]).up;
+  EXPECT_NEAR(up[0], 0, 0.002);
+  EXPECT_NEAR(up[1], std::sin(roll_rad), 0.002);
+  EXPECT_NEAR(up[2], std::cos(roll_rad), 0.002);
+  const Points points = points_in(frames[2]);
+  for (std::size_t i = 0; i < points.z.size(); ++i)  // along the up vector all points are 5 m down
+    EXPECT_NEAR(points.y[i] * static_cast<double>(up[1]) + points.z[i] * static_cast<double>(up[2]), -5, 0.05);
+}
+
+TEST(SurveyorAcoustics, NoBottomNoPoints) {
+  Sounder sounder(SceneMaker().add_point({0, 0, 50}, -40).make());
+  EXPECT_EQ(message_in<AtofPointData>(sounder.ping(1)[1]).points, 0);
+}
+
+}  // namespace
+}  // namespace sonar::ping

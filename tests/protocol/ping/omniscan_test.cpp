@@ -1,0 +1,125 @@
+// A host's conversation with an emulated Omniscan 450, without a socket: its session, its profile, refusals.
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "protocol/ping/omniscan_settings.hpp"
+#include "tests/protocol/ping/ping_testing.hpp"
+
+namespace sonar::ping::omniscan {
+namespace {
+
+using namespace testing;
+
+Bytes pings(OsPingParams p = {.enable = 1}) { return framed_message(Id::os_ping_params, 0, p); }
+
+TEST(Omniscan, ASessionStartsAndEndsByEnable) {
+  Talk talk("omniscan-450");
+  talk.say(general(Id::device_information));
+  ASSERT_EQ(talk.take().size(), 1u);
+  EXPECT_EQ(talk.settings.rate_hz, 0);
+  EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "it says nothing by itself";
+  talk.say(pings());
+  EXPECT_GE(talk.settings.rate_hz, 2.5) << "hosts wait half a second for a profile of 5 m";
+  EXPECT_NEAR(talk.settings.rate_hz, 1 / (10 / 1500.0 + 0.01), 1e-3) << "as fast as sound allows";
+  talk.say(pings({.start_mm = 2000, .length_mm = 30000, .period_ms = 200, .results = 1200, .enable = 1}));
+  EXPECT_EQ(talk.settings.rate_hz, 5);
+  EXPECT_DOUBLE_EQ(talk.settings.range_start_m, 2);
+  EXPECT_DOUBLE_EQ(talk.settings.range_bin_m, 0.025);
+  talk.say(pings({.enable = 0}));
+  EXPECT_EQ(talk.settings.rate_hz, 0);
+  EXPECT_TRUE(talk.take().empty());
+}
+
+TEST(Omniscan, BothSizesOfSettingsAndBothNumbersOfTheSpeedOfSoundAreKnown) {
+  Talk talk("omniscan-450");
+  Bytes payload = wire::bytes_of(OsPingParams{.length_mm = 7000, .enable = 1});
+  EXPECT_EQ(payload.size(), 34u);
+  payload.resize(36);
+  talk.say(framed(Id::os_ping_params, 0, payload));
+  EXPECT_DOUBLE_EQ(talk.settings.range_m, 7);
+  talk.say(framed_message(Id::set_sound_speed, 0, SoundSpeed{1450000}));
+  EXPECT_EQ(talk.settings.device_sound_speed_mps, 1450);
+  talk.say(framed_message(Id::set_sound_speed_before, 0, SoundSpeed{1480000}));
+  EXPECT_EQ(talk.settings.device_sound_speed_mps, 1480);
+  EXPECT_DOUBLE_EQ(talk.settings.range_m, 7) << "the settings stay";
+  EXPECT_TRUE(talk.take().empty());
+}
+
+TEST(Omniscan, AProfileSaysHowItWasMade) {
+  Talk talk("omniscan-450");
+  talk.state.powered_up_at = at_s(0);
+  talk.say(pings({.start_mm = 500, .length_mm = 5000, .gain = 3, .results = 700, .enable = 1}));
+  Ping ping;
+  ping.request.settings = talk.settings;
+  ping.request.vendor_settings = talk.state.settings;
+  ping.request.fired_at = at_s(2.5);
+  ping.request.number = PingNumber(1);
+  ping.request.sonar_in_world.orientation = quat_from_rpy({0, 0, -pi / 2});  // to the south
+  for (int i = 0; i < 700; ++i)
+    for (const int part : {i & 0xFF, i >> 8}) ping.samples.push_back(static_cast<std::byte>(part));
+  const auto datagrams = talk.vendor.datagrams(talk.vendor.ports()[1], ping, talk.state);
+  ASSERT_EQ(datagrams.size(), 1u);
+  EXPECT_EQ(*talk.vendor.frame(ping, talk.state), datagrams.front());
+  const Frame frame = frames_in(datagrams).front();
+  EXPECT_EQ(frame.header.id, Id::os_mono_profile);
+  EXPECT_EQ(frame.payload.size(), 52u + 2 * 700);
+  const auto profile = message_in<OsMonoProfile>(frame);
+  EXPECT_EQ(profile.ping, 0u);
+  EXPECT_EQ(profile.start_mm, 500u);
+  EXPECT_EQ(profile.length_mm, 5000u);
+  EXPECT_EQ(profile.power_up_ms, 2500u);
+  EXPECT_EQ(profile.hz, 450000u);
+  EXPECT_EQ(profile.gain, 3);
+  EXPECT_EQ(profile.results, 700);
+  EXPECT_EQ(profile.speed_dmps, 15000);
+  EXPECT_NEAR(static_cast<double>(profile.pulse_s), 2 * 0.002 * 5.5 / 1500, 1e-9);
+  EXPECT_NEAR(static_cast<double>(profile.transducer_heading_deg), 180, 1e-3);
+  EXPECT_LT(static_cast<double>(profile.highest_db - profile.lowest_db) / 65535, 0.01) << "steps of the powers";
+  wire::Reader powers(BytesView(frame.payload).subspan(52));
+  for (std::uint16_t i = 0, power = 0; i < 700; ++i) {
+    powers("power", power);
+    ASSERT_EQ(power, i);
+  }
+}
+
+TEST(Omniscan, AProfileThatIsAskedForIsTheNextOne) {
+  Talk talk("omniscan-450");
+  talk.say(general(Id::os_mono_profile));
+  EXPECT_EQ(talk.take().at(0).header.id, Id::nack) << "no pings are enabled";
+  talk.say(pings());
+  talk.say(general(Id::os_mono_profile));
+  EXPECT_TRUE(talk.take().empty());
+}
+
+TEST(Omniscan, RefusesWhatItCannotDo) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const OsPingParams& p :
+       {OsPingParams{.length_mm = 0}, OsPingParams{.start_mm = 4294967295u, .length_mm = 4294967295u}, OsPingParams{.gain = 8},
+        OsPingParams{.results = 199}, OsPingParams{.results = 1201}, OsPingParams{.pulse_part = nan}}) {
+    Talk talk("omniscan-450");
+    talk.say(pings(p));
+    EXPECT_EQ(talk.take().at(0).header.id, Id::nack);
+  }
+  Talk talk("omniscan-450");
+  talk.say(framed_message(Id::set_sound_speed, 0, SoundSpeed{1500}));
+  EXPECT_EQ(talk.take().at(0).header.id, Id::nack);
+}
+
+TEST(Omniscan, AnOverrideIsWhatAHostWouldSet) {
+  Talk talk("omniscan-450");
+  protocol::SettingsOverride wanted;
+  wanted.range_m = 12;
+  wanted.rate_hz = 4;
+  wanted.gain_percent = 100;
+  const auto changed = talk.vendor.apply_override(wanted, talk.state);
+  ASSERT_TRUE(changed);
+  EXPECT_DOUBLE_EQ(changed->settings.range_m, 12);
+  EXPECT_EQ(changed->settings.rate_hz, 4);
+  EXPECT_EQ(changed->settings.gain_db, 42);
+  wanted.range_m = 1000;
+  EXPECT_FALSE(talk.vendor.apply_override(wanted, talk.state));
+}
+
+}  // namespace
+}  // namespace sonar::ping::omniscan

@@ -1,0 +1,116 @@
+// A host's conversation with an emulated Surveyor 240, without a socket: its session, its clock, refusals.
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "protocol/ping/surveyor_settings.hpp"
+#include "tests/protocol/ping/ping_testing.hpp"
+
+namespace sonar::ping::surveyor {
+namespace {
+
+using namespace testing;
+
+Bytes pings(PingParameters p = {.end_mm = 5000, .enable = 1}) { return framed_message(Id::set_ping_parameters, 0, p); }
+
+Ping ping_of(const Talk& talk, double at) {
+  Ping ping;
+  ping.request.settings = talk.settings;
+  ping.request.vendor_settings = talk.state.settings;
+  ping.request.fired_at = at_s(at);
+  ping.request.number = PingNumber(7);
+  ping.beam_azimuth_rad.resize(static_cast<std::size_t>(talk.settings.beam_count));
+  ping.samples.resize(2 * static_cast<std::size_t>(talk.settings.range_bin_count * talk.settings.beam_count));
+  return ping;
+}
+
+TEST(Surveyor, ASessionStartsAndEndsByEnable) {
+  Talk talk("surveyor-240");
+  talk.say(general(Id::device_information));
+  ASSERT_EQ(talk.take().size(), 1u);
+  EXPECT_EQ(talk.settings.rate_hz, 0);
+  talk.say(pings());
+  EXPECT_EQ(talk.settings.rate_hz, 10);
+  EXPECT_DOUBLE_EQ(talk.settings.range_start_m, 0.25) << "at least 5 % of the end";
+  EXPECT_DOUBLE_EQ(talk.settings.range_m, 5);
+  talk.say(pings({.end_mm = 30000, .period_ms = 10, .enable = 1}));
+  EXPECT_NEAR(talk.settings.rate_hz, 1 / (60 / 1500.0 + 0.01), 1e-3) << "as fast as sound allows";
+  talk.say(pings({.end_mm = 5000, .enable = 0}));
+  EXPECT_EQ(talk.settings.rate_hz, 0);
+}
+
+TEST(Surveyor, WhatComesWithEveryPingIsAnsweredByTheNext) {
+  Talk talk("surveyor-240");
+  const auto answered = [&](Id id) {
+    talk.say(general(id));
+    return !talk.take().empty();
+  };
+  EXPECT_TRUE(answered(Id::yz_point_data)) << "refused: no pings are enabled";
+  talk.say(pings({.end_mm = 5000, .enable = 1, .yz = 1, .atof = 0}));
+  EXPECT_FALSE(answered(Id::yz_point_data));
+  EXPECT_FALSE(answered(Id::attitude_report));
+  EXPECT_TRUE(answered(Id::atof_point_data)) << "refused: it is not enabled";
+}
+
+TEST(Surveyor, ItsClockIsWhatAHostTold) {
+  Talk talk("surveyor-240");
+  talk.run_to(0);
+  const auto asked = talk.take();
+  ASSERT_EQ(asked.size(), 1u);
+  EXPECT_EQ(asked[0].header.id, Id::utc_request);
+  EXPECT_EQ(talk.dialogue->next_tick(), at_s(10));
+  talk.say(pings());
+  const auto utc = [&](double at) {
+    return message_in<AttitudeReport>(frames_in({*talk.vendor.frame(ping_of(talk, at), talk.state)}).front()).utc_ms;
+  };
+  EXPECT_EQ(utc(1), 0u);
+  talk.say(framed_message(Id::utc_response, 0, UtcResponse{1800000000000, 0}), 1);
+  EXPECT_NEAR(static_cast<double>(utc(1.5)), 1800000000500.0, 1);
+  EXPECT_EQ(talk.settings.rate_hz, 10) << "the settings stay";
+}
+
+TEST(Surveyor, OneFrameADatagramAndTheSameFramesOverTcp) {
+  Talk talk("surveyor-240");
+  talk.state.powered_up_at = at_s(0);
+  for (const bool atof : {false, true}) {
+    talk.say(pings({.end_mm = 5000, .enable = 1, .yz = 1, .atof = atof}));
+    const Ping ping = ping_of(talk, 5.5);
+    const auto datagrams = talk.vendor.datagrams(talk.vendor.ports()[1], ping, talk.state);
+    std::vector<Id> ids;
+    for (const Frame& frame : frames_in(datagrams)) ids.push_back(frame.header.id);
+    if (atof)
+      EXPECT_THAT(ids, ::testing::ElementsAre(Id::attitude_report, Id::atof_point_data, Id::yz_point_data));
+    else
+      EXPECT_THAT(ids, ::testing::ElementsAre(Id::attitude_report, Id::yz_point_data));
+    EXPECT_EQ(datagrams.size(), ids.size());
+    Bytes all;
+    for (const Bytes& one : datagrams) all.insert(all.end(), one.begin(), one.end());
+    EXPECT_EQ(*talk.vendor.frame(ping, talk.state), all);
+  }
+  EXPECT_EQ(talk.vendor.datagrams(talk.vendor.ports()[1], ping_of(talk, 6.05), talk.state).size(), 4u) << "118 once a second";
+}
+
+TEST(Surveyor, RefusesWhatItCannotDo) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const PingParameters& p :
+       {PingParameters{.end_mm = -1}, PingParameters{.end_mm = 300000}, PingParameters{.start_mm = 6000, .end_mm = 5000},
+        PingParameters{.speed_mps = nan}, PingParameters{.gain = 101}, PingParameters{.steps = 199},
+        PingParameters{.pulse_steps = nan}, PingParameters{.period_ms = -1}}) {
+    Talk talk("surveyor-240");
+    talk.say(pings(p));
+    const auto replies = talk.take();
+    ASSERT_EQ(replies.size(), 1u);
+    EXPECT_EQ(replies[0].header.id, Id::nack);
+  }
+}
+
+TEST(Surveyor, AHostByDatagramsThatAsksForNoPingsIsForgotten) {
+  Talk tcp("surveyor-240", 0), udp("surveyor-240", 1);
+  EXPECT_FALSE(tcp.dialogue->longest_silence());
+  EXPECT_TRUE(udp.dialogue->longest_silence());
+  udp.say(pings());
+  EXPECT_FALSE(udp.dialogue->longest_silence());
+}
+
+}  // namespace
+}  // namespace sonar::ping::surveyor
