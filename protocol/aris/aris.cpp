@@ -56,6 +56,10 @@ class ArisVendor final : public protocol::Vendor {
                                        protocol::BytesView message) const override {
     return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // the beacon is of varints
   }
+  bool change_integer(protocol::Part part, protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change,
+                      protocol::Bytes& message) const override {
+    return part == protocol::Part::ping ? change_part(name, change, message) : change_beacon(name, change, message);
+  }
   std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
     return locate(region, ping);
   }

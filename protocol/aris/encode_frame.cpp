@@ -12,7 +12,7 @@ namespace {
 
 /// Which sixteenth of the beams a channel of the digitiser holds: a fact of the hardware, as the vendor's library has it.
 constexpr std::array<std::size_t, channels> sixteenth{10, 2, 14, 6, 8, 0, 12, 4, 11, 3, 15, 7, 9, 1, 13, 5};
-constexpr std::size_t first_part_samples = 620, part_samples = 1370;
+constexpr std::size_t first_part_samples = 620, part_samples = 1370;  // of datagrams of 1400 bytes
 constexpr std::size_t largest_picture = std::size_t{most_samples} * 128;
 constexpr double surface_psi = 14.6959, psi_per_m = 1 / 0.702398;
 
@@ -106,15 +106,16 @@ Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings) {
   return picture;
 }
 
-std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples) {
+std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples, std::size_t longest) {
+  const std::size_t more = longest - longest_datagram;
   std::vector<Bytes> parts;
   for (std::size_t at = 0; at < samples.size() || parts.empty();) {
     FramePart part{frame_index, static_cast<std::int32_t>(samples.size()), {}, {}, static_cast<std::int32_t>(at)};
     if (at == 0) part.header = header;
-    part.data = samples.subspan(at, std::min(at == 0 ? first_part_samples : part_samples, samples.size() - at));
+    part.data = samples.subspan(at, std::min((at == 0 ? first_part_samples : part_samples) + more, samples.size() - at));
     at += part.data.size();
     parts.push_back(protobuf::bytes_of(part));
-    assert(parts.back().size() <= longest_datagram);
+    assert(parts.back().size() <= longest);
   }
   return parts;
 }
@@ -127,7 +128,10 @@ std::vector<Bytes> encode_frame(const Ping& ping, const protocol::DeviceState& d
   header.reordered = text_option(device.options, option_name::reordered) == "true";
   if (!header.reordered)
     samples = raw_from_picture(samples, header.samples_per_beam, ping.request.settings.beam_count / channels);
-  return parts_of(index, wire::bytes_of(header), samples);
+  const auto size = [&](std::string_view name) { return static_cast<std::size_t>(number_option(device.options, name)); };
+  const Bytes whole_header = wire::bytes_of(header);
+  return parts_of(index, BytesView(whole_header).first(size(option_name::header_bytes)), samples,
+                  size(option_name::datagram_bytes));
 }
 
 Bytes make_beacon(const protocol::DeviceState& device) {

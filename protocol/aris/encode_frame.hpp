@@ -1,6 +1,7 @@
 // A Ping as the datagrams of a frame: header, channel order, parts. And the way back, for tools and tests.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -19,8 +20,9 @@ inline constexpr std::size_t longest_datagram = 1400;  // an older sample progra
 Bytes raw_from_picture(BytesView picture, std::size_t samples, int pings);
 Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings);
 
-/// Datagrams of a frame: the header is in the first, the samples in all.
-std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples);
+/// Datagrams of a frame, of at most `longest` bytes, 1400 or more: the header is in the first, the samples in all.
+std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples,
+                            std::size_t longest = longest_datagram);
 std::vector<Bytes> encode_frame(const Ping& ping, const protocol::DeviceState& device, const Settings& settings);
 
 /// The first datagram of a frame.
@@ -28,6 +30,12 @@ std::optional<protocol::Field> locate(protocol::FieldName name, BytesView first_
 std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView first_part);
 
 Bytes make_beacon(const protocol::DeviceState& device);
+
+/// Vendor::change_integer of a datagram of a frame: ping_id (FrameIndex, which counts from 0) and image_size (total_data_size).
+bool change_part(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& part);
+/// Of a beacon: device_id; connected_address (not 0: a controller is connected); device_status (of an Oculus: 0x4000 too hot,
+/// 0x8000 stopped by heat).
+bool change_beacon(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& beacon);
 
 /// A whole frame, as its parts say.
 struct DecodedFrame {

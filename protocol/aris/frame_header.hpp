@@ -49,7 +49,9 @@ struct FrameHeader {
   std::uint32_t error_flags = 0, missed_packets = 0, app_version = 8711, available2 = 0, reordered = 0, salinity = 0;
   float pressure_psi = 0, battery_mv = 0, main_mv = 0, switched_mv = 0;
   std::uint32_t focus_motor_moving = 0, voltage_changing = 0;
-  std::array<std::uint32_t, 14> faults{};  // focus time-out first; see docs/protocols/aris.md
+  std::array<std::uint32_t, 3> focus_faults{};  // time-out, over-current, not found
+  std::uint32_t focus_stalled = 0;
+  std::array<std::uint32_t, 10> faults{};  // FPGA time-out, busy, stuck; CPU, PSU, water, humidity, pressure, voltage read, write
   std::uint32_t focus_position = 0;
   std::array<float, 3> rotator_targets{};
   std::array<std::uint32_t, 3> rotator_errors{};
@@ -130,6 +132,8 @@ constexpr void fields(V& visit, M& m) {
   visit("SwitchVoltage", m.switched_mv);
   visit("FocusMotorMoving", m.focus_motor_moving);
   visit("VoltageChanging", m.voltage_changing);
+  visit("FocusMotorFaults", m.focus_faults);
+  visit("FocusMotorStalled", m.focus_stalled);
   visit("Faults", m.faults);
   visit("FocusCurrentPosition", m.focus_position);
   visit("RotatorTargets", m.rotator_targets);

@@ -1,5 +1,7 @@
 // Where the first datagram of a frame and the beacon have their fields. Integers of the part itself are varints, which have no
 // fixed place; fields of the frame header do.
+#include <algorithm>
+
 #include "protocol/aris/encode_frame.hpp"
 
 namespace sonar::aris {
@@ -40,10 +42,14 @@ std::string_view header_name(FieldName name) {
       return "FrameRate";
     case FieldName::gain:
       return "ReceiverGain";
+    case FieldName::ping_status:
+      return "FocusMotorStalled";
     default:
       return {};
   }
 }
+
+constexpr std::int64_t too_hot = 0x4000, stopped_by_heat = 0x8000;  // status bits of an Oculus, as faults have them
 
 using Place = std::pair<std::size_t, std::size_t>;  // offset, size
 
@@ -51,11 +57,10 @@ Place place_of(BytesView inside, BytesView whole) {
   return {inside.empty() ? whole.size() : static_cast<std::size_t>(inside.data() - whole.data()), inside.size()};
 }
 
-/// Nothing: the part has no whole frame header.
+/// Nothing: the part has no frame header.
 std::optional<FramePart> first_of(BytesView first_part) {
   FramePart part;
-  protobuf::read(first_part, part);
-  return part.header && part.header->size() >= header_size ? std::optional(part) : std::nullopt;
+  return protobuf::read(first_part, part) && part.header ? std::optional(part) : std::nullopt;
 }
 
 }  // namespace
@@ -64,7 +69,7 @@ std::optional<Field> locate(FieldName name, BytesView first_part) {
   auto found = wire::locate<FrameHeader>(header_name(name));
   if (!found || first_part.empty()) return found;
   const auto part = first_of(first_part);
-  if (!part) return std::nullopt;
+  if (!part || found->offset + found->size > part->header->size()) return std::nullopt;
   found->offset += place_of(*part->header, first_part).first;
   return found;
 }
@@ -77,6 +82,43 @@ std::optional<Place> locate(protocol::Region region, BytesView first_part) {
   const Place header = place_of(*part->header, first_part);
   if (region == protocol::Region::header) return Place{0, header.first};
   return region == protocol::Region::metadata ? header : place_of(part->data, first_part);
+}
+
+bool change_part(FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& bytes) {
+  if (name != FieldName::ping_id && name != FieldName::image_size) return false;
+  FramePart part;
+  if (bytes.empty() || !protobuf::read(bytes, part)) return bytes.empty();
+  Bytes header = part.header ? Bytes(part.header->begin(), part.header->end()) : Bytes{};
+  if (part.header) part.header = header;
+  if (name == FieldName::image_size) {
+    part.total_size = static_cast<std::int32_t>(change(part.total_size));
+  } else {
+    part.frame_index = static_cast<std::int32_t>(change(part.frame_index - 1) + 1);
+    const auto number = static_cast<std::uint32_t>(part.frame_index - 1);
+    Bytes index;
+    wire::Writer write(index);
+    write("FrameIndex", number);
+    if (header.size() >= index.size()) std::copy(index.begin(), index.end(), header.begin());
+  }
+  bytes = protobuf::bytes_of(part);
+  return true;
+}
+
+bool change_beacon(FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& bytes) {
+  const bool known = name == FieldName::device_id || name == FieldName::connected_address || name == FieldName::device_status;
+  Availability a;
+  if (!known || bytes.empty() || !protobuf::read(bytes, a)) return known && bytes.empty();
+  if (name == FieldName::device_id) {
+    a.serial = static_cast<std::uint32_t>(change(a.serial));
+  } else if (name == FieldName::connected_address) {
+    a.busy = change(a.busy) != 0;
+  } else {
+    const std::int64_t status = change(0);
+    if (status & (too_hot | stopped_by_heat)) a.cpu_c = a.hot_limit_c + 2;
+    if (status & stopped_by_heat) a.power_down_reason = 0;
+  }
+  bytes = protobuf::bytes_of(a);
+  return true;
 }
 
 }  // namespace sonar::aris

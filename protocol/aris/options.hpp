@@ -9,7 +9,8 @@
 namespace sonar::aris {
 
 namespace option_name {
-inline constexpr std::string_view cycle = "cycle", reordered = "reordered", receivers = "receivers", silence_s = "silence_s";
+inline constexpr std::string_view cycle = "cycle", reordered = "reordered", receivers = "receivers", silence_s = "silence_s",
+                                  header_bytes = "header_bytes", datagram_bytes = "datagram_bytes";
 }
 
 std::span<const protocol::Option> options();

@@ -12,7 +12,7 @@ import unittest
 import tshark as shark
 from aris_controller import BEACONS, COMMANDS, PING, RECEIVER, SALINITY, Beacons, Controller, field, fields
 from pcap_writer import Capture
-from running_sonard import ROOT, SONARCTL, Sonard, run
+from running_sonard import ROOT, SONARCTL, SONARD, Sonard, run
 
 DISSECTOR = ROOT / "clients/wireshark/aris.lua"
 STARBOARD, PORT = range(0, 64), range(64, 128)  # beam 0 is the right-most
@@ -211,11 +211,36 @@ class Tools(unittest.TestCase):
                 viewed = daemon.ctl("view", "--png", picture)
                 self.assertEqual(viewed.returncode, 0, viewed.stderr)
                 self.assertTrue(picture.exists())
-            recorded = (pathlib.Path(folder) / "run.aris").read_bytes()
+            file = pathlib.Path(folder) / "run.aris"
+            recorded = file.read_bytes()
+            self.assertEqual(self.replayed(file, daemon.address).stderr, "")
+            self.set_cookies(file, 99)
+            self.assertIn("does not use the settings", self.replayed(file, daemon.address).stderr)
         _, frames, beams, samples = (struct.unpack_from("<I", recorded, at)[0] for at in (0, 4, 16, 24))
         self.assertEqual((recorded[:4], beams), (b"DDF\x05", 96))
         self.assertEqual(len(recorded), 1024 + frames * (1024 + beams * samples))
         self.assertGreaterEqual(frames, 5)
+
+    def replayed(self, file, address):
+        replay = subprocess.Popen([SONARD, "replay", file, "--ip", address, "--loop"], stderr=subprocess.PIPE, text=True)
+        try:
+            self.assertIn("(.aris file) as sonar 7001", replay.stderr.readline())
+            heard = run(SONARCTL, "listen", address, "--aris", "--pings", 5)
+            self.assertEqual(heard.returncode, 0, heard.stderr)
+            self.assertRegex(heard.stdout, r"x 96  8 bit  6\.\d+ m  1\.8000 MHz")
+            return heard
+        finally:
+            replay.terminate()
+            replay.communicate(timeout=20)
+
+    @staticmethod
+    def set_cookies(file, cookie):
+        data = bytearray(file.read_bytes())
+        _, frames, beams, samples = (struct.unpack_from("<I", data, at)[0] for at in (0, 4, 16, 24))
+        for i in range(frames):
+            for place in (680, 684):
+                struct.pack_into("<I", data, 1024 + i * (1024 + beams * samples) + place, cookie)
+        file.write_bytes(data)
 
     def test_faults_on_purpose(self):
         with Sonard(scene="l-targets.yaml", profile="aris-3000", arguments=("--faults",)) as daemon:

@@ -45,5 +45,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   assembler.add(protocol::BytesView(bytes).subspan(half));
   aris::vendor().field(protocol::Part::ping, protocol::FieldName::rows, bytes);
   aris::vendor().region(protocol::Region::image, bytes);
+  const auto next = [](std::int64_t n) { return n + 1; };
+  protocol::Bytes part = bytes, beacon = bytes;
+  for (const auto name : {protocol::FieldName::ping_id, protocol::FieldName::image_size})
+    aris::vendor().change_integer(protocol::Part::ping, name, next, part);
+  for (const auto name : {protocol::FieldName::device_id, protocol::FieldName::device_status})
+    aris::vendor().change_integer(protocol::Part::beacon, name, next, beacon);
   return 0;
 }

@@ -151,5 +151,48 @@ TEST(ArisFrame, FieldsAndRegionsOfTheFirstPart) {
   EXPECT_FALSE(vendor().field(protocol::Part::ping, protocol::FieldName::rows, BytesView(first).first(100)));
 }
 
+TEST(ArisFrame, OlderFirmwareAndLongerDatagramsAreOptions) {
+  const auto state = testing::device("aris-3000", {{"header_bytes", "700"}, {"datagram_bytes", "9000"}});
+  Settings s = initial_settings(state);
+  apply(s, testing::acoustics(9), state);
+  const Ping ping = ping_of(state, s, 1);
+  FrameAssembler assembler;
+  std::optional<DecodedFrame> frame;
+  std::size_t longest = 0;
+  for (const Bytes& datagram : vendor().datagrams(vendor().ports()[2], ping, state)) {
+    FramePart part;
+    ASSERT_TRUE(protobuf::read(datagram, part));
+    EXPECT_TRUE(!part.header || part.header->size() == 700u);
+    longest = std::max(longest, datagram.size());
+    if (auto whole = assembler.add(datagram)) frame = std::move(whole);
+  }
+  EXPECT_GT(longest, 8900u);
+  EXPECT_LE(longest, 9000u);
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->header.applied_cookie, 9u);
+  EXPECT_EQ(frame->header.go_time_us, 0u) << "of a field that older firmware lacks";
+}
+
+TEST(ArisFrame, OfATelephotoLens) {
+  const auto state = testing::device("aris-1800");
+  Settings s = initial_settings(state);
+  s.telephoto = true;
+  Acoustics a = testing::acoustics(9);
+  a.ping_mode = 3;
+  a.cycle_us = 6000;
+  a.frame_rate_hz = 8;
+  ASSERT_EQ(apply(s, a, state).refusal, "");
+  const Ping ping = ping_of(state, s, 1);
+  FrameAssembler assembler;
+  std::optional<DecodedFrame> frame;
+  for (const Bytes& datagram : vendor().datagrams(vendor().ports()[2], ping, state))
+    if (auto whole = assembler.add(datagram)) frame = std::move(whole);
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->header.large_lens, 1u);
+  EXPECT_EQ(frame->beams, 96u);
+  const FrequencyMode& mode = state.model->modes[static_cast<std::size_t>(ping.request.settings.mode)];
+  EXPECT_NEAR(mode.beam_azimuths_rad.front(), 7.42 * 3.14159265 / 180, 0.001) << "half as wide as without it";
+}
+
 }  // namespace
 }  // namespace sonar::aris
