@@ -1,9 +1,13 @@
 #include "protocol/recording/aris_file.hpp"
 
+#include <deque>
+
 #include "protocol/aris/encode_frame.hpp"
 
 namespace sonar::recording {
 namespace {
+
+constexpr std::uint32_t most_beams = 128;
 
 struct FileHeader {
   std::uint32_t version = aris::file_version, frames = 0;
@@ -23,6 +27,76 @@ constexpr void fields(V& visit, M& m) {
   visit("reserved2", m.reserved2);
   visit("SerialNumber", m.serial);
 }
+
+class ArisFileReader final : public RecordingReader {
+ public:
+  ArisFileReader(std::unique_ptr<Source> source, const FileHeader& header)
+      : source_(std::move(source)),
+        scan_(*source_, aris::padded_header_size),
+        header_(header),
+        picture_size_(std::size_t{header.beams} * header.samples) {}
+
+  std::optional<RecordedMessage> next() override {
+    while (parts_.empty())
+      if (!read_frame()) return std::nullopt;
+    RecordedMessage message{at_, Origin::device, Carrier::datagram, std::move(parts_.front())};
+    parts_.pop_front();
+    return message;
+  }
+  std::optional<Error> damage() const override { return damages_.error(source_->name()); }
+  void rewind() override {
+    scan_.seek(aris::padded_header_size);
+    places_ = frames_ = 0;
+    ended_ = false;
+    damages_.clear();
+    parts_.clear();
+  }
+
+ private:
+  /// False at the end of the file.
+  bool read_frame() {
+    const std::size_t record = aris::padded_header_size + picture_size_;
+    if (ended_) return false;
+    const std::uint64_t at = scan_.position(), left = scan_.left();
+    const BytesView bytes = left < record ? BytesView{} : scan_.read(record);
+    if (bytes.size() != record) {
+      ended_ = true;
+      const std::string frame = "frame " + std::to_string(places_ + 1);
+      if (left >= record)
+        damages_.add("cannot be read from byte " + std::to_string(at) + " on");
+      else if (left > 0)
+        damages_.add("the file ends at byte " + std::to_string(source_->size()) + " within " + frame + ", of which " +
+                     std::to_string(left) + " bytes are there");
+      else if (places_ < header_.frames)
+        damages_.add("the file states " + std::to_string(header_.frames) + " frames and holds " + std::to_string(places_));
+      return false;
+    }
+    ++places_;
+    aris::FrameHeader header;
+    wire::Reader reader(bytes);
+    fields(reader, header);
+    if (header.version != aris::file_version || header.samples_per_beam != header_.samples) {
+      damages_.add("frame " + std::to_string(places_) + " at byte " + std::to_string(at) + " does not begin with its header");
+      return true;
+    }
+    at_ = Time(std::chrono::microseconds(header.frame_time_us % longest_time_us));
+    for (Bytes& part : aris::parts_of(++frames_, bytes.first(aris::header_size), bytes.subspan(aris::padded_header_size)))
+      parts_.push_back(std::move(part));
+    return true;
+  }
+
+  static constexpr std::uint64_t longest_time_us = std::uint64_t{1} << 52;  // of years: no overflow of nanoseconds
+  std::unique_ptr<Source> source_;
+  Scan scan_;
+  FileHeader header_;
+  std::size_t picture_size_;
+  std::uint64_t places_ = 0;
+  std::int32_t frames_ = 0;
+  bool ended_ = false;
+  Time at_{};
+  std::deque<Bytes> parts_;
+  Damages damages_;
+};
 
 class ArisFileWriter final : public RecordingWriter {
  public:
@@ -63,6 +137,20 @@ class ArisFileWriter final : public RecordingWriter {
 };
 
 }  // namespace
+
+Result<std::unique_ptr<RecordingReader>> read_aris_file(std::unique_ptr<Source> source) {
+  Scan scan(*source);
+  const BytesView front = scan.read(aris::padded_header_size);
+  if (front.size() < aris::padded_header_size)
+    return failure(ErrorKind::bad_data, source->name() + " ends at byte " + std::to_string(front.size()) + ", within its header");
+  FileHeader header;
+  wire::Reader reader(front);
+  fields(reader, header);
+  if (header.beams == 0 || header.beams > most_beams || header.samples == 0 || header.samples > aris::most_samples)
+    return failure(ErrorKind::bad_data, source->name() + " states frames of " + std::to_string(header.beams) + " beams and " +
+                                            std::to_string(header.samples) + " samples, which no ARIS sends");
+  return std::make_unique<ArisFileReader>(std::move(source), header);
+}
 
 std::unique_ptr<RecordingWriter> write_aris_file(std::unique_ptr<Sink> sink) {
   return std::make_unique<ArisFileWriter>(std::move(sink));

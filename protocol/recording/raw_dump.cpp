@@ -52,15 +52,16 @@ class RawReader final : public RecordingReader {
 
 class RawWriter final : public RecordingWriter {
  public:
-  explicit RawWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
+  RawWriter(std::unique_ptr<Sink> sink, Carrier by) : sink_(std::move(sink)), by_(by) {}
   Result<void> write(const RecordedMessage& message) override {
-    if (message.from != Origin::device || message.by != Carrier::stream) return {};
+    if (message.from != Origin::device || message.by != by_) return {};
     return sink_->append(message.bytes);
   }
   Result<void> close() override { return sink_->close(); }
 
  private:
   std::unique_ptr<Sink> sink_;
+  Carrier by_;
 };
 
 }  // namespace
@@ -74,8 +75,8 @@ Result<std::unique_ptr<RecordingReader>> read_raw_dump(std::unique_ptr<Source> s
   return std::make_unique<RawReader>(std::move(source));
 }
 
-std::unique_ptr<RecordingWriter> write_raw_dump(std::unique_ptr<Sink> sink) {
-  return std::make_unique<RawWriter>(std::move(sink));
+std::unique_ptr<RecordingWriter> write_raw_dump(std::unique_ptr<Sink> sink, Carrier by) {
+  return std::make_unique<RawWriter>(std::move(sink), by);
 }
 
 }  // namespace sonar::recording

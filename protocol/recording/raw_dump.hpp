@@ -10,7 +10,7 @@ namespace sonar::recording {
 
 /// bad_data when the source does not begin with an Oculus message.
 Result<std::unique_ptr<RecordingReader>> read_raw_dump(std::unique_ptr<Source> source);
-/// Keeps only the bytes that the device sent by TCP.
-std::unique_ptr<RecordingWriter> write_raw_dump(std::unique_ptr<Sink> sink);
+/// Keeps only the bytes that the device sent, of pings, by TCP or as datagrams.
+std::unique_ptr<RecordingWriter> write_raw_dump(std::unique_ptr<Sink> sink, Carrier by = Carrier::stream);
 
 }  // namespace sonar::recording

@@ -1,5 +1,5 @@
-// A recording of any kind, identified by its first bytes: .oculus log, raw dump, capture (pcap, pcapng), MCAP. What `sonard
-// replay` and `sonarctl record --from` open.
+// A recording of any kind, identified by its first bytes: .oculus log, raw dump, capture (pcap, pcapng), MCAP, .aris, .sonar,
+// .svlog. What `sonard replay` and `sonarctl record --from` open.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace sonar::recording {
 
-enum class Format { oculus_log, raw_dump, pcap, mcap };
+enum class Format { oculus_log, raw_dump, pcap, mcap, aris_file, sonar_file, ping_log };
 const char* name_of(Format format);
 
 struct Recording {

@@ -16,11 +16,11 @@ void add_replay_options(CLI::App& app, ReplayCommand& replay) {
       "  sonard replay capture.pcapng --speed 4 --loop\n"
       "  sonard replay run.mcap --stepped                  as fast as the driver reads\n"
       "Ends when a driver has had the whole recording, or, with --loop, by Ctrl-C.");
-  app.add_option("file", replay.file, "recording: .oculus log, raw dump, pcap, pcapng or MCAP")->required();
+  app.add_option("file", replay.file, "recording: .oculus log, raw dump, pcap, pcapng, MCAP, .aris, .sonar or .svlog")
+      ->required();
   app.add_option("--ip", replay.ip, "address to serve it at, one of this computer's")->capture_default_str();
-  app.add_option("--port", replay.port, "TCP port; drivers expect 52100")
-      ->check(text::whole_number(1, 65535))
-      ->capture_default_str();
+  app.add_option("--port", replay.port, "TCP port (default: the sonar's, 52100 of an Oculus)")
+      ->check(text::whole_number(1, 65535));
   app.add_option("--status-to", replay.status_to,
                  "IP or IP:PORT for status datagrams (default: broadcast of the address's network)");
   CLI::Option* speed = app.add_option("--speed", replay.speed, "2 = twice as fast as recorded")
@@ -73,12 +73,15 @@ Result<ReplayOptions> options_from(const ReplayCommand& command) {
 
 Result<void> run_replay(const ReplayCommand& command) {
   std::signal(SIGPIPE, SIG_IGN);
-  const auto options = options_from(command);
+  auto options = options_from(command);
   if (!options) return tl::make_unexpected(options.error());
   auto opened = recording::open_recording(std::filesystem::path(command.file), command.sonar);
   if (!opened) return tl::make_unexpected(opened.error());
   auto device = find_replay_device(*opened->reader, command.file, command.part_number);
   if (!device) return tl::make_unexpected(device.error());
+  if (device->by_datagrams() && command.stepped)
+    return failure(ErrorKind::usage, "--stepped: datagrams have a pace; --speed changes it");
+  if (command.port == 0) options->at.port = device->tcp_port();
   LogOptions log_options;
   log_options.json = command.json;
   Log log(log_options);
@@ -86,8 +89,8 @@ Result<void> run_replay(const ReplayCommand& command) {
   ReplayServer server(io, *opened->reader, *device, *options, log);
   if (auto listening = server.open(); !listening) return listening;
   if (!opened->reader->note().empty()) log.info(opened->reader->note());
-  log.announce(std::string("replaying ") + command.file + " (" + recording::name_of(opened->format) + ") as sonar " +
-               std::to_string(device->status.device_id) + " on tcp " + text_of(server.at()) + "; Ctrl-C stops\n");
+  log.announce(std::string("replaying ") + command.file + " (" + recording::name_of(opened->format) + ") as " + device->name() +
+               " on tcp " + text_of(server.at()) + "; Ctrl-C stops\n");
   server.start();
   io.run();
   const ReplayServer::Figures& done = server.figures();

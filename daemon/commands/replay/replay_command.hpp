@@ -15,7 +15,7 @@ namespace sonar {
 
 struct ReplayCommand {
   std::string file, ip = "127.0.0.2", sonar;
-  std::uint16_t port = 52100, part_number = 1042;
+  std::uint16_t port = 0, part_number = 1042;
   std::vector<std::string> status_to;
   double speed = 1, rate_hz = 10;
   bool stepped = false, loop = false, json = false;

@@ -1,17 +1,30 @@
 // The sonar that a recording comes from, as its status datagram shows it: taken from the recording, with the addresses of here.
 #pragma once
 
+#include <memory>
+
 #include "daemon/config/config.hpp"
 #include "protocol/oculus/messages.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace sonar {
 
+/// An Oculus, which sends by itself, or a sonar that hosts ask for pings: an ARIS, a Sonar 3D-15, a sonar of the ping protocol.
 struct ReplayDevice {
   oculus::StatusMessage status;
-  bool recorded_status = false;  // else made up from the device id
+  bool recorded_status = false;              // else made up from the device id
+  const protocol::Vendor* vendor = nullptr;  // of one that is asked, else null; and what it is like
+  std::shared_ptr<protocol::DeviceState> state;
+  std::uint32_t serial = 0;  // of an ARIS
 
-  /// 142 bytes: drivers connect to the address in it, and take nothing from a device of another id.
+  /// Null: it listens by TCP for connections that last.
+  const protocol::Port* http() const { return vendor != nullptr ? vendor->port(protocol::Port::Kind::http) : nullptr; }
+  bool by_datagrams() const { return vendor != nullptr && !vendor->pings_over_tcp(); }
+  std::string name() const;
+  std::uint16_t tcp_port() const;
+  /// 0: it sends no status.
+  std::uint16_t status_port() const;
+  /// 142 bytes of an Oculus: drivers connect to the address in it, and take nothing from a device of another id. Else the beacon.
   protocol::Bytes status_at(Ipv4 ip, Ipv4 mask, Ipv4 client) const;
 };
 

@@ -4,12 +4,14 @@
 #include <cstdlib>
 
 #include "daemon/server/system/listen.hpp"
+#include "daemon/server/time/clock.hpp"
 
 namespace sonar {
 namespace {
 
 constexpr auto goodbye_limit = std::chrono::milliseconds(1500);
 constexpr auto status_period = std::chrono::seconds(1);
+constexpr auto part_gap = std::chrono::microseconds(20);  // between the datagrams of a frame
 
 std::string text_of_bytes(std::uint64_t bytes) { return std::to_string((bytes + 500'000) / 1'000'000) + " MB"; }
 
@@ -30,6 +32,7 @@ ReplayServer::ReplayServer(asio::io_context& io, recording::RecordingReader& rea
 
 Result<void> ReplayServer::open() {
   at_ = options_.at;
+  if (device_.http() != nullptr) return open_http();
   if (Result<void> listening = listen_tcp(acceptor_, at_); !listening) return listening;
   error_code ec;
   at_.port = acceptor_.local_endpoint(ec).port();
@@ -38,8 +41,29 @@ Result<void> ReplayServer::open() {
   derive_addresses(network);
   mask_ = network.netmask;
   for (const Endpoint& to : options_.status_to.empty() ? network.status_to : options_.status_to)
-    status_to_.emplace_back(address_of(to.ip), to.port == 0 ? oculus::status_port : to.port);
-  return bind_udp(status_, {at_.ip, 0}, true);
+    if (device_.status_port() != 0) status_to_.emplace_back(address_of(to.ip), to.port == 0 ? device_.status_port() : to.port);
+  if (Result<void> bound = bind_udp(status_, {at_.ip, 0}, true); !bound) return bound;
+  send_multicast_from(status_, at_.ip);
+  return {};
+}
+
+Result<void> ReplayServer::open_http() {
+  const auto answer = [this](const protocol::ResourceRequest& request) {
+    protocol::ResourceReply reply = device_.vendor->on_http(*device_.http(), request, *device_.state, Clock::system_wall());
+    figures_.clients = 1;
+    if (!client_) return reply;
+    for (const protocol::Event& event : reply.events) obey(*client_, event);
+    client_->wake.cancel();
+    return reply;
+  };
+  http_ = std::make_unique<SonarHttp>(io_, limits_, admission_, log_, device_.name(), answer);
+  if (Result<void> listening = http_->open(at_); !listening) return listening;
+  at_ = http_->at();
+  client_ = std::make_shared<Client>(tcp::socket(io_));
+  client_->name = "http";
+  if (Result<void> bound = bind_udp(status_, {at_.ip, 0}, true); !bound) return bound;
+  send_multicast_from(status_, at_.ip);
+  return {};
 }
 
 /// An exception in one of its coroutines would leave a server that runs and serves no client.
@@ -53,8 +77,13 @@ void ReplayServer::spawn(Coroutine coroutine) {
 }
 
 void ReplayServer::start() {
-  spawn(accept());
-  spawn(send_status());
+  if (http_) {
+    http_->start();
+    spawn(serve(client_));
+  } else {
+    spawn(accept());
+    spawn(send_status());
+  }
   if (options_.handle_signals) spawn(watch_signals());
 }
 
@@ -90,6 +119,7 @@ void ReplayServer::stop() {
 void ReplayServer::end() {
   over_ = true;
   error_code ec;
+  if (http_) http_->stop();
   acceptor_.close(ec);
   status_.close(ec);
   if (client_) client_->socket.close(ec);
@@ -123,6 +153,12 @@ asio::awaitable<void> ReplayServer::accept() {
     client->socket.set_option(tcp::no_delay(true), ec);
     client->socket.set_option(asio::socket_base::keep_alive(true), ec);
     client_ = client;
+    if (device_.vendor != nullptr) {
+      device_.state->connected_client = client->ip;
+      device_.state->settings.reset();
+      client->dialogue = device_.vendor->converse(*device_.vendor->port(protocol::Port::Kind::tcp_stream), *device_.state, {});
+      status_timer_.cancel();  // says so at once
+    }
     ++figures_.clients;
     log_.info("client connected", {{"client", client->name}});
     spawn(serve(client));
@@ -146,6 +182,7 @@ asio::awaitable<void> ReplayServer::serve(ClientPointer client) {
   error_code ec;
   client->socket.close(ec);
   client_.reset();
+  if (device_.vendor != nullptr) status_timer_.cancel();
   const char* const how = played == Played::to_the_end ? "recording served to its end"
                           : played == Played::left     ? "client left"
                                                        : "stopped";
@@ -157,25 +194,102 @@ asio::awaitable<void> ReplayServer::serve(ClientPointer client) {
 
 asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, ReplayPace& pace) {
   bool any = false;
+  const auto carrier = device_.by_datagrams() ? recording::Carrier::datagram : recording::Carrier::stream;
+  error_code ec;
   while (auto message = reader_.next()) {
-    if (message->from != recording::Origin::device || message->by != recording::Carrier::stream) continue;
-    if (stopping_) co_return Played::stopped;
-    if (client->gone) co_return Played::left;
-    error_code ec;
-    if (!options_.stepped) {
-      client->wake.expires_at(pace.due(message->at, Steady::now()));
+    if (message->from != recording::Origin::device || message->by != carrier) continue;
+    co_await send_replies(client);
+    while (device_.vendor != nullptr && !client->wants_frames && !ends(*client)) {
+      client->wake.expires_at(Steady::time_point::max());
       co_await client->wake.async_wait(into(ec));
+      co_await send_replies(client);
+      pace.begin_again();
     }
-    if (stopping_) co_return Played::stopped;
-    if (client->gone) co_return Played::left;
-    co_await asio::async_write(client->socket, asio::buffer(message->bytes), into(ec));
-    if (ec) co_return stopping_ ? Played::stopped : Played::left;
-    ++figures_.messages;
+    const bool begins = !device_.by_datagrams() || http_ || device_.vendor->region(protocol::Region::metadata, message->bytes);
+    client->frames += begins;
+    if (!options_.stepped && !ends(*client)) {
+      client->wake.expires_at(begins ? pace.due(message->at, Steady::now()) : Steady::now() + part_gap);
+      do {
+        co_await client->wake.async_wait(into(ec));
+        co_await send_replies(client);
+      } while (ec && !ends(*client) && client->wake.expiry() > Steady::now());
+    }
+    if (ends(*client)) co_return stopping_ ? Played::stopped : Played::left;
+    if (device_.by_datagrams()) {
+      if (!http_ && !number_datagram(*client, message->bytes)) continue;
+      co_await send_datagram(client, message->bytes);
+    } else {
+      co_await asio::async_write(client->socket, asio::buffer(message->bytes), into(ec));
+      if (ec) co_return stopping_ ? Played::stopped : Played::left;
+    }
+    figures_.messages += begins;
     figures_.bytes += message->bytes.size();
     any = true;
   }
   if (const auto damage = reader_.damage(); damage && !std::exchange(damage_logged_, true)) log_.warning(damage->text);
   co_return any ? Played::to_the_end : Played::left;
+}
+
+/// Frames are counted from 1 in each connection, whatever is left out or begins again. False: it is of no frame.
+bool ReplayServer::number_datagram(const Client& client, protocol::Bytes& datagram) const {
+  const auto number = [&](auto) { return client.frames - 1; };
+  return client.frames > 0 &&
+         device_.vendor->change_integer(protocol::Part::ping, protocol::FieldName::ping_id, number, datagram);
+}
+
+asio::awaitable<void> ReplayServer::send_datagram(ClientPointer client, const protocol::Bytes& datagram) {
+  const std::vector<udp::endpoint> receivers = client->receivers;
+  for (const udp::endpoint& to : receivers) {
+    error_code ec;
+    co_await status_.async_send_to(asio::buffer(datagram), to, into(ec));
+    if (ec && !over_)
+      log_limited(log_, unsent_limit_, LogLevel::warning, "cannot send frames: " + ec.message(),
+                  {{"to", to.address().to_string()}});
+  }
+}
+
+/// Of the stream, which one coroutine writes.
+asio::awaitable<void> ReplayServer::send_replies(ClientPointer client) {
+  error_code ec;
+  while (!client->replies.empty() && !ec) {
+    const protocol::Bytes replies = std::exchange(client->replies, {});
+    co_await asio::async_write(client->socket, asio::buffer(replies), into(ec));
+  }
+}
+
+/// What a host says decides where frames go, and from when on.
+void ReplayServer::obey(Client& client, protocol::BytesView bytes) {
+  client.heard = Steady::now();
+  const protocol::Reaction reaction = client.dialogue->on_bytes(bytes, {});
+  for (const protocol::Bytes& reply : reaction.replies) client.replies.insert(client.replies.end(), reply.begin(), reply.end());
+  for (const protocol::Event& event : reaction.events) obey(client, event);
+  client.wake.cancel();
+}
+
+void ReplayServer::obey(Client& client, const protocol::Event& event) {
+  const auto send_to = [&client](const protocol::SetReceivers& set) {
+    client.receivers.clear();
+    for (const Endpoint& to : set.to) client.receivers.emplace_back(address_of(to.ip == Ipv4{} ? client.ip : to.ip), to.port);
+  };
+  error_code ec;
+  if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
+    device_.state->settings = change->vendor_settings;
+    client.wants_frames = change->settings.rate_hz > 0;
+    if (change->receivers) send_to(*change->receivers);
+  } else if (const auto* set = std::get_if<protocol::SetReceivers>(&event)) {
+    send_to(*set);
+  } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
+    log_.warning(notice->text, {{"client", client.name}});
+  } else if (std::holds_alternative<protocol::Close>(event)) {
+    client.socket.close(ec);
+  }
+}
+
+void ReplayServer::end_if_silent() {
+  if (!client_ || !client_->dialogue) return;
+  const auto limit = client_->dialogue->longest_silence();
+  error_code ec;
+  if (limit && Steady::now() - client_->heard > *limit) client_->socket.close(ec);
 }
 
 /// What a client says changes nothing; it is read so that the client can go on saying it.
@@ -187,6 +301,7 @@ asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
     const std::size_t n = co_await client->socket.async_read_some(asio::buffer(ignored), into(ec));
     if (ec) break;
     figures_.client_bytes += n;
+    if (client->dialogue) obey(*client, protocol::BytesView(ignored).first(n));
     if (!std::exchange(logged, true)) log_.info("settings of a client have no effect on a recording", {{"client", client->name}});
   }
   client->gone = true;
@@ -204,6 +319,7 @@ asio::awaitable<void> ReplayServer::close_stream(ClientPointer client) {
 asio::awaitable<void> ReplayServer::send_status() {
   bool logged = false;
   while (!over_) {
+    end_if_silent();
     const protocol::Bytes status = device_.status_at(at_.ip, mask_, client_ ? client_->ip : Ipv4{});
     error_code ec;
     for (const udp::endpoint& to : status_to_) {

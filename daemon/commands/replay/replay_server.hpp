@@ -1,4 +1,6 @@
 // Serves a recording as the sonar it came from would: TCP, one client at a time, its messages byte for byte; status datagrams.
+// A sonar that is asked for pings answers its host, and sends them from when on the host wants them: an ARIS by datagrams, to the
+// receivers that its controller sets; a Sonar 3D-15 likewise, to those set over HTTP, as of one client that does not leave.
 // The whole of `sonard replay` but its command line; one thread, no scene, no engine.
 #pragma once
 
@@ -6,14 +8,15 @@
 
 #include "daemon/commands/replay/replay_device.hpp"
 #include "daemon/commands/replay/replay_pace.hpp"
+#include "daemon/server/sonars/sonar_http.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
 
 namespace sonar {
 
 struct ReplayOptions {
-  Endpoint at{{127, 0, 0, 2}, oculus::tcp_port};
-  std::vector<Endpoint> status_to;  // empty = the broadcast address of `at`'s network, port 52102
+  Endpoint at{{127, 0, 0, 2}, 0};   // port 0: any
+  std::vector<Endpoint> status_to;  // empty = the broadcast address of `at`'s network, the device's port
   double speed = 1;                 // of the recorded pace
   bool stepped = false;             // no pace: the next message when the client has taken the last
   bool loop = false;                // from the front again and again
@@ -51,6 +54,13 @@ class ReplayServer {
     Ipv4 ip{};
     std::string name;
     bool gone = false;
+    // Of a sonar that is asked for pings:
+    std::unique_ptr<protocol::Dialogue> dialogue;
+    protocol::Bytes replies;  // not yet sent
+    std::vector<udp::endpoint> receivers;
+    bool wants_frames = false;
+    std::int64_t frames = 0;
+    Steady::time_point heard = Steady::now();
   };
   using ClientPointer = std::shared_ptr<Client>;
   enum class Played { to_the_end, left, stopped };
@@ -58,7 +68,15 @@ class ReplayServer {
   asio::awaitable<void> accept();
   asio::awaitable<void> serve(ClientPointer client);
   asio::awaitable<Played> play(ClientPointer client, ReplayPace& pace);
+  bool ends(const Client& client) const { return stopping_ || client.gone; }
+  bool number_datagram(const Client& client, protocol::Bytes& datagram) const;
+  asio::awaitable<void> send_replies(ClientPointer client);
+  asio::awaitable<void> send_datagram(ClientPointer client, const protocol::Bytes& datagram);
   asio::awaitable<void> listen_to(ClientPointer client);
+  void obey(Client& client, protocol::BytesView bytes);
+  void obey(Client& client, const protocol::Event& event);
+  Result<void> open_http();
+  void end_if_silent();
   asio::awaitable<void> close_stream(ClientPointer client);
   asio::awaitable<void> send_status();
   asio::awaitable<void> watch_signals();
@@ -78,8 +96,11 @@ class ReplayServer {
   udp::socket status_;
   asio::steady_timer status_timer_, deadline_;
   asio::signal_set signals_;
+  LimitConfig limits_;
+  Admission admission_{limits_, log_};
+  std::unique_ptr<SonarHttp> http_;  // of a device that is told over HTTP; then nothing else listens
   ClientPointer client_;
-  LogLimiter turned_away_limit_;
+  LogLimiter turned_away_limit_, unsent_limit_;
   Figures figures_;
   Result<void> outcome_;
   bool stopping_ = false, over_ = false, damage_logged_ = false;

@@ -6,6 +6,7 @@
 
 #include "protocol/recording/aris_file.hpp"
 #include "protocol/recording/oculus_log.hpp"
+#include "protocol/recording/ping_log.hpp"
 #include "protocol/recording/raw_dump.hpp"
 
 namespace sonar {
@@ -16,11 +17,13 @@ using Kind = RecordingFile::Kind;
 
 constexpr std::size_t longest_name = 128;
 constexpr auto status_period = std::chrono::seconds(1);
-constexpr std::array<std::pair<std::string_view, Kind>, 5> endings{{{".mcap", Kind::mcap},
+constexpr std::array<std::pair<std::string_view, Kind>, 7> endings{{{".mcap", Kind::mcap},
                                                                     {".pcap", Kind::pcap},
                                                                     {".oculus", Kind::oculus_log},
                                                                     {".raw", Kind::raw_dump},
-                                                                    {".aris", Kind::aris}}};
+                                                                    {".aris", Kind::aris},
+                                                                    {".sonar", Kind::sonar},
+                                                                    {".svlog", Kind::ping_log}}};
 
 bool may_stand_in_name(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
@@ -67,11 +70,19 @@ Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vend
     return refuse("the name of a recording has letters, digits, - _ and . only, 128 at most, and no folder: run-1.mcap");
   if (name.front() == '-')
     return refuse("the name of a recording does not begin with -, which every program takes for an option: run-1.mcap");
-  if (ending == endings.end()) return refuse("name the kind of file by its end: .mcap, .pcap, .oculus, .raw or .aris");
+  if (ending == endings.end())
+    return refuse("name the kind of file by its end: .mcap, .pcap, .oculus, .raw, .aris, .sonar or .svlog");
   if (ending->second == Kind::mcap) return ending->second;
   if (ending->second == Kind::aris && vendor != "aris")
     return refuse("such files hold frames of an ARIS, and this is a sonar of another kind: end the name in .mcap");
-  if (ending->second != Kind::aris && vendor != "oculus")
+  if (ending->second == Kind::sonar && vendor != "waterlinked")
+    return refuse("such files hold images of a Sonar 3D-15, and this is a sonar of another kind: end the name in .mcap");
+  if (ending->second == Kind::ping_log && vendor != "surveyor240" && vendor != "omniscan450")
+    return refuse(
+        "such files hold frames of a Surveyor or an Omniscan, and this is a sonar of another kind: end the name in .mcap");
+  const bool of_another_vendor =
+      ending->second == Kind::aris || ending->second == Kind::sonar || ending->second == Kind::ping_log;
+  if (!of_another_vendor && vendor != "oculus")
     return refuse("such files hold Oculus messages, and this is a sonar of another kind: end the name in .mcap");
   return ending->second;
 }
@@ -92,6 +103,10 @@ RecordingFile::RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, c
     writer_ = recording::write_oculus_log(std::move(counted));
   } else if (kind == Kind::aris) {
     writer_ = recording::write_aris_file(std::move(counted));
+  } else if (kind == Kind::sonar) {  // its datagrams, back to back
+    writer_ = recording::write_raw_dump(std::move(counted), recording::Carrier::datagram);
+  } else if (kind == Kind::ping_log) {
+    writer_ = recording::write_ping_log(std::move(counted));
   } else if (kind == Kind::raw_dump) {
     writer_ = recording::write_raw_dump(std::move(counted));
   } else {

@@ -113,7 +113,8 @@ TEST(Recording, RefusesOtherFiles) {
     return opened ? "" : opened.error().text;
   };
   EXPECT_EQ(text_of(""), "a file is empty");
-  EXPECT_THAT(text_of("hello"), HasSubstr("not a recording: expected an .oculus log, a raw dump, pcap, pcapng or MCAP"));
+  EXPECT_THAT(text_of("hello"),
+              HasSubstr("not a recording: expected an .oculus log, a raw dump, pcap, pcapng, MCAP, .aris, .sonar or .svlog"));
   EXPECT_THAT(text_of("SQLite format 3"), HasSubstr("version 2"));
   EXPECT_THAT(text_of("SO, it begins like a message"), HasSubstr("does not begin with an Oculus message"));
   const auto missing = open_recording("/no/such/recording");

@@ -1,0 +1,9 @@
+// .sonar files of any origin: their packets come out whole, wherever the search for the next one begins.
+#include "protocol/recording/sonar_file.hpp"
+#include "tests/fuzz/recording_fuzz.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace sonar;
+  fuzz::check_reader(recording::read_sonar_file(recording::source_from("input", fuzz::bytes_from(data, size))), size);
+  return 0;
+}

@@ -1,0 +1,96 @@
+// .svlog files: frames as sent, behind a JSON text.
+#include <gmock/gmock.h>
+
+#include "protocol/ping/messages.hpp"
+#include "protocol/recording/ping_log.hpp"
+#include "protocol/recording/recording.hpp"
+#include "tests/protocol/recording/recording_testing.hpp"
+
+namespace sonar::recording {
+namespace {
+
+TEST(PingLog, HoldsTheFramesBehindOneThatDescribesThem) {
+  Bytes file;
+  const auto writer = write_ping_log(sink_into(file));
+  const Bytes sent = ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{12, 1.5f});
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(writer->write({testing::start, Origin::device, Carrier::stream, sent}));
+  ASSERT_TRUE(writer->write({testing::start, Origin::device, Carrier::datagram, Bytes(7)}));
+  ASSERT_TRUE(writer->write({testing::start, Origin::client, Carrier::stream, Bytes(7)}));
+  ASSERT_TRUE(writer->close());
+  ping::Framer framer(65535);
+  framer.append(file);
+  std::vector<ping::Frame> frames;
+  while (auto frame = framer.next()) frames.push_back(std::move(*frame));
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(framer.waiting_bytes(), 0u);
+  EXPECT_EQ(frames[0].header.id, ping::Id::json_wrapper);
+  std::string text;
+  for (const std::byte b : frames[0].payload) text += static_cast<char>(b);
+  EXPECT_THAT(text, ::testing::HasSubstr("\"mbes24016\""));
+  EXPECT_EQ(frames[2].header.id, ping::Id::water_stats);
+}
+
+Bytes log_of(std::uint32_t pings) {
+  Bytes file;
+  const auto writer = write_ping_log(sink_into(file));
+  for (std::uint32_t i = 0; i < pings; ++i) {
+    ping::AttitudeReport attitude;
+    attitude.power_up_ms = 5000 + 100 * i;
+    for (const Bytes& frame : {ping::framed_message(ping::Id::attitude_report, 0, attitude),
+                               ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{12, 1.5f})})
+      EXPECT_TRUE(writer->write({testing::start, Origin::device, Carrier::stream, frame}));
+  }
+  EXPECT_TRUE(writer->close());
+  return file;
+}
+
+struct ReadBack {
+  std::vector<RecordedMessage> messages;
+  std::string damage;
+};
+ReadBack read_back(Bytes file) {
+  ReadBack read;
+  auto opened = open_recording(source_from("f", std::move(file)));
+  if (!opened) return {{}, opened.error().text};
+  EXPECT_EQ(opened->format, Format::ping_log);
+  for (int times = 0; times < 2; ++times, opened->reader->rewind()) {
+    read.messages.clear();
+    while (auto message = opened->reader->next()) read.messages.push_back(std::move(*message));
+    read.damage = opened->reader->damage() ? opened->reader->damage()->text : "";
+  }
+  return read;
+}
+
+TEST(PingLog, IsReadAsFramesWithTimesSincePowerUp) {
+  const ReadBack read = read_back(log_of(3));
+  EXPECT_EQ(read.damage, "");
+  ASSERT_EQ(read.messages.size(), 6u) << "without the text";
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(read.messages[i].at, Time(std::chrono::milliseconds(5000 + 100 * (i / 2))));
+    EXPECT_EQ(read.messages[i].bytes.size(), i % 2 == 0 ? 46u : 18u);
+  }
+}
+
+TEST(PingLog, CutOrDamagedSaysWhere) {
+  const Bytes whole = log_of(3);
+  const std::size_t text = whole.size() - 3 * 64;
+  const auto bytes = [](std::size_t from, std::size_t to) {
+    return "f: bytes " + std::to_string(from) + " to " + std::to_string(to) + " are no whole frame";
+  };
+  ReadBack read = read_back(Bytes(whole.begin(), whole.end() - 5));
+  EXPECT_EQ(read.messages.size(), 5u);
+  EXPECT_EQ(read.damage, bytes(text + 174, whole.size() - 6));
+  Bytes file = whole;
+  file[text + 64 + 20] ^= std::byte{1};
+  read = read_back(file);
+  EXPECT_EQ(read.messages.size(), 5u);
+  EXPECT_EQ(read.damage, bytes(text + 64, text + 109));
+  file[text + 2] = std::byte{0xFF};  // a length beyond the end hides nothing
+  file[text + 3] = std::byte{0xFF};
+  EXPECT_EQ(read_back(file).damage, bytes(text, text + 45) + "; 1 more such places");
+  EXPECT_THAT(read_back(Bytes(3, std::byte{'B'})).damage, ::testing::HasSubstr("is not a recording"));
+  EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "one sonar without a name";
+}
+
+}  // namespace
+}  // namespace sonar::recording
