@@ -126,7 +126,9 @@ class SonarJudge {
     std::string last;
     if (!gone.address().empty())
       last = "; the last one, " + gone.address() + ", left at " + utc_text(gone.utc_ns()) + ": " + gone.why();
-    const std::string cure = "point a driver at " + where_to_connect(sonar_);
+    const std::string cure = sonar_.profile().starts_with("waterlinked-")
+                                 ? "post true to /acoustics/enabled and a mode to /udp of " + sonar_.advertised()
+                                 : "point a driver at " + where_to_connect(sonar_);
     add(Level::warn, "driver",
         "No driver is connected to " + sonar_.name() +
             (sonar_.preview() ? "; pings are a preview for viewers alone" : "; nothing is simulated without one") + last,

@@ -137,8 +137,10 @@ wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, c
   fixed.header.source = device.id;
   fixed.header.version = reply_version(fire, text_option(device.options, option_name::reply_version));
   fixed.sound_speed_mps = sound_speed_used(fire.settings, settings);
-  fixed.fire = echo_of(fire.settings, text_option(device.options, option_name::gain_echo), fixed.sound_speed_mps);
-  if (settings.gain_assist) fixed.fire.gain_percent = static_cast<double>(settings.gain_db) / db_per_percent;
+  const std::string_view gain_echo = text_option(device.options, option_name::gain_echo);
+  fixed.fire = echo_of(fire.settings, gain_echo, fixed.sound_speed_mps);
+  if (settings.gain_assist && gain_echo == "used")
+    fixed.fire.gain_percent = static_cast<double>(settings.gain_db) / db_per_percent;
   fixed.extension = fire.extension;
   fixed.ping_id = static_cast<std::uint32_t>(ping.request.number);
   fixed.frequency_hz = ping.mode().centre_hz;
@@ -156,8 +158,10 @@ wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, c
   assert(ping.samples.size() * 8 ==
          std::size_t{fixed.row_count} * fixed.beam_count * static_cast<unsigned>(settings.format.bits));
   assert(!settings.format.row_gains || ping.row_gain.size() == fixed.row_count);
-  const std::span<const std::uint32_t> gains = settings.format.row_gains ? ping.row_gain : std::span<const std::uint32_t>{};
-  return encode_ping(std::move(head), {bearings, gains, ping.samples});
+  if (!settings.format.row_gains) return encode_ping(std::move(head), {bearings, {}, ping.samples});
+  if (text_option(device.options, option_name::row_gain) == "tvg")
+    return encode_ping(std::move(head), {bearings, ping.row_gain, ping.samples});
+  return encode_ping(std::move(head), {bearings, digital_row_gains(settings), ping.samples});
 }
 
 }  // namespace sonar::oculus

@@ -43,9 +43,10 @@ void fit_to_recording(ReceiverModel& receiver) {
   receiver.noise_width = 0.66f / 0.9f;
   // Small echoes within 0.5 m are 3 beams wide at half their amplitude ahead, 5 to 7 at 20 degrees.
   receiver.defocus = 0.4f;
-  // The noise of rows 620 to 702 and 20 to 150, and its neighbouring beams.
-  receiver.profile.noise_db = {-4.8f, -3.8f, -1.6f, 0.4f, 1.8f, 1.0f, -1.0f, -3.2f, -4.3f};
-  receiver.profile.near_noise_db = {11, 4, -5, -12, -14, -13, -6, 2, 10};
+  // The noise of rows 620 to 702, with a stripe in the middle, of rows 20 to 150, and its neighbouring beams.
+  receiver.profile.noise_db = {-4.8f, -5.5f, -3.6f, -2.3f, -1.7f, 0.3f,  -0.1f, 0.7f, 2.6f,
+                               0.7f,  0.1f,  -0.1f, -1.0f, -2.7f, -2.9f, -4.3f, -4.5f};
+  receiver.profile.near_noise_db = {11, 7.5f, 4, -0.5f, -5, -8.5f, -12, -13, -14, -13.5f, -13, -9.5f, -6, -2, 2, 6, 10};
   receiver.profile.near_m = 0.25f;
   receiver.profile.blend = {-0.1f, 0.07f, 0.1f, 0.13f, 0.13f, 0.13f, 0.13f, 0.06f, -0.1f};
   // The medians of rows 0 to 8: it rings, with a null in row 2. By half a row.

@@ -7,19 +7,25 @@
 namespace sonar::oculus {
 namespace {
 
-const std::array<protocol::Option, 21> option_rows{{
+const std::array<protocol::Option, 22> option_rows{{
     {option_name::before_first_fire,
      {"dummies", "pings"},
      "dummies",
      "what a client gets before its first fire message; pings use the stored configuration and version 0"},
     {option_name::gain_echo,
-     {"auto", "verbatim", "mapped"},
+     {"auto", "verbatim", "mapped", "used"},
      "auto",
-     "gain in the echo: auto = 40 + 0.6 g in mode 2 with flag bit 4 clear, mapped = in mode 2 always, verbatim = never"},
+     "gain in the echo: auto = 40 + 0.6 g in mode 2 with flag bit 4 clear, mapped = in mode 2 always, verbatim = never; "
+     "used = as auto, but with gain assist the gain used, which no client expects"},
     {option_name::gain_assist,
-     {"off", "flag_set", "flag_clear"},
-     "off",
-     "which state of flag bit 4 leaves the gain to the device; its echo is then the gain used, which no client expects"},
+     {"flag_set", "flag_clear", "off"},
+     "flag_set",
+     "which state of flag bit 4 leaves the gain to the device"},
+    {option_name::row_gain,
+     {"digital", "tvg"},
+     "digital",
+     "what row gains state: digital = the gain used + 20 log r, tvg = the time-varied gain over that of the first row, which "
+     "samples over its root undo"},
     {option_name::pulse,
      {"rows", "native"},
      "rows",

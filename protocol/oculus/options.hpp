@@ -13,7 +13,7 @@ namespace sonar::oculus {
 
 namespace option_name {
 inline constexpr std::string_view before_first_fire = "before_first_fire", gain_echo = "gain_echo", gain_assist = "gain_assist",
-                                  pulse = "pulse", ping_start_time_unit = "ping_start_time_unit",
+                                  row_gain = "row_gain", pulse = "pulse", ping_start_time_unit = "ping_start_time_unit",
                                   honour_network_speed = "honour_network_speed", reply_version = "reply_version",
                                   out_of_range = "out_of_range", user_config_write = "user_config_write",
                                   status_bit7 = "status_bit7", row_rate_hz = "row_rate_hz", row_origin = "row_origin",

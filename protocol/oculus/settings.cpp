@@ -108,8 +108,19 @@ bool asks_for_gain_assist(const FireSettings& fire, std::string_view option) {
 
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo) {
   const bool high_frequency = fire.mode == 2;
-  const bool mapped = gain_echo == "mapped" || (gain_echo == "auto" && (fire.flags & flag::gain_assist) == 0);
+  const bool mapped = gain_echo == "mapped" || (gain_echo != "verbatim" && (fire.flags & flag::gain_assist) == 0);
   return high_frequency && mapped ? 40 + 0.6 * fire.gain_percent : fire.gain_percent;
+}
+
+std::vector<std::uint32_t> digital_row_gains(const PingSettings& settings) {
+  std::vector<std::uint32_t> gains;
+  gains.reserve(static_cast<std::size_t>(settings.range_bin_count));
+  for (int row = 0; row < settings.range_bin_count; ++row) {
+    const double spreading_db = settings.tvg ? 20 * std::log10(std::max(settings.range_of_row(row), row_gain_from_m)) : 0;
+    const double gain = std::pow(10, (static_cast<double>(settings.gain_db) + spreading_db) / 10);
+    gains.push_back(static_cast<std::uint32_t>(std::clamp(std::round(gain), 1.0, 4294967295.0)));
+  }
+  return gains;
 }
 
 bool has_non_finite(const FireSettings& fire) {

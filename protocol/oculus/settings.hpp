@@ -15,6 +15,7 @@ namespace sonar::oculus {
 inline constexpr double row_rate_hz = 37.5e6 / 143.0;
 inline constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus issue 13: 0-100 % is 0-96 dB
 inline constexpr int row_limit = 720;             // liboculus node README, measured by its authors
+inline constexpr double row_gain_from_m = 0.58;   // fitted to FIL's row gains, docs/protocols/oculus.md, 5.2
 inline constexpr double native_pulse_m = 0.0025;  // the finest range resolution the data sheets quote
 
 /// Rows of a ping (docs/protocols/oculus.md, 5.4): c / (2 fs) doubled until at most 720 rows cover the range.
@@ -36,6 +37,10 @@ double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo)
 
 /// Option gain_assist: which state of flag bit 4, if any, leaves the gain to the device.
 bool asks_for_gain_assist(const FireSettings& fire, std::string_view option);
+
+/// Row gains of option `row_gain: digital`: the power gain 10^((gain_db + 20 log r) / 10), r at least row_gain_from_m, in 1 to
+/// 2^32 - 1. 32-bit samples have no time-varied gain: 10^(gain_db / 10).
+std::vector<std::uint32_t> digital_row_gains(const PingSettings& settings);
 
 /// True when a double of the message is NaN or infinite: the message must be ignored.
 bool has_non_finite(const FireSettings& fire);

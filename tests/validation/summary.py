@@ -154,8 +154,10 @@ CASES_TITLE = """
 
 """
 PICTURE = """
+Which of its points above 60 % come from what: [acoustics](acoustics.MD), section 9.
+
 ![A recorded ping and ours](validation/capture.png)
-"""
+""".replace(".MD", ".md")  # as above
 ORACLES_TITLE = """
 ## Oracles
 

@@ -144,6 +144,12 @@ def interval(right, places):
     return right.mean(), *np.percentile(means, (2.5, 97.5))
 
 
+def by_rows(right, places):
+    """First and last row of each band of patches, and the share that is right there."""
+    return [(PATCH * first, PATCH * last - 1, right[(places[:, 1] >= first) & (places[:, 1] < last)].mean())
+            for first, last in ((0, 3), (3, 7), (7, 14), (14, comparison.ROWS // PATCH))]
+
+
 def only(patch_set, first, last):
     return patch_set[0][:, first:last], patch_set[1]
 
@@ -169,21 +175,23 @@ def render(program, seed, scene=comparison.SCENE):
 
 
 def results(captured, ours, others):
-    """Rows of the table: name, accuracy, its interval; and the features that tell most."""
+    """Rows of the table: name, accuracy, its interval; the features that tell most; and the first row's accuracy by rows."""
     import numpy as np
 
     sets = [patches(p) for p in (captured, ours, others)]
     names = sets[0][2]
     texture = len(names) - LEVELS
-    rows = []
+    rows, bands = [], None
     for name, first, features, second, unseen in (
             ("unseen sector, texture", 1, texture, 0, 2), ("unseen sector, all features", 1, len(names), 0, 2),
             ("unseen ping, texture", 1, texture, 0, 0), ("unseen ping, all features", 1, len(names), 0, 0),
             ("control: sonard against sonard, unseen sector, texture", 1, texture, 2, 2)):
         a, b = (only(sets[i], 0, features) for i in (first, second))
-        rows.append((name, *interval(told_apart(a, b, unseen), np.vstack([a[1], b[1]]))))
+        right, places = told_apart(a, b, unseen), np.vstack([a[1], b[1]])
+        bands = bands or by_rows(right, places)
+        rows.append((name, *interval(right, places)))
     best = best_features(only(sets[1], 0, texture), only(sets[0], 0, texture), names[:texture])
-    return rows, best
+    return rows, best, bands
 
 
 INTRODUCTION = f"""## Can a classifier tell?
@@ -198,9 +206,10 @@ the patches' places.
 
 
 def chapter(program, captures):
-    rows, best = results(comparison.images_of_capture(captures), render(program, SEEDS[0]), render(program, SEEDS[1]))
+    rows, best, bands = results(comparison.images_of_capture(captures), render(program, SEEDS[0]), render(program, SEEDS[1]))
     text = INTRODUCTION
     text += "".join(f"| {name} | {100 * mean:.1f} | {100 * low:.1f} to {100 * high:.1f} |\n" for name, mean, low, high in rows)
+    text += "\nOf the first, by rows: " + "; ".join(f"{first} to {last} {100 * share:.0f} %" for first, last, share in bands) + ".\n"
     text += "\nWhat gives the picture away most, each feature alone with its best threshold:\n\n"
     text += "| feature | right, % | captured, median | sonard, median |\n|---|---|---|---|\n"
     return text + "".join(f"| {name} | {100 * share:.1f} | {real:.3g} | {ours:.3g} |\n" for share, name, real, ours in best)

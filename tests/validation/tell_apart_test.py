@@ -54,12 +54,14 @@ class Classifier(unittest.TestCase):
 
     def test_tells_what_differs_and_no_more(self):
         with mock.patch.object(tell_apart, "TREES", 20):
-            rows, best = tell_apart.results(pings(1, smooth=True), pings(2), pings(3))
+            rows, best, bands = tell_apart.results(pings(1, smooth=True), pings(2), pings(3))
         shares = {name: (low, high) for name, _, low, high in rows}
         self.assertGreater(shares["unseen sector, texture"][0], 0.95)
         low, high = shares["control: sonard against sonard, unseen sector, texture"]
         self.assertTrue(low - 0.05 < 0.5 < high + 0.05, (low, high))
         self.assertGreater(best[0][0], 0.95)
+        self.assertEqual([band[:2] for band in bands], [(0, 95), (96, 223), (224, 447), (448, 671)])
+        self.assertTrue(all(share > 0.9 for *_, share in bands), bands)
 
 
 if __name__ == "__main__":

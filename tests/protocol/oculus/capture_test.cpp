@@ -4,6 +4,7 @@
 #include <fstream>
 #include <optional>
 
+#include "core/sonar/gain_assist.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
 namespace sonar::oculus::testing {
@@ -108,6 +109,17 @@ TEST_F(Capture, OurDeviceAnswersTheSameRequestAlike) {
   EXPECT_EQ(mine.row_count, real.row_count);
   EXPECT_EQ(mine.range_resolution_m, real.range_resolution_m);
   EXPECT_NEAR(mine.frequency_hz, real.frequency_hz, 0.2);
+}
+
+// docs/protocols/oculus.md, 5.2: the third ping is near the level that the first two were fitted to.
+TEST_F(Capture, IsAsBrightAsGainAssistWouldMakeIt) {
+  for (const DecodedPing& received : pings_) {
+    Ping ping;
+    ping.request.settings.format = {.bits = 8, .max_code = 254};
+    for (std::size_t row = 0; row < received.rows(); ++row)
+      ping.samples.insert(ping.samples.end(), received.row_samples(row).begin(), received.row_samples(row).end());
+    EXPECT_NEAR(percentile_of_full_scale(ping), assisted_level, 0.015);
+  }
 }
 
 TEST_F(Capture, SamplesSaturateAt254) {

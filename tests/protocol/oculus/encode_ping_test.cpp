@@ -50,11 +50,13 @@ TEST(EncodePing, RangeIsEchoedVerbatimEvenWhenClamped) {
   EXPECT_NEAR(ping.head.fixed.range_resolution_m * static_cast<double>(ping.rows()), 10, 0.05);
 }
 
-TEST(EncodePing, WithGainAssistTheEchoIsTheGainUsed) {
+TEST(EncodePing, GainAssistFollowsTheFlagAndEchoesTheRequest) {
   const FireRequest set = fire(0, 2, PingRate::hz10, 0x19, 2, 50), clear = fire(0, 2, PingRate::hz10, 0x09, 2, 50);
   const auto assisted = [](const char* option, const FireRequest& request) {
     return resolve(request, device("oculus-m1200d", {{"gain_assist", option}})).settings.gain_assist;
   };
+  EXPECT_TRUE(resolve(set, device()).settings.gain_assist) << "the default, as in the capture";
+  EXPECT_FALSE(resolve(clear, device()).settings.gain_assist);
   EXPECT_FALSE(assisted("off", set));
   EXPECT_FALSE(assisted("off", clear));
   EXPECT_TRUE(assisted("flag_set", set));
@@ -63,9 +65,30 @@ TEST(EncodePing, WithGainAssistTheEchoIsTheGainUsed) {
   FireRequest scientific = fire(2, 2, PingRate::hz10, 0x19, 2, 50);
   scientific.extension.flags = flag::extended_32_bit;
   EXPECT_FALSE(assisted("flag_set", scientific));
-  const auto state = device("oculus-m1200d", {{"gain_assist", "flag_set"}});
-  const DecodedPing ping = answer(state, set);
-  EXPECT_NEAR(ping.head.fixed.fire.gain_percent, 50, 1e-5);
+  const auto echoed = [&](const char* gain_echo) {
+    const auto state = device("oculus-m1200d", {{"gain_echo", gain_echo}});
+    Ping ping = made_up_ping(state, resolve(set, state).settings);
+    ping.request.settings.gain_db = 72;
+    return decode_ping(encode_ping(ping, state, set)).value().head.fixed.fire.gain_percent;
+  };
+  EXPECT_EQ(echoed("auto"), 50) << "the capture has 50 % and flag bit 4";
+  EXPECT_NEAR(echoed("used"), 75, 1e-5);
+}
+
+// FIL's M750d at 6 m and 50 %: row gains from 21 260 to 1 922 146.
+TEST(EncodePing, RowGainsAreDigitalOrUndoTheTvg) {
+  const FireRequest request = fire(0, 2, PingRate::hz10, 0x5D, 6, 50);
+  const DecodedPing digital = answer(device("oculus-m750d"), request);
+  EXPECT_NEAR(digital.row_gains.front(), 21260, 100);
+  EXPECT_NEAR(10 * std::log10(digital.row_gains.back() / 1922146.0), 0, 1) << "dB";
+  EXPECT_TRUE(std::is_sorted(digital.row_gains.begin(), digital.row_gains.end()));
+  EXPECT_EQ(answer(device("oculus-m750d", {{"row_gain", "tvg"}}), request).row_gains[4], 5u) << "those of the ping";
+
+  const DecodedPing none = answer(device(), fire(0, 1, PingRate::hz10, 0x4D, 6, 0));
+  EXPECT_EQ(none.row_gains.front(), 1u) << "never 0: clients divide by the root";
+  FireRequest scientific = fire(2, 1, PingRate::hz10, 0x4D, 6, 100);
+  scientific.extension.flags = flag::extended_32_bit;
+  for (const std::uint32_t gain : answer(device(), scientific).row_gains) EXPECT_NEAR(gain, 3.981e9, 1e6) << "96 dB";
 }
 
 TEST(EncodePing, GainEchoFollowsTheOption) {
