@@ -8,6 +8,7 @@
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/scattering_law.hpp"
 #include "core/scene/shapes/primitives.hpp"
+#include "core/sonar/range_image.hpp"
 #include "daemon/commands/render/resolution_cell.hpp"
 #include "daemon/commands/render/sonar_keys.hpp"
 
@@ -202,6 +203,8 @@ std::vector<RenderJob> shipped_sonars_over_a_bed() {
         if (std::any_of(jobs.begin(), jobs.end(), [&](const RenderJob& other) { return acoustically_equal(job, other); }))
           continue;
         job.scene = level_bed(2.5 * job.settings.range_m);
+        // Coverage is of a fan's beams.
+        if (range_image_of(make_request(job, world_of(job), PingNumber{1}, Time{})) != nullptr) continue;
         jobs.push_back(std::move(job));
       }
   return jobs;

@@ -39,7 +39,8 @@ bool is_of_a_ping(const path& file) {
   const std::string name = file.filename().string();
   const bool digits =
       name.size() > 6 && std::all_of(name.begin(), name.begin() + 6, [](unsigned char c) { return std::isdigit(c); });
-  constexpr std::string_view ends[] = {"_pressure.npy", "_samples.npy", "_beams.npy", "_samples.raw", ".png", ".json"};
+  constexpr std::string_view ends[] = {"_pressure.npy", "_samples.npy", "_beams.npy",   "_samples.raw", "_labels.npy",
+                                       "_share.npy",    "_caster.npy",  "_labels.json", ".png",         ".json"};
   return digits && std::any_of(std::begin(ends), std::end(ends), [&](std::string_view end) { return name.substr(6) == end; });
 }
 
@@ -80,6 +81,10 @@ Result<void> make_way(const OutputOptions& o, const std::string& digest) {
   const bool is_known = !inputs.empty();
   if (!is_known && std::filesystem::exists(about, ec))
     return failure(ErrorKind::usage, about.string() + " was not written by sonard, and is not overwritten; choose another --out");
+  if (const path objects = o.folder / "objects.json"; o.labels && !is_known && std::filesystem::exists(objects, ec))
+    return failure(ErrorKind::usage, objects.string() +
+                                         " may not be from sonard: the folder has no render.json; it is not overwritten: choose "
+                                         "another --out");
   const auto others = pings_in(o.folder);
   if (!others) return tl::make_unexpected(others.error());
   if (!is_known && others->empty()) return {};
@@ -139,6 +144,8 @@ std::vector<path> OutputFolder::files_of(std::uint64_t number) const {
   if (options_.npy) files.push_back(with("_samples.npy"));
   if (options_.complex) files.push_back(with("_beams.npy"));
   if (options_.raw) files.push_back(with("_samples.raw"));
+  if (options_.labels)
+    for (const char* end : {"_labels.npy", "_share.npy", "_caster.npy", "_labels.json"}) files.push_back(with(end));
   if (options_.png) files.push_back(with(".png"));
   files.push_back(with(".json"));
   return files;

@@ -15,7 +15,7 @@ namespace sonar::render {
 
 struct OutputOptions {
   std::filesystem::path folder;
-  bool npy = true, png = true, raw = false, complex = false;
+  bool npy = true, png = true, raw = false, complex = false, labels = false;
   bool rings = true;                   // in pictures
   int batch = 1;                       // pings that are made before they are written, by all threads at once
   bool overwrite = false;              // pings of other inputs in the folder are removed

@@ -162,6 +162,7 @@ OutputOptions output_options(const RenderCommand& command) {
   options.png = wanted("png");
   options.raw = wanted("raw");
   options.complex = command.complex;
+  options.labels = command.labels;
   options.overwrite = command.overwrite;
   options.rings = command.image_rings != "off";
   options.batch = command.batch;

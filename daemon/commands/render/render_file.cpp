@@ -122,6 +122,7 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   read_sonar(root.optional("sonar"), job);
   root.optional("sweep").map().entries();
   root.optional("let").map().entries();
+  for (const char* key : {"dataset", "vary", "constraints", "counts"}) root.optional(key);  // of a data set's job
   job.expectations = read_expectations(root.optional("expect"));
   if (auto error = document->finish()) return tl::make_unexpected(*error);
   auto scene = read_scene_of(scene_node, folder, job.name, *document);
@@ -223,11 +224,18 @@ Result<RenderInput> load_render_input(const std::filesystem::path& file, const s
   if (!outline) return tl::make_unexpected(outline.error());
   Map root = outline->root();
   if (is_scene(root)) return failure(ErrorKind::config, what_to_do_with_a_scene(file));
+  if (root.has("dataset"))
+    return failure(ErrorKind::config,
+                   file.string() + " is the job of a data set: sonard dataset " + file.string() + " --out DIR");
   const bool is_config = root.has("world");
   if (!is_config && !sonar.empty())
     return failure(ErrorKind::usage, "--sonar is for configurations; " + file.string() + " is a render file");
   auto input = is_config ? from_config(file, *text, sonar) : parse_render_file(*text, file.string(), file.parent_path());
   if (!input) return input;
+  if (const Node scene = root.optional("scene"); !is_config && scene.present() && !scene.is_map()) {
+    const SceneFile its = read_scene_file(scene, file.parent_path());
+    if (const auto more = its.built_in ? Result<std::string>{} : text_of_file(its.path)) input->text += *more;
+  }
   const bool wants_motion =
       root.optional("engine").map().optional("motion").choice_or<bool>(false, {{"on", true}, {"off", false}});
   for (RenderJob& job : input->jobs) job.wants_motion = wants_motion;

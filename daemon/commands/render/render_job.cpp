@@ -20,6 +20,22 @@ PingSettings device_settings(const RenderJob& job) {
   return job.sonar().profile.vendor->initial_settings(device).settings;
 }
 
+namespace {
+
+/// As the device keeps them in the job's mode: they say whether its ping is a range image.
+std::shared_ptr<const VendorSettings> vendor_settings(const RenderJob& job) {
+  const protocol::Vendor* const vendor = job.sonar().profile.vendor;
+  if (vendor == nullptr) return nullptr;
+  protocol::DeviceState device = device_state(job.sonar(), job.config, Time{});
+  device.settings = vendor->initial_settings(device).vendor_settings;
+  protocol::SettingsOverride wanted;
+  wanted.mode = static_cast<std::uint32_t>(job.settings.mode);
+  const auto change = vendor->apply_override(wanted, device);
+  return change ? change->vendor_settings : device.settings;
+}
+
+}  // namespace
+
 std::string note_of_range(const RenderJob& job) {
   constexpr double rounding = 1 + 1e-6;
   const double least_m = static_cast<double>(job.mode().min_range_m), most_m = static_cast<double>(job.mode().max_range_m);
@@ -57,6 +73,7 @@ PingRequest make_request(const RenderJob& job, const World& world, PingNumber nu
   request.model = sonar.profile.model;
   request.number = number;
   request.settings = job.settings;
+  request.vendor_settings = vendor_settings(job);
   request.sonar_id = static_cast<std::uint32_t>(job.sonar_index);
   return request;
 }

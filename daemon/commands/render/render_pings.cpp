@@ -7,8 +7,10 @@
 #include <stdexcept>
 
 #include "core/image/draw_fan.hpp"
+#include "core/pipeline/labelling_engine.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "core/text/format.hpp"
+#include "daemon/commands/render/label_json.hpp"
 #include "daemon/commands/render/npy.hpp"
 #include "daemon/commands/render/sidecar.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
@@ -38,6 +40,7 @@ struct MadePing {
   PingRequest request;
   Ping ping;
   PingStatistics count;
+  PingLabels labels;
   Result<std::uint64_t> written = std::uint64_t{0};  // bytes
 };
 
@@ -62,6 +65,14 @@ Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, con
   put(o.complex, "_beams.npy", npy_header("<c8", {rows * static_cast<std::size_t>(s.samples_per_row), beams}),
       std::as_bytes(std::span(ping.beam_signal_upa)));
   put(o.raw, "_samples.raw", {}, ping.samples);
+  const PingLabels& labels = made.labels;
+  put(o.labels, "_labels.npy", npy_header("<u2", {rows, beams}), std::as_bytes(std::span(labels.instance)));
+  put(o.labels, "_share.npy", npy_header("|u1", {rows, beams}), std::as_bytes(std::span(labels.share)));
+  put(o.labels, "_caster.npy", npy_header("<u2", {rows, beams}), std::as_bytes(std::span(labels.caster)));
+  if (o.labels) {
+    const nlohmann::json words{{"layout", layout_of(ping)}, {"annotations", annotations_of(labels, ping, *job.scene)}};
+    put(true, "_labels.json", words.dump(1) + "\n", {});
+  }
   if (done && o.png) done = write_picture(ping, o.rings, stem + ".png");
   if (done)
     done = write_output(stem + ".json", {bytes_of(sidecar(job, ping, engine, made.count, folder.digest()).dump(1) + "\n")});
@@ -69,9 +80,11 @@ Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, con
   return folder.size_of(made.number);
 }
 
-Result<std::unique_ptr<PingEngine>> engine_for(const RenderJob& job, Parallel& pool) {
-  const auto make = [&](std::shared_ptr<const Scene> s) {
-    return choose_engine(job.config.engine.device, std::move(s), pool, {.simd = job.config.engine.simd},
+Result<std::unique_ptr<PingEngine>> engine_for(const RenderJob& job, Parallel& pool, bool labels) {
+  const auto make = [&](std::shared_ptr<const Scene> s) -> std::unique_ptr<PingEngine> {
+    const EngineOptions options{.simd = job.config.engine.simd};
+    if (labels) return std::make_unique<LabellingEngine>(std::move(s), pool, options);
+    return choose_engine(job.config.engine.device, std::move(s), pool, options,
                          [](const std::string& what) { std::fprintf(stderr, "sonard: %s\n", what.c_str()); });
   };
   return start_engine(make, job.scene);
@@ -86,7 +99,7 @@ class JobRun {
       : source_(source), job_(job), folder_(folder), pool_(pool), progress_(progress), on_progress_(on_progress) {}
 
   Result<void> make(std::uint64_t number, PingRequest request) {
-    batch_.push_back({number, std::move(request), {}, {}, {}});
+    batch_.push_back({number, std::move(request), {}, {}, {}, {}});
     return batch_.size() < static_cast<std::size_t>(folder_.options().batch) ? Result<void>{} : take_turns();
   }
   /// One that is there already ends a batch.
@@ -119,7 +132,7 @@ class JobRun {
   }
   Result<void> submit() {
     if (!engine_) {  // not before it is needed: a finished folder costs no scene
-      auto started = engine_for(job_, pool_);
+      auto started = engine_for(job_, pool_, folder_.options().labels);
       if (!started) return tl::make_unexpected(started.error());
       engine_ = *std::move(started);
     }
@@ -134,6 +147,8 @@ class JobRun {
     for (std::size_t i = 0; i < batch_.size(); ++i) {
       batch_[i].ping = std::move(pings.at(i));
       batch_[i].count = counts.at(i);
+      if (const auto* labelling = dynamic_cast<const LabellingEngine*>(engine_.get()))
+        batch_[i].labels = labelling->labels().at(i);
     }
     const std::string description = engine_->description();  // of all: what a device that fails had begun is made again
     pool_.for_each(batch_.size(),
@@ -233,6 +248,11 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
   }
   const auto folder = OutputFolder::claim(input, o, digest_of(input, o.rate_hz.value_or(0), o.png && !o.rings));
   if (!folder) return tl::make_unexpected(folder.error());
+  if (o.labels) {
+    const std::string objects = instances_of(*input.jobs.front().scene).dump(1) + "\n";
+    if (const auto done = write_output(o.folder / "objects.json", {bytes_of(objects)}); !done)
+      return tl::make_unexpected(done.error());
+  }
   std::uint64_t number = o.first;
   for (std::size_t j = 0; j < input.jobs.size(); ++j) {
     const RenderJob& job = input.jobs[j];

@@ -143,7 +143,7 @@ void add_way(Sha256& hash, const std::shared_ptr<const motion::Trajectory>& way,
 
 void add_scene(Sha256& hash, const Scene& scene) {
   for (const Object& o : scene.objects) {
-    add(hash, {o.name, o.visible, json_of(o.in_world)});
+    add(hash, {o.name, o.label, o.visible, json_of(o.in_world)});
     hash.add(std::as_bytes(std::span(o.mesh->vertices)));
     hash.add(std::as_bytes(std::span(o.mesh->triangles)));
     hash.add(std::as_bytes(std::span(o.mesh->material)));

@@ -1,0 +1,31 @@
+// What a drawn ping must fulfil, by geometry alone: no ray is traced, so occlusion is left to the labels.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "core/sonar/ping.hpp"
+#include "daemon/commands/dataset/dataset_job.hpp"
+
+namespace sonar::dataset {
+
+/// By name, by the name its instances share, or by label.
+bool is_named(const Object& object, const std::string& name);
+/// All that is_named() knows in a scene.
+std::set<std::string> names_of(const Scene& scene);
+/// A sentence about a name that the scene does not have; else empty.
+std::string why_unknown(const Constraints& constraints, const std::vector<std::string>& targets, const Scene& scene);
+
+/// How often each constraint was not met.
+struct Unmet {
+  int in_view = 0, above_bed = 0, no_overlap = 0;
+  std::string sentence() const;
+};
+
+/// in_view: of each name one visible object has the middle of its box in the fan. above_bed: so are the middles of all visible
+/// ones, and the sonar. no_overlap: the boxes along the world's axes of all visible ones are apart. Hidden objects meet all.
+bool meets(const Constraints& constraints, const PingRequest& request, const Scene& scene, Unmet& unmet);
+
+}  // namespace sonar::dataset

@@ -1,0 +1,74 @@
+// A data set's job: a render file (docs/render.md) that varies its values from ping to ping, and the ping that each number stands
+// for. A ping is a function of the job's text, the files it names and its number.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/commands/dataset/vary.hpp"
+#include "daemon/commands/render/render_job.hpp"
+
+namespace sonar::dataset {
+
+struct Constraints {
+  // Names or labels of objects; above_bed also takes "sonar".
+  std::vector<std::string> in_view, above_bed, no_overlap;
+  std::string bed;  // the object that above_bed is about
+  std::uint32_t tries = 100;
+};
+
+struct DatasetJob {
+  std::string source, text;
+  std::filesystem::path folder;  // where the paths in it begin
+  std::string name, about, license;
+  Seed seed{};
+  std::uint64_t pings = 0, shard_pings = 1024;
+  double negatives = 0;              // share of the pings without targets
+  std::vector<std::string> targets;  // names or labels
+  bool fan = false;                  // also a picture of each ping
+  std::vector<Variation> variations;
+  Constraints constraints;
+
+  std::uint64_t shards() const { return (pings + shard_pings - 1) / shard_pings; }
+};
+
+/// Errors: file:line:col: key.path: what is wrong.
+Result<DatasetJob> load_job(const std::filesystem::path& file);
+Result<DatasetJob> parse_job(std::string text, const std::string& name, const std::filesystem::path& folder);
+
+/// A file that a job names.
+struct NamedFile {
+  std::string word;            // as it is named
+  std::filesystem::path file;  // below the folder of what names it
+  std::string digest;          // SHA-256; "unreadable"
+};
+/// All, whichever ping draws them, and those that the YAML among them names: words of the text that are files.
+std::vector<NamedFile> named_files(const DatasetJob& job);
+
+/// A ping that met the constraints.
+struct DrawnPing {
+  render::RenderJob job;
+  Draws draws;
+  std::uint32_t attempt = 0;
+  bool negative = false;
+  std::string scene_key;                     // scenes of equal keys are equal
+  std::shared_ptr<const Scene> whole_scene;  // before counts and a negative hide some of its objects
+};
+
+/// Draws until the constraints are met. config: they never are, with what they were; what the filled file has wrong. `known`: a
+/// scene that has been read, for the pings that have the same.
+struct KnownScene {
+  std::string key;
+  std::shared_ptr<const Scene> scene;
+};
+Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const KnownScene& known = {});
+
+/// Everything the ping depends on.
+PingRequest request_of(const DrawnPing& ping, std::uint64_t number);
+
+}  // namespace sonar::dataset

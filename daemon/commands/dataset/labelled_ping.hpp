@@ -1,0 +1,50 @@
+// One ping of a data set as the files it has in a shard.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/parallel.hpp"
+#include "core/base/result.hpp"
+#include "core/image/raster.hpp"
+#include "core/pipeline/labelling_engine.hpp"
+#include "daemon/commands/dataset/dataset_job.hpp"
+
+namespace sonar::dataset {
+
+struct LabelledPing {
+  std::vector<std::pair<std::string, std::vector<std::byte>>> files;  // ending and contents
+  nlohmann::json annotations;                                         // of render::annotations_of
+  nlohmann::json pixels;                                              // samples by class
+  int width = 0, height = 0;                                          // beams, rows
+  bool negative = false;
+};
+
+/// Makes pings one after the other on one thread; keeps the engine while the scene stays the same.
+class PingMaker {
+ public:
+  /// `simd`: instead of the job's.
+  PingMaker(const DatasetJob& job, std::string inputs, std::optional<SimdLevel> simd)
+      : job_(job), inputs_(std::move(inputs)), simd_(simd) {}
+  Result<LabelledPing> make(std::uint64_t number);
+  /// The fan alone, without rings; nothing of a ping of one beam.
+  Result<std::optional<Raster>> picture(std::uint64_t number, int width_px);
+
+ private:
+  Result<DrawnPing> compute(std::uint64_t number, Ping& ping);
+
+  const DatasetJob& job_;
+  std::string inputs_;
+  std::optional<SimdLevel> simd_;
+  Parallel one_{1};
+  KnownScene known_;
+  std::string engine_key_;
+  std::unique_ptr<LabellingEngine> engine_;
+};
+
+}  // namespace sonar::dataset

@@ -1,0 +1,363 @@
+#include "daemon/commands/dataset/make_dataset.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "core/base/parallel.hpp"
+#include "core/pipeline/simd/kernels.hpp"
+#include "core/text/format.hpp"
+#include "daemon/commands/dataset/labelled_ping.hpp"
+#include "daemon/commands/dataset/shards.hpp"
+#include "daemon/commands/render/sidecar.hpp"
+#include "daemon/commands/render/sonar_version.hpp"
+
+namespace sonar::dataset {
+namespace {
+
+using nlohmann::json;
+using std::filesystem::path;
+
+constexpr std::uint64_t pings_a_thread = 4;  // of a batch: they wait in memory until they are written in order
+
+constexpr std::array<std::string_view, 5> own_names{"job.json", "README.md", "manifest.json", "coco.json", "contact.png"};
+
+std::string ping_key(std::uint64_t number) { return text::format("%010llu", static_cast<unsigned long long>(number)); }
+path part_file(const path& out, std::uint64_t shard) { return out / path(shard_name(shard)).replace_extension(".json"); }
+
+json read_json(const path& file) {
+  std::ifstream in(file);
+  return json::parse(in, nullptr, false);
+}
+
+class Folder final : public DatasetFolder {
+ public:
+  Folder(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress)
+      : job_(job), o_(options), on_progress_(std::move(on_progress)), pool_(options.threads) {}
+
+  Result<DatasetProgress> make_all() {
+    std::vector<std::uint64_t> missing;
+    for (std::uint64_t shard = o_.part; shard < job_.shards(); shard += o_.parts) {
+      const auto is_there = holds(shard);
+      if (!is_there) return tl::make_unexpected(is_there.error());
+      ++progress_.all_shards;
+      if (*is_there)
+        ++progress_.shards, ++progress_.kept_shards;
+      else
+        missing.push_back(shard), progress_.all_pings += end_of(shard) - first_of(shard);
+    }
+    for (const std::uint64_t shard : missing)
+      if (const auto r = make(shard); !r) return tl::make_unexpected(r.error());
+    return conclude();
+  }
+
+  const std::string& inputs() const override { return inputs_; }
+  const std::string& instruction_set() const override { return instruction_set_; }
+  bool differs() const override { return differs_; }
+
+  /// The folder is of this job, or becomes it.
+  Result<void> claim() {
+    const auto first = draw_ping(job_, 1);  // what is wrong with the job shows before there is a folder
+    if (!first) return tl::make_unexpected(first.error());
+    instruction_set_ = simd::kernels_for(o_.simd.value_or(first->job.config.engine.simd)).name;
+    Sha256 files;
+    for (const NamedFile& named : named_files(job_))
+      for (const std::string& text : {named.word, named.digest}) files.add(std::as_bytes(std::span(text)));
+    inputs_ = render::digest_of({job_.source, {first->job}, job_.text + instruction_set_ + files.hex()}, 0, job_.fan);
+    for (int i = 0; i < pool_.threads(); ++i) makers_.push_back(std::make_unique<PingMaker>(job_, inputs_, o_.simd));
+    std::error_code ec;
+    std::filesystem::create_directories(o_.out, ec);
+    if (ec)
+      return failure(ErrorKind::io, "cannot make the folder " + o_.out.string() + ": " + ec.message() + "; choose another --out");
+    const path about = o_.out / "job.json";
+    const std::string foreign = own_file_in(o_.out);  // before the question whose it is: another process may just be beginning
+    if (!std::filesystem::exists(about, ec)) {
+      if (!foreign.empty())
+        return failure(ErrorKind::usage, (o_.out / foreign).string() +
+                                             " may not be from sonard: the folder has no job.json; it is not overwritten: choose "
+                                             "another --out");
+      const json words{{"sonard", render::version},
+                       {"inputs", inputs_},
+                       {"from", job_.source},
+                       {"job", job_.text},
+                       {"instruction_set", instruction_set_}};
+      auto file = DurableFile::open(about);
+      if (!file) return tl::make_unexpected(file.error());
+      if (const auto done = file->write(words.dump(1) + "\n"); !done) return done;
+      // Another process may have begun the same folder meanwhile.
+      if (const auto is_new = file->commit_new(); !is_new) return tl::make_unexpected(is_new.error());
+    }
+    const json there = read_json(about);
+    if (!there.is_object() || there.value("inputs", "") != inputs_)
+      return failure(ErrorKind::usage, o_.out.string() +
+                                           " holds shards of another job, program version or instruction set (job.json); "
+                                           "choose another --out");
+    remove_unfinished(o_.out, [&](const std::string& name) { return is_own(name); });
+    return {};
+  }
+
+  /// Killed between rename and digest, a shard has none: then it gets it now.
+  Result<bool> holds(std::uint64_t shard) override {
+    differs_ = false;
+    const path file = o_.out / shard_name(shard), noted = file.string() + ".sha256";
+    std::error_code ec;
+    if (!std::filesystem::exists(file, ec) || !std::filesystem::exists(part_file(o_.out, shard), ec)) return false;
+    const auto digest = digest_of_file(file);
+    if (!digest) return tl::make_unexpected(digest.error());
+    const std::string line = *digest + "  " + file.filename().string() + "\n";
+    std::ifstream in(noted, std::ios::binary);
+    if (!in) {
+      if (const auto done = write_durably(noted, line); !done) return tl::make_unexpected(done.error());
+      return true;
+    }
+    const std::string there{std::istreambuf_iterator<char>(in), {}};
+    if (there == line) return true;
+    differs_ = true;
+    return failure(ErrorKind::bad_data, file.string() + " differs from " + noted.filename().string() +
+                                            ": it was changed or damaged; remove both, and run the same command again");
+  }
+
+  Result<void> make(std::uint64_t shard) override {
+    differs_ = false;
+    auto tar = ShardWriter::open(o_.out / shard_name(shard));
+    if (!tar) return tl::make_unexpected(tar.error());
+    json part{{"images", json::array()}, {"pixels", json::object()}};
+    const std::uint64_t at_once = pings_a_thread * static_cast<std::uint64_t>(pool_.threads());
+    for (std::uint64_t from = first_of(shard); from < end_of(shard); from += at_once) {
+      const auto count = static_cast<std::size_t>(std::min(at_once, end_of(shard) - from));
+      std::vector<Result<LabelledPing>> made(count, failure(ErrorKind::bug, "not made"));
+      pool_.for_each(count,
+                     [&](std::size_t i, int worker) { made[i] = makers_[static_cast<std::size_t>(worker)]->make(from + i); });
+      for (std::size_t i = 0; i < count; ++i) {
+        if (!made[i]) return tl::make_unexpected(made[i].error());
+        for (const auto& [ending, contents] : made[i]->files)
+          if (const auto done = tar->add(ping_key(from + i) + "." + ending, contents); !done) return done;
+        for (const auto& [name, n] : made[i]->pixels.items())
+          part["pixels"][name] = part["pixels"].value(name, std::uint64_t{0}) + n.get<std::uint64_t>();
+        part["images"].push_back({{"id", from + i},
+                                  {"width", made[i]->width},
+                                  {"height", made[i]->height},
+                                  {"negative", made[i]->negative},
+                                  {"annotations", std::move(made[i]->annotations)}});
+      }
+      progress_.pings += count;
+      on_progress_(progress_);
+    }
+    // The part first: where the archive has its name, all of the shard is there.
+    if (const auto done = write_durably(part_file(o_.out, shard), part.dump() + "\n"); !done) return done;
+    progress_.bytes += tar->bytes();
+    if (const auto done = tar->commit(); !done) {
+      differs_ = done.error().kind == ErrorKind::bad_data;
+      return tl::make_unexpected(done.error());
+    }
+    ++progress_.shards;
+    on_progress_(progress_);
+    return {};
+  }
+
+  /// When no shard is missing, of this part or another. One shard's labels at a time are in memory.
+  Result<DatasetProgress> conclude() override {
+    json shards = json::array(), pixels = json::object(), categories = json::array();
+    std::uint64_t negatives = 0;
+    std::map<std::string, std::uint64_t> instances;
+    std::error_code ec;
+    for (std::uint64_t shard = 0; shard < job_.shards(); ++shard) {
+      std::ifstream in(o_.out / (shard_name(shard) + ".sha256"));
+      std::string digest;
+      if (!(in >> digest) || !std::filesystem::exists(o_.out / shard_name(shard), ec) ||
+          !std::filesystem::exists(part_file(o_.out, shard), ec)) {
+        progress_.missing = shard;
+        return progress_;
+      }
+      shards.push_back({{"name", shard_name(shard)}, {"sha256", digest}, {"pings", end_of(shard) - first_of(shard)}});
+      const auto part = read_part(shard);
+      if (!part) return tl::make_unexpected(part.error());
+      for (const auto& [name, n] : (*part)["pixels"].items())
+        pixels[name] = pixels.value(name, std::uint64_t{0}) + n.get<std::uint64_t>();
+      for (const json& image : (*part)["images"]) {
+        negatives += image["negative"].get<bool>() ? 1 : 0;
+        for (const json& a : image["annotations"]) ++instances[a["class"].get<std::string>()];
+      }
+    }
+    std::map<std::string, std::size_t> id_of;
+    for (const auto& [name, n] : instances) {
+      const std::size_t id = id_of.size() + 1;
+      id_of[name] = id;
+      categories.push_back({{"id", id}, {"name", name}});
+    }
+    if (const auto done = write_coco(categories, id_of); !done) return tl::make_unexpected(done.error());
+    const auto has_contact_sheet = write_contact_sheet();
+    if (!has_contact_sheet) return tl::make_unexpected(has_contact_sheet.error());
+    if (const auto done = write_durably(o_.out / "README.md", card(pixels, instances, negatives, *has_contact_sheet)); !done)
+      return tl::make_unexpected(done.error());
+    const json manifest{{"name", job_.name},
+                        {"about", job_.about},
+                        {"license", job_.license},
+                        {"sonard", render::version},
+                        {"instruction_set", instruction_set_},
+                        {"inputs", inputs_},
+                        {"job", job_.text},
+                        {"seed", static_cast<std::uint64_t>(job_.seed)},
+                        {"pings", job_.pings},
+                        {"shards", shards}};
+    if (const auto done = write_durably(o_.out / "manifest.json", manifest.dump(1) + "\n"); !done)
+      return tl::make_unexpected(done.error());
+    progress_.whole = true;
+    return progress_;
+  }
+
+ private:
+  std::uint64_t first_of(std::uint64_t shard) const { return shard * job_.shard_pings + 1; }
+  std::uint64_t end_of(std::uint64_t shard) const { return std::min((shard + 1) * job_.shard_pings, job_.pings) + 1; }
+
+  /// The first file there that has a name that a data set gives, but for job.json; empty without any.
+  static std::string own_file_in(const path& folder) {
+    std::error_code ec;
+    std::string first;
+    for (std::filesystem::directory_iterator entry(folder, ec), end; !ec && entry != end; entry.increment(ec)) {
+      const std::string name = entry->path().filename().string();
+      if (name == "job.json") continue;
+      const bool is_own = name.starts_with("shard-") || std::find(own_names.begin(), own_names.end(), name) != own_names.end();
+      if (is_own && (first.empty() || name < first)) first = name;
+    }
+    return first;
+  }
+
+  /// A shard of this part; without parts, everything that a data set consists of.
+  bool is_own(const std::string& name) const {
+    unsigned long long shard = 0;
+    if (std::sscanf(name.c_str(), "shard-%llu.", &shard) == 1) return shard % o_.parts == o_.part;
+    return o_.parts == 1 && std::find(own_names.begin(), own_names.end(), name) != own_names.end();
+  }
+
+  /// What is beside a shard says of its pings.
+  Result<json> read_part(std::uint64_t shard) const {
+    json part = read_json(part_file(o_.out, shard));
+    if (part.is_object() && part.contains("images") && part.contains("pixels")) return part;
+    return failure(ErrorKind::bad_data,
+                   part_file(o_.out, shard).string() + " cannot be read; remove it, and run the same command again");
+  }
+
+  Result<void> write_coco(const json& categories, const std::map<std::string, std::size_t>& id_of) const {
+    auto coco = DurableFile::open(o_.out / "coco.json");
+    if (!coco) return tl::make_unexpected(coco.error());
+    std::uint64_t annotation = 0;
+    // An array with what `add` makes of each ping's part.
+    const auto write_array = [&](const std::string& begin, const auto& add) -> Result<void> {
+      std::string text = begin;
+      bool is_first = true;
+      for (std::uint64_t shard = 0; shard < job_.shards(); ++shard) {
+        auto part = read_part(shard);
+        if (!part) return tl::make_unexpected(part.error());
+        for (json& image : (*part)["images"])
+          add(image, [&](const json& item) { text += (std::exchange(is_first, false) ? "" : ",") + item.dump(); });
+        if (const auto done = coco->write(std::exchange(text, {})); !done) return done;
+      }
+      return {};
+    };
+    const auto images = write_array("{\"images\":[", [&](const json& image, const auto& put) {
+      const auto id = image["id"].get<std::uint64_t>();
+      const std::uint64_t shard = (id - 1) / job_.shard_pings;
+      put({{"id", id},
+           {"width", image["width"]},
+           {"height", image["height"]},
+           {"file_name", shard_name(shard) + "/" + ping_key(id) + ".samples.png"}});
+    });
+    if (!images) return images;
+    const auto annotations = write_array("],\"annotations\":[", [&](json& image, const auto& put) {
+      for (json& a : image["annotations"]) {
+        const auto category = id_of.find(a["class"].get<std::string>());
+        a["id"] = ++annotation, a["image_id"] = image["id"], a["iscrowd"] = 0;
+        a["category_id"] = category == id_of.end() ? 0 : category->second;
+        a.erase("class");
+        put(a);
+      }
+    });
+    if (!annotations) return annotations;
+    if (const auto done = coco->write("],\"categories\":" + categories.dump() + "}\n"); !done) return done;
+    return coco->commit();
+  }
+
+  /// Of pings that have more than one beam; false without any.
+  Result<bool> write_contact_sheet() {
+    constexpr int across = 4, width_px = 240, gap_px = 4;
+    const std::uint64_t count = std::min<std::uint64_t>(job_.pings, 12);
+    std::vector<Raster> pictures;
+    for (std::uint64_t i = 0; i < count; ++i) {
+      auto picture = makers_.front()->picture(1 + i * job_.pings / count, width_px);
+      if (!picture) return tl::make_unexpected(picture.error());
+      if (*picture) pictures.push_back(**std::move(picture));
+    }
+    if (pictures.empty()) return false;
+    int height_px = 1;
+    for (const Raster& p : pictures) height_px = std::max(height_px, p.height);
+    Raster sheet(across * (width_px + gap_px), (static_cast<int>(pictures.size()) + across - 1) / across * (height_px + gap_px));
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+      const int left = static_cast<int>(i) % across * (width_px + gap_px),
+                top = static_cast<int>(i) / across * (height_px + gap_px);
+      for (int y = 0; y < pictures[i].height; ++y)
+        for (int x = 0; x < pictures[i].width; ++x) sheet.at(left + x, top + y) = pictures[i].at(x, y);
+    }
+    const auto png = encode_png(sheet);
+    if (!png) return tl::make_unexpected(png.error());
+    const std::string_view bytes(reinterpret_cast<const char*>(png->data()), png->size());
+    if (const auto done = write_durably(o_.out / "contact.png", bytes); !done) return tl::make_unexpected(done.error());
+    return true;
+  }
+
+  std::string card(const json& pixels, const std::map<std::string, std::uint64_t>& instances, std::uint64_t negatives,
+                   bool has_contact_sheet) const {
+    std::string text = "# " + job_.name + "\n\n" + (job_.about.empty() ? "" : job_.about + "\n\n") + "License: " + job_.license +
+                       "\n\n" + std::to_string(job_.pings) + " synthetic pings in " + std::to_string(job_.shards()) +
+                       " shards, " + std::to_string(negatives) + " of them without targets; made by sonard " + render::version +
+                       " (" + instruction_set_ + ") from the job in `manifest.json`, which makes them again, byte for byte.\n\n" +
+                       (has_contact_sheet ? "![some of the pings](contact.png)\n\n" : "") +
+                       "| class | instances seen |\n|---|---|\n";
+    for (const auto& [name, n] : instances) text += "| " + name + " | " + std::to_string(n) + " |\n";
+    text += "\n| samples of | share |\n|---|---|\n";
+    double all = 0;
+    for (const auto& [name, n] : pixels.items()) all += n.get<double>();
+    for (const auto& [name, n] : pixels.items())
+      text += "| " + name + " | " + text::format("%.2f %%", 100 * n.get<double>() / all) + " |\n";
+    return text +
+           "\nEach ping has `samples.png`, `labels.png` (instance of each sample, 16 bits), `share.png` (of the sample's energy, "
+           "255 = all), `caster.png` (instance that casts a shadow there) and `json` (pose, settings, water, truth, instances, "
+           "boxes, draws). Rows by range, beam 0 most to port. The echoes are modelled, not recorded: tests on real data "
+           "decide.\n";
+  }
+
+  const DatasetJob& job_;
+  const DatasetOptions o_;
+  const OnProgress on_progress_;
+  Parallel pool_;
+  std::string inputs_, instruction_set_;
+  std::vector<std::unique_ptr<PingMaker>> makers_;  // one a thread
+  DatasetProgress progress_;
+  bool differs_ = false;
+};
+
+Result<std::unique_ptr<Folder>> open_folder(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress) {
+  auto folder = std::make_unique<Folder>(job, options, std::move(on_progress));
+  if (const auto done = folder->claim(); !done) return tl::make_unexpected(done.error());
+  return folder;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<DatasetFolder>> open_dataset(const DatasetJob& job, const DatasetOptions& options,
+                                                    OnProgress on_progress) {
+  return open_folder(job, options, std::move(on_progress));
+}
+
+Result<DatasetProgress> make_dataset(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress) {
+  auto folder = open_folder(job, options, std::move(on_progress));
+  if (!folder) return tl::make_unexpected(folder.error());
+  return (*folder)->make_all();
+}
+
+}  // namespace sonar::dataset

@@ -1,0 +1,56 @@
+// Makes a data set: its shards, as far as they are missing, and when all are there the manifest, the COCO file and the card.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "core/pipeline/ping_engine.hpp"
+#include "daemon/commands/dataset/dataset_job.hpp"
+
+namespace sonar::dataset {
+
+struct DatasetOptions {
+  std::filesystem::path out;
+  std::uint64_t part = 0, parts = 1;   // of the shards: those whose number leaves `part` when divided by `parts`
+  int threads = 1;                     // pings side by side
+  std::optional<SimdLevel> simd = {};  // instead of the job's
+};
+
+struct DatasetProgress {
+  std::uint64_t shards = 0, all_shards = 0, kept_shards = 0;  // of this part
+  std::uint64_t pings = 0, all_pings = 0;                     // made by this run, to be made by it
+  std::uint64_t bytes = 0;                                    // of finished shards
+  bool whole = false;                                         // the manifest has been written
+  std::optional<std::uint64_t> missing = {};                  // the first shard that another part has not made yet
+};
+
+using OnProgress = std::function<void(const DatasetProgress&)>;  // after every few pings
+
+/// The folder of a job's shards. Processes of several machines may work in one.
+class DatasetFolder {
+ public:
+  virtual ~DatasetFolder() = default;
+  virtual const std::string& inputs() const = 0;           // digest of all that the bytes depend on
+  virtual const std::string& instruction_set() const = 0;  // of simd_level_names
+  /// Whether the shard is there, and as it was written. bad_data: it differs from its digest.
+  virtual Result<bool> holds(std::uint64_t shard) = 0;
+  /// A shard of that name that has come meanwhile stays. bad_data: its bytes differ. Others: io; config as draw_ping().
+  virtual Result<void> make(std::uint64_t shard) = 0;
+  /// Whether the last error is that a shard's bytes differ: another program, or a damaged disk or memory.
+  virtual bool differs() const = 0;
+  /// The manifest, the COCO file and the card, when no shard is missing: `whole`, else `missing`.
+  virtual Result<DatasetProgress> conclude() = 0;
+};
+
+/// Makes the folder. `job` outlives it. Errors: io; usage when it holds another job's shards; config as draw_ping().
+Result<std::unique_ptr<DatasetFolder>> open_dataset(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress);
+
+/// Everything of this part that is missing, and the conclusion.
+Result<DatasetProgress> make_dataset(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress);
+
+}  // namespace sonar::dataset

@@ -1,0 +1,197 @@
+#include "daemon/commands/dataset/shards.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+#include "core/base/regular_file.hpp"
+#include "core/text/format.hpp"
+
+namespace sonar::dataset {
+namespace {
+
+using std::filesystem::path;
+
+constexpr std::size_t tar_block = 512;
+
+constexpr std::string_view unfinished_mark = ".tmp";
+
+/// That no other process of any machine chooses.
+std::string unfinished_name(const path& file) {
+  std::array<char, 256> host{};
+  ::gethostname(host.data(), host.size() - 1);
+  return file.string() + std::string(unfinished_mark) + "." + host.data() + "." + std::to_string(::getpid());
+}
+
+tl::unexpected<Error> cannot_write(const path& file, int why) {
+  return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(why) +
+                                    "; make room or choose another --out: finished shards are kept, run the same command again");
+}
+
+/// Of POSIX.1-1988 (ustar): a regular file, readable by all, of 1970.
+std::array<char, tar_block> tar_header(std::string_view name, std::size_t size) {
+  std::array<char, tar_block> h{};
+  const auto put = [&](std::size_t at, std::string_view text) { std::memcpy(h.data() + at, text.data(), text.size()); };
+  put(0, name);
+  put(100, "0000644");
+  put(108, "0000000");
+  put(116, "0000000");
+  put(124, text::format("%011zo", size));
+  put(136, "00000000000");
+  put(148, "        ");  // the checksum counts as blanks
+  put(156, "0");
+  put(257, std::string_view("ustar\00000", 8));
+  unsigned sum = 0;
+  for (const char c : h) sum += static_cast<unsigned char>(c);
+  put(148, text::format("%06o", sum));
+  h[154] = '\0';
+  return h;
+}
+
+/// Makes a rename last: the folder's own entry.
+void sync_folder(const path& folder) {
+  const int fd = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return;
+  ::fsync(fd);
+  ::close(fd);
+}
+
+}  // namespace
+
+std::string shard_name(std::uint64_t shard) { return text::format("shard-%06llu.tar", static_cast<unsigned long long>(shard)); }
+
+Result<DurableFile> DurableFile::open(const path& file) {
+  const std::string name = unfinished_name(file);
+  constexpr int most_tries = 1000;
+  for (int i = 0; i < most_tries; ++i) {
+    const std::string unfinished = i == 0 ? name : name + "." + std::to_string(i);
+    const int fd = ::open(unfinished.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    if (fd < 0 && errno == EEXIST) continue;
+    if (fd < 0) return cannot_write(file, errno);
+    ::flock(fd, LOCK_EX);
+    struct stat s {};
+    if (::fstat(fd, &s) == 0 && s.st_nlink > 0) return DurableFile(file, unfinished, fd);
+    ::close(fd);  // remove_unfinished() of another process came before the lock
+  }
+  return cannot_write(file, EEXIST);
+}
+
+DurableFile::DurableFile(DurableFile&& other) noexcept
+    : file_(std::move(other.file_)),
+      unfinished_(std::move(other.unfinished_)),
+      descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+DurableFile::~DurableFile() {
+  if (descriptor_ < 0) return;
+  ::unlink(unfinished_.c_str());
+  ::close(descriptor_);
+}
+
+Result<void> DurableFile::write(std::span<const std::byte> bytes) {
+  for (std::size_t at = 0; at < bytes.size();) {
+    const ssize_t n = ::write(descriptor_, bytes.data() + at, bytes.size() - at);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return cannot_write(file_, errno);
+    at += static_cast<std::size_t>(n);
+  }
+  return {};
+}
+
+Result<void> DurableFile::commit() {
+  if (::fsync(descriptor_) != 0) return cannot_write(file_, errno);
+  if (::rename(unfinished_.c_str(), file_.c_str()) != 0) return cannot_write(file_, errno);
+  ::close(std::exchange(descriptor_, -1));
+  sync_folder(file_.parent_path());
+  return {};
+}
+
+Result<bool> DurableFile::commit_new() {
+  if (::fsync(descriptor_) != 0) return cannot_write(file_, errno);
+  if (::link(unfinished_.c_str(), file_.c_str()) != 0) {
+    if (errno == EEXIST) return false;
+    if (const auto done = commit(); !done) return tl::make_unexpected(done.error());  // a file system without links
+    return true;
+  }
+  sync_folder(file_.parent_path());
+  return true;
+}
+
+void remove_unfinished(const path& folder, const std::function<bool(const std::string&)>& is_own) {
+  std::error_code ec;
+  for (std::filesystem::directory_iterator entry(folder, ec), end; !ec && entry != end; entry.increment(ec)) {
+    const std::string name = entry->path().filename().string();
+    const std::size_t mark = name.find(unfinished_mark);
+    if (mark == std::string::npos || !is_own(name.substr(0, mark))) continue;
+    const int fd = ::open(entry->path().c_str(), O_WRONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0) continue;
+    if (::flock(fd, LOCK_EX | LOCK_NB) == 0) ::unlink(entry->path().c_str());
+    ::close(fd);
+  }
+}
+
+Result<ShardWriter> ShardWriter::open(const path& file) {
+  auto opened = DurableFile::open(file);
+  if (!opened) return tl::make_unexpected(opened.error());
+  return ShardWriter(*std::move(opened));
+}
+
+Result<void> ShardWriter::write(std::span<const std::byte> bytes) {
+  hash_.add(bytes);
+  return file_.write(bytes);
+}
+
+Result<void> ShardWriter::add(std::string_view name, std::span<const std::byte> contents) {
+  if (name.size() > 99) return failure(ErrorKind::bug, "the name " + std::string(name) + " is too long for an archive");
+  std::vector<std::byte> member((tar_block + contents.size() + tar_block - 1) / tar_block * tar_block);
+  const auto header = tar_header(name, contents.size());
+  std::memcpy(member.data(), header.data(), tar_block);
+  if (!contents.empty()) std::memcpy(member.data() + tar_block, contents.data(), contents.size());
+  return write(member);
+}
+
+Result<std::string> ShardWriter::commit() {
+  const std::vector<std::byte> end(2 * tar_block);
+  if (auto done = write(end); !done) return tl::make_unexpected(done.error());
+  const std::string digest = hash_.hex();
+  const path& file = file_.file();
+  const auto is_new = file_.commit_new();
+  if (!is_new) return tl::make_unexpected(is_new.error());
+  if (!*is_new) {
+    const auto there = digest_of_file(file);
+    if (!there) return tl::make_unexpected(there.error());
+    if (*there != digest)
+      return failure(ErrorKind::bad_data, file.string() + " is there with other bytes (" + *there + ") than were made now (" +
+                                              digest +
+                                              "): it was changed, or a disk or memory fails; remove it and what is wrong");
+  }
+  const auto noted = write_durably(file.string() + ".sha256", digest + "  " + file.filename().string() + "\n");
+  if (!noted) return tl::make_unexpected(noted.error());
+  return digest;
+}
+
+Result<void> write_durably(const path& file, std::string_view text) {
+  auto opened = DurableFile::open(file);
+  if (!opened) return tl::make_unexpected(opened.error());
+  if (const auto done = opened->write(text); !done) return done;
+  return opened->commit();
+}
+
+Result<std::string> digest_of_file(const path& file) {
+  const auto in = open_regular(file);
+  if (!in) return tl::make_unexpected(in.error());
+  Sha256 hash;
+  std::vector<std::byte> piece(1 << 20);
+  while (const std::size_t n = std::fread(piece.data(), 1, piece.size(), in->get())) hash.add(std::span(piece).first(n));
+  if (std::ferror(in->get()) != 0) return failure(ErrorKind::io, "cannot read " + file.string());
+  return hash.hex();
+}
+
+}  // namespace sonar::dataset

@@ -1,0 +1,26 @@
+// What labels say in words: the instances of a scene, and where each of a ping's is, in COCO's form (docs/datasets.md).
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "core/pipeline/labels.hpp"
+#include "core/sonar/ping.hpp"
+
+namespace sonar::render {
+
+/// Class of an instance: its label, else that of its first material, else that material's name; of a point target without a
+/// label "point".
+std::string class_of(const Scene& scene, std::size_t index);
+
+/// By instance from 1: name, class, and whether it is a thing, which has boxes and polygons: an object with a label of its own.
+nlohmann::json instances_of(const Scene& scene);
+
+/// Every thing that is seen: `bbox`, `area` and `segmentation` in pixels of the samples, x = beam, y = row; the same under
+/// `cartesian` in pixels of the fan; `visible`, the share of its energy that nothing in the way takes.
+nlohmann::json annotations_of(const PingLabels& labels, const Ping& ping, const Scene& scene);
+
+/// Where metres lie among the pixels of the Cartesian form, which is the fan of --image-rings off.
+nlohmann::json layout_of(const Ping& ping);
+
+}  // namespace sonar::render
