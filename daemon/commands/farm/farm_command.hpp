@@ -1,0 +1,12 @@
+// `sonarctl farm`, which runs `sonard farm`: jobs into the farm's queue, how they stand, and the data set of finished shards.
+#pragma once
+
+#include "daemon/commands/command_line.hpp"
+
+namespace sonar::farm {
+
+/// The exit code. Errors: what the job or the folder have wrong; unavailable: the server; bad_data: shards that are missing or
+/// differ from their digests.
+Result<int> run_farm(const FarmCommand& command);
+
+}  // namespace sonar::farm

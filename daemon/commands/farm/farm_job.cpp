@@ -1,0 +1,183 @@
+#include "daemon/commands/farm/farm_job.hpp"
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "core/base/enum_names.hpp"
+#include "core/base/regular_file.hpp"
+#include "core/pipeline/simd/kernels.hpp"
+#include "daemon/commands/dataset/shards.hpp"
+#include "daemon/commands/render/sonar_version.hpp"
+#include "daemon/server/system/sha256.hpp"
+
+namespace sonar::farm {
+namespace {
+
+using nlohmann::json;
+using std::filesystem::path;
+
+constexpr std::size_t most_in_bucket = std::size_t{8} << 20;
+constexpr std::size_t piece_bytes = std::size_t{512} << 10;  // a server takes messages of 1 MiB unless it is told otherwise
+
+std::string digest_of(std::string_view bytes) {
+  Sha256 hash;
+  hash.add(std::as_bytes(std::span(bytes)));
+  return hash.hex();
+}
+
+/// A name below a folder, and the only one of its file.
+bool is_confined(const path& name) {
+  return !name.empty() && name.is_relative() && name.lexically_normal() == name && name.has_filename() && *name.begin() != "..";
+}
+
+std::string id_of(const FarmJob& record) {
+  json names = json::object();
+  for (const FarmFile& f : record.files) names[f.name] = f.digest;
+  return digest_of(json{
+      {"version", record.version},
+      {"instruction_set", record.instruction_set},
+      {"file", record.file},
+      {"files", names}}.dump());
+}
+
+std::string piece_key(const std::string& digest, std::size_t piece) { return digest + "." + std::to_string(piece); }
+
+/// Makes its folders, which no link leads out of.
+Result<void> write_below(const path& folder, const std::string& name, const std::string& bytes) {
+  const path file = folder / name;
+  std::error_code ec;
+  std::filesystem::create_directories(file.parent_path(), ec);
+  const path from = std::filesystem::canonical(folder, ec), to = std::filesystem::canonical(file.parent_path(), ec);
+  if (ec) return failure(ErrorKind::io, "cannot make the folder of " + file.string() + ": " + ec.message());
+  if (std::mismatch(from.begin(), from.end(), to.begin(), to.end()).first != from.end())
+    return failure(ErrorKind::bad_data, file.string() + " leads out of " + folder.string() + " by a link; remove the link");
+  return dataset::write_durably(file, bytes);
+}
+
+bool is_there(const path& file, const std::string& digest) {
+  const auto there = dataset::digest_of_file(file);
+  return there && *there == digest;
+}
+
+}  // namespace
+
+std::string FarmJob::folder() const { return path(file).stem().string() + "-" + id.substr(0, 12); }
+
+std::string FarmJob::to_json() const {
+  json names = json::array();
+  for (const FarmFile& f : files) names.push_back({{"name", f.name}, {"sha256", f.digest}});
+  return json{{"version", version},
+              {"instruction_set", instruction_set},
+              {"file", file},
+              {"files", names},
+              {"shards", shards},
+              {"shard_pings", shard_pings},
+              {"pings", pings},
+              {"patience_ms", patience.count()},
+              {"submitted_unix_s", submitted_unix_s},
+              {"in_bucket", in_bucket}}
+      .dump();
+}
+
+Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& instruction_set) {
+  FarmJob record;
+  record.version = render::version, record.instruction_set = instruction_set;
+  record.file = path(job.source).filename().string();
+  record.shards = job.shards(), record.shard_pings = job.shard_pings, record.pings = job.pings;
+  std::map<std::string, std::string> names{{record.file, digest_of(job.text)}};
+  const path folder = std::filesystem::absolute(job.folder / ".").lexically_normal();
+  for (const dataset::NamedFile& named : dataset::named_files(job)) {
+    const path name = std::filesystem::absolute(named.file).lexically_normal().lexically_relative(folder);
+    if (!is_confined(name))
+      return failure(ErrorKind::config, job.source + ": " + named.word + " is not below the job's folder " + folder.string() +
+                                            "; a farm's job has all its files there: copy it");
+    names[name.string()] = named.digest;
+  }
+  for (const auto& [name, digest] : names) record.files.push_back({name, digest});
+  record.id = id_of(record);
+  return record;
+}
+
+Result<FarmJob> parse_farm_job(const std::string& id, const std::string& text) {
+  FarmJob record;
+  try {
+    const json words = json::parse(text);
+    record.version = words.at("version"), record.instruction_set = words.at("instruction_set"), record.file = words.at("file");
+    for (const json& f : words.at("files")) record.files.push_back({f.at("name"), f.at("sha256")});
+    record.shards = words.at("shards"), record.shard_pings = words.at("shard_pings"), record.pings = words.at("pings");
+    record.patience = std::chrono::milliseconds(std::max(words.at("patience_ms").get<std::int64_t>(), std::int64_t{100}));
+    record.submitted_unix_s = words.at("submitted_unix_s"), record.in_bucket = words.at("in_bucket");
+  } catch (const json::exception& e) {
+    return failure(ErrorKind::bad_data, "the farm's record of job " + id + " cannot be read: " + e.what());
+  }
+  record.id = id_of(record);
+  const bool is_named = std::any_of(record.files.begin(), record.files.end(), [&](const FarmFile& f) {
+    return f.name == record.file && path(f.name).filename() == f.name;
+  });
+  const bool is_inside =
+      std::all_of(record.files.begin(), record.files.end(), [](const FarmFile& f) { return is_confined(f.name); });
+  if (record.id == id && is_named && is_inside) return record;
+  return failure(ErrorKind::bad_data, "the farm's record of job " + id +
+                                          (is_inside ? " does not fit its id" : " has names that lead out of its folder") +
+                                          "; submit the job again");
+}
+
+Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const path& files, Queue& queue) {
+  std::uint64_t bytes = 0;
+  std::error_code ec;
+  for (const FarmFile& f : record.files)
+    bytes += f.name == record.file ? job.text.size() : std::filesystem::file_size(job.folder / f.name, ec);
+  record.in_bucket = bytes < most_in_bucket;
+  for (const FarmFile& f : record.files) {
+    const auto contents = f.name == record.file ? job.text : read_regular(job.folder / f.name, std::size_t{1} << 40);
+    if (!contents) return tl::make_unexpected(contents.error());
+    if (digest_of(*contents) != f.digest)
+      return failure(ErrorKind::bad_data, (job.folder / f.name).string() + " has just been changed; submit again");
+    if (!is_there(files / f.name, f.digest))
+      if (const auto done = write_below(files, f.name, *contents); !done) return done;
+    if (!record.in_bucket) continue;
+    for (std::size_t at = 0, piece = 0; at < contents->size() || piece == 0; at += piece_bytes, ++piece)
+      if (const auto done =
+              queue.put(file_table, piece_key(f.digest, piece), std::string_view(*contents).substr(at, piece_bytes));
+          !done)
+        return done;
+  }
+  return {};
+}
+
+Result<path> receive_files(const FarmJob& record, const path& files, Queue& queue) {
+  for (const FarmFile& f : record.files) {
+    if (is_there(files / f.name, f.digest)) continue;
+    std::string contents;
+    while (record.in_bucket) {
+      const auto piece = queue.get(file_table, piece_key(f.digest, contents.size() / piece_bytes));
+      if (!piece) return tl::make_unexpected(piece.error());
+      if (!*piece) break;
+      contents += **piece;
+      if ((*piece)->size() < piece_bytes || contents.size() > most_in_bucket) break;
+    }
+    if (digest_of(contents) != f.digest)
+      return failure(
+          ErrorKind::missing_file,
+          (files / f.name).string() + " is not there as it was submitted" +
+              (record.in_bucket ? ", nor in the queue: submit the job again"
+                                : ", and files of 8 MiB and more are not sent: give --out the folder of the submission"));
+    if (const auto done = write_below(files, f.name, contents); !done) return tl::make_unexpected(done.error());
+  }
+  return files / record.file;
+}
+
+std::string why_unfit(const FarmJob& record) {
+  if (record.version != render::version)
+    return record.folder() + " was submitted by sonard " + record.version + ", and this is " + render::version +
+           ": other versions make other bytes; install that one here, or submit with this one";
+  const auto level = enum_from<SimdLevel>(record.instruction_set, simd_level_names);
+  const std::string here = level ? simd::kernels_for(*level).name : "unknown";
+  if (here == record.instruction_set) return {};
+  return record.folder() + " is computed with " + record.instruction_set +
+         ", which this processor lacks: submit it with --simd " + here + ", which all workers have, or work on another machine";
+}
+
+}  // namespace sonar::farm

@@ -1,0 +1,49 @@
+// A data set's job as it travels to workers: a record, and the bytes of the job file and of every file that it names.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/pipeline/ping_engine.hpp"
+#include "daemon/commands/dataset/dataset_job.hpp"
+#include "daemon/commands/farm/queue.hpp"
+
+namespace sonar::farm {
+
+struct FarmFile {
+  std::string name;  // below the job file's folder
+  std::string digest;
+};
+
+struct FarmJob {
+  std::string id;  // SHA-256 of the canonical JSON of all that the bytes of the shards depend on: the first four
+  std::string version, instruction_set;
+  std::string file;             // the job file, one of `files`
+  std::vector<FarmFile> files;  // by name
+  std::uint64_t shards = 0, shard_pings = 0, pings = 0;
+  std::chrono::milliseconds patience{60'000};
+  double submitted_unix_s = 0;
+  bool in_bucket = false;  // the files, else in the shared folder alone
+
+  /// "mines-0123456789ab", the job's folder below the farm's.
+  std::string folder() const;
+  std::string to_json() const;
+};
+
+/// Errors: a file that is not below the job file's folder.
+Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& instruction_set);
+/// bad_data: what is no record, or one whose id does not fit, or whose names lead out of the job's folder.
+Result<FarmJob> parse_farm_job(const std::string& id, const std::string& json);
+
+/// Copies the job's files to `files`, and into the queue when they are small enough; says so in the record.
+Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const std::filesystem::path& files, Queue& queue);
+/// Takes from the queue what is not in the folder `files`. The job file's path. missing_file: it is in neither.
+Result<std::filesystem::path> receive_files(const FarmJob& record, const std::filesystem::path& files, Queue& queue);
+
+/// Nothing when this program makes the same bytes as the one that submitted, else a sentence.
+std::string why_unfit(const FarmJob& record);
+
+}  // namespace sonar::farm

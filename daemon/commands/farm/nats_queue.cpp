@@ -1,0 +1,288 @@
+#include <nats/nats.h>
+
+#include <map>
+
+#include "core/base/regular_file.hpp"
+#include "core/text/decimal.hpp"
+#include "daemon/commands/farm/queue.hpp"
+
+namespace sonar::farm {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr const char* stream = "FARM";
+constexpr std::int64_t ns_per_ms = 1'000'000, patience_ms = 5000;
+constexpr int already_queued = 10071;  // JSStreamWrongLastSequence: a message of that subject is there
+
+template <auto destroy>
+struct Destroy {
+  void operator()(auto* p) const { destroy(p); }
+};
+template <class T, auto destroy>
+using Owned = std::unique_ptr<T, Destroy<destroy>>;
+using Message = Owned<natsMsg, natsMsg_Destroy>;
+using Subscription = Owned<natsSubscription, natsSubscription_Destroy>;
+
+/// The answer of a call that makes something: its owner, and the status.
+template <class Owner, class Call>
+natsStatus into(Owner& owner, const Call& call) {
+  typename Owner::pointer made = nullptr;
+  const natsStatus status = call(&made);
+  owner.reset(made);
+  return status;
+}
+
+std::string subject_of(const std::string& job, const std::string& shard) { return "farm.work." + job + "." + shard; }
+
+class NatsQueue;
+
+class NatsTask final : public Task {
+ public:
+  NatsTask(NatsQueue& queue, std::string job, std::uint64_t shard, int delivery, Message message)
+      : queue_(queue), job_(std::move(job)), shard_(shard), delivery_(delivery), message_(std::move(message)) {}
+  std::uint64_t shard() const override { return shard_; }
+  int delivery() const override { return delivery_; }
+  Result<void> in_progress() override;
+  Result<void> done() override;
+  Result<void> again(milliseconds later) override;
+  Result<void> bury(const std::string& why) override;
+
+ private:
+  NatsQueue& queue_;
+  std::string job_;
+  std::uint64_t shard_;
+  int delivery_;
+  Message message_;
+};
+
+class NatsQueue final : public Queue {
+ public:
+  Result<void> connect(const QueueOptions& o) {
+    where_ = o.url.substr(o.url.find('@') == std::string::npos ? 0 : o.url.rfind('@') + 1);
+    Owned<natsOptions, natsOptions_Destroy> options;
+    natsStatus s = into(options, natsOptions_Create);
+    if (s == NATS_OK) s = natsOptions_SetURL(options.get(), o.url.c_str());
+    if (s != NATS_OK) return failure(ErrorKind::usage, "--nats " + where_ + " is no address like nats://10.0.0.1:4222");
+    natsOptions_SetMaxReconnect(options.get(), -1);
+    natsOptions_SetReconnectWait(options.get(), 500);
+    if (!o.token_file.empty()) {
+      auto token = read_regular(o.token_file, 4096);
+      if (!token) return tl::make_unexpected(token.error());
+      token->erase(token->find_last_not_of(" \r\n") + 1);
+      natsOptions_SetToken(options.get(), token->c_str());
+    }
+    if (!o.credentials.empty() &&
+        natsOptions_SetUserCredentialsFromFiles(options.get(), o.credentials.c_str(), nullptr) != NATS_OK)
+      return failure(ErrorKind::missing_file, o.credentials.string() + ": cannot be read as a NATS credentials file");
+    s = into(connection_, [&](auto** c) { return natsConnection_Connect(c, options.get()); });
+    if (s != NATS_OK)
+      return failure(ErrorKind::unavailable, std::string("no NATS server answers at ") + where_ + ": " + natsStatus_GetText(s) +
+                                                 "; start one with nats-server -js -sd FOLDER, or give --nats its address");
+    jsOptions defaults;
+    jsOptions_Init(&defaults);
+    defaults.Wait = patience_ms;
+    s = into(jetstream_, [&](auto** js) { return natsConnection_JetStream(js, connection_.get(), &defaults); });
+    return s == NATS_OK ? make_stream() : refused("no JetStream", s);
+  }
+
+  Result<void> put(Table table, const std::string& key, std::string_view value) override {
+    kvStore* kv = store(table);
+    const natsStatus s =
+        kv ? kvStore_Put(nullptr, kv, key.c_str(), value.data(), static_cast<int>(value.size())) : NATS_NO_SERVER;
+    return s == NATS_OK ? Result<void>{} : refused("cannot write " + key + " of " + table.name, s);
+  }
+
+  Result<std::optional<std::string>> get(Table table, const std::string& key) override {
+    Owned<kvEntry, kvEntry_Destroy> entry;
+    kvStore* kv = store(table);
+    const natsStatus s = kv ? into(entry, [&](auto** e) { return kvStore_Get(e, kv, key.c_str()); }) : NATS_NO_SERVER;
+    if (s == NATS_NOT_FOUND) return std::nullopt;
+    if (s != NATS_OK) return refused("cannot read " + key + " of " + table.name, s);
+    return std::string(static_cast<const char*>(kvEntry_Value(entry.get())),
+                       static_cast<std::size_t>(kvEntry_ValueLen(entry.get())));
+  }
+
+  Result<std::vector<std::string>> keys(Table table) override {
+    kvKeysList list{};
+    kvStore* kv = store(table);
+    const natsStatus s = kv ? kvStore_Keys(&list, kv, nullptr) : NATS_NO_SERVER;
+    std::vector<std::string> all;
+    if (s == NATS_OK) all.assign(list.Keys, list.Keys + list.Count);
+    kvKeysList_Destroy(&list);
+    if (s != NATS_OK && s != NATS_NOT_FOUND) return refused(std::string("cannot list ") + table.name, s);
+    return all;
+  }
+
+  Result<void> erase(Table table, const std::string& key) override {
+    kvStore* kv = store(table);
+    const natsStatus s = kv ? kvStore_Delete(kv, key.c_str()) : NATS_NO_SERVER;
+    return s == NATS_OK ? Result<void>{} : refused("cannot remove " + key + " of " + table.name, s);
+  }
+
+  Result<void> open_job(const std::string& job, milliseconds patience) override {
+    const std::string subject = subject_of(job, "*");
+    jsConsumerConfig config;
+    jsConsumerConfig_Init(&config);
+    config.Durable = job.c_str();
+    config.FilterSubject = subject.c_str();
+    config.AckPolicy = js_AckExplicit;
+    config.AckWait = patience.count() * ns_per_ms;
+    config.MaxAckPending = 100'000;
+    // Without the server's MaxDeliver: a shard that it gives up would vanish without a word. Workers count, and bury it.
+    jsErrCode code{};
+    const natsStatus s = js_AddConsumer(nullptr, jetstream_.get(), stream, &config, nullptr, &code);
+    return s == NATS_OK ? Result<void>{} : refused("cannot open job " + job, s, code);
+  }
+
+  Result<bool> publish(const std::string& job, std::uint64_t shard) override {
+    const std::string number = std::to_string(shard), id = job + "/" + number;
+    // The server drops an id that it has seen within two minutes. When that shard has left the queue since, it is to be made
+    // anew.
+    for (const char* message_id : {id.c_str(), static_cast<const char*>(nullptr)}) {
+      jsPubOptions options;
+      jsPubOptions_Init(&options);
+      options.MsgId = message_id;
+      options.ExpectNoMessage = true;
+      Owned<jsPubAck, jsPubAck_Destroy> ack;
+      jsErrCode code{};
+      const natsStatus s = into(ack, [&](auto** a) {
+        return js_Publish(a, jetstream_.get(), subject_of(job, number).c_str(), nullptr, 0, &options, &code);
+      });
+      if (code == already_queued) return false;
+      if (s != NATS_OK) return refused("cannot publish shard " + id, s, code);
+      if (!ack->Duplicate) return true;
+    }
+    return false;
+  }
+
+  Result<Waiting> waiting(const std::string& job) override {
+    Owned<jsConsumerInfo, jsConsumerInfo_Destroy> info;
+    jsErrCode code{};
+    const natsStatus s =
+        into(info, [&](auto** i) { return js_GetConsumerInfo(i, jetstream_.get(), stream, job.c_str(), nullptr, &code); });
+    if (s == NATS_NOT_FOUND) return Waiting{};
+    if (s != NATS_OK) return refused("cannot ask for job " + job, s, code);
+    return Waiting{info->NumPending, static_cast<std::uint64_t>(info->NumAckPending)};
+  }
+
+  Result<std::unique_ptr<Task>> take(const std::string& job, milliseconds wait) override {
+    if (!subscription_ || subscribed_ != job) {
+      jsSubOptions options;
+      jsSubOptions_Init(&options);
+      options.Stream = stream;
+      options.Consumer = job.c_str();
+      jsErrCode code{};
+      const natsStatus s = into(subscription_, [&](auto** sub) {
+        return js_PullSubscribe(sub, jetstream_.get(), subject_of(job, "*").c_str(), job.c_str(), nullptr, &options, &code);
+      });
+      if (s != NATS_OK) return refused("cannot take from job " + job, s, code);
+      subscribed_ = job;
+    }
+    natsMsgList list{};
+    jsErrCode code{};
+    const natsStatus s = natsSubscription_Fetch(&list, subscription_.get(), 1, wait.count(), &code);
+    Message message(s == NATS_OK && list.Count > 0 ? std::exchange(list.Msgs[0], nullptr) : nullptr);
+    natsMsgList_Destroy(&list);
+    if (s == NATS_TIMEOUT) return std::unique_ptr<Task>();
+    if (s != NATS_OK || !message) {
+      subscription_.reset();
+      return refused("cannot take from job " + job, s, code);
+    }
+    Owned<jsMsgMetaData, jsMsgMetaData_Destroy> about;
+    const std::string subject = natsMsg_GetSubject(message.get());
+    const auto shard = text::parse_unsigned(subject.substr(subject.rfind('.') + 1));
+    if (into(about, [&](auto** a) { return natsMsg_GetMetaData(a, message.get()); }) != NATS_OK || !shard) {
+      natsMsg_Term(message.get(), nullptr);
+      return failure(ErrorKind::unavailable, "the queue holds " + subject + ", which is no shard; it is removed");
+    }
+    return std::make_unique<NatsTask>(*this, job, *shard, static_cast<int>(about->NumDelivered), std::move(message));
+  }
+
+  tl::unexpected<Error> refused(const std::string& what, natsStatus status, int code = 0) const {
+    const char* last = nats_GetLastError(nullptr);
+    return failure(ErrorKind::unavailable,
+                   "NATS server " + where_ + ": " + what + ": " + (last && *last ? last : natsStatus_GetText(status)) +
+                       (code ? " (" + std::to_string(code) + ")" : "") + "; it needs JetStream: nats-server -js -sd FOLDER");
+  }
+
+  /// For those who listen; the table is what counts.
+  void announce(const std::string& subject, const std::string& words) {
+    natsConnection_PublishString(connection_.get(), subject.c_str(), words.c_str());
+  }
+  /// What has no answer is at the server, in case the program ends now.
+  void flush() { natsConnection_FlushTimeout(connection_.get(), patience_ms); }
+
+ private:
+  Result<void> make_stream() {
+    const char* subjects[] = {"farm.work.>"};
+    jsStreamConfig config;
+    jsStreamConfig_Init(&config);
+    config.Name = stream;
+    config.Subjects = subjects, config.SubjectsLen = 1;
+    config.Retention = js_WorkQueuePolicy;
+    config.Storage = js_FileStorage;
+    jsErrCode code{};
+    const natsStatus s = js_AddStream(nullptr, jetstream_.get(), &config, nullptr, &code);  // no error where it is there
+    return s == NATS_OK ? Result<void>{} : refused("cannot make the stream FARM", s, code);
+  }
+
+  /// Null: the server does not answer.
+  kvStore* store(Table table) {
+    auto& kv = stores_[table.name];
+    if (kv || into(kv, [&](auto** made) { return js_KeyValue(made, jetstream_.get(), table.name); }) == NATS_OK) return kv.get();
+    kvConfig config;
+    kvConfig_Init(&config);
+    config.Bucket = table.name;
+    config.TTL = milliseconds(table.lifetime).count() * ns_per_ms;
+    into(kv, [&](auto** made) { return js_CreateKeyValue(made, jetstream_.get(), &config); });
+    return kv.get();
+  }
+
+  std::string where_;
+  Owned<natsConnection, natsConnection_Destroy> connection_;
+  Owned<jsCtx, jsCtx_Destroy> jetstream_;
+  std::map<std::string, Owned<kvStore, kvStore_Destroy>> stores_;
+  Subscription subscription_;  // of the job that was last taken from
+  std::string subscribed_;
+};
+
+Result<void> NatsTask::in_progress() {
+  const natsStatus s = natsMsg_InProgress(message_.get(), nullptr);
+  return s == NATS_OK ? Result<void>{} : queue_.refused("cannot keep a shard", s);
+}
+
+Result<void> NatsTask::done() {
+  jsErrCode code{};
+  jsOptions options;
+  jsOptions_Init(&options);
+  options.Wait = patience_ms;
+  const natsStatus s = natsMsg_AckSync(message_.get(), &options, &code);
+  return s == NATS_OK ? Result<void>{} : queue_.refused("cannot acknowledge a shard", s, code);
+}
+
+Result<void> NatsTask::again(milliseconds later) {
+  const natsStatus s =
+      later.count() > 0 ? natsMsg_NakWithDelay(message_.get(), later.count(), nullptr) : natsMsg_Nak(message_.get(), nullptr);
+  queue_.flush();
+  return s == NATS_OK ? Result<void>{} : queue_.refused("cannot give a shard back", s);
+}
+
+Result<void> NatsTask::bury(const std::string& why) {
+  const std::string shard = std::to_string(shard_);
+  if (const auto put = queue_.put(dead_table, job_ + "." + shard, why); !put) return put;
+  queue_.announce("farm.dead." + job_ + "." + shard, why);
+  const natsStatus s = natsMsg_Term(message_.get(), nullptr);
+  queue_.flush();
+  return s == NATS_OK ? Result<void>{} : queue_.refused("cannot bury a shard", s);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Queue>> connect(const QueueOptions& options) {
+  auto queue = std::make_unique<NatsQueue>();
+  if (const auto connected = queue->connect(options); !connected) return tl::make_unexpected(connected.error());
+  return queue;
+}
+
+}  // namespace sonar::farm

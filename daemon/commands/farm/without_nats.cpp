@@ -1,0 +1,12 @@
+// In place of nats_queue.cpp where libnats was not found.
+#include "daemon/commands/farm/queue.hpp"
+
+namespace sonar::farm {
+
+Result<std::unique_ptr<Queue>> connect(const QueueOptions&) {
+  return failure(ErrorKind::unavailable,
+                 "this sonard was built without the farm: install libnats-dev and build it again, or share the shards by "
+                 "sonard dataset --shards I/N");
+}
+
+}  // namespace sonar::farm

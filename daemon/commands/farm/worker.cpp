@@ -1,0 +1,252 @@
+#include "daemon/commands/farm/worker.hpp"
+
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <future>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "core/base/confined_reads.hpp"
+#include "core/base/enum_names.hpp"
+#include "daemon/commands/dataset/make_dataset.hpp"
+#include "daemon/commands/dataset/shards.hpp"
+#include "daemon/commands/farm/farm_job.hpp"
+
+namespace sonar::farm {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+using std::filesystem::path;
+
+constexpr int most_tries = 4;
+constexpr milliseconds most_between_beats = 5s, for_a_shard = 2s, least_rest = 500ms, most_rest = 5s;
+
+volatile std::sig_atomic_t stopping = 0;
+
+class Worker {
+ public:
+  Worker(const WorkerCommand& command, Queue& queue) : c_(command), queue_(queue) {
+    std::array<char, 256> host{};
+    ::gethostname(host.data(), host.size() - 1);
+    name_ = std::string(host.data()) + "." + std::to_string(::getpid());
+    for (char& c : name_)
+      if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '.') c = '_';  // of a key
+  }
+
+  Result<int> run() {
+    while (!stopping) {
+      const auto job = next_job();
+      if (!job && job.error().kind == ErrorKind::unavailable && !is_unfit_) {
+        say(job.error().text + "; trying again");
+        rest();
+        continue;
+      }
+      if (!job) return tl::make_unexpected(job.error());
+      if (!*job && c_.until_empty) break;
+      if (!*job)
+        rest();
+      else if (const auto served = serve(**job); !served)
+        return tl::make_unexpected(served.error());
+    }
+    queue_.erase(beat_table, name_);
+    return 0;
+  }
+
+ private:
+  void say(const std::string& words) const {
+    if (!c_.quiet) std::fprintf(stderr, "%s\n", words.c_str());
+  }
+
+  /// Longer each time until a shard is made, so that a thousand idle workers do not keep the server from its work.
+  void rest() {
+    for (const auto end = Clock::now() + rest_; Clock::now() < end && !stopping;) std::this_thread::sleep_for(50ms);
+    rest_ = std::min(2 * rest_, most_rest);
+  }
+
+  /// Of those with work, the one submitted first; nothing without any.
+  Result<std::optional<FarmJob>> next_job() {
+    const auto ids = queue_.keys(job_table);
+    if (!ids) return tl::make_unexpected(ids.error());
+    std::optional<FarmJob> first;
+    std::string unfit;
+    for (const std::string& id : *ids) {
+      if (id.find('.') != std::string::npos || std::find(ids->begin(), ids->end(), id + ".stopped") != ids->end()) continue;
+      const auto waiting = queue_.waiting(id);
+      if (!waiting) return tl::make_unexpected(waiting.error());
+      if (waiting->queued + waiting->running == 0) continue;
+      const auto words = queue_.get(job_table, id);
+      if (!words) return tl::make_unexpected(words.error());
+      if (!*words) continue;
+      auto job = parse_farm_job(id, **words);
+      const std::string why = unfit_.contains(id) ? unfit_[id] : job ? why_unfit(*job) : job.error().text;
+      if (!why.empty())
+        unfit = why;
+      else if (!first || job->submitted_unix_s < first->submitted_unix_s)
+        first = *std::move(job);
+    }
+    is_unfit_ = !first && !unfit.empty();
+    if (is_unfit_) return failure(ErrorKind::unavailable, unfit);
+    return first;
+  }
+
+  /// Until the queue has none of its shards for a moment.
+  Result<void> serve(const FarmJob& record) {
+    if (opened_ != record.id)
+      if (const auto opened = open(record); !opened) {
+        if (opened.error().kind == ErrorKind::io) return opened;
+        say(opened.error().text);
+        if (opened.error().kind == ErrorKind::unavailable)
+          rest();
+        else
+          unfit_[record.id] = opened.error().text;  // its shards are left to workers that have what is missing here
+        return {};
+      }
+    while (!stopping) {
+      const auto stopped = queue_.get(job_table, record.id + ".stopped");
+      if (stopped && *stopped) return {};
+      auto task = queue_.take(record.id, for_a_shard);
+      if (!task) rest();  // the server is away, or the job is
+      if (!task || !*task) return {};
+      if (const auto done = work(record, **task); !done) return done;
+    }
+    return {};
+  }
+
+  Result<void> open(const FarmJob& record) {
+    const path out = path(c_.out) / record.folder();
+    const auto file = receive_files(record, out / "files", queue_);
+    if (!file) return tl::make_unexpected(file.error());
+    auto job = dataset::load_job(*file);
+    if (!job) return tl::make_unexpected(job.error());
+    folder_.reset();
+    opened_.clear();
+    job_ = *std::move(job);
+    dataset::DatasetOptions options;
+    options.out = out, options.threads = c_.threads.value_or(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+    options.simd = enum_from<SimdLevel>(record.instruction_set, simd_level_names);
+    auto folder = dataset::open_dataset(job_, options, [this](const dataset::DatasetProgress& p) { pings_ = p.pings; });
+    if (!folder) return tl::make_unexpected(folder.error());
+    folder_ = *std::move(folder), opened_ = record.id, begin_ = Clock::now(), shards_ = 0, pings_ = 0;
+    return {};
+  }
+
+  Result<void> refuse(const FarmJob& record, Task& task, const Error& why) {
+    const bool is_last = task.delivery() >= most_tries;
+    say(dataset::shard_name(task.shard()) + ": " + why.text + (is_last ? "; it is dead" : ""));
+    const auto told = is_last ? task.bury(why.text) : task.again(record.patience / 12);
+    if (!told) say(told.error().text);
+    rest();  // where all fails, as for want of a file, others shall have the next tries
+    return {};
+  }
+
+  /// Errors: what keeps this worker from any work.
+  Result<void> work(const FarmJob& record, Task& task) {
+    if (task.delivery() > most_tries)
+      return refuse(record, task,
+                    {ErrorKind::bug, "its workers ended without a word " + std::to_string(most_tries) +
+                                         " times: killed, or out of memory; see their logs, then submit the job again"});
+    auto made = std::async(std::launch::async, [this, shard = task.shard()]() -> Result<bool> {
+      const auto is_there = folder_->holds(shard);
+      if (!is_there || *is_there) return is_there;
+      const auto done = folder_->make(shard);
+      if (!done) return tl::make_unexpected(done.error());
+      return false;
+    });
+    const milliseconds between_signs = record.patience / 3;
+    const milliseconds tick = std::min(between_signs, most_between_beats);
+    auto signed_at = Clock::now();
+    while (made.wait_for(milliseconds(0)) != std::future_status::ready) {
+      beat(record, dataset::shard_name(task.shard()));
+      for (const auto until = Clock::now() + tick; Clock::now() < until && !stopping;)
+        if (made.wait_for(std::min(tick, milliseconds(200))) == std::future_status::ready) break;
+      if (stopping) leave(task);
+      if (Clock::now() - signed_at < between_signs) continue;
+      signed_at = Clock::now();
+      if (const auto sign = task.in_progress(); !sign) say(sign.error().text);
+    }
+    const auto is_there = made.get();
+    if (is_there) {
+      shards_ += 1;
+      rest_ = least_rest;
+      acknowledge(task);
+      say(dataset::shard_name(task.shard()) + (*is_there ? " was there already" : " of " + record.folder() + " is made"));
+      return {};
+    }
+    const Error& why = is_there.error();
+    if (folder_->differs()) {
+      say("ALARM: " + why.text + "; the job is stopped");
+      if (const auto told = queue_.put(job_table, record.id + ".stopped", why.text); !told) say(told.error().text);
+      task.again({});
+      return {};
+    }
+    if (why.kind != ErrorKind::io) return refuse(record, task, why);
+    task.again({});  // this machine's disk is full: another may have room
+    return tl::make_unexpected(why);
+  }
+
+  /// The shard has its name already: when the queue loses the word, the shard is found.
+  void acknowledge(Task& task) {
+    constexpr int most = 60;
+    for (int i = 0; i < most && !stopping; ++i) {
+      const auto done = task.done();
+      if (done) return;
+      say(done.error().text + "; trying again");
+      rest();
+    }
+  }
+
+  /// The threads that compute are not waited for: what they write has no name yet.
+  [[noreturn]] void leave(Task& task) {
+    task.again({});
+    queue_.erase(beat_table, name_);
+    say("the shard that was under way is given back");
+    std::_Exit(0);
+  }
+
+  void beat(const FarmJob& record, const std::string& shard) {
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
+    queue_.put(beat_table, name_,
+               nlohmann::json{{"job", record.id},
+                              {"shard", shard},
+                              {"shards", shards_},
+                              {"pings_per_s", static_cast<double>(pings_) / std::max(seconds, 1e-3)}}
+                   .dump());
+  }
+
+  const WorkerCommand& c_;
+  Queue& queue_;
+  std::string name_;
+  milliseconds rest_ = least_rest;
+  std::map<std::string, std::string> unfit_;  // jobs that cannot be opened here, and why
+  bool is_unfit_ = false;                     // the last error of next_job() is not the server's
+  std::string opened_;                        // the job that the next three are of
+  dataset::DatasetJob job_;
+  std::unique_ptr<dataset::DatasetFolder> folder_;
+  Clock::time_point begin_;
+  std::uint64_t shards_ = 0;
+  std::atomic<std::uint64_t> pings_{0};
+};
+
+}  // namespace
+
+Result<int> run_worker(const WorkerCommand& command) {
+  const auto queue = connect(command.queue);
+  if (!queue) return tl::make_unexpected(queue.error());
+  std::error_code ec;
+  std::filesystem::create_directories(command.out, ec);
+  if (ec) return failure(ErrorKind::io, "cannot make the folder " + command.out + ": " + ec.message() + "; choose another --out");
+  confine_reads(command.out);
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stopping = 1; });
+  std::signal(SIGPIPE, SIG_IGN);
+  return Worker(command, **queue).run();
+}
+
+}  // namespace sonar::farm
