@@ -22,15 +22,18 @@ using text::whole_number;
 constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the names of the files
 /// Makers of the demo's sonar, and the product that stands for each; empty = the demo's own.
 constexpr std::pair<std::string_view, std::string_view> demos[] = {
-    {"oculus", ""}, {"blueview", "blueview-p900-90"}, {"aris", "aris-3000"}};
+    {"oculus", ""},         {"blueview", "blueview-p900-90"}, {"aris", "aris-3000"},       {"3d15", "waterlinked-3d15"},
+    {"ping360", "ping360"}, {"surveyor", "surveyor-240"},     {"omniscan", "omniscan-450"}};
 
 void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("config", run.config, "configuration file; without one sonard looks in the usual places, then runs the demo");
   app.add_option_function<std::string>(
          "--demo", [&run](const std::string& maker) { run.demo = true, run.demo_of = maker; },
-         "run the built-in demo, whatever files there are; --demo blueview, --demo aris: with such a sonar instead of an Oculus")
+         "run the built-in demo, whatever files there are; --demo blueview, aris, 3d15, ping360, surveyor, omniscan: with such "
+         "a sonar instead of an Oculus")
       ->expected(0, 1)
-      ->type_name("TEXT:oculus|blueview|aris");  // complaint() judges it: a file is not meant for a maker
+      ->type_name(
+          "TEXT:oculus|blueview|aris|3d15|ping360|surveyor|omniscan");  // complaint() judges it: a file is not meant for a maker
   app.add_option("--profile", run.profile, "run the demo with this product, as blueview-m900-130 (docs/configuration.md)");
   app.add_option(
          "--clock", run.clock,
@@ -72,6 +75,8 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
       ->check(one_of({"npy", "png", "raw"}));
   app.add_option("--image-rings", render.image_rings, "range rings in the pictures (default on)")->check(one_of({"on", "off"}));
   app.add_flag("--complex", render.complex, "also the complex beam signal, before magnitude and gain (npy)");
+  app.add_flag("--labels", render.labels,
+               "also which object's echo each sample holds, with boxes and polygons (docs/datasets.md)");
   app.add_option("--sonar", render.sonar, "which sonar of the configuration, when it has several");
   app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, TUM, EuRoC, KITTI");
   app.add_option("--pose-frame", render.pose_frame, "of that file, when it does not say so itself")
@@ -92,6 +97,54 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
   app.add_flag("--overwrite", render.overwrite, "replace the pings of other inputs in the folder");
   app.add_flag("--quiet", render.quiet, "no progress");
   add_engine_options(app, render.engine);
+}
+
+void add_dataset_options(CLI::App& app, DatasetCommand& dataset) {
+  app.footer(
+      "examples:\n  sonard dataset scenes/datasets/mines.yaml --out mines\n  sonard dataset job.yaml --out set --shards 3/8");
+  app.add_option("job", dataset.job, "job file (docs/datasets.md)")->required();
+  app.add_option("--out", dataset.out, "folder for the shards; made when it is not there")->required();
+  app.add_option("--shards", dataset.shards, "I/N: the shards whose number leaves I when divided by N, for several machines");
+  app.add_option("--threads", dataset.threads, "pings to make side by side (all processors)")->check(whole_number(1, 1024));
+  app.add_flag("--quiet", dataset.quiet, "no progress");
+}
+
+void add_queue_options(CLI::App& app, farm::QueueOptions& queue) {
+  app.add_option("--nats", queue.url, "address of the NATS server (default nats://127.0.0.1:4222)")->envname("NATS_URL");
+  app.add_option("--credentials", queue.credentials, "NATS credentials file");
+  app.add_option("--token-file", queue.token_file, "file with the server's token");
+}
+
+void add_worker_options(CLI::App& app, WorkerCommand& worker) {
+  app.footer("examples:\n  sonard worker --nats nats://10.8.0.1:4222 --out /shared/sets");
+  add_queue_options(app, worker.queue);
+  app.add_option("--out", worker.out, "the farm's folder, with a folder of each job below it")->required();
+  app.add_option("--threads", worker.threads, "pings to make side by side (all processors)")->check(whole_number(1, 1024));
+  app.add_flag("--until-empty", worker.until_empty, "end when the queue is empty");
+  app.add_flag("--quiet", worker.quiet, "no progress");
+}
+
+void add_farm_options(CLI::App& app, FarmCommand& farm) {
+  app.require_subcommand(1);
+  app.footer(
+      "examples:\n  sonarctl farm submit mines.yaml --nats nats://10.8.0.1:4222 --out /shared/sets\n"
+      "  sonarctl farm status --watch\n  sonarctl farm collect /shared/sets/mines-0123456789ab");
+  CLI::App& submit = *app.add_subcommand("submit", "put the shards of a job that are missing into the queue");
+  submit.add_option("job", farm.job, "job file (docs/datasets.md)")->required();
+  submit.add_option("--out", farm.out, "the farm's folder; the job's folder is made below it")->required();
+  submit.add_option("--simd", farm.simd, "instruction set that all workers have (as the job says, else this processor's)")
+      ->check(one_of({simd_level_names.begin(), simd_level_names.end()}));
+  submit.add_option("--ack-wait", farm.ack_wait_s, "seconds until a silent worker's shard is another's (60)")
+      ->check(number(0.5, 86400));
+  add_queue_options(submit, farm.queue);
+  submit.callback([&farm] { farm.what = FarmCommand::What::submit; });
+  CLI::App& status = *app.add_subcommand("status", "how jobs and workers stand");
+  status.add_flag("--watch", farm.watch, "again every two seconds");
+  add_queue_options(status, farm.queue);
+  status.callback([&farm] { farm.what = FarmCommand::What::status; });
+  CLI::App& collect = *app.add_subcommand("collect", "check every shard, then write manifest.json, coco.json and README.md");
+  collect.add_option("folder", farm.out, "the job's folder")->required();
+  collect.callback([&farm] { farm.what = FarmCommand::What::collect; });
 }
 
 /// What is missing or makes no sense together; empty = nothing.
@@ -124,7 +177,8 @@ std::string complaint(const RunCommand& run) {
   const std::string file = !known && is_like_a_file(run.demo_of) ? run.demo_of : run.config;
   if (run.demo && !file.empty()) return "--demo runs the built-in demo, not " + file + ": leave out one of the two";
   if (!known)
-    return "there is no demo \"" + run.demo_of + "\"; there are oculus, blueview and aris, and --profile NAME for any product";
+    return "there is no demo \"" + run.demo_of +
+           "\"; there are oculus, blueview, aris, 3d15, ping360 and surveyor, and --profile NAME for any product";
   if (!run.profile.empty() && !file.empty())
     return "--profile chooses the demo's sonar, and " + file + " says itself what its sonars are: leave out one of the two";
   if (!run.profile.empty() && !run.demo_of.empty())
@@ -135,7 +189,7 @@ std::string complaint(const RunCommand& run) {
 /// The first word when it is neither an option, a command nor a file name; else empty.
 std::string unknown_command(std::string_view word) {
   if (word.empty() || word[0] == '-' || is_like_a_file(word)) return {};
-  constexpr std::array<std::string_view, 4> commands{"run", "check", "render", "replay"};
+  constexpr std::array<std::string_view, 7> commands{"run", "check", "render", "dataset", "worker", "farm", "replay"};
   return "there is no command or file \"" + std::string(word) + "\"" + text::suggestion(word, commands, "the commands are");
 }
 
@@ -150,19 +204,26 @@ Command parse_command_line(int argc, char** argv) {
   RunCommand run;
   CheckCommand check;
   RenderCommand render;
+  DatasetCommand dataset;
+  WorkerCommand worker;
+  FarmCommand farm;
   ReplayCommand replay;
   // `sonard CONFIG` is `sonard run CONFIG`: the word may be left out.
-  constexpr std::array<std::string_view, 4> words{"run", "check", "render", "replay"};
+  constexpr std::array<std::string_view, 7> words{"run", "check", "render", "dataset", "worker", "farm", "replay"};
   const bool bare = argc < 2 || std::find(words.begin(), words.end(), argv[1]) == words.end();
   if (bare) {
     add_run_options(app, run);
     app.footer(
         "examples:\n"
         "  sonard                           the configuration found in the usual places, else the demo\n"
-        "  sonard --demo blueview           the demo with a BlueView head; aris: with an ARIS; --profile NAME: with any product\n"
+        "  sonard --demo blueview           the demo with a BlueView head; aris, 3d15, ping360, surveyor; --profile NAME: with "
+        "any product\n"
         "  sonard my.yaml --log-level debug\n"
-        "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, replay FILE; each has --help.\n"
-        "Oculus and ARIS sonars are wire-compatible. BlueView sonars are compatible with the vendor's SDK by libraries of our "
+        "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, dataset JOB --out DIR, worker --out DIR, "
+        "farm, "
+        "replay FILE; each has --help.\n"
+        "Oculus, ARIS, Water Linked, Ping360 and Surveyor sonars are wire-compatible. BlueView sonars are compatible with the "
+        "vendor's SDK by libraries of our "
         "own, not on "
         "the wire. Not affiliated with any vendor.");
   } else {
@@ -178,6 +239,9 @@ Command parse_command_line(int argc, char** argv) {
         "examples:\n  sonard render my.yaml --out pings --pings 5 --format npy,png\n  sonard render my.yaml "
         "--check-expectations");
     add_render_options(render_app, render);
+    add_dataset_options(*app.add_subcommand("dataset", "make a labelled data set from a job"), dataset);
+    add_worker_options(*app.add_subcommand("worker", "make the shards of a farm's jobs"), worker);
+    add_farm_options(*app.add_subcommand("farm", "what sonarctl farm runs"), farm);
     add_replay_options(*app.add_subcommand("replay", "serve a recording to a driver, byte for byte"), replay);
   }
   const std::vector<std::string> typed(argv + std::min(argc, 1), argv + argc);
@@ -192,6 +256,9 @@ Command parse_command_line(int argc, char** argv) {
   }
   if (!bare && app.got_subcommand("check")) return check;
   if (!bare && app.got_subcommand("replay")) return replay;
+  if (!bare && app.got_subcommand("dataset")) return dataset;
+  if (!bare && app.got_subcommand("worker")) return worker;
+  if (!bare && app.got_subcommand("farm")) return farm;
   if (!bare && app.got_subcommand("render")) {
     const std::string wrong = complaint(render);
     if (wrong.empty()) return render;
@@ -207,6 +274,10 @@ Command parse_command_line(int argc, char** argv) {
 Result<void> override_config(Config& config, const RunCommand& command) {
   if (!command.profile.empty())
     if (const auto r = use_product(config, command.profile); !r) return failure(r.error().kind, "--profile: " + r.error().text);
+  if (command.demo)  // a sonar that waits to be switched on shows nothing
+    for (const auto& [name, value] : {std::pair("acoustics_at_start", "enabled"), std::pair("udp_at_start", "multicast")})
+      if (const auto option = config.sonars.front().options.find(name); option != config.sonars.front().options.end())
+        option->second = value;
   if (const auto mode = enum_from<ClockMode>(command.clock, clock_modes)) config.clock = *mode, config.clock_place = "--clock";
   if (const auto r = override_engine(config.engine, config.seed, command.engine); !r) return r;
   if (!command.log_format.empty()) config.log.json = command.log_format == "json";

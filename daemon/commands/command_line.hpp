@@ -9,6 +9,7 @@
 
 #include "core/base/result.hpp"
 #include "daemon/commands/engine_options.hpp"
+#include "daemon/commands/farm/queue.hpp"
 #include "daemon/commands/replay/replay_command.hpp"
 #include "daemon/config/config.hpp"
 
@@ -40,8 +41,26 @@ struct RenderCommand {
   std::string image_rings = "on";
   std::optional<double> rate_hz;
   int batch = 1;
-  bool complex = false, quiet = false, overwrite = false, check_expectations = false;
+  bool complex = false, labels = false, quiet = false, overwrite = false, check_expectations = false;
   EngineOptionsGiven engine;
+};
+struct DatasetCommand {
+  std::string job, out, shards;  // shards: "I/N", or empty for all
+  std::optional<int> threads;
+  bool quiet = false;
+};
+struct WorkerCommand {
+  farm::QueueOptions queue;
+  std::string out;
+  std::optional<int> threads;
+  bool until_empty = false, quiet = false;
+};
+struct FarmCommand {
+  enum class What { submit, status, collect } what = What::status;
+  farm::QueueOptions queue;
+  std::string job, out, simd;
+  double ack_wait_s = 60;
+  bool watch = false;
 };
 struct CheckCommand {
   std::string config;
@@ -49,7 +68,8 @@ struct CheckCommand {
 struct Leave {  // help, version or a usage error, already printed
   int exit_code = 0;
 };
-using Command = std::variant<RunCommand, CheckCommand, RenderCommand, ReplayCommand, Leave>;
+using Command =
+    std::variant<RunCommand, CheckCommand, RenderCommand, DatasetCommand, WorkerCommand, FarmCommand, ReplayCommand, Leave>;
 
 Command parse_command_line(int argc, char** argv);
 /// What was given on the command line, or stands for it in the environment, wins over the file.

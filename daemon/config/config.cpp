@@ -203,6 +203,9 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   Config config;
   config.source = name;
   Map root = document.root();
+  if (root.has("dataset") && !root.has("world"))
+    return failure(ErrorKind::config, name + ": this is a data set's job, not a configuration: sonard dataset " + name +
+                                          " --out DIR (docs/datasets.md)");
   if (root.has("scene") && !root.has("world"))
     return failure(ErrorKind::config,
                    name + ": this is a render file, not a configuration: sonard render " + name + " --out DIR (docs/render.md)");

@@ -42,7 +42,7 @@ std::string sonar_lines(const Device& device) {
   std::string text = "sonar     " + device.config().name + "  " + model.name + "  " +
                      text::frequency_text(static_cast<double>(mode.centre_hz)) +
                      format("  %d beams  %g m", s.beam_count, s.range_m) +
-                     (s.rate_hz > 0 ? format("  %g Hz\n", static_cast<double>(s.rate_hz)) : "\n");
+                     (s.rate_hz > 0 && !s.triggered ? format("  %g Hz\n", static_cast<double>(s.rate_hz)) : "\n");
   const Endpoint data = device.data_endpoint();
   text += data.port == 0 ? "  data    by datagrams" : "  data    tcp " + text_of(data);
   const protocol::Port* const beacon = device.sonar().vendor().port(protocol::Port::Kind::udp_beacon);

@@ -129,8 +129,8 @@ constexpr FaultKind table[] = {
      {P{"before", "3", 0, 1000}}, "ping_id"},
     {"D08", "id-reset", 1, S::framing, E::renumber, "Ping numbers begin again at 0.", "takes it as a new beginning", 10, F::ping_id,
      {}, "ping_id"},
-    {"D09", "id-jump", 2, S::framing, E::renumber, "Ping numbers jump ahead.", "counts pings as lost", 10, F::ping_id,
-     {P{"by", "1000", 1, 4294967295.0}}, "ping_id"},
+    {"D09", "id-jump", 2, S::framing, E::renumber, "Ping numbers jump.", "ahead: counts pings as lost; back: takes it as a new beginning", 10, F::ping_id,
+     {P{"by", "1000", -4294967295.0, 4294967295.0}}, "ping_id"},
     {"D10", "id-frozen", 2, S::framing, E::renumber, "All pings have the same number.", "uses the stamps", 5, F::ping_id, {},
      "ping_id"},
     {"D11", "sample-width-switch", 1, S::device, E::change_settings, "Samples change their width.",
@@ -171,6 +171,8 @@ constexpr FaultKind table[] = {
      "checks their order", 5, {}, {P{.name = "how", .value = "reversed", .words = "reversed zero shuffled changing"}}, "bearings"},
     {"D30", "log-messages", 2, S::framing, E::insert_message, "Text messages precede a ping.", "limits what it prints", 0,
      F::message_type, {P{"type", "0x80", 0, 65535}, P{"bytes", "64", 0, 65536}}, "front"},
+    {"D32", "part-failed", 2, S::framing, E::set_field, "The header of a ping says that a part of the device failed.",
+     "reports it; goes on", 5, F::ping_status, {P{"value", "1", 0, 65535}}, "ping_status"},
 
     // ---- status messages
     {"U01", "never-announced", 1, S::status, E::no_beacon, "No status message is sent.", "lets the user give an address", 600, {},
@@ -238,7 +240,7 @@ constexpr FaultKind table[] = {
      10, {}, {P{.name = "how", .value = "reset", .words = "reset fin"}}, "admission"},
     {"M09", "rejects-host-message", 1, S::clients, E::end_on_request,
      "The device ends the connection when the host sends a command.", "checks what it sends; does not reconnect in a loop", 10, {},
-     {end_how}, "requests"},
+     {end_how, P{.name = "command", .value = "settings", .words = "settings any"}}, "requests"},
     {"M10", "reconnect-storm", 1, S::clients, E::end_after, "Every connection ends after a short while.",
      "closes before it opens; waits longer each time", 10, {}, {P{"seconds", "0.5", 0.01, 60}, end_how}, "end"},
 
@@ -290,8 +292,8 @@ constexpr FaultKind table[] = {
      {}},
 
     // ---- datagrams of a ping
-    {"G01", "part-lost", 1, S::datagrams, E::lose_part, "A datagram of a ping is lost.", "publishes what is whole", 0, {}, {},
-     "parts"},
+    {"G01", "part-lost", 1, S::datagrams, E::lose_part, "A datagram of a ping is lost.", "publishes what is whole", 0, {},
+     {P{.name = "which", .value = "any", .words = "any first"}}, "parts"},
     {"G02", "parts-reordered", 1, S::datagrams, E::reorder_parts, "The datagrams of a ping come in another order.",
      "puts them in order", 0, {}, {}, "parts"},
     {"G03", "part-twice", 1, S::datagrams, E::repeat_part, "A datagram of a ping comes twice.", "uses it once", 0, {}, {}, "parts"},
@@ -301,6 +303,8 @@ constexpr FaultKind table[] = {
      "does not mix two pings", 0, {}, {}, "parts"},
     {"G06", "ip-fragment-lost", 1, S::datagrams, E::harness, "An IP fragment is lost.", "loses one ping", 6, {}, {}, {}},
     {"G07", "group-lost", 1, S::datagrams, E::leave_group, "Datagrams do not reach the group.", "joins again", 6, {}, {}, "group"},
+    {"G08", "part-late", 1, S::datagrams, E::late_part, "A datagram of a ping comes after the next ping has begun.",
+     "drops it; does not take it for the next ping's", 0, {}, {}, "parts"},
 };
 
 constexpr Trouble trouble_table[] = {
@@ -331,15 +335,6 @@ bool same_word(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](char x, char y) { return lower(x) == lower(y); });
 }
 
-/// Of a sonar whose pings travel as datagrams alone: what changes the first of them, or no ping.
-bool acts_without_stream(const FaultKind& kind) {
-  if (kind.stage == S::stream) return false;
-  if (kind.stage == S::framing)
-    return kind.effect == E::set_field || kind.effect == E::add_to_field || kind.effect == E::flip || kind.effect == E::drop;
-  constexpr E of_streams[] = {E::end, E::thin_link, E::delay, E::jitter, E::outbox_policy};
-  return std::find(std::begin(of_streams), std::end(of_streams), kind.effect) == std::end(of_streams);
-}
-
 }  // namespace
 
 std::span<const FaultParameter> FaultKind::given() const {
@@ -355,44 +350,6 @@ const FaultKind* find_fault_kind(std::string_view code_or_name) {
     return same_word(k.code, code_or_name) || same_word(k.name, code_or_name);
   });
   return it == std::end(table) ? nullptr : it;
-}
-
-std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& vendor) {
-  using Port = protocol::Port::Kind;
-  if (kind.code == "B15") return "is of files: cut one with head -c";
-  if (kind.effect == E::harness) return "needs two network namespaces: sonarctl lab";
-  const bool blueview_only = kind.code.front() == 'B';
-  if (blueview_only && vendor.name() != "blueview") return "only the BlueView link has it";
-  if (const protocol::Port* const stream = vendor.port(Port::udp_stream); kind.stage == S::datagrams) {
-    if (stream == nullptr) return "sends no datagrams of pings";
-    return kind.effect == E::leave_group && stream->group.port == 0 ? "has no group of its own" : "";
-  }
-  const bool of_beacon = kind.stage == S::status || kind.effect == E::heat;
-  if (of_beacon && vendor.port(Port::udp_beacon) == nullptr) return "has no status message";
-  if (kind.field && !vendor.field(of_beacon ? protocol::Part::beacon : protocol::Part::ping, *kind.field, {}))
-    return "has no field " + std::string(protocol::field_names[static_cast<std::size_t>(*kind.field)]);
-  if (kind.effect == E::bearings && !vendor.region(protocol::Region::bearings, {})) return "sends no bearings";
-  const bool of_stream = kind.stage == S::framing || kind.stage == S::stream || kind.stage == S::link || kind.stage == S::clients;
-  if (of_stream && vendor.port(Port::tcp_stream) == nullptr) return "has no TCP stream";
-  if (!vendor.pings_over_tcp() && !acts_without_stream(kind)) return "sends pings by datagrams alone";
-  if (kind.effect == E::change_settings && (kind.code == "D12" || kind.code == "D11") && vendor.name() != "oculus")
-    return "has one type of samples";
-  return {};
-}
-
-std::string support_table() {
-  std::string text = "| code | name | tier |";
-  for (const protocol::Vendor* vendor : protocol::vendors()) text += " " + std::string(vendor->name()) + " |";
-  text += "\n|---|---|---|";
-  for (std::size_t i = 0; i < protocol::vendors().size(); ++i) text += "---|";
-  for (const FaultKind& kind : table) {
-    text += "\n| " + std::string(kind.code) + " | " + std::string(kind.name) + " | " + std::to_string(kind.tier) + " |";
-    for (const protocol::Vendor* vendor : protocol::vendors()) {
-      const std::string why = why_without_effect(kind, *vendor);
-      text += " " + (why.empty() ? std::string("takes effect") : why) + " |";
-    }
-  }
-  return text + "\n";
 }
 
 }  // namespace sonar

@@ -101,6 +101,7 @@ enum class FaultEffect {
   repeat_part,
   lose_last_part,
   older_part,
+  late_part,
   leave_group,
   // not from inside the daemon
   harness,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "core/base/enum_names.hpp"
@@ -57,6 +58,10 @@ void write_field(const Fault& fault, Bytes& bytes, const Field& field) {
     for (std::size_t at = 0; at < field.size; at += 4)
       write_integer(bytes, field.offset + at, std::min<std::size_t>(4, field.size - at),
                     static_cast<std::uint64_t>(fault.number("value")));
+}
+
+std::function<std::int64_t(std::int64_t)> always(std::int64_t value) {
+  return [value](std::int64_t) { return value; };
 }
 
 void add_to(Bytes& bytes, const std::optional<Field>& field, std::int64_t by) {
@@ -114,15 +119,17 @@ Touch cut_row(const Fault& fault, const MessageContext& c, Bytes& bytes) {
 }
 
 Touch renumber(const Fault& fault, const MessageContext& c, Bytes& bytes) {
+  const std::int64_t since = std::int64_t{c.number} - c.first_number;
+  const auto other = [&](std::int64_t number) {
+    const std::string_view code = fault.kind->code;
+    if (code == "D07") return (std::int64_t{1} << 32) - static_cast<std::int64_t>(fault.number("before")) + since;
+    if (code == "D09") return number + static_cast<std::int64_t>(fault.number("by"));
+    return code == "D10" ? number - since : since;  // D08
+  };
   const auto field = c.vendor.field(Part::ping, FieldName::ping_id, bytes);
-  if (!field) return {false};
-  const std::uint64_t number = read_integer(bytes, *field), since = number - c.first_number;
-  const std::string_view code = fault.kind->code;
-  std::uint64_t value = since;  // D08
-  if (code == "D07") value = (std::uint64_t{1} << 32) - static_cast<std::uint64_t>(fault.number("before")) + since;
-  if (code == "D09") value = number + static_cast<std::uint64_t>(fault.number("by"));
-  if (code == "D10") value = c.first_number;
-  write_integer(bytes, field->offset, field->size, value);
+  if (!field) return {c.vendor.change_integer(Part::ping, FieldName::ping_id, other, bytes)};
+  write_integer(bytes, field->offset, field->size,
+                static_cast<std::uint64_t>(other(static_cast<std::int64_t>(read_integer(bytes, *field)))));
   return {};
 }
 
@@ -218,7 +225,11 @@ Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
     write_address(bytes, of(FieldName::address), address_from("link-local"));
     return bytes;
   }
-  add_to(bytes, of(FieldName::device_id), 1);
+  if (const auto id = of(FieldName::device_id))
+    add_to(bytes, id, 1);
+  else
+    vendor.change_integer(
+        Part::beacon, FieldName::device_id, [](auto n) { return n + 1; }, bytes);
   add_to(bytes, of(FieldName::source_id), 1);
   if (const auto mac = of(FieldName::mac)) bytes[mac->offset + mac->size - 1] ^= std::byte{1};
   if (const auto field = of(FieldName::address); field && address == "next") bytes[field->offset + 3] ^= std::byte{1};
@@ -251,9 +262,7 @@ Touch alter_pace(const Fault& fault, MessageEdit& m) {
   }
 }
 
-}  // namespace
-
-Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m) {
+Touch alter_content(const Fault& fault, const MessageContext& c, MessageEdit& m) {
   Bytes& bytes = m.bytes;
   using E = FaultEffect;
   switch (fault.kind->effect) {
@@ -272,8 +281,12 @@ Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m)
       return set_field(fault, c, bytes);
     case E::add_to_field: {
       const auto field = field_of(fault, c.vendor, Part::ping, bytes);
-      add_to(bytes, field, static_cast<std::int64_t>(fault.number("add")));
-      return {field.has_value()};
+      const auto by = static_cast<std::int64_t>(fault.number("add"));
+      if (!field)
+        return {c.vendor.change_integer(
+            Part::ping, *fault.kind->field, [by](auto n) { return n + by; }, bytes)};
+      add_to(bytes, field, by);
+      return {};
     }
     case E::cut_row:
       return cut_row(fault, c, bytes);
@@ -304,6 +317,18 @@ Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m)
   }
 }
 
+}  // namespace
+
+Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m) {
+  using E = FaultEffect;
+  const E effect = fault.kind->effect;
+  const bool of_fields = effect == E::set_field || effect == E::add_to_field || effect == E::renumber;
+  const Bytes before = of_fields ? m.bytes : Bytes{};
+  const Touch touch = alter_content(fault, c, m);
+  if (of_fields && touch.acted) c.vendor.reseal(before, m.bytes);
+  return touch;
+}
+
 void alter_beacons(const Fault& fault, const Vendor& vendor, const FaultDraws& draws, std::vector<Bytes>& datagrams) {
   if (datagrams.empty()) return;
   Bytes& bytes = datagrams.front();
@@ -319,6 +344,8 @@ void alter_beacons(const Fault& fault, const Vendor& vendor, const FaultDraws& d
       if (const auto field = field_of(fault, vendor, Part::beacon, bytes))
         write_integer(bytes, field->offset, field->size,
                       read_integer(bytes, *field) | static_cast<std::uint64_t>(fault.number("status")));
+      else
+        vendor.change_integer(Part::beacon, *fault.kind->field, always(static_cast<std::int64_t>(fault.number("status"))), bytes);
       return;
     case E::beacon_field: {
       const auto field = field_of(fault, vendor, Part::beacon, bytes);
@@ -327,8 +354,12 @@ void alter_beacons(const Fault& fault, const Vendor& vendor, const FaultDraws& d
       const std::uint64_t cleared = read_integer(bytes, *field) & ~static_cast<std::uint64_t>(fault.number("clear-bits"));
       return write_integer(bytes, field->offset, field->size, cleared | static_cast<std::uint64_t>(fault.number("set-bits")));
     }
-    case E::beacon_address:
-      return write_address(bytes, field_of(fault, vendor, Part::beacon, bytes), address_from(fault.word("address")));
+    case E::beacon_address: {
+      const text::Ipv4 address = address_from(fault.word("address"));
+      if (const auto field = field_of(fault, vendor, Part::beacon, bytes)) return write_address(bytes, field, address);
+      vendor.change_integer(Part::beacon, *fault.kind->field, always(text::number_from_ipv4(address)), bytes);
+      return;
+    }
     case E::second_beacon:
       datagrams.push_back(second_device(fault, vendor, bytes));
       return;

@@ -24,6 +24,7 @@ struct MessageContext {
   const protocol::Vendor& vendor;
   FaultDraws draws;
   std::uint32_t first_number = 0;           // of renumber: the first ping that met the fault
+  std::uint32_t number = 0;                 // of this ping
   const protocol::Bytes* before = nullptr;  // of splice: the message before; may be null
 };
 

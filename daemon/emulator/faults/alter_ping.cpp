@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/sonar/range_image.hpp"
+
 namespace sonar {
 namespace {
 
@@ -43,16 +45,50 @@ std::uint32_t scaled(std::uint32_t code, double factor, std::uint32_t most) {
   return static_cast<std::uint32_t>(std::clamp(static_cast<double>(code) * factor, 0.0, static_cast<double>(most)));
 }
 
+/// A sample of a picture is a level; one of a range image is the level above the range of a return, and a pixel without one stays
+/// so.
+class Levels {
+ public:
+  Levels(const Ping& ping, std::uint32_t full)
+      : of_ranges_(range_image_of(ping.request)), full_(of_ranges_ ? full >> 16 : full) {}
+  std::uint32_t of(std::uint32_t code) const { return of_ranges_ ? code >> 16 : code; }
+  std::uint32_t with(std::uint32_t code, std::uint32_t level) const {
+    if (of_ranges_ == nullptr) return level;
+    return level == 0 || (code & most_range) == 0 ? 0 : level << 16 | (code & most_range);
+  }
+  std::uint32_t full() const { return full_; }
+  bool are_of_ranges() const { return of_ranges_ != nullptr; }
+
+  /// Of a range image: the return at so many times its range, none beyond `most_m`.
+  std::uint32_t at_range(std::uint32_t code, double factor, double most_m) const {
+    const double range = static_cast<double>(code & most_range) * factor;
+    if (range < 1 || range > std::min<double>(most_range, most_m / of_ranges_->range_unit_m)) return 0;
+    return (code & ~most_range) | static_cast<std::uint32_t>(range);
+  }
+
+ private:
+  static constexpr std::uint32_t most_range = RangePixel::most_range;
+  const RangeImageSettings* of_ranges_;
+  std::uint32_t full_;
+};
+
 /// What moves, scales or removes rows and beams.
 void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
+  const Levels levels(ping, image.full());
+  const double most_m = ping.request.settings.range_m;
   const std::size_t from = static_cast<std::size_t>(fault.number("fraction") * static_cast<double>(image.rows()));
   using E = FaultEffect;
   switch (fault.kind->effect) {
     case E::gain_step:
       return image.fill([&](std::size_t row, std::size_t beam) {
-        return row < from ? image.get(row, beam) : scaled(image.get(row, beam), fault.number("factor"), image.full());
+        const std::uint32_t code = image.get(row, beam);
+        return row < from ? code : levels.with(code, scaled(levels.of(code), fault.number("factor"), levels.full()));
       });
     case E::missing_rows:
+      if (levels.are_of_ranges())
+        return image.fill([&](std::size_t row, std::size_t beam) {
+          return levels.at_range(image.get(row, beam), 1, most_m * fault.number("fraction"));
+        });
       return image.fill([&](std::size_t row, std::size_t beam) { return row < from ? image.get(row, beam) : 0; });
     case E::mirror: {
       Ping before = ping;
@@ -60,6 +96,10 @@ void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
       return image.fill([&](std::size_t row, std::size_t beam) { return old.get(row, image.beams() - 1 - beam); });
     }
     case E::scale_range: {
+      if (levels.are_of_ranges())
+        return image.fill([&](std::size_t row, std::size_t beam) {
+          return levels.at_range(image.get(row, beam), fault.number("factor"), most_m);
+        });
       Ping before = ping;
       const Image old(before);
       return image.fill([&](std::size_t row, std::size_t beam) {
@@ -76,6 +116,7 @@ void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
 
 void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, std::uint64_t begun, Ping& ping) {
   Image image(ping);
+  const Levels levels(ping, image.full());
   const double share = fault.number("share");
   // The same beams in every ping: draws of the fault, not of the ping.
   FaultDraws of_fault = draws;
@@ -102,17 +143,20 @@ void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, s
       return std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
     case E::saturate:
       return image.fill([&](std::size_t row, std::size_t beam) {
-        return uniform_open(draw(row, beam)) < static_cast<float>(share) ? image.full() : image.get(row, beam);
+        const std::uint32_t code = image.get(row, beam);
+        return uniform_open(draw(row, beam)) < static_cast<float>(share) ? levels.with(code, levels.full()) : code;
       });
     case E::noise:
       return image.fill([&](std::size_t row, std::size_t beam) {
-        return static_cast<std::uint32_t>(draw(row, beam) % (std::uint64_t{image.full()} + 1));
+        const auto level = static_cast<std::uint32_t>(draw(row, beam) % (std::uint64_t{levels.full()} + 1));
+        return levels.with(image.get(row, beam), level);
       });
     case E::dead_beams:
       return image.fill([&](std::size_t row, std::size_t beam) { return chosen_beam(beam) ? 0 : image.get(row, beam); });
     case E::spokes:
       return image.fill([&](std::size_t row, std::size_t beam) {
-        return draws.uniform(static_cast<std::uint32_t>(beam)) < share ? image.full() : image.get(row, beam);
+        const std::uint32_t code = image.get(row, beam);
+        return draws.uniform(static_cast<std::uint32_t>(beam)) < share ? levels.with(code, levels.full()) : code;
       });
     default:
       return alter_rows(fault, image, ping);

@@ -113,6 +113,8 @@ class Faults {
   enum class Request { apply, ignore, end, reset };
   /// A client requested settings. `change` may be limited. `ignore`: the sonar does not apply it (it may come back as an order).
   Request on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state, Time now);
+  /// A client sent bytes, whatever they are.
+  Request on_bytes(const std::string& who, Time now);
 
   // ---- status messages
   void alter_beacons(std::vector<protocol::Bytes>& beacons, Time now);
@@ -131,7 +133,7 @@ class Faults {
     std::optional<std::uint32_t> first_number;
     std::shared_ptr<const Ping> kept;
     std::optional<Time> kept_time;
-    protocol::Bytes before;                           // of splice and older_part
+    protocol::Bytes before;                           // of splice, older_part and late_part
     std::vector<std::pair<Time, ConnectionId>> ends;  // of end_after
     std::vector<std::pair<Time, ApplyRequest>> late;  // of delay_requests
   };
@@ -152,7 +154,7 @@ class Faults {
   void step(Entry& entry, Time now);
   void count_ping(Entry& entry, Time now);
   void note(Entry& entry, FaultEntry::What what, Time now, FaultEntry more = {});
-  void alter_first_datagram(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
+  void alter_bytes_of_datagrams(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
   void note_message(Entry& entry, const Connection& to, std::uint32_t ping, const protocol::Bytes& before,
                     const protocol::Bytes& after, Time now, std::optional<std::size_t> place = {});
   std::uint32_t draw(const Entry& entry, std::uint32_t a, std::uint32_t b, std::uint32_t c) const;

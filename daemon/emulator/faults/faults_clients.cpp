@@ -83,4 +83,15 @@ Faults::Request Faults::on_request(protocol::ChangeSettings& change, const std::
   return Request::apply;
 }
 
+Faults::Request Faults::on_bytes(const std::string& who, Time now) {
+  for (Entry& e : entries_) {
+    if (!e.active || e.fault.kind->effect != Effect::end_on_request || e.fault.word("command") != "any") continue;
+    FaultEntry more;
+    more.client = who;
+    note(e, FaultEntry::What::injected, now, std::move(more));
+    return e.fault.word("how") == "reset" ? Request::reset : Request::end;
+  }
+  return Request::apply;
+}
+
 }  // namespace sonar

@@ -1,6 +1,7 @@
 // What faults do to pings, to the messages of clients, to their requests and to status messages.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "daemon/emulator/faults/alter_message.hpp"
 #include "daemon/emulator/faults/alter_ping.hpp"
@@ -87,7 +88,8 @@ bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
     if (!edit) edit = MessageEdit{whole(message), {}, Outbox::Shape::End::none, false};
     const Bytes before = edit->bytes;
     const FaultDraws draws{around_.seed, e.key, around_.index, message.ping, static_cast<std::uint32_t>(to.number)};
-    const Touch touch = alter_message(e.fault, {around_.vendor, draws, e.first_number.value_or(message.ping), &earlier}, *edit);
+    const Touch touch =
+        alter_message(e.fault, {around_.vendor, draws, e.first_number.value_or(message.ping), message.ping, &earlier}, *edit);
     if (touch.acted) note_message(e, to, message.ping, before, edit->bytes, now, touch.place);
     if (edit->dropped) return false;
     if (edit->end != Outbox::Shape::End::none) break;  // nothing is sent after it
@@ -115,31 +117,45 @@ void Faults::note_message(Entry& e, const Connection& to, std::uint32_t ping, co
   note(e, FaultEntry::What::injected, now, std::move(more));
 }
 
-/// Where pings travel as datagrams alone: kinds that change bytes change the first, which has the fields of the ping.
-void Faults::alter_first_datagram(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
+/// Where a ping travels as datagrams: kinds that change bytes change the first that has what they change; a number without a
+/// fixed place is in all of them.
+void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
+  using protocol::Part;
   for (Entry& e : entries_) {
-    if (e.fault.kind->stage != FaultStage::framing || datagrams.empty() || !met(e, ping)) continue;
-    MessageEdit edit{datagrams.front(), {}, Outbox::Shape::End::none, false};
+    if (e.fault.kind->stage != FaultStage::framing || datagrams.empty() || !chosen(e.fault, stream) || !met(e, ping)) continue;
+    const auto name = e.fault.kind->field;
+    const bool of_all = name && !around_.vendor.field(Part::ping, *name, {});
     const FaultDraws draws{around_.seed, e.key, around_.index, ping, 0};
-    const Touch touch = alter_message(e.fault, {around_.vendor, draws, e.first_number.value_or(ping), nullptr}, edit);
-    if (touch.acted) note_message(e, stream, ping, datagrams.front(), edit.bytes, now, touch.place);
-    datagrams.front() = std::move(edit.bytes);
-    if (edit.dropped) datagrams.clear();
+    bool acted = false, dropped = false;
+    for (Bytes& datagram : datagrams) {
+      MessageEdit edit{datagram, {}, Outbox::Shape::End::none, false};
+      const Touch touch = alter_message(e.fault, {around_.vendor, draws, e.first_number.value_or(ping), ping, nullptr}, edit);
+      if (!touch.acted) continue;
+      if (!std::exchange(acted, true)) note_message(e, stream, ping, datagram, edit.bytes, now, touch.place);
+      datagram = std::move(edit.bytes);
+      dropped = edit.dropped;
+      if (!of_all) break;
+    }
+    if (dropped) datagrams.clear();
   }
 }
 
 void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
-  if (!around_.vendor.pings_over_tcp()) alter_first_datagram(datagrams, stream, ping, now);
+  if (stream.role == Role::client || !around_.vendor.pings_over_tcp()) alter_bytes_of_datagrams(datagrams, stream, ping, now);
   for (Entry& e : entries_) {
-    if (e.fault.kind->stage != FaultStage::datagrams || datagrams.empty() || (e.over && e.hits.empty())) continue;
-    const bool older = e.fault.kind->effect == Effect::older_part;
+    if (e.fault.kind->stage != FaultStage::datagrams || datagrams.empty() || !chosen(e.fault, stream)) continue;
+    const bool older = e.fault.kind->effect == Effect::older_part, delays = e.fault.kind->effect == Effect::late_part;
+    Bytes late = delays ? std::exchange(e.before, {}) : Bytes{};
+    if (e.over && e.hits.empty() && late.empty()) continue;
     const Bytes first = datagrams.front();
     if (met(e, ping)) {
       const FaultDraws draws{around_.seed, e.key, around_.index, ping, 0};
-      const std::size_t part = draws.below(datagrams.size(), 0);
+      const bool the_first = e.fault.word("which") == "first";
+      const std::size_t part = the_first ? 0 : draws.below(datagrams.size(), 0);
       const auto at = datagrams.begin() + static_cast<std::ptrdiff_t>(part);
       const std::size_t before = datagrams.size();
-      if (e.fault.kind->effect == Effect::lose_part) datagrams.erase(at);
+      if (delays) e.before = *at;
+      if (delays || e.fault.kind->effect == Effect::lose_part) datagrams.erase(at);
       if (e.fault.kind->effect == Effect::lose_last_part) datagrams.pop_back();
       if (e.fault.kind->effect == Effect::repeat_part) datagrams.insert(at, Bytes(*at));
       if (e.fault.kind->effect == Effect::reorder_parts) std::rotate(datagrams.begin(), datagrams.begin() + 1, datagrams.end());
@@ -152,6 +168,7 @@ void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& st
       note(e, FaultEntry::What::injected, now, std::move(more));
     }
     if (older) e.before = first;
+    if (!late.empty()) datagrams.insert(datagrams.begin() + (datagrams.empty() ? 0 : 1), std::move(late));
   }
 }
 

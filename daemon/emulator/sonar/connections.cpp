@@ -19,6 +19,11 @@ void add_traffic(DeviceFigures& f, const Connection& c) {
   f.bytes_read += c.bytes_read;
 }
 
+bool Connection::receives(std::size_t stream) const {
+  return std::any_of(receivers.begin(), receivers.end(),
+                     [stream](const protocol::SetReceivers& list) { return list.stream == stream && !list.to.empty(); });
+}
+
 std::optional<Time> Connection::next_tick() const {
   if (finishing || dialogue == nullptr) return std::nullopt;
   return std::max(dialogue->next_tick(), not_before);

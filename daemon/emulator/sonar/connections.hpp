@@ -20,6 +20,7 @@ namespace sonar {
 struct Peer {
   std::string name;     // for the log: "127.0.0.1:40123"
   protocol::Ipv4 ip{};  // as the status message shows it
+  std::uint16_t port = 0;
 };
 
 struct Connection {
@@ -47,9 +48,16 @@ struct Connection {
   bool finishing = false;  // no more bytes are taken in, no more pings offered
   Time not_before{};       // earliest next call of dialogue->on_tick, in unskipped time
   std::uint64_t bytes_written = 0, bytes_read = 0;
-  std::uint64_t requests = 0;  // for settings or a ping
-  std::string complaint = {};  // the last about what it sent
+  std::uint64_t streamed_pings = 0, streamed_bytes = 0;  // of a client: by a stream's datagrams to its receivers
+  std::uint64_t requests = 0;                            // for settings or a ping
+  std::string complaint = {};                            // the last about what it sent
 
+  /// What it gets is datagrams: of a port of kind udp_stream or udp_dialogue.
+  bool takes_datagrams() const { return port != nullptr && port->kind != protocol::Port::Kind::tcp_stream; }
+  /// By its own connection or a stream.
+  std::uint64_t pings_written() const { return outbox.pings_written() + streamed_pings; }
+  /// Names a receiver of that stream.
+  bool receives(std::size_t stream) const;
   /// When the conversation has something to do; nothing while it ends.
   std::optional<Time> next_tick() const;
   /// When it will request a ping by itself.

@@ -19,8 +19,8 @@ Sonar::Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time 
       index_(index),
       state_(device_state(config_, around.config, now)),
       connections_(config_),
-      faults_({vendor_, connections_, config_.name, index, Seed(around.config.seed), around.journal}, now),
-      skipped_(skipped) {
+      faults_({vendor_, connections_, config_.name, index, Seed(around.config.seed), around.journal}, now) {
+  state_.skipped = skipped;
   update_depth(now);
   use_initial_settings();
 }
@@ -37,9 +37,13 @@ void Sonar::report(Report::Topic topic, LogLevel level, std::string phrase, std:
 void Sonar::use_initial_settings() {
   asked_ = false;
   asked_by_.clear();
+  aim_ = {};
   protocol::ChangeSettings initial = vendor_.initial_settings(state_);
   settings_ = initial.settings;
   state_.settings = std::move(initial.vendor_settings);
+  if (initial.receivers)
+    if (Connection* const stream = connections_.stream(initial.receivers->stream))
+      stream->receivers = {*std::move(initial.receivers)};
   busy_unwanted_ = busy_;
 }
 
@@ -56,6 +60,7 @@ void Sonar::change_settings(const protocol::ChangeSettings& change, const std::s
   }
   settings_ = change.settings;  // of a repeat too: the device's own sound speed follows its depth
   asked_ = true;
+  if (change.receivers) set_receivers({}, *change.receivers, now);
   if (wants_pings()) update_pacer(now);
 }
 
@@ -81,9 +86,14 @@ void Sonar::move(const SonarConfig& config, Time now) {
 
 void Sonar::use_water(const Water& water, Time now) {
   state_.water = water;
-  // The client's request stays; what the device derives from it, its sound speed say, follows the water.
-  if (const auto same = vendor_.apply_override({}, state_)) settings_ = same->settings;
+  follow_water();
   if (wants_pings()) update_pacer(now);
+}
+
+/// The client's request stays; what the device derives from it follows the water at its depth.
+void Sonar::follow_water() {
+  const auto same = vendor_.apply_override({}, state_);
+  if (same && same->settings.device_sound_speed_mps != settings_.device_sound_speed_mps) settings_ = same->settings;
 }
 
 DeviceFigures Sonar::figures() const {
@@ -162,7 +172,7 @@ Actions Sonar::tick_pacer(Time now) {
 }
 
 void Sonar::skip(std::chrono::nanoseconds by) {
-  skipped_ += by;
+  state_.skipped += by;
   pacer_.skip(by);
   state_.powered_up_at += by;
 }
@@ -198,10 +208,12 @@ PingNumber Sonar::next_number() {
 PingRequest Sonar::request_at(Time at) const {
   const Config& config = around_.config;
   const bool stale = around_.world.is_stale(config_.vehicle, at);
-  PingRequest request = ping_request(config, around_.world, config_.vehicle, config_.mount, at);
+  const Pose head{{}, quat_from_rpy({0, 0, aim_.head_rad})};
+  const Pose mount = aim_.head_rad == 0 ? config_.mount : compose(config_.mount, head);
+  PingRequest request = ping_request(config, around_.world, config_.vehicle, mount, at);
   request.model = state_.model;
   request.settings = settings_;
-  request.vendor_settings = state_.settings;
+  request.vendor_settings = aim_.with ? aim_.with : state_.settings;
   request.sonar_id = index_;
   request.blank = (stale && config.poses.on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
   return request;
@@ -221,6 +233,7 @@ void Sonar::request_ping(Time at, Actions& actions) {
     return;
   }
   update_depth(at);
+  follow_water();
   PingRequest request = request_at(at);
   request.number = next_number();
   request.settings.gain_db = gain_assist_.gain_db(settings_, at);
@@ -267,12 +280,18 @@ void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
   for (Connection& c : connections_.all()) {
     if (c.role == Role::stream)
       offer_datagrams(c, *reported, now, queued, actions);
+    else if (c.takes_datagrams())
+      guarded(c, actions, [&] {
+        for (protocol::Event& event : offer_to_host(c, *reported, now, queued, actions))
+          events.emplace_back(&c, std::move(event));
+      });
     else if (bytes != nullptr)
       guarded(c, actions, [&] {
         for (protocol::Event& event : offer(c, bytes, outcome.ping->request, now, actions))
           events.emplace_back(&c, std::move(event));
       });
   }
+  state_.framed_at = reported->request.fired_at;
   for (const auto& [from, event] : events) on_event(source_of(*from), event, now, actions);
   actions.emplace_back(std::move(queued));
   obey_faults(now, actions);
@@ -282,21 +301,36 @@ void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
 void Sonar::offer_datagrams(Connection& stream, const Ping& ping, Time now, PingQueued& queued, Actions& actions) {
   if (stream.finishing || receivers(stream.id).empty()) return;
   try {
-    std::vector<protocol::Bytes> made = vendor_.datagrams(*stream.port, ping, state_);
-    if (made.empty()) return;
-    faults_.alter_datagrams(made, stream, static_cast<std::uint32_t>(ping.request.number), now);
-    if (made.empty()) return stream.outbox.drop_offered(DropReason::fault);
-    const auto datagrams = std::make_shared<const std::vector<protocol::Bytes>>(std::move(made));
-    queued.datagrams.push_back(datagrams);
-    stream.outbox.push_ping({.bytes = nullptr,
-                             .ping = static_cast<std::uint32_t>(ping.request.number),
-                             .prefixes = {},
-                             .fired_at = ping.request.fired_at,
-                             .datagrams = datagrams});
-    actions.emplace_back(Wake{stream.id});
+    push_datagrams(stream, ping, now, queued, actions);
   } catch (const std::exception& e) {
     report_fault(e, actions);
   }
+}
+
+/// Returns what the host requests next.
+std::vector<protocol::Event> Sonar::offer_to_host(Connection& host, const Ping& ping, Time now, PingQueued& queued,
+                                                  Actions& actions) {
+  if (host.finishing || host.state != Connection::State::served) return {};
+  protocol::Delivery delivery = host.dialogue->on_ping(ping.request.vendor_settings.get(), 0, unskipped(now));
+  if (!delivery.prefixes.empty()) push_datagrams(host, ping, now, queued, actions);
+  return std::move(delivery.events);
+}
+
+void Sonar::push_datagrams(Connection& to, const Ping& ping, Time now, PingQueued& queued, Actions& actions) {
+  std::vector<protocol::Bytes> made = vendor_.datagrams(*to.port, ping, state_);
+  if (made.empty()) return;
+  faults_.alter_datagrams(made, to, static_cast<std::uint32_t>(ping.request.number), now);
+  if (made.empty()) return to.outbox.drop_offered(DropReason::fault);
+  const auto datagrams = std::make_shared<const std::vector<protocol::Bytes>>(std::move(made));
+  queued.datagrams.push_back(datagrams);
+  Outbox::Message message{.bytes = nullptr,
+                          .ping = static_cast<std::uint32_t>(ping.request.number),
+                          .prefixes = {},
+                          .fired_at = ping.request.fired_at,
+                          .datagrams = datagrams};
+  if (to.role == Role::client) return deliver(to, std::move(message), now, actions);
+  to.outbox.push_ping(std::move(message));
+  actions.emplace_back(Wake{to.id});
 }
 
 /// Returns what the client requests next.

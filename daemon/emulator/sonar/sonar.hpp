@@ -37,20 +37,22 @@ class Sonar {
 
   // ---- connections
 
-  /// A client or an observer at a port of kind tcp_stream, by default the vendor's first. Serve, KeepWaiting or TurnAway is among
-  /// the actions.
+  /// A client or an observer at a port of kind tcp_stream, by default the vendor's first, or a host at one of kind udp_dialogue.
+  /// Serve, KeepWaiting or TurnAway is among the actions.
   Actions on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port = nullptr);
   /// A port of kind udp_stream is open: messages for its receivers can be taken under this id.
   Actions open_stream(ConnectionId id, const protocol::Port& port, Time now);
-  /// Where a message of the stream goes, as of now.
+  /// Where a message of the stream, or of the host at a port of kind udp_dialogue, goes, as of now.
   std::vector<protocol::Endpoint> receivers(ConnectionId stream) const;
+  /// Another host goes on with the dialogue at a port of kind udp_dialogue.
+  void hand_over(ConnectionId id, Peer to);
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
   /// The next message to write, whole; empty when there is none or one is being written.
   Outbox::Message next_message(ConnectionId id, Time now);
   /// So many bytes of it were taken; after the last one on_written().
   void on_sent(ConnectionId id, std::size_t bytes);
   void on_written(ConnectionId id, const Outbox::Message& message, Time now);
-  /// The message of a stream that was taken last had no receiver left.
+  /// The message of a stream that was taken last had no receiver left, or none of its datagrams could be sent.
   void on_not_sent(ConnectionId id);
   /// The caller ends the connection after the message being written.
   void finish(ConnectionId id);
@@ -138,9 +140,11 @@ class Sonar {
   std::optional<PingRequest> preview_request(PingNumber number, Time at) const;
 
  private:
-  Time unskipped(Time now) const { return now - skipped_; }
+  Time unskipped(Time now) const { return now - state_.skipped; }
   /// The way back, if nothing more is skipped.
-  Time clock_time(Time unskipped) const { return unskipped > Time::max() - skipped_ ? Time::max() : unskipped + skipped_; }
+  Time clock_time(Time unskipped) const {
+    return unskipped > Time::max() - state_.skipped ? Time::max() : unskipped + state_.skipped;
+  }
   std::optional<Time> earliest(std::optional<Time> (Connection::*of)() const) const;
   void handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions);
   /// `connection`: null when a datagram or an HTTP request caused it.
@@ -160,6 +164,7 @@ class Sonar {
   void release_held(Connection& to, Time now, bool all, Actions& actions);
   void serve_waiting(Time now, Actions& actions);
   void change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions);
+  void end_by_fault(Connection& connection, Faults::Request fate, Actions& actions);
   void serve(Connection& connection, Time now, Actions& actions);
   /// An exception is a mistake in sonard: it may cost this connection, never the others.
   template <class Call>
@@ -187,8 +192,11 @@ class Sonar {
   std::vector<protocol::Event> offer(Connection& to, const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,
                                      Time now, Actions& actions);
   void offer_datagrams(Connection& stream, const Ping& ping, Time now, PingQueued& queued, Actions& actions);
+  std::vector<protocol::Event> offer_to_host(Connection& host, const Ping& ping, Time now, PingQueued& queued, Actions& actions);
+  void push_datagrams(Connection& to, const Ping& ping, Time now, PingQueued& queued, Actions& actions);
   void note_water(const PingRequest& computed, Time now, Actions& actions);
   void update_depth(Time now);
+  void follow_water();
   void report(Report::Topic topic, LogLevel level, std::string phrase, std::vector<LogField> fields, Actions& actions) const;
 
   Surroundings around_;
@@ -198,10 +206,10 @@ class Sonar {
   protocol::DeviceState state_;
   Connections connections_;
   Faults faults_;
-  std::chrono::nanoseconds skipped_;
 
   Pacer pacer_;
   PingSettings settings_;
+  protocol::RequestPing aim_;  // the last
   GainAssist gain_assist_;
   bool asked_ = false;  // settings were requested since the first client or receiver came
   std::string asked_by_;

@@ -95,9 +95,17 @@ Actions Sonar::open_stream(ConnectionId id, const protocol::Port& port, Time now
 std::vector<protocol::Endpoint> Sonar::receivers(ConnectionId stream) const {
   const Connection* const connection = connections_.find(stream);
   if (connection == nullptr) return {};
+  if (connection->role == Role::client) return {{connection->peer.ip, connection->peer.port}};
   std::vector<protocol::Endpoint> to = connections_.receivers(*connection);
   if (faults_.leaves_group()) std::erase(to, connection->port->group);
   return to;
+}
+
+void Sonar::hand_over(ConnectionId id, Peer to) {
+  Connection* const host = connections_.find(id);
+  if (host == nullptr) return;
+  host->peer = std::move(to);
+  if (connections_.oldest_client() == host) state_.connected_client = host->peer.ip;
 }
 
 void Sonar::set_receivers(const Source& from, protocol::SetReceivers wanted, Time now) {
@@ -133,7 +141,7 @@ Sonar::Answers Sonar::on_datagram(const protocol::Port& port, const protocol::En
 Sonar::HttpAnswer Sonar::on_http(const protocol::Port& port, const protocol::ResourceRequest& request, Time now) {
   HttpAnswer answer{{500, "internal fault\n", "text/plain"}, {}};
   try {
-    answer.reply = vendor_.on_http(port, request, state_, unskipped(now));
+    answer.reply = vendor_.on_http(port, request, state_, now);  // as the stamps of pings: no conversation goes on
     const Source from{nullptr, "http " + text::format_ipv4(request.from), request.from};
     for (const protocol::Event& event : answer.reply.events) on_event(from, event, now, answer.actions);
   } catch (const std::exception& e) {
@@ -153,7 +161,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
   for (Connection::Held& held : connection->held) connection->outbox.push_ping(std::move(held.ping));
   connection->outbox.end(connection->finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection->peer.name, connection->role, connection->state != Connection::State::waiting,
-                              connection->outbox.pings_written(), connection->outbox.pings_dropped(), why});
+                              connection->pings_written(), connection->outbox.pings_dropped(), why});
   if (connection->role != Role::observer) add_traffic(figures_, *connection);
   connections_.remove(id);
   if (connection_role == Role::stream) update_pacer(now);
@@ -202,6 +210,10 @@ Actions Sonar::on_bytes(ConnectionId id, protocol::BytesView bytes, Time now) {
   from->bytes_read += bytes.size();
   from->not_before = {};
   if (from->finishing) return actions;
+  if (const auto fate = faults_.on_bytes(from->peer.name, now); fate != Faults::Request::apply && from->role == Role::client) {
+    end_by_fault(*from, fate, actions);
+    return actions;
+  }
   guarded(*from, actions, [&] { handle(*from, from->dialogue->on_bytes(bytes, unskipped(now)), now, actions); });
   return actions;
 }
@@ -242,7 +254,9 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
   } else if (const auto* request = std::get_if<protocol::RequestPing>(&event)) {
     // The ping being computed will do only if it was fired with the settings that hold now.
     const bool served = request->joins && busy_ && busy_settings_ == state_.settings;
-    if (!served) pacer_.trigger(now, request->joins);
+    if (served) return;
+    aim_ = *request;
+    pacer_.trigger(now, request->joins);
   } else if (const auto* store = std::get_if<protocol::StoreAddress>(&event)) {
     state_.stored_address = store->address;
   } else if (const auto* receivers = std::get_if<protocol::SetReceivers>(&event)) {
@@ -273,6 +287,11 @@ void Sonar::on_written(ConnectionId id, const Outbox::Message& message, Time now
   if (to == nullptr) return;
   to->outbox.written();
   if (to->role == Role::observer || message.ping == 0) return;
+  for (Connection& c : connections_.all()) {
+    if (to->role != Role::stream || c.role != Role::client || !c.receives(to->receivers.front().stream)) continue;
+    ++c.streamed_pings;
+    c.streamed_bytes += message.size();
+  }
   figures_.latency.add(seconds(now - message.fired_at));
   if (message.ping <= last_served_.ping) return;
   if (last_served_.ping != 0)

@@ -38,13 +38,19 @@ std::string Sonar::why_no_faults(const std::vector<Fault>& faults) const {
       if (std::string conflict = conflict_of(fault, *other.fault); !conflict.empty()) return conflict;
     }
   }
-  return any ? std::string() : why;
+  const bool is_trouble = !faults.empty() && find_fault_kind(faults.front().what) == nullptr;
+  return any ? std::string() : (is_trouble ? "none of the kinds of " + faults.front().what + " has an effect: " : "") + why;
 }
 
 Actions Sonar::add_faults(const std::vector<Fault>& faults, bool manual, Time now) {
   Actions actions;
   for (const Fault& fault : faults) {
-    if ((!fault.sonar.empty() && fault.sonar != config_.name) || !why_without_effect(*fault.kind, vendor_).empty()) continue;
+    if (!fault.sonar.empty() && fault.sonar != config_.name) continue;
+    if (const std::string why = why_without_effect(*fault.kind, vendor_); !why.empty()) {
+      report(Report::Topic::state, LogLevel::warning, "fault " + fault.name + " left out: this sonar " + why,
+             {{"kind", std::string(fault.kind->code)}}, actions);
+      continue;
+    }
     report(Report::Topic::state, LogLevel::warning, "fault " + fault.name + ": " + std::string(fault.kind->sentence),
            {{"kind", std::string(fault.kind->code)}}, actions);
     faults_.add(fault, manual, now);
@@ -127,11 +133,14 @@ void Sonar::change_as_requested(const Source& from, protocol::ChangeSettings cha
   const Faults::Request fate = faults_.on_request(change, from.name, state_, now);
   obey_faults(now, actions);
   if (fate == Faults::Request::apply) return change_settings(change, from.name, now, actions);
-  if (from.connection == nullptr || fate == Faults::Request::ignore) return;
+  if (from.connection != nullptr && fate != Faults::Request::ignore) end_by_fault(*from.connection, fate, actions);
+}
+
+void Sonar::end_by_fault(Connection& connection, Faults::Request fate, Actions& actions) {
   if (fate == Faults::Request::reset)
-    actions.emplace_back(Reset{from.connection->id, "a fault"});
+    actions.emplace_back(Reset{connection.id, "a fault"});
   else
-    begin_finish(*from.connection, "a fault", actions);
+    begin_finish(connection, "a fault", actions);
 }
 
 // ---- pings held back

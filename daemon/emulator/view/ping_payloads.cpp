@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/image/draw_fan.hpp"
+#include "core/sonar/range_image.hpp"
 #include "protocol/foxglove/foxglove_messages.hpp"
 
 namespace sonar {
@@ -12,6 +13,7 @@ namespace {
 constexpr int fan_width_px = 720;
 constexpr std::size_t most_points = 20000;
 constexpr int arc_pieces = 16;
+constexpr std::size_t plan_rows = 256;  // of a range image seen from above
 
 ViewPayload::Piece piece(wire::Bytes bytes) { return {"", std::make_shared<const wire::Bytes>(std::move(bytes))}; }
 
@@ -21,10 +23,54 @@ ViewPayloadPointer picture(Time at, const std::string& frame, const foxglove::Im
   return std::make_shared<const ViewPayload>(std::move(payload));
 }
 
+/// A range image from above: the strongest pixel of each bearing and range.
+PolarImage plan_of(const Ping& ping, double unit_m) {
+  const RangeImageGrid grid(ping.request);
+  PolarImage image;
+  image.rows = plan_rows;
+  image.beams = static_cast<std::size_t>(grid.columns);
+  image.row_spacing_m = ping.request.settings.range_m / static_cast<double>(plan_rows);
+  image.azimuth_rad.assign(ping.beam_azimuth_rad.begin(), ping.beam_azimuth_rad.end());
+  image.samples.assign(image.rows * image.beams, 0);
+  image.full_scale = static_cast<float>(ping.request.settings.format.max_code >> 16);
+  for (std::size_t i = 0; i < ping.samples.size() / 4; ++i) {
+    const RangePixel pixel = range_pixel(ping, i);
+    const double level_m = pixel.range * unit_m * std::cos(grid.elevation_rad(static_cast<double>(i / image.beams)));
+    const auto row = static_cast<std::size_t>(level_m / image.row_spacing_m);
+    if (pixel.range == 0 || row >= image.rows) continue;
+    float& sample = image.samples[row * image.beams + i % image.beams];
+    sample = std::max(sample, std::min(image.full_scale, static_cast<float>(pixel.strength)));
+  }
+  return image;
+}
+
+foxglove::CloudPoint point_of(double range_m, double azimuth_rad, double elevation_rad, float part) {
+  const double level_m = range_m * std::cos(elevation_rad);
+  return {static_cast<float>(level_m * std::cos(azimuth_rad)), static_cast<float>(level_m * std::sin(azimuth_rad)),
+          static_cast<float>(range_m * std::sin(elevation_rad)), static_cast<std::uint8_t>(std::lround(255 * part))};
+}
+
+/// Every pixel of a range image is a place in space.
+std::vector<foxglove::CloudPoint> points_of(const Ping& ping, const RangeImageSettings& settings, double threshold) {
+  const RangeImageGrid grid(ping.request);
+  const auto full = static_cast<float>(ping.request.settings.format.max_code >> 16);
+  const auto columns = static_cast<std::size_t>(grid.columns);
+  std::vector<foxglove::CloudPoint> points;
+  for (std::size_t i = 0; i < ping.samples.size() / 4; ++i) {
+    const RangePixel pixel = range_pixel(ping, i);
+    const float part = std::min(1.0f, static_cast<float>(pixel.strength) / full);
+    if (pixel.range == 0 || part <= static_cast<float>(threshold)) continue;
+    points.push_back(point_of(pixel.range * settings.range_unit_m, grid.azimuth_rad(static_cast<double>(i % columns)),
+                              grid.elevation_rad(static_cast<double>(i / columns)), part));
+  }
+  return points;
+}
+
 }  // namespace
 
 PolarImage polar_image_of(const Ping& ping) {
   const PingSettings& s = ping.request.settings;
+  if (const RangeImageSettings* const range_image = range_image_of(ping.request)) return plan_of(ping, range_image->range_unit_m);
   PolarImage image;
   image.rows = static_cast<std::size_t>(s.range_bin_count);
   image.beams = static_cast<std::size_t>(s.beam_count);
@@ -106,6 +152,9 @@ ViewPayloadPointer fan_payload(const std::string& sonar, const Ping& ping, FanPa
 }
 
 ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold) {
+  if (const RangeImageSettings* const range_image = range_image_of(ping.request))
+    return view_payload(ping.request.fired_at,
+                        foxglove::cloud(ping.request.fired_at, sonar, points_of(ping, *range_image, threshold)));
   const PolarImage image = polar_image_of(ping);
   std::vector<std::pair<float, std::size_t>> bright;  // sample, where
   const auto least = static_cast<float>(threshold) * image.full_scale;

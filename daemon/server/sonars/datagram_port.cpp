@@ -36,12 +36,13 @@ Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port) {
   return {};
 }
 
-void DatagramPort::answer_with(const SonarConfig& sonar, Answer answer) {
-  answer_ = std::move(answer);
-  const Ipv4 broadcast = broadcast_of(sonar);
-  if (sonar.bind_ip == Ipv4{} || broadcast == sonar.bind_ip) return;
-  Socket& all = sockets_.emplace_back(io_);
-  if (!bind_shared(all.socket, {address_of(broadcast), number_})) sockets_.pop_back();
+void DatagramPort::hear_broadcasts(const SonarConfig& sonar) {
+  if (sonar.bind_ip == Ipv4{}) return;
+  for (const Ipv4& broadcast : {broadcast_of(sonar), Ipv4{255, 255, 255, 255}}) {
+    if (broadcast == sonar.bind_ip) continue;
+    Socket& all = sockets_.emplace_back(io_);
+    if (!bind_shared(all.socket, {address_of(broadcast), number_})) sockets_.pop_back();
+  }
 }
 
 void DatagramPort::start() {

@@ -1,5 +1,6 @@
 // A UDP port of an emulated sonar: datagrams of hosts are answered (Port::Kind::udp_answer), also those sent to the broadcast
-// address of its network, and pings are sent from it (Port::Kind::udp_stream). Owned by Device; the bytes are the vendor's.
+// address of its network, or belong to a dialogue (Port::Kind::udp_dialogue), and pings are sent from it. Owned by Device; the
+// bytes are the vendor's.
 #pragma once
 
 #include <array>
@@ -22,8 +23,10 @@ class DatagramPort {
 
   /// On the sonar's own address; port 0: any. Errors name the address and the next step.
   Result<void> open(const SonarConfig& sonar, std::uint16_t port);
-  /// From start() on, what arrives is answered. A broadcast address that cannot be bound is left out.
-  void answer_with(const SonarConfig& sonar, Answer answer);
+  /// From start() on, what arrives is answered.
+  void answer_with(Answer answer) { answer_ = std::move(answer); }
+  /// What arrives at the broadcast address, too. One that cannot be bound is left out.
+  void hear_broadcasts(const SonarConfig& sonar);
   void start();
   void stop();
   /// Of the sonar's own address, to send from.

@@ -26,43 +26,56 @@ void DatagramStream::finish(std::string why) {
 asio::awaitable<void> DatagramStream::send() {
   const auto self = shared_from_this();
   while (true) {
-    if (const Outbox::Message ping = parent_.next_message(id_)) {
-      const auto receivers = parent_.receivers(id_);  // one list for the whole ping
+    if (const Outbox::Message message = parent_.next_message(id_)) {
+      const auto receivers = parent_.receivers(id_);  // one list for the whole message
       if (receivers.empty()) {
         parent_.on_not_sent(id_);
         continue;
       }
-      if (!co_await send_ping(ping, receivers)) co_return;
-      parent_.on_written(id_, ping);
+      if (!co_await send_message(message, receivers)) co_return;
+      parent_.on_written(id_, message);
     } else if (finishing_) {
       co_return;
     } else {
-      error_code ec;
-      wake_.expires_at(asio::steady_timer::time_point::max());
-      co_await wake_.async_wait(into(ec));
+      co_await wait();
     }
   }
 }
 
-/// False: the socket was closed before the ping was whole.
-asio::awaitable<bool> DatagramStream::send_ping(const Outbox::Message& ping, const std::vector<Endpoint>& receivers) {
-  for (std::size_t i = 0; i < ping.datagrams->size(); ++i) {
-    const protocol::Bytes& datagram = (*ping.datagrams)[i];
-    error_code ec;
+/// For the next message. A host that was silent for too long is given up.
+asio::awaitable<void> DatagramStream::wait() {
+  const auto longest = parent_.longest_silence(id_);
+  wake_.expires_at(longest ? heard_at_ + *longest : asio::steady_timer::time_point::max());
+  error_code ec;
+  co_await wake_.async_wait(into(ec));
+  if (!ec && longest && std::chrono::steady_clock::now() - heard_at_ >= *longest)
+    finish("silent for " + std::to_string(longest->count() / 1000) + " s");
+}
+
+/// False: the socket was closed before the message was whole.
+asio::awaitable<bool> DatagramStream::send_message(const Outbox::Message& message, const std::vector<Endpoint>& receivers) {
+  if (message.datagrams == nullptr) co_return co_await send_datagram(*message.bytes, receivers);
+  for (std::size_t i = 0; i < message.datagrams->size(); ++i) {
     if (i > 0 && gap_.count() > 0) {
+      error_code ec;
       pause_.expires_after(gap_);
       co_await pause_.async_wait(into(ec));
       if (!socket_.is_open()) co_return false;
     }
-    for (const Endpoint& to : receivers) {
-      ec = {};
-      co_await socket_.async_send_to(asio::buffer(datagram), udp::endpoint(address_of(to.ip), to.port), into(ec));
-      if (!socket_.is_open()) co_return false;
-      if (ec)
-        parent_.on_send_error(to, ec.message());
-      else
-        parent_.on_sent(id_, datagram.size());
-    }
+    if (!co_await send_datagram((*message.datagrams)[i], receivers)) co_return false;
+  }
+  co_return true;
+}
+
+asio::awaitable<bool> DatagramStream::send_datagram(const protocol::Bytes& datagram, const std::vector<Endpoint>& receivers) {
+  for (const Endpoint& to : receivers) {
+    error_code ec;
+    co_await socket_.async_send_to(asio::buffer(datagram), udp::endpoint(address_of(to.ip), to.port), into(ec));
+    if (!socket_.is_open()) co_return false;
+    if (ec)
+      parent_.on_send_error(to, ec.message());
+    else
+      parent_.on_sent(id_, datagram.size());
   }
   co_return true;
 }

@@ -1,5 +1,5 @@
-// Sends the pings of an emulated sonar as datagrams to all receivers of a port of kind udp_stream, whole pings in order, and no
-// faster than the port allows. Owned by its Device and by its own coroutine.
+// Sends the messages of an emulated sonar as datagrams: to all receivers of a port of kind udp_stream, or to the host at one of
+// kind udp_dialogue. Whole messages in order, no faster than the port allows. Owned by its Device and by its own coroutine.
 #pragma once
 
 #include <chrono>
@@ -21,17 +21,25 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   void wake() { wake_.cancel(); }
   /// No more pings after the one being sent, and no more of that when the socket is closed.
   void finish(std::string why);
+  /// A request of the host came: it has not gone.
+  void heard() {
+    heard_at_ = std::chrono::steady_clock::now();
+    wake_.cancel();  // what it said may limit how long it may be silent
+  }
   ConnectionId id() const { return id_; }
 
  private:
   asio::awaitable<void> send();
-  asio::awaitable<bool> send_ping(const Outbox::Message& ping, const std::vector<Endpoint>& receivers);
+  asio::awaitable<void> wait();
+  asio::awaitable<bool> send_message(const Outbox::Message& message, const std::vector<Endpoint>& receivers);
+  asio::awaitable<bool> send_datagram(const protocol::Bytes& datagram, const std::vector<Endpoint>& receivers);
 
   SessionParent& parent_;
   udp::socket& socket_;
   ConnectionId id_;
   std::chrono::nanoseconds gap_;
   asio::steady_timer wake_, pause_;
+  std::chrono::steady_clock::time_point heard_at_ = std::chrono::steady_clock::now();
   bool finishing_ = false;
   std::string why_;
 };

@@ -53,8 +53,16 @@ Result<void> Device::open(const protocol::Port& port) {
   }
   auto datagrams = datagram_port(port.number);
   if (!datagrams) return tl::make_unexpected(datagrams.error());
+  if (port.kind == Kind::udp_dialogue) {
+    (*datagrams)->answer_with([this, at = *datagrams, &port](Endpoint from, protocol::BytesView datagram) {
+      on_host_datagram(*at, port, from, datagram);
+      return std::vector<protocol::Bytes>{};
+    });
+    return {};
+  }
   if (port.kind == Kind::udp_answer) {
-    (*datagrams)->answer_with(config(), [this, &port](Endpoint from, protocol::BytesView datagram) {
+    (*datagrams)->hear_broadcasts(config());
+    (*datagrams)->answer_with([this, &port](Endpoint from, protocol::BytesView datagram) {
       Sonar::Answers answers = sonar_.on_datagram(port, from, datagram, network_.clock.now());
       perform(std::move(answers.actions));
       if (!answers.datagrams.empty()) searched_ = Visit{text_of(from), {}};
@@ -193,7 +201,7 @@ void Device::on_not_sent(ConnectionId stream) {
 
 std::optional<std::chrono::milliseconds> Device::longest_silence(ConnectionId of) const {
   const Connection* const connection = sonar_.connections().find(of);
-  return connection == nullptr ? std::nullopt : connection->dialogue->longest_silence();
+  return connection == nullptr || !connection->dialogue ? std::nullopt : connection->dialogue->longest_silence();
 }
 
 /// A mistake in sonard, not of a client: it may cost that client its connection, never the others.
@@ -341,6 +349,7 @@ void Device::carry_out(const Finish& action) {
 
 void Device::carry_out(const Reset& action) {
   if (const SessionPointer session = session_of(action.connection)) return session->reset(action.why);
+  if (const StreamPointer stream = stream_of(action.connection)) return stream->finish(action.why);
   if (arrived_.erase(action.connection) > 0) perform(sonar_.on_closed(action.connection, action.why, network_.clock.now()));
 }
 

@@ -36,9 +36,9 @@ v1::Visit message_of(const Visit& visit) {
 /// `session`: null when it ends.
 void fill(v1::ClientStatus& out, const Connection& c, Session* session) {
   out.set_address(c.peer.name);
-  out.set_pings_written(c.outbox.pings_written());
+  out.set_pings_written(c.pings_written());
   out.set_pings_dropped(c.outbox.pings_dropped());
-  out.set_bytes_written(c.bytes_written);
+  out.set_bytes_written(c.bytes_written + c.streamed_bytes);
   out.set_bytes_read(c.bytes_read);
   out.set_requests(static_cast<std::uint32_t>(c.requests));
   out.set_complaint(c.complaint);

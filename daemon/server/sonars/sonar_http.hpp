@@ -21,6 +21,7 @@ class SonarHttp final : public HttpService {
   Result<void> open(Endpoint at) { return listener_.open(at); }
   void start() { listener_.start(); }
   void stop() { listener_.stop(); }
+  Endpoint at() const { return listener_.at(); }
   bool is_open() const { return listener_.is_open(); }
   bool gone() const { return listener_.gone(); }
 

@@ -101,6 +101,10 @@ TEST(CommandLine, TheDemoHasTheSonarThatIsAskedFor) {
   EXPECT_EQ(sonar_of({"--demo", "oculus"}), "oculus-m1200d");
   EXPECT_EQ(sonar_of({"--demo", "blueview"}), "blueview-p900-90");
   EXPECT_EQ(sonar_of({"--demo", "aris"}), "aris-3000");
+  EXPECT_EQ(sonar_of({"--demo", "3d15"}), "waterlinked-3d15");
+  EXPECT_EQ(sonar_of({"--demo", "ping360"}), "ping360");
+  EXPECT_EQ(sonar_of({"--demo", "surveyor"}), "surveyor-240");
+  EXPECT_EQ(sonar_of({"--demo", "omniscan"}), "omniscan-450");
   EXPECT_EQ(sonar_of({"run", "--demo=blueview", "--threads", "1"}), "blueview-p900-90");
   EXPECT_EQ(sonar_of({"--demo", "--threads", "1"}), "oculus-m1200d");
   EXPECT_EQ(sonar_of({"--profile", "blueview-m900-130"}), "blueview-m900-130");

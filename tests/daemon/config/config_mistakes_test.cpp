@@ -134,6 +134,13 @@ TEST(ConfigMistakes, PointsRenderFilesToTheirCommand) {
   EXPECT_THAT(config.error().text, ::testing::HasSubstr("sonard render r.yaml"));
 }
 
+TEST(ConfigMistakes, PointsADataSetsJobToItsCommand) {
+  const auto config = load_config(std::filesystem::path(SONARD_SOURCE_DIR) / "scenes/datasets/mines.yaml");
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().kind, ErrorKind::config);
+  EXPECT_THAT(config.error().text, HasSubstr("this is a data set's job, not a configuration: sonard dataset "));
+}
+
 TEST(ConfigMistakes, KnowsAScene) {
   const auto config = load_config(std::filesystem::path(SONARD_SOURCE_DIR) / "scenes/tank-rod.yaml");
   ASSERT_FALSE(config);

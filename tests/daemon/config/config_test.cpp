@@ -310,6 +310,18 @@ TEST(Config, TheShippedExampleIsValid) {
   ASSERT_TRUE(aris) << aris.error().text;
   EXPECT_EQ(aris->sonars.at(0).profile.model->profile, "aris-3000");
   EXPECT_TRUE(notes_of_options(*aris).empty());
+  const auto water_linked = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/sonard-3d15.yaml");
+  ASSERT_TRUE(water_linked) << water_linked.error().text;
+  EXPECT_EQ(water_linked->sonars.at(0).profile.model->profile, "waterlinked-3d15");
+  EXPECT_TRUE(notes_of_options(*water_linked).empty());
+  for (const auto& [file, profile] : {std::pair{"sonard-ping360.yaml", "ping360"},
+                                      {"sonard-surveyor.yaml", "surveyor-240"},
+                                      {"sonard-omniscan.yaml", "omniscan-450"}}) {
+    const auto ping = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/" + file);
+    ASSERT_TRUE(ping) << ping.error().text;
+    EXPECT_EQ(ping->sonars.at(0).profile.model->profile, profile);
+    EXPECT_TRUE(notes_of_options(*ping).empty());
+  }
   const auto demo = demo_config();
   ASSERT_TRUE(demo) << demo.error().text;
   EXPECT_EQ(text_of(demo->sonars.at(0).bind_ip), "127.0.0.2");

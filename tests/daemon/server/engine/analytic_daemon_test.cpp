@@ -144,7 +144,8 @@ TEST(AnalyticDaemon, PingsWhileControlChangesTheSceneAndTheConfigurationIsReadAg
 
   EXPECT_EQ(daemon.stop(), 0) << daemon.log_text();
   const DeviceFigures f = daemon.app().devices().front().figures();
-  EXPECT_EQ(f.ticks, f.pings + f.skipped_ticks);
+  EXPECT_LE(f.pings + f.skipped_ticks, f.ticks);
+  EXPECT_LE(f.ticks, f.pings + f.skipped_ticks + 1) << "a ping may be under way at the stop";
   EXPECT_EQ(f.offered, f.sent + f.dropped);
 }
 

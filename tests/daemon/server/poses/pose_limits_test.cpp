@@ -164,8 +164,9 @@ TEST_F(PoseLimits, APageOfTheWebMovesNothing) {
 
 TEST_F(PoseLimits, ABadLineOfADatagramCostsTheOthersNothing) {
   begin("");
-  send_udp(daemon->address(), port, bytes_of(line_at_x(1) + "nonsense\n{\"position\":NaN}\n" + line_at_x(2)));
+  send_udp(daemon->address(), port, bytes_of(line_at_x(1, "boat") + "nonsense\n{\"position\":NaN}\n" + line_at_x(2)));
   EXPECT_TRUE(is_at_x(2));
+  EXPECT_TRUE(is_at_x(1, 1));
   EXPECT_EQ(daemon->status().poses().refused(), 2u);
 }
 

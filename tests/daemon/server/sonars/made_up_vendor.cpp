@@ -21,14 +21,15 @@ using protocol::BytesView;
 using protocol::DeviceState;
 using Kind = protocol::Port::Kind;
 
-const std::array<protocol::Port, 7> port_table{
+const std::array<protocol::Port, 8> port_table{
     {{.kind = Kind::tcp_stream, .number = command_port},
      {.kind = Kind::tcp_stream, .number = data_port},
      {.kind = Kind::udp_beacon, .number = beacon_port, .period = 10s, .on_change = true},
      {.kind = Kind::udp_answer, .number = udp_port},
      {.kind = Kind::udp_stream, .number = udp_port, .gap = 100us},
      {.kind = Kind::udp_stream, .group = {group_ip, group_port}},
-     {.kind = Kind::http, .number = http_port}}};
+     {.kind = Kind::http, .number = http_port},
+     {.kind = Kind::udp_dialogue, .number = data_port}}};
 
 Bytes bytes_of(const std::string& text) {
   const auto* const begin = reinterpret_cast<const std::byte*>(text.data());
@@ -163,6 +164,9 @@ class MadeUpVendor final : public protocol::Vendor {
     protocol::Reaction reaction = obey(request.path.substr(1) + " " + request.body, device);
     if (reaction.events.empty()) return {400, text_of(reaction.replies.front()), "text/plain"};
     return {204, "", "", "", std::move(reaction.events)};
+  }
+  bool is_request(const protocol::Port&, BytesView datagram) const override {
+    return !datagram.empty() && datagram.back() == std::byte{'\n'};
   }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const DeviceState& device, Time) const override {
     return std::make_unique<LineDialogue>(device, port.number == data_port);

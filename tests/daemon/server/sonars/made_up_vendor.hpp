@@ -9,7 +9,7 @@ namespace sonar::testing_daemon {
 //   range METRES | receivers [ADDRESS:PORT ...] | ping | quit
 // and over UDP also who, answered by the sonar's name and range.
 constexpr std::uint16_t command_port = 15000;  // TCP
-constexpr std::uint16_t data_port = 15001;     // TCP: "PING number bytes\n" and the samples
+constexpr std::uint16_t data_port = 15001;     // TCP: "PING number bytes\n" and the samples; UDP: a dialogue of lines, and parts
 constexpr std::uint16_t beacon_port = 15002;   // UDP: "NAME free" or "NAME busy", every 10 s and when that changes
 constexpr std::uint16_t udp_port = 15003;      // UDP: commands; datagrams of pings come from it too
 constexpr std::uint16_t group_port = 15004;    // UDP: the ping's number alone, to group_ip

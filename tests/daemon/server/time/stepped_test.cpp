@@ -80,7 +80,7 @@ TEST(Stepped, WaitsForEveryClient) {
 TEST(Stepped, GainAssistFollowsThePicturesAndTellsItsGain) {
   DaemonSetup setup;
   setup.more = "clock: stepped\n";
-  setup.sonar_lines = "    options: {gain_assist: flag_set}\n";
+  setup.sonar_lines = "    options: {gain_echo: used}\n";
   Daemon daemon(setup);
   Client client(daemon.address());
   auto fire = fire_at(PingRate::hz10);

@@ -1,0 +1,176 @@
+// A Sonar 3D-15 and a Surveyor by UDP in virtual time: what their receivers are sent, with faults too.
+#include <gmock/gmock.h>
+
+#include "protocol/ping/messages.hpp"
+#include "protocol/waterlinked/messages.hpp"
+#include "protocol/waterlinked/rip.hpp"
+#include "tests/daemon/emulator/sonar/virtual_time.hpp"
+
+namespace sonar {
+namespace {
+
+using namespace testing_emulator;
+using protocol::Bytes;
+using protocol::Endpoint;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr ConnectionId stream = 99;
+
+/// What a sonar sends by datagrams, ping by ping.
+struct Talk {
+  explicit Talk(const std::string& profile, const std::string& options = {})
+      : time(yaml_of("  - name: front\n    profile: " + profile + "\n    bind_ip: 127.0.0.2\n" + options)) {}
+  Sonar& sonar() { return time.sonar("front"); }
+  std::vector<std::vector<Bytes>> pings(milliseconds length) {
+    std::vector<std::vector<Bytes>> all;
+    for (const Time end = time.now + length; time.now < end;) {
+      time.run(milliseconds(10));
+      while (const Outbox::Message message = sonar().next_message(stream, time.now)) {
+        if (message.datagrams) all.push_back(*message.datagrams);
+        sonar().on_written(stream, message, time.now);
+      }
+    }
+    return all;
+  }
+  void add_fault(const std::string& what, std::map<std::string, std::string> with = {}, const std::string& client = {}) {
+    FaultRecord record;
+    record.what = what;
+    record.with = std::move(with);
+    record.client = client;
+    time.add_fault("front", record);
+  }
+  VirtualTime time;
+};
+
+// ---- Sonar 3D-15
+
+struct Imager : Talk {
+  explicit Imager(const std::string& more = {})
+      : Talk("waterlinked-3d15", "    options: {acoustics_at_start: enabled, udp_at_start: multicast" + more + "}\n") {
+    sonar().open_stream(stream, *sonar().vendor().port(protocol::Port::Kind::udp_stream), time.now);
+  }
+  void post(const std::string& path, const std::string& body) {
+    const protocol::Port& http = *sonar().vendor().port(protocol::Port::Kind::http);
+    const protocol::ResourceRequest request{"POST", "/api/v1/integration" + path, "", "application/json", body, {127, 0, 0, 1}};
+    EXPECT_EQ(sonar().on_http(http, request, time.now).reply.status, 204u) << path;
+  }
+  void send_to(const std::string& ip) {
+    post("/udp", R"({"mode":"unicast","unicast_destination_ip":")" + ip + R"(","unicast_destination_port":4747})");
+  }
+  static waterlinked::Decoded read(const Bytes& datagram) {
+    const auto content = waterlinked::rip_content(datagram);
+    EXPECT_TRUE(content);
+    return content ? waterlinked::decode(*content) : waterlinked::Decoded{};
+  }
+};
+constexpr Endpoint group{{224, 0, 0, 96}, 4747}, host{{10, 0, 0, 5}, 4747};
+
+TEST(Sonar3d15InVirtualTime, ItsReceiverIsOneOfItsSettings) {
+  Imager imager;
+  imager.send_to("10.0.0.5");
+  EXPECT_THAT(imager.sonar().receivers(stream), ElementsAre(host));
+  imager.add_fault("D01");
+  imager.send_to("10.0.0.6");
+  EXPECT_THAT(imager.sonar().receivers(stream), ElementsAre(host)) << "ignored with the rest";
+  imager.time.end_faults("front");
+  imager.post("/udp", R"({"mode":"disabled"})");
+  EXPECT_THAT(imager.sonar().receivers(stream), IsEmpty());
+  EXPECT_THAT(imager.pings(seconds(1)), IsEmpty());
+  imager.send_to("10.0.0.5");
+  imager.add_fault("D05");
+  EXPECT_THAT(imager.sonar().receivers(stream), ElementsAre(group)) << "forgotten with the rest";
+  EXPECT_EQ(imager.pings(seconds(1)).size(), 5u);
+}
+
+TEST(Sonar3d15InVirtualTime, AHundredImuSamplesASecondAtAnyRate) {
+  Imager imager;
+  imager.post("/output/imu-batch/enabled", "true");
+  imager.pings(seconds(1));
+  protocol::SettingsOverride slower;
+  slower.rate_hz = 3;
+  EXPECT_TRUE(imager.sonar().change(slower, "test", imager.time.now));
+  imager.pings(seconds(1));
+  std::vector<Time> at;
+  for (const auto& shot : imager.pings(seconds(10))) {
+    const auto batch = imager.read(shot.at(2)).imu;
+    ASSERT_TRUE(batch);
+    for (const auto& sample : batch->samples) at.push_back(sample.at);
+  }
+  EXPECT_NEAR(static_cast<double>(at.size()), 1000, 34) << "up to a shot's at either end";
+  for (std::size_t i = 1; i < at.size(); ++i) ASSERT_EQ(at[i] - at[i - 1], milliseconds(10)) << i;
+}
+
+TEST(Sonar3d15InVirtualTime, TheSpeedOfSoundFollowsItsDepth) {
+  Imager imager;
+  const auto speed = [&] { return imager.read(imager.pings(milliseconds(400)).back().front()).ranges->shot.speed_of_sound_mps; };
+  const float above = speed();
+  imager.sonar().move_mount({{0, 0, -500}, {}}, imager.time.now);
+  EXPECT_NEAR(static_cast<double>(speed() - above), 8.2, 1);
+  imager.post("/acoustics/speed_of_sound", "1491");
+  EXPECT_FLOAT_EQ(speed(), 1491);
+}
+
+// ---- Surveyor
+
+struct Sounder : Talk {
+  Sounder() : Talk("surveyor-240") {
+    time.clients[stream].sonar = &sonar();
+    time.clients[stream].reads = false;  // pings() does
+    const protocol::Port& port = *sonar().vendor().port(protocol::Port::Kind::udp_dialogue);
+    sonar().on_connect(stream, Role::client, {"host", {10, 0, 0, 5}, 5000}, time.now, &port);
+    ping::PingParameters parameters;
+    parameters.end_mm = 10000;
+    parameters.period_ms = 100;
+    parameters.enable = parameters.atof = parameters.yz = 1;
+    send(ping::framed_message(ping::Id::set_ping_parameters, 0, parameters));
+  }
+  void send(const Bytes& frame) { time.send(stream, frame); }
+  /// Of the next ping: each frame is a datagram, and its sum is right.
+  std::vector<ping::Frame> frames() {
+    std::vector<ping::Frame> all;
+    const auto sent = pings(milliseconds(150));
+    for (const Bytes& datagram : sent.at(0)) {
+      ping::Framer framer(65535, true);
+      framer.append(datagram);
+      const auto frame = framer.next();
+      EXPECT_TRUE(frame && frame->sum_is_right);
+      if (frame) all.push_back(*frame);
+    }
+    return all;
+  }
+  ping::AtofPointData atof() {
+    ping::AtofPointData data;
+    for (const ping::Frame& frame : frames()) {
+      wire::Reader reader(frame.payload);
+      if (frame.header.id == ping::Id::atof_point_data) fields(reader, data);
+    }
+    return data;
+  }
+};
+
+TEST(SurveyorInVirtualTime, FieldsOfItsDatagramsFailWithTheRightSum) {
+  Sounder sounder;
+  const std::uint32_t before = sounder.atof().ping;
+  ASSERT_GT(before, 0u);
+  sounder.add_fault("D09", {{"by", "1000"}}, "2");
+  EXPECT_LT(sounder.atof().ping, 1000u) << "of another client";
+  sounder.time.end_faults("front");
+  sounder.add_fault("D09", {{"by", "1000"}});
+  EXPECT_GT(sounder.atof().ping, 1000u);
+}
+
+TEST(SurveyorInVirtualTime, TellsTheTimeThatItWasToldWhateverItSkipped) {
+  constexpr std::uint64_t utc_ms = 1'700'000'000'000;
+  Sounder sounder;
+  EXPECT_EQ(sounder.atof().utc_ms, 0u);
+  sounder.sonar().skip(seconds(1000));
+  sounder.time.now += seconds(1000);
+  sounder.send(ping::framed_message(ping::Id::utc_response, 0, ping::UtcResponse{.utc_ms = utc_ms}));
+  EXPECT_NEAR(static_cast<double>(sounder.atof().utc_ms - utc_ms), 100, 100);
+}
+
+}  // namespace
+}  // namespace sonar
