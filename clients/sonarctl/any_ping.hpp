@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <variant>
 #include <vector>
 
 #include "clients/bvtsdk/core/polar_ping.hpp"
+#include "core/image/polar_image.hpp"
 #include "protocol/aris/encode_frame.hpp"
 #include "protocol/oculus/decode.hpp"
 
@@ -22,15 +24,21 @@ struct ArisPing {
   double frequency_hz = 0;
   std::size_t message_size = 0;  // bytes of all its datagrams
 };
-using AnyPing = std::variant<oculus::DecodedPing, BlueViewPing, ArisPing>;
-
 struct PingFacts {
   std::uint32_t number = 0;
   unsigned beams = 0, rows = 0, bits = 0;
   double row_m = 0, range_m = 0;  // range_m: far end of the last row
   double frequency_hz = 0;
   std::size_t message_size = 0;  // bytes
+  std::string note = {};         // more for the line of a ping
 };
+/// Of a sonar of the ping protocol.
+struct BrpingPing {
+  PolarImage image;  // of a Ping360: the sector as scanned so far
+  PingFacts facts;
+  bool is_whole = true;  // the sector was scanned once
+};
+using AnyPing = std::variant<oculus::DecodedPing, BlueViewPing, ArisPing, BrpingPing>;
 PingFacts facts_of(const AnyPing& ping);
 
 }  // namespace sonar::clients

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+#include <utility>
 
 #include "protocol/aris/models.hpp"
 
@@ -82,7 +84,7 @@ Result<ArisStream> ArisStream::open(Socket commands, const std::optional<HeadReq
   for (const auto& model : aris::models()) {
     auto acoustics = request ? acoustics_for(aris::product_of(*model), *request) : std::nullopt;
     if (!acoustics) continue;
-    acoustics->cookie = ++cookie;
+    acoustics->cookie = stream.asked_[aris::product_of(*model).system] = ++cookie;
     command = {};
     command.type = aris::CommandType::set_acoustics;
     command.acoustics = *acoustics;
@@ -116,6 +118,20 @@ Read ArisStream::receive(std::chrono::milliseconds patience) {
   return {Wait::data, from.sin_addr.s_addr == sonar_ip_ ? static_cast<std::size_t>(size) : 0, {}};
 }
 
+/// Once each: settings that the sonar does not use, frames of which datagrams were lost.
+void ArisStream::warn_of(const aris::DecodedFrame& frame) {
+  constexpr int settled = 3;  // the first frames may still have the settings of before
+  const aris::FrameHeader& h = frame.header;
+  if (frame.index >= settled && !asked_.empty() && !warned_of_settings_) {
+    const auto cookie = asked_.find(static_cast<aris::SystemType>(h.system));
+    warned_of_settings_ =
+        cookie == asked_.end() || (h.applied_cookie != cookie->second && h.constrained_cookie != cookie->second);
+    if (warned_of_settings_) std::fprintf(stderr, "sonarctl: the sonar does not use the settings that were sent to it\n");
+  }
+  if (assembler_.incomplete() > 0 && !std::exchange(warned_of_losses_, true))
+    std::fprintf(stderr, "sonarctl: a frame before number %d is left out: datagrams were lost\n", frame.index);
+}
+
 ArisStream::Item ArisStream::next(std::chrono::milliseconds patience) {
   const auto deadline = Clock::now() + patience;
   for (;;) {
@@ -129,8 +145,10 @@ ArisStream::Item ArisStream::next(std::chrono::milliseconds patience) {
     const Read read = receive(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(200)));
     if (read.what == Wait::interrupted || read.what == Wait::closed) return {read.what, {}, read.error};
     bytes_ += read.size;
-    if (auto frame = assembler_.add(std::span<const std::byte>(chunk_).first(read.size)))
+    if (auto frame = assembler_.add(std::span<const std::byte>(chunk_).first(read.size))) {
+      warn_of(*frame);
       if (auto ping = ping_from(std::move(*frame), std::exchange(bytes_, 0))) return {Wait::data, std::move(ping), {}};
+    }
     if (ends_without_a_byte(commands_, std::chrono::milliseconds(0))) return {Wait::closed, {}, {}};
     if (Clock::now() >= deadline) return {Wait::timed_out, {}, {}};
   }

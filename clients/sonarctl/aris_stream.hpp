@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,10 +33,13 @@ class ArisStream {
   ArisStream(Socket commands, Socket frames) : commands_(std::move(commands)), frames_(std::move(frames)) {}
   Result<void> send(const aris::Command& command);
   Read receive(std::chrono::milliseconds patience);
+  void warn_of(const aris::DecodedFrame& frame);
 
   Socket commands_, frames_;
   std::uint32_t sonar_ip_ = 0;  // in network order
   aris::FrameAssembler assembler_;
+  std::map<aris::SystemType, std::uint32_t> asked_;  // the cookie of the settings for each product; empty = none were sent
+  bool warned_of_settings_ = false, warned_of_losses_ = false;
   Clock::time_point sent_at_{};
   std::size_t bytes_ = 0;  // received since the last whole frame
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);

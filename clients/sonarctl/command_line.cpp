@@ -29,15 +29,15 @@ int run(int argc, char** argv) {
       "  sonarctl COMMAND --help               explains a command, with examples");
   const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
   const std::vector<std::pair<std::string, Run>> commands{
-      {"doctor", add_doctor(app)},       {"status", add_status(app)}, {"listen", add_listen(app)},
-      {"view", add_view(app)},           {"stats", add_stats(app)},   {"record", add_record(app)},
-      {"pose", add_pose(app)},           {"events", add_events(app)}, {"set", add_set(app)},
-      {"step", add_step(app)},           {"load", add_load(app)},     {"object", add_object(app)},
-      {"recording", add_recording(app)}, {"fault", add_fault(app)},   {"scene", add_scene(app)},
-      {"judge", add_judge(app, words)},  {"lab", add_lab(app, words)}};
-  const bool is_python = !words.empty() && (words[0] == "judge" || words[0] == "lab");
+      {"doctor", add_doctor(app)},       {"status", add_status(app)},      {"listen", add_listen(app)},
+      {"view", add_view(app)},           {"stats", add_stats(app)},        {"record", add_record(app)},
+      {"pose", add_pose(app)},           {"events", add_events(app)},      {"set", add_set(app)},
+      {"step", add_step(app)},           {"load", add_load(app)},          {"object", add_object(app)},
+      {"recording", add_recording(app)}, {"fault", add_fault(app)},        {"scene", add_scene(app)},
+      {"farm", add_farm(app, words)},    {"judge", add_judge(app, words)}, {"lab", add_lab(app, words)}};
+  const bool is_other_program = !words.empty() && (words[0] == "farm" || words[0] == "judge" || words[0] == "lab");
   try {
-    app.parse(is_python ? 2 : argc, argv);
+    app.parse(is_other_program ? 2 : argc, argv);
   } catch (const CLI::ParseError& error) {
     const std::string complaint = text::complaint_about(app, error, words);
     return complaint.empty() ? app.exit(error) : complain(complaint, ErrorKind::usage);

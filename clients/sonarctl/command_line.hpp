@@ -29,8 +29,9 @@ Run add_load(CLI::App& app);
 Run add_object(CLI::App& app);
 Run add_recording(CLI::App& app);
 Run add_fault(CLI::App& app);
-/// `words`: all after "sonarctl". The parser does not read them: a driver's command line is among them.
+/// `words`: all after "sonarctl". The parser does not read them: another program's command line is among them.
 Run add_judge(CLI::App& app, const std::vector<std::string>& words);
+Run add_farm(CLI::App& app, const std::vector<std::string>& words);
 Run add_lab(CLI::App& app, const std::vector<std::string>& words);
 
 /// Runs the command that the arguments name; the exit code of the program.

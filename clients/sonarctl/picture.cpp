@@ -67,6 +67,10 @@ PolarImage picture_of(const ArisPing& ping) {
 }  // namespace
 
 Result<PolarImage> picture_of(const AnyPing& ping) {
+  if (const auto* of_brping = std::get_if<BrpingPing>(&ping)) {
+    if (of_brping->image.beams >= 2) return of_brping->image;
+    return failure(ErrorKind::usage, "one beam makes no picture: sonarctl listen prints the profiles of an Omniscan");
+  }
   if (const auto* of_aris = std::get_if<ArisPing>(&ping)) return picture_of(*of_aris);
   if (const auto* of_oculus = std::get_if<oculus::DecodedPing>(&ping)) return picture_of(*of_oculus);
   return picture_of(std::get<BlueViewPing>(ping).polar);

@@ -25,8 +25,8 @@ struct SourceArguments {
 
   void add_to(CLI::App& app, bool recordings) {
     device.add_to(app,
-                  "TCP port of the sonar (default: 52100 of an Oculus, 14750 of a BlueView head or 56888 of an ARIS, the first "
-                  "that answers)");
+                  "port of the sonar (default: 52100 of an Oculus, 14750 of a BlueView head, 56888 of an ARIS, 62312 of a "
+                  "Surveyor, 51200 of an Omniscan or 12345 of a Ping360, the first that answers)");
     app.add_flag("--blueview", is_blueview, "the sonar is a BlueView head; needed on ports other than 14750");
     app.add_flag("--aris", is_aris, "the sonar is an ARIS; needed on ports other than 56888");
     if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
@@ -53,6 +53,8 @@ struct SourceArguments {
       source.kind = SonarKind::blueview;
     else if (is_aris || at->port == aris::command_port)
       source.kind = SonarKind::aris;
+    else if (brping_device_at(at->port))
+      source.kind = SonarKind::brping;
     else if (any_port && !device.discover)
       source.kind = SonarKind::either;
     source.device = *at;

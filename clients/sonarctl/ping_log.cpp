@@ -79,6 +79,7 @@ std::string line_from(const AnyPing& ping, const PingReport& report) {
   const PingFacts f = facts_of(ping);
   std::string line = format("ping %u  %u x %u  %u bit  %.2f m  %.4f MHz  %zu bytes", f.number, f.rows, f.beams, f.bits, f.range_m,
                             f.frequency_hz / 1e6, f.message_size);
+  if (!f.note.empty()) line += "  " + f.note;
   for (const std::string& error : report.errors) line += "\n  error: " + error;
   for (const std::string& mismatch : report.echo_mismatches) line += "\n  echo: " + mismatch;
   return line;

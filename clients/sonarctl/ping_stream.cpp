@@ -10,20 +10,44 @@ namespace sonar::clients {
 
 namespace {
 
+constexpr std::uint16_t http_port = 80;
+constexpr std::chrono::milliseconds probe_patience(300);
 constexpr std::chrono::milliseconds answer_patience(3000);  // minimum for a head, which may be computing
 
 }  // namespace
 
 Result<PingStream> PingStream::open(const Endpoint& device, SonarKind kind, Settings settings,
                                     std::chrono::milliseconds patience) {
+  const auto open_brping = [&](Endpoint place, Socket socket) -> Result<PingStream> {
+    auto host = BrpingStream::open(std::move(socket), brping_device_at(place.port).value_or(BrpingDevice::surveyor),
+                                   settings.oculus ? std::optional(settings.head) : std::nullopt);
+    if (!host) return tl::unexpected(host.error());
+    return PingStream(std::move(place), *std::move(host));
+  };
+  const Endpoint ping360{device.host, brping_ports[0]};
+  if (kind == SonarKind::brping && device.port == ping360.port) {
+    auto socket = BrpingStream::find_ping360(ping360, patience);
+    if (!socket) return tl::unexpected(socket.error());
+    return open_brping(ping360, *std::move(socket));
+  }
   std::vector<Endpoint> places{device};
   if (kind == SonarKind::either) {
     places.push_back({device.host, blueview::tcp_port});
     places.push_back({device.host, aris::command_port});
+    places.push_back({device.host, brping_ports[1]});
+    places.push_back({device.host, brping_ports[2]});
   }
   auto connected = connect_first(places, patience);
+  if (!connected && kind == SonarKind::either)
+    if (auto socket = BrpingStream::find_ping360(ping360, probe_patience)) return open_brping(ping360, *std::move(socket));
+  if (!connected && kind == SonarKind::either && connect_first({{device.host, http_port}}, patience))
+    return failure(ErrorKind::usage,
+                   "at " + device.host +
+                       " only HTTP answers, as of a Sonar 3D-15: it sends images by UDP, which sonarctl does not "
+                       "read; the live view shows them, sonarctl recording start RUN.sonar keeps them");
   if (!connected) return tl::unexpected(connected.error());
   const Endpoint& place = places[connected->which];
+  if (kind == SonarKind::brping || connected->which > 2) return open_brping(place, std::move(connected->socket));
   if (kind == SonarKind::blueview || connected->which == 1) {
     auto head = BlueViewStream::open(std::move(connected->socket), settings.head, std::max(patience, answer_patience));
     if (head) return PingStream(place, *std::move(head));
@@ -48,11 +72,12 @@ Result<void> PingStream::ask_again() {
 
 bool PingStream::is_rejected(std::chrono::milliseconds patience) const {
   if (aris_) return aris_->is_rejected(patience);
+  if (brping_) return brping_->is_rejected(patience);
   return !blueview_ && ends_without_a_byte(socket_, patience);
 }
 
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
-  if (aris_) return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is an ARIS at " + text_from(device_));
+  if (aris_ || brping_) return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is " + about());
   if (blueview_)
     return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is a BlueView head at " + text_from(device_) +
                                          "; hosts record it with BVTSonar_CreateFile");
@@ -70,6 +95,12 @@ PingStream::Item PingStream::next(std::chrono::milliseconds patience) {
   }
   if (aris_) {
     ArisStream::Item item = aris_->next(patience);
+    Item out{item.what, {}, {}, std::move(item.error)};
+    if (item.ping) out.ping = *std::move(item.ping);
+    return out;
+  }
+  if (brping_) {
+    BrpingStream::Item item = brping_->next(patience);
     Item out{item.what, {}, {}, std::move(item.error)};
     if (item.ping) out.ping = *std::move(item.ping);
     return out;

@@ -13,14 +13,16 @@
 #include "clients/sonarctl/any_ping.hpp"
 #include "clients/sonarctl/aris_stream.hpp"
 #include "clients/sonarctl/blueview_stream.hpp"
+#include "clients/sonarctl/brping_stream.hpp"
 #include "clients/sonarctl/net.hpp"
 #include "core/base/result.hpp"
 #include "protocol/oculus/decode.hpp"
 
 namespace sonar::clients {
 
-/// Kind of sonar at an address; either: an Oculus there, or a BlueView head or an ARIS at its own port, the first that answers.
-enum class SonarKind { oculus, blueview, either, aris };
+/// Kind of sonar at an address; either: an Oculus there, or another at its own port, the first that answers. brping: that of the
+/// ping protocol which is usual at that port.
+enum class SonarKind { oculus, blueview, either, aris, brping };
 
 /// Settings to send, by kind of sonar. Without `oculus` none: an ARIS is not sent `head` either.
 struct Settings {
@@ -51,9 +53,12 @@ class PingStream {
   std::uint64_t junk_bytes() const { return decoder_.skipped_bytes(); }
   const Endpoint& device() const { return device_; }
   bool is_blueview() const { return blueview_.has_value(); }
-  bool is_oculus() const { return !blueview_ && !aris_; }
+  bool is_oculus() const { return !blueview_ && !aris_ && !brping_; }
   /// "127.0.0.2:14750, BlueView P900-90, serial 7001"
-  std::string about() const { return text_from(device_) + (blueview_ ? ", " + blueview_->about() : aris_ ? ", an ARIS" : ""); }
+  std::string about() const {
+    const std::string what = blueview_ ? blueview_->about() : aris_ ? "an ARIS" : brping_ ? brping_->about() : "";
+    return text_from(device_) + (what.empty() ? "" : ", " + what);
+  }
 
  private:
   PingStream(Endpoint device, Socket socket, std::optional<oculus::FireRequest> asked)
@@ -62,11 +67,13 @@ class PingStream {
       : device_(std::move(device)), socket_(-1), blueview_(std::move(blueview)) {}
 
   PingStream(Endpoint device, ArisStream aris) : device_(std::move(device)), socket_(-1), aris_(std::move(aris)) {}
+  PingStream(Endpoint device, BrpingStream brping) : device_(std::move(device)), socket_(-1), brping_(std::move(brping)) {}
 
   Endpoint device_;
   Socket socket_;  // of an Oculus
   std::optional<BlueViewStream> blueview_;
   std::optional<ArisStream> aris_;
+  std::optional<BrpingStream> brping_;
   std::optional<oculus::FireRequest> asked_;
   oculus::Decoder decoder_;
   std::ofstream record_;

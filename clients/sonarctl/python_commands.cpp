@@ -1,4 +1,4 @@
-// `sonarctl judge` and `sonarctl lab`: programs of the Python package, found beside sonarctl.
+// `sonarctl judge` and `sonarctl lab`, programs of the Python package, and `sonarctl farm`, of sonard: found beside sonarctl.
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <cstdlib>
@@ -28,6 +28,14 @@ fs::path sonard_near(const fs::path& program) {
   return {};
 }
 
+/// Returns when there is no such program.
+void execute(std::vector<std::string>& words) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  ::execvp(arguments[0], arguments.data());
+}
+
 Result<void> become(const std::string& module, const std::vector<std::string>& words) {
   std::error_code ec;
   const fs::path program = fs::read_symlink("/proc/self/exe", ec);
@@ -40,10 +48,7 @@ Result<void> become(const std::string& module, const std::vector<std::string>& w
   if (const fs::path sonard = sonard_near(program); !sonard.empty()) ::setenv("SONARD", sonard.c_str(), 0);
   std::vector<std::string> all{"python3", "-m", module};
   all.insert(all.end(), words.begin(), words.end());
-  std::vector<char*> arguments;
-  for (std::string& word : all) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  ::execvp("python3", arguments.data());
+  execute(all);
   return failure(ErrorKind::missing_file, "python3 is not installed");
 }
 
@@ -53,6 +58,19 @@ Run add(CLI::App& app, const char* name, const char* purpose, const std::string&
 }
 
 }  // namespace
+
+/// The farm makes data sets, as sonard does: it is a command of sonard's.
+Run add_farm(CLI::App& app, const std::vector<std::string>& words) {
+  app.add_subcommand("farm", "labelled data sets by many machines: submit jobs, see how they stand, collect");
+  return [words]() -> Result<void> {
+    std::error_code ec;
+    const fs::path program = fs::read_symlink("/proc/self/exe", ec), sonard = sonard_near(program);
+    std::vector<std::string> all{sonard.string()};
+    all.insert(all.end(), words.begin(), words.end());
+    if (!sonard.empty()) execute(all);
+    return failure(ErrorKind::missing_file, "sonard is not installed beside " + program.string() + "; install it there");
+  };
+}
 
 Run add_judge(CLI::App& app, const std::vector<std::string>& words) {
   return add(app, "judge", "run a driver against sonard with one fault at a time, and report", "sonard_client.judge", words);

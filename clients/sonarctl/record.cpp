@@ -227,10 +227,25 @@ Result<void> record_device(const RecordOptions& options) {
 /// Ten a second, as raw dumps have no times.
 Time made_up_time(std::uint64_t number) { return Time(number * 100ms); }
 
+/// The writers' formats and the count of pings are of Oculus. bad_data.
+Result<void> check_oculus(recording::RecordingReader& reader, const std::string& file) {
+  const auto is_oculus = [](const RecordedMessage& message) {
+    return message.bytes.size() >= oculus::header_size && oculus::header_of(message.bytes).oculus_id == oculus::magic;
+  };
+  std::optional<RecordedMessage> message;
+  do message = reader.next();
+  while (message && interrupted == 0 && !is_oculus(*message));
+  const auto damage = reader.damage();
+  reader.rewind();
+  if (message || interrupted != 0) return {};
+  return failure(ErrorKind::bad_data, damage ? damage->text : file + " holds no Oculus messages, and record converts no others");
+}
+
 Result<void> convert(const RecordOptions& options) {
   auto opened = recording::open_recording(options.source.recording, options.sonar);
   if (!opened) return tl::unexpected(opened.error());
   recording::RecordingReader& reader = *opened->reader;
+  if (Result<void> oculus = check_oculus(reader, options.source.recording.string()); !oculus) return oculus;
   auto files = RecordFiles::create(options, {}, options.sonar.empty() ? "sonar" : options.sonar);
   if (!files) return tl::unexpected(files.error());
   Result<void> written;

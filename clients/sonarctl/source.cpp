@@ -75,7 +75,7 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
   if (!opened) return tl::unexpected(opened.error());
   PingStream* const stream = &opened->stream;
   if (opened->observes) source.asked.reset();
-  const auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
+  auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
   bool received = !stream->is_oculus();  // a head greeted; an ARIS has only pings
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
@@ -94,6 +94,10 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
     }
     received = received || item.what == Wait::data;
     if (!item.ping) continue;
+    if (const auto* of = std::get_if<BrpingPing>(&*item.ping); of != nullptr && !of->is_whole) {
+      give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
+      continue;
+    }
     const auto* ping = std::get_if<oculus::DecodedPing>(&*item.ping);
     const bool as_asked = ping == nullptr || !source.asked || oculus::echo_violations(*source.asked, *ping).empty();
     if (as_asked || ++stale > stale_pings) return *std::move(item.ping);

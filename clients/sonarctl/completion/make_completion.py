@@ -16,8 +16,8 @@ OPTION = re.compile(r"^  (?:(-\w),)?(--[\w-]+)((?:[ :=(]\S.*|\s{2,}.*)?)$")
 CHOICES = re.compile(r"\{([^}]+)\}|TEXT:([\w.-]+(?:\|[\w.-]+)*)|INT:([\w.-]+(?:\|[\w.-]+)+)")  # of CLI11's own check, and of ours
 COMMAND = re.compile(r"^  ([a-z][\w-]*)\s{2,}\S")
 FILE_WORDS = {"--png", "--record", "--from-raw", "--token-file", "--out", "--poses", "--json-file", "--pcap", "--mcap",
-              "--oculus", "--raw", "--from"}
-SCENE_COMMANDS = {"load", "run", "check", "render", "replay", "info", "import"}  # they take files, not addresses
+              "--oculus", "--raw", "--from", "--credentials"}
+SCENE_COMMANDS = {"load", "run", "check", "render", "dataset", "replay", "info", "import", "submit", "collect"}  # they take files, not addresses
 
 
 def help_of(program, words):
@@ -60,10 +60,10 @@ def sonard_tree(program):
     """sonard lists its commands in a sentence, not in a section."""
     tree = walk(program)
     if len(tree) == 1:
-        commands = ["run", "check", "render", "replay"]
+        commands = ["run", "check", "render", "dataset", "worker", "farm", "replay"]
         tree[()] = (commands, tree[()][1])
         for command in commands:
-            tree[(command,)] = ([], read_help(help_of(program, (command,)))[1])
+            tree.update(walk(program, (command,)))
     return tree
 
 

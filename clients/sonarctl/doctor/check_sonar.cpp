@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "clients/sonarctl/brping_stream.hpp"
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
@@ -40,7 +41,7 @@ const ReceivedStatus* status_from(const Facts& facts, const std::string& host) {
 class SonarChecks {
  public:
   SonarChecks(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings)
-      : facts_(facts), sonar_(sonar), findings_(findings), at_("tcp " + text_from(sonar.at)) {
+      : facts_(facts), sonar_(sonar), findings_(findings), at_((is_ping360() ? "udp " : "tcp ") + text_from(sonar.at)) {
     if (facts.sonars.size() > 1) prefix_ = (sonar.name.empty() ? sonar.at.host : sonar.name) + ": ";
   }
 
@@ -49,7 +50,8 @@ class SonarChecks {
     if (sonar_.out_of_time)
       return add(Level::warn, "ping", sonar_.at.host + " was not examined: the time limit was reached",
                  "raise it with --within SECONDS, or give the address of this sonar alone");
-    if (!sonar_.blueview && !sonar_.aris) check_status();
+    if (sonar_.by_http) return check_images();
+    if (!sonar_.blueview && !sonar_.aris && !sonar_.brping) check_status();
     check_connection();
     if (sonar_.stream.outcome == Outcome::pings) check_rate();
     if (sonar_.stream.outcome == Outcome::not_tried) check_rate_of_others();
@@ -60,7 +62,22 @@ class SonarChecks {
     findings_.push_back({level, check, prefix_ + text, cure});
   }
 
+  /// Its pings come as fast as its head turns.
+  bool is_ping360() const { return sonar_.brping && sonar_.at.port == brping_ports[0]; }
   bool answers() const { return sonar_.stream.outcome >= Outcome::closed_without_a_byte || !sonar_.clients.empty(); }
+
+  /// Images go by UDP, for which no client connects: only the daemon knows of them.
+  void check_images() {
+    const std::string at = "http at " + sonar_.at.host;
+    if (!sonar_.reported) return add(Level::warn, "ping", at + ": no daemon tells whether images are sent", "");
+    if (!sonar_.reported->pinging())
+      return add(Level::warn, "ping", at + ": no images are made",
+                 "post true to /acoustics/enabled and a mode to /udp, below http://" + sonar_.at.host + "/api/v1/integration");
+    add(Level::ok, "ping",
+        at + ": images by UDP at " + format("%g", sonar_.reported->rate_hz()) + " Hz, " +
+            std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",
+        "");
+  }
 
   void check_status() {
     const std::string port = std::to_string(facts_.status.on.port);
@@ -219,7 +236,8 @@ class SonarChecks {
 
   /// The rate that another, connected client requested.
   void check_rate_of_others() {
-    if (!sonar_.reported || !sonar_.reported->pinging() || clock() != "realtime" || !too_slow_for(sonar_.reported->rate_hz()))
+    if (!sonar_.reported || is_ping360() || !sonar_.reported->pinging() || clock() != "realtime" ||
+        !too_slow_for(sonar_.reported->rate_hz()))
       return;
     add(Level::warn, "rate",
         "rate " + format("%g", sonar_.reported->rate_hz()) + " Hz requested by " + joined(sonar_.clients) + ", " +
@@ -237,9 +255,8 @@ class SonarChecks {
                  format("%.1f", s.rate_hz) +
                      " pings per second of this computer's clock; the daemon uses another (clock: " + clock() + ")",
                  "");
-    const double expected_hz = s.asked && !sonar_.blueview && !sonar_.aris ? s.asked_hz
-                               : sonar_.reported                           ? sonar_.reported->rate_hz()
-                                                                           : 0;
+    const bool is_asked_hz = s.asked && !sonar_.blueview && !sonar_.aris && !sonar_.brping;
+    const double expected_hz = is_asked_hz ? s.asked_hz : sonar_.reported && !is_ping360() ? sonar_.reported->rate_hz() : 0;
     std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
     if (expected_hz > 0) text += (sonar_.blueview ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
     text += latency_text();

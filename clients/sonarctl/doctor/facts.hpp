@@ -59,6 +59,8 @@ struct SonarFacts {
   Endpoint at;
   bool blueview = false;   // a BlueView head, no Oculus
   bool aris = false;       // an ARIS
+  bool brping = false;     // of the ping protocol
+  bool by_http = false;    // a Sonar 3D-15: HTTP, and images by UDP, for which no client connects
   std::string name;        // from the control stream; empty = not known
   std::string unresolved;  // why its name has no address
   bool on_this_host = false;

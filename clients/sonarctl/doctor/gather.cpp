@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "clients/sonarctl/brping_stream.hpp"
 #include "clients/sonarctl/doctor/probes.hpp"
 #include "clients/sonarctl/doctor/proc_net.hpp"
 #include "clients/sonarctl/doctor/watch_pings.hpp"
@@ -18,6 +19,7 @@ using namespace std::chrono_literals;
 constexpr auto status_patience = 2500ms;  // status messages come every second
 constexpr auto first_status = 1300ms;     // to learn who is connected
 const Endpoint usual_http{"127.0.0.1", 8088};
+constexpr std::uint16_t http_port = 80;  // of a Sonar 3D-15
 constexpr auto short_patience = 700ms, own_patience = 200ms;
 constexpr auto head_patience = 400ms, head_patience_here = 100ms;  // for an answer to discovery
 
@@ -97,7 +99,7 @@ class Gathering {
   void note_daemons(const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
     for (const SocketLine& socket : sockets) {
       const bool of_sonars = socket.local_port == oculus::tcp_port || socket.local_port == blueview::tcp_port ||
-                             socket.local_port == aris::command_port;
+                             socket.local_port == aris::command_port || brping_device_at(socket.local_port).has_value();
       if (socket.state != listening || !of_sonars) continue;
       PortHolder holder = holder_of(socket, programs);
       if (holder.program == "sonard") facts_.daemons.push_back(std::move(holder));
@@ -122,11 +124,22 @@ class Gathering {
   }
 
   static std::uint16_t port_of(const v1::SonarStatus& s) {
-    const std::uint16_t usual = is_blueview(s) ? blueview::tcp_port : is_aris(s) ? aris::command_port : oculus::tcp_port;
+    const std::uint16_t usual = is_blueview(s) ? blueview::tcp_port
+                                : is_aris(s)   ? aris::command_port
+                                : is_http(s)   ? http_port
+                                : brping_of(s) ? brping_ports[static_cast<std::size_t>(*brping_of(s))]
+                                               : oculus::tcp_port;
     return parse_endpoint(s.listens(), {"", usual}).value_or(Endpoint{"", usual}).port;
   }
   static bool is_blueview(const v1::SonarStatus& s) { return s.profile().starts_with("blueview-"); }
   static bool is_aris(const v1::SonarStatus& s) { return s.profile().starts_with("aris-"); }
+  static bool is_http(const v1::SonarStatus& s) { return s.profile().starts_with("waterlinked-"); }
+  static std::optional<BrpingDevice> brping_of(const v1::SonarStatus& s) {
+    constexpr std::string_view profiles[] = {"ping360", "surveyor-", "omniscan-"};
+    for (std::size_t i = 0; i < std::size(profiles); ++i)
+      if (s.profile().starts_with(profiles[i])) return static_cast<BrpingDevice>(i);
+    return std::nullopt;
+  }
   static bool is_at(const v1::SonarStatus& s, const std::string& host) {
     return s.advertised() == host || s.listens().starts_with(host + ":");
   }
@@ -154,6 +167,8 @@ class Gathering {
     sonar.at = at;
     sonar.blueview = is_blueview(at);
     sonar.aris = at.port == aris::command_port;
+    sonar.brping = brping_device_at(at.port).has_value();
+    sonar.by_http = at.port == http_port;
     sonar.name = name;
     facts_.sonars.push_back(std::move(sonar));
   }
@@ -177,7 +192,7 @@ class Gathering {
     for (const SocketLine& socket : sockets)
       if (socket.state == established && socket.local_port == sonar.at.port && socket.local_host == sonar.at.host)
         sonar.clients.push_back(socket.remote_host + ":" + std::to_string(socket.remote_port));
-    if (!sonar.clients.empty() || sonar.blueview || sonar.aris) return;
+    if (!sonar.clients.empty() || sonar.blueview || sonar.aris || sonar.brping || sonar.by_http) return;
     status_.listen(sonar.at.host, no_later_than(start_ + first_status));
     for (const ReceivedStatus& received : status_.facts().received)
       if (!received.client.empty() && (received.advertised == sonar.at.host || received.from == sonar.at.host))
@@ -202,7 +217,8 @@ class Gathering {
       return;
     }
     note_clients(sonar, sockets);
-    if (sonar.clients.empty() || questions_.take) watch_pings(sonar, control_ ? &*control_ : nullptr, deadline_, facts_.control);
+    if (!sonar.by_http && (sonar.clients.empty() || questions_.take))
+      watch_pings(sonar, control_ ? &*control_ : nullptr, deadline_, facts_.control);
     update_stats(sonar);
   }
 
@@ -216,7 +232,8 @@ class Gathering {
 
   void listen_to_all() {
     for (const SonarFacts& sonar : facts_.sonars)  // the others have no such message
-      if (!sonar.blueview && !sonar.aris) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
+      if (!sonar.blueview && !sonar.aris && !sonar.brping && !sonar.by_http)
+        status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
     status_.finish();
     facts_.status = status_.facts();
   }

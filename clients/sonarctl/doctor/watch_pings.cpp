@@ -138,12 +138,13 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
   Settings settings;
   if (sonar.clients.empty()) settings.oculus = usual_request();
   facts.asked = sonar.blueview || settings.oculus.has_value();  // heads are asked for every ping
-  facts.asked_hz = settings.oculus && !sonar.blueview && !sonar.aris ? 10 : 0;
+  facts.asked_hz = settings.oculus && !sonar.blueview && !sonar.aris && !sonar.brping ? 10 : 0;
   Watch watch(facts, deadline);
   auto stream =
       PingStream::open(sonar.at,
                        sonar.blueview ? SonarKind::blueview
                        : sonar.aris   ? SonarKind::aris
+                       : sonar.brping ? SonarKind::brping
                                       : SonarKind::oculus,
                        std::move(settings), std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
   if (!stream) {
@@ -152,7 +153,7 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
     return;
   }
   watch.run(std::move(*stream));
-  if (control == nullptr || sonar.aris) return;  // frames of an ARIS are counted from 1 in each connection
+  if (control == nullptr || sonar.aris || sonar.brping) return;  // whose numbers of pings are not the daemon's
   const Watch::DaemonTimes daemon_times = watch.daemon_times(*control, sonar.name);
   if (!daemon_times.computing_ms.empty()) facts.computing_ms = percentile(daemon_times.computing_ms, 0.5);
   set_latency(sonar, daemon_times.delays_s, clocks);

@@ -13,7 +13,7 @@ function rateOf(facts) {
 }
 
 /// The product's short name: "oculus-m1200d" -> "M1200d".
-const product = (profile) => profile.replace(/^(oculus|blueview)-/, '').replace(/^aris-/, 'ARIS ').replace(/^./, (c) => c.toUpperCase());
+const product = (profile) => profile.replace(/^(oculus|blueview)-/, '').replace(/^aris-/, 'ARIS ').replace('waterlinked-3d15', 'Sonar 3D-15').replace(/^./, (c) => c.toUpperCase());
 
 export function drawHead(facts) {
   const sonars = facts.status?.sonars ?? [];
