@@ -22,7 +22,7 @@ sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
 
 class Help(unittest.TestCase):
     def test_every_command_explains_itself(self):
-        for command in [(SONARD,), (SONARD, "run"), (SONARD, "check"), (SONARD, "render"), (SONARCTL,), (SONARCTL, "listen"), (SONARCTL, "view"),
+        for command in [(SONARD,), (SONARD, "run"), (SONARD, "check"), (SONARD, "render"), (SONARD, "dataset"), (SONARD, "worker"), (SONARD, "farm"), (SONARCTL,), (SONARCTL, "listen"), (SONARCTL, "view"),
                         (SONARCTL, "stats"), (SONARCTL, "pose"), (SONARCTL, "pose", "circle")]:
             with self.subTest(command=command):
                 result = run(*command, "--help")
@@ -30,7 +30,7 @@ class Help(unittest.TestCase):
                 self.assertIn("Usage", result.stdout)
 
     def test_every_command_of_sonard_gives_examples(self):
-        for words in [[], ["run"], ["check"], ["render"]]:
+        for words in [[], ["run"], ["check"], ["render"], ["dataset"], ["worker"], ["farm"]]:
             self.assertIn("examples:", run(SONARD, *words, "--help").stdout)
 
     def test_every_command_of_sonarctl_gives_examples(self):
@@ -79,7 +79,7 @@ class Mistakes(unittest.TestCase):
                  (["run", "a.yaml", "b.yaml"], 'unexpected argument "b.yaml"'),
                  (["run", "--clock"], "--clock: 1 required"),
                  (["--demo", "my.yaml"], "--demo runs the built-in demo, not my.yaml"),
-                 (["--demo=maybe"], 'there is no demo "maybe"; there are oculus, blueview and aris'),
+                 (["--demo=maybe"], 'there is no demo "maybe"; there are oculus, blueview, aris, 3d15, ping360 and surveyor'),
                  (["--profile", "blueview-p900"], "--profile: unknown profile 'blueview-p900'", "oculus-m370s", "blueview-mb2250-90"),
                  (["chekc"], 'no command or file "chekc"; did you mean "check"?'),
                  (["check"], "sonard: config is required: the configuration file", "sonard check --help"),

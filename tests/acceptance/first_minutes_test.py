@@ -11,7 +11,8 @@ from running_sonard import BUILD, ROOT
 
 ISOLATED = ["unshare", "-rn", "sh", "-c", 'ip link set lo up && exec "$0" "$@"']
 MACHINE = [(r"cpu, \w+, ", "cpu, SIMD, "), (r"CUDA: .*", "CUDA: x"), (r"\(looked in .*\)", "(looked in PLACES)"),
-           (r"^(ok|warn) +rate .*", "rate"), (r"^(ok|warn) +ports .*", "ports"), (r"\d+ warnings?", "warnings")]
+           (r"^(ok|warn) +rate .*", "rate"), (r"^(ok|warn) +ports .*", "ports"), (r"key=[0-9a-f.]+", "key=KEY"),
+           (r"\d+ warnings?", "warnings")]
 
 
 def words(line):

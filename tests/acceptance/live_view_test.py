@@ -353,6 +353,7 @@ class Preview(unittest.TestCase):
                 deadline = time.monotonic() + 5  # the view looks ten times a second
                 while Steering.parameters(viewer, "now", "/front/preview")["/front/preview"]:
                     self.assertLess(time.monotonic(), deadline)
+                    time.sleep(0.1)  # a viewer that asks without end is closed
                 self.assertEqual(Steering.set(viewer, "/front/preview", True), False)
                 self.numbers(viewer, 2)
             events = [viewer.decode(topic, payload) for topic, _, payload in viewer.messages if topic == "/front/ping"]

@@ -11,6 +11,7 @@ from running_sonard import Sonard
 
 A, B, C, BELOW = (3.9, -20), (3.9, 10), (6.9, -8), (4.9, 0)  # range m, bearing deg: positive to starboard
 VERBATIM_GAIN = 0x59  # metres, simple result, 512 beams; bit 4: the gain is used as it is in mode 2 too
+UNASSISTED = "oculus-m1200d\n    options: {gain_assist: off}"
 SALINITY = 30.0  # as the water's: else the device believes another sound speed, and its ranges are off by a few per cent
 LEVEL, BOW_DOWN, BOW_UP = "0,0,0", "0,25,0", "0,-25,0"      # east-north-up, forward-left-up
 
@@ -40,7 +41,8 @@ def mean_around(ping, place, half_range_m=0.3, half_bearing_deg=3):
 class Mirror(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.daemon = Sonard(scene="l-targets.yaml", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}").__enter__()
+        cls.daemon = Sonard(scene="l-targets.yaml", profile=UNASSISTED,
+                            pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}").__enter__()
 
     @classmethod
     def tearDownClass(cls):
@@ -111,7 +113,8 @@ class Mirror(unittest.TestCase):
 
 class Rolled(unittest.TestCase):
     def ping(self, attitude, **settings):
-        with Sonard(scene="l-targets.yaml", pose=f"{{frame: ENU_FLU, xyz_m: [0, 0, 0], rpy_deg: {list(attitude)}}}") as daemon:
+        pose = f"{{frame: ENU_FLU, xyz_m: [0, 0, 0], rpy_deg: {list(attitude)}}}"
+        with Sonard(scene="l-targets.yaml", profile=UNASSISTED, pose=pose) as daemon:
             with Client(daemon.address) as client:
                 return client.ping_made_with(fire_message(version=2, flags=VERBATIM_GAIN, gain=20.0, salinity=SALINITY, **settings))
 

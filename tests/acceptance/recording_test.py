@@ -210,7 +210,10 @@ class Inside(Files):
                 while self.recording()["running"] and time.monotonic() < deadline:
                     numbers += [client.ping().id for _ in range(4)]
                 numbers += [client.ping().id for _ in range(4)]
-            self.assertEqual(numbers, list(range(numbers[0], numbers[0] + len(numbers))))
+            figures = json.loads(self.steer("status", "--json").stdout)["sonars"][0]["figures"]
+            missing = numbers[-1] - numbers[0] + 1 - len(numbers)  # some, where this test is too slow a client
+            self.assertLessEqual(missing, int(figures.get("dropped", 0)))
+            self.assertEqual(numbers, sorted(set(numbers)))
             self.assertIn("File too large", self.recording()["why"])
             self.assertIn(f"recording {kept}  of front: ", self.steer("status").stdout)
             self.assertEqual(self.steer("recording", "stop").stderr, "sonarctl: sonard refused: nothing is being recorded\n")
@@ -329,6 +332,9 @@ class OneIntoAnother(Files):
         self.assertEqual((done.returncode, done.stderr.count("\n")), (64, 1), done.stderr)
         self.assertIn("named for two kinds of files", done.stderr)
         self.assertFalse(once.exists())
+        done = self.convert(SEEDS / "aris_file/two.aris", "--oculus", self.path("oculus"))
+        self.assertEqual((done.returncode, self.path("oculus").exists()), (65, False))
+        self.assertIn("two.aris holds no Oculus messages", done.stderr)
         for code, words in [(66, [self.folder / "none"]), (65, [self.path("raw")]), (64, [self.path("raw"), "--ip", "nowhere"])]:
             done = run(SONARD, "replay", *words)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, 1), done.stderr)

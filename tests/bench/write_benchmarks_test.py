@@ -9,7 +9,7 @@ import write_benchmarks
 
 
 def result(case, threads, rate):
-    return {"case": case, "scene": "local-search", "threads": threads, "description": case + " described", "engine": "cpu, test",
+    return {"case": case, "scene": "local-search", "threads": threads, "description": case + " described", "engine": "cpu, avx512, 2 threads, Embree",
             "triangles": 202692, "pings_per_second": rate, "median_ms": 1e3 / rate, "min_ms": 900 / rate, "processor_ms": 5.0,
             "thread_ms": {"trace": 3.34, "scatter": 3.8, "frame": 0.0}}
 
@@ -19,13 +19,13 @@ TIMES = {"min_ms": 1.0, "median_ms": 2.0, "p90_ms": 3.0, "p99_ms": 4.0, "max_ms"
 
 class Page(unittest.TestCase):
     def test_verdicts_are_those_of_the_figures(self):
-        report = {"processor": "test", "results": [result("P1", 1, 100), result("P1", 2, 260), result("P3a", 2, 39)]}
+        report = {"processor": "test", "results": [result("P1", 1, 100), result("P1", 2, 460), result("P3a", 2, 39)]}
         page = write_benchmarks.page(report)
         row = {line.split(" | ")[0]: line for line in page.splitlines() if line.startswith("| P") and "described" in line}
-        self.assertIn("| 260 |", row["| P1"])
+        self.assertIn("| 460 |", row["| P1"])
         self.assertTrue(row["| P1"].endswith("goal |"))
         self.assertTrue(row["| P3a"].endswith("**missed** |"))
-        self.assertIn("P1, 2 threads: 867 times the paper's", page)
+        self.assertIn("P1, 2 threads: 1533 times the paper's", page)
         tables = write_benchmarks.tables(report)
         self.assertIn("50 %", tables, "1.9 ms of the prototype against 3.8")
         self.assertIn("| P1, 1 thread: P1 described | 100.0 | 333 times the paper's |", tables)
@@ -48,7 +48,7 @@ class Page(unittest.TestCase):
             for svg in ("benchmarks-rates.svg", "benchmarks-curves.svg"):
                 self.assertTrue(ElementTree.parse(Path(folder) / svg).getroot().tag.endswith("svg"))
         for words in ("p99 4.00 ms", "1 dropped | 40 %, no drop | 15 % | **missed** |", "**different bytes**",
-                      "the next ping 2.0 ms | 500 ms | 60 ms | goal |", "before the run: 5.5"):
+                      "the next ping 2.0 ms | 500 ms | 60 ms | goal |", "before the run 5.5"):
             self.assertIn(words, page)
         for words in ("31.000 %", "| 500 |", "400: 5.00 ms"):
             self.assertIn(words, tables)
@@ -70,10 +70,27 @@ class Page(unittest.TestCase):
         self.assertIn("| P1 | P1 described | 100 | 40 (2.50) |", chapter)
         self.assertIn("| P1 | portable | 3.80 | 3.34 |", chapter)
         page = write_benchmarks.tables({"processor": "test", "results": [result("P1", 2, 260)]})
-        once = write_benchmarks.with_chapter(page, chapter)
-        self.assertEqual(once.replace(chapter + "\n", ""), page)
-        again = write_benchmarks.with_chapter(once, chapter.replace("| 100 |", "| 120 |"))
-        self.assertEqual(again, once.replace("| 100 |", "| 120 |"), "the chapter is replaced, and all else is kept")
+        once = write_benchmarks.with_sets(page, chapter, page)
+        self.assertIn(chapter, once)
+        again = write_benchmarks.with_sets(once, chapter.replace("| 100 |", "| 120 |"), once)
+        self.assertEqual(again, once.replace("| 100 |", "| 120 |"), "the machine's chapter is replaced, and all else is kept")
+        other = write_benchmarks.with_sets(page, chapter.replace("### avx2:", "### avx512:"), once)
+        self.assertIn(chapter, other, "the chapter of a machine with another instruction set is kept")
+        self.assertLess(other.index("### avx2:"), other.index("### avx512:"))
+        self.assertEqual(other.count("## Instruction sets\n"), 1)
+
+    def test_rates_of_another_instruction_set_are_kept(self):
+        older = {"processor": "old", "date": "2026-01-02", "results": [result("P1", 2, 242)]}
+        newer = {"processor": "new", "results": [dict(result("P1", 2, 140), engine="cpu, avx2, 2 threads, Embree")]}
+        with TemporaryDirectory() as name:
+            folder = Path(name)
+            for report in (older, newer, newer):
+                write_benchmarks.write(report, folder)
+            page = write_benchmarks.file_of(folder, write_benchmarks.NAME).read_text(encoding="utf-8")
+        self.assertEqual(page.count("### avx512: old, 2026-01-02\n"), 1)
+        self.assertEqual(page.count("### avx2: new, "), 1)
+        self.assertIn("| P1 | P1 described |  | 242 | 269 | 5.00 | 75 | 400 | holds |", page)
+        self.assertIn("| P1 | P1 described |  | 140 | 156 | 5.00 | 75 | 160 | holds |", page)
 
     def test_a_report_of_nothing_is_a_page(self):
         self.assertIn("# Benchmarks", write_benchmarks.page({"processor": "test", "results": [result("P2", 1, 10)]}))

@@ -20,9 +20,7 @@ std::string complaint(const std::vector<std::string>& words) {
   CLI::App app("", "sonarctl");
   app.require_subcommand(1);
   app.set_version_flag("--version", "1");
-  add_view(app);
-  add_pose(app);
-  add_set(app);
+  const std::vector<Run> commands{add_view(app), add_pose(app), add_set(app)};  // they own what the options are read into
   try {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
   } catch (const CLI::ParseError& error) {

@@ -43,7 +43,7 @@ esac
 #   load.descriptors                                   the undefined behaviour sanitizer looks at memory through a pipe, and takes
 #                                                      every object for a bad one when there is no descriptor left for it
 #   the Python client alone and without numpy          no program of ours takes part
-acceptance=(commands protocol mirror blueview_link aris_link life_cycle control reload status fault doctor view completion scene_command
+acceptance=(commands protocol mirror blueview_link aris_link waterlinked_link ping_link life_cycle control reload status fault doctor view completion scene_command
   dissector driver_example first_minutes recording live_view)
 programs="^acceptance\.($(IFS='|'; echo "${acceptance[*]}"))\$"
 programs+='|^load\.real_pings$|^python_client\.with_daemon$|^bvtsdk\.sequences$'
