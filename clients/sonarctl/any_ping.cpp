@@ -3,7 +3,7 @@
 namespace sonar::clients {
 
 PingFacts facts_of(const AnyPing& any) {
-  if (const auto* of = std::get_if<BrpingPing>(&any)) return of->facts;
+  if (const auto* of = std::get_if<PicturePing>(&any)) return of->facts;
   PingFacts facts;
   if (const auto* ping = std::get_if<oculus::DecodedPing>(&any)) {
     const oculus::PingResultV2& f = ping->head.fixed;

@@ -32,13 +32,13 @@ struct PingFacts {
   std::size_t message_size = 0;  // bytes
   std::string note = {};         // more for the line of a ping
 };
-/// Of a sonar of the ping protocol.
-struct BrpingPing {
+/// Of a sonar of the ping protocol, or a Sonar 3D-15: drawn as it arrives.
+struct PicturePing {
   PolarImage image;  // of a Ping360: the sector as scanned so far
   PingFacts facts;
   bool is_whole = true;  // the sector was scanned once
 };
-using AnyPing = std::variant<oculus::DecodedPing, BlueViewPing, ArisPing, BrpingPing>;
+using AnyPing = std::variant<oculus::DecodedPing, BlueViewPing, ArisPing, PicturePing>;
 PingFacts facts_of(const AnyPing& ping);
 
 }  // namespace sonar::clients

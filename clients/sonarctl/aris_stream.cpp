@@ -1,11 +1,9 @@
 #include "clients/sonarctl/aris_stream.hpp"
 
 #include <netinet/in.h>
-#include <poll.h>
 #include <sys/socket.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -103,21 +101,6 @@ Result<void> ArisStream::send(const aris::Command& command) {
   return write_all(commands_, aris::framed(command));
 }
 
-/// A datagram of the sonar; others have no bytes.
-Read ArisStream::receive(std::chrono::milliseconds patience) {
-  pollfd ready{frames_.fd(), POLLIN, 0};
-  const int polled = ::poll(&ready, 1, static_cast<int>(patience.count()));
-  if (polled == 0) return {Wait::timed_out, 0, {}};
-  sockaddr_in from{};
-  socklen_t length = sizeof from;
-  const ssize_t size = polled < 0 ? -1
-                                  : ::recvfrom(frames_.fd(), chunk_.data(), chunk_.size(), MSG_DONTWAIT,
-                                               reinterpret_cast<sockaddr*>(&from), &length);
-  if (size < 0 && errno == EAGAIN) return {Wait::timed_out, 0, {}};  // its checksum was wrong
-  if (size < 0) return errno == EINTR ? Read{Wait::interrupted, 0, {}} : Read{Wait::closed, 0, std::strerror(errno)};
-  return {Wait::data, from.sin_addr.s_addr == sonar_ip_ ? static_cast<std::size_t>(size) : 0, {}};
-}
-
 /// Once each: settings that the sonar does not use, frames of which datagrams were lost.
 void ArisStream::warn_of(const aris::DecodedFrame& frame) {
   constexpr int settled = 3;  // the first frames may still have the settings of before
@@ -142,10 +125,12 @@ ArisStream::Item ArisStream::next(std::chrono::milliseconds patience) {
       if (const auto sent = send(command); !sent) return {Wait::closed, {}, sent.error().text};
     }
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-    const Read read = receive(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(200)));
+    const Datagram read =
+        receive_from(frames_, chunk_, std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(200)));
     if (read.what == Wait::interrupted || read.what == Wait::closed) return {read.what, {}, read.error};
-    bytes_ += read.size;
-    if (auto frame = assembler_.add(std::span<const std::byte>(chunk_).first(read.size))) {
+    const std::size_t size = read.ip == sonar_ip_ ? read.size : 0;  // others' datagrams are nothing to us
+    bytes_ += size;
+    if (auto frame = assembler_.add(std::span<const std::byte>(chunk_).first(size))) {
       warn_of(*frame);
       if (auto ping = ping_from(std::move(*frame), std::exchange(bytes_, 0))) return {Wait::data, std::move(ping), {}};
     }

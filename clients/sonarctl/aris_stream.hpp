@@ -32,7 +32,6 @@ class ArisStream {
   using Clock = std::chrono::steady_clock;
   ArisStream(Socket commands, Socket frames) : commands_(std::move(commands)), frames_(std::move(frames)) {}
   Result<void> send(const aris::Command& command);
-  Read receive(std::chrono::milliseconds patience);
   void warn_of(const aris::DecodedFrame& frame);
 
   Socket commands_, frames_;

@@ -56,10 +56,11 @@ Result<void> BlueViewStream::apply(const HeadRequest& request, std::chrono::mill
   if (!request.oculus_only.empty())
     return failure(ErrorKind::usage, request.oculus_only.front() + " applies to Oculus sonars; this is a " + sonar_.model +
                                          ": it accepts --mode (its heads, from 1), --range, --gain and --rate");
-  if (request.head >= sonar_.heads.size())
+  const std::size_t wanted = request.head.value_or(0);
+  if (wanted >= sonar_.heads.size())
     return failure(ErrorKind::usage, sonar_.model + " has " + std::to_string(sonar_.heads.size()) + " head(s), no mode " +
-                                         std::to_string(request.head + 1));
-  head_ = request.head;
+                                         std::to_string(wanted + 1));
+  head_ = wanted;
   const bvt::HeadDescription& head = sonar_.heads[head_];
   if (request.range_m &&
       (*request.range_m <= static_cast<double>(head.start_m) || *request.range_m > static_cast<double>(head.max_range_m)))

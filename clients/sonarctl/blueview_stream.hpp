@@ -17,9 +17,9 @@ namespace sonar::clients {
 
 /// Settings that the user typed; unset fields keep the value that the sonar has.
 struct HeadRequest {
-  std::size_t head = 0;  // from 0, in the order of the greeting
+  std::optional<std::size_t> head;  // from 0, in the order of the greeting; of a Sonar 3D-15: its mode
   std::optional<double> range_m, rate_hz, gain_percent;
-  std::vector<std::string> oculus_only;  // options typed that no BlueView head has
+  std::vector<std::string> oculus_only;  // options typed that only an Oculus has
 };
 
 class BlueViewStream {

@@ -54,8 +54,8 @@ std::optional<wire::BytesView> read_front(const ping::Frame& frame, M& message) 
   return wire::BytesView(frame.payload).subspan(wire::wire_size<M>());
 }
 
-BrpingPing points_of(const ping::YzPointData& data, wire::BytesView rest) {
-  BrpingPing found;
+PicturePing points_of(const ping::YzPointData& data, wire::BytesView rest) {
+  PicturePing found;
   std::vector<std::pair<double, double>> polar;  // azimuth, range
   wire::Reader reader(rest);
   for (int i = 0; i < data.points; ++i) {
@@ -94,8 +94,8 @@ BrpingPing points_of(const ping::YzPointData& data, wire::BytesView rest) {
   return found;
 }
 
-BrpingPing profile_of(const ping::OsMonoProfile& data, wire::BytesView rest) {
-  BrpingPing found;
+PicturePing profile_of(const ping::OsMonoProfile& data, wire::BytesView rest) {
+  PicturePing found;
   PolarImage& image = found.image;
   image.start_m = 1e-3 * data.start_mm;
   image.beams = 1;
@@ -150,7 +150,7 @@ BrpingStream::~BrpingStream() {
     static_cast<void>(write_all(socket_, ping::framed(ping::Id::motor_off, 0, {})));
 }
 
-BrpingPing BrpingStream::line_of_scan(std::uint16_t angle, unsigned period, unsigned khz, wire::BytesView samples) {
+PicturePing BrpingStream::line_of_scan(std::uint16_t angle, unsigned period, unsigned khz, wire::BytesView samples) {
   const double row_m = period * sample_unit_s * sound_mps / 2;
   if (sector_.rows != samples.size() || sector_.row_spacing_m != row_m) {
     sector_ = {};
@@ -167,13 +167,13 @@ BrpingPing BrpingStream::line_of_scan(std::uint16_t angle, unsigned period, unsi
     for (std::size_t row = 0; row < sector_.rows; ++row)
       sector_.samples[row * sector_.beams + beam] = static_cast<float>(std::to_integer<int>(samples[row]));
   }
-  BrpingPing ping{sector_, {}, std::find(scanned_.begin(), scanned_.end(), false) == scanned_.end()};
+  PicturePing ping{sector_, {}, std::find(scanned_.begin(), scanned_.end(), false) == scanned_.end()};
   ping.facts = {++pings_, 1, static_cast<unsigned>(samples.size()), 8, row_m, sector_.range_m(), 1e3 * khz, 0};
   ping.facts.note = "angle " + std::to_string(angle) + " grad";
   return ping;
 }
 
-std::optional<BrpingPing> BrpingStream::ping_from(const ping::Frame& frame) {
+std::optional<PicturePing> BrpingStream::ping_from(const ping::Frame& frame) {
   const auto counted = [](wire::BytesView rest, std::size_t count) { return rest.first(std::min(rest.size(), count)); };
   switch (frame.header.id) {
     case ping::Id::auto_device_data: {

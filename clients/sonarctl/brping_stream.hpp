@@ -34,7 +34,7 @@ class BrpingStream {
 
   struct Item {
     Wait what = Wait::timed_out;
-    std::optional<BrpingPing> ping;  // with Wait::data
+    std::optional<PicturePing> ping;  // with Wait::data
     std::string error;
   };
   Item next(std::chrono::milliseconds patience);
@@ -46,8 +46,8 @@ class BrpingStream {
 
  private:
   BrpingStream(Socket socket, BrpingDevice device) : socket_(std::move(socket)), device_(device) {}
-  std::optional<BrpingPing> ping_from(const ping::Frame& frame);
-  BrpingPing line_of_scan(std::uint16_t angle, unsigned period, unsigned khz, wire::BytesView samples);
+  std::optional<PicturePing> ping_from(const ping::Frame& frame);
+  PicturePing line_of_scan(std::uint16_t angle, unsigned period, unsigned khz, wire::BytesView samples);
 
   Socket socket_;
   BrpingDevice device_;

@@ -154,6 +154,21 @@ Read read_some(const Socket& socket, std::span<std::byte> into, std::chrono::mil
   return {Wait::closed, 0, size < 0 ? std::strerror(errno) : ""};
 }
 
+Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience) {
+  pollfd ready{socket.fd(), POLLIN, 0};
+  const int polled = ::poll(&ready, 1, static_cast<int>(std::max<std::int64_t>(0, patience.count())));
+  if (polled == 0) return {Wait::timed_out, 0, 0, {}};
+  sockaddr_in from{};
+  socklen_t length = sizeof from;
+  const ssize_t size =
+      polled < 0 ? -1
+                 : ::recvfrom(socket.fd(), into.data(), into.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &length);
+  if (size >= 0) return {Wait::data, static_cast<std::size_t>(size), from.sin_addr.s_addr, {}};
+  if (errno == EAGAIN) return {Wait::timed_out, 0, 0, {}};  // its checksum was wrong
+  if (errno == EINTR) return {Wait::interrupted, 0, 0, {}};
+  return {Wait::closed, 0, 0, std::strerror(errno)};
+}
+
 bool ends_without_a_byte(const Socket& socket, std::chrono::milliseconds patience) {
   pollfd ready{socket.fd(), POLLIN, 0};
   std::byte first{};

@@ -59,6 +59,14 @@ struct Read {
   std::string error;  // reason when the connection was not closed regularly
 };
 Read read_some(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience);
+/// One datagram, and who sent it.
+struct Datagram {
+  Wait what = Wait::timed_out;
+  std::size_t size = 0;
+  std::uint32_t ip = 0;  // in network order
+  std::string error;
+};
+Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience);
 /// Reads nothing. False when a byte is available, or nothing happens within `patience`.
 bool ends_without_a_byte(const Socket& socket, std::chrono::milliseconds patience);
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);

@@ -67,8 +67,8 @@ PolarImage picture_of(const ArisPing& ping) {
 }  // namespace
 
 Result<PolarImage> picture_of(const AnyPing& ping) {
-  if (const auto* of_brping = std::get_if<BrpingPing>(&ping)) {
-    if (of_brping->image.beams >= 2) return of_brping->image;
+  if (const auto* drawn = std::get_if<PicturePing>(&ping)) {
+    if (drawn->image.beams >= 2) return drawn->image;
     return failure(ErrorKind::usage, "one beam makes no picture: sonarctl listen prints the profiles of an Omniscan");
   }
   if (const auto* of_aris = std::get_if<ArisPing>(&ping)) return picture_of(*of_aris);

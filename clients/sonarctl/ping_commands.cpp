@@ -17,7 +17,7 @@ using text::whole_number;
 /// Options that belong to a source of pings; finish() turns their texts into a SourceOptions once the line is parsed.
 struct SourceArguments {
   DeviceArguments device;
-  bool as_it_is = false, observe = false, is_blueview = false, is_aris = false;
+  bool as_it_is = false, observe = false, is_blueview = false, is_aris = false, is_3d15 = false;
   std::string control;
   std::filesystem::path token_file;
   std::string recording;
@@ -26,9 +26,10 @@ struct SourceArguments {
   void add_to(CLI::App& app, bool recordings) {
     device.add_to(app,
                   "port of the sonar (default: 52100 of an Oculus, 14750 of a BlueView head, 56888 of an ARIS, 62312 of a "
-                  "Surveyor, 51200 of an Omniscan or 12345 of a Ping360, the first that answers)");
+                  "Surveyor, 51200 of an Omniscan, 12345 of a Ping360 or 80 of a Sonar 3D-15, the first that answers)");
     app.add_flag("--blueview", is_blueview, "the sonar is a BlueView head; needed on ports other than 14750");
     app.add_flag("--aris", is_aris, "the sonar is an ARIS; needed on ports other than 56888");
+    app.add_flag("--3d15", is_3d15, "the sonar is a Sonar 3D-15; needed on ports other than 80");
     if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
     app.add_flag("--as-it-is", as_it_is, "send no settings (many sonars then send no pings)");
     app.add_flag("--observe", observe,
@@ -47,12 +48,15 @@ struct SourceArguments {
       return failure(ErrorKind::usage,
                      "--discover finds Oculus sonars only: leave it out, and give the address of the BlueView head");
     const bool any_port = at->port == 0;
-    if (any_port) at->port = is_blueview ? blueview::tcp_port : is_aris ? aris::command_port : oculus::tcp_port;
+    if (any_port)
+      at->port = is_blueview ? blueview::tcp_port : is_aris ? aris::command_port : is_3d15 ? waterlinked_port : oculus::tcp_port;
     source.kind = SonarKind::oculus;
     if (is_blueview || at->port == blueview::tcp_port)
       source.kind = SonarKind::blueview;
     else if (is_aris || at->port == aris::command_port)
       source.kind = SonarKind::aris;
+    else if (is_3d15 || at->port == waterlinked_port)
+      source.kind = SonarKind::waterlinked;
     else if (brping_device_at(at->port))
       source.kind = SonarKind::brping;
     else if (any_port && !device.discover)

@@ -10,7 +10,6 @@ namespace sonar::clients {
 
 namespace {
 
-constexpr std::uint16_t http_port = 80;
 constexpr std::chrono::milliseconds probe_patience(300);
 constexpr std::chrono::milliseconds answer_patience(3000);  // minimum for a head, which may be computing
 
@@ -18,48 +17,42 @@ constexpr std::chrono::milliseconds answer_patience(3000);  // minimum for a hea
 
 Result<PingStream> PingStream::open(const Endpoint& device, SonarKind kind, Settings settings,
                                     std::chrono::milliseconds patience) {
-  const auto open_brping = [&](Endpoint place, Socket socket) -> Result<PingStream> {
-    auto host = BrpingStream::open(std::move(socket), brping_device_at(place.port).value_or(BrpingDevice::surveyor),
-                                   settings.oculus ? std::optional(settings.head) : std::nullopt);
-    if (!host) return tl::unexpected(host.error());
-    return PingStream(std::move(place), *std::move(host));
+  const std::optional<HeadRequest> wanted = settings.oculus ? std::optional(settings.head) : std::nullopt;
+  const auto stream_at = [](const Endpoint& place, auto opened) -> Result<PingStream> {
+    if (!opened) return tl::unexpected(opened.error());
+    return PingStream(place, Other(*std::move(opened)));
   };
-  const Endpoint ping360{device.host, brping_ports[0]};
+  const Endpoint ping360{device.host, brping_ports[0]}, http{device.host, waterlinked_port};
+  if (kind == SonarKind::waterlinked) return stream_at(device, WaterlinkedStream::open(device, wanted, patience));
   if (kind == SonarKind::brping && device.port == ping360.port) {
     auto socket = BrpingStream::find_ping360(ping360, patience);
     if (!socket) return tl::unexpected(socket.error());
-    return open_brping(ping360, *std::move(socket));
+    return stream_at(ping360, BrpingStream::open(*std::move(socket), BrpingDevice::ping360, wanted));
   }
   std::vector<Endpoint> places{device};
-  if (kind == SonarKind::either) {
-    places.push_back({device.host, blueview::tcp_port});
-    places.push_back({device.host, aris::command_port});
-    places.push_back({device.host, brping_ports[1]});
-    places.push_back({device.host, brping_ports[2]});
-  }
+  if (kind == SonarKind::either)
+    for (const std::uint16_t port : {blueview::tcp_port, aris::command_port, brping_ports[1], brping_ports[2]})
+      places.push_back({device.host, port});
   auto connected = connect_first(places, patience);
-  if (!connected && kind == SonarKind::either)
-    if (auto socket = BrpingStream::find_ping360(ping360, probe_patience)) return open_brping(ping360, *std::move(socket));
-  if (!connected && kind == SonarKind::either && connect_first({{device.host, http_port}}, patience))
-    return failure(ErrorKind::usage,
-                   "at " + device.host +
-                       " only HTTP answers, as of a Sonar 3D-15: it sends images by UDP, which sonarctl does not "
-                       "read; the live view shows them, sonarctl recording start RUN.sonar keeps them");
+  if (!connected && kind == SonarKind::either) {
+    if (auto socket = BrpingStream::find_ping360(ping360, probe_patience))
+      return stream_at(ping360, BrpingStream::open(*std::move(socket), BrpingDevice::ping360, wanted));
+    if (connect_first({http}, probe_patience))
+      return stream_at(http, WaterlinkedStream::open(http, wanted, std::max(patience, answer_patience)));
+  }
   if (!connected) return tl::unexpected(connected.error());
   const Endpoint& place = places[connected->which];
-  if (kind == SonarKind::brping || connected->which > 2) return open_brping(place, std::move(connected->socket));
+  if (kind == SonarKind::brping || connected->which > 2)
+    return stream_at(place, BrpingStream::open(std::move(connected->socket),
+                                               brping_device_at(place.port).value_or(BrpingDevice::surveyor), wanted));
   if (kind == SonarKind::blueview || connected->which == 1) {
     auto head = BlueViewStream::open(std::move(connected->socket), settings.head, std::max(patience, answer_patience));
-    if (head) return PingStream(place, *std::move(head));
-    const Error& error = head.error();
-    return failure(error.kind, error.kind == ErrorKind::usage ? error.text : "tcp " + text_from(place) + " " + error.text);
+    if (!head && head.error().kind != ErrorKind::usage)
+      return failure(head.error().kind, "tcp " + text_from(place) + " " + head.error().text);
+    return stream_at(place, std::move(head));
   }
-  if (kind == SonarKind::aris || connected->which == 2) {
-    auto controller =
-        ArisStream::open(std::move(connected->socket), settings.oculus ? std::optional(settings.head) : std::nullopt);
-    if (!controller) return tl::unexpected(controller.error());
-    return PingStream(place, *std::move(controller));
-  }
+  if (kind == SonarKind::aris || connected->which == 2)
+    return stream_at(place, ArisStream::open(std::move(connected->socket), wanted));
   PingStream stream(place, std::move(connected->socket), std::move(settings.oculus));
   if (stream.asked_)
     if (Result<void> sent = stream.ask_again(); !sent) return tl::unexpected(sent.error());
@@ -71,40 +64,44 @@ Result<void> PingStream::ask_again() {
 }
 
 bool PingStream::is_rejected(std::chrono::milliseconds patience) const {
-  if (aris_) return aris_->is_rejected(patience);
-  if (brping_) return brping_->is_rejected(patience);
-  return !blueview_ && ends_without_a_byte(socket_, patience);
+  if (const auto* aris = std::get_if<ArisStream>(&other_)) return aris->is_rejected(patience);
+  if (const auto* brping = std::get_if<BrpingStream>(&other_)) return brping->is_rejected(patience);
+  return is_oculus() && ends_without_a_byte(socket_, patience);
+}
+
+std::string PingStream::about() const {
+  std::string what;
+  if (const auto* blueview = std::get_if<BlueViewStream>(&other_)) what = blueview->about();
+  if (std::holds_alternative<ArisStream>(other_)) what = "an ARIS";
+  if (const auto* brping = std::get_if<BrpingStream>(&other_)) what = brping->about();
+  if (std::holds_alternative<WaterlinkedStream>(other_)) what = "a Sonar 3D-15";
+  return text_from(device_) + (what.empty() ? "" : ", " + what);
 }
 
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
-  if (aris_ || brping_) return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is " + about());
-  if (blueview_)
+  if (is_blueview())
     return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is a BlueView head at " + text_from(device_) +
                                          "; hosts record it with BVTSonar_CreateFile");
+  if (!is_oculus()) return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is " + about());
   record_.open(file, std::ios::binary | std::ios::trunc);
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
   return {};
 }
 
 PingStream::Item PingStream::next(std::chrono::milliseconds patience) {
-  if (blueview_) {
-    BlueViewStream::Item item = blueview_->next(patience);
-    Item out{item.what, {}, {}, std::move(item.error)};
-    if (item.ping) out.ping = *std::move(item.ping);
-    return out;
-  }
-  if (aris_) {
-    ArisStream::Item item = aris_->next(patience);
-    Item out{item.what, {}, {}, std::move(item.error)};
-    if (item.ping) out.ping = *std::move(item.ping);
-    return out;
-  }
-  if (brping_) {
-    BrpingStream::Item item = brping_->next(patience);
-    Item out{item.what, {}, {}, std::move(item.error)};
-    if (item.ping) out.ping = *std::move(item.ping);
-    return out;
-  }
+  if (!is_oculus())
+    return std::visit(
+        [patience](auto& stream) -> Item {
+          if constexpr (std::is_same_v<std::decay_t<decltype(stream)>, std::monostate>) {
+            return {};
+          } else {
+            auto item = stream.next(patience);
+            Item out{item.what, {}, {}, std::move(item.error)};
+            if (item.ping) out.ping = *std::move(item.ping);
+            return out;
+          }
+        },
+        other_);
   const auto deadline = std::chrono::steady_clock::now() + patience;
   for (;;) {
     if (auto message = decoder_.next()) {

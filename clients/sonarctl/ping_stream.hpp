@@ -8,6 +8,7 @@
 #include <fstream>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "clients/sonarctl/any_ping.hpp"
@@ -15,14 +16,15 @@
 #include "clients/sonarctl/blueview_stream.hpp"
 #include "clients/sonarctl/brping_stream.hpp"
 #include "clients/sonarctl/net.hpp"
+#include "clients/sonarctl/waterlinked_stream.hpp"
 #include "core/base/result.hpp"
 #include "protocol/oculus/decode.hpp"
 
 namespace sonar::clients {
 
 /// Kind of sonar at an address; either: an Oculus there, or another at its own port, the first that answers. brping: that of the
-/// ping protocol which is usual at that port.
-enum class SonarKind { oculus, blueview, either, aris, brping };
+/// ping protocol which is usual at that port. waterlinked: a Sonar 3D-15.
+enum class SonarKind { oculus, blueview, either, aris, brping, waterlinked };
 
 /// Settings to send, by kind of sonar. Without `oculus` none: an ARIS is not sent `head` either.
 struct Settings {
@@ -52,28 +54,20 @@ class PingStream {
   Result<void> record_to(const std::filesystem::path& file);
   std::uint64_t junk_bytes() const { return decoder_.skipped_bytes(); }
   const Endpoint& device() const { return device_; }
-  bool is_blueview() const { return blueview_.has_value(); }
-  bool is_oculus() const { return !blueview_ && !aris_ && !brping_; }
+  bool is_blueview() const { return std::holds_alternative<BlueViewStream>(other_); }
+  bool is_oculus() const { return std::holds_alternative<std::monostate>(other_); }
   /// "127.0.0.2:14750, BlueView P900-90, serial 7001"
-  std::string about() const {
-    const std::string what = blueview_ ? blueview_->about() : aris_ ? "an ARIS" : brping_ ? brping_->about() : "";
-    return text_from(device_) + (what.empty() ? "" : ", " + what);
-  }
+  std::string about() const;
 
  private:
   PingStream(Endpoint device, Socket socket, std::optional<oculus::FireRequest> asked)
       : device_(std::move(device)), socket_(std::move(socket)), asked_(std::move(asked)) {}
-  PingStream(Endpoint device, BlueViewStream blueview)
-      : device_(std::move(device)), socket_(-1), blueview_(std::move(blueview)) {}
-
-  PingStream(Endpoint device, ArisStream aris) : device_(std::move(device)), socket_(-1), aris_(std::move(aris)) {}
-  PingStream(Endpoint device, BrpingStream brping) : device_(std::move(device)), socket_(-1), brping_(std::move(brping)) {}
+  using Other = std::variant<std::monostate, BlueViewStream, ArisStream, BrpingStream, WaterlinkedStream>;
+  PingStream(Endpoint device, Other other) : device_(std::move(device)), socket_(-1), other_(std::move(other)) {}
 
   Endpoint device_;
   Socket socket_;  // of an Oculus
-  std::optional<BlueViewStream> blueview_;
-  std::optional<ArisStream> aris_;
-  std::optional<BrpingStream> brping_;
+  Other other_;    // another sonar's
   std::optional<oculus::FireRequest> asked_;
   oculus::Decoder decoder_;
   std::ofstream record_;

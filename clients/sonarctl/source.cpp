@@ -94,7 +94,7 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
     }
     received = received || item.what == Wait::data;
     if (!item.ping) continue;
-    if (const auto* of = std::get_if<BrpingPing>(&*item.ping); of != nullptr && !of->is_whole) {
+    if (const auto* of = std::get_if<PicturePing>(&*item.ping); of != nullptr && !of->is_whole) {
       give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
       continue;
     }

@@ -183,7 +183,6 @@ class Images(unittest.TestCase):
                 self.assertEqual(begun.returncode, 0, begun.stderr)
                 said = run(SONARCTL, "doctor", *control, "--http", f"{daemon.address}:8088")
                 self.assertIn("images by UDP at 5 Hz", said.stdout)
-                self.assertIn("as of a Sonar 3D-15", daemon.ctl("listen", "--pings", 1).stderr)
                 time.sleep(2)
                 run(SONARCTL, "recording", "stop", *control)
             recorded, at, kinds = (pathlib.Path(folder) / "run.sonar").read_bytes(), 0, []
@@ -193,6 +192,27 @@ class Images(unittest.TestCase):
                 at += size
             self.assertGreater(len(kinds), 10)
             self.assertEqual(kinds[:2], ["RangeImage", "BitmapImageGreyscale8"])
+
+    def test_sonarctl_listens_and_draws(self):
+        with sonar() as daemon, tempfile.TemporaryDirectory() as folder:
+            self.assertIn("leave out --as-it-is", daemon.ctl("listen", "--as-it-is").stderr)
+            listened = daemon.ctl("listen", "--pings", 3, "--range", 12, "--mode", 2)
+            self.assertEqual(listened.returncode, 0, listened.stderr)
+            self.assertIn("a Sonar 3D-15", listened.stdout)
+            self.assertRegex(listened.stdout, r"returns from \d+\.\d+ to \d+\.\d+ m\n")
+            self.assertEqual(json.loads(self.ask(daemon, "/acoustics/range")[1])["max"], 12)
+            self.assertEqual(json.loads(self.ask(daemon, "/acoustics/mode")[1]), "high-frequency")
+            picture = pathlib.Path(folder) / "fan.png"
+            drawn = daemon.ctl("view", "--png", picture, "--3d15")
+            self.assertEqual(drawn.returncode, 0, drawn.stderr)
+            self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+            refused = daemon.ctl("listen", "--range", 16)
+            self.assertEqual(refused.returncode, 64)
+            self.assertIn("min and max lie within 0 to 15", refused.stderr)
+            self.assertIn("--gain does not apply to a Sonar 3D-15", daemon.ctl("listen", "--gain", 50).stderr)
+            where = {"mode": "unicast", "unicast_destination_ip": "127.0.0.1", "unicast_destination_port": 40999}
+            self.assertEqual(self.ask(daemon, "/udp", where)[0], 204)
+            self.assertIn("127.0.0.1", daemon.ctl("listen").stderr)
 
     @unittest.skipIf(shark.why_not(), shark.why_not())
     def test_dissector(self):

@@ -6,6 +6,7 @@
 #include "clients/sonarctl/doctor/probes.hpp"
 #include "clients/sonarctl/doctor/proc_net.hpp"
 #include "clients/sonarctl/doctor/watch_pings.hpp"
+#include "clients/sonarctl/waterlinked_stream.hpp"
 #include "protocol/aris/messages.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/control/answers.hpp"
@@ -19,7 +20,6 @@ using namespace std::chrono_literals;
 constexpr auto status_patience = 2500ms;  // status messages come every second
 constexpr auto first_status = 1300ms;     // to learn who is connected
 const Endpoint usual_http{"127.0.0.1", 8088};
-constexpr std::uint16_t http_port = 80;  // of a Sonar 3D-15
 constexpr auto short_patience = 700ms, own_patience = 200ms;
 constexpr auto head_patience = 400ms, head_patience_here = 100ms;  // for an answer to discovery
 
@@ -126,7 +126,7 @@ class Gathering {
   static std::uint16_t port_of(const v1::SonarStatus& s) {
     const std::uint16_t usual = is_blueview(s) ? blueview::tcp_port
                                 : is_aris(s)   ? aris::command_port
-                                : is_http(s)   ? http_port
+                                : is_http(s)   ? waterlinked_port
                                 : brping_of(s) ? brping_ports[static_cast<std::size_t>(*brping_of(s))]
                                                : oculus::tcp_port;
     return parse_endpoint(s.listens(), {"", usual}).value_or(Endpoint{"", usual}).port;
@@ -168,7 +168,7 @@ class Gathering {
     sonar.blueview = is_blueview(at);
     sonar.aris = at.port == aris::command_port;
     sonar.brping = brping_device_at(at.port).has_value();
-    sonar.by_http = at.port == http_port;
+    sonar.by_http = at.port == waterlinked_port;
     sonar.name = name;
     facts_.sonars.push_back(std::move(sonar));
   }

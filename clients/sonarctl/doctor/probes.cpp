@@ -10,11 +10,11 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <fstream>
 
 #include "clients/sonarctl/doctor/proc_net.hpp"
+#include "clients/sonarctl/http.hpp"
 #include "core/text/ipv4.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/decode.hpp"
@@ -192,22 +192,10 @@ HttpFacts ask_health(const Endpoint& at, bool given, std::chrono::milliseconds p
   HttpFacts facts;
   facts.at = at;
   facts.given = given;
-  const auto deadline = Steady::now() + patience;
-  const auto socket = connect_tcp(at, patience);
-  if (!socket) return facts;
-  const std::string request = "GET /healthz HTTP/1.1\r\nHost: " + text_from(at) + "\r\nConnection: close\r\n\r\n";
-  if (!write_all(*socket, std::as_bytes(std::span(request.data(), request.size())))) return facts;
-  std::string answer;
-  std::array<std::byte, 4096> chunk;
-  while (answer.size() < 65536) {
-    const Read read = read_some(*socket, chunk, left_until(deadline));
-    if (read.what != Wait::data) break;
-    for (std::size_t i = 0; i < read.size; ++i) answer += static_cast<char>(chunk[i]);
-  }
-  if (answer.starts_with("HTTP/1.") && answer.size() > 12) std::from_chars(answer.data() + 9, answer.data() + 12, facts.code);
-  const std::size_t body = answer.find("\r\n\r\n");
-  if (body == std::string::npos) return facts;
-  facts.text = answer.substr(body + 4, answer.find('\n', body + 4) - body - 4);
+  const auto reply = http_ask(at, "GET", "/healthz", "", patience);
+  if (!reply) return facts;
+  facts.code = static_cast<int>(reply->status);
+  facts.text = reply->body.substr(0, reply->body.find('\n'));
   while (!facts.text.empty() && (facts.text.back() == '\r' || facts.text.back() == ' ')) facts.text.pop_back();
   return facts;
 }
