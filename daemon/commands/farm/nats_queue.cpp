@@ -1,6 +1,7 @@
 #include <nats/nats.h>
 
 #include <map>
+#include <set>
 
 #include "core/base/regular_file.hpp"
 #include "core/text/decimal.hpp"
@@ -12,7 +13,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr const char* stream = "FARM";
-constexpr std::int64_t ns_per_ms = 1'000'000, patience_ms = 5000;
+constexpr std::int64_t ns_per_ms = 1'000'000, patience_ms = 5000, listing_ms = 2000;
 constexpr int already_queued = 10071;  // JSStreamWrongLastSequence: a message of that subject is there
 
 template <auto destroy>
@@ -104,14 +105,14 @@ class NatsQueue final : public Queue {
   }
 
   Result<std::vector<std::string>> keys(Table table) override {
-    kvKeysList list{};
-    kvStore* kv = store(table);
-    const natsStatus s = kv ? kvStore_Keys(&list, kv, nullptr) : NATS_NO_SERVER;
-    std::vector<std::string> all;
-    if (s == NATS_OK) all.assign(list.Keys, list.Keys + list.Count);
-    kvKeysList_Destroy(&list);
-    if (s != NATS_OK && s != NATS_NOT_FOUND) return refused(std::string("cannot list ") + table.name, s);
-    return all;
+    // Not kvStore_Keys: it waits without end for an entry that expires while it is listing.
+    natsStatus s = NATS_TIMEOUT;
+    for (int attempt = 0; s == NATS_TIMEOUT && attempt < 3; ++attempt) {
+      std::set<std::string> found;
+      s = list(table, found);
+      if (s == NATS_OK) return std::vector<std::string>(found.begin(), found.end());
+    }
+    return refused(std::string("cannot list ") + table.name, s);
   }
 
   Result<void> erase(Table table, const std::string& key) override {
@@ -225,6 +226,27 @@ class NatsQueue final : public Queue {
     jsErrCode code{};
     const natsStatus s = js_AddStream(nullptr, jetstream_.get(), &config, nullptr, &code);  // no error where it is there
     return s == NATS_OK ? Result<void>{} : refused("cannot make the stream FARM", s, code);
+  }
+
+  /// NATS_TIMEOUT: the table did not tell its end; an entry may have expired meanwhile, so a second listing may.
+  natsStatus list(Table table, std::set<std::string>& found) {
+    kvStore* kv = store(table);
+    if (!kv) return NATS_NO_SERVER;
+    kvWatchOptions options;
+    kvWatchOptions_Init(&options);
+    options.MetaOnly = true;
+    Owned<kvWatcher, kvWatcher_Destroy> watcher;
+    natsStatus s = into(watcher, [&](auto** w) { return kvStore_WatchAll(w, kv, &options); });
+    while (s == NATS_OK) {
+      Owned<kvEntry, kvEntry_Destroy> entry;
+      s = into(entry, [&](auto** e) { return kvWatcher_Next(e, watcher.get(), listing_ms); });
+      if (s != NATS_OK || !entry) break;  // no entry: all that was there has been told
+      if (kvEntry_Operation(entry.get()) == kvOp_Put)
+        found.insert(kvEntry_Key(entry.get()));
+      else
+        found.erase(kvEntry_Key(entry.get()));
+    }
+    return s;
   }
 
   /// Null: the server does not answer.
