@@ -1,5 +1,10 @@
 #include "daemon/server/sonars/datagram_port.hpp"
 
+#include <linux/errqueue.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <cstring>
 #include <span>
 
 #include "daemon/server/system/listen.hpp"
@@ -26,6 +31,17 @@ Ipv4 broadcast_of(const SonarConfig& sonar) {
   return address;
 }
 
+/// Whether an error of a socket is the answer "port unreachable" of a computer that something was sent to.
+bool is_closed_port(msghdr& message) {
+  for (const cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, const_cast<cmsghdr*>(c))) {
+    if (c->cmsg_level != IPPROTO_IP || c->cmsg_type != IP_RECVERR) continue;
+    sock_extended_err error{};
+    std::memcpy(&error, CMSG_DATA(c), sizeof error);
+    if (error.ee_origin == SO_EE_ORIGIN_ICMP && error.ee_errno == ECONNREFUSED) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port) {
@@ -47,7 +63,29 @@ void DatagramPort::hear_broadcasts(const SonarConfig& sonar) {
 
 void DatagramPort::start() {
   if (!answer_) return;
+  if (closed_) {
+    const int on = 1;
+    setsockopt(socket().native_handle(), IPPROTO_IP, IP_RECVERR, &on, sizeof on);
+  }
   for (Socket& socket : sockets_) receive(socket);
+}
+
+void DatagramPort::take_errors() {
+  while (closed_ && !stopping_) {
+    sockaddr_in host{};
+    alignas(cmsghdr) std::array<std::byte, 512> more{};
+    msghdr message{};
+    message.msg_name = &host;
+    message.msg_namelen = sizeof host;
+    message.msg_control = more.data();
+    message.msg_controllen = more.size();
+    if (recvmsg(socket().native_handle(), &message, MSG_ERRQUEUE | MSG_DONTWAIT) < 0) return;
+    if (!is_closed_port(message)) continue;
+    Endpoint closed;
+    std::memcpy(closed.ip.data(), &host.sin_addr, closed.ip.size());
+    closed.port = ntohs(host.sin_port);
+    closed_(closed);
+  }
 }
 
 void DatagramPort::stop() {
@@ -59,6 +97,7 @@ void DatagramPort::stop() {
 void DatagramPort::receive(Socket& at) {
   at.socket.async_receive_from(asio::buffer(at.datagram), at.from, [this, &at](const error_code& ec, std::size_t size) {
     if (stopping_ || ec == asio::error::operation_aborted) return;
+    take_errors();
     if (!ec && at.from.address().is_v4()) {
       const Endpoint from{at.from.address().to_v4().to_bytes(), at.from.port()};
       // From the sonar's own address: that is how a host learns it. A host that cannot be reached gets no answer.

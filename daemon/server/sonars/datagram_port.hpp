@@ -25,6 +25,8 @@ class DatagramPort {
   Result<void> open(const SonarConfig& sonar, std::uint16_t port);
   /// From start() on, what arrives is answered.
   void answer_with(Answer answer) { answer_ = std::move(answer); }
+  /// A host whose port is closed is named when its computer says so, to what was sent there. Before start().
+  void tell_of_closed_ports(std::function<void(Endpoint host)> tell) { closed_ = std::move(tell); }
   /// What arrives at the broadcast address, too. One that cannot be bound is left out.
   void hear_broadcasts(const SonarConfig& sonar);
   void start();
@@ -41,9 +43,11 @@ class DatagramPort {
     std::array<std::byte, 1500> datagram{};
   };
   void receive(Socket& at);
+  void take_errors();
 
   asio::io_context& io_;
   Answer answer_;
+  std::function<void(Endpoint host)> closed_;
   std::list<Socket> sockets_;
   std::uint16_t number_ = 0;  // as asked for
   bool stopping_ = false;

@@ -70,7 +70,10 @@ asio::awaitable<bool> DatagramStream::send_message(const Outbox::Message& messag
 asio::awaitable<bool> DatagramStream::send_datagram(const protocol::Bytes& datagram, const std::vector<Endpoint>& receivers) {
   for (const Endpoint& to : receivers) {
     error_code ec;
-    co_await socket_.async_send_to(asio::buffer(datagram), udp::endpoint(address_of(to.ip), to.port), into(ec));
+    const auto sent_to = udp::endpoint(address_of(to.ip), to.port);
+    co_await socket_.async_send_to(asio::buffer(datagram), sent_to, into(ec));
+    // That is the answer to an earlier datagram, perhaps to another host; this one was not sent.
+    if (ec == asio::error::connection_refused) co_await socket_.async_send_to(asio::buffer(datagram), sent_to, into(ec));
     if (!socket_.is_open()) co_return false;
     if (ec)
       parent_.on_send_error(to, ec.message());

@@ -58,6 +58,7 @@ Result<void> Device::open(const protocol::Port& port) {
       on_host_datagram(*at, port, from, datagram);
       return std::vector<protocol::Bytes>{};
     });
+    (*datagrams)->tell_of_closed_ports([this, &port](Endpoint host) { on_host_closed(port, host); });
     return {};
   }
   if (port.kind == Kind::udp_answer) {

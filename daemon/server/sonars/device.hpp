@@ -156,6 +156,7 @@ class Device final : public SessionParent {
   void on_client_socket(tcp::socket socket, const protocol::Port& port);
   void on_host_datagram(DatagramPort& at, const protocol::Port& port, const Endpoint& from, protocol::BytesView datagram);
   StreamPointer host_of(const protocol::Port& port) const;
+  void on_host_closed(const protocol::Port& port, const Endpoint& host);
   StreamPointer begin_dialogue(DatagramPort& at, const protocol::Port& port, Peer host);
   void on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port);
   asio::awaitable<void> turn_away(tcp::socket socket, Admission::Place place);

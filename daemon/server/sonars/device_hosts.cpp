@@ -18,6 +18,14 @@ void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, cons
   on_bytes(dialogue->id(), datagram);
 }
 
+/// Without a connection, that is how a host's end is noticed.
+void Device::on_host_closed(const protocol::Port& port, const Endpoint& host) {
+  const StreamPointer dialogue = host_of(port);
+  if (!dialogue) return;
+  if (const Peer& last = sonar_.connections().find(dialogue->id())->peer; last.ip == host.ip && last.port == host.port)
+    dialogue->finish("its port is closed");
+}
+
 Device::StreamPointer Device::host_of(const protocol::Port& port) const {
   for (const StreamPointer& stream : streams_) {
     const Connection* const c = sonar_.connections().find(stream->id());

@@ -235,6 +235,32 @@ TEST(Transports, ADialogueByDatagramsBelongsToTheHostThatAskedLast) {
   EXPECT_TRUE(stranger.next(milliseconds(100)).empty()) << "it is sent nothing";
 }
 
+TEST(Transports, AHostByDatagramsWhosePortIsClosedIsGivenUpAndAnotherLosesNothing) {
+  Daemon daemon(made_up());
+  {
+    UdpSocket gone;
+    gone.send("range 6\n", daemon.address(), data_port);
+    EXPECT_EQ(gone.next(), "ok\n");
+    next_ping(gone);
+    EXPECT_EQ(daemon.status().sonars(0).clients_size(), 1);
+  }
+  EXPECT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 0; }));
+  UdpSocket host;
+  host.send("range 6\n", daemon.address(), data_port);
+  EXPECT_EQ(host.next(), "ok\n");
+  unsigned first = 0, second = 0;
+  next_ping(host, &first);
+  next_ping(host, &second);
+  EXPECT_EQ(second, first + 1);
+  // The answer to a stranger's closed port is on the way between the host's datagrams.
+  for (int i = 0; i < 20; ++i) {
+    UdpSocket().send("nothing\n", daemon.address(), data_port);
+    host.send("range 6\n", daemon.address(), data_port);
+    EXPECT_TRUE(eventually([&] { return host.next() == "ok\n"; }));
+  }
+  EXPECT_EQ(daemon.status().sonars(0).clients_size(), 1);
+}
+
 TEST(Transports, TheBeaconSaysAtOnceThatAClientCameOrWent) {
   Daemon daemon(made_up());
   UdpSocket host("127.0.0.1", beacon_port);
