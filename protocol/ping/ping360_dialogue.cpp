@@ -11,7 +11,7 @@ namespace {
 
 using protocol::Reaction;
 
-constexpr auto longest_wait = std::chrono::seconds(2);  // for a ping that could not be made
+constexpr auto longest_wait = std::chrono::seconds(2);  // for a ping that could not be made; one that is late counts
 
 DeviceInformation identity(const protocol::OptionValues& options) {
   DeviceInformation info;
@@ -29,10 +29,11 @@ class Ping360Dialogue final : public Conversation {
   Ping360Dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
       : Conversation(device, port, identity(device.options), Settings{}.id), head_{0, 0, now} {}
 
-  Reaction on_tick(Time now, bool) override {
+  Reaction on_tick(Time now, bool ping_pending) override {
     Reaction reaction;
     if (now < next_tick()) return reaction;
-    if (fired_) return advance(now), reaction;  // no ping came of it
+    if (fired_ && ping_pending) return fired_at_ = now, reaction;  // the one before it is late
+    if (fired_) return late_ = fired_, advance(now), reaction;     // no ping came of it yet
     Settings s = settings();
     s.id = id_;
     s.ping.angle = head_.target();
@@ -55,6 +56,10 @@ class Ping360Dialogue final : public Conversation {
     return task_ != Task::none && !fired_ ? std::optional(due_) : std::nullopt;  // stepped time comes to a mere turn too
   }
   protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
+    if (late_ && made_with == late_.get()) {
+      late_.reset();
+      return {{Bytes{}}, {}};
+    }
     if (!fired_ || made_with != fired_.get()) return {};  // of a request that another has replaced
     advance(now);
     return {{Bytes{}}, {}};
@@ -119,6 +124,7 @@ class Ping360Dialogue final : public Conversation {
   void stop(Time now) {
     task_ = Task::none;
     fired_.reset();
+    late_.reset();
     head_ = {head_.angle_at(now), head_.angle_at(now), now};
   }
 
@@ -142,6 +148,7 @@ class Ping360Dialogue final : public Conversation {
   bool back_ = false;  // of a scan that oscillates
   Time due_{};
   std::shared_ptr<const HeldSettings> fired_;  // the ping that is being made
+  std::shared_ptr<const HeldSettings> late_;   // one that has not come in time
   Time fired_at_{};
 };
 

@@ -203,6 +203,41 @@ TEST(Ping360, APingThatIsNotMadeDoesNotEndAScan) {
   EXPECT_GT(talk.pings, 10);
 }
 
+TEST(Ping360, ASinglePingThatIsLateIsAnswered) {
+  Talk talk("ping360");
+  talk.say(ping_at(0));
+  talk.obey(talk.dialogue->on_tick(at_s(0), false));
+  talk.run_to(3);
+  EXPECT_EQ(talk.pings, 1) << "it is not asked for again";
+  talk.deliver(3.5);
+  const auto answers = talk.take();
+  ASSERT_EQ(answers.size(), 1u);
+  EXPECT_EQ(answers[0].header.id, Id::device_data);
+  talk.deliver(3.6);
+  EXPECT_TRUE(talk.take().empty());
+}
+
+TEST(Ping360, AScanLosesNoPingThatIsLate) {
+  Talk talk("ping360");
+  talk.say(scan(0, 399));
+  const auto tick = [&](bool pending) { talk.obey(talk.dialogue->on_tick(talk.dialogue->next_tick(), pending)); };
+  tick(false);
+  const protocol::RequestPing first = talk.aim;
+  tick(false);  // too late
+  tick(false);
+  EXPECT_EQ(talk.pings, 2);
+  tick(true);  // the second waits for the first
+  EXPECT_EQ(talk.pings, 2);
+  const protocol::RequestPing second = std::exchange(talk.aim, first);
+  talk.deliver(5);
+  talk.aim = second;
+  talk.deliver(5.1);
+  talk.run_to(5.2);
+  const auto heard = angles(talk.take());
+  ASSERT_GE(heard.size(), 3u);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(heard[static_cast<std::size_t>(i)], i);
+}
+
 TEST(Ping360, IsFoundByOneDatagram) {
   Talk talk("ping360");
   const protocol::Port& port = talk.vendor.ports()[1];
