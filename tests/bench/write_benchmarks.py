@@ -18,12 +18,12 @@ from pathlib import Path
 # name: required, and the goals with two threads by instruction set [pings/s]; no goal where none is named.
 GOALS = {
     "P1": (75, {"avx512": 400, "avx2": 160}),
-    "P2": (60, {"avx512": 200}),
+    "P2": (60, {"avx512": 200, "avx2": 90}),
     "P3a": (40, {"avx512": 320, "avx2": 130}),
-    "P3b": (40, {"avx512": 250}),
-    "P3c": (40, {"avx512": 170}),
+    "P3b": (40, {"avx512": 250, "avx2": 100}),
+    "P3c": (40, {"avx512": 350, "avx2": 140}),
     "P3d": (40, {"avx512": 120, "avx2": 55}),
-    "P4a": (40, {"avx512": 180}),
+    "P4a": (40, {"avx512": 180, "avx2": 75}),
     "P4b": (25, {"avx512": 80, "avx2": 30}),
 }
 # Thread ms of the prototype's stages for P1 (2 processors with AVX-512), from which the goal was derived.
