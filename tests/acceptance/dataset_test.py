@@ -17,10 +17,6 @@ try:
     import PIL.Image  # noqa: F401
 except ImportError:
     np = None
-try:
-    from sklearn.linear_model import LogisticRegression
-except ImportError:
-    LogisticRegression = None
 
 MINES = (ROOT / "scenes/datasets/mines.yaml").read_text(encoding="utf-8")
 
@@ -44,6 +40,18 @@ def features(samples):
     around = sum(np.roll(np.roll(level, dy, 0), dx, 1) for dy in range(-2, 3) for dx in range(-2, 3)) / 25
     row = level.mean(1, keepdims=True) + 0 * level
     return np.stack([level, around, around - row, row], -1).reshape(-1, 4)
+
+
+def learned(x, y):
+    """Logistic regression by Newton's method, things and the rest of equal weight: how much each feature speaks for a thing."""
+    x = np.column_stack([x, np.ones(len(x))])
+    counts = np.where(y, 0.5 / y.mean(), 0.5 / (1 - y.mean()))
+    weights = np.zeros(x.shape[1])
+    for _ in range(20):
+        p = 1 / (1 + np.exp(-x @ weights))
+        curvature = (x * (counts * p * (1 - p))[:, None]).T @ x + 1e-6 * np.eye(x.shape[1])
+        weights += np.linalg.solve(curvature, x.T @ (counts * (y - p)))
+    return weights[:-1]
 
 
 class Dataset(unittest.TestCase):
@@ -178,11 +186,8 @@ class Dataset(unittest.TestCase):
                 x.append(features(ping["samples.png"]))
                 y.append(np.isin(ping["labels.png"], things).reshape(-1))
             sets.append((np.concatenate(x), np.concatenate(y)))
-        if LogisticRegression is None:
-            self.skipTest("needs scikit-learn")
         (x, y), (x_test, y_test) = sets
-        model = LogisticRegression(class_weight="balanced", max_iter=300).fit(x, y)
-        score = model.decision_function(x_test)
+        score = x_test @ learned(x, y)
         share = y_test.mean()
         found = score > np.quantile(score, 1 - share)  # as many samples as there are of things
         iou = (found & y_test).sum() / (found | y_test).sum()

@@ -13,7 +13,7 @@ page_packages=(esbuild libjs-three)
 
 # What only tests use: without it some are skipped, saying so.
 test_packages=(
-  tshark systemd dpkg-dev file strace python3-numpy nats-server
+  tshark systemd dpkg-dev file strace python3-numpy python3-pil nats-server
 )
 browser_packages=(chromium)
 
@@ -63,10 +63,12 @@ export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
 
 # configure PRESET [cmake arguments...]
 configure() {
-  local log preset=$1
+  local log preset=$1 python=()
   shift
   log=$(mktemp)
-  if cmake --preset "$preset" -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" "$@" >"$log" 2>&1 </dev/null; then
+  # Debian's packages of NumPy and Pillow are for its own Python, which need not be the first in PATH.
+  if command -v dpkg-query >/dev/null && [ -x /usr/bin/python3 ]; then python=(-DPython3_EXECUTABLE=/usr/bin/python3); fi
+  if cmake --preset "$preset" -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" "${python[@]}" "$@" >"$log" 2>&1 </dev/null; then
     grep -E '^-- (sonard|  )|Warning' "$log" || true
     rm -f "$log"
   else
