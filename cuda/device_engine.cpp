@@ -378,6 +378,7 @@ std::string why_not_on_device(const PingRequest& request, bool transforms) {
   if (request.switches.mode != Mode::canonical) return "pings of the comparison modes";
   if (request.switches.fixed_fan > 0) return "pings of a fixed fan";
   if (range_image_of(request) != nullptr) return "range images";
+  if (request.switches.keep_labels) return "pings with labels";
   if (request.switches.expected_power || transforms) return "";
   if (w.shape == Waveform::Shape::measured) return "pings with a measured pulse";
   if (w.exact) return "pings with an exact pulse";

@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "core/pipeline/check_request.hpp"
+#include "core/pipeline/labelling_engine.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simulate.hpp"
 #include "core/pipeline/water_line.hpp"
@@ -52,14 +53,23 @@ class CpuEngine final : public PingEngine, private Interruption {
     if (!cells_ || !cells_->serves(request.seed, fields))
       cells_ = std::make_shared<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, fields);
     place_bodies(request);
-    if (under_way_.request != nullptr) return simulate(rays_, *cells_, request, kernels_, work_[1], pool_);
+    std::shared_ptr<PingLabels> labels;
+    if (request.switches.keep_labels && why_unlabelled(request, *scene_).empty())
+      labels = std::make_shared<PingLabels>(no_labels(request, *scene_));
+    Ping ping = under_way_.request != nullptr ? simulate(rays_, *cells_, request, kernels_, work_[1], pool_, labels.get())
+                                              : run_outer(request, labels.get());
+    ping.labels = std::move(labels);
+    return ping;
+  }
+  /// Between whose parts others may run.
+  Ping run_outer(const PingRequest& request, PingLabels* labels) {
     under_way_ = {&request, cells_, 0};
     struct Finish {
       UnderWay& ping;
       ~Finish() { ping = {}; }
     } finish{under_way_};
     work_[0].set_between(interruption_ ? this : nullptr);
-    return simulate(rays_, *under_way_.cells, request, kernels_, work_[0], pool_);
+    return simulate(rays_, *under_way_.cells, request, kernels_, work_[0], pool_, labels);
   }
   void place_bodies(const PingRequest& request) {
     if (!scene_->bodies_in_world.empty())

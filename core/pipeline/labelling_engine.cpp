@@ -8,7 +8,6 @@
 #include "core/sonar/range_image.hpp"
 
 namespace sonar {
-namespace {
 
 std::string why_unlabelled(const PingRequest& request, const Scene& scene) {
   if (request.switches.mode != Mode::canonical || request.switches.fixed_fan > 0)
@@ -20,7 +19,6 @@ std::string why_unlabelled(const PingRequest& request, const Scene& scene) {
   return why_invalid(request);
 }
 
-/// Of a ping that hears nothing.
 PingLabels no_labels(const PingRequest& request, const Scene& scene) {
   const PingSettings& s = request.settings;
   const auto size = static_cast<std::size_t>(s.range_bin_count) * static_cast<std::size_t>(s.beam_count);
@@ -30,8 +28,6 @@ PingLabels no_labels(const PingRequest& request, const Scene& scene) {
   labels.visible.resize(scene.objects.size() + scene.point_targets.size());
   return labels;
 }
-
-}  // namespace
 
 struct LabellingEngine::Impl {
   Impl(std::shared_ptr<const Scene> s, Parallel& p, const EngineOptions& o)

@@ -11,6 +11,11 @@
 
 namespace sonar {
 
+/// Why the samples of such pings have no labels; empty = they have.
+std::string why_unlabelled(const PingRequest& request, const Scene& scene);
+/// Those of a ping that hears nothing.
+PingLabels no_labels(const PingRequest& request, const Scene& scene);
+
 class LabellingEngine final : public PingEngine {
  public:
   /// The pool must outlive it.

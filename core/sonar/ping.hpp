@@ -36,6 +36,7 @@ struct Switches {
   bool keep_pressure = false;   // fill Ping::pressure_upa
   bool keep_beams = false;      // fill Ping::beam_signal_upa
   bool keep_truth = false;      // fill Ping::truth
+  bool keep_labels = false;     // fill Ping::labels, where samples can have them; such pings are the CPU's
 
   // Switched by name, see named_switches. A part that needs something of the scene or the model (volume, interference, leak, ...)
   // is silent where that is not given, even when it is on.
@@ -123,6 +124,8 @@ struct BeamTruth {
   std::uint32_t object = nothing;  // index into Scene::objects
 };
 
+struct PingLabels;  // core/sonar/ping_labels.hpp
+
 /// Vendor-neutral result. Rows by range, row 0 nearest; beam 0 = most to port (azimuth falls from + to -).
 struct Ping {
   PingRequest request;
@@ -131,8 +134,9 @@ struct Ping {
   std::vector<std::uint32_t> row_gain;  // [rows] when format.row_gains: power gain applied to the row, at least 1
   std::vector<float> pressure_upa;      // [rows][beams] before TVG, when switches.keep_pressure
   std::vector<std::complex<float>>
-      beam_signal_upa;           // [samples][beams] before TVG, when switches.keep_beams; not in expected power
-  std::vector<BeamTruth> truth;  // [beams], when switches.keep_truth
+      beam_signal_upa;                       // [samples][beams] before TVG, when switches.keep_beams; not in expected power
+  std::vector<BeamTruth> truth;              // [beams], when switches.keep_truth
+  std::shared_ptr<const PingLabels> labels;  // when switches.keep_labels
 
   const FrequencyMode& mode() const { return request.model->modes[static_cast<std::size_t>(request.settings.mode)]; }
 };

@@ -58,6 +58,7 @@ struct Step {
 struct StartRecording {
   std::string file;
   std::string sonar = {};  // empty = the only one there is
+  bool labels = false;
 };
 struct StopRecording {
   std::string file;  // empty = all

@@ -124,7 +124,7 @@ Result<StartRecording> from(const v1::StartRecording& m) {
   if (!file) return tl::make_unexpected(file.error());
   const auto sonar = checked_text(m.sonar(), "sonar", false);
   if (!sonar) return tl::make_unexpected(sonar.error());
-  return StartRecording{*file, *sonar};
+  return StartRecording{*file, *sonar, m.labels()};
 }
 
 Result<StopRecording> from(const v1::StopRecording& m) {
@@ -293,6 +293,7 @@ struct FillRequest {
   void operator()(const StartRecording& op) const {
     out.mutable_start_recording()->set_file(op.file);
     out.mutable_start_recording()->set_sonar(op.sonar);
+    out.mutable_start_recording()->set_labels(op.labels);
   }
   void operator()(const StopRecording& op) const { out.mutable_stop_recording()->set_file(op.file); }
   void operator()(const AddFault& op) const {

@@ -224,6 +224,37 @@ class Inside(Files):
             self.assertIn(done.returncode, (0, 65), done.stderr)
             self.assertGreater(len(split(self.read("raw"))), 3)
 
+    def test_labels_of_the_samples_on_request(self):
+        with Sonard(more="recording: {folder: .}\n") as self.daemon:
+            self.assertEqual(self.steer("recording", "start", "run.raw", "--labels").returncode, 65)
+            self.assertEqual(self.steer("recording", "start", "run.mcap", "--labels").returncode, 0)
+            with Client(self.daemon.address) as client:
+                client.send(fire_message(range_=8, flags=0x09))
+                for _ in range(3):
+                    client.ping()
+            self.assertEqual(self.steer("recording", "stop").returncode, 0)
+            checked = mcap_checker.check((pathlib.Path(self.daemon.folder.name) / "run.mcap").read_bytes())
+        truths = checked.read("/front/truth")
+        images, labels, shares, casters, instances = (
+            checked.read(f"/front/{topic}") for topic in ("image", "labels", "share", "caster", "instances"))
+        self.assertGreaterEqual(len(labels), 3)
+        for image, label, share, caster, named, truth in zip(images, labels, shares, casters, instances, truths, strict=True):
+            shape = [image[key] for key in ("width", "height", "timestamp")]
+            for picture, encoding in ((label, "mono16"), (share, "mono8"), (caster, "mono16")):
+                self.assertEqual([picture[key] for key in ("width", "height", "timestamp")], shape)
+                self.assertEqual(picture["encoding"], encoding)
+            samples = shape[0] * shape[1]
+            label, caster = (struct.unpack(f"<{samples}H", picture["data"]) for picture in (label, caster))
+            self.assertFalse(any(a and b for a, b in zip(label, caster, strict=True)))
+            self.assertTrue(all(a or not b for a, b in zip(label, share["data"], strict=True)))
+            self.assertEqual({one["instance"] for one in named["instances"]}, (set(label) | set(caster)) - {0})
+            self.assertEqual(named["ping"], truth["ping"])
+            names = {one["index"] + 1: one["name"] for one in truth["objects"]}
+            for one in named["instances"]:
+                self.assertEqual(one["name"], names.get(one["instance"], one["name"]))
+            met = {index + 1 for index in truth["object"] if index >= 0}
+            self.assertTrue(met & set(label), "what beams meet first is heard")
+
     def test_only_where_the_configuration_says(self):
         with Sonard(scene="tank-rod.yaml") as self.daemon:
             done = self.steer("recording", "start", "run.mcap")

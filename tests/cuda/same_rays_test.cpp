@@ -167,6 +167,9 @@ TEST(DeviceEngine, LeavesToTheCpuWhatItCannotDoAndSaysSoOnce) {
   const bool transforms = test_machine().value()->why_no_transforms().empty();
   EXPECT_EQ(cuda::why_not_on_device(low()), "");
   EXPECT_EQ(cuda::why_not_on_device(low(), false), spectral::have_transform ? "pings with an exact pulse" : "");
+  PingRequest labelled = high();
+  labelled.switches.keep_labels = true;
+  EXPECT_EQ(cuda::why_not_on_device(labelled), "pings with labels");
   const std::vector<Ping> pings = both.by_device(requests);
   for (std::size_t i = 0; i < requests.size(); ++i) expect_same(both.by_cpu(requests[i]), pings[i], std::to_string(i));
   ASSERT_EQ(both.said.size(), spectral::have_transform && !transforms ? 2u : 1u);

@@ -188,10 +188,10 @@ class Control:
         self._post("set_trajectory", _given(vehicle=vehicle or None, object=object_name or None, paused=paused,
                                             position_s=position_s, speed=speed))
 
-    def start_recording(self, file: str, sonar: str = "") -> None:
+    def start_recording(self, file: str, sonar: str = "", labels: bool = False) -> None:
         """Starts a recording inside sonard, in its folder. The extension selects the kind: .mcap, .pcap, .oculus, .raw.
-        Returns when the file is open."""
-        self._post("start_recording", _given(file=file, sonar=sonar or None))
+        labels: in .mcap, of every sample. Returns when the file is open."""
+        self._post("start_recording", _given(file=file, sonar=sonar or None, labels=labels or None))
 
     def stop_recording(self, file: str = "") -> None:
         """Stops one recording, or all. Returns when the files are complete."""

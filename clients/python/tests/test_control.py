@@ -128,6 +128,8 @@ class Requests(unittest.TestCase):
         self.assertEqual(self.last(), ("POST", "/api/v1/set_trajectory", {"object": "boat", "speed": 2}))
         self.control.start_recording("run.mcap", "front")
         self.assertEqual(self.last(), ("POST", "/api/v1/start_recording", {"file": "run.mcap", "sonar": "front"}))
+        self.control.start_recording("run.mcap", labels=True)
+        self.assertEqual(self.last(), ("POST", "/api/v1/start_recording", {"file": "run.mcap", "labels": True}))
         self.control.stop_recording()
         self.assertEqual(self.last(), ("POST", "/api/v1/stop_recording", {}))
 

@@ -5,6 +5,7 @@
 
 #include "core/image/draw_fan.hpp"
 #include "core/image/gray_png.hpp"
+#include "core/scene/instances.hpp"
 #include "daemon/commands/render/label_json.hpp"
 #include "daemon/commands/render/sidecar.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
@@ -33,7 +34,7 @@ json pixels_of(const PingLabels& labels, const Scene& scene) {
     ++by_instance[labels.instance[i]], shadow += labels.caster[i] != 0 ? 1 : 0;
   std::map<std::string, std::uint64_t> by_class{{"none", by_instance[0] - shadow}, {"shadow", shadow}};
   for (std::size_t i = 1; i < by_instance.size(); ++i)
-    if (by_instance[i] > 0) by_class[render::class_of(scene, i - 1)] += by_instance[i];
+    if (by_instance[i] > 0) by_class[instance_class(scene, i - 1)] += by_instance[i];
   return by_class;
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/image/draw_fan.hpp"
 #include "core/image/outline.hpp"
+#include "core/scene/instances.hpp"
 
 namespace sonar::render {
 namespace {
@@ -89,25 +90,13 @@ struct Box {
 
 }  // namespace
 
-std::string class_of(const Scene& scene, std::size_t index) {
-  if (index >= scene.objects.size()) {
-    const std::string& label = scene.point_targets.at(index - scene.objects.size()).label;
-    return label.empty() ? "point" : label;
-  }
-  const Object& object = scene.objects[index];
-  if (!object.label.empty()) return object.label;
-  const Material& material = scene.materials.at(object.mesh->material.empty() ? 0 : object.mesh->material.front());
-  return material.label.empty() ? material.name : material.label;
-}
-
 json instances_of(const Scene& scene) {
   json all = json::array();
-  for (std::size_t i = 0; i < scene.objects.size() + scene.point_targets.size(); ++i) {
-    const bool is_object = i < scene.objects.size();
-    if (is_object && !scene.objects[i].visible) continue;
+  for (std::size_t i = 0; i < instance_count(scene); ++i) {
+    if (i < scene.objects.size() && !scene.objects[i].visible) continue;
     all.push_back({{"instance", i + 1},
-                   {"name", is_object ? scene.objects[i].name : scene.point_targets[i - scene.objects.size()].name},
-                   {"class", class_of(scene, i)},
+                   {"name", instance_name(scene, i)},
+                   {"class", instance_class(scene, i)},
                    {"thing", is_thing(scene, i)}});
   }
   return all;
@@ -149,8 +138,8 @@ json annotations_of(const PingLabels& labels, const Ping& ping, const Scene& sce
       if (labels.beams > 1) cartesian.push_back(cartesian_polygon(outline, Cartesian(shape)));
     }
     json one{{"instance", i + 1},
-             {"name", i < scene.objects.size() ? scene.objects[i].name : scene.point_targets[i - scene.objects.size()].name},
-             {"class", class_of(scene, i)},
+             {"name", instance_name(scene, i)},
+             {"class", instance_class(scene, i)},
              {"bbox", {box.x0, box.y0, box.x1 - box.x0, box.y1 - box.y0}},
              {"area", box.pixels},
              {"visible", std::round(1e3 * static_cast<double>(labels.visible[i])) / 1e3},

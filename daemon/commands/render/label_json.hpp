@@ -9,10 +9,6 @@
 
 namespace sonar::render {
 
-/// Class of an instance: its label, else that of its first material, else that material's name; of a point target without a
-/// label "point".
-std::string class_of(const Scene& scene, std::size_t index);
-
 /// By instance from 1: name, class, and whether it is a thing, which has boxes and polygons: an object with a label of its own.
 nlohmann::json instances_of(const Scene& scene);
 

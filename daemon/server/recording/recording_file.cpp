@@ -54,7 +54,8 @@ std::size_t RecordedPing::size() const {
   std::size_t sent = bytes ? bytes->size() : 0;
   for (const auto& stream : datagrams)
     for (const protocol::Bytes& datagram : *stream) sent += datagram.size();
-  return sent + status.size() + ping->samples.size() + ping->truth.size() * sizeof(BeamTruth) +
+  const std::size_t of_labels = ping->labels ? 5 * ping->labels->share.size() : 0;
+  return sent + status.size() + ping->samples.size() + of_labels + ping->truth.size() * sizeof(BeamTruth) +
          ping->request.bodies_in_world.size() * sizeof(Pose);
 }
 
@@ -88,14 +89,14 @@ Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vend
 }
 
 Result<std::unique_ptr<RecordingFile>> RecordingFile::create(const std::filesystem::path& file, Kind kind,
-                                                             const RecordedSonar& sonar) {
+                                                             const RecordedSonar& sonar, bool labels) {
   auto sink = recording::create_new_sink(file);
   if (!sink) return tl::unexpected(sink.error());
-  return std::make_unique<RecordingFile>(std::move(*sink), kind, sonar);
+  return std::make_unique<RecordingFile>(std::move(*sink), kind, sonar, labels);
 }
 
-RecordingFile::RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, const RecordedSonar& sonar)
-    : kind_(kind), vendor_(sonar.vendor) {
+RecordingFile::RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, const RecordedSonar& sonar, bool labels)
+    : kind_(kind), vendor_(sonar.vendor), labels_(labels) {
   auto counted = std::make_unique<CountedSink>(std::move(sink), bytes_);
   if (kind == Kind::pcap) {
     writer_ = recording::write_pcap(std::move(counted), sonar.ends);
@@ -149,6 +150,8 @@ Result<void> RecordingFile::put_truth(const RecordedPing& ping) {
   truth.beams = ping.ping->truth;
   truth.bodies_in_world = request.bodies_in_world;
   truth.names = ping.names.get();
+  if (labels_ && ping.ping->labels)
+    if (Result<void> written = mcap_->write_labels(ping.at, truth, *ping.ping->labels); !written) return written;
   return mcap_->write_truth(ping.at, truth);
 }
 

@@ -46,10 +46,11 @@ class RecordingFile {
   /// .raw, .aris, .sonar or .svlog. A sentence where it is none; .aris is of the ARIS family only, .sonar of Water Linked, .svlog
   /// of a Surveyor, the others but .mcap of the Oculus family.
   static Result<Kind> kind_of(std::string_view name, std::string_view vendor);
-  /// io; a file that is there already is not touched.
-  static Result<std::unique_ptr<RecordingFile>> create(const std::filesystem::path& file, Kind kind, const RecordedSonar& sonar);
+  /// `labels`: in MCAP, of pings that have them. io; a file that is there already is not touched.
+  static Result<std::unique_ptr<RecordingFile>> create(const std::filesystem::path& file, Kind kind, const RecordedSonar& sonar,
+                                                       bool labels = false);
 
-  RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, const RecordedSonar& sonar);
+  RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, const RecordedSonar& sonar, bool labels = false);
 
   /// A status message goes before it when the last one is a second old. After an error (io) only close() makes sense.
   Result<void> write(const RecordedPing& ping);
@@ -71,6 +72,7 @@ class RecordingFile {
 
   Kind kind_;
   std::string vendor_;
+  bool labels_;
   std::shared_ptr<std::uint64_t> bytes_ = std::make_shared<std::uint64_t>(0);
   std::unique_ptr<recording::RecordingWriter> writer_;
   recording::McapSession* mcap_ = nullptr;  // the writer, when it is one

@@ -7,6 +7,7 @@
 #include <new>
 #include <utility>
 
+#include "core/scene/instances.hpp"
 #include "protocol/control/answers.hpp"
 
 namespace sonar {
@@ -16,12 +17,21 @@ std::vector<LogField> fields_of(const v1::RecordingStatus& status) {
   return {{"sonar", status.sonar()}, {"file", status.file()}, {"pings", status.pings()}, {"bytes", status.bytes()}};
 }
 
+std::string why_without_labels(RecordingFile::Kind kind, const RecordedSonar& sonar, const Switches& switches) {
+  if (kind != RecordingFile::Kind::mcap) return "labels are recorded in MCAP only: end the name in .mcap";
+  if (sonar.vendor == "waterlinked") return "range images have no labels; the file's truth is what each column sees";
+  if (switches.mode != Mode::canonical || switches.fixed_fan > 0)
+    return "labels need the canonical model: sonard was started with another mode or a fixed fan";
+  return {};
+}
+
 }  // namespace
 
 struct Recordings::Recording {
   enum class State { opening, running, ending, ended } state = State::opening;
   std::string name;  // in the folder
   RecordingFile::Kind kind{};
+  bool labels = false;
   v1::RecordingStatus status;
   std::size_t waiting_bytes = 0;
   bool failed = false;    // and the log says so
@@ -76,9 +86,9 @@ void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar
   const Pointer recording = *begun;
   on_thread(
       recording->work,
-      [file = std::filesystem::path(recording->status.file()), kind = recording->kind,
+      [file = std::filesystem::path(recording->status.file()), kind = recording->kind, labels = recording->labels,
        sonar = std::move(sonar)](Work& work) -> Result<void> {
-        auto made = RecordingFile::create(file, kind, sonar);
+        auto made = RecordingFile::create(file, kind, sonar, labels);
         if (!made) return tl::make_unexpected(made.error());
         work.file = std::move(*made);
         return {};
@@ -104,12 +114,15 @@ Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& ask
                    "sonard may not write recordings: the configuration says where, recording: {folder: DIR} (docs/recording.md)");
   const auto kind = RecordingFile::kind_of(asked.file, sonar.vendor);
   if (!kind) return tl::make_unexpected(kind.error());
+  if (const std::string why = asked.labels ? why_without_labels(*kind, sonar, config_.engine.switches) : ""; !why.empty())
+    return failure(ErrorKind::usage, why);
   if (running() >= most_at_once)
     return failure(ErrorKind::unavailable, std::to_string(most_at_once) + " recordings are under way already: stop one");
   remove_oldest();
   auto recording = std::make_shared<Recording>();
   recording->name = asked.file;
   recording->kind = *kind;
+  recording->labels = asked.labels;
   recording->status.set_sonar(sonar.name);
   recording->status.set_file((config_.recording.folder / asked.file).string());
   recording->status.set_running(true);
@@ -177,10 +190,18 @@ bool Recordings::wants_truth(const std::string& sonar) const {
   });
 }
 
+bool Recordings::wants_labels(const std::string& sonar) const {
+  return std::any_of(recordings_.begin(), recordings_.end(), [&](const Pointer& r) {
+    return r->state == Recording::State::running && r->status.sonar() == sonar && r->labels;
+  });
+}
+
 void Recordings::use_scene(const Scene& scene) {
   auto names = std::make_shared<SceneNames>();
   for (const Object& object : scene.objects) names->objects.push_back(object.name);
   names->bodies = scene.body_names;
+  for (std::size_t i = 0; i < instance_count(scene); ++i)
+    names->instances.push_back({instance_name(scene, i), instance_class(scene, i)});
   names_ = std::move(names);
 }
 

@@ -52,6 +52,7 @@ class Recordings {
   bool takes(const std::string& sonar) const;
   /// What beams meet is kept in MCAP only.
   bool wants_truth(const std::string& sonar) const;
+  bool wants_labels(const std::string& sonar) const;
   void take(const std::string& sonar, RecordedPing ping);
 
   /// An entry of the journal of faults, in JSON; kept in MCAP only.

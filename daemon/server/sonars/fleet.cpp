@@ -175,6 +175,7 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
 
 void Fleet::compute(const Device& of, PingRequest request, Simulator::Done done) {
   request.switches.keep_truth = recordings_.wants_truth(of.config().name);
+  request.switches.keep_labels = recordings_.wants_labels(of.config().name);
   computed_names_[of.sonar().index()] = recordings_.names();
   simulator_.submit(std::move(request), std::move(done));
 }

@@ -1,5 +1,6 @@
 #include "protocol/recording/mcap/mcap_json.hpp"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -58,6 +59,22 @@ std::string truth_json(const PingTruth& truth) {
                   {"bodies", moving_bodies(truth)}});
 }
 
+std::string instances_json(const PingTruth& truth, const PingLabels& labels) {
+  std::set<std::size_t> named(labels.instance.begin(), labels.instance.end());
+  named.insert(labels.caster.begin(), labels.caster.end());
+  named.erase(0);
+  Json instances = Json::array();
+  for (const std::size_t i : named) {
+    if (truth.names == nullptr || i > truth.names->instances.size()) continue;
+    const SceneNames::Instance& of = truth.names->instances[i - 1];
+    Json one{{"instance", i}, {"name", of.name}, {"class", of.of_class}};
+    const float visible = i <= labels.visible.size() ? labels.visible[i - 1] : -1;
+    if (visible >= 0) one["visible"] = std::round(1e3 * static_cast<double>(visible)) / 1e3;
+    instances.push_back(std::move(one));
+  }
+  return text_of({{"timestamp", json_of(truth.fired_at)}, {"ping", truth.ping}, {"instances", std::move(instances)}});
+}
+
 // ---- the schemas
 
 namespace {
@@ -91,6 +108,19 @@ JsonSchema truth_schema() {
        {"object", array(type("integer"))},
        {"objects", array(object({{"index", type("integer")}, {"name", type("string")}}))},
        {"bodies", array(object({{"name", type("string")}, {"pose", pose()}}))}});
+}
+
+JsonSchema label_schema() {
+  return schema(
+      "sonard.PingInstances",
+      "What the numbers in labels and casters of a ping are; visible: of objects with a label, the part of their energy "
+      "that nothing in the way takes",
+      {{"timestamp", timestamp()},
+       {"ping", type("integer")},
+       {"instances", array(object({{"instance", type("integer")},
+                                   {"name", type("string")},
+                                   {"class", type("string")},
+                                   {"visible", type("number")}}))}});
 }
 
 JsonSchema fault_schema() {

@@ -8,6 +8,7 @@
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
 #include "core/sonar/ping.hpp"
+#include "core/sonar/ping_labels.hpp"
 
 namespace sonar::recording::mcap {
 
@@ -16,10 +17,15 @@ struct JsonSchema {
 };
 JsonSchema truth_schema();  // sonard.PingTruth
 JsonSchema fault_schema();  // sonard.FaultEntry
+JsonSchema label_schema();  // sonard.PingInstances
 
 struct SceneNames {
   std::vector<std::string> objects;  // by BeamTruth::object
   std::vector<std::string> bodies;   // moving bodies, by PingRequest::bodies_in_world
+  struct Instance {
+    std::string name, of_class;
+  };
+  std::vector<Instance> instances;  // of labels, less 1
 };
 
 /// Ground truth of a ping: the poses of the sonar and of the moving bodies at transmission, and per beam the first object hit.
@@ -32,5 +38,7 @@ struct PingTruth {
   const SceneNames* names = nullptr;           // null: neither object names nor bodies are written
 };
 std::string truth_json(const PingTruth& truth);
+/// The instances that the labels of a ping name.
+std::string instances_json(const PingTruth& truth, const PingLabels& labels);
 
 }  // namespace sonar::recording::mcap

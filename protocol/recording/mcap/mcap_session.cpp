@@ -81,6 +81,10 @@ McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::str
   pose_ = protobuf_channel("/" + sonar_ + "/pose", "foxglove.PoseInFrame");
   tf_ = protobuf_channel("/tf", "foxglove.FrameTransforms");
   truth_ = json_channel("/" + sonar_ + "/truth", mcap::truth_schema());
+  labels_ = protobuf_channel("/" + sonar_ + "/labels", "foxglove.RawImage");
+  share_ = protobuf_channel("/" + sonar_ + "/share", "foxglove.RawImage");
+  caster_ = protobuf_channel("/" + sonar_ + "/caster", "foxglove.RawImage");
+  instances_ = json_channel("/" + sonar_ + "/instances", mcap::label_schema());
   faults_ = json_channel("/faults", mcap::fault_schema());
 }
 
@@ -135,6 +139,20 @@ Result<void> McapSession::write_truth(Time at, const mcap::PingTruth& truth) {
   if (!bodies.empty())
     if (Result<void> put = writer_.write(tf_, at, foxglove::transforms(bodies)); !put) return put;
   return write_json(truth_, at, mcap::truth_json(truth));
+}
+
+Result<void> McapSession::write_labels(Time at, const mcap::PingTruth& truth, const PingLabels& labels) {
+  const auto put = [&](std::uint16_t channel, const auto& values) {
+    const BytesView bytes = std::as_bytes(std::span(values));
+    const foxglove::Image image =
+        foxglove::image_of(static_cast<std::size_t>(labels.beams), static_cast<std::size_t>(labels.rows),
+                           static_cast<int>(8 * sizeof values[0]), 0, std::make_shared<Bytes>(bytes.begin(), bytes.end()));
+    return writer_.write(channel, at, foxglove::raw_image(at, sonar_, image));
+  };
+  if (Result<void> done = put(labels_, labels.instance); !done) return done;
+  if (Result<void> done = put(share_, labels.share); !done) return done;
+  if (Result<void> done = put(caster_, labels.caster); !done) return done;
+  return write_json(instances_, at, mcap::instances_json(truth, labels));
 }
 
 Result<void> McapSession::write_json(std::uint16_t channel, Time at, const std::string& text) {

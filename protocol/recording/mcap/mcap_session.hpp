@@ -12,7 +12,8 @@
 namespace sonar::recording {
 
 /// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose and /tf in the live view's
-/// protobuf (protocol/foxglove/foxglove_messages.hpp); /NAME/truth and /faults in JSON.
+/// protobuf (protocol/foxglove/foxglove_messages.hpp), as /NAME/labels, share and caster; /NAME/truth, /NAME/instances and
+/// /faults in JSON.
 class McapSession final : public RecordingWriter {
  public:
   /// `vendor`: vendor of the messages; only pings of "oculus" are converted to images automatically.
@@ -25,6 +26,8 @@ class McapSession final : public RecordingWriter {
   Result<void> write_image(Time at, const std::shared_ptr<const Ping>& ping);
   /// Moving bodies also as the frames object/NAME of /tf.
   Result<void> write_truth(Time at, const mcap::PingTruth& truth);
+  /// Labels of the samples as pictures, and the instances that they name.
+  Result<void> write_labels(Time at, const mcap::PingTruth& truth, const PingLabels& labels);
   /// `json`: a FaultEntry of control.proto.
   Result<void> write_fault(Time at, const std::string& json) { return write_json(faults_, at, json); }
   Result<void> close() override { return writer_.close(); }
@@ -37,7 +40,7 @@ class McapSession final : public RecordingWriter {
 
   mcap::Writer writer_;
   std::string sonar_, vendor_;
-  std::uint16_t device_, client_, status_, image_, pose_, tf_, truth_, faults_;
+  std::uint16_t device_, client_, status_, image_, pose_, tf_, truth_, labels_, share_, caster_, instances_, faults_;
 };
 
 /// The vendor's bytes of one sonar: the named one, or the first. bad_data: not an MCAP file.

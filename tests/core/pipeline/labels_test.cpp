@@ -58,6 +58,23 @@ TEST(Labels, ThePingIsTheSameWithThem) {
   EXPECT_EQ(l.pings.front().pressure_upa, plain.pressure_upa);
 }
 
+TEST(Labels, AnyPingOfTheCpuMayCarryThem) {
+  Labelled l(sphere_on_sand(), 2);
+  const PingLabels labels = l.run();
+  PingRequest request = l.s.request;
+  request.switches.keep_labels = true;
+  const auto engine = make_cpu_engine(sphere_on_sand(), l.pool);
+  const Ping ping = engine->run({&request, 1}).front();
+  EXPECT_EQ(ping.samples, l.pings.front().samples);
+  ASSERT_TRUE(ping.labels);
+  EXPECT_EQ(ping.labels->instance, labels.instance);
+  EXPECT_EQ(ping.labels->share, labels.share);
+  EXPECT_EQ(ping.labels->caster, labels.caster);
+  EXPECT_EQ(ping.labels->visible, labels.visible);
+  request.switches.fixed_fan = 100;
+  EXPECT_FALSE(engine->run({&request, 1}).front().labels);
+}
+
 TEST(Labels, ASphereOnSandIsTheArcThatGeometrySays) {
   Labelled l(sphere_on_sand(), 2);
   const PingLabels& labels = l.run();

@@ -43,7 +43,7 @@ inline std::vector<Request> every_request() {
           {12, SetTrajectory{PoseSample::Of::object, "crate", true, 1.5, 2.5}},
           {13, SetTrajectory{PoseSample::Of::vehicle, "rov", {}, 0.25, {}}},
           {14, Step{0.125}},
-          {15, StartRecording{"run-1.mcap", "front"}},
+          {15, StartRecording{"run-1.mcap", "front", true}},
           {16, StopRecording{"run-1.mcap"}}};
 }
 

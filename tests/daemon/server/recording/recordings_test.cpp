@@ -81,7 +81,7 @@ RecordedPing ping_at(double at_s, std::size_t bytes = 64) {
   ping->request.bodies_in_world = {Pose{{1, 2, 3}, {}}};
   ping->truth = {{2.5f, 1}, {}};
   auto names = std::make_shared<SceneNames>();
-  *names = {{"floor", "box"}, {"crate"}};
+  *names = {{"floor", "box"}, {"crate"}, {}};
   return {Time{} + nanoseconds_from(at_s),   ping, std::make_shared<const protocol::Bytes>(bytes, std::byte{1}), {},
           protocol::Bytes(20, std::byte{2}), names};
 }
@@ -109,6 +109,37 @@ TEST(RecordingFile, KeepsAStatusASecondAndTheTruthOfEveryPing) {
                                  std::pair("/front/truth", 5), std::pair("/tf", 10)));
   EXPECT_THAT(truth,
               HasSubstr(R"("range_m":[2.5,0.0],"object":[1,-1],"objects":[{"index":1,"name":"box"}],"bodies":[{"name":"crate")"));
+}
+
+TEST(RecordingFile, KeepsLabelsWhenAsked) {
+  for (const bool asked : {false, true}) {
+    const RecordedPing plain = ping_at(0);
+    auto ping = std::make_shared<Ping>(*plain.ping);
+    ping->labels = std::make_shared<PingLabels>(PingLabels{1, 3, {2, 0, 0}, {200, 0, 0}, {0, 0, 3}, {-1, 0.25f, 0}});
+    auto names = std::make_shared<SceneNames>(*plain.names);
+    names->instances = {{"floor", "mud"}, {"box", "mine"}, {"crate", "stone"}};
+    RecordedPing labelled = plain;
+    labelled.ping = ping, labelled.names = names;
+    EXPECT_EQ(labelled.size(), plain.size() + 15);
+    recording::Bytes bytes;
+    RecordingFile file(recording::sink_into(bytes), Kind::mcap, {"front", "oculus", {}}, asked);
+    EXPECT_TRUE(file.write(labelled));
+    EXPECT_TRUE(file.close());
+    auto reader = recording::mcap::Reader::open(recording::source_from("it", bytes));
+    ASSERT_TRUE(reader);
+    std::map<std::string, std::string> found;
+    while (const auto message = reader->next()) {
+      std::string& text = found[reader->channels().at(message->channel).topic];
+      for (const std::byte b : message->data) text += static_cast<char>(b);
+    }
+    EXPECT_EQ(found.count("/front/labels") + found.count("/front/instances"), asked ? 2u : 0u);
+    if (!asked) continue;
+    EXPECT_TRUE(found["/front/labels"].ends_with(std::string("\2\0\0\0\0\0", 6)));
+    EXPECT_TRUE(found["/front/share"].ends_with(std::string("\xc8\0\0", 3)));
+    EXPECT_TRUE(found["/front/caster"].ends_with(std::string("\0\0\0\0\3\0", 6)));
+    EXPECT_THAT(found["/front/instances"], HasSubstr(R"("instances":[{"instance":2,"name":"box","class":"mine","visible":0.25},)"
+                                                     R"({"instance":3,"name":"crate","class":"stone","visible":0.0}])"));
+  }
 }
 
 TEST(RecordingFile, AnExistingFileIsNotTouched) {
@@ -248,6 +279,28 @@ TEST(Recordings, FewAtATimeAndOnlyWhereTheConfigurationSays) {
   EXPECT_THAT(answers[0], HasSubstr("recording: {folder: DIR}"));
   EXPECT_THAT(answers[1], HasSubstr("No such file or directory"));
   EXPECT_TRUE(q.recordings->idle());
+}
+
+TEST(Recordings, LabelsOnlyWhereSamplesHaveThem) {
+  Queue q(1 << 20);
+  const auto answer = [&](const std::string& name, const char* vendor) {
+    std::string text = "not answered";
+    q.recordings->start({name, "front", true}, {"front", vendor, {}}, "test",
+                        [&](const Result<void>& r) { text = r ? "ok" : r.error().text; });
+    q.run();
+    return text;
+  };
+  EXPECT_THAT(answer("run.oculus", "oculus"), HasSubstr("labels are recorded in MCAP only"));
+  EXPECT_THAT(answer("run.mcap", "waterlinked"), HasSubstr("range images have no labels"));
+  q.config.engine.switches.fixed_fan = 40;
+  EXPECT_THAT(answer("run.mcap", "oculus"), HasSubstr("labels need the canonical model"));
+  q.config.engine.switches = {};
+  EXPECT_FALSE(q.recordings->wants_labels("front"));
+  EXPECT_EQ(answer("run.mcap", "oculus"), "ok");
+  EXPECT_TRUE(q.recordings->wants_labels("front"));
+  q.recordings->stop({}, [](const Result<void>& r) { EXPECT_TRUE(r); });
+  q.run();
+  EXPECT_FALSE(q.recordings->wants_labels("front"));
 }
 
 // ---- with clients

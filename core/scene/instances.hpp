@@ -1,0 +1,33 @@
+// Instances of labels (core/sonar/ping_labels.hpp) by what the scene calls them.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "core/scene/scene.hpp"
+
+namespace sonar {
+
+/// Objects, then point targets; `index` is the instance less 1.
+inline std::size_t instance_count(const Scene& scene) { return scene.objects.size() + scene.point_targets.size(); }
+
+inline const std::string& instance_name(const Scene& scene, std::size_t index) {
+  const std::size_t objects = scene.objects.size();
+  return index < objects ? scene.objects[index].name : scene.point_targets.at(index - objects).name;
+}
+
+/// Its label, else that of its first material, else that material's name; of a point target without a label "point".
+inline std::string instance_class(const Scene& scene, std::size_t index) {
+  if (index >= scene.objects.size()) {
+    const std::string& label = scene.point_targets.at(index - scene.objects.size()).label;
+    return label.empty() ? "point" : label;
+  }
+  const Object& object = scene.objects[index];
+  if (!object.label.empty()) return object.label;
+  const std::size_t first = object.mesh && !object.mesh->material.empty() ? object.mesh->material.front() : 0;
+  if (first >= scene.materials.size()) return {};
+  const Material& material = scene.materials[first];
+  return material.label.empty() ? material.name : material.label;
+}
+
+}  // namespace sonar
