@@ -164,8 +164,10 @@ struct Port {
   std::uint16_t number = 0;
   std::chrono::milliseconds period{0};  // of a beacon
   bool on_change = false;               // of a beacon: also sent at once when a client comes or goes
-  Endpoint group{};                 // of a udp_stream: its receiver until SetReceivers, often a multicast group; port 0 = none
-  std::chrono::nanoseconds gap{0};  // of a udp_stream: least time between two datagrams of a ping
+  Endpoint group{};  // of a udp_stream: its receiver until SetReceivers, often a multicast group; port 0 = none
+  /// Of a udp_stream: least time between two datagrams of a ping. Of a tcp_stream: pause between the parts of a ping that
+  /// Vendor::datagrams gives and Vendor::frame holds one behind the other.
+  std::chrono::nanoseconds gap{0};
 };
 
 /// One request for a resource of the device, its sizes already limited by the server.

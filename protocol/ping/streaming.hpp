@@ -9,7 +9,9 @@
 namespace sonar::ping {
 
 constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number) {
-  return {{{.kind = protocol::Port::Kind::tcp_stream, .number = number},
+  // Hosts of ping-python read one message of each packet they receive: messages written together fill their queue. Chosen.
+  constexpr std::chrono::milliseconds between_messages{3};
+  return {{{.kind = protocol::Port::Kind::tcp_stream, .number = number, .gap = between_messages},
            {.kind = protocol::Port::Kind::udp_dialogue, .number = number}}};
 }
 

@@ -28,7 +28,7 @@ inline constexpr std::size_t drop_reasons = 4;
 class Outbox {
  public:
   using Bytes = std::vector<std::byte>;
-  /// How a message is written when a fault shapes it. Its bytes stay as they are.
+  /// How a message is written when a fault or the port's gap shapes it. Its bytes stay as they are.
   struct Shape {
     struct Pause {
       std::size_t before = 0;             // the byte of that index

@@ -287,7 +287,7 @@ void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
       });
     else if (bytes != nullptr)
       guarded(c, actions, [&] {
-        for (protocol::Event& event : offer(c, bytes, outcome.ping->request, now, actions))
+        for (protocol::Event& event : offer(c, bytes, *reported, outcome.ping->request, now, actions))
           events.emplace_back(&c, std::move(event));
       });
   }
@@ -335,7 +335,7 @@ void Sonar::push_datagrams(Connection& to, const Ping& ping, Time now, PingQueue
 
 /// Returns what the client requests next.
 std::vector<protocol::Event> Sonar::offer(Connection& to, const std::shared_ptr<const protocol::Bytes>& bytes,
-                                          const PingRequest& ping, Time now, Actions& actions) {
+                                          const Ping& reported, const PingRequest& ping, Time now, Actions& actions) {
   if (to.finishing || to.state != Connection::State::served) return {};
   protocol::Delivery delivery = to.dialogue->on_ping(ping.vendor_settings.get(), bytes->size(), unskipped(now));
   if (!delivery.prefixes.empty()) {
@@ -344,11 +344,24 @@ std::vector<protocol::Event> Sonar::offer(Connection& to, const std::shared_ptr<
             {.bytes = bytes,
              .ping = static_cast<std::uint32_t>(ping.number),
              .prefixes = as_it_is ? std::vector<protocol::Bytes>{} : std::move(delivery.prefixes),
-             .fired_at = ping.fired_at},
+             .fired_at = ping.fired_at,
+             .shape = as_it_is ? parted(to, reported) : nullptr},
             now, actions);
   }
   if (to.role == Role::observer) return {};
   return std::move(delivery.events);
+}
+
+/// The pauses between the parts of a ping at a port with a gap.
+std::shared_ptr<const Outbox::Shape> Sonar::parted(const Connection& to, const Ping& ping) const {
+  if (to.port == nullptr || to.port->gap.count() == 0) return nullptr;
+  Outbox::Shape shape;
+  std::size_t end = 0;
+  for (const protocol::Bytes& part : vendor_.datagrams(*to.port, ping, state_)) {
+    if (end > 0) shape.pauses.push_back({end, to.port->gap});
+    end += part.size();
+  }
+  return std::make_shared<const Outbox::Shape>(std::move(shape));
 }
 
 /// The engine computed noise only of a ping that was requested as any other: it compares the depth with the sea surface.

@@ -189,8 +189,9 @@ class Sonar {
   void request_ping(Time at, Actions& actions);
   PingNumber next_number();
   void queue_ping(const PingOutcome& outcome, Time now, Actions& actions);
-  std::vector<protocol::Event> offer(Connection& to, const std::shared_ptr<const protocol::Bytes>& bytes, const PingRequest& ping,
-                                     Time now, Actions& actions);
+  std::vector<protocol::Event> offer(Connection& to, const std::shared_ptr<const protocol::Bytes>& bytes, const Ping& reported,
+                                     const PingRequest& ping, Time now, Actions& actions);
+  std::shared_ptr<const Outbox::Shape> parted(const Connection& to, const Ping& ping) const;
   void offer_datagrams(Connection& stream, const Ping& ping, Time now, PingQueued& queued, Actions& actions);
   std::vector<protocol::Event> offer_to_host(Connection& host, const Ping& ping, Time now, PingQueued& queued, Actions& actions);
   void push_datagrams(Connection& to, const Ping& ping, Time now, PingQueued& queued, Actions& actions);

@@ -116,10 +116,10 @@ TEST(Sonar3d15InVirtualTime, TheSpeedOfSoundFollowsItsDepth) {
 // ---- Surveyor
 
 struct Sounder : Talk {
-  Sounder() : Talk("surveyor-240") {
+  explicit Sounder(protocol::Port::Kind kind = protocol::Port::Kind::udp_dialogue) : Talk("surveyor-240") {
     time.clients[stream].sonar = &sonar();
     time.clients[stream].reads = false;  // pings() does
-    const protocol::Port& port = *sonar().vendor().port(protocol::Port::Kind::udp_dialogue);
+    const protocol::Port& port = *sonar().vendor().port(kind);
     sonar().on_connect(stream, Role::client, {"host", {10, 0, 0, 5}, 5000}, time.now, &port);
     ping::PingParameters parameters;
     parameters.end_mm = 10000;
@@ -160,6 +160,37 @@ TEST(SurveyorInVirtualTime, FieldsOfItsDatagramsFailWithTheRightSum) {
   sounder.time.end_faults("front");
   sounder.add_fault("D09", {{"by", "1000"}});
   EXPECT_GT(sounder.atof().ping, 1000u);
+}
+
+/// ping-python reads one message of each packet: several in one would pile up in the host.
+TEST(SurveyorInVirtualTime, ItsMessagesAreWrittenOneByOneByTcp) {
+  Sounder sounder(protocol::Port::Kind::tcp_stream);
+  Outbox::Message message;
+  for (const Time end = sounder.time.now + seconds(2); !message || message.ping == 0;) {
+    sounder.time.run(milliseconds(10));
+    ASSERT_LT(sounder.time.now, end);
+    if (const Outbox::Message next = sounder.sonar().next_message(stream, sounder.time.now)) {
+      message = next;
+      sounder.sonar().on_written(stream, message, sounder.time.now);
+    }
+  }
+  ASSERT_TRUE(message.shape);
+  std::size_t begin = 0;
+  std::vector<std::size_t> ends;
+  for (const Outbox::Shape::Pause& pause : message.shape->pauses) {
+    EXPECT_GE(pause.length, milliseconds(1));
+    ends.push_back(pause.before);
+  }
+  ends.push_back(message.bytes->size());
+  EXPECT_GE(ends.size(), 3u) << "attitude, points, point data; a request for the time while it does not know it";
+  for (const std::size_t end : ends) {
+    ping::Framer framer(65535, true);
+    framer.append(protocol::BytesView(*message.bytes).subspan(begin, end - begin));
+    const auto frame = framer.next();
+    EXPECT_TRUE(frame && frame->sum_is_right) << begin;
+    EXPECT_FALSE(framer.next()) << "one frame a part";
+    begin = end;
+  }
 }
 
 TEST(SurveyorInVirtualTime, TellsTheTimeThatItWasToldWhateverItSkipped) {
