@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "cuda/device_types.hpp"
+#include "cuda/column_steps.hpp"
 
 namespace sonar::cuda {
 
@@ -66,6 +66,21 @@ SONAR_HD inline void add_pulses(const PingView& p, std::uint32_t j, std::int32_t
   }
 }
 
+/// Noise that all channels share, at sample `n` of beam `j`.
+SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
+  if (p.shared_noise == nullptr || p.has_noise == 0 || n >= p.shared_samples) return;
+  const float* r = p.shared_noise + 2 * (static_cast<std::int64_t>(j) * p.shared_samples + n);
+  if (p.sea.expected_power != 0) {
+    re += r[0] * r[0] + r[1] * r[1];
+    return;
+  }
+  Complex c;
+  const NoiseKey& key = p.noise_key;
+  add_noise(p.noise_table, place_of(key, key.sonar, key.ping, shared_noise_column), static_cast<std::uint32_t>(n), 1, c);
+  re += c.re * r[0] - c.im * r[1];
+  im += c.re * r[1] + c.im * r[0];
+}
+
 /// Sums of one sample over columns, for the beams of `panels` panels that hear the same columns. `weight`: of each panel.
 template <std::uint32_t panels>
 SONAR_HD inline void sum_over_columns(const float* const* weight, const float* column, std::int64_t stride, std::int32_t count,
@@ -110,7 +125,10 @@ SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
     const std::uint32_t j = first * beams_a_panel + beam;
     if (j >= beams) break;
     add_points(p, j, n, re[beam], im[beam]);
-    if (p.mixed == nullptr) add_pulses(p, j, n, re[beam], im[beam]);  // else behind the blur, in refocus()
+    if (p.mixed == nullptr) {  // else behind the blur, in refocus(), and behind the blend
+      add_pulses(p, j, n, re[beam], im[beam]);
+      add_shared_noise(p, j, n, re[beam], im[beam]);
+    }
     float* to = p.beam_signals + 2 * (static_cast<std::int64_t>(j) * p.samples + n);
     to[0] = re[beam];
     to[1] = im[beam];
@@ -138,6 +156,7 @@ SONAR_HD inline void blend(const PingView& p, std::uint32_t i) {
   const float* from = p.mixed + 2 * static_cast<std::int64_t>(i);
   MixedSample s{from[0], from[1]};
   if (p.mix.own != nullptr) s = blended(p.mix, p.mixed, 2 * static_cast<std::int64_t>(p.samples), j, n);
+  add_shared_noise(p, static_cast<std::uint32_t>(j), n, s.re, s.im);
   float* to = p.beam_signals + 2 * static_cast<std::int64_t>(i);
   to[0] = s.re;
   to[1] = s.im;
@@ -183,7 +202,7 @@ SONAR_HD inline void receive(const PingView& p, std::uint32_t i) {
   const float octaves = log2_of(larger(power * p.row_power_factor[row], 1e-30f));
   const float code = p.logarithmic != 0
                          ? std::floor(smaller(larger(p.per_octave * octaves + (p.at_full_scale + 0.5f), 0.0f), max_code))
-                         : smaller(std::floor(exp2_of(p.half_gamma * octaves) * max_code + 0.5f), max_code);
+                         : smaller(std::floor(exp2_of(p.half_gamma * octaves) * p.code_factor + p.code_rounding), max_code);
   // 2^32 - 1 is no float: compare before the conversion can overflow.
   const std::uint32_t whole = code >= max_code ? p.max_code : static_cast<std::uint32_t>(code);
   std::uint8_t* out = p.codes + static_cast<std::int64_t>(i) * p.bytes_a_sample;

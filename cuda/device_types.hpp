@@ -199,11 +199,14 @@ struct PingView {
   double* point_weights;       // [point_count + pulse_count][beams]
   float* crosstalk;            // complex [samples], null = none
   float* mixed;                // complex [beams][samples], null = beams keep to themselves
+  const float* shared_noise;   // complex [beams][shared_samples], SharedNoiseTable; null = none
+  std::int64_t shared_samples;
   BeamMixView mix;
   std::int32_t point_count, pulse_count;
   // samples
   const float* row_power_factor;                // [rows]
   float half_gamma, per_octave, at_full_scale;  // the latter two of LevelLine
+  float code_factor, code_rounding;             // simd::CodeScale
   std::uint32_t max_code;
   std::int32_t bytes_a_sample, logarithmic;
   std::uint8_t* codes;      // [rows][beams][bytes]

@@ -48,6 +48,8 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.rows = p.settings.range_bin_count;
   view_.beams = p.settings.beam_count;
   view_.max_code = p.settings.format.max_code;
+  view_.code_factor = static_cast<float>(p.settings.format.max_code) + (p.truncates() ? 1.0f : 0.0f);
+  view_.code_rounding = p.truncates() ? 0.0f : 0.5f;
   view_.half_gamma = p.settings.format.gamma / 2;
   // (40) as a straight line in log2 of the power.
   const LevelLine line = level_line(p.settings.format);
@@ -60,6 +62,10 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
     view_.noise_near_less_far = memory_.put(p.noise_profile.near_less_far);
     view_.noise_decay = memory_.put(p.noise_profile.decay);
     view_.noise_decays = static_cast<std::int64_t>(p.noise_profile.decay.size());
+  }
+  if (p.shared_noise.is_audible()) {
+    view_.shared_noise = memory_.put(p.shared_noise.response());
+    view_.shared_samples = p.shared_noise.samples();
   }
   view_.mix = p.beam_mix.view();
   if (p.beam_mix.blurs()) view_.mix.turn_m = memory_.put(p.beam_mix.turn_m());

@@ -171,7 +171,7 @@ void lay_out_noise_profile(PingPlan& p) {
     p.noise_profile.far.push_back(static_cast<float>(far));
     p.noise_profile.near_less_far.push_back(static_cast<float>(near - far));
   }
-  constexpr double least = 1e-4;
+  constexpr double least = 1e-3;
   for (int n = 0; n < p.samples && !profile.near_noise_db.empty(); ++n) {
     const double decay = std::exp(-(n + p.sample_offset) * p.sample_spacing_m / static_cast<double>(profile.near_m));
     if (decay < least) break;
@@ -368,6 +368,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   // sum_k W_jk^2 column powers make a beam's: NL (eq. 30) at its output.
   p.column_noise_upa = noise_rms_upa(mode, bandwidth_hz) / std::sqrt(p.beam_weights.weight_energy);
   lay_out_noise_profile(p);
+  p.shared_noise = SharedNoiseTable(p);
   p.beam_mix = BeamMix(p);
   fill_row_gains(p);
   return p;

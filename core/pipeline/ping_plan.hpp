@@ -14,6 +14,7 @@
 #include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/pulses/pulse.hpp"
 #include "core/pipeline/pulses/spectral_columns.hpp"
+#include "core/pipeline/shared_noise.hpp"
 #include "core/pipeline/signals.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/scene/cells/surface_cells.hpp"
@@ -102,6 +103,7 @@ struct PingPlan {
   std::vector<float> noise_filter;  // the same of the receiver's noise, whose filter may be wider
   double column_noise_upa = 0;      // rms of one column
   NoiseProfile noise_profile;
+  SharedNoiseTable shared_noise;
   BeamMix beam_mix;
   std::vector<float> row_power_factor;  // per row: (gain * TVG / full scale)^2
   std::vector<std::uint32_t> row_gain;  // when settings.format.row_gains
@@ -123,6 +125,7 @@ struct PingPlan {
   static constexpr int side_columns = 4;
   /// What the fan and the levels of cells look at.
   void aim(CellView& view) const;
+  bool truncates() const { return switches.truncation && mode.receiver.truncates; }
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
 };
 

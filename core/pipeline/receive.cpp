@@ -75,6 +75,8 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
   scratch.codes.resize(static_cast<std::size_t>(width));
   scratch.bytes.resize(static_cast<std::size_t>(width));
   const auto max_code = static_cast<float>(s.format.max_code);
+  const simd::CodeScale scale{s.format.gamma / 2, plan.truncates() ? max_code + 1 : max_code, plan.truncates() ? 0.0f : 0.5f,
+                              max_code};
   const bool logarithmic = s.format.scale == SampleFormat::Scale::logarithmic;
   const LevelLine line = level_line(s.format);
   const auto per_octave = static_cast<float>(line.per_octave), at_full_scale = static_cast<float>(line.at_full_scale);
@@ -85,10 +87,10 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
     if (!ping.pressure_upa.empty())
       for (int j = 0; j < s.beam_count; ++j) ping.pressure_upa[at + static_cast<std::size_t>(j)] = std::sqrt(power[j]);
     // Eq. 37: code = max_code (|s| / full scale)^gamma: power times (gain TVG / full scale)^2, to the power gamma / 2.
-    const float gain = plan.row_power_factor[static_cast<std::size_t>(first_row + row)], half_gamma = s.format.gamma / 2;
+    const float gain = plan.row_power_factor[static_cast<std::size_t>(first_row + row)];
     std::byte* out = ping.samples.data() + at * static_cast<std::size_t>(bytes);
     if (bytes == 1 && !logarithmic) {
-      kernels.quantise_bytes(power, gain, half_gamma, max_code, scratch.bytes.data(), width);
+      kernels.quantise_bytes(power, gain, scale, scratch.bytes.data(), width);
       std::memcpy(out, scratch.bytes.data(), static_cast<std::size_t>(s.beam_count));
       continue;
     }
@@ -96,7 +98,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
     if (logarithmic)
       kernels.quantise_levels(power, gain, per_octave, at_full_scale, max_code, scratch.codes.data(), width);
     else
-      kernels.quantise(power, gain, half_gamma, max_code, scratch.codes.data(), width);
+      kernels.quantise(power, gain, scale, scratch.codes.data(), width);
     if (bytes == 2) {  // most sonars' samples, in a loop that becomes vector code
       for (int j = 0; j < s.beam_count; ++j) {
         const auto code = static_cast<std::uint16_t>(static_cast<std::int32_t>(scratch.codes[static_cast<std::size_t>(j)]));

@@ -56,6 +56,8 @@ struct Switches {
   bool bandwidth = true;
   bool uneven = true;
   bool defocus = true;
+  bool shared_noise = true;
+  bool truncation = true;
 
   bool operator==(const Switches&) const = default;
 };
@@ -66,7 +68,7 @@ struct NamedSwitch {
   bool Switches::*is_on;
   const char* meaning;
 };
-inline constexpr std::array<NamedSwitch, 16> named_switches{{
+inline constexpr std::array<NamedSwitch, 18> named_switches{{
     {"noise", &Switches::noise, "receiver noise"},
     {"specular", &Switches::specular, "specular echoes of smooth surfaces"},
     {"texture", &Switches::texture, "patchiness of materials that have a texture"},
@@ -83,6 +85,8 @@ inline constexpr std::array<NamedSwitch, 16> named_switches{{
     {"bandwidth", &Switches::bandwidth, "noise of the receiver's own bandwidth; off: of the pulse's"},
     {"uneven", &Switches::uneven, "noise and width that differ from beam to beam"},
     {"defocus", &Switches::defocus, "blur of near echoes off broadside"},
+    {"shared_noise", &Switches::shared_noise, "noise that all receive channels share, near the sonar"},
+    {"truncation", &Switches::truncation, "samples cut off to whole codes; off: rounded"},
 }};
 
 /// How the sonar moves while a ping is under way.

@@ -10,7 +10,7 @@ namespace sonar {
 /// (docs/acoustics.md, eq. 37, 40).
 struct SampleFormat {
   enum class Scale {
-    linear,       // round(max_code v^gamma)
+    linear,       // round(max_code v^gamma); a receiver may truncate instead, see ReceiverModel
     logarithmic,  // round(max_code (L - floor_db) / (ceiling_db - floor_db)), L = 20 log10 v: 0 dB is the linear full scale
   };
   int bits = 8;                  // 8, 16 or 32

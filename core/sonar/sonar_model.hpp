@@ -36,6 +36,14 @@ struct BeamProfile {
   std::vector<float> blend;          // amplitude that a beam receives of either neighbour half a beam width away, re its own
 };
 
+/// Noise that all receive channels share, with opposite signs in neighbours (docs/acoustics.md, section 5).
+struct SharedNoise {
+  float level_db = -200;  // of a channel, re the channel's own noise; below -150 = none
+  int channels = 128;     // even
+  float sine = 0.56f;     // from where the beams hear it, far away: half a wavelength over the channels' spacing
+  float full_m = 0.25f;   // nearer, its power is proportional to the range
+};
+
 /// How the receiver turns pressure into samples (docs/acoustics.md, section 7); constants of the product.
 struct ReceiverModel {
   float tvg_slope_db = 30;  // X of X log10 r
@@ -51,9 +59,12 @@ struct ReceiverModel {
       leak_ring_db;  // of a ringing leak: re leak_upa at 0, 1, 2 .. leak_ring_step_m, then over; takes the decay's place
   float leak_ring_step_m = 0.003f;
   BeamProfile profile;
+  SharedNoise shared_noise;
   /// 0: receive beams are focused at every range and bearing; 1: with the delays of broadside, which leave near beams off it
   /// blurred (docs/acoustics.md, section 6).
   float defocus = 0;
+  /// Codes of a linear scale are floor((max_code + 1) v^gamma), not rounded (docs/acoustics.md, section 7).
+  bool truncates = false;
 };
 
 struct FrequencyMode {

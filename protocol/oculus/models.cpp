@@ -46,12 +46,18 @@ void fit_to_recording(ReceiverModel& receiver) {
   // The noise of rows 620 to 702, with a stripe in the middle, of rows 20 to 150, and its neighbouring beams.
   receiver.profile.noise_db = {-4.8f, -5.5f, -3.6f, -2.3f, -1.7f, 0.3f,  -0.1f, 0.7f, 2.6f,
                                0.7f,  0.1f,  -0.1f, -1.0f, -2.7f, -2.9f, -4.3f, -4.5f};
-  receiver.profile.near_noise_db = {11, 7.5f, 4, -0.5f, -5, -8.5f, -12, -13, -14, -13.5f, -13, -9.5f, -6, -2, 2, 6, 10};
-  receiver.profile.near_m = 0.25f;
+  receiver.profile.near_noise_db = {4.2f,  3.6f, -0.2f, -4,    -6.5f, -7.6f, -6.7f, -5.3f, -4.6f,
+                                    -5.3f, -7,   -7.7f, -6.5f, -4.3f, -2,    1.6f,  3.4f};
+  receiver.profile.near_m = 0.4f;
+  // The streaks of rows 10 to 180 lie beside a dome: the shadow of an aperture of 81 mm, heard from a sine of 0.56 (half a
+  // wavelength of the low mode would be 0.57), which 128 channels of that spacing make.
+  receiver.shared_noise.level_db = 3.2f;
+  // 255 never occurs; codes 0 to 5 of the noise are as frequent as of floor(255 v^gamma), v below 1.
+  receiver.truncates = true;
   receiver.profile.blend = {-0.1f, 0.07f, 0.1f, 0.13f, 0.13f, 0.13f, 0.13f, 0.06f, -0.1f};
   // The medians of rows 0 to 8: it rings, with a null in row 2. By half a row.
   receiver.leak_ring_db = {-5.4f, -5.4f,  -5.2f, -5.1f,  -15, -26,    -24, -22.7f, -21, -19.4f,
-                           -21,   -22.6f, -26,   -30.5f, -35, -38.7f, -43, -47,    -60};
+                           -21,   -22.6f, -25,   -28.2f, -31, -33.5f, -38, -45,    -60};
   receiver.leak_ring_step_m = 0.001421f;
 }
 

@@ -62,8 +62,9 @@ SONAR_HD inline LevelLine level_line(const SampleFormat& format) {
   return {10 * std::log10(2.0) * per_db, -floor_db * per_db};
 }
 
-/// Sample code of v = amplitude over full scale (eq. 37 and 40), held at max_code; NaN and negative give 0.
-SONAR_HD inline std::uint32_t quantise(double v, const SampleFormat& format) {
+/// Sample code of v = amplitude over full scale (eq. 37 and 40), held at max_code; NaN and negative give 0. `truncates`: see
+/// ReceiverModel.
+SONAR_HD inline std::uint32_t quantise(double v, const SampleFormat& format, bool truncates = false) {
   if (!(v > 0)) return 0;
   if (format.scale == SampleFormat::Scale::logarithmic) {
     const LevelLine line = level_line(format);
@@ -73,7 +74,9 @@ SONAR_HD inline std::uint32_t quantise(double v, const SampleFormat& format) {
   if (v >= 1) return format.max_code;
   const double gamma = static_cast<double>(format.gamma);
   const double shaped = gamma == 1 ? v : std::pow(v, gamma);
-  return static_cast<std::uint32_t>(static_cast<double>(format.max_code) * shaped + 0.5);
+  const auto max_code = static_cast<double>(format.max_code);
+  const double code = truncates ? (max_code + 1) * shaped : max_code * shaped + 0.5;
+  return code < max_code ? static_cast<std::uint32_t>(code) : format.max_code;
 }
 
 }  // namespace sonar

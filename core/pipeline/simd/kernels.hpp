@@ -37,6 +37,11 @@ struct TileSeen {
   float seen_turn[9], seen_place[3];  // there = seen_turn * place + seen_place, row-major
 };
 
+/// Linear codes (eq. 37): floor(factor v^gamma + rounding), at most max_code.
+struct CodeScale {
+  float half_gamma, factor, rounding, max_code;
+};
+
 /// What holds for all tiles of one column group.
 struct GroupView {
   bool conical;  // cones about the array: u = y / r, t = z / x; else flat beams: u = y / h, t = z / h, h^2 = x^2 + y^2
@@ -128,10 +133,10 @@ struct Kernels {
   void (*refocus)(const float* from, std::ptrdiff_t stride, const FocusTaps&, int floats, float* to);
   /// power[row * width + beam] = |beams[beam * stride + 2 * row ...]|^2.
   void (*detect)(const float* beams, std::ptrdiff_t stride, int beam_count, int rows, float* power, int width);
-  /// codes[i] = min(max_code, round(max_code * (power[i] * gain)^half_gamma)), as float; n is a multiple of 16.
-  void (*quantise)(const float* power, float gain, float half_gamma, float max_code, float* codes, int n);
+  /// codes[i], as float, of v^2 = power[i] * gain; n is a multiple of 16.
+  void (*quantise)(const float* power, float gain, const CodeScale&, float* codes, int n);
   /// The same as bytes, max_code at most 255.
-  void (*quantise_bytes)(const float* power, float gain, float half_gamma, float max_code, std::uint8_t* codes, int n);
+  void (*quantise_bytes)(const float* power, float gain, const CodeScale&, std::uint8_t* codes, int n);
   /// Logarithmic codes, as float: per_octave log2(power[i] * gain) + at_full_scale, rounded, from 0 to max_code (LevelLine).
   void (*quantise_levels)(const float* power, float gain, float per_octave, float at_full_scale, float max_code, float* codes,
                           int n);

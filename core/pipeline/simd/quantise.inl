@@ -17,14 +17,14 @@ inline Lanes exp2_of(Lanes x) {  // as exp2_of(float)
   return p * reinterpret_cast<Lanes>((whole_part(whole) + 127) << 23);
 }
 
-inline Lanes codes_of(const float* power, float gain, float half_gamma, float max_code) {
+inline Lanes codes_of(const float* power, float gain, const CodeScale& scale) {
   // (power gain)^(gamma / 2): docs/acoustics.md, eq. 37.
-  const Lanes v = exp2_of(half_gamma * log2_of(larger(load(power) * gain, all(1e-30f))));
-  return smaller(v * max_code + 0.5f, all(max_code));
+  const Lanes v = exp2_of(scale.half_gamma * log2_of(larger(load(power) * gain, all(1e-30f))));
+  return smaller(v * scale.factor + scale.rounding, all(scale.max_code));
 }
 
-void quantise(const float* power, float gain, float half_gamma, float max_code, float* codes, int n) {
-  for (int i = 0; i < n; i += lanes) store(codes + i, codes_of(power + i, gain, half_gamma, max_code));
+void quantise(const float* power, float gain, const CodeScale& scale, float* codes, int n) {
+  for (int i = 0; i < n; i += lanes) store(codes + i, codes_of(power + i, gain, scale));
   for (int i = 0; i < n; ++i) codes[i] = std::floor(codes[i]);
 }
 
@@ -37,9 +37,9 @@ void quantise_levels(const float* power, float gain, float per_octave, float at_
   for (int i = 0; i < n; ++i) codes[i] = std::floor(codes[i]);
 }
 
-void quantise_bytes(const float* power, float gain, float half_gamma, float max_code, std::uint8_t* codes, int n) {
+void quantise_bytes(const float* power, float gain, const CodeScale& scale, std::uint8_t* codes, int n) {
   for (int i = 0; i < n; i += lanes) {
-    const LaneNumbers code = whole_part(codes_of(power + i, gain, half_gamma, max_code));
+    const LaneNumbers code = whole_part(codes_of(power + i, gain, scale));
 #if defined(__AVX512F__)
     _mm_storeu_si128(reinterpret_cast<__m128i*>(codes + i), _mm512_cvtepi32_epi8(reinterpret_cast<__m512i>(code)));
 #elif defined(__AVX2__)

@@ -77,6 +77,10 @@ TEST(Receiver, Quantise) {
   EXPECT_EQ(quantise(1.51 / 254, linear8), 2u);
   const SampleFormat root8{.bits = 8, .max_code = 254, .gamma = 0.5f, .row_gains = false};
   EXPECT_EQ(quantise(0.25, root8), 127u);
+  EXPECT_EQ(quantise(0.999 / 255, linear8, true), 0u);
+  EXPECT_EQ(quantise(1.001 / 255, linear8, true), 1u);
+  EXPECT_EQ(quantise(0.9999, linear8, true), 254u);
+  EXPECT_EQ(quantise(1, linear8, true), 254u);
   const SampleFormat linear32{.bits = 32, .max_code = 4294967295u, .gamma = 1, .row_gains = false};
   EXPECT_EQ(quantise(2, linear32), 4294967295u);
   EXPECT_EQ(quantise(0.5, linear32), 2147483648u);
