@@ -36,8 +36,8 @@ constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;
 // m is 30 dB above the noise. Other modes: chosen.
 constexpr float noise_figure_db = 10, m1200d_high_noise_figure_db = 15;
 
-/// unknown: fitted to the first two captured M1200d pings and kept by the third (docs/acoustics.md, section 9); of their mode
-/// only.
+/// unknown: fitted to the first two captured M1200d pings, levels adjusted after a look at the third (docs/acoustics.md, section
+/// 9); of their mode only.
 void fit_to_recording(ReceiverModel& receiver) {
   // Neighbouring rows of the far noise are uncorrelated (0.02), those of the bed are as with a pulse of 0.9 rows.
   receiver.noise_width = 0.66f / 0.9f;
