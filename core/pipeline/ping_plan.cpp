@@ -171,7 +171,7 @@ void lay_out_noise_profile(PingPlan& p) {
     p.noise_profile.far.push_back(static_cast<float>(far));
     p.noise_profile.near_less_far.push_back(static_cast<float>(near - far));
   }
-  constexpr double least = 1e-3;
+  constexpr double least = 1e-3;  // of near - far, at most some 10 dB: less than 0.05 dB
   for (int n = 0; n < p.samples && !profile.near_noise_db.empty(); ++n) {
     const double decay = std::exp(-(n + p.sample_offset) * p.sample_spacing_m / static_cast<double>(profile.near_m));
     if (decay < least) break;

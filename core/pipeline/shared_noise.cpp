@@ -11,7 +11,7 @@ namespace sonar {
 namespace {
 
 constexpr double none_db = -150;
-constexpr double margin = 2;  // how far beyond the range where the aperture's shadow leaves the sector its edge is followed
+constexpr double margin = 2;  // how far beyond the range where the streaks leave the sector their edge is followed
 
 }  // namespace
 
@@ -24,7 +24,9 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   const double sine = static_cast<double>(law.sine), spacing_m = wavelength_m / (2 * sine), oblique = 1 - sine * sine;
   const int half = law.channels / 2;
   const auto beams = static_cast<int>(plan.beam_sine.size());
-  const double outside = sine - std::abs(plan.beam_sine.front());
+  double widest = 0;
+  for (const double u : plan.beam_sine) widest = std::max(widest, std::abs(u));
+  const double outside = sine - widest;
   const double until_m = outside > 0 ? margin * oblique * half * spacing_m / outside : plan.settings.range_m;
   const auto range_m = [&](int n) { return (n + plan.sample_offset) * plan.sample_spacing_m; };
   while (samples_ < plan.samples && range_m(samples_) < until_m) ++samples_;

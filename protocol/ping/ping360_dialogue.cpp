@@ -11,7 +11,7 @@ namespace {
 
 using protocol::Reaction;
 
-constexpr auto longest_wait = std::chrono::seconds(2);  // for a ping that could not be made; one that is late counts
+constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping is taken as lost; it is still sent if it comes
 
 DeviceInformation identity(const protocol::OptionValues& options) {
   DeviceInformation info;
@@ -56,12 +56,12 @@ class Ping360Dialogue final : public Conversation {
     return task_ != Task::none && !fired_ ? std::optional(due_) : std::nullopt;  // stepped time comes to a mere turn too
   }
   protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
-    if (late_ && made_with == late_.get()) {
+    if (late_ && made_with == late_.get())
       late_.reset();
-      return {{Bytes{}}, {}};
-    }
-    if (!fired_ || made_with != fired_.get()) return {};  // of a request that another has replaced
-    advance(now);
+    else if (fired_ && made_with == fired_.get())
+      advance(now);
+    else
+      return {};  // of a request that another has replaced
     return {{Bytes{}}, {}};
   }
 

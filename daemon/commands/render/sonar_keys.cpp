@@ -57,6 +57,17 @@ void read_profile(const Node& node, BeamProfile& profile) {
   if (near.present() && profile.noise_db.empty()) near.fail("needs noise_db");
 }
 
+void read_shared_noise(const Node& node, SharedNoise& noise) {
+  if (!node.present()) return;
+  Map keys = node.map();
+  set(keys.optional("level_db"), Range::between(-200, 150), noise.level_db);
+  const Node channels = keys.optional("channels");
+  noise.channels = static_cast<int>(channels.integer_or(noise.channels, 2, 4096));
+  if (noise.channels % 2 != 0) channels.fail("must be even: neighbours have opposite signs");
+  set(keys.optional("sine"), Range::between(0.05, 0.99), noise.sine);
+  set(keys.optional("full_m"), Range::between(1e-3, 1000), noise.full_m);
+}
+
 void read_receiver(const Node& node, ReceiverModel& law) {
   if (!node.present()) return;
   Map keys = node.map();
@@ -74,6 +85,8 @@ void read_receiver(const Node& node, ReceiverModel& law) {
   set(keys.optional("noise_width"), Range::between(0.2, 5), law.noise_width);
   set(keys.optional("defocus"), Range::between(0, 1), law.defocus);
   read_profile(keys.optional("profile"), law.profile);
+  read_shared_noise(keys.optional("shared_noise"), law.shared_noise);
+  law.truncates = keys.optional("truncates").boolean_or(law.truncates);
   set(keys.optional("leak_upa"), Range::at_least(0), law.leak_upa);
   read_table(keys.optional("leak_ring_db"), Range::between(-300, 100), law.leak_ring_db);
   set(keys.optional("leak_ring_step_m"), Range::between(1e-5, 10), law.leak_ring_step_m);

@@ -97,6 +97,7 @@ bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
   if (!edit) return true;
   message.bytes = std::make_shared<const Bytes>(std::move(edit->bytes));
   message.prefixes.clear();
+  message.shape = nullptr;  // the port's: its places are those of the bytes as they were
   if (!edit->pauses.empty() || edit->end != Outbox::Shape::End::none) {
     std::sort(edit->pauses.begin(), edit->pauses.end(), [](const auto& a, const auto& b) { return a.before < b.before; });
     message.shape = std::make_shared<const Outbox::Shape>(Outbox::Shape{std::move(edit->pauses), edit->end});

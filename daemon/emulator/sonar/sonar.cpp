@@ -361,7 +361,7 @@ std::shared_ptr<const Outbox::Shape> Sonar::parted(const Connection& to, const P
     if (end > 0) shape.pauses.push_back({end, to.port->gap});
     end += part.size();
   }
-  return std::make_shared<const Outbox::Shape>(std::move(shape));
+  return shape.pauses.empty() ? nullptr : std::make_shared<const Outbox::Shape>(std::move(shape));
 }
 
 /// The engine computed noise only of a ping that was requested as any other: it compares the depth with the sea surface.

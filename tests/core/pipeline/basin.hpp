@@ -126,6 +126,7 @@ inline std::vector<std::pair<std::string, PingRequest>> turns() {
     r.switches.*part.is_on = !(r.switches.*part.is_on);
     all.emplace_back(std::string(part.name) + " switched", std::move(r));
   }
+  both("beams that are not mixed", [](PingRequest& r) { r.switches.uneven = r.switches.defocus = false; });
   both("everything at last", [](PingRequest&) {});
   return all;
 }

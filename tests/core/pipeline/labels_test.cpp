@@ -182,6 +182,22 @@ TEST(Labels, APointTargetIsAnInstance) {
   EXPECT_EQ(labels.visible.at(1), 1.0f);
 }
 
+TEST(Labels, EchoesBelowTheNoiseThatChannelsShareHaveNone) {
+  // Of a point at the edge of the sector, where that noise is loud near the sonar.
+  const auto share = [](float level_db) {
+    FrequencyMode mode = p900();
+    mode.receiver.shared_noise.level_db = level_db;
+    auto scene = std::make_shared<Scene>(*SceneMaker().add_point({0.4, 0.24, 0}, -20).make());
+    Sounding s(scene, mode, native_rows(2, 0.0254));
+    s.request.switches.noise = s.request.switches.keep_labels = true;
+    Parallel pool(1);
+    const Ping ping = make_cpu_engine(scene, pool)->run({&s.request, 1}).front();
+    return ping.labels ? *std::max_element(ping.labels->share.begin(), ping.labels->share.end()) : 0;
+  };
+  EXPECT_GT(share(-200), 200);
+  EXPECT_LT(share(140), 20);
+}
+
 TEST(Labels, APointTargetThatIsSeenOverAShadowKeepsItsLabel) {
   const Vec3d place{7, 0, 1.0};
   Labelled l(

@@ -128,6 +128,15 @@ struct Sounder : Talk {
     send(ping::framed_message(ping::Id::set_ping_parameters, 0, parameters));
   }
   void send(const Bytes& frame) { time.send(stream, frame); }
+  /// The next ping of a connection.
+  Outbox::Message ping_by_tcp() {
+    for (const Time end = time.now + seconds(2); time.now < end; time.run(milliseconds(10)))
+      while (Outbox::Message message = sonar().next_message(stream, time.now)) {
+        sonar().on_written(stream, message, time.now);
+        if (message.ping != 0) return message;
+      }
+    throw std::runtime_error("no ping");
+  }
   /// Of the next ping: each frame is a datagram, and its sum is right.
   std::vector<ping::Frame> frames() {
     std::vector<ping::Frame> all;
@@ -165,15 +174,7 @@ TEST(SurveyorInVirtualTime, FieldsOfItsDatagramsFailWithTheRightSum) {
 /// ping-python reads one message of each packet: several in one would pile up in the host.
 TEST(SurveyorInVirtualTime, ItsMessagesAreWrittenOneByOneByTcp) {
   Sounder sounder(protocol::Port::Kind::tcp_stream);
-  Outbox::Message message;
-  for (const Time end = sounder.time.now + seconds(2); !message || message.ping == 0;) {
-    sounder.time.run(milliseconds(10));
-    ASSERT_LT(sounder.time.now, end);
-    if (const Outbox::Message next = sounder.sonar().next_message(stream, sounder.time.now)) {
-      message = next;
-      sounder.sonar().on_written(stream, message, sounder.time.now);
-    }
-  }
+  const Outbox::Message message = sounder.ping_by_tcp();
   ASSERT_TRUE(message.shape);
   std::size_t begin = 0;
   std::vector<std::size_t> ends;
@@ -191,6 +192,11 @@ TEST(SurveyorInVirtualTime, ItsMessagesAreWrittenOneByOneByTcp) {
     EXPECT_FALSE(framer.next()) << "one frame a part";
     begin = end;
   }
+  // Where a fault adds bytes, the ends of the messages are elsewhere.
+  sounder.add_fault("F01");
+  const Outbox::Message longer = sounder.ping_by_tcp();
+  EXPECT_GT(longer.bytes->size(), message.bytes->size());
+  EXPECT_FALSE(longer.shape);
 }
 
 TEST(SurveyorInVirtualTime, TellsTheTimeThatItWasToldWhateverItSkipped) {
