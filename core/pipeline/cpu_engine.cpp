@@ -3,7 +3,7 @@
 #include <stdexcept>
 
 #include "core/pipeline/check_request.hpp"
-#include "core/pipeline/labelling_engine.hpp"
+#include "core/pipeline/labels.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simulate.hpp"
 #include "core/pipeline/water_line.hpp"

@@ -4,7 +4,30 @@
 #include <cmath>
 #include <complex>
 
+#include "core/pipeline/check_request.hpp"
+#include "core/sonar/range_image.hpp"
+
 namespace sonar {
+
+std::string why_unlabelled(const PingRequest& request, const Scene& scene) {
+  if (request.switches.mode != Mode::canonical || request.switches.fixed_fan > 0)
+    return "labels need the canonical model: its surface cells belong to objects; leave out the mode and the fixed fan";
+  if (range_image_of(request) != nullptr)
+    return "range images have no labels: they are made without surface cells; keep_truth tells what each column sees";
+  if (scene.objects.size() + scene.point_targets.size() > PingLabels::most_instances)
+    return "labels are numbers of 16 bits: the scene has more than 65535 objects and point targets";
+  return why_invalid(request);
+}
+
+PingLabels no_labels(const PingRequest& request, const Scene& scene) {
+  const PingSettings& s = request.settings;
+  const auto size = static_cast<std::size_t>(s.range_bin_count) * static_cast<std::size_t>(s.beam_count);
+  PingLabels labels{s.range_bin_count, s.beam_count, {}, {}, {}, {}};
+  labels.instance.resize(size), labels.share.resize(size), labels.caster.resize(size);
+  for (const Object& o : scene.objects) labels.visible.push_back(o.label.empty() ? -1.0f : 0.0f);
+  labels.visible.resize(scene.objects.size() + scene.point_targets.size());
+  return labels;
+}
 
 struct LabelWork::Point {
   std::size_t object = 0;

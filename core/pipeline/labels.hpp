@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,11 @@
 #include "core/sonar/ping_labels.hpp"
 
 namespace sonar {
+
+/// Why the samples of such pings have no labels; empty = they have.
+std::string why_unlabelled(const PingRequest& request, const Scene& scene);
+/// Those of a ping that receives nothing.
+PingLabels no_labels(const PingRequest& request, const Scene& scene);
 
 /// The labels of one ping while it is made. Kept from ping to ping for its buffers.
 class LabelWork {

@@ -5,6 +5,7 @@
 
 #include "core/image/draw_fan.hpp"
 #include "core/image/gray_png.hpp"
+#include "core/pipeline/labels.hpp"
 #include "core/scene/instances.hpp"
 #include "daemon/commands/render/label_json.hpp"
 #include "daemon/commands/render/sidecar.hpp"
@@ -62,16 +63,18 @@ Result<DrawnPing> PingMaker::compute(std::uint64_t number, Ping& ping) {
     engine_.reset();
     const SimdLevel simd = simd_.value_or(drawn->job.config.engine.simd);
     const auto make = [&](std::shared_ptr<const Scene> s) -> std::unique_ptr<PingEngine> {
-      return std::make_unique<LabellingEngine>(std::move(s), one_, EngineOptions{.simd = simd});
+      return make_cpu_engine(std::move(s), one_, {.simd = simd});
     };
     auto started = start_engine(make, drawn->job.scene);
     if (!started) return tl::make_unexpected(started.error());
-    engine_.reset(static_cast<LabellingEngine*>(started->release()));
+    engine_ = *std::move(started);
     engine_key_ = key;
   }
   known_ = {drawn->scene_key, drawn->whole_scene};
   try {
-    const PingRequest request = request_of(*drawn, number);
+    PingRequest request = request_of(*drawn, number);
+    if (const std::string why = why_unlabelled(request, *drawn->job.scene); !why.empty()) throw std::invalid_argument(why);
+    request.switches.keep_labels = true;
     ping = std::move(engine_->run({&request, 1}).front());
   } catch (const std::invalid_argument& refused) {
     return failure(ErrorKind::config, job_.source + ": ping " + std::to_string(number) + ": " + refused.what());
@@ -86,7 +89,7 @@ Result<LabelledPing> PingMaker::make(std::uint64_t number) {
   const PingSettings& s = ping.request.settings;
   if (s.format.bits > 16)
     return failure(ErrorKind::config, job_.source + ": samples of 32 bits do not fit a PNG file; set sonar.ping.bits to 8 or 16");
-  const PingLabels& labels = engine_->labels().front();
+  const PingLabels& labels = *ping.labels;
   LabelledPing made;
   made.width = s.beam_count, made.height = s.range_bin_count, made.negative = drawn->negative;
   Result<void> done;

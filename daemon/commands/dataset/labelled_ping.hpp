@@ -12,7 +12,7 @@
 #include "core/base/parallel.hpp"
 #include "core/base/result.hpp"
 #include "core/image/raster.hpp"
-#include "core/pipeline/labelling_engine.hpp"
+#include "core/pipeline/ping_engine.hpp"
 #include "daemon/commands/dataset/dataset_job.hpp"
 
 namespace sonar::dataset {
@@ -44,7 +44,7 @@ class PingMaker {
   Parallel one_{1};
   KnownScene known_;
   std::string engine_key_;
-  std::unique_ptr<LabellingEngine> engine_;
+  std::unique_ptr<PingEngine> engine_;
 };
 
 }  // namespace sonar::dataset

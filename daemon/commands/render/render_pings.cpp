@@ -7,7 +7,8 @@
 #include <stdexcept>
 
 #include "core/image/draw_fan.hpp"
-#include "core/pipeline/labelling_engine.hpp"
+#include "core/pipeline/labels.hpp"
+#include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "core/text/format.hpp"
 #include "daemon/commands/render/label_json.hpp"
@@ -40,7 +41,6 @@ struct MadePing {
   PingRequest request;
   Ping ping;
   PingStatistics count;
-  PingLabels labels;
   Result<std::uint64_t> written = std::uint64_t{0};  // bytes
 };
 
@@ -65,11 +65,11 @@ Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, con
   put(o.complex, "_beams.npy", npy_header("<c8", {rows * static_cast<std::size_t>(s.samples_per_row), beams}),
       std::as_bytes(std::span(ping.beam_signal_upa)));
   put(o.raw, "_samples.raw", {}, ping.samples);
-  const PingLabels& labels = made.labels;
-  put(o.labels, "_labels.npy", npy_header("<u2", {rows, beams}), std::as_bytes(std::span(labels.instance)));
-  put(o.labels, "_share.npy", npy_header("|u1", {rows, beams}), std::as_bytes(std::span(labels.share)));
-  put(o.labels, "_caster.npy", npy_header("<u2", {rows, beams}), std::as_bytes(std::span(labels.caster)));
   if (o.labels) {
+    const PingLabels& labels = *ping.labels;
+    put(true, "_labels.npy", npy_header("<u2", {rows, beams}), std::as_bytes(std::span(labels.instance)));
+    put(true, "_share.npy", npy_header("|u1", {rows, beams}), std::as_bytes(std::span(labels.share)));
+    put(true, "_caster.npy", npy_header("<u2", {rows, beams}), std::as_bytes(std::span(labels.caster)));
     const nlohmann::json words{{"layout", layout_of(ping)}, {"annotations", annotations_of(labels, ping, *job.scene)}};
     put(true, "_labels.json", words.dump(1) + "\n", {});
   }
@@ -83,7 +83,7 @@ Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, con
 Result<std::unique_ptr<PingEngine>> engine_for(const RenderJob& job, Parallel& pool, bool labels) {
   const auto make = [&](std::shared_ptr<const Scene> s) -> std::unique_ptr<PingEngine> {
     const EngineOptions options{.simd = job.config.engine.simd};
-    if (labels) return std::make_unique<LabellingEngine>(std::move(s), pool, options);
+    if (labels) return make_cpu_engine(std::move(s), pool, options);
     return choose_engine(job.config.engine.device, std::move(s), pool, options,
                          [](const std::string& what) { std::fprintf(stderr, "sonard: %s\n", what.c_str()); });
   };
@@ -99,7 +99,12 @@ class JobRun {
       : source_(source), job_(job), folder_(folder), pool_(pool), progress_(progress), on_progress_(on_progress) {}
 
   Result<void> make(std::uint64_t number, PingRequest request) {
-    batch_.push_back({number, std::move(request), {}, {}, {}, {}});
+    if (folder_.options().labels) {
+      if (const std::string why = why_unlabelled(request, *job_.scene); !why.empty())
+        return failure(ErrorKind::config, source_ + ": " + why);
+      request.switches.keep_labels = true;
+    }
+    batch_.push_back({number, std::move(request), {}, {}, {}});
     return batch_.size() < static_cast<std::size_t>(folder_.options().batch) ? Result<void>{} : take_turns();
   }
   /// One that is there already ends a batch.
@@ -147,8 +152,6 @@ class JobRun {
     for (std::size_t i = 0; i < batch_.size(); ++i) {
       batch_[i].ping = std::move(pings.at(i));
       batch_[i].count = counts.at(i);
-      if (const auto* labelling = dynamic_cast<const LabellingEngine*>(engine_.get()))
-        batch_[i].labels = labelling->labels().at(i);
     }
     const std::string description = engine_->description();  // of all: what a device that fails had begun is made again
     pool_.for_each(batch_.size(),
