@@ -68,7 +68,8 @@ configure() {
   log=$(mktemp)
   # Debian's packages of NumPy and Pillow are for its own Python, which need not be the first in PATH.
   if command -v dpkg-query >/dev/null && [ -x /usr/bin/python3 ]; then python=(-DPython3_EXECUTABLE=/usr/bin/python3); fi
-  if cmake --preset "$preset" -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" "${python[@]}" "$@" >"$log" 2>&1 </dev/null; then
+  if cmake --preset "$preset" -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" "${python[@]}" "$@" \
+    >"$log" 2>&1 </dev/null; then
     grep -E '^-- (sonard|  )|Warning' "$log" || true
     rm -f "$log"
   else

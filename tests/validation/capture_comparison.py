@@ -306,7 +306,8 @@ soft mud (-40 dB) 0.6 m below a sonar that looks down by 42 degrees. The real be
 chosen for a similar picture, as are the small things that drift in the water. TVG curve, leak, noise (level, bandwidth,
 by beam, shared by the channels), truncation, blend and defocus of our profile are fitted to the first two pings; compared is the
 third. It was not kept out wholly: after a look at it the level of the shared noise, the near noise by beam and three values of
-the leak were adjusted, which brought the last 4 of the statistics inside. Array and pulse are not fitted. The bed's strength and the noise figure cannot be separated (only their distance is visible), nor can gain and full scale.
+the leak were adjusted, which brought the last 4 of the statistics inside. Array and pulse are not fitted. The bed's strength and
+the noise figure cannot be separated (only their distance is visible), nor can gain and full scale.
 The gain here is {gain} dB; the requested 50 % would be 48: our full scale is set by the demo's brightness, and the recording has
 flag bit 4 set, gain assist. Local means are over 9 x 9 samples; bed: rows 288 to 447, far noise: rows 620 to 702; "edges": 24
 beams on either side. Correlations and skewness are compared with 0.2 at least: less is as good as none.

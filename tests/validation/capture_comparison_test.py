@@ -1,4 +1,4 @@
-"""The comparison with the captured pings: its statistics on made pictures, and the fit of our profile where the recordings are."""
+"""Comparison with the captured pings: its statistics on made pictures, and the fit of our profile where the recordings are."""
 import os
 import pathlib
 import random
@@ -31,7 +31,8 @@ class Statistics(unittest.TestCase):
         self.assertEqual(figures["difference of pings, rows 20-119, sd"], 0)
 
     def test_what_is_farther_off_gets_its_reason_or_is_told(self):
-        real, ours = {"mean": 10.0, "saturated share, %": 4.0, "other": 1.0}, {"mean": 11.0, "saturated share, %": 5.0, "other": 2.0}
+        real = {"mean": 10.0, "saturated share, %": 4.0, "other": 1.0}
+        ours = {"mean": 11.0, "saturated share, %": 5.0, "other": 2.0}
         text, within = comparison.table(real, ours)
         self.assertEqual(within, 1)
         self.assertIn(comparison.REASONS["saturated share, %"][0], text)

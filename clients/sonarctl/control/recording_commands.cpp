@@ -40,8 +40,12 @@ Run add_recording(CLI::App& app) {
       add_command(recording, "start", "start a file; its suffix selects the format: .mcap, .pcap, .oculus, .raw", a);
   start.add_option("FILE", a.start.file, "file name, without a folder")->required();
   start.add_option("--sonar", a.start.sonar, "name of the sonar (default: the only one)");
-  start.add_flag("--labels", a.start.labels, "of every sample, in .mcap: which object's echo it holds; pings take twice as long");
-  start.footer("examples:\n  sonarctl recording start run-1.mcap\n  sonarctl recording start left.oculus --sonar left");
+  start.add_flag("--labels", a.start.labels,
+                 "in .mcap, also which object's echo each sample holds; pings take about twice as long");
+  start.footer(
+      "examples:\n"
+      "  sonarctl recording start run-1.mcap --labels\n"
+      "  sonarctl recording start left.oculus --sonar left");
   start.callback([&a] {
     a.what = [&a] { return steer(a.control, a.start, a.start.file + " is being recorded; sonarctl status shows how it goes"); };
   });
