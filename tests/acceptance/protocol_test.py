@@ -97,7 +97,8 @@ class Capture(unittest.TestCase):
         folder = os.environ.get("SONARD_CAPTURES")
         if not folder:
             self.skipTest("SONARD_CAPTURES names no folder of recordings")
-        data = (pathlib.Path(folder) / "three_pings_8bit.raw").read_bytes()
+        below = pathlib.Path(folder, "oculus/three_pings_8bit.raw")
+        data = (below if below.exists() else pathlib.Path(folder, "three_pings_8bit.raw")).read_bytes()
         pings = [Ping(data[i:i + 182016]) for i in range(0, len(data), 182016)]
         self.assertEqual([p.id for p in pings], [415323, 415324, 415325])
         self.assertEqual((pings[0].rows, pings[0].beams, pings[0].image_offset), (703, 256, 2048))

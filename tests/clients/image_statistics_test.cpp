@@ -73,7 +73,9 @@ TEST(FirstEcho, IsWhereTheQuietEnds) {
 TEST(Capture, HasItsPublishedFigures) {
   const char* folder = std::getenv("SONARD_CAPTURES");
   if (folder == nullptr) GTEST_SKIP() << "SONARD_CAPTURES names no folder of recordings";
-  const auto pings = read_recording(std::filesystem::path(folder) / "three_pings_8bit.raw");
+  std::filesystem::path file = std::filesystem::path(folder) / "oculus/three_pings_8bit.raw";
+  if (!std::filesystem::exists(file)) file = std::filesystem::path(folder) / "three_pings_8bit.raw";
+  const auto pings = read_recording(file);
   ASSERT_TRUE(pings) << pings.error().text;
   ASSERT_EQ(pings->size(), 3u);
   const PolarImage image = *picture_of(pings->front());

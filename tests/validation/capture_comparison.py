@@ -61,6 +61,8 @@ REASONS = {
 
 
 def images_of_capture(folder):
+    if (folder / "oculus" / CAPTURE).exists():
+        folder = folder / "oculus"
     data = (folder / CAPTURE).read_bytes()
     if len(data) != PINGS * MESSAGE:
         raise RuntimeError(f"{folder / CAPTURE} has {len(data)} bytes, not {PINGS * MESSAGE}")

@@ -102,7 +102,8 @@ class Junk(unittest.TestCase):
 @unittest.skipUnless(CAPTURES, "no recordings: SONARD_CAPTURES is not set")
 class Captures(unittest.TestCase):
     def test_three_pings_of_a_real_device(self):
-        reader, messages = read(pathlib.Path(CAPTURES, "three_pings_8bit.raw").read_bytes())
+        below = pathlib.Path(CAPTURES, "oculus/three_pings_8bit.raw")
+        reader, messages = read((below if below.exists() else pathlib.Path(CAPTURES, "three_pings_8bit.raw")).read_bytes())
         pings = [ping_from(m) for m in messages]
         self.assertEqual(reader.skipped_bytes, 0)
         self.assertEqual([p.number for p in pings], [415323, 415324, 415325])
