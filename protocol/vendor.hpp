@@ -286,6 +286,7 @@ class Vendor {
   /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings).
   virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const = 0;
   /// Of a port of kind udp_stream with receivers, or udp_dialogue: the datagrams of a ping in order, at most 65,507 bytes each.
+  /// Of one of kind tcp_stream with a gap: the parts of frame() between which it pauses.
   virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};

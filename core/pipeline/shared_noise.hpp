@@ -18,7 +18,7 @@ class SharedNoiseTable {
   /// Nothing where the receiver has none. Needs the plan's columns and the level of their noise.
   explicit SharedNoiseTable(const PingPlan& plan);
   bool is_audible() const { return samples_ > 0; }
-  int samples() const { return samples_; }  // so many from the first on; behind them it lies beside the sector
+  int samples() const { return samples_; }  // from the first on; at larger ranges the noise falls outside the sector
   /// Complex [beams][samples]: of a unit draw at that sample [uPa].
   const std::vector<float>& response() const { return response_; }
   /// The draws of one ping, complex [samples], E|c|^2 = 1.

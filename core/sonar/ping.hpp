@@ -36,7 +36,7 @@ struct Switches {
   bool keep_pressure = false;   // fill Ping::pressure_upa
   bool keep_beams = false;      // fill Ping::beam_signal_upa
   bool keep_truth = false;      // fill Ping::truth
-  bool keep_labels = false;     // fill Ping::labels, where samples can have them; such pings are the CPU's
+  bool keep_labels = false;     // fill Ping::labels, where samples can have them; only the CPU engine computes such pings
 
   // Switched by name, see named_switches. A part that needs something of the scene or the model (volume, interference, leak, ...)
   // is silent where that is not given, even when it is on.

@@ -25,7 +25,7 @@ struct SceneNames {
   struct Instance {
     std::string name, of_class;
   };
-  std::vector<Instance> instances = {};  // of labels, less 1
+  std::vector<Instance> instances = {};  // [instance - 1] of PingLabels
 };
 
 /// Ground truth of a ping: the poses of the sonar and of the moving bodies at transmission, and per beam the first object hit.
