@@ -197,13 +197,15 @@ class Live(PageChecks, unittest.TestCase):
         with Sonard(mount=MOUNT, trajectory=str(self.circle()), arguments=["--faults"]) as daemon, Driver(daemon.address):
             page = self.open(daemon)
             shown(page)
-            page.run("((f) => { f.value = '7'; f.dispatchEvent(new Event('change')); })(document.querySelector('[name=\"/front/range_m\"]'))")
+            field = "document.querySelector('[name=\"/front/range_m\"]')"
+            page.wait(f"!!{field}")
+            page.run(f"((f) => {{ f.value = '7'; f.dispatchEvent(new Event('change')); }})({field})")
             self.patiently(lambda: ask(daemon, "status")["sonars"][0]["range_m"] == 7)
             page.wait("document.querySelector('#timeline').offsetWidth > 0")
             page.press(" ")
             self.patiently(lambda: ask(daemon, "status")["vehicles"][0]["trajectory"].get("paused"))
-            page.run("document.querySelector('#fault-seconds').value = 60, "
-                     "[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === 'Deaf head').click()")
+            page.wait("!!" + self.trouble("Deaf head"))
+            page.run(f"document.querySelector('#fault-seconds').value = 60, {self.trouble('Deaf head')}.click()")
             page.wait("document.querySelector('.fault-card .left')?.innerText.startsWith('0:') && document.querySelector('#fan-pane').matches('.faulty')")
             self.assertEqual(page.text("#fault-count"), "1")
             page.wait("document.querySelector('.fault-card progress').value < 0.97")
@@ -225,13 +227,17 @@ class Live(PageChecks, unittest.TestCase):
                 shown(page)
                 page.wait("document.querySelectorAll('#clients tr').length === 3")
                 if width > 800:
-                    page.run("document.querySelector('#fault-seconds').value = 60, "
-                             "[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === 'Thin tether').click()")
+                    page.wait("!!" + self.trouble("Thin tether"))
+                    page.run(f"document.querySelector('#fault-seconds').value = 60, {self.trouble('Thin tether')}.click()")
                     page.wait("/thin.tether/i.test(document.querySelector('#findings li')?.innerText)")
                     time.sleep(8)
                 page.picture(SHOTS / f"{name}.png")
                 self.assert_quiet(page, url_of(daemon))
                 page.close()
+
+    @staticmethod
+    def trouble(name):
+        return f"[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === '{name}')"
 
     def circle(self):
         """A file with a circle about the middle of the demo's scene in 90 s, looking inwards."""

@@ -147,6 +147,8 @@ class Page:
         self.call("Input.dispatchKeyEvent", type="keyUp", key=key, code=code)
 
     def click(self, selector):
+        """Waits for the element: a message of the daemon may put it there, or replace it."""
+        self.wait(f"!!document.querySelector({json.dumps(selector)})")
         self.run(f"document.querySelector({json.dumps(selector)}).click()")
 
     def picture(self, path):
