@@ -66,17 +66,21 @@ SONAR_HD inline void add_pulses(const PingView& p, std::uint32_t j, std::int32_t
   }
 }
 
-/// Noise that all channels share, at sample `n` of beam `j`.
+/// What all channels share, at sample `n` of beam `j`.
 SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
-  if (p.shared_noise == nullptr || p.has_noise == 0 || n >= p.shared_samples) return;
+  if (p.shared_noise == nullptr || n >= p.shared_samples) return;
+  const float rms = p.has_noise != 0 ? p.shared_rms[n] : 0.0f, leak = n < p.shared_leak_samples ? p.shared_leak[n] : 0.0f;
   const float* r = p.shared_noise + 2 * (static_cast<std::int64_t>(j) * p.shared_samples + n);
+  const auto steady = static_cast<float>(p.shared_steady);
   if (p.sea.expected_power != 0) {
-    re += r[0] * r[0] + r[1] * r[1];
+    re += (rms * rms * (1 + steady * steady) + leak * leak) * (r[0] * r[0] + r[1] * r[1]);
     return;
   }
   Complex c;
   const NoiseKey& key = p.noise_key;
-  add_noise(p.noise_table, place_of(key, key.sonar, key.ping, shared_noise_column), static_cast<std::uint32_t>(n), 1, c);
+  if (rms > 0)
+    add_noise(p.noise_table, place_of(key, key.sonar, key.ping, shared_noise_column), static_cast<std::uint32_t>(n), rms, c);
+  c.re += rms * steady + leak;
   re += c.re * r[0] - c.im * r[1];
   im += c.re * r[1] + c.im * r[0];
 }

@@ -102,10 +102,11 @@ SONAR_HD inline void finish_columns(const PingView& p, std::uint32_t i) {
   if (static_cast<std::int32_t>(n) < p.leak_samples) {
     const float rms = p.leak_rms[n];
     if (power) {
-      s.re += rms * rms;
+      s.re += rms * rms * (p.leak_steady * p.leak_steady + p.leak_changing * p.leak_changing);
     } else {
       Complex grain;
-      add_noise(p.grain_table, place_of(key, leak_sonar(key.sonar), every_ping, k), n, p.leak_steady, grain);
+      if (p.leak_steady > 0)
+        add_noise(p.grain_table, place_of(key, leak_sonar(key.sonar), every_ping, k), n, p.leak_steady, grain);
       add_noise(p.grain_table, place_of(key, leak_sonar(key.sonar), key.ping, k), n, p.leak_changing, grain);
       s.re += rms * grain.re;
       s.im += rms * grain.im;

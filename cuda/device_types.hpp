@@ -200,7 +200,10 @@ struct PingView {
   float* crosstalk;            // complex [samples], null = none
   float* mixed;                // complex [beams][samples], null = beams keep to themselves
   const float* shared_noise;   // complex [beams][shared_samples], SharedNoiseTable; null = none
-  std::int64_t shared_samples;
+  const float* shared_rms;     // [shared_samples] of the noise in a channel
+  const float* shared_leak;    // [shared_leak_samples] amplitude in a channel
+  std::int64_t shared_samples, shared_leak_samples;
+  double shared_steady;
   BeamMixView mix;
   std::int32_t point_count, pulse_count;
   // samples

@@ -99,8 +99,9 @@ void PingPreparer::add_receiver(Making& m) {
   if (leak.is_audible() && !m.request().blank) {
     view.leak_rms = m.room.tables.put(leak.rms_upa());
     view.leak_samples = static_cast<std::int32_t>(leak.rms_upa().size());
-    // (31): powers of the fixed and the changing part add up to 1.
-    view.leak_steady = static_cast<float>(std::sqrt(1 - Leak::changing_share));
+    // (31): powers of the fixed and the changing part add up to 1. Of a shared leak the fixed part is added to the beams.
+    view.leak_steady = leak.steady();
+    view.shared_leak_samples = static_cast<std::int64_t>(m.plan.shared_noise.leak_upa().size());
     view.leak_changing = static_cast<float>(std::sqrt(Leak::changing_share));
   }
   const Crosstalk crosstalk(m.plan, m.request().switches);

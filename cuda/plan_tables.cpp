@@ -65,7 +65,10 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   }
   if (p.shared_noise.is_audible()) {
     view_.shared_noise = memory_.put(p.shared_noise.response());
+    view_.shared_rms = memory_.put(p.shared_noise.noise_upa());
+    view_.shared_leak = memory_.put(p.shared_noise.leak_upa());
     view_.shared_samples = p.shared_noise.samples();
+    view_.shared_steady = static_cast<double>(p.shared_noise.steady());
   }
   view_.mix = p.beam_mix.view();
   if (p.beam_mix.blurs()) view_.mix.turn_m = memory_.put(p.beam_mix.turn_m());

@@ -30,6 +30,7 @@ double rise(double x) { return 0.5 * (1 + std::erf(x)); }
 Leak::Leak(const PingPlan& plan, const Switches& switches) {
   const ReceiverModel& law = plan.mode.receiver;
   if (!switches.leak || !(law.leak_upa > 0)) return;
+  steady_ = plan.shared_noise.has_leak() ? 0.0f : static_cast<float>(steady_part);
   const double per_column = static_cast<double>(law.leak_upa) / std::sqrt(plan.beam_weights.weight_energy);
   for (int n = 0; n < plan.samples; ++n) {
     const double range_m = (n + plan.sample_offset) * plan.sample_spacing_m;
@@ -50,18 +51,19 @@ Leak::Leak(const PingPlan& plan, const Switches& switches) {
 void Leak::add(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) const {
   const std::size_t n = rms_upa_.size();
   std::vector<float> grain(2 * n);
+  const auto changing = static_cast<float>(std::sqrt(changing_share));
   for (int k = first; k < last; ++k) {
     float* to = signals.column(k) + 2 * signals.lead;
     if (plan.expected_power) {
-      for (std::size_t i = 0; i < n; ++i) to[2 * i] += rms_upa_[i] * rms_upa_[i];
+      const float share = steady_ * steady_ + changing * changing;
+      for (std::size_t i = 0; i < n; ++i) to[2 * i] += share * rms_upa_[i] * rms_upa_[i];
       continue;
     }
     // A steady and a changing part, whose powers add to 1.
     std::fill(grain.begin(), grain.end(), 0.0f);
     const int count = static_cast<int>(n);
-    noise.table->add(leak_sonar(noise.sonar), every_ping, k, static_cast<float>(std::sqrt(1 - changing_share)), count,
-                     grain.data());
-    noise.table->add(leak_sonar(noise.sonar), noise.ping, k, static_cast<float>(std::sqrt(changing_share)), count, grain.data());
+    if (steady_ > 0) noise.table->add(leak_sonar(noise.sonar), every_ping, k, steady_, count, grain.data());
+    noise.table->add(leak_sonar(noise.sonar), noise.ping, k, changing, count, grain.data());
     for (std::size_t i = 0; i < n; ++i) {
       to[2 * i] += rms_upa_[i] * grain[2 * i];
       to[2 * i + 1] += rms_upa_[i] * grain[2 * i + 1];

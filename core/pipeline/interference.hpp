@@ -17,6 +17,7 @@ namespace sonar {
 
 /// Direct leakage of the transmitter, from the moment it fires: rms pressure at a beam's output leak_upa 10^(-decay r / 20) over
 /// the device's range r, complex Gaussian with the pulse's correlation, per column like the noise. Nearly the same in every ping.
+/// The steady part of a leak that the channels share is added by SharedNoiseTable.
 class Leak {
  public:
   /// How far it may decay before it is left out [dB]. A table ends with its last entry, and may have nulls.
@@ -24,17 +25,20 @@ class Leak {
   /// unknown: chosen. Share of its power that is new in every ping; in the captured M1200d pings 0.2 % in the first two rows,
   /// about a quarter in the next five.
   static constexpr double changing_share = 0.02;
+  static constexpr double steady_part = 0.98994949366116653;  // of its amplitude: sqrt(1 - changing_share)
 
   Leak() = default;
   Leak(const PingPlan& plan, const Switches& switches);
   bool is_audible() const { return !rms_upa_.empty(); }
   const std::vector<float>& rms_upa() const { return rms_upa_; }  // of a column, per sample
+  float steady() const { return steady_; }                        // amplitude of the part that the columns receive in every ping
   /// Adds it to columns [first, last). The table of `noise` must be prepared with the request's seed and the plan's filter;
   /// unused in expected power.
   void add(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) const;
 
  private:
   std::vector<float> rms_upa_;
+  float steady_ = 0;
 };
 
 /// A pulse of another sonar while we listen: a tone through our receiver, somewhere on the sample grid.

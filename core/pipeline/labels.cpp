@@ -107,12 +107,7 @@ double LabelWork::noise_of(int row, std::size_t beam) const {
   const auto& decay = context_->plan.noise_profile.decay;
   const auto sample = static_cast<std::size_t>(row) * static_cast<std::size_t>(context_->plan.settings.samples_per_row);
   double power = noise_far_[beam] + (sample < decay.size() ? static_cast<double>(decay[sample]) : 0.0) * noise_near_[beam];
-  const SharedNoiseTable& shared = context_->plan.shared_noise;
-  if (const auto samples = static_cast<std::size_t>(shared.samples()); sample < samples) {
-    const float* response = shared.response().data() + 2 * (beam * samples + sample);
-    power += static_cast<double>(response[0] * response[0] + response[1] * response[1]);
-  }
-  return power;
+  return power + context_->plan.shared_noise.noise_power(beam, sample);
 }
 
 void LabelWork::add_cells(const simd::GroupView& group, Echoes& scratch) {

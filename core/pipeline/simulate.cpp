@@ -351,8 +351,11 @@ Ping PingSimulation::image() {
   shape_ping(plan_, request_.switches, ping);
   if (!w_.first_hits.empty()) ping.truth = truth_of_beams(plan_, w_.first_hits);
   if (labels_ && !request_.blank) *labels_ = w_.labels.finish(points_);
-  if (request_.switches.noise && !plan_.expected_power)
-    plan_.shared_noise.draw({&prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number)}, shared_noise_);
+  if (plan_.expected_power)
+    plan_.shared_noise.draw_power(request_.switches.noise, request_.blank, shared_noise_);
+  else
+    plan_.shared_noise.draw({&prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number)},
+                            request_.switches.noise, request_.blank, shared_noise_);
   const int rows = plan_.settings.range_bin_count, rows_at_once = std::max(1, window_samples / plan_.settings.samples_per_row);
   pool_.for_each(static_cast<std::size_t>((rows + rows_at_once - 1) / rows_at_once), [&](std::size_t window, int worker) {
     const int first = static_cast<int>(window) * rows_at_once;
@@ -379,7 +382,7 @@ void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWork
   plan_.beam_mix.blur(kernels_, mine.beams, mine.mixed);
   add_pulses(other_sonars_, plan_, mine.beams);
   plan_.beam_mix.blend(mine.beams, mine.mixed);
-  if (request_.switches.noise) plan_.shared_noise.add(shared_noise_, plan_.expected_power, mine.beams);
+  plan_.shared_noise.add(shared_noise_, plan_.expected_power, mine.beams);
   if (crosstalk_.is_audible()) crosstalk_.add(plan_, mine.beams);
   watch.lap(Stage::form_beams);
   receive(mine.beams, plan_, kernels_, mine.receive, ping);

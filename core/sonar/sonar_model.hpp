@@ -42,6 +42,9 @@ struct SharedNoise {
   int channels = 128;     // even
   float sine = 0.56f;     // from where the beams hear it, far away: half a wavelength over the channels' spacing
   float full_m = 0.25f;   // nearer, its power is proportional to the range
+  float steady = 0;       // share of its power that is the same in every ping, of one phase
+  float focus_rows = 0;   // the array is focused that many rows behind a row's centre
+  float nearest_focus_m = 0;
 };
 
 /// How the receiver turns pressure into samples (docs/acoustics.md, section 7); constants of the product.
@@ -58,6 +61,7 @@ struct ReceiverModel {
   std::vector<float>
       leak_ring_db;  // of a ringing leak: re leak_upa at 0, 1, 2 .. leak_ring_step_m, then over; takes the decay's place
   float leak_ring_step_m = 0.003f;
+  bool leak_is_shared = false;  // by the channels, as shared_noise is; else its phases are random from column to column
   BeamProfile profile;
   SharedNoise shared_noise;
   /// 0: receive beams are focused at every range and bearing; 1: with the delays of broadside, which leave near beams off it

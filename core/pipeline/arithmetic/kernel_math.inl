@@ -5,10 +5,8 @@
 SONAR_HD inline float larger(float a, float b) { return a > b ? a : b; }
 SONAR_HD inline float smaller(float a, float b) { return a < b ? a : b; }
 
-SONAR_HD inline float sine_of_turns(float turns) {
-  float x = turns - std::floor(turns + 0.5f);
-  const float folded = (x > 0 ? 0.5f : -0.5f) - x;
-  x = std::fabs(x) > 0.25f ? folded : x;
+/// sin(2 pi x), |x| up to a quarter.
+SONAR_HD inline float sine_of_quarter(float x) {
   const float y = 6.2831853071795865f * x, y2 = y * y;
   float p = -2.5052108e-8f;
   p = p * y2 + 2.7557319e-6f;
@@ -16,6 +14,10 @@ SONAR_HD inline float sine_of_turns(float turns) {
   p = p * y2 + 8.3333333e-3f;
   p = p * y2 - 1.6666667e-1f;
   return y + y * y2 * p;
+}
+SONAR_HD inline float sine_of_turns(float turns) {
+  const float x = turns - std::floor(turns + 0.5f), folded = (x > 0 ? 0.5f : -0.5f) - x;
+  return sine_of_quarter(std::fabs(x) > 0.25f ? folded : x);
 }
 
 SONAR_HD inline float log2_of(float x) {  // x > 0 and normal; relative error of 2^(log2 x) about 2e-7

@@ -75,12 +75,16 @@ json json_of(const SonarModel& model, const FrequencyMode& mode) {
              {{"level_db", law.shared_noise.level_db},
               {"channels", law.shared_noise.channels},
               {"sine", law.shared_noise.sine},
-              {"full_m", law.shared_noise.full_m}}},
+              {"full_m", law.shared_noise.full_m},
+              {"steady", law.shared_noise.steady},
+              {"focus_rows", law.shared_noise.focus_rows},
+              {"nearest_focus_m", law.shared_noise.nearest_focus_m}}},
             {"truncates", law.truncates},
             {"leak_upa", law.leak_upa},
             {"leak_ring_db", law.leak_ring_db},
             {"leak_ring_step_m", law.leak_ring_step_m},
-            {"leak_decay_db_per_m", law.leak_decay_db_per_m}}}};
+            {"leak_decay_db_per_m", law.leak_decay_db_per_m},
+            {"leak_is_shared", law.leak_is_shared}}}};
 }
 
 json json_of(const PingSettings& s) {

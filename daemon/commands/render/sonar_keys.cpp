@@ -66,6 +66,9 @@ void read_shared_noise(const Node& node, SharedNoise& noise) {
   if (noise.channels % 2 != 0) channels.fail("must be even: neighbours have opposite signs");
   set(keys.optional("sine"), Range::between(0.05, 0.99), noise.sine);
   set(keys.optional("full_m"), Range::between(1e-3, 1000), noise.full_m);
+  set(keys.optional("steady"), Range::between(0, 0.99), noise.steady);
+  set(keys.optional("focus_rows"), Range::between(-10, 10), noise.focus_rows);
+  set(keys.optional("nearest_focus_m"), Range::between(0, 1000), noise.nearest_focus_m);
 }
 
 void read_receiver(const Node& node, ReceiverModel& law) {
@@ -91,6 +94,7 @@ void read_receiver(const Node& node, ReceiverModel& law) {
   read_table(keys.optional("leak_ring_db"), Range::between(-300, 100), law.leak_ring_db);
   set(keys.optional("leak_ring_step_m"), Range::between(1e-5, 10), law.leak_ring_step_m);
   set(keys.optional("leak_decay_db_per_m"), Range::between(0, 1e4), law.leak_decay_db_per_m);
+  law.leak_is_shared = keys.optional("leak_is_shared").boolean_or(law.leak_is_shared);
 }
 
 /// A list of azimuths makes the spacing a listed one.

@@ -112,7 +112,8 @@ TEST(Everything, SwitchedOffIsAsIfItsDataWereNotThere) {
   same(&Switches::bandwidth, as_it_is, receiver([](ReceiverModel& law) { law.noise_width = 1; }));
   same(&Switches::uneven, as_it_is, receiver([](ReceiverModel& law) { law.profile = {}; }));
   same(&Switches::defocus, as_it_is, receiver([](ReceiverModel& law) { law.defocus = 0; }));
-  same(&Switches::shared_noise, as_it_is, receiver([](ReceiverModel& law) { law.shared_noise = {}; }));
+  same(&Switches::shared_noise, as_it_is,
+       receiver([](ReceiverModel& law) { law.shared_noise = {}, law.leak_is_shared = false; }));
   same(&Switches::truncation, as_it_is, receiver([](ReceiverModel& law) { law.truncates = false; }));
   same(&Switches::crosstalk, as_it_is, receiver([](ReceiverModel& law) { law.crosstalk_db = -200; }));
 }

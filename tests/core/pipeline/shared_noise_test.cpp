@@ -1,5 +1,5 @@
-// Noise that all channels share: its power in every beam against the sum over the channels, its streaks, and nothing where it is
-// off (docs/acoustics.md, section 5). Codes that are cut off, not rounded (section 7).
+// What all channels share, noise and leak: its power in every beam against the sum over the channels, its streaks, and nothing
+// where it is off (docs/acoustics.md, section 5). Codes that are cut off, not rounded (section 7).
 #include "core/pipeline/shared_noise.hpp"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,19 @@ Sounding with(const std::function<void(ReceiverModel&)>& change, int threads = 2
 }
 const auto loud = [](ReceiverModel& law) { law.shared_noise.level_db = 60; };
 
-// In power: the beam is focused at (r, u) by its delays, channel by channel, and hears signs in turns.
+/// |sum over the channels|^2 of signs in turns, focused at `r` and sine `u` by its delays.
+double focused_power(const FrequencyMode& mode, double r, double u) {
+  const SharedNoise& law = mode.receiver.shared_noise;
+  const double wavelength_m = 1500 / static_cast<double>(mode.centre_hz),
+               spacing_m = wavelength_m / (2 * static_cast<double>(law.sine));
+  std::complex<double> sum = 0;
+  for (int n = 0; n < law.channels; ++n) {
+    const double x = (n - (law.channels - 1) / 2.0) * spacing_m;
+    sum += std::polar(n % 2 == 0 ? 1.0 : -1.0, 2 * pi / wavelength_m * (std::sqrt(r * r - 2 * r * x * u + x * x) - r));
+  }
+  return std::norm(sum);
+}
+
 TEST(SharedNoise, IsTheFocusedArraysSumOverItsChannels) {
   Sounding s = with(loud);
   s.request.switches.expected_power = true;
@@ -46,14 +58,8 @@ TEST(SharedNoise, IsTheFocusedArraysSumOverItsChannels) {
   for (const int row : {60, 90, 130, 180, 220})
     for (int j = 0; j < s.beams(); ++j) {
       const double r = s.range_of_row(row), u = s.beam_sine(j);
-      std::complex<double> sum = 0;
-      for (int n = 0; n < law.channels; ++n) {
-        const double x = (n - (law.channels - 1) / 2.0) * wavelength_m / (2 * sine);
-        // To second order about the direction that the noise seems to come from.
-        sum += std::polar(n % 2 == 0 ? 1.0 : -1.0, 2 * pi / wavelength_m * (x * x * (1 - sine * sine) / (2 * r) - x * u));
-      }
       const double expected =
-          power_from_db(60) * std::min(1.0, r / static_cast<double>(law.full_m)) * std::norm(sum) / law.channels;
+          power_from_db(60) * std::min(1.0, r / static_cast<double>(law.full_m)) * focused_power(s.mode(), r, u) / law.channels;
       const double measured = s.power(row, j) / (own_upa * own_upa) - 1;
       most = std::max(most, expected);
       off = std::max(off, std::abs(measured - expected));
@@ -97,6 +103,80 @@ TEST(SharedNoise, IsOneDrawASampleNewInEveryPing) {
   EXPECT_NEAR(share / n, 1, 0.3);
   EXPECT_NEAR(steady / pairs, 1, 0.6);
   EXPECT_LT(together, 0.1) << "a channel's own noise is 60 dB lower";
+}
+
+// 90 % steady: two pings differ by a tenth of the power each, and the mean power stays.
+TEST(SharedNoise, HasASteadyPart) {
+  Sounding s = with([](ReceiverModel& law) {
+    loud(law);
+    law.shared_noise.steady = 0.9f;
+  });
+  s.request.switches.expected_power = true;
+  s.ping();
+  const std::vector<float> mean = s.last().pressure_upa;
+  s.request.switches.expected_power = false;
+  s.request.switches.keep_beams = true;
+  std::vector<std::complex<float>> before;
+  double power = 0, difference = 0;
+  for (std::uint32_t number = 1; number <= 20; ++number) {
+    s.request.number = PingNumber{number};
+    s.ping();
+    const std::vector<std::complex<float>>& beams = s.last().beam_signal_upa;
+    ASSERT_EQ(beams.size(), mean.size()) << "one sample a row";
+    for (int row = 40; row < 110; ++row) {
+      const auto at = static_cast<std::size_t>(row * s.beams() + 4);
+      const double of_mean = std::pow(static_cast<double>(mean[at]), 2);
+      power += static_cast<double>(std::norm(beams[at])) / of_mean / (20 * 70);
+      if (!before.empty()) difference += static_cast<double>(std::norm(beams[at] - before[at])) / of_mean / (19 * 70);
+    }
+    before = beams;
+  }
+  EXPECT_NEAR(power, 1, 0.05);
+  EXPECT_NEAR(difference, 0.2, 0.02);
+}
+
+// The leak by the same channels: fringes of the focused array, their mean over the beams as without, and no other in any ping but
+// for its changing part.
+TEST(SharedLeak, IsWhatTheFocusedArrayMakesOfIt) {
+  const auto leaking = [](ReceiverModel& law) {
+    law.leak_upa = 1e8f;
+    law.leak_decay_db_per_m = 200;
+    law.leak_is_shared = true;
+    law.shared_noise.focus_rows = 0.5f;
+    law.shared_noise.nearest_focus_m = 0.0085f;
+  };
+  Sounding s = with(leaking);
+  s.request.switches.noise = false;
+  s.request.switches.expected_power = true;
+  s.ping();
+  const double row_m = s.range_of_row(1) - s.range_of_row(0);
+  double worst = 0;
+  for (const int row : {0, 1, 5, 12, 30}) {
+    const double focus_m = std::max(s.range_of_row(row) + row_m / 2, 0.0085);
+    std::vector<double> expected;
+    double mean = 0;
+    for (int j = 0; j < s.beams(); ++j) {
+      expected.push_back(focused_power(s.mode(), focus_m, s.beam_sine(j)));
+      mean += expected.back() / s.beams();
+    }
+    for (int j = 0; j < s.beams(); ++j) {
+      const double level = 1e16 * power_from_db(-200 * s.range_of_row(row));
+      const double share = 0.98 * expected[static_cast<std::size_t>(j)] / mean + 0.02;
+      worst = std::max(worst, std::abs(s.power(row, j) / level - share));
+    }
+  }
+  EXPECT_LT(worst, 0.01);
+
+  s.request.switches.expected_power = false;
+  s.ping();
+  const double lit = s.pressure(3, 40);
+  s.request.number = PingNumber{7};
+  s.ping();
+  EXPECT_NEAR(s.pressure(3, 40) / lit, 1, 0.6) << "steady but for 2 % of the power";
+  EXPECT_NE(s.pressure(3, 40), lit);
+  s.request.switches.leak = false;
+  s.ping();
+  EXPECT_EQ(s.pressure(3, 40), 0);
 }
 
 TEST(SharedNoise, IsTheSameForAnyNumberOfThreadsAndNothingWhenOff) {
