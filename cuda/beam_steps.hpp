@@ -66,23 +66,28 @@ SONAR_HD inline void add_pulses(const PingView& p, std::uint32_t j, std::int32_t
   }
 }
 
-/// What all channels share, at sample `n` of beam `j`.
+/// What channels share, at sample `n` of beam `j`.
 SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
   if (p.shared_noise == nullptr || n >= p.shared_samples) return;
-  const float rms = p.has_noise != 0 ? p.shared_rms[n] : 0.0f, leak = n < p.shared_leak_samples ? p.shared_leak[n] : 0.0f;
-  const float* r = p.shared_noise + 2 * (static_cast<std::int64_t>(j) * p.shared_samples + n);
-  const auto steady = static_cast<float>(p.shared_steady);
-  if (p.sea.expected_power != 0) {
-    re += (rms * rms * (1 + steady * steady) + leak * leak) * (r[0] * r[0] + r[1] * r[1]);
-    return;
-  }
-  Complex c;
+  const bool noise = p.has_noise != 0;
+  const float rms = noise ? p.shared_rms[n] : 0.0f;
+  const float steady = (noise ? p.shared_steady[n] : 0.0f) + (n < p.shared_leak_samples ? p.shared_leak[n] : 0.0f);
   const NoiseKey& key = p.noise_key;
-  if (rms > 0)
-    add_noise(p.noise_table, place_of(key, key.sonar, key.ping, shared_noise_column), static_cast<std::uint32_t>(n), rms, c);
-  c.re += rms * steady + leak;
-  re += c.re * r[0] - c.im * r[1];
-  im += c.re * r[1] + c.im * r[0];
+  for (std::uint32_t part = 0; part < p.shared_parts; ++part) {
+    const float* r = p.shared_noise + 2 * ((static_cast<std::int64_t>(part) * p.beams + j) * p.shared_samples + n);
+    const bool changes = part + 1 < p.shared_parts;
+    const float level = changes ? rms : steady;
+    if (p.sea.expected_power != 0) {
+      re += level * level * (r[0] * r[0] + r[1] * r[1]);
+      continue;
+    }
+    Complex c{changes ? 0 : steady, 0};
+    if (changes && noise)
+      add_noise(p.noise_table, place_of(key, key.sonar, key.ping, first_shared_noise_column + part),
+                static_cast<std::uint32_t>(n), rms, c);
+    re += c.re * r[0] - c.im * r[1];
+    im += c.re * r[1] + c.im * r[0];
+  }
 }
 
 /// Sums of one sample over columns, for the beams of `panels` panels that hear the same columns. `weight`: of each panel.

@@ -193,17 +193,17 @@ struct PingView {
   float noise_rms, leak_steady, leak_changing, crosstalk_own, crosstalk_leaked;
   NoiseKey noise_key;
   // beams
-  float* beam_signals;         // complex [beams][samples]
-  const PulseInBeams* points;  // [point_count]
-  const PulseInBeams* pulses;  // [pulse_count], of other sonars
-  double* point_weights;       // [point_count + pulse_count][beams]
-  float* crosstalk;            // complex [samples], null = none
-  float* mixed;                // complex [beams][samples], null = beams keep to themselves
-  const float* shared_noise;   // complex [beams][shared_samples], SharedNoiseTable; null = none
-  const float* shared_rms;     // [shared_samples] of the noise in a channel
-  const float* shared_leak;    // [shared_leak_samples] amplitude in a channel
+  float* beam_signals;                      // complex [beams][samples]
+  const PulseInBeams* points;               // [point_count]
+  const PulseInBeams* pulses;               // [pulse_count], of other sonars
+  double* point_weights;                    // [point_count + pulse_count][beams]
+  float* crosstalk;                         // complex [samples], null = none
+  float* mixed;                             // complex [beams][samples], null = beams keep to themselves
+  const float* shared_noise;                // complex [shared_parts][beams][shared_samples], SharedNoiseTable; null = none
+  const float *shared_rms, *shared_steady;  // [shared_samples] in a channel
+  const float* shared_leak;                 // [shared_leak_samples] amplitude in a channel
   std::int64_t shared_samples, shared_leak_samples;
-  double shared_steady;
+  std::uint32_t shared_parts;
   BeamMixView mix;
   std::int32_t point_count, pulse_count;
   // samples

@@ -68,7 +68,8 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
     view_.shared_rms = memory_.put(p.shared_noise.noise_upa());
     view_.shared_leak = memory_.put(p.shared_noise.leak_upa());
     view_.shared_samples = p.shared_noise.samples();
-    view_.shared_steady = static_cast<double>(p.shared_noise.steady());
+    view_.shared_steady = memory_.put(p.shared_noise.steady_upa());
+    view_.shared_parts = static_cast<std::uint32_t>(p.shared_noise.parts());
   }
   view_.mix = p.beam_mix.view();
   if (p.beam_mix.blurs()) view_.mix.turn_m = memory_.put(p.beam_mix.turn_m());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
 #include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/pipeline/arithmetic/noise_place.hpp"
@@ -23,37 +24,51 @@ float sine_near_0(float x) {
   return sine_of_quarter(std::fabs(x) > 0.25f ? folded : x);
 }
 
-/// Complex [beams]: sum over the channels of (-1)^m e^{i 2 pi d / lambda}, d the delay of a channel at x against the array's
-/// middle, from a point at `range_m` and sine u.
+/// Complex [parts][beams]: sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}, d the delay of a channel at x against the
+/// array's middle, from a point at a range and sine u. Parts: groups, which overlap by half and whose w^2 add to 1 in every
+/// channel; last, all channels alike.
 class FocusedArray {
  public:
-  FocusedArray(const std::vector<double>& beam_sines, int channels, double spacing_in_wavelengths)
-      : u_(beam_sines.begin(), beam_sines.end()),
-        re_(u_.size()),
-        im_(u_.size()),
-        channels_(channels),
-        d_(spacing_in_wavelengths) {}
+  FocusedArray(const std::vector<double>& beam_sines, const SharedNoise& law, double spacing_in_wavelengths)
+      : u_(beam_sines.begin(), beam_sines.end()), channels_(law.channels), half_(law.group / 2), d_(spacing_in_wavelengths) {
+    re_.resize(static_cast<std::size_t>(parts()) * u_.size());
+    im_.resize(re_.size());
+  }
+  int parts() const { return channels_ / half_ + 2; }
   void focus(double range_in_wavelengths) {
     std::fill(re_.begin(), re_.end(), 0.0f);
     std::fill(im_.begin(), im_.end(), 0.0f);
     const auto r = static_cast<float>(range_in_wavelengths);
+    std::vector<float> cosine(u_.size()), sine(u_.size());
     for (int m = 0; m < channels_; ++m) {
       const auto x = static_cast<float>((m - 0.5 * (channels_ - 1)) * d_);
-      const float sign = m % 2 == 0 ? 1.0f : -1.0f;
       for (std::size_t j = 0; j < u_.size(); ++j) {
         const float beyond = x * (x - 2 * r * u_[j]), delay = beyond / (std::sqrt(r * r + beyond) + r);
         const float turns = delay - ((delay + whole) - whole);
-        re_[j] += sign * sine_near_0(0.25f - std::fabs(turns));
-        im_[j] += sign * sine_near_0(turns);
+        cosine[j] = sine_near_0(0.25f - std::fabs(turns));
+        sine[j] = sine_near_0(turns);
       }
+      const double sign = m % 2 == 0 ? 1 : -1, way = pi / 2 * (m % half_ + 0.5) / half_;
+      add(m / half_, sign * std::cos(way), cosine, sine);
+      add(m / half_ + 1, sign * std::sin(way), cosine, sine);
+      add(parts() - 1, sign, cosine, sine);
     }
   }
-  float re(std::size_t beam) const { return re_[beam]; }
-  float im(std::size_t beam) const { return im_[beam]; }
+  std::complex<float> of(int part, std::size_t beam) const { return {re_[at(part) + beam], im_[at(part) + beam]}; }
 
  private:
+  std::size_t at(int part) const { return static_cast<std::size_t>(part) * u_.size(); }
+  void add(int part, double weight, const std::vector<float>& cosine, const std::vector<float>& sine) {
+    const auto w = static_cast<float>(weight);
+    float* __restrict re = re_.data() + at(part), * __restrict im = im_.data() + at(part);
+    for (std::size_t j = 0; j < u_.size(); ++j) {
+      re[j] += w * cosine[j];
+      im[j] += w * sine[j];
+    }
+  }
+
   std::vector<float> u_, re_, im_;
-  int channels_;
+  int channels_, half_;
   double d_;
 };
 
@@ -79,69 +94,80 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   while (samples_ < plan.samples && ((noise && range_m(samples_) < until_m) || samples_ < leak_samples)) ++samples_;
   // A channel's own noise, by itself, is (30) at a beam's output.
   const double own_upa = plan.column_noise_upa * std::sqrt(plan.beam_weights.weight_energy / law.channels);
-  const double changing = 1 - static_cast<double>(law.steady);
-  const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) * std::sqrt(changing) : 0;
-  steady_ = static_cast<float>(std::sqrt(static_cast<double>(law.steady) / changing));
+  const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) : 0;
+  const auto steady = static_cast<double>(law.steady);
   const double focus_m = static_cast<double>(law.focus_rows) * plan.settings.samples_per_row * plan.sample_spacing_m;
   const double nearest_m = std::max(static_cast<double>(law.nearest_focus_m), plan.sample_spacing_m / 2);
-  response_.resize(2 * beams * static_cast<std::size_t>(samples_));
-  FocusedArray array(plan.beam_sine, law.channels, spacing_m / wavelength_m);
-  for (int n = 0; n < samples_; ++n) {
-    array.focus(std::max(range_m(n) + focus_m, nearest_m) / wavelength_m);
+  FocusedArray array(plan.beam_sine, law, spacing_m / wavelength_m);
+  parts_ = static_cast<std::size_t>(array.parts());
+  beams_ = beams;
+  const auto samples = static_cast<std::size_t>(samples_);
+  response_.resize(2 * parts_ * beams * samples);
+  for (std::size_t n = 0; n < samples; ++n) {
+    const double range = range_m(static_cast<int>(n)), r = std::max(range, plan.sample_spacing_m / 2);
+    array.focus(std::max(range + focus_m, nearest_m) / wavelength_m);
     double power = 0;
-    for (std::size_t j = 0; j < beams; ++j) {
-      float* to = response_.data() + 2 * (j * static_cast<std::size_t>(samples_) + static_cast<std::size_t>(n));
-      to[0] = array.re(j);
-      to[1] = array.im(j);
-      power += static_cast<double>(to[0] * to[0] + to[1] * to[1]);
-    }
-    const double r = std::max(range_m(n), plan.sample_spacing_m / 2);
-    noise_upa_.push_back(static_cast<float>(level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)))));
+    for (int part = 0; part < array.parts(); ++part)
+      for (std::size_t j = 0; j < beams; ++j) {
+        const std::complex<float> of_beam = array.of(part, j);
+        float* to = response_.data() + 2 * ((static_cast<std::size_t>(part) * beams + j) * samples + n);
+        to[0] = of_beam.real();
+        to[1] = of_beam.imag();
+        if (part + 1 == array.parts()) power += static_cast<double>(std::norm(of_beam));
+      }
+    const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)));
+    noise_upa_.push_back(static_cast<float>(upa * std::sqrt(1 - steady)));
+    steady_upa_.push_back(static_cast<float>(upa * std::sqrt(steady)));
     // (31) at the beams' outputs, as a mean over them.
-    if (n < leak_samples)
-      leak_.push_back(static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[static_cast<std::size_t>(n)]) *
-                                         std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams) / power)));
+    if (static_cast<int>(n) < leak_samples)
+      leak_upa_.push_back(static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[n]) *
+                                             std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams) / power)));
   }
 }
 
 double SharedNoiseTable::noise_power(std::size_t beam, std::size_t sample) const {
-  if (sample >= static_cast<std::size_t>(samples_)) return 0;
-  const float* r = response_.data() + 2 * (beam * static_cast<std::size_t>(samples_) + sample);
-  return static_cast<double>((r[0] * r[0] + r[1] * r[1]) * noise_upa_[sample] * noise_upa_[sample] * (1 + steady_ * steady_));
-}
-
-void SharedNoiseTable::draw(const PingNoise& key, bool noise, bool blank, std::vector<float>& shared) const {
-  shared.assign(2 * static_cast<std::size_t>(samples_), 0.0f);
-  if (noise) key.table->set(key.sonar, key.ping, static_cast<int>(shared_noise_column), 1, samples_, shared.data());
-  for (std::size_t n = 0; n < noise_upa_.size(); ++n) {
-    shared[2 * n] = noise_upa_[n] * (shared[2 * n] + (noise ? steady_ : 0));
-    shared[2 * n + 1] *= noise_upa_[n];
+  if (sample >= noise_upa_.size()) return 0;
+  double power = 0;
+  for (std::size_t part = 0; part < parts_; ++part) {
+    const float* r = response_.data() + 2 * ((part * beams_ + beam) * noise_upa_.size() + sample);
+    const float rms = part + 1 < parts_ ? noise_upa_[sample] : steady_upa_[sample];
+    power += static_cast<double>(rms * rms * (r[0] * r[0] + r[1] * r[1]));
   }
-  for (std::size_t n = 0; n < leak_.size() && !blank; ++n) shared[2 * n] += leak_[n];
+  return power;
 }
 
-void SharedNoiseTable::draw_power(bool noise, bool blank, std::vector<float>& shared) const {
-  shared.assign(2 * static_cast<std::size_t>(samples_), 0.0f);
-  for (std::size_t n = 0; n < noise_upa_.size() && noise; ++n)
-    shared[2 * n] = noise_upa_[n] * noise_upa_[n] * (1 + steady_ * steady_);
-  for (std::size_t n = 0; n < leak_.size() && !blank; ++n) shared[2 * n] += leak_[n] * leak_[n];
+void SharedNoiseTable::draw(const PingNoise& key, bool noise, bool leak, bool expected_power, std::vector<float>& shared) const {
+  const auto samples = static_cast<std::size_t>(samples_);
+  shared.assign(2 * parts_ * samples, 0.0f);
+  for (std::size_t part = 0; part + 1 < parts_ && noise; ++part) {
+    float* to = shared.data() + 2 * part * samples;
+    if (!expected_power) key.table->set(key.sonar, key.ping, static_cast<int>(first_shared_noise_column + part), 1, samples_, to);
+    for (std::size_t n = 0; n < samples; ++n) {
+      to[2 * n] = noise_upa_[n] * (expected_power ? 1 : to[2 * n]);
+      to[2 * n + 1] *= noise_upa_[n];
+    }
+  }
+  if (samples == 0) return;
+  float* steady = shared.data() + 2 * (parts_ - 1) * samples;
+  for (std::size_t n = 0; n < samples && noise; ++n) steady[2 * n] += steady_upa_[n];
+  for (std::size_t n = 0; n < leak_upa_.size() && leak; ++n) steady[2 * n] += leak_upa_[n];
 }
 
 void SharedNoiseTable::add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const {
   const int count = std::min(beams.samples, samples_ - beams.first_sample);
-  for (int j = 0; j < beams.beams && count > 0; ++j) {
-    const float* __restrict r = response_.data() + 2 * (static_cast<std::ptrdiff_t>(j) * samples_ + beams.first_sample);
-    const float* __restrict c = shared.data() + 2 * static_cast<std::ptrdiff_t>(beams.first_sample);
-    float* __restrict to = beams.beam(j);
-    if (expected_power) {
-      for (int n = 0; n < count; ++n) to[2 * n] += c[2 * n] * (r[2 * n] * r[2 * n] + r[2 * n + 1] * r[2 * n + 1]);
-      continue;
+  const auto first = static_cast<std::size_t>(beams.first_sample), samples = static_cast<std::size_t>(samples_);
+  for (int j = 0; j < beams.beams && count > 0; ++j)
+    for (std::size_t part = 0; part < parts_; ++part) {
+      const float* __restrict r = response_.data() + 2 * ((part * beams_ + static_cast<std::size_t>(j)) * samples + first);
+      const float* __restrict c = shared.data() + 2 * (part * samples + first);
+      float* __restrict to = beams.beam(j);
+      for (int n = 0; n < count && expected_power; ++n)
+        to[2 * n] += c[2 * n] * c[2 * n] * (r[2 * n] * r[2 * n] + r[2 * n + 1] * r[2 * n + 1]);
+      for (int n = 0; n < count && !expected_power; ++n) {
+        to[2 * n] += c[2 * n] * r[2 * n] - c[2 * n + 1] * r[2 * n + 1];
+        to[2 * n + 1] += c[2 * n] * r[2 * n + 1] + c[2 * n + 1] * r[2 * n];
+      }
     }
-    for (int n = 0; n < count; ++n) {
-      to[2 * n] += c[2 * n] * r[2 * n] - c[2 * n + 1] * r[2 * n + 1];
-      to[2 * n + 1] += c[2 * n] * r[2 * n + 1] + c[2 * n + 1] * r[2 * n];
-    }
-  }
 }
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-// Signals that all receive channels share, with opposite signs in neighbours: noise, and of some receivers the transmitter's
+// Signals that receive channels share, with opposite signs in neighbours: noise, and of some receivers the transmitter's
 // leak. The array, focused at every range, makes streaks and fringes of them (docs/acoustics.md, section 5).
 #pragma once
 
@@ -18,25 +18,26 @@ class SharedNoiseTable {
   /// Nothing where the receiver has none. Needs the plan's columns and the level of their noise.
   explicit SharedNoiseTable(const PingPlan& plan);
   bool is_audible() const { return samples_ > 0; }
-  bool has_leak() const { return !leak_.empty(); }
+  bool has_leak() const { return !leak_upa_.empty(); }
   int samples() const { return samples_; }  // from the first on; at larger ranges the signal falls outside the sector
-  /// Complex [beams][samples]: of a signal of amplitude 1 in every channel.
+  std::size_t parts() const { return parts_; }
+  /// Complex [parts][beams][samples]: of a signal of amplitude 1 in the channels of a group; in the last part, in all channels.
   const std::vector<float>& response() const { return response_; }
-  const std::vector<float>& noise_upa() const { return noise_upa_; }  // [samples] rms in a channel of what is new in every ping
-  float steady() const { return steady_; }                            // amplitude of what is not, over that
-  const std::vector<float>& leak_upa() const { return leak_; }        // [as far as it reaches] amplitude in a channel
-  double noise_power(std::size_t beam, std::size_t sample) const;     // [uPa^2]; 0 beyond the samples
-  /// What the channels of one ping share, complex [samples]; without `noise`, or without the leak of a ping that is `blank`.
-  void draw(const PingNoise& key, bool noise, bool blank, std::vector<float>& shared) const;
-  /// On top of the beams; of expected power: `shared` as draw_power() leaves it.
+  // In a channel. Of what is new in every ping and by group, rms [samples]; of what is not, amplitude [samples]; of the leak,
+  // amplitude [as far as it reaches].
+  const std::vector<float>& noise_upa() const { return noise_upa_; }
+  const std::vector<float>& steady_upa() const { return steady_upa_; }
+  const std::vector<float>& leak_upa() const { return leak_upa_; }
+  double noise_power(std::size_t beam, std::size_t sample) const;  // [uPa^2]; 0 beyond the samples
+  /// What the channels of one ping share, complex [parts][samples], or its rms; without the noise, or without the leak.
+  void draw(const PingNoise& key, bool noise, bool leak, bool expected_power, std::vector<float>& shared) const;
+  /// On top of the beams.
   void add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const;
-  /// E|signal|^2 of the channels in place of draw().
-  void draw_power(bool noise, bool blank, std::vector<float>& shared) const;
 
  private:
   int samples_ = 0;
-  std::vector<float> response_, noise_upa_, leak_;
-  float steady_ = 0;
+  std::size_t parts_ = 0, beams_ = 0;
+  std::vector<float> response_, noise_upa_, steady_upa_, leak_upa_;
 };
 
 }  // namespace sonar

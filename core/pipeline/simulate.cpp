@@ -194,7 +194,7 @@ class PingSimulation {
   int group_columns_ = 0;
   std::vector<PointEcho> points_;
   std::vector<ReceivedPulse> other_sonars_;
-  std::vector<float> shared_noise_;  // draws of this ping
+  std::vector<float> shared_noise_;  // what the channels share in this ping
 };
 
 /// How many columns a worker takes at once. Tiles that reach into several groups are looked at by each, so the more the better,
@@ -351,11 +351,8 @@ Ping PingSimulation::image() {
   shape_ping(plan_, request_.switches, ping);
   if (!w_.first_hits.empty()) ping.truth = truth_of_beams(plan_, w_.first_hits);
   if (labels_ && !request_.blank) *labels_ = w_.labels.finish(points_);
-  if (plan_.expected_power)
-    plan_.shared_noise.draw_power(request_.switches.noise, request_.blank, shared_noise_);
-  else
-    plan_.shared_noise.draw({&prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number)},
-                            request_.switches.noise, request_.blank, shared_noise_);
+  plan_.shared_noise.draw({&prepared_.noise, request_.sonar_id, static_cast<std::uint32_t>(request_.number)},
+                          request_.switches.noise, !request_.blank, plan_.expected_power, shared_noise_);
   const int rows = plan_.settings.range_bin_count, rows_at_once = std::max(1, window_samples / plan_.settings.samples_per_row);
   pool_.for_each(static_cast<std::size_t>((rows + rows_at_once - 1) / rows_at_once), [&](std::size_t window, int worker) {
     const int first = static_cast<int>(window) * rows_at_once;

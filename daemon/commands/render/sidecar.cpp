@@ -74,6 +74,7 @@ json json_of(const SonarModel& model, const FrequencyMode& mode) {
             {"shared_noise",
              {{"level_db", law.shared_noise.level_db},
               {"channels", law.shared_noise.channels},
+              {"group", law.shared_noise.group},
               {"sine", law.shared_noise.sine},
               {"full_m", law.shared_noise.full_m},
               {"steady", law.shared_noise.steady},

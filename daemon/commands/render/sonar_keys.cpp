@@ -64,9 +64,13 @@ void read_shared_noise(const Node& node, SharedNoise& noise) {
   const Node channels = keys.optional("channels");
   noise.channels = static_cast<int>(channels.integer_or(noise.channels, 2, 4096));
   if (noise.channels % 2 != 0) channels.fail("must be even: neighbours have opposite signs");
+  const Node group = keys.optional("group");
+  noise.group = static_cast<int>(group.integer_or(noise.group, 2, 4096));
+  if (noise.group % 2 != 0 || noise.channels % (noise.group / 2) != 0)
+    group.fail("must be even, and the number of channels a multiple of its half");
   set(keys.optional("sine"), Range::between(0.05, 0.99), noise.sine);
   set(keys.optional("full_m"), Range::between(1e-3, 1000), noise.full_m);
-  set(keys.optional("steady"), Range::between(0, 0.99), noise.steady);
+  set(keys.optional("steady"), Range::between(0, 1), noise.steady);
   set(keys.optional("focus_rows"), Range::between(-10, 10), noise.focus_rows);
   set(keys.optional("nearest_focus_m"), Range::between(0, 1000), noise.nearest_focus_m);
 }

@@ -47,7 +47,7 @@ inline std::shared_ptr<const SonarModel> model_of(FrequencyMode mode, Waveform::
   mode.receiver.leak_upa = 1e7f;
   mode.receiver.noise_width = 0.8f;
   mode.receiver.defocus = 1;
-  mode.receiver.shared_noise = {.level_db = 20, .channels = 40, .steady = 0.3f, .focus_rows = 0.5f};
+  mode.receiver.shared_noise = {.level_db = 20, .channels = 40, .group = 8, .steady = 0.3f, .focus_rows = 0.5f};
   mode.receiver.leak_is_shared = true;
   mode.receiver.truncates = true;
   mode.receiver.profile = {{-3, 1, -2}, {6, -4, 5}, 0.3f, {-0.1f, 0.2f, 0}};

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <complex>
 #include <functional>
-#include <map>
 #include <memory>
 #include <vector>
 
@@ -34,75 +33,97 @@ Sounding with(const std::function<void(ReceiverModel&)>& change, int threads = 2
 }
 const auto loud = [](ReceiverModel& law) { law.shared_noise.level_db = 60; };
 
-/// |sum over the channels|^2 of signs in turns, focused at `r` and sine `u` by its delays.
-double focused_power(const FrequencyMode& mode, double r, double u) {
+constexpr int all = -1;
+
+/// Sum over channels with signs in turns, focused at `r` and sine `u` by their delays: over all of them, or over group `g`, whose
+/// weights are half a period of a sine, the next group's being half of that further on.
+std::complex<double> focused(const FrequencyMode& mode, double r, double u, int g) {
   const SharedNoise& law = mode.receiver.shared_noise;
   const double wavelength_m = 1500 / static_cast<double>(mode.centre_hz),
                spacing_m = wavelength_m / (2 * static_cast<double>(law.sine));
   std::complex<double> sum = 0;
   for (int n = 0; n < law.channels; ++n) {
-    const double x = (n - (law.channels - 1) / 2.0) * spacing_m;
-    sum += std::polar(n % 2 == 0 ? 1.0 : -1.0, 2 * pi / wavelength_m * (std::sqrt(r * r - 2 * r * x * u + x * x) - r));
+    const double x = (n - (law.channels - 1) / 2.0) * spacing_m, half = law.group / 2.0, place = (n + 0.5 - half * g) / half;
+    if (g != all && std::abs(place) > 1) continue;
+    const double weight = (n % 2 == 0 ? 1.0 : -1.0) * (g == all ? 1.0 : std::cos(pi / 2 * place));
+    sum += std::polar(weight, 2 * pi / wavelength_m * (std::sqrt(r * r - 2 * r * x * u + x * x) - r));
   }
-  return std::norm(sum);
+  return sum;
+}
+int groups(const FrequencyMode& mode) {
+  const SharedNoise& law = mode.receiver.shared_noise;
+  return 2 * law.channels / law.group + 1;
+}
+double focused_power(const FrequencyMode& mode, double r, double u) { return std::norm(focused(mode, r, u, all)); }
+/// Of two beams, E[a b*] re a channel's power.
+std::complex<double> in_common(const FrequencyMode& mode, double r, double u, double v) {
+  std::complex<double> sum = 0;
+  for (int g = 0; g < groups(mode); ++g) sum += focused(mode, r, u, g) * std::conj(focused(mode, r, v, g));
+  return sum;
 }
 
 TEST(SharedNoise, IsTheFocusedArraysSumOverItsChannels) {
-  Sounding s = with(loud);
-  s.request.switches.expected_power = true;
-  s.ping();
-  const SharedNoise& law = s.mode().receiver.shared_noise;
-  const double wavelength_m = 1500 / static_cast<double>(s.mode().centre_hz), sine = static_cast<double>(law.sine);
-  const double own_upa = noise_rms_upa(s.mode(), noise_bandwidth_hz(s.envelope_hz()));
-  double off = 0, most = 0, beside = 0;
-  for (const int row : {60, 90, 130, 180, 220})
-    for (int j = 0; j < s.beams(); ++j) {
-      const double r = s.range_of_row(row), u = s.beam_sine(j);
-      const double expected =
-          power_from_db(60) * std::min(1.0, r / static_cast<double>(law.full_m)) * focused_power(s.mode(), r, u) / law.channels;
-      const double measured = s.power(row, j) / (own_upa * own_upa) - 1;
-      most = std::max(most, expected);
-      off = std::max(off, std::abs(measured - expected));
-      // The shadow of the aperture: dark within the dome by rays.
-      const double edge = sine - law.channels / 2.0 * wavelength_m / (2 * sine) * (1 - sine * sine) / r;
-      if (std::abs(u) < edge - 0.06) beside = std::max(beside, measured / power_from_db(60));
-    }
-  record_oracle(no_number, "noise that channels share: beams against the sum over channels, re the loudest", 0, off / most, 1e-3,
-                "");
-  record_below(no_number, "noise that channels share: within the dome, re a channel's own", 0.5, beside, "");
+  for (const float share : {0.0f, 1.0f}) {
+    Sounding s = with([share](ReceiverModel& law) {
+      loud(law);
+      law.shared_noise.steady = share;
+    });
+    s.request.switches.expected_power = true;
+    s.ping();
+    const SharedNoise& law = s.mode().receiver.shared_noise;
+    const double wavelength_m = 1500 / static_cast<double>(s.mode().centre_hz), sine = static_cast<double>(law.sine);
+    const double own_upa = noise_rms_upa(s.mode(), noise_bandwidth_hz(s.envelope_hz()));
+    double off = 0, most = 0, beside = 0;
+    for (const int row : {60, 90, 130, 180, 220})
+      for (int j = 0; j < s.beams(); ++j) {
+        const double r = s.range_of_row(row), u = s.beam_sine(j);
+        const double power = share > 0 ? focused_power(s.mode(), r, u) : in_common(s.mode(), r, u, u).real();
+        const double expected = power_from_db(60) * std::min(1.0, r / static_cast<double>(law.full_m)) * power / law.channels;
+        const double measured = s.power(row, j) / (own_upa * own_upa) - 1;
+        most = std::max(most, expected);
+        off = std::max(off, std::abs(measured - expected));
+        // The shadow of the aperture: dark within the dome by rays.
+        const double edge = sine - law.channels / 2.0 * wavelength_m / (2 * sine) * (1 - sine * sine) / r;
+        if (std::abs(u) < edge - 0.06) beside = std::max(beside, measured / power_from_db(60));
+      }
+    record_oracle(no_number, "noise that channels share: beams against the sum over channels, re the loudest", 0, off / most,
+                  1e-3, share > 0 ? "the steady part" : "the changing part");
+    record_below(no_number, "noise that channels share: within the dome, re a channel's own", 0.5, beside,
+                 share > 0 ? "the steady part" : "the changing part");
+  }
 }
 
-// One draw a sample serves all beams: the ratio of two beams is that of their powers. The mean over draws is the power.
-TEST(SharedNoise, IsOneDrawASampleNewInEveryPing) {
+// What two beams have in common, over 30 pings and 50 rows, against the sum over groups; and two pings, nothing.
+TEST(SharedNoise, IsOneDrawAGroupNewInEveryPing) {
   Sounding s = with(loud);
-  s.request.switches.expected_power = true;
-  s.ping();
-  const std::vector<float> mean = s.last().pressure_upa;
-  s.request.switches.expected_power = false;
-  double share = 0, together = 0, steady = 0;
-  int n = 0, pairs = 0;
-  std::map<int, double> before;  // by row
-  for (std::uint32_t number = 1; number <= 40; ++number) {
+  s.request.switches.keep_beams = true;
+  std::vector<std::complex<float>> before;
+  double expected_power = 0, alike = 0, earlier = 0;
+  for (std::uint32_t number = 1; number <= 30; ++number) {
     s.request.number = PingNumber{number};
     s.ping();
-    for (const int row : {50, 70, 95}) {
-      const auto at = [&](int beam) { return static_cast<std::size_t>(row * s.beams() + beam); };
-      const auto draw = [&](int beam) {
-        return std::pow(static_cast<double>(s.last().pressure_upa[at(beam)] / mean[at(beam)]), 2);
-      };
-      share += draw(3), ++n;
-      together = std::max(together, std::abs(std::sqrt(draw(3) / draw(12)) - 1));
-      if (const auto earlier = before.find(row); earlier != before.end()) {
-        EXPECT_NE(draw(3), earlier->second) << "new in every ping";
-        steady += draw(3) * earlier->second, ++pairs;
+    const std::vector<std::complex<float>>& beams = s.last().beam_signal_upa;
+    for (int row = 40; row < 140; row += 2)
+      for (const int beam : {3, 8, 200}) {
+        const double r = s.range_of_row(row), u = s.beam_sine(beam), v = s.beam_sine(beam + 3);
+        const std::complex<double> scale =
+            std::conj(in_common(s.mode(), r, u, v)) / (in_common(s.mode(), r, u, u).real() * in_common(s.mode(), r, v, v).real());
+        const auto at = static_cast<std::size_t>(row * s.beams() + beam);
+        const double own_upa = noise_rms_upa(s.mode(), noise_bandwidth_hz(s.envelope_hz())),
+                     c = own_upa * own_upa * power_from_db(60) / 128 *
+                         std::min(1.0, r / static_cast<double>(s.mode().receiver.shared_noise.full_m));
+        const auto of = [&](const std::vector<std::complex<float>>& from) {
+          return (std::complex<double>(beams[at]) * std::conj(std::complex<double>(from[at + 3])) * scale).real() / c;
+        };
+        expected_power += (in_common(s.mode(), r, u, v) * scale).real();
+        alike += of(beams);
+        if (!before.empty()) earlier += of(before);
       }
-      before[row] = draw(3);
-    }
+    before = beams;
   }
-  // Exponentially distributed: 120 draws have a mean of 1 within 0.09 (1 sigma); of products of two, within 0.2.
-  EXPECT_NEAR(share / n, 1, 0.3);
-  EXPECT_NEAR(steady / pairs, 1, 0.6);
-  EXPECT_LT(together, 0.1) << "a channel's own noise is 60 dB lower";
+  EXPECT_GT(expected_power, 0.3 * 30 * 50 * 3) << "neighbours have much in common";
+  EXPECT_NEAR(alike / expected_power, 1, 0.1);
+  EXPECT_NEAR(earlier / expected_power, 0, 0.1);
 }
 
 // 90 % steady: two pings differ by a tenth of the power each, and the mean power stays.
