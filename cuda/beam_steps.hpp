@@ -73,21 +73,25 @@ SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::i
   const float rms = noise ? p.shared_rms[n] : 0.0f;
   const float steady = (noise ? p.shared_steady[n] : 0.0f) + (n < p.shared_leak_samples ? p.shared_leak[n] : 0.0f);
   const NoiseKey& key = p.noise_key;
+  float sum_re = 0, sum_im = 0;
   for (std::uint32_t part = 0; part < p.shared_parts; ++part) {
-    const float* r = p.shared_noise + 2 * ((static_cast<std::int64_t>(part) * p.beams + j) * p.shared_samples + n);
+    const float* r = p.shared_noise + 2 * (static_cast<std::int64_t>(part) * p.beams + j) * p.shared_samples + n;
+    const float r_re = r[0], r_im = r[p.shared_samples];
     const bool changes = part + 1 < p.shared_parts;
     const float level = changes ? rms : steady;
     if (p.sea.expected_power != 0) {
-      re += level * level * (r[0] * r[0] + r[1] * r[1]);
+      sum_re += level * level * (r_re * r_re + r_im * r_im);
       continue;
     }
     Complex c{changes ? 0 : steady, 0};
     if (changes && noise)
       add_noise(p.noise_table, place_of(key, key.sonar, key.ping, first_shared_noise_column + part),
                 static_cast<std::uint32_t>(n), rms, c);
-    re += c.re * r[0] - c.im * r[1];
-    im += c.re * r[1] + c.im * r[0];
+    sum_re += c.re * r_re - c.im * r_im;
+    sum_im += c.re * r_im + c.im * r_re;
   }
+  re += sum_re;
+  im += sum_im;
 }
 
 /// Sums of one sample over columns, for the beams of `panels` panels that hear the same columns. `weight`: of each panel.

@@ -199,7 +199,7 @@ struct PingView {
   double* point_weights;                    // [point_count + pulse_count][beams]
   float* crosstalk;                         // complex [samples], null = none
   float* mixed;                             // complex [beams][samples], null = beams keep to themselves
-  const float* shared_noise;                // complex [shared_parts][beams][shared_samples], SharedNoiseTable; null = none
+  const float* shared_noise;                // [shared_parts][beams][2][shared_samples], SharedNoiseTable; null = none
   const float *shared_rms, *shared_steady;  // [shared_samples] in a channel
   const float* shared_leak;                 // [shared_leak_samples] amplitude in a channel
   std::int64_t shared_samples, shared_leak_samples;

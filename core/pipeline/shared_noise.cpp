@@ -15,6 +15,10 @@ namespace {
 constexpr double none_db = -150;
 constexpr double margin = 2;  // how far beyond the range where the streaks leave the sector their edge is followed
 
+/// Blocks of samples of a beam are left out of a part where its power is so much less than that of the channels' own noise.
+constexpr double silent = 3e-3;
+constexpr std::size_t block_samples = 32;
+
 /// Adding and subtracting it leaves a whole number.
 constexpr float whole = 12582912;
 
@@ -110,9 +114,9 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
     for (int part = 0; part < array.parts(); ++part)
       for (std::size_t j = 0; j < beams; ++j) {
         const std::complex<float> of_beam = array.of(part, j);
-        float* to = response_.data() + 2 * ((static_cast<std::size_t>(part) * beams + j) * samples + n);
+        float* to = response_.data() + 2 * (static_cast<std::size_t>(part) * beams + j) * samples + n;
         to[0] = of_beam.real();
-        to[1] = of_beam.imag();
+        to[samples] = of_beam.imag();
         if (part + 1 == array.parts()) power += static_cast<double>(std::norm(of_beam));
       }
     const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)));
@@ -123,15 +127,35 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
       leak_upa_.push_back(static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[n]) *
                                              std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams) / power)));
   }
+  leave_out(silent * own_upa * own_upa * law.channels);
+}
+
+void SharedNoiseTable::leave_out(double power) {
+  const auto samples = static_cast<std::size_t>(samples_);
+  blocks_ = (samples + block_samples - 1) / block_samples;
+  for (std::size_t i = 0; i < parts_ * beams_ * blocks_; ++i) {
+    const bool changes = i / (beams_ * blocks_) + 1 < parts_;
+    const std::size_t from = i % blocks_ * block_samples, to = std::min(from + block_samples, samples);
+    float *re = response_.data() + 2 * (i / blocks_ * samples), *im = re + samples;
+    double most = 0;
+    for (std::size_t n = from; n < to; ++n) {
+      const float upa = changes ? noise_upa_[n] : steady_upa_[n] + (n < leak_upa_.size() ? leak_upa_[n] : 0);
+      most = std::max(most, static_cast<double>(upa * upa * (re[n] * re[n] + im[n] * im[n])));
+    }
+    is_heard_.push_back(most > power ? 1 : 0);
+    if (most > power) continue;
+    std::fill(re + from, re + to, 0.0f);
+    std::fill(im + from, im + to, 0.0f);
+  }
 }
 
 double SharedNoiseTable::noise_power(std::size_t beam, std::size_t sample) const {
   if (sample >= noise_upa_.size()) return 0;
   double power = 0;
   for (std::size_t part = 0; part < parts_; ++part) {
-    const float* r = response_.data() + 2 * ((part * beams_ + beam) * noise_upa_.size() + sample);
-    const float rms = part + 1 < parts_ ? noise_upa_[sample] : steady_upa_[sample];
-    power += static_cast<double>(rms * rms * (r[0] * r[0] + r[1] * r[1]));
+    const float* r = response_.data() + 2 * (part * beams_ + beam) * noise_upa_.size() + sample;
+    const float im = r[noise_upa_.size()], rms = part + 1 < parts_ ? noise_upa_[sample] : steady_upa_[sample];
+    power += static_cast<double>(rms * rms * (r[0] * r[0] + im * im));
   }
   return power;
 }
@@ -139,33 +163,48 @@ double SharedNoiseTable::noise_power(std::size_t beam, std::size_t sample) const
 void SharedNoiseTable::draw(const PingNoise& key, bool noise, bool leak, bool expected_power, std::vector<float>& shared) const {
   const auto samples = static_cast<std::size_t>(samples_);
   shared.assign(2 * parts_ * samples, 0.0f);
+  if (samples == 0) return;
+  std::vector<float> draws(2 * samples);
   for (std::size_t part = 0; part + 1 < parts_ && noise; ++part) {
-    float* to = shared.data() + 2 * part * samples;
-    if (!expected_power) key.table->set(key.sonar, key.ping, static_cast<int>(first_shared_noise_column + part), 1, samples_, to);
+    float *re = shared.data() + 2 * part * samples, *im = re + samples;
+    if (expected_power) {
+      std::copy(noise_upa_.begin(), noise_upa_.end(), re);
+      continue;
+    }
+    key.table->set(key.sonar, key.ping, static_cast<int>(first_shared_noise_column + part), 1, samples_, draws.data());
     for (std::size_t n = 0; n < samples; ++n) {
-      to[2 * n] = noise_upa_[n] * (expected_power ? 1 : to[2 * n]);
-      to[2 * n + 1] *= noise_upa_[n];
+      re[n] = noise_upa_[n] * draws[2 * n];
+      im[n] = noise_upa_[n] * draws[2 * n + 1];
     }
   }
-  if (samples == 0) return;
   float* steady = shared.data() + 2 * (parts_ - 1) * samples;
-  for (std::size_t n = 0; n < samples && noise; ++n) steady[2 * n] += steady_upa_[n];
-  for (std::size_t n = 0; n < leak_upa_.size() && leak; ++n) steady[2 * n] += leak_upa_[n];
+  if (noise) std::copy(steady_upa_.begin(), steady_upa_.end(), steady);
+  for (std::size_t n = 0; n < leak_upa_.size() && leak; ++n) steady[n] += leak_upa_[n];
 }
 
 void SharedNoiseTable::add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const {
-  const int count = std::min(beams.samples, samples_ - beams.first_sample);
-  const auto first = static_cast<std::size_t>(beams.first_sample), samples = static_cast<std::size_t>(samples_);
-  for (int j = 0; j < beams.beams && count > 0; ++j)
-    for (std::size_t part = 0; part < parts_; ++part) {
-      const float* __restrict r = response_.data() + 2 * ((part * beams_ + static_cast<std::size_t>(j)) * samples + first);
-      const float* __restrict c = shared.data() + 2 * (part * samples + first);
-      float* __restrict to = beams.beam(j);
-      for (int n = 0; n < count && expected_power; ++n)
-        to[2 * n] += c[2 * n] * c[2 * n] * (r[2 * n] * r[2 * n] + r[2 * n + 1] * r[2 * n + 1]);
-      for (int n = 0; n < count && !expected_power; ++n) {
-        to[2 * n] += c[2 * n] * r[2 * n] - c[2 * n + 1] * r[2 * n + 1];
-        to[2 * n + 1] += c[2 * n] * r[2 * n + 1] + c[2 * n + 1] * r[2 * n];
+  const auto samples = static_cast<std::size_t>(samples_), first = static_cast<std::size_t>(beams.first_sample);
+  const std::size_t last = std::min(first + static_cast<std::size_t>(beams.samples), samples);
+  for (std::size_t j = 0; j < beams_ && first < last; ++j)
+    for (std::size_t block = first / block_samples; block * block_samples < last; ++block) {
+      const std::size_t from = std::max(first, block * block_samples), to = std::min(last, (block + 1) * block_samples);
+      const auto count = static_cast<int>(to - from);
+      float re[block_samples] = {}, im[block_samples] = {};
+      for (std::size_t part = 0; part < parts_; ++part) {
+        const std::size_t i = part * beams_ + j;
+        if (is_heard_[i * blocks_ + block] == 0) continue;
+        const float* __restrict r = response_.data() + 2 * i * samples + from, * __restrict r_im = r + samples;
+        const float* __restrict c = shared.data() + 2 * part * samples + from, * __restrict c_im = c + samples;
+        for (int n = 0; n < count && expected_power; ++n) re[n] += c[n] * c[n] * (r[n] * r[n] + r_im[n] * r_im[n]);
+        for (int n = 0; n < count && !expected_power; ++n) {
+          re[n] += c[n] * r[n] - c_im[n] * r_im[n];
+          im[n] += c[n] * r_im[n] + c_im[n] * r[n];
+        }
+      }
+      float* s = beams.beam(static_cast<int>(j)) + 2 * (from - first);
+      for (int n = 0; n < count; ++n) {
+        s[2 * n] += re[n];
+        s[2 * n + 1] += im[n];
       }
     }
 }

@@ -2,6 +2,7 @@
 // leak. The array, focused at every range, makes streaks and fringes of them (docs/acoustics.md, section 5).
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "core/pipeline/noise.hpp"
@@ -21,7 +22,8 @@ class SharedNoiseTable {
   bool has_leak() const { return !leak_upa_.empty(); }
   int samples() const { return samples_; }  // from the first on; at larger ranges the signal falls outside the sector
   std::size_t parts() const { return parts_; }
-  /// Complex [parts][beams][samples]: of a signal of amplitude 1 in the channels of a group; in the last part, in all channels.
+  /// Real and imaginary part, [parts][beams][2][samples]: of a signal of amplitude 1 in the channels of a group; in the last
+  /// part, in all channels.
   const std::vector<float>& response() const { return response_; }
   // In a channel. Of what is new in every ping and by group, rms [samples]; of what is not, amplitude [samples]; of the leak,
   // amplitude [as far as it reaches].
@@ -29,14 +31,17 @@ class SharedNoiseTable {
   const std::vector<float>& steady_upa() const { return steady_upa_; }
   const std::vector<float>& leak_upa() const { return leak_upa_; }
   double noise_power(std::size_t beam, std::size_t sample) const;  // [uPa^2]; 0 beyond the samples
-  /// What the channels of one ping share, complex [parts][samples], or its rms; without the noise, or without the leak.
+  /// What the channels of one ping share, [parts][2][samples], or its rms; without the noise, or without the leak.
   void draw(const PingNoise& key, bool noise, bool leak, bool expected_power, std::vector<float>& shared) const;
   /// On top of the beams.
   void add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const;
 
  private:
+  void leave_out(double power);
+
   int samples_ = 0;
-  std::size_t parts_ = 0, beams_ = 0;
+  std::size_t parts_ = 0, beams_ = 0, blocks_ = 0;
+  std::vector<std::uint8_t> is_heard_;  // [parts][beams][blocks]
   std::vector<float> response_, noise_upa_, steady_upa_, leak_upa_;
 };
 

@@ -34,30 +34,31 @@ constexpr float tvg_slope_db = 35, tvg_minimum_range_m = 0.25f;
 constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;
 // unknown: fitted to the captured M1200d ping on the assumption that its bed is very soft mud (-40 dB): the echo of the bed at 1
 // m is 30 dB above the noise. Other modes: chosen.
-constexpr float noise_figure_db = 10, m1200d_high_noise_figure_db = 15;
+constexpr float noise_figure_db = 10, m1200d_high_noise_figure_db = 14.6f;
 
-/// unknown: fitted to the first two captured M1200d pings, levels adjusted after a look at the third (docs/acoustics.md, section
-/// 9); of their mode only.
+/// unknown: fitted to the first two captured M1200d pings (docs/acoustics.md, section 9); of their mode only.
 void fit_to_recording(ReceiverModel& receiver) {
-  // Neighbouring rows of the far noise are uncorrelated (0.02), those of the bed are as with a pulse of 0.9 rows.
-  receiver.noise_width = 0.66f / 0.9f;
+  // Neighbouring rows of the far noise are uncorrelated (0.02).
+  receiver.noise_width = 0.71f / 0.9f;
   // Small echoes within 0.5 m are 3 beams wide at half their amplitude ahead, 5 to 7 at 20 degrees.
   receiver.defocus = 0.4f;
   // The noise of rows 620 to 702, with a stripe in the middle, of rows 20 to 150, and its neighbouring beams.
-  receiver.profile.noise_db = {-4.8f, -5.5f, -3.6f, -2.3f, -1.7f, 0.3f,  -0.1f, 0.7f, 2.6f,
-                               0.7f,  0.1f,  -0.1f, -1.0f, -2.7f, -2.9f, -4.3f, -4.5f};
-  receiver.profile.near_noise_db = {4.2f,  3.6f, -0.2f, -4,    -6.5f, -7.6f, -6.7f, -5.3f, -4.6f,
-                                    -5.3f, -7,   -7.7f, -6.5f, -4.3f, -2,    1.6f,  3.4f};
+  receiver.profile.noise_db = {-5.6f, -6.2f, -3.9f, -2.3f, -1.7f, 0.3f,  -0.1f, 0.7f, 2.6f,
+                               0.7f,  0.1f,  -0.1f, -1.0f, -2.7f, -3.2f, -5,    -5.3f};
+  receiver.profile.near_noise_db = {-9.9f, -9.9f, -9.9f, -8.7f, -8.7f, -8.7f, -8.7f, -6.4f, -4.1f,
+                                    -6.4f, -8.7f, -8.7f, -8.7f, -8.7f, -9.9f, -9.9f, -9.9f};
   receiver.profile.near_m = 0.4f;
-  // The streaks of rows 10 to 180 lie beside a dome: the shadow of an aperture of 81 mm, heard from a sine of 0.56 (half a
-  // wavelength of the low mode would be 0.57), which 128 channels of that spacing make.
-  receiver.shared_noise.level_db = 3.2f;
+  // In rows 0 and 1 the leak is a comb, in rows 8 to 20 the noise has steady fringes, and in rows 10 to 180 it lies beside a
+  // dome, in grains that are the wider the nearer: 128 channels, heard from a sine of 0.56 (half a wavelength of the low mode
+  // would be 0.57), with opposite signs in neighbours.
+  receiver.shared_noise = {.level_db = 3.4f, .full_m = 0.2f, .steady = 0.6f, .focus_rows = 0.5f, .nearest_focus_m = 0.0085f};
+  receiver.leak_is_shared = true;
   // 255 never occurs; codes 0 to 5 of the noise are as frequent as of floor(255 v^gamma), v below 1.
   receiver.truncates = true;
   receiver.profile.blend = {-0.1f, 0.07f, 0.1f, 0.13f, 0.13f, 0.13f, 0.13f, 0.06f, -0.1f};
   // The medians of rows 0 to 8: it rings, with a null in row 2. By half a row.
-  receiver.leak_ring_db = {-5.4f, -5.4f,  -5.2f, -5.1f,  -15, -26,    -24, -22.7f, -21, -19.4f,
-                           -21,   -22.6f, -25,   -28.2f, -31, -33.5f, -38, -45,    -60};
+  receiver.leak_ring_db = {-5.4f, -5.4f,  -5.2f, -5.1f,  -16, -28,    -24.5f, -22.7f, -21, -19.4f,
+                           -21,   -22.6f, -25,   -28.2f, -31, -33.5f, -38,    -45,    -60};
   receiver.leak_ring_step_m = 0.001421f;
 }
 
