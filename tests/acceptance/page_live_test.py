@@ -140,12 +140,6 @@ class Live(PageChecks, unittest.TestCase):
                 self.skipTest(f"other programs keep the processors busy: load {os.getloadavg()[0]:.1f}")
             self.assertLess(best, 1000)
 
-    def patiently(self, condition, patience_s=60):
-        deadline = time.monotonic() + patience_s
-        while not condition():
-            self.assertLess(time.monotonic(), deadline)
-            time.sleep(0.05)
-
     def test_numbers_are_true(self):
         """A driver that reads at 7 Hz is shown with 7 Hz, and with the drops that the status has."""
         with Sonard(scene="tank-rod.yaml", pose="{frame: ENU_FLU, xyz_m: [-0.4, 0, -0.61]}") as daemon, \

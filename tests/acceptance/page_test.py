@@ -196,7 +196,7 @@ class Page(PageChecks, unittest.TestCase):
         self.assertGreater(page.run("document.querySelector('#fan-pane').offsetWidth"), 100)
         self.mock.set_calls.clear()
         page.press(" ")
-        time.sleep(0.5)
+        self.patiently(lambda: self.mock.set_calls)
         self.assertEqual(self.mock.set_calls, [("/rov/trajectory/paused", True)])
         page.run("document.querySelector('#setting-rows input').focus()")
         page.press("c")
@@ -234,8 +234,8 @@ class Page(PageChecks, unittest.TestCase):
         page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
         change = "(v) => {{ const f = document.querySelector('[name=\"/front/range_m\"]'); f.value = v; f.dispatchEvent(new Event('change')); }}"
         page.run(f"({change.replace('{{', '{').replace('}}', '}')})('7.5')")
+        self.patiently(lambda: self.mock.parameters["/front/range_m"] == 7.5)
         page.wait("document.querySelector('[name=\"/front/range_m\"]').value === '7.5'")
-        self.assertEqual(self.mock.parameters["/front/range_m"], 7.5)
         page.run(f"({change.replace('{{', '{').replace('}}', '}')})('400')")
         page.wait("document.querySelector('#refusal').innerText.includes('range_m must be')")
         page.wait("document.querySelector('[name=\"/front/range_m\"]').value === '7.5'")

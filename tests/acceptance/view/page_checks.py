@@ -51,6 +51,12 @@ def shown(page, patience_s=60):
 class PageChecks:
     """Of a TestCase."""
 
+    def patiently(self, condition, patience_s=60):
+        deadline = time.monotonic() + patience_s
+        while not condition():
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.05)
+
     def reference(self, raw, map_name, width):
         """What `sonarctl view` draws of a ping's message in a file."""
         png = pathlib.Path(f"{raw}.png")
