@@ -9,6 +9,7 @@
 #include <complex>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "core/pipeline/arithmetic/receiver.hpp"
@@ -86,10 +87,10 @@ TEST(SharedNoise, IsTheFocusedArraysSumOverItsChannels) {
         const double edge = sine - law.channels / 2.0 * wavelength_m / (2 * sine) * (1 - sine * sine) / r;
         if (std::abs(u) < edge - 0.06) beside = std::max(beside, measured / power_from_db(60));
       }
-    record_oracle(no_number, "noise that channels share: beams against the sum over channels, re the loudest", 0, off / most,
-                  1e-3, share > 0 ? "the steady part" : "the changing part");
-    record_below(no_number, "noise that channels share: within the dome, re a channel's own", 0.5, beside,
-                 share > 0 ? "the steady part" : "the changing part");
+    const std::string part = share > 0 ? "steady" : "changing";
+    record_oracle(no_number, part + " noise that channels share: beams against the sum over channels, re the loudest", 0,
+                  off / most, 1e-3, "");
+    record_below(no_number, part + " noise that channels share: within the dome, re a channel's own", 0.5, beside, "");
   }
 }
 
