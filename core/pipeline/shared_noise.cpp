@@ -13,9 +13,9 @@ namespace sonar {
 namespace {
 
 constexpr double none_db = -150;
-constexpr double margin = 2;  // how far beyond the range where the streaks leave the sector their edge is followed
+constexpr double margin = 2;  // how far beyond the range where it leaves the sector it is followed
 
-/// Blocks of samples of a beam are left out of a part where its power is so much less than that of the channels' own noise.
+/// Of a part, blocks of samples of a beam are left out that are nowhere louder than this share of the channels' own noise (30).
 constexpr double silent = 3e-3;
 constexpr std::size_t block_samples = 32;
 

@@ -102,6 +102,29 @@ sonar:
   EXPECT_FALSE(job.config.engine.switches.noise);
 }
 
+TEST(RenderFile, WhatChannelsShareReachesTheReceiver) {
+  const auto with = [](const std::string& noise) {
+    return point + "sonar: {model: {receiver: {leak_is_shared: true, shared_noise: {" + noise + "}}}}\n";
+  };
+  const RenderInput input = parsed(
+      with("level_db: 3, channels: 96, group: 24, sine: 0.4, full_m: 2, steady: 0.5, focus_rows: 1, nearest_focus_m: 0.1"));
+  const ReceiverModel& law = input.jobs.at(0).mode().receiver;
+  EXPECT_TRUE(law.leak_is_shared);
+  EXPECT_EQ(law.shared_noise.level_db, 3);
+  EXPECT_EQ(law.shared_noise.channels, 96);
+  EXPECT_EQ(law.shared_noise.group, 24);
+  EXPECT_EQ(law.shared_noise.sine, 0.4f);
+  EXPECT_EQ(law.shared_noise.full_m, 2);
+  EXPECT_EQ(law.shared_noise.steady, 0.5f);
+  EXPECT_EQ(law.shared_noise.focus_rows, 1);
+  EXPECT_EQ(law.shared_noise.nearest_focus_m, 0.1f);
+
+  EXPECT_THAT(refusal(with("channels: 97")), HasSubstr("shared_noise.channels: must be even"));
+  for (const char* wrong : {"group: 31", "channels: 100", "group: 2"})
+    EXPECT_THAT(refusal(with(wrong)), HasSubstr("shared_noise.group: must be even and at least a 32nd of the channels")) << wrong;
+  EXPECT_THAT(refusal(with("steady: 1.1")), HasSubstr("shared_noise.steady: must be between 0 and 1"));
+}
+
 TEST(RenderFile, WindowsListedBeamsAndLevelsReachTheSonar) {
   const std::string text = point +
                            "sonar: {model: {beam_azimuths_deg: [20, 5, -10], beam_widths_deg: [2, 1, 3]},\n"
