@@ -25,6 +25,13 @@ double rise(double x) { return 0.5 * (1 + std::erf(x)); }
 
 }  // namespace
 
+double Leak::reach_m(const ReceiverModel& law) {
+  if (!(law.leak_upa > 0)) return 0;
+  if (!law.leak_ring_db.empty())
+    return static_cast<double>(law.leak_ring_step_m) * static_cast<double>(law.leak_ring_db.size() - 1);
+  return forgotten_db / static_cast<double>(law.leak_decay_db_per_m);
+}
+
 /// docs/acoustics.md, eq. 31: rms(r) = leak_upa 10^(-decay r / 20), or by a table, at a beam's output; per column over sqrt(sum_k
 /// W_jk^2), as for the noise.
 Leak::Leak(const PingPlan& plan, const Switches& switches) {

@@ -27,6 +27,9 @@ class Leak {
   static constexpr double changing_share = 0.02;
   static constexpr double steady_part = 0.98994949366116653;  // of its amplitude: sqrt(1 - changing_share)
 
+  /// Where it ends [m]; infinity where it does not decay, 0 where there is none.
+  static double reach_m(const ReceiverModel& law);
+
   Leak() = default;
   Leak(const PingPlan& plan, const Switches& switches);
   bool is_audible() const { return !rms_upa_.empty(); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 
 #include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/pipeline/arithmetic/noise_place.hpp"
@@ -19,6 +20,10 @@ constexpr double margin = 2;  // how far beyond the range where it leaves the se
 constexpr double silent = 3e-3;
 constexpr std::size_t block_samples = 32;
 
+/// Mean over the beams of what they receive of the leak, re the sum of the channels' powers: where it is less, the beams point
+/// at its nulls, and are not given the level of (31) nonetheless.
+constexpr double faint = 1e-3;
+
 /// Adding and subtracting it leaves a whole number.
 constexpr float whole = 12582912;
 
@@ -28,17 +33,35 @@ float sine_near_0(float x) {
   return sine_of_quarter(std::fabs(x) > 0.25f ? folded : x);
 }
 
+bool has_noise(const SharedNoise& law) { return static_cast<double>(law.level_db) > none_db; }
+int parts_of(const SharedNoise& law) { return law.channels / (law.group / 2) + 2; }
+
+/// Beams of sines up to `widest` hear the noise to there, or at every range.
+double reach_m(const SharedNoise& law, double wavelength_m, double widest) {
+  const double sine = static_cast<double>(law.sine), outside = sine - widest;
+  if (!has_noise(law)) return 0;
+  if (outside <= 0) return std::numeric_limits<double>::infinity();
+  return margin * (1 - sine * sine) * law.channels / 2 * wavelength_m / (2 * sine) / outside;
+}
+double wavelength_of(const FrequencyMode& mode, const PingSettings& settings) {
+  return static_cast<double>(settings.device_sound_speed_mps) / static_cast<double>(mode.centre_hz);
+}
+
 /// Complex [parts][beams]: sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}, d the delay of a channel at x against the
 /// array's middle, from a point at a range and sine u. Parts: groups, which overlap by half and whose w^2 add to 1 in every
 /// channel; last, all channels alike.
 class FocusedArray {
  public:
   FocusedArray(const std::vector<double>& beam_sines, const SharedNoise& law, double spacing_in_wavelengths)
-      : u_(beam_sines.begin(), beam_sines.end()), channels_(law.channels), half_(law.group / 2), d_(spacing_in_wavelengths) {
-    re_.resize(static_cast<std::size_t>(parts()) * u_.size());
+      : u_(beam_sines.begin(), beam_sines.end()),
+        channels_(law.channels),
+        half_(law.group / 2),
+        parts_(parts_of(law)),
+        d_(spacing_in_wavelengths) {
+    re_.resize(static_cast<std::size_t>(parts_) * u_.size());
     im_.resize(re_.size());
   }
-  int parts() const { return channels_ / half_ + 2; }
+  int parts() const { return parts_; }
   void focus(double range_in_wavelengths) {
     std::fill(re_.begin(), re_.end(), 0.0f);
     std::fill(im_.begin(), im_.end(), 0.0f);
@@ -47,7 +70,7 @@ class FocusedArray {
     for (int m = 0; m < channels_; ++m) {
       const auto x = static_cast<float>((m - 0.5 * (channels_ - 1)) * d_);
       for (std::size_t j = 0; j < u_.size(); ++j) {
-        const float beyond = x * (x - 2 * r * u_[j]), delay = beyond / (std::sqrt(r * r + beyond) + r);
+        const float beyond = x * (x - 2 * r * u_[j]), delay = beyond / (std::sqrt(larger(r * r + beyond, 0)) + r);
         const float turns = delay - ((delay + whole) - whole);
         cosine[j] = sine_near_0(0.25f - std::fabs(turns));
         sine[j] = sine_near_0(turns);
@@ -55,7 +78,7 @@ class FocusedArray {
       const double sign = m % 2 == 0 ? 1 : -1, way = pi / 2 * (m % half_ + 0.5) / half_;
       add(m / half_, sign * std::cos(way), cosine, sine);
       add(m / half_ + 1, sign * std::sin(way), cosine, sine);
-      add(parts() - 1, sign, cosine, sine);
+      add(parts_ - 1, sign, cosine, sine);
     }
   }
   std::complex<float> of(int part, std::size_t beam) const { return {re_[at(part) + beam], im_[at(part) + beam]}; }
@@ -72,30 +95,37 @@ class FocusedArray {
   }
 
   std::vector<float> u_, re_, im_;
-  int channels_, half_;
+  int channels_, half_, parts_;
   double d_;
 };
 
 }  // namespace
 
+double shared_noise_values(const FrequencyMode& mode, const PingSettings& settings) {
+  const ReceiverModel& law = mode.receiver;
+  const double widest = std::sin(std::min(static_cast<double>(mode.horizontal_aperture_rad) / 2, pi / 2));
+  const double until_m =
+      std::max(reach_m(law.shared_noise, wavelength_of(mode, settings), widest), law.leak_is_shared ? Leak::reach_m(law) : 0);
+  const double most = static_cast<double>(settings.range_bin_count) * settings.samples_per_row;
+  const double samples = std::min(most, std::ceil(until_m / settings.range_bin_m * settings.samples_per_row) + 1);
+  return 2.0 * parts_of(law.shared_noise) * settings.beam_count * samples;
+}
+
 /// Eq. 47.
 SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   const SharedNoise& law = plan.mode.receiver.shared_noise;
-  const bool noise = static_cast<double>(law.level_db) > none_db;
+  const bool noise = has_noise(law);
   const Leak leak = plan.mode.receiver.leak_is_shared ? Leak(plan, plan.switches) : Leak();
   if (!plan.switches.shared_noise || !(noise || leak.is_audible()) || law.channels < 2) return;
-  const double wavelength_m =
-      static_cast<double>(plan.settings.device_sound_speed_mps) / static_cast<double>(plan.mode.centre_hz);
+  const double wavelength_m = wavelength_of(plan.mode, plan.settings);
   const double sine = static_cast<double>(law.sine), spacing_m = wavelength_m / (2 * sine);
   const std::size_t beams = plan.beam_sine.size();
   double widest = 0;
   for (const double u : plan.beam_sine) widest = std::max(widest, std::abs(u));
-  const double outside = sine - widest;
-  const double until_m =
-      outside > 0 ? margin * (1 - sine * sine) * law.channels / 2 * spacing_m / outside : plan.settings.range_m;
+  const double until_m = reach_m(law, wavelength_m, widest);
   const auto range_m = [&](int n) { return (n + plan.sample_offset) * plan.sample_spacing_m; };
   const auto leak_samples = static_cast<int>(leak.rms_upa().size());
-  while (samples_ < plan.samples && ((noise && range_m(samples_) < until_m) || samples_ < leak_samples)) ++samples_;
+  while (samples_ < plan.samples && (range_m(samples_) < until_m || samples_ < leak_samples)) ++samples_;
   // A channel's own noise, by itself, is (30) at a beam's output.
   const double own_upa = plan.column_noise_upa * std::sqrt(plan.beam_weights.weight_energy / law.channels);
   const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) : 0;
@@ -107,6 +137,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   beams_ = beams;
   const auto samples = static_cast<std::size_t>(samples_);
   response_.resize(2 * parts_ * beams * samples);
+  const double least = faint * law.channels * static_cast<double>(beams);
   for (std::size_t n = 0; n < samples; ++n) {
     const double range = range_m(static_cast<int>(n)), r = std::max(range, plan.sample_spacing_m / 2);
     array.focus(std::max(range + focus_m, nearest_m) / wavelength_m);
@@ -123,9 +154,9 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
     noise_upa_.push_back(static_cast<float>(upa * std::sqrt(1 - steady)));
     steady_upa_.push_back(static_cast<float>(upa * std::sqrt(steady)));
     // (31) at the beams' outputs, as a mean over them.
+    const double per_channel = std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams) / std::max(power, least));
     if (static_cast<int>(n) < leak_samples)
-      leak_upa_.push_back(static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[n]) *
-                                             std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams) / power)));
+      leak_upa_.push_back(static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[n]) * per_channel));
   }
   leave_out(silent * own_upa * own_upa * law.channels);
 }

@@ -12,6 +12,9 @@ namespace sonar {
 
 struct PingPlan;
 
+/// How many values the table below holds at most.
+double shared_noise_values(const FrequencyMode& mode, const PingSettings& settings);
+
 /// What the beams make of them, a function of the plan alone.
 class SharedNoiseTable {
  public:

@@ -2,7 +2,7 @@
 // where it is off (docs/acoustics.md, section 5). Codes that are cut off, not rounded (section 7).
 #include "core/pipeline/shared_noise.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +14,7 @@
 
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
+#include "core/pipeline/check_request.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "tests/core/pipeline/kernel_sets.hpp"
 #include "tests/core/pipeline/scenes.hpp"
@@ -199,6 +200,35 @@ TEST(SharedLeak, IsWhatTheFocusedArrayMakesOfIt) {
   s.request.switches.leak = false;
   s.ping();
   EXPECT_EQ(s.pressure(3, 40), 0);
+}
+
+// One beam ahead, where the signs cancel: it is not given the level of the mean for all that.
+TEST(SharedLeak, IsNotRaisedWhereItCancels) {
+  Sounding s = with([](ReceiverModel& law) {
+    law.leak_upa = 1e8f;
+    law.leak_decay_db_per_m = 200;
+    law.leak_is_shared = true;
+  });
+  s.request.settings.beam_count = 1;
+  s.request.switches.noise = false;
+  s.request.switches.expected_power = true;
+  s.ping();
+  ASSERT_EQ(s.beam_sine(0), 0);
+  for (const int row : {0, 1, 5, 12, 30})
+    EXPECT_NEAR(s.power(row, 0) / (1e16 * power_from_db(-200 * s.range_of_row(row))), 0.02, 0.001) << "its changing part alone";
+}
+
+TEST(SharedNoise, IsRefusedWhereItsTableFitsNoMemory) {
+  Sounding s = with([](ReceiverModel& law) { law.shared_noise = {.level_db = 3, .channels = 1024, .group = 32, .sine = 0.2f}; });
+  s.request.settings.range_bin_count = 20000;
+  s.request.settings.beam_count = 512;
+  EXPECT_THAT(why_invalid(s.request), ::testing::HasSubstr("what the channels share"));
+  Sounding outside = with([](ReceiverModel& law) { law.shared_noise = {.level_db = 3, .channels = 1024, .group = 32}; });
+  outside.request.settings.range_bin_count = 20000;
+  outside.request.settings.beam_count = 512;
+  EXPECT_EQ(why_invalid(outside.request), "");
+  s.request.switches.shared_noise = false;
+  EXPECT_EQ(why_invalid(s.request), "");
 }
 
 TEST(SharedNoise, IsTheSameForAnyNumberOfThreadsAndNothingWhenOff) {
