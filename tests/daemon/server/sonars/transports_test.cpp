@@ -93,8 +93,11 @@ class UdpSocket {
 
 /// The next datagram that this daemon sent: daemons of the tests that run beside this one send to fixed ports and groups too.
 std::string next_of(const Daemon& daemon, UdpSocket& to, milliseconds timeout = patience) {
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
   std::string datagram;
-  do datagram = to.next(timeout);
+  do
+    datagram = to.next(std::chrono::ceil<milliseconds>(
+        std::max(deadline - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration::zero())));
   while (!datagram.empty() && !to.sender.starts_with(daemon.address() + ":"));
   return datagram;
 }
