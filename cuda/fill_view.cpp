@@ -102,7 +102,7 @@ void PingPreparer::add_receiver(Making& m) {
     // (31): powers of the fixed and the changing part add up to 1. Of a shared leak the fixed part is added to the beams.
     view.leak_steady = leak.steady();
     view.shared_leak_samples = static_cast<std::int64_t>(m.plan.shared_noise.leak_upa().size());
-    view.leak_changing = static_cast<float>(std::sqrt(Leak::changing_share));
+    view.leak_changing = static_cast<float>(Leak::changing_part);
   }
   const Crosstalk crosstalk(m.plan, m.request().switches);
   if (crosstalk.is_audible()) {

@@ -12,7 +12,6 @@ namespace {
 constexpr double longest_pulse_in_samples = 1000;
 constexpr double shortest_exact_pulse_in_samples = 0.25;  // by way of the spectrum; tabulated ones may be as short as they like
 constexpr double most_column_samples = 1 << 29;           // of all columns, 4 GiB
-constexpr double most_shared_values = 1 << 30;            // of noise that channels share, 4 GiB
 constexpr double most_frequencies = 1 << 20;              // of a column by way of the spectrum
 constexpr double tone_band_in_pulses = 20, other_band_in_pulses = 3;  // in 1 / width, at least Pulse::band_hz
 constexpr int most_fixed_rays = 100000;
@@ -21,7 +20,7 @@ constexpr double widest_beam_rad = 1.5, narrowest_width_rad = 1e-4;
 constexpr float widest_level_db = 300;
 
 /// Pulses and buffers that no picture needs and no memory holds.
-std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings& s, const Switches& switches) {
+std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings& s) {
   const double samples = static_cast<double>(s.range_bin_count) * s.samples_per_row;
   const double pulse = static_cast<double>(s.pulse_width_m) / (s.range_bin_m / s.samples_per_row);  // in samples
   const bool measured = mode.waveform.shape == Waveform::Shape::measured;  // has a width, and limits, of its own
@@ -34,9 +33,6 @@ std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings&
     return "an exact pulse so short on so many samples needs too much memory: choose fewer rows or a longer pulse";
   if (samples * make_columns(mode, s.beam_count).count > most_column_samples)
     return "so many beams, rows and samples a row need too much memory: choose fewer of them";
-  if (switches.shared_noise && shared_noise_values(mode, s) > most_shared_values)
-    return "what the channels share, at so many ranges and in so many groups, needs too much memory: choose fewer rows, larger "
-           "groups, or a sine of shared_noise outside the sector";
   return {};
 }
 
@@ -119,7 +115,9 @@ std::string why_invalid(const PingRequest& r) {
       return why;
   if (r.switches.fixed_fan < 0 || r.switches.fixed_fan > most_fixed_rays)
     return "fixed_fan " + std::to_string(r.switches.fixed_fan) + " is not in 0..100000";
-  if (std::string why = why_out_of_proportion(mode, s, r.switches); !why.empty()) return why;
+  if (std::string why = why_out_of_proportion(mode, s); !why.empty()) return why;
+  if (std::string why = why_impossible(mode.receiver.shared_noise); !why.empty()) return "shared_noise: " + why;
+  if (std::string why = why_table_too_large(mode, s, r.switches); !why.empty()) return why;
   return why_impossible_motion(r);
 }
 

@@ -58,7 +58,7 @@ Leak::Leak(const PingPlan& plan, const Switches& switches) {
 void Leak::add(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) const {
   const std::size_t n = rms_upa_.size();
   std::vector<float> grain(2 * n);
-  const auto changing = static_cast<float>(std::sqrt(changing_share));
+  const auto changing = static_cast<float>(changing_part);
   for (int k = first; k < last; ++k) {
     float* to = signals.column(k) + 2 * signals.lead;
     if (plan.expected_power) {

@@ -25,7 +25,11 @@ class Leak {
   /// unknown: chosen. Share of its power that is new in every ping; in the captured M1200d pings 0.2 % in the first two rows,
   /// about a quarter in the next five.
   static constexpr double changing_share = 0.02;
-  static constexpr double steady_part = 0.98994949366116653;  // of its amplitude: sqrt(1 - changing_share)
+  // Of its amplitude: sqrt(1 - changing_share), sqrt(changing_share).
+  static constexpr double steady_part = 0.98994949366116653, changing_part = 0.14142135623730951;
+  static_assert(steady_part * steady_part + changing_share > 1 - 1e-15 && steady_part * steady_part + changing_share < 1 + 1e-15);
+  static_assert(changing_part * changing_part / changing_share > 1 - 1e-15 &&
+                changing_part * changing_part / changing_share < 1 + 1e-15);
 
   /// Where it ends [m]; infinity where it does not decay, 0 where there is none.
   static double reach_m(const ReceiverModel& law);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <string>
 
 #include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/pipeline/arithmetic/noise_place.hpp"
@@ -14,11 +15,18 @@ namespace sonar {
 namespace {
 
 constexpr double none_db = -150;
-constexpr double margin = 2;  // how far beyond the range where it leaves the sector it is followed
+/// How far beyond the range where the whole array's part leaves the sector the noise is followed, and where it begins to fade:
+/// what groups hear in the outer beams would go on, and is not in the recording at 1.75 m, 3.7 times that range.
+constexpr double margin = 3, fades_from = 2;
 
-/// Of a part, blocks of samples of a beam are left out that are nowhere louder than this share of the channels' own noise (30).
-constexpr double silent = 3e-3;
+/// Of a part, blocks of samples of a beam are left out that are nowhere louder than this share of the channels' own noise (30),
+/// over the number of parts.
+constexpr double silent = 0.03;
 constexpr std::size_t block_samples = 32;
+
+constexpr int most_groups = 32;  // each has a table
+// Of a table's complex values, 1 GiB, and of its sums: some 10 s.
+constexpr double most_values = 1 << 27, most_steps = 4e9;
 
 /// Mean over the beams of what they receive of the leak, re the sum of the channels' powers: where it is less, the beams point
 /// at its nulls, and are not given the level of (31) nonetheless.
@@ -27,21 +35,22 @@ constexpr double faint = 1e-3;
 /// Adding and subtracting it leaves a whole number.
 constexpr float whole = 12582912;
 
-/// sin(2 pi x), |x| up to a half.
-float sine_near_0(float x) {
-  const float folded = (x > 0 ? 0.5f : -0.5f) - x;
-  return sine_of_quarter(std::fabs(x) > 0.25f ? folded : x);
-}
-
 bool has_noise(const SharedNoise& law) { return static_cast<double>(law.level_db) > none_db; }
 int parts_of(const SharedNoise& law) { return law.channels / (law.group / 2) + 2; }
 
-/// Beams of sines up to `widest` hear the noise to there, or at every range.
-double reach_m(const SharedNoise& law, double wavelength_m, double widest) {
+/// Where the whole array's part leaves a sector of beams of sines up to `widest`; infinity where it never does.
+double leaves_at_m(const SharedNoise& law, double wavelength_m, double widest) {
   const double sine = static_cast<double>(law.sine), outside = sine - widest;
   if (!has_noise(law)) return 0;
   if (outside <= 0) return std::numeric_limits<double>::infinity();
-  return margin * (1 - sine * sine) * law.channels / 2 * wavelength_m / (2 * sine) / outside;
+  return (1 - sine * sine) * law.channels / 2 * wavelength_m / (2 * sine) / outside;
+}
+/// Power that is left at a range.
+double faded(double range_m, double leaves_m) {
+  return std::isinf(leaves_m) ? 1.0 : std::clamp((margin - range_m / leaves_m) / (margin - fades_from), 0.0, 1.0);
+}
+double focus_m(const SharedNoise& law, const PingSettings& settings) {
+  return static_cast<double>(law.focus_rows) * settings.range_bin_m;
 }
 double wavelength_of(const FrequencyMode& mode, const PingSettings& settings) {
   return static_cast<double>(settings.device_sound_speed_mps) / static_cast<double>(mode.centre_hz);
@@ -72,8 +81,8 @@ class FocusedArray {
       for (std::size_t j = 0; j < u_.size(); ++j) {
         const float beyond = x * (x - 2 * r * u_[j]), delay = beyond / (std::sqrt(larger(r * r + beyond, 0)) + r);
         const float turns = delay - ((delay + whole) - whole);
-        cosine[j] = sine_near_0(0.25f - std::fabs(turns));
-        sine[j] = sine_near_0(turns);
+        cosine[j] = sine_of_quarter(0.25f - std::fabs(turns));
+        sine[j] = sine_of_half(turns);
       }
       const double sign = m % 2 == 0 ? 1 : -1, way = pi / 2 * (m % half_ + 0.5) / half_;
       add(m / half_, sign * std::cos(way), cosine, sine);
@@ -101,14 +110,30 @@ class FocusedArray {
 
 }  // namespace
 
-double shared_noise_values(const FrequencyMode& mode, const PingSettings& settings) {
+std::string why_impossible(const SharedNoise& law) {
+  if (law.channels >= 2 && law.channels % 2 == 0 && law.group >= 2 && law.group % 2 == 0 && law.channels % (law.group / 2) == 0 &&
+      law.channels <= most_groups * law.group)
+    return {};
+  return "a group of " + std::to_string(law.group) + " of " + std::to_string(law.channels) +
+         " channels: both must be even, half a group must divide the channels, and a group must be at least a " +
+         std::to_string(most_groups) + "nd of them";
+}
+
+std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
   const ReceiverModel& law = mode.receiver;
+  const bool leaks = switches.leak && law.leak_is_shared;
+  if (!switches.shared_noise || !(leaks || has_noise(law.shared_noise))) return {};
   const double widest = std::sin(std::min(static_cast<double>(mode.horizontal_aperture_rad) / 2, pi / 2));
-  const double until_m =
-      std::max(reach_m(law.shared_noise, wavelength_of(mode, settings), widest), law.leak_is_shared ? Leak::reach_m(law) : 0);
+  const double until_m = std::max(margin * leaves_at_m(law.shared_noise, wavelength_of(mode, settings), widest) +
+                                      std::max(0.0, -focus_m(law.shared_noise, settings)),
+                                  leaks ? Leak::reach_m(law) : 0);
   const double most = static_cast<double>(settings.range_bin_count) * settings.samples_per_row;
   const double samples = std::min(most, std::ceil(until_m / settings.range_bin_m * settings.samples_per_row) + 1);
-  return 2.0 * parts_of(law.shared_noise) * settings.beam_count * samples;
+  const double responses = samples * settings.beam_count;
+  if (responses * parts_of(law.shared_noise) <= most_values && responses * law.shared_noise.channels <= most_steps) return {};
+  return "the noise or leak that channels share needs too much memory or time at so many ranges: choose fewer rows, beams, "
+         "channels "
+         "or groups, a shared_noise.sine outside the sector, or a leak that ends";
 }
 
 /// Eq. 47.
@@ -122,15 +147,15 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   const std::size_t beams = plan.beam_sine.size();
   double widest = 0;
   for (const double u : plan.beam_sine) widest = std::max(widest, std::abs(u));
-  const double until_m = reach_m(law, wavelength_m, widest);
+  const double leaves_m = leaves_at_m(law, wavelength_m, widest), behind_m = focus_m(law, plan.settings);
   const auto range_m = [&](int n) { return (n + plan.sample_offset) * plan.sample_spacing_m; };
+  const auto is_near = [&](double range) { return range + std::min(0.0, behind_m) < margin * leaves_m; };
   const auto leak_samples = static_cast<int>(leak.rms_upa().size());
-  while (samples_ < plan.samples && (range_m(samples_) < until_m || samples_ < leak_samples)) ++samples_;
+  while (samples_ < plan.samples && (is_near(range_m(samples_)) || samples_ < leak_samples)) ++samples_;
   // A channel's own noise, by itself, is (30) at a beam's output.
   const double own_upa = plan.column_noise_upa * std::sqrt(plan.beam_weights.weight_energy / law.channels);
   const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) : 0;
   const auto steady = static_cast<double>(law.steady);
-  const double focus_m = static_cast<double>(law.focus_rows) * plan.settings.samples_per_row * plan.sample_spacing_m;
   const double nearest_m = std::max(static_cast<double>(law.nearest_focus_m), plan.sample_spacing_m / 2);
   FocusedArray array(plan.beam_sine, law, spacing_m / wavelength_m);
   parts_ = static_cast<std::size_t>(array.parts());
@@ -140,7 +165,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   const double least = faint * law.channels * static_cast<double>(beams);
   for (std::size_t n = 0; n < samples; ++n) {
     const double range = range_m(static_cast<int>(n)), r = std::max(range, plan.sample_spacing_m / 2);
-    array.focus(std::max(range + focus_m, nearest_m) / wavelength_m);
+    array.focus(std::max(range + behind_m, nearest_m) / wavelength_m);
     double power = 0;
     for (int part = 0; part < array.parts(); ++part)
       for (std::size_t j = 0; j < beams; ++j) {
@@ -150,7 +175,8 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
         to[samples] = of_beam.imag();
         if (part + 1 == array.parts()) power += static_cast<double>(std::norm(of_beam));
       }
-    const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)));
+    const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)) *
+                                             faded(range + std::min(0.0, behind_m), leaves_m));
     noise_upa_.push_back(static_cast<float>(upa * std::sqrt(1 - steady)));
     steady_upa_.push_back(static_cast<float>(upa * std::sqrt(steady)));
     // (31) at the beams' outputs, as a mean over them.
@@ -158,7 +184,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
     if (static_cast<int>(n) < leak_samples)
       leak_upa_.push_back(static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[n]) * per_channel));
   }
-  leave_out(silent * own_upa * own_upa * law.channels);
+  leave_out(silent / array.parts() * own_upa * own_upa * law.channels);
 }
 
 void SharedNoiseTable::leave_out(double power) {

@@ -3,17 +3,21 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/signals.hpp"
+#include "core/sonar/ping.hpp"
 
 namespace sonar {
 
 struct PingPlan;
 
-/// How many values the table below holds at most.
-double shared_noise_values(const FrequencyMode& mode, const PingSettings& settings);
+/// What is wrong with the numbers of channels, and of a group; empty if nothing is.
+std::string why_impossible(const SharedNoise& law);
+/// Why the table below would need too much memory or time; empty if it does not. Needs possible numbers of channels.
+std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
 
 /// What the beams make of them, a function of the plan alone.
 class SharedNoiseTable {

@@ -85,7 +85,7 @@ inline constexpr std::array<NamedSwitch, 18> named_switches{{
     {"bandwidth", &Switches::bandwidth, "noise of the receiver's own bandwidth; off: of the pulse's"},
     {"uneven", &Switches::uneven, "noise and width that differ from beam to beam"},
     {"defocus", &Switches::defocus, "blur of near echoes off broadside"},
-    {"shared_noise", &Switches::shared_noise, "noise that receive channels share, near the sonar"},
+    {"shared_noise", &Switches::shared_noise, "noise and leak that receive channels share, near the sonar"},
     {"truncation", &Switches::truncation, "samples cut off to whole codes; off: rounded"},
 }};
 

@@ -32,11 +32,12 @@ constexpr float tvg_ceiling_db = 80;    // unknown: chosen
 // by 35 dB from 0.1 to 1.9 m and hardly below 0.25 m. The leak: rows 0 to 6; in the range of one pulse it is over.
 constexpr float tvg_slope_db = 35, tvg_minimum_range_m = 0.25f;
 constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;
-// unknown: fitted to the captured M1200d ping on the assumption that its bed is very soft mud (-40 dB): the echo of the bed at 1
+// unknown: fitted to the captured M1200d ping on the assumption that its bed is soft mud (-40 dB): the echo of the bed at 1
 // m is 30 dB above the noise. Other modes: chosen.
 constexpr float noise_figure_db = 10, m1200d_high_noise_figure_db = 14.6f;
 
-/// unknown: fitted to the first two captured M1200d pings (docs/acoustics.md, section 9); of their mode only.
+/// unknown: fitted to the first two captured M1200d pings; of several fits the one that a comparison with all three judged best
+/// was kept (docs/acoustics.md, section 9). Of their mode only.
 void fit_to_recording(ReceiverModel& receiver) {
   // Neighbouring rows of the far noise are uncorrelated (0.02).
   receiver.noise_width = 0.71f / 0.9f;
@@ -49,8 +50,8 @@ void fit_to_recording(ReceiverModel& receiver) {
                                     -6.4f, -8.7f, -8.7f, -8.7f, -8.7f, -9.9f, -9.9f, -9.9f};
   receiver.profile.near_m = 0.4f;
   // In rows 0 and 1 the leak is a comb, in rows 8 to 20 the noise has steady fringes, and in rows 10 to 180 it lies beside a
-  // dome, in grains that are the wider the nearer: 128 channels, heard from a sine of 0.56 (half a wavelength of the low mode
-  // would be 0.57), with opposite signs in neighbours.
+  // dome, in grains that are wider the nearer they are: 128 channels, heard from a sine of 0.56 (half a wavelength of the low
+  // mode would be 0.57), with opposite signs in neighbours.
   receiver.shared_noise = {.level_db = 3.4f, .full_m = 0.2f, .steady = 0.6f, .focus_rows = 0.5f, .nearest_focus_m = 0.0085f};
   receiver.leak_is_shared = true;
   // 255 never occurs; codes 0 to 5 of the noise are as frequent as of floor(255 v^gamma), v below 1.

@@ -302,7 +302,7 @@ patches are chosen for a similar picture, as are the small things that drift in 
 bandwidth, by beam, shared by the channels), truncation, blend and defocus of our profile are fitted to the first two pings, with
 the scene; compared is the third. It was not kept out wholly: of several fits and models the one was kept that the classifier
 below, which sees all three pings, and this table judged best. The array is not fitted, the pulse is (0.66 rows; other scenes have
-the first setting's 0.9). The bed's strength and the noise figure cannot be separated (only their distance is visible), nor can
+the default 0.9). The bed's strength and the noise figure cannot be separated (only their distance is visible), nor can
 gain and full scale.
 The gain here is {gain} dB; the requested 50 % would be 48: our full scale is set by the demo's brightness, and the recording has
 flag bit 4 set, gain assist. Local means are over 9 x 9 samples; bed: rows 288 to 447, far noise: rows 620 to 702; "edges": 24

@@ -15,10 +15,12 @@ SONAR_HD inline float sine_of_quarter(float x) {
   p = p * y2 - 1.6666667e-1f;
   return y + y * y2 * p;
 }
-SONAR_HD inline float sine_of_turns(float turns) {
-  const float x = turns - std::floor(turns + 0.5f), folded = (x > 0 ? 0.5f : -0.5f) - x;
+/// |x| up to a half.
+SONAR_HD inline float sine_of_half(float x) {
+  const float folded = (x > 0 ? 0.5f : -0.5f) - x;
   return sine_of_quarter(std::fabs(x) > 0.25f ? folded : x);
 }
+SONAR_HD inline float sine_of_turns(float turns) { return sine_of_half(turns - std::floor(turns + 0.5f)); }
 
 SONAR_HD inline float log2_of(float x) {  // x > 0 and normal; relative error of 2^(log2 x) about 2e-7
   const std::uint32_t bits = bits_of(x);

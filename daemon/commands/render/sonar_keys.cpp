@@ -6,6 +6,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
+#include "core/pipeline/shared_noise.hpp"
 #include "core/text/decimal.hpp"
 
 namespace sonar::render {
@@ -58,17 +59,12 @@ void read_profile(const Node& node, BeamProfile& profile) {
 }
 
 void read_shared_noise(const Node& node, SharedNoise& noise) {
-  constexpr int most_groups = 32;  // each has a table
   if (!node.present()) return;
   Map keys = node.map();
   set(keys.optional("level_db"), Range::between(-200, 150), noise.level_db);
-  const Node channels = keys.optional("channels");
-  noise.channels = static_cast<int>(channels.integer_or(noise.channels, 2, 4096));
-  if (noise.channels % 2 != 0) channels.fail("must be even: neighbours have opposite signs");
-  const Node group = keys.optional("group");
-  noise.group = static_cast<int>(group.integer_or(noise.group, 2, 4096));
-  if (noise.group % 2 != 0 || noise.channels % (noise.group / 2) != 0 || noise.channels / noise.group > most_groups)
-    group.fail("must be even and at least a 32nd of the channels, and their number a multiple of its half");
+  noise.channels = static_cast<int>(keys.optional("channels").integer_or(noise.channels, 2, 4096));
+  noise.group = static_cast<int>(keys.optional("group").integer_or(noise.group, 2, 4096));
+  if (const std::string why = why_impossible(noise); !why.empty()) node.fail(why);
   set(keys.optional("sine"), Range::between(0.05, 0.99), noise.sine);
   set(keys.optional("full_m"), Range::between(1e-3, 1000), noise.full_m);
   set(keys.optional("steady"), Range::between(0, 1), noise.steady);

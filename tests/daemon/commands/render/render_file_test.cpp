@@ -119,9 +119,9 @@ TEST(RenderFile, WhatChannelsShareReachesTheReceiver) {
   EXPECT_EQ(law.shared_noise.focus_rows, 1);
   EXPECT_EQ(law.shared_noise.nearest_focus_m, 0.1f);
 
-  EXPECT_THAT(refusal(with("channels: 97")), HasSubstr("shared_noise.channels: must be even"));
-  for (const char* wrong : {"group: 31", "channels: 100", "group: 2"})
-    EXPECT_THAT(refusal(with(wrong)), HasSubstr("shared_noise.group: must be even and at least a 32nd of the channels")) << wrong;
+  EXPECT_THAT(refusal(with("channels: 100")), HasSubstr("shared_noise: a group of 32 of 100 channels: both must be even"));
+  for (const char* wrong : {"channels: 97", "group: 31", "group: 2", "channels: 130, group: 4"})
+    EXPECT_THAT(refusal(with(wrong)), HasSubstr("a group must be at least a 32nd of them")) << wrong;
   EXPECT_THAT(refusal(with("steady: 1.1")), HasSubstr("shared_noise.steady: must be between 0 and 1"));
 }
 
