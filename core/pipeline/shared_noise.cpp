@@ -26,7 +26,7 @@ constexpr std::size_t block_samples = 32;
 
 constexpr int most_groups = 32;  // each has a table
 // Of a table's complex values, 1 GiB, and of its sums: some 10 s.
-constexpr double most_values = 1 << 27, most_steps = 4e9;
+constexpr double most_values = 1 << 27, most_steps = 1e9;
 
 /// Mean over the beams of what they receive of the leak, re the sum of the channels' powers: where it is less, the beams point
 /// at its nulls, and are not given the level of (31) nonetheless.

@@ -259,11 +259,11 @@ TEST(SharedLeak, IsNotRaisedWhereItCancels) {
 }
 
 TEST(SharedNoise, IsRefusedWhereItsTableFitsNoMemory) {
-  Sounding s = with([](ReceiverModel& law) { law.shared_noise = {.level_db = 3, .channels = 1024, .group = 32, .sine = 0.2f}; });
+  Sounding s = with([](ReceiverModel& law) { law.shared_noise = {.level_db = 3, .channels = 256, .group = 16, .sine = 0.2f}; });
   s.request.settings.range_bin_count = 20000;
   s.request.settings.beam_count = 512;
   EXPECT_THAT(why_invalid(s.request), ::testing::HasSubstr("that channels share needs too much memory"));
-  Sounding outside = with([](ReceiverModel& law) { law.shared_noise = {.level_db = 3, .channels = 1024, .group = 32}; });
+  Sounding outside = with([](ReceiverModel& law) { law.shared_noise = {.level_db = 3, .channels = 256, .group = 16}; });
   outside.request.settings.range_bin_count = 20000;
   outside.request.settings.beam_count = 512;
   EXPECT_EQ(why_invalid(outside.request), "");
