@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdlib>
 #include <limits>
 #include <string>
 
@@ -111,12 +112,18 @@ class FocusedArray {
 }  // namespace
 
 std::string why_impossible(const SharedNoise& law) {
-  if (law.channels >= 2 && law.channels % 2 == 0 && law.group >= 2 && law.group % 2 == 0 && law.channels % (law.group / 2) == 0 &&
-      law.channels <= most_groups * law.group)
-    return {};
-  return "a group of " + std::to_string(law.group) + " of " + std::to_string(law.channels) +
-         " channels: both must be even, half a group must divide the channels, and a group must be at least a " +
-         std::to_string(most_groups) + "nd of them";
+  if (law.channels < 2 || law.channels % 2 != 0)
+    return "channels must be even and at least 2, since neighbours have opposite signs, and are " + std::to_string(law.channels);
+  const auto fits = [&](int group) {
+    return group >= 2 && group % 2 == 0 && law.channels % (group / 2) == 0 && law.channels <= most_groups * group;
+  };
+  if (fits(law.group)) return {};
+  int nearest = 2 * law.channels;
+  for (int group = 2; group < 2 * law.channels; group += 2)
+    if (fits(group) && std::abs(group - law.group) < std::abs(nearest - law.group)) nearest = group;
+  return "group " + std::to_string(law.group) + " does not fit " + std::to_string(law.channels) +
+         " channels: " + std::to_string(nearest) + " would do; it must be even, at least channels / " +
+         std::to_string(most_groups) + ", and half of it must divide the channels";
 }
 
 std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
@@ -130,10 +137,13 @@ std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& s
   const double most = static_cast<double>(settings.range_bin_count) * settings.samples_per_row;
   const double samples = std::min(most, std::ceil(until_m / settings.range_bin_m * settings.samples_per_row) + 1);
   const double responses = samples * settings.beam_count;
-  if (responses * parts_of(law.shared_noise) <= most_values && responses * law.shared_noise.channels <= most_steps) return {};
-  return "the noise or leak that channels share needs too much memory or time at so many ranges: choose fewer rows, beams, "
-         "channels "
-         "or groups, a shared_noise.sine outside the sector, or a leak that ends";
+  const double times =
+      std::max(responses * parts_of(law.shared_noise) / most_values, responses * law.shared_noise.channels / most_steps);
+  if (times <= 1) return {};
+  return "the noise or leak that channels share would take about " + std::to_string(std::lround(std::ceil(times))) +
+         " times the memory or time allowed: choose fewer rows, beams or channels, or in receiver.shared_noise a larger group or "
+         "a "
+         "sine outside the sector, or a leak that ends";
 }
 
 /// Eq. 47.

@@ -94,7 +94,7 @@ def coverage(text):
     (_, rows), = tables_of(text)
     worst = max(rows, key=lambda r: abs(first_number(r[6])))
     whole = sum(first_number(r[5]) == 100 for r in rows)
-    yield [f"flat bed, {len(rows)} modes of all sonars, {whole} wholly within", "closed form", f"{worst[6]} ({worst[0]})", "1 dB"]
+    yield [f"flat bed, {len(rows)} modes of all sonars, {whole} with all bins within 1 dB", "closed form", f"{worst[6]} ({worst[0]})", "1 dB"]
 
 
 def capture(text):
@@ -110,7 +110,7 @@ def tell_apart(text):
     by_sector = next(r for r in judged if r[0] == "unseen sector, texture")
     control = next(r for r in judged if r[0].startswith("control"))
     yield ["the same: patches that a classifier tells apart", f"guessing; ours against ours {control[1]} %",
-           f"{by_sector[1]} % ({by_sector[2]}; most by: {features[0][0]})", "60 % is the aim"]
+           f"{by_sector[1]} % ({by_sector[2]}; most by: {features[0][0]})", "60 % at most is the aim"]
 
 
 CASES = {"tank": tank, "two-cylinders": two_cylinders, "local-search": local_search, "differences": differences, "coverage": coverage,
@@ -130,7 +130,7 @@ def page_of(chapters):
     text = TITLE
     rows = [row for name, of in CASES.items() if name in chapters for row in of(chapters[name])]
     if rows:
-        text += CASES_TITLE + table(["what", "compared with", "largest deviation", "tolerance"], rows)
+        text += CASES_TITLE + table(["what", "compared with", "result, or largest deviation", "tolerance"], rows)
         text += PICTURE if "capture" in chapters else ""
     if "oracles" in chapters:
         rows, count, missed = oracle_rows(chapters["oracles"])
@@ -154,7 +154,7 @@ CASES_TITLE = """
 
 """
 PICTURE = """
-Which of its points above 60 % come from what: [acoustics](acoustics.MD), section 9.
+What each part of the model contributes to that: [acoustics](acoustics.MD), section 9.
 
 ![A recorded ping and ours](validation/capture.png)
 """.replace(".MD", ".md")  # as above

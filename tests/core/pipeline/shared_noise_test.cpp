@@ -262,7 +262,7 @@ TEST(SharedNoise, IsRefusedWhereItsTableFitsNoMemory) {
   Sounding s = with([](ReceiverModel& law) { law.shared_noise = {.level_db = 3, .channels = 256, .group = 16, .sine = 0.2f}; });
   s.request.settings.range_bin_count = 20000;
   s.request.settings.beam_count = 512;
-  EXPECT_THAT(why_invalid(s.request), ::testing::HasSubstr("that channels share needs too much memory"));
+  EXPECT_THAT(why_invalid(s.request), ::testing::HasSubstr("would take about 3 times the memory or time allowed"));
   Sounding outside = with([](ReceiverModel& law) { law.shared_noise = {.level_db = 3, .channels = 256, .group = 16}; });
   outside.request.settings.range_bin_count = 20000;
   outside.request.settings.beam_count = 512;
@@ -281,7 +281,7 @@ TEST(SharedNoise, IsRefusedWhereItsTableFitsNoMemory) {
   endless.request.switches.leak = false;
   EXPECT_EQ(why_invalid(endless.request), "");
   Sounding none = with([](ReceiverModel& law) { law.shared_noise.group = 1; });
-  EXPECT_THAT(why_invalid(none.request), ::testing::HasSubstr("shared_noise: a group of 1 of 128 channels"));
+  EXPECT_THAT(why_invalid(none.request), ::testing::HasSubstr("shared_noise: group 1 does not fit 128 channels"));
 }
 
 TEST(SharedNoise, IsTheSameForAnyNumberOfThreadsAndNothingWhenOff) {
