@@ -66,8 +66,7 @@ BeamMix::BeamMix(const PingPlan& plan) {
 /// in the sine are samples of the aperture's transform, so that a factor on the aperture is a convolution across the beams.
 void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
   const double wavelengths = plan.beam_pattern[0].aperture_wavelengths;
-  const double wavelength_m =
-      static_cast<double>(plan.settings.device_sound_speed_mps) / static_cast<double>(plan.mode.centre_hz);
+  const double wavelength_m = device_wavelength_m(plan.mode, plan.settings);
   const double edge_rad_m = static_cast<double>(plan.mode.receiver.defocus) * pi * wavelengths * wavelengths * wavelength_m / 4;
   for (const double u : plan.beam_sine) turn_m_.push_back(static_cast<float>(edge_rad_m * u * u));
   largest_turn_m_ = *std::max_element(turn_m_.begin(), turn_m_.end());

@@ -337,6 +337,10 @@ void PingPlan::aim(CellView& view) const {
   view.side_coarser = expected_power ? 0 : 1;
 }
 
+double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings) {
+  return static_cast<double>(settings.device_sound_speed_mps) / static_cast<double>(mode.centre_hz);
+}
+
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
   PingPlan p;
   p.mode = mode;

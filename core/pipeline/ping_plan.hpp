@@ -130,6 +130,8 @@ struct PingPlan {
 };
 
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
+/// Of the centre frequency, at the sound speed that the device assumes [m].
+double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
 /// The client's gain alone, which may change with every ping.
 void set_gain(PingPlan& plan, float gain_db);
 /// Whether the plan still serves this request, but for its gain.

@@ -39,22 +39,23 @@ constexpr float whole = 12582912;
 bool has_noise(const SharedNoise& law) { return static_cast<double>(law.level_db) > none_db; }
 int parts_of(const SharedNoise& law) { return law.channels / (law.group / 2) + 2; }
 
-/// Where the whole array's part leaves a sector of beams of sines up to `widest`; infinity where it never does.
-double leaves_at_m(const SharedNoise& law, double wavelength_m, double widest) {
-  const double sine = static_cast<double>(law.sine), outside = sine - widest;
-  if (!has_noise(law)) return 0;
-  if (outside <= 0) return std::numeric_limits<double>::infinity();
-  return (1 - sine * sine) * law.channels / 2 * wavelength_m / (2 * sine) / outside;
-}
-/// Power that is left at a range.
-double faded(double range_m, double leaves_m) {
-  return std::isinf(leaves_m) ? 1.0 : std::clamp((margin - range_m / leaves_m) / (margin - fades_from), 0.0, 1.0);
-}
 double focus_m(const SharedNoise& law, const PingSettings& settings) {
   return static_cast<double>(law.focus_rows) * settings.range_bin_m;
 }
-double wavelength_of(const FrequencyMode& mode, const PingSettings& settings) {
-  return static_cast<double>(settings.device_sound_speed_mps) / static_cast<double>(mode.centre_hz);
+
+/// As far as the noise is followed: to `end_m`, over the last `fade_m` of which its power falls to nothing.
+struct Reach {
+  double end_m = 0, fade_m = 1;
+  double share(double range_m) const { return std::clamp((end_m - range_m) / fade_m, 0.0, 1.0); }  // of its power
+};
+/// In a sector of beams of sines up to `widest`. Where the whole array's part never leaves it, the noise has no end.
+Reach reach_of(const FrequencyMode& mode, const PingSettings& settings, double widest) {
+  const SharedNoise& law = mode.receiver.shared_noise;
+  const double sine = static_cast<double>(law.sine), outside = sine - widest;
+  if (!has_noise(law)) return {};
+  if (outside <= 0) return {.end_m = std::numeric_limits<double>::infinity()};
+  const double leaves_m = (1 - sine * sine) * law.channels / 2 * device_wavelength_m(mode, settings) / (2 * sine) / outside;
+  return {margin * leaves_m + std::max(0.0, -focus_m(law, settings)), (margin - fades_from) * leaves_m};
 }
 
 /// Complex [parts][beams]: sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}, d the delay of a channel at x against the
@@ -62,12 +63,12 @@ double wavelength_of(const FrequencyMode& mode, const PingSettings& settings) {
 /// channel; last, all channels alike.
 class FocusedArray {
  public:
-  FocusedArray(const std::vector<double>& beam_sines, const SharedNoise& law, double spacing_in_wavelengths)
+  FocusedArray(const std::vector<double>& beam_sines, const SharedNoise& law)
       : u_(beam_sines.begin(), beam_sines.end()),
         channels_(law.channels),
         half_(law.group / 2),
         parts_(parts_of(law)),
-        d_(spacing_in_wavelengths) {
+        d_(1 / (2 * static_cast<double>(law.sine))) {
     re_.resize(static_cast<std::size_t>(parts_) * u_.size());
     im_.resize(re_.size());
   }
@@ -106,7 +107,7 @@ class FocusedArray {
 
   std::vector<float> u_, re_, im_;
   int channels_, half_, parts_;
-  double d_;
+  double d_;  // spacing of the channels, in wavelengths
 };
 
 }  // namespace
@@ -131,9 +132,7 @@ std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& s
   const bool leaks = switches.leak && law.leak_is_shared;
   if (!switches.shared_noise || !(leaks || has_noise(law.shared_noise))) return {};
   const double widest = std::sin(std::min(static_cast<double>(mode.horizontal_aperture_rad) / 2, pi / 2));
-  const double until_m = std::max(margin * leaves_at_m(law.shared_noise, wavelength_of(mode, settings), widest) +
-                                      std::max(0.0, -focus_m(law.shared_noise, settings)),
-                                  leaks ? Leak::reach_m(law) : 0);
+  const double until_m = std::max(reach_of(mode, settings, widest).end_m, leaks ? Leak::reach_m(law) : 0);
   const double most = static_cast<double>(settings.range_bin_count) * settings.samples_per_row;
   const double samples = std::min(most, std::ceil(until_m / settings.range_bin_m * settings.samples_per_row) + 1);
   const double responses = samples * settings.beam_count;
@@ -141,9 +140,8 @@ std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& s
       std::max(responses * parts_of(law.shared_noise) / most_values, responses * law.shared_noise.channels / most_steps);
   if (times <= 1) return {};
   return "the noise or leak that channels share would take about " + std::to_string(std::lround(std::ceil(times))) +
-         " times the memory or time allowed: choose fewer rows, beams or channels, or in receiver.shared_noise a larger group or "
-         "a "
-         "sine outside the sector, or a leak that ends";
+         " times the memory or time allowed: choose fewer rows, beams or channels, "
+         "or in receiver.shared_noise a larger group or a sine outside the sector, or a leak that ends";
 }
 
 /// Eq. 47.
@@ -151,23 +149,22 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   const SharedNoise& law = plan.mode.receiver.shared_noise;
   const bool noise = has_noise(law);
   const Leak leak = plan.mode.receiver.leak_is_shared ? Leak(plan, plan.switches) : Leak();
-  if (!plan.switches.shared_noise || !(noise || leak.is_audible()) || law.channels < 2) return;
-  const double wavelength_m = wavelength_of(plan.mode, plan.settings);
-  const double sine = static_cast<double>(law.sine), spacing_m = wavelength_m / (2 * sine);
+  if (!plan.switches.shared_noise || !(noise || leak.is_audible())) return;
+  const double wavelength_m = device_wavelength_m(plan.mode, plan.settings);
   const std::size_t beams = plan.beam_sine.size();
   double widest = 0;
   for (const double u : plan.beam_sine) widest = std::max(widest, std::abs(u));
-  const double leaves_m = leaves_at_m(law, wavelength_m, widest), behind_m = focus_m(law, plan.settings);
+  const Reach reach = reach_of(plan.mode, plan.settings, widest);
   const auto range_m = [&](int n) { return (n + plan.sample_offset) * plan.sample_spacing_m; };
-  const auto is_near = [&](double range) { return range + std::min(0.0, behind_m) < margin * leaves_m; };
   const auto leak_samples = static_cast<int>(leak.rms_upa().size());
-  while (samples_ < plan.samples && (is_near(range_m(samples_)) || samples_ < leak_samples)) ++samples_;
+  while (samples_ < plan.samples && (range_m(samples_) < reach.end_m || samples_ < leak_samples)) ++samples_;
   // A channel's own noise, by itself, is (30) at a beam's output.
   const double own_upa = plan.column_noise_upa * std::sqrt(plan.beam_weights.weight_energy / law.channels);
   const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) : 0;
   const auto steady = static_cast<double>(law.steady);
+  const double behind_m = focus_m(law, plan.settings);
   const double nearest_m = std::max(static_cast<double>(law.nearest_focus_m), plan.sample_spacing_m / 2);
-  FocusedArray array(plan.beam_sine, law, spacing_m / wavelength_m);
+  FocusedArray array(plan.beam_sine, law);
   parts_ = static_cast<std::size_t>(array.parts());
   beams_ = beams;
   const auto samples = static_cast<std::size_t>(samples_);
@@ -185,8 +182,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
         to[samples] = of_beam.imag();
         if (part + 1 == array.parts()) power += static_cast<double>(std::norm(of_beam));
       }
-    const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)) *
-                                             faded(range + std::min(0.0, behind_m), leaves_m));
+    const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)) * reach.share(range));
     noise_upa_.push_back(static_cast<float>(upa * std::sqrt(1 - steady)));
     steady_upa_.push_back(static_cast<float>(upa * std::sqrt(steady)));
     // (31) at the beams' outputs, as a mean over them.

@@ -76,10 +76,10 @@ double fade(const FrequencyMode& mode, double r) {
 class ChannelsShare : public ::testing::TestWithParam<float> {};
 
 TEST_P(ChannelsShare, IsTheFocusedArraysSumOverItsChannels) {
-  const float level_db = GetParam();
+  const auto level_db = static_cast<double>(GetParam());
   for (const float share : {0.0f, 1.0f}) {
     Sounding s = with([=](ReceiverModel& law) {
-      law.shared_noise.level_db = level_db;
+      law.shared_noise.level_db = GetParam();
       law.shared_noise.steady = share;
     });
     s.request.switches.expected_power = true;
@@ -92,14 +92,14 @@ TEST_P(ChannelsShare, IsTheFocusedArraysSumOverItsChannels) {
       for (int j = 0; j < s.beams(); ++j) {
         const double r = s.range_of_row(row), u = s.beam_sine(j);
         const double power = share > 0 ? focused_power(s.mode(), r, u) : in_common(s.mode(), r, u, u).real();
-        const double expected = power_from_db(static_cast<double>(level_db)) * fade(s.mode(), r) *
-                                std::min(1.0, r / static_cast<double>(law.full_m)) * power / law.channels;
+        const double expected = power_from_db(level_db) * fade(s.mode(), r) * std::min(1.0, r / static_cast<double>(law.full_m)) *
+                                power / law.channels;
         const double measured = s.power(row, j) / (own_upa * own_upa) - 1;
         most = std::max(most, expected);
         off = std::max(off, std::abs(measured - expected));
         // The shadow of the aperture: dark within the dome by rays.
         const double edge = sine - law.channels / 2.0 * wavelength_m / (2 * sine) * (1 - sine * sine) / r;
-        if (std::abs(u) < edge - 0.06) beside = std::max(beside, measured / power_from_db(static_cast<double>(level_db)));
+        if (std::abs(u) < edge - 0.06) beside = std::max(beside, measured / power_from_db(level_db));
       }
     if (level_db < 20) {
       EXPECT_LT(off, 0.03) << "what is left out, re the channels' own";
@@ -225,7 +225,6 @@ TEST(SharedLeak, IsWhatTheFocusedArrayMakesOfIt) {
   EXPECT_LT(worst, 0.01);
 
   s.request.switches.expected_power = false;
-  s.ping();
   s.request.switches.keep_beams = true;
   s.ping();
   const std::vector<std::complex<float>> before = s.last().beam_signal_upa;
@@ -256,6 +255,20 @@ TEST(SharedLeak, IsNotRaisedWhereItCancels) {
   ASSERT_EQ(s.beam_sine(0), 0);
   for (const int row : {0, 1, 5, 12, 30})
     EXPECT_NEAR(s.power(row, 0) / (1e16 * power_from_db(-200 * s.range_of_row(row))), 0.02, 0.001) << "its changing part alone";
+}
+
+// A sample at range 0, of a leak without shared noise.
+TEST(SharedLeak, BeginsAtRangeZero) {
+  Sounding s = with([](ReceiverModel& law) {
+    law.leak_upa = 1e8f;
+    law.leak_decay_db_per_m = 200;
+    law.leak_is_shared = true;
+  });
+  s.request.settings.row_centre = 0;
+  s.request.switches.expected_power = true;
+  const std::vector<float>& pressure = s.ping().pressure_upa;
+  EXPECT_TRUE(std::all_of(pressure.begin(), pressure.end(), [](float p) { return std::isfinite(p); }));
+  EXPECT_GT(s.power(0, 40), 1);
 }
 
 TEST(SharedNoise, IsRefusedWhereItsTableFitsNoMemory) {
