@@ -94,7 +94,8 @@ def coverage(text):
     (_, rows), = tables_of(text)
     worst = max(rows, key=lambda r: abs(first_number(r[6])))
     whole = sum(first_number(r[5]) == 100 for r in rows)
-    yield [f"flat bed, {len(rows)} modes of all sonars, {whole} with all bins within 1 dB", "closed form", f"{worst[6]} ({worst[0]})", "1 dB"]
+    yield [f"flat bed, {len(rows)} modes of all sonars, {whole} with all bins within 1 dB", "closed form",
+           f"{worst[6]} ({worst[0]})", "1 dB"]
 
 
 def capture(text):

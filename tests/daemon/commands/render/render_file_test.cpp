@@ -119,7 +119,7 @@ TEST(RenderFile, WhatChannelsShareReachesTheReceiver) {
   EXPECT_EQ(law.shared_noise.focus_rows, 1);
   EXPECT_EQ(law.shared_noise.nearest_focus_m, 0.1f);
 
-  EXPECT_THAT(refusal(with("channels: 97")), HasSubstr("channels must be even"));
+  EXPECT_THAT(refusal(with("channels: 97")), HasSubstr("shared_noise: channels must be even"));
   EXPECT_THAT(refusal(with("channels: 100")),
               HasSubstr("shared_noise: group 32 does not fit 100 channels: 40 would do; it must be even"));
   for (const auto& [wrong, right] :
