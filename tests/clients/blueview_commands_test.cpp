@@ -18,7 +18,7 @@
 #include "clients/sonarctl/source.hpp"
 #include "protocol/blueview/frames.hpp"
 
-namespace sonar::clients {
+namespace sonar::clients::blueview_commands_test {
 namespace {
 
 using blueview::FrameType;
@@ -262,4 +262,4 @@ TEST(BlueViewCommands, RawBytesAreOfOculusSonarsOnly) {
 }
 
 }  // namespace
-}  // namespace sonar::clients
+}  // namespace sonar::clients::blueview_commands_test

@@ -6,7 +6,7 @@
 
 #include <array>
 
-namespace sonar::clients {
+namespace sonar::clients::ping_log_test {
 namespace {
 
 using testing::ElementsAre;
@@ -98,4 +98,4 @@ TEST(Percentile, TakesTheNearestRank) {
 }
 
 }  // namespace
-}  // namespace sonar::clients
+}  // namespace sonar::clients::ping_log_test

@@ -9,9 +9,8 @@
 #include "tests/protocol/blueview/blueview_testing.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
+namespace sonar::fields_test {
 namespace {
-
-using namespace sonar;
 using protocol::Field;
 using protocol::FieldName;
 using protocol::Part;
@@ -205,3 +204,4 @@ TEST(Fields, RegionsOfABlueViewPing) {
 }
 
 }  // namespace
+}  // namespace sonar::fields_test

@@ -6,9 +6,8 @@
 #include "protocol/vendor.hpp"
 #include "tests/protocol/blueview/blueview_testing.hpp"
 
+namespace sonar::settings_override_test {
 namespace {
-
-using namespace sonar;
 using testing::HasSubstr;
 
 /// One knob after the other: set().range(5).rate(10).
@@ -143,3 +142,4 @@ TEST(BlueViewOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
 }
 
 }  // namespace
+}  // namespace sonar::settings_override_test

@@ -8,9 +8,8 @@
 #include "protocol/blueview/models.hpp"
 #include "protocol/vendor.hpp"
 
+namespace sonar::vendors_test {
 namespace {
-
-using namespace sonar;
 using testing::HasSubstr;
 
 const protocol::Vendor& oculus() { return *protocol::vendors().front(); }
@@ -105,3 +104,4 @@ TEST(BlueView, PresetIsTheBenchmarksCase) {
 }
 
 }  // namespace
+}  // namespace sonar::vendors_test

@@ -5,6 +5,7 @@
 
 #include <memory>
 
+namespace sonar::wire_test {
 namespace {
 
 using sonar::wire::Bytes;
@@ -137,3 +138,4 @@ TEST(Wire, PrintsTheOffsetTable) {
 }
 
 }  // namespace
+}  // namespace sonar::wire_test

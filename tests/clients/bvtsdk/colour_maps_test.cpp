@@ -10,8 +10,7 @@
 #include <iterator>
 #include <limits>
 
-using namespace sonar::bvt;
-
+namespace sonar::bvt {
 namespace {
 
 struct ColourMaps : testing::Test {
@@ -62,8 +61,6 @@ std::string bytes_of(std::uint32_t pixel) {
   std::memcpy(b.data(), &pixel, 4);
   return b;
 }
-
-}  // namespace
 
 TEST_F(ColourMaps, AreFilesOf4096BlueGreenRed) {
   for (const std::string_view name : colour_map_names) {
@@ -174,3 +171,6 @@ TEST_F(ColourMaps, PicturesOfMagnitudesHave16BitsBigEndian) {
     EXPECT_EQ(save_pgm("/dev/full", image_with({1})), file_write);
   }
 }
+
+}  // namespace
+}  // namespace sonar::bvt

@@ -10,8 +10,7 @@
 
 #include "tests/clients/bvtsdk/made_ping.hpp"
 
-using namespace sonar::bvt;
-
+namespace sonar::bvt {
 namespace {
 
 MagImage image_of(const PolarPing& ping, ImageType type, const ImageSettings& settings = {}) {
@@ -47,8 +46,6 @@ Spot spot_of(const MagImage& image) {
 double mean_of(const MagImage& image) {
   return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) / static_cast<double>(image.pixels.size());
 }
-
-}  // namespace
 
 TEST(XyImage, ShowsATargetWhereItIsAndNotMirrored) {
   for (const double bearing : {-40.0, -12.5, 0.0, 30.0})
@@ -363,3 +360,6 @@ TEST(Image, SurvivesBinsFarShorterThanItsRows) {
   settings.requested_height = 10;
   for (const ImageType type : {ImageType::xy, ImageType::r_theta}) EXPECT_EQ(image_of(ping, type, settings).height, 10);
 }
+
+}  // namespace
+}  // namespace sonar::bvt

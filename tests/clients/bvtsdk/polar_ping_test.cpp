@@ -7,8 +7,7 @@
 
 #include "tests/clients/bvtsdk/made_ping.hpp"
 
-using namespace sonar::bvt;
-
+namespace sonar::bvt {
 namespace {
 
 constexpr Packing every_packing[] = {Packing::plain, Packing::deflate, Packing::planes};
@@ -46,8 +45,6 @@ void expect_same(const PolarPing& a, const PolarPing& b) {
   EXPECT_EQ(a.nav.heading_deg, b.nav.heading_deg);
   EXPECT_EQ(a.nav.text, b.nav.text);
 }
-
-}  // namespace
 
 TEST(PolarPing, ComesBackAsItWas) {
   for (const Packing packing : every_packing) {
@@ -181,3 +178,6 @@ TEST(NavData, OmitsNonFiniteNumbersAndRefusesUnknownFields) {
   EXPECT_EQ(decode_nav(other).present, 0);
   EXPECT_FALSE(other.ok());
 }
+
+}  // namespace
+}  // namespace sonar::bvt

@@ -7,8 +7,7 @@
 
 #include "tests/clients/bvtsdk/made_ping.hpp"
 
-using namespace sonar::bvt;
-
+namespace sonar::bvt {
 namespace {
 
 RangeList list_of(const PolarPing& ping, const RangeListSettings& settings = {}) {
@@ -21,8 +20,6 @@ RangeList list_of(const PolarPing& ping, const RangeListSettings& settings = {})
 PolarPing two_echoes() {
   return make_ping(8, 100, 1, 0.1f, [](int j, int k) { return j != 3 ? 5 : k == 10 ? 20000 : k == 50 ? 40000 : 5; });
 }
-
-}  // namespace
 
 TEST(RangeList, FindsATargetAtItsRangeAndBearing) {
   RangeListSettings settings;
@@ -121,3 +118,6 @@ TEST(RangeList, NeedsASignal) {
   EXPECT_EQ(make_range_list(ping, {}, list), no_ping_signal);
   EXPECT_EQ(list.count(), 0);
 }
+
+}  // namespace
+}  // namespace sonar::bvt

@@ -11,8 +11,7 @@
 
 #include "tests/clients/bvtsdk/made_ping.hpp"
 
-using namespace sonar::bvt;
-
+namespace sonar::bvt {
 namespace {
 
 const Bytes hello{1, 0, 7, 7, 7};
@@ -89,8 +88,6 @@ void expect_all(RecordingReader& reader) {
   EXPECT_EQ(mark.key, "mine");
   EXPECT_EQ(mark.text, "a suspicious shape");
 }
-
-}  // namespace
 
 TEST_F(Recording, PlaysBackWhatWasPut) {
   RecordingWriter writer;
@@ -294,3 +291,6 @@ TEST_F(Recording, StartsAnewWhenCreatedAgain) {
   EXPECT_EQ(reader.ping_count(0), 1);
   EXPECT_EQ(reader.nav_count(), 0);
 }
+
+}  // namespace
+}  // namespace sonar::bvt

@@ -6,10 +6,10 @@
 namespace sonar::scene_tools {
 namespace {
 
-using testing::Contains;
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::StartsWith;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 Vec3d where(const Result<ImportedWorld>& world, std::size_t shape = 0) {
   if (!world || shape >= world->shapes.size()) {
@@ -179,7 +179,7 @@ TEST(ReadSdf, WhatASceneCannotHoldIsNamedOnceWithItsLine) {
 TEST(ReadSdf, MistakesAreToldWithFileAndLine) {
   Reading r;
   EXPECT_THAT(r.error(sdf(model("m", link("base", "<pose relative_to='bse'/>")))),
-              testing::AllOf(StartsWith("w.sdf:3: no frame \"bse\" in model \"m\""), HasSubstr("did you mean \"base\"?")));
+              ::testing::AllOf(StartsWith("w.sdf:3: no frame \"bse\" in model \"m\""), HasSubstr("did you mean \"base\"?")));
   EXPECT_THAT(r.error(sdf(model("m", std::string("<pose relative_to='nowhere'/>") + link("l")))),
               HasSubstr("no frame \"nowhere\" in the world"));
   EXPECT_THAT(r.error(sdf(model("m", link("l", "<pose>1 2 3</pose>")))),
@@ -188,7 +188,7 @@ TEST(ReadSdf, MistakesAreToldWithFileAndLine) {
   EXPECT_THAT(r.error(sdf(model("m", link("l", "<pose>1 2 3 0 0 nan</pose>")))), HasSubstr("\"nan\" is not a number"));
   EXPECT_THAT(r.error(sdf(model("m", link("l") + link("l")))), HasSubstr("link \"l\": a name used twice"));
   EXPECT_THAT(r.error(sdf("<include><uri>model://gone</uri></include>")),
-              testing::AllOf(StartsWith("w.sdf:3:"), HasSubstr("--model-path")));
+              ::testing::AllOf(StartsWith("w.sdf:3:"), HasSubstr("--model-path")));
   EXPECT_THAT(r.error("<sdf><world>"), StartsWith("w.sdf:1: not well-formed XML"));
   EXPECT_THAT(r.error("<gazebo version='1.0'/>"), HasSubstr("neither <sdf> nor <robot>"));
   EXPECT_THAT(r.error(""), HasSubstr("is empty"));

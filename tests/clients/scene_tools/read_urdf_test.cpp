@@ -5,8 +5,8 @@
 namespace sonar::scene_tools {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 std::string robot(const std::string& content) { return std::string("<robot name='arm'>\n") + content + "</robot>"; }
 std::string part(const std::string& link, const std::string& origin = "", const std::string& geometry = "<box size='1 2 3'/>") {
@@ -49,7 +49,7 @@ TEST(ReadUrdf, MeshesAndTheRest) {
 
 TEST(ReadUrdf, MistakesAreToldWithFileAndLine) {
   Reading r;
-  EXPECT_THAT(r.error(robot(part("a") + joint("j", "a", "b"))), testing::StartsWith("w.sdf:3: joint \"j\": no link \"b\""));
+  EXPECT_THAT(r.error(robot(part("a") + joint("j", "a", "b"))), ::testing::StartsWith("w.sdf:3: joint \"j\": no link \"b\""));
   EXPECT_THAT(r.error(robot(part("a") + part("b") + joint("j", "a", "b") + joint("k", "b", "a"))), HasSubstr("form a circle"));
   EXPECT_THAT(r.error(robot(part("a") + part("b") + joint("j", "a", "b") + joint("k", "a", "b"))),
               HasSubstr("hangs on two joints"));

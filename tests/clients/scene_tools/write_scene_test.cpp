@@ -7,8 +7,8 @@
 namespace sonar::scene_tools {
 namespace {
 
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::string written(const std::string& world, const WriteOptions& options = {}) {
   Reading r;

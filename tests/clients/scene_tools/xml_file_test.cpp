@@ -21,18 +21,18 @@ TEST(XmlFile, ElementsKnowTheirLinesAndAbsentOnesAreEmpty) {
 }
 
 TEST(XmlFile, RefusesWhatIsTooLargeOrNoText) {
-  EXPECT_THAT(parse_xml(std::string(max_xml_bytes + 1, ' '), "x", "x").error().text, testing::HasSubstr("16 MiB"));
-  EXPECT_THAT(parse_xml(std::string("<a>\0</a>", 8), "x", "x").error().text, testing::HasSubstr("not a text file"));
-  EXPECT_THAT(parse_xml("<!-- nothing -->", "x", "x").error().text, testing::HasSubstr("x:1: "));
+  EXPECT_THAT(parse_xml(std::string(max_xml_bytes + 1, ' '), "x", "x").error().text, ::testing::HasSubstr("16 MiB"));
+  EXPECT_THAT(parse_xml(std::string("<a>\0</a>", 8), "x", "x").error().text, ::testing::HasSubstr("not a text file"));
+  EXPECT_THAT(parse_xml("<!-- nothing -->", "x", "x").error().text, ::testing::HasSubstr("x:1: "));
 }
 
 TEST(XmlFile, NumbersAreCountedAndChecked) {
   Findings findings;
-  EXPECT_THAT(read_numbers(" 1 -2e1\n+3 ", 3, {}, "p", findings), testing::ElementsAre(1, -20, 3));
+  EXPECT_THAT(read_numbers(" 1 -2e1\n+3 ", 3, {}, "p", findings), ::testing::ElementsAre(1, -20, 3));
   EXPECT_FALSE(findings.failed());
   for (const char* wrong : {"1 2", "1 2 3 4", "1 2 3x", "1 2 inf", "1 2 1e300", "1,2,3"}) {
     Findings these;
-    EXPECT_THAT(read_numbers(wrong, 3, {}, "p", these), testing::ElementsAre(0, 0, 0)) << wrong;
+    EXPECT_THAT(read_numbers(wrong, 3, {}, "p", these), ::testing::ElementsAre(0, 0, 0)) << wrong;
     EXPECT_TRUE(these.failed()) << wrong;
   }
 }

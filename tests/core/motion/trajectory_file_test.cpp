@@ -14,7 +14,7 @@
 
 #include "core/base/memory_left.hpp"
 
-namespace sonar::motion {
+namespace sonar::motion::trajectory_file_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -257,4 +257,4 @@ TEST(TrajectoryFile, AnHourIsReadInNoTime) {
 }
 
 }  // namespace
-}  // namespace sonar::motion
+}  // namespace sonar::motion::trajectory_file_test

@@ -19,7 +19,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::beam_mix_test {
 namespace {
 
 double db(double power) { return 10 * std::log10(power); }
@@ -235,4 +235,4 @@ TEST(BeamMix, ChangesNothingWhenOff) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::beam_mix_test

@@ -15,7 +15,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::brute_force_test {
 namespace {
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
@@ -240,4 +240,4 @@ TEST(Truths, AWorldFarFromItsOriginIsTheSame) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::brute_force_test

@@ -12,7 +12,7 @@
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 
-namespace sonar::test {
+namespace sonar::test::interference_test {
 namespace {
 
 double db(double power) { return 10 * std::log10(power); }
@@ -307,4 +307,4 @@ TEST(Crosstalk, ChangesNothingWhenOffOrNotGiven) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::interference_test

@@ -9,7 +9,7 @@
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 
-namespace sonar::test {
+namespace sonar::test::labels_test {
 namespace {
 
 /// A scene of these with a label for every object but the first.
@@ -221,4 +221,4 @@ TEST(Labels, CostLessThanTwoAndAHalfPings) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::labels_test

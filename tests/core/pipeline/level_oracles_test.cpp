@@ -11,7 +11,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::level_oracles_test {
 namespace {
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
@@ -275,4 +275,4 @@ TEST(LevelOracles, Oracle45_ModesDifferByAbsorptionAndBeamAlone) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::level_oracles_test

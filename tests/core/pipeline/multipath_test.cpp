@@ -7,7 +7,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::multipath_test {
 namespace {
 
 constexpr double silent_db = -80;  // diffuse echoes of the mirrors themselves, out of the way
@@ -217,4 +217,4 @@ TEST(Multipath, OffIsTheDefaultAndNothingToMirrorIsNoChange) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::multipath_test

@@ -15,7 +15,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::pulse_oracles_test {
 namespace {
 
 using Shape = Waveform::Shape;
@@ -279,4 +279,4 @@ TEST(PulseOracles, RequestsWithPulsesThatCannotBeUsedAreRefused) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::pulse_oracles_test

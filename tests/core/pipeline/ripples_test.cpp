@@ -13,7 +13,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::ripples_test {
 namespace {
 
 constexpr double height = 2, tilt = 0.25, lambert_db = -20, from_m = 4.8, to_m = 7.6;
@@ -139,4 +139,4 @@ TEST(Ripples, ShowNoFalseArcsInStepWithTheRays) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::ripples_test

@@ -15,7 +15,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::scattering_law_test {
 namespace {
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
@@ -211,4 +211,4 @@ TEST(ScatteringLaw, LevelOfABedThatFollowsGsab) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::scattering_law_test

@@ -9,7 +9,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::side_lobes_test {
 namespace {
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
@@ -82,4 +82,4 @@ TEST(SideLobes, CoarserCellsKeepItsLevel) { expect_bed(p900(), true, true); }
 TEST(SideLobes, SwitchedOffNothingIsHeardThere) { expect_bed(p900(), false, false); }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::side_lobes_test

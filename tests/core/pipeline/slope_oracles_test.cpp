@@ -12,7 +12,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::slope_oracles_test {
 namespace {
 
 constexpr double dr = 0.0254;
@@ -144,4 +144,4 @@ TEST(SlopeOracles, Oracle08_AbsoluteSeabedLevelInFlatBeams) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::slope_oracles_test

@@ -14,7 +14,7 @@
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/oracles/record.hpp"
 
-namespace sonar::test {
+namespace sonar::test::thin_objects_test {
 namespace {
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
@@ -245,4 +245,4 @@ TEST(ThinObjects, ObjectsOfLargeScenesAreToldApart) {
 }
 
 }  // namespace
-}  // namespace sonar::test
+}  // namespace sonar::test::thin_objects_test

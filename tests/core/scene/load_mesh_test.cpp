@@ -18,7 +18,7 @@
 extern "C" const char* __lsan_default_suppressions();
 extern "C" const char* __lsan_default_suppressions() { return "leak:libassimp"; }
 
-namespace sonar {
+namespace sonar::load_mesh_test {
 namespace {
 
 using testing::expect_sound;
@@ -287,4 +287,4 @@ TEST(CleanMesh, Limits) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::load_mesh_test

@@ -6,7 +6,7 @@
 
 #include "core/scene/files/load_scene.hpp"
 
-namespace sonar {
+namespace sonar::materials_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -105,4 +105,4 @@ TEST(Materials, WhatCannotBeIsRefusedWithASentence) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::materials_test

@@ -12,7 +12,7 @@
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/temporary_files.hpp"
 
-namespace sonar {
+namespace sonar::terrain_test {
 namespace {
 
 using testing::expect_sound;
@@ -195,4 +195,4 @@ TEST(HeightGrid, TooManyTrianglesAreRefused) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::terrain_test

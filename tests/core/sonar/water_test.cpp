@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace sonar {
+namespace sonar::water_test {
 namespace {
 
 struct WaterColumn {
@@ -112,4 +112,4 @@ TEST(Water, PressureAndTrueSoundSpeed) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::water_test

@@ -7,7 +7,7 @@
 #include "daemon/config/config.hpp"
 #include "daemon/config/restart_keys.hpp"
 
-namespace sonar {
+namespace sonar::config_mavlink_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -100,4 +100,4 @@ TEST(ConfigMavlink, LinksAndOriginNeedARestart) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::config_mavlink_test

@@ -9,7 +9,7 @@
 #include "daemon/config/config.hpp"
 #include "daemon/config/products.hpp"
 
-namespace sonar {
+namespace sonar::config_mistakes_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -151,4 +151,4 @@ TEST(ConfigMistakes, KnowsAScene) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::config_mistakes_test

@@ -10,7 +10,7 @@
 
 #include "daemon/config/products.hpp"
 
-namespace sonar {
+namespace sonar::config_test {
 namespace {
 
 using ::testing::AllOf;
@@ -428,4 +428,4 @@ TEST(ConfigControl, ReadsItsKeysAndRefusesStrangersWithoutAToken) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::config_test

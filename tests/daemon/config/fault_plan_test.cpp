@@ -6,7 +6,7 @@
 
 #include "daemon/config/config.hpp"
 
-namespace sonar {
+namespace sonar::fault_plan_test {
 namespace {
 
 using ::testing::AllOf;
@@ -58,4 +58,4 @@ TEST(FaultPlan, ThatCannotHoldIsRefusedInItsPlace) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::fault_plan_test

@@ -9,7 +9,7 @@
 
 #include "daemon/config/config.hpp"
 
-namespace sonar {
+namespace sonar::trajectory_config_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -123,4 +123,4 @@ TEST(TrajectoryConfig, MistakesAreToldWithTheirPlace) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::trajectory_config_test

@@ -10,7 +10,7 @@
 #include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
-namespace sonar::testing_daemon {
+namespace sonar::testing_daemon::scene_change_test {
 namespace {
 
 using oculus::PingRate;
@@ -282,4 +282,4 @@ TEST(SceneChange, StoppingDoesNotWaitForAnswersThatAreNotRead) {
 }
 
 }  // namespace
-}  // namespace sonar::testing_daemon
+}  // namespace sonar::testing_daemon::scene_change_test

@@ -8,7 +8,7 @@
 
 #include "tests/protocol/control/examples.hpp"
 
-namespace sonar::control {
+namespace sonar::control::requests_test {
 namespace {
 
 using testing::HasSubstr;
@@ -146,4 +146,4 @@ TEST(ControlRequests, TruncationsAndFlippedBytesAreReadOrRefusedNeverFatal) {
 }
 
 }  // namespace
-}  // namespace sonar::control
+}  // namespace sonar::control::requests_test

@@ -4,7 +4,7 @@
 
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
-namespace sonar::mavlink {
+namespace sonar::mavlink::commands_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -97,4 +97,4 @@ TEST_F(MavlinkCommands, WithoutAHandlerTheyAreUnsupported) {
 }
 
 }  // namespace
-}  // namespace sonar::mavlink
+}  // namespace sonar::mavlink::commands_test

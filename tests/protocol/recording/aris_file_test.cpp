@@ -7,7 +7,7 @@
 #include "protocol/recording/recording.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
-namespace sonar::recording {
+namespace sonar::recording::aris_file_test {
 namespace {
 
 std::vector<Bytes> datagrams(std::int32_t index, std::uint32_t samples) {
@@ -145,4 +145,4 @@ TEST(ArisFile, RealOne) {
 }
 
 }  // namespace
-}  // namespace sonar::recording
+}  // namespace sonar::recording::aris_file_test

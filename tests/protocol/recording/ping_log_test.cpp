@@ -6,7 +6,7 @@
 #include "protocol/recording/recording.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
-namespace sonar::recording {
+namespace sonar::recording::ping_log_test {
 namespace {
 
 TEST(PingLog, HoldsTheFramesBehindOneThatDescribesThem) {
@@ -93,4 +93,4 @@ TEST(PingLog, CutOrDamagedSaysWhere) {
 }
 
 }  // namespace
-}  // namespace sonar::recording
+}  // namespace sonar::recording::ping_log_test

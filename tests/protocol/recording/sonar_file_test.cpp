@@ -6,7 +6,7 @@
 #include "protocol/waterlinked/rip.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
-namespace sonar::recording {
+namespace sonar::recording::sonar_file_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -98,4 +98,4 @@ TEST(SonarFile, RealOne) {
 }
 
 }  // namespace
-}  // namespace sonar::recording
+}  // namespace sonar::recording::sonar_file_test

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace sonar::render {
+namespace sonar::render::formula_test {
 namespace {
 
 using testing::HasSubstr;
@@ -65,4 +65,4 @@ TEST(Substitute, TellsFileAndLine) {
 }
 
 }  // namespace
-}  // namespace sonar::render
+}  // namespace sonar::render::formula_test

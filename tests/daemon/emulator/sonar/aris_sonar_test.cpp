@@ -4,7 +4,7 @@
 #include "protocol/aris/encode_frame.hpp"
 #include "tests/daemon/emulator/sonar/virtual_time.hpp"
 
-namespace sonar {
+namespace sonar::aris_sonar_test {
 namespace {
 
 using namespace testing_emulator;
@@ -211,4 +211,4 @@ TEST(ArisFaults, AKeepAliveIsAnsweredByAReset) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::aris_sonar_test

@@ -6,7 +6,7 @@
 #include "protocol/waterlinked/rip.hpp"
 #include "tests/daemon/emulator/sonar/virtual_time.hpp"
 
-namespace sonar {
+namespace sonar::datagram_sonars_test {
 namespace {
 
 using namespace testing_emulator;
@@ -211,4 +211,4 @@ TEST(SurveyorInVirtualTime, TellsTheTimeThatItWasToldWhateverItSkipped) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::datagram_sonars_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace sonar {
+namespace sonar::pacer_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -160,4 +160,4 @@ TEST(Pacer, EveryTickIsFiredOrSkippedForAReason) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::pacer_test

@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-namespace sonar {
+namespace sonar::rate_watch_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -74,4 +74,4 @@ TEST(RateWatch, AnotherRateIsLookedAtAnew) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::rate_watch_test

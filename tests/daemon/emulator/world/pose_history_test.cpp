@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace sonar {
+namespace sonar::pose_history_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -131,4 +131,4 @@ TEST(PoseHistory, GivenVelocitiesAreTheMotionBeyondTheNewest) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::pose_history_test

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace sonar {
+namespace sonar::world_test {
 namespace {
 
 using control::ClockDomain;
@@ -347,4 +347,4 @@ TEST(World, WhatWasHiddenForNowIsShownAgainAndWhatItsPosesHideIsNot) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::world_test

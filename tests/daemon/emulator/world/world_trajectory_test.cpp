@@ -4,7 +4,7 @@
 
 #include "daemon/emulator/world/world.hpp"
 
-namespace sonar {
+namespace sonar::world_trajectory_test {
 namespace {
 
 using control::PoseSample;
@@ -119,4 +119,4 @@ TEST(WorldTrajectory, ObjectsFollowThemToo) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::world_trajectory_test

@@ -12,7 +12,7 @@
 #include "tests/daemon/server/loopback.hpp"
 #include "tests/small_disk.hpp"
 
-namespace sonar::testing_daemon {
+namespace sonar::testing_daemon::recordings_test {
 namespace {
 
 using oculus::PingRate;
@@ -453,4 +453,4 @@ TEST(RecordedDaemon, AStopOfTheDaemonFinishesTheFile) {
 }
 
 }  // namespace
-}  // namespace sonar::testing_daemon
+}  // namespace sonar::testing_daemon::recordings_test

@@ -7,7 +7,7 @@
 
 #include "tests/daemon/server/loopback.hpp"
 
-namespace sonar::testing_daemon {
+namespace sonar::testing_daemon::session_test {
 namespace {
 
 using std::chrono::duration_cast;
@@ -153,4 +153,4 @@ TEST_F(SessionShapes, AnEmptyMessageEndsAtABoundary) {
 }
 
 }  // namespace
-}  // namespace sonar::testing_daemon
+}  // namespace sonar::testing_daemon::session_test

@@ -12,7 +12,7 @@
 #include "tests/daemon/server/loopback.hpp"
 #include "tests/daemon/server/sonars/made_up_vendor.hpp"
 
-namespace sonar::testing_daemon {
+namespace sonar::testing_daemon::transports_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -377,4 +377,4 @@ TEST(Beacon, SendsItsDatagramsInOrder) {
 }
 
 }  // namespace
-}  // namespace sonar::testing_daemon
+}  // namespace sonar::testing_daemon::transports_test

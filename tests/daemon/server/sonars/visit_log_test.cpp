@@ -6,7 +6,7 @@
 #include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
-namespace sonar::testing_daemon {
+namespace sonar::testing_daemon::visit_log_test {
 namespace {
 
 using Kind = VisitLog::Kind;
@@ -86,4 +86,4 @@ TEST(VisitLog, AClientThatReconnectsIsSeenToGo) {
 }
 
 }  // namespace
-}  // namespace sonar::testing_daemon
+}  // namespace sonar::testing_daemon::visit_log_test

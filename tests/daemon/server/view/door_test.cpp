@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace sonar {
+namespace sonar::door_test {
 namespace {
 
 using std::chrono::seconds;
@@ -144,4 +144,4 @@ TEST_F(Door, TheHandshake) {
 }
 
 }  // namespace
-}  // namespace sonar
+}  // namespace sonar::door_test
