@@ -1,7 +1,7 @@
 """The page of the live view in a real browser, before sonard itself with a driver. Skipped without browser or page.
 
 SONARD_PAGE_MINUTES=20 also runs what takes long (class Long): the page's memory over so many minutes, its delays, its pictures a second.
-SONARD_SHOTS names the folder of the pictures, else they lie beside the build; those of docs/live-view.md are among them
+SONARD_SHOTS names a folder for pictures, those of docs/live-view.md among them; without it there are only those of tests that fail
 (SONARD_SHOT_HZ: at that rate, for slow computers).
 """
 import collections
@@ -22,7 +22,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "reliability"))
 
 from browser import Browser  # noqa: E402
-from page_checks import SHOTS, WHY_NOT, PageChecks, shown  # noqa: E402
+from page_checks import WHY_NOT, PageChecks, shown  # noqa: E402
 from record import record  # noqa: E402
 from running_sonard import BUILD, ROOT, Sonard  # noqa: E402
 
@@ -96,12 +96,11 @@ def client_of(daemon):
 class Live(PageChecks, unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        SHOTS.mkdir(parents=True, exist_ok=True)
         cls.browser = cls.enterClassContext(Browser())
 
     def open(self, daemon, width=1440, height=900, query="", **options):
         page = self.browser.open(url_of(daemon) + query, width, height, **options)
-        self.addCleanup(page.close)
+        self.addCleanup(self.leave, page)
         return page
 
     def test_fan_is_true(self):
@@ -224,8 +223,7 @@ class Live(PageChecks, unittest.TestCase):
                     page.wait("!!" + self.trouble("Thin tether"))
                     page.run(f"document.querySelector('#fault-seconds').value = 60, {self.trouble('Thin tether')}.click()")
                     page.wait("/thin.tether/i.test(document.querySelector('#findings li')?.innerText)")
-                    time.sleep(8)
-                page.picture(SHOTS / f"{name}.png")
+                self.picture(page, name, 8 if width > 800 else 0)
                 self.assert_quiet(page, url_of(daemon))
                 page.close()
 

@@ -1,6 +1,6 @@
 """The page of the live view in a real browser, before a scripted daemon (view/mock_daemon.py). Skipped without browser or page.
 
-Pictures of the states are kept in the folder that SONARD_SHOTS names, else beside the build.
+Pictures of the states are kept in the folder that SONARD_SHOTS names; without it only of tests that fail, beside the build.
 """
 import gzip
 import http.client
@@ -14,7 +14,7 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
 from browser import Browser  # noqa: E402
-from page_checks import FAINT_WORDS, NAMELESS_CONTROLS, PAGE, SHOTS, SMALL_TARGETS, WHY_NOT, PageChecks, shown  # noqa: E402
+from page_checks import FAINT_WORDS, NAMELESS_CONTROLS, PAGE, SMALL_TARGETS, WHY_NOT, PageChecks, shown  # noqa: E402
 from running_sonard import ROOT, Sonard  # noqa: E402
 
 from sonard_client import OculusClient  # noqa: E402  pylint: disable=wrong-import-order
@@ -61,7 +61,6 @@ class Page(PageChecks, unittest.TestCase):
                 cls.pings[name] = ping_about(ping)
                 cls.raw[name] = pathlib.Path(cls.folder.name) / name.replace(" ", "-")
                 cls.raw[name].write_bytes(ping.data)
-        SHOTS.mkdir(parents=True, exist_ok=True)
         cls.mock = MockDaemon(PAGE, [cls.pings["60 degrees, 8 bit"]]).start()
         cls.addClassCleanup(cls.mock.stop)
         cls.url = f"http://127.0.0.1:{cls.mock.port}/"
@@ -74,7 +73,7 @@ class Page(PageChecks, unittest.TestCase):
 
     def open(self, width=1440, height=900, query="", **options):
         page = self.browser.open(self.url + query, width, height, **options)
-        self.addCleanup(page.close)
+        self.addCleanup(self.leave, page)
         return page
 
     def test_fan_is_true(self):
@@ -84,7 +83,7 @@ class Page(PageChecks, unittest.TestCase):
         for name, width, colours in [("60 degrees, 8 bit", 1000, ["copper"]), ("60 degrees, 8 bit", 300, maps),
                                      ("60 degrees, 16 bit", 300, ["copper"]), ("130 degrees, 8 bit", 300, ["gray"])]:
             self.mock.pings = [self.pings[name]]
-            page = self.browser.open(f"{self.url}?test={width}", 1100, 700)
+            page = self.open(1100, 700, query=f"?test={width}")
             shown(page)
             for map_name in colours:
                 with self.subTest(ping=name, width=width, colours=map_name):
@@ -115,8 +114,7 @@ class Page(PageChecks, unittest.TestCase):
                 page.wait(f"document.body.dataset.situation === '{kind}' && document.body.innerText.includes({text!r})", 12)
                 if button:
                     self.assertEqual(page.text("#notice-button"), button)
-                time.sleep(1.5)
-                page.picture(SHOTS / f"{state.replace(' ', '-')}.png")
+                self.picture(page, state.replace(" ", "-"), 1.5)
 
     def test_buttons_of_states(self):
         page = self.open()
@@ -158,8 +156,7 @@ class Page(PageChecks, unittest.TestCase):
         shown(page)
         self.mock.state("lost")
         page.wait("document.querySelector('#notice-text').innerText.includes('sonard has not answered for')", 10)
-        time.sleep(1)
-        page.picture(SHOTS / "lost.png")
+        self.picture(page, "lost", 1)
         self.mock.state("fine")
         page.wait("document.body.dataset.situation === 'fine'", 12)
 
@@ -167,7 +164,7 @@ class Page(PageChecks, unittest.TestCase):
         self.mock.token = "secret"
         page = self.open(1100, 760)
         page.wait("document.querySelector('#token').offsetWidth > 0")
-        page.picture(SHOTS / "token.png")
+        self.picture(page, "token")
         page.run("document.querySelector('#token').value = 'secret', document.querySelector('#token-form').requestSubmit()")
         shown(page)
 
@@ -176,7 +173,7 @@ class Page(PageChecks, unittest.TestCase):
                          " return kind === 'webgl2' ? null : old.call(this, kind, ...rest); })(HTMLCanvasElement.prototype.getContext)")
         page.wait("document.querySelector('#no-scene').offsetWidth > 0")
         page.wait("document.querySelector('#fan').width === 720", 60)  # as sonard has drawn it
-        page.picture(SHOTS / "no-webgl.png")
+        self.picture(page, "no-webgl")
         page.run("1")
         self.assertEqual(page.errors, [])
 
@@ -210,7 +207,7 @@ class Page(PageChecks, unittest.TestCase):
     def test_no_sideways_scrolling(self):
         for width, height in ((320, 640), (390, 844), (768, 1024), (1440, 900), (2560, 1440)):
             with self.subTest(width=width):
-                page = self.browser.open(self.url, width, height, touch=width < 800)
+                page = self.open(width, height, touch=width < 800)
                 shown(page)
                 self.assert_fits(page, width)
                 page.close()
@@ -220,14 +217,14 @@ class Page(PageChecks, unittest.TestCase):
         for theme in ("dark", "light"):
             for touch in (False, True):
                 with self.subTest(theme=theme, touch=touch):
-                    page = self.browser.open(self.url, 390 if touch else 1440, 844 if touch else 900, touch=touch, theme=theme)
+                    page = self.open(390 if touch else 1440, 844 if touch else 900, touch=touch, theme=theme)
                     shown(page)
                     page.run("localStorage.clear(), document.documentElement.dataset.theme = '%s', document.body.dataset.tab = 'faults'" % theme)
                     self.assertEqual(page.run(FAINT_WORDS), [])
                     self.assertEqual(page.run(NAMELESS_CONTROLS), [])
                     if touch:
                         self.assertEqual(page.run(SMALL_TARGETS), [])
-                    page.picture(SHOTS / f"{theme}{'-phone' if touch else ''}.png")
+                    self.picture(page, f"{theme}{'-phone' if touch else ''}")
                     page.close()
 
     def test_settings_are_asked_for_and_refusals_shown(self):

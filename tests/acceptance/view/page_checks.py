@@ -11,7 +11,8 @@ from pictures import difference, mirrored, read_png
 from running_sonard import BUILD, SONARCTL, run
 
 PAGE = BUILD / "clients/web/page"
-SHOTS = pathlib.Path(os.environ.get("SONARD_SHOTS", BUILD / "tests/page-pictures"))
+SHOTS = pathlib.Path(os.environ["SONARD_SHOTS"]) if os.environ.get("SONARD_SHOTS") else None
+FAILED_SHOTS = SHOTS or BUILD / "tests/page-pictures"
 WHY_NOT = ("this build has no page" if not (PAGE / "index.html").is_file() else
            "no chromium" if program() is None else
            "no protoc" if shutil.which("protoc") is None else "")
@@ -51,6 +52,24 @@ def shown(page, patience_s=60):
 class PageChecks:
     """Of a TestCase."""
 
+    @staticmethod
+    def picture(page, name, settled_s=0.0):
+        """Kept where SONARD_SHOTS names a folder, once what moves has had some time."""
+        if SHOTS:
+            SHOTS.mkdir(parents=True, exist_ok=True)
+            time.sleep(settled_s)
+            page.picture(SHOTS / f"{name}.png")
+
+    def leave(self, page):
+        """Closes it; a picture is kept of a test that failed."""
+        if not self._outcome.success:
+            FAILED_SHOTS.mkdir(parents=True, exist_ok=True)
+            try:
+                page.picture(FAILED_SHOTS / f"failed-{self.id().rpartition('.')[2]}.png")
+            except OSError:
+                pass  # it is closed already
+        page.close()
+
     def patiently(self, condition, patience_s=60):
         deadline = time.monotonic() + patience_s
         while not condition():
@@ -83,14 +102,14 @@ class PageChecks:
         self.assertGreater(difference(mirrored(width, height, ours), theirs)[0], 2)
 
     def assert_fits(self, page, width, name=""):
-        """No sideways scrolling in any pane; a picture of each."""
+        """No sideways scrolling in any pane."""
         for tab in TABS if width < 820 else TABS[:1]:
             if width < 820:
                 page.click(f"#tabs [data-tab={tab}]")
                 time.sleep(0.5)
             self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
             self.assertEqual(page.run(WIDER_THAN.replace("WIDTH", str(width))), [], tab)
-            page.picture(SHOTS / f"{name}{width}-{tab}.png")
+            self.picture(page, f"{name}{width}-{tab}")
 
     def assert_quiet(self, page, url):
         """No error of the console, and no request but to `url`."""
