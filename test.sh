@@ -14,7 +14,7 @@ case "${1:-}" in
   --long) long=1; shift ;;
 esac
 
-setup_and_build || exit
+timed "build" setup_and_build || exit
 for packages in "${test_packages[*]}" "${browser_packages[*]}"; do
   # shellcheck disable=SC2086
   need_packages $packages || echo "going on without: the tests that need them are skipped"
@@ -24,7 +24,8 @@ if [ -n "$long" ]; then  # tests that measure what reliability_table.py shows le
   rm -f "$SONARD_RELIABILITY"/*.json  # what is not measured now is told as "not run"
 fi
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"
-ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-2}" --output-on-failure --no-tests=error "$@" </dev/null
+timed "tests" ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-$(nproc)}" --output-on-failure --no-tests=error \
+  --output-junit "$PWD/build/release/tests.xml" "$@" </dev/null
 status=$?
 # What the oracles of docs/acoustics.md measured. A run of some tests only need not have figures for all of them.
 partial=()

@@ -16,11 +16,10 @@ if [ $# -eq 0 ]; then
   ! grep -qw avx512f /proc/cpuinfo 2>/dev/null || set -- avx2:avx2 "$@"
 fi
 
-# Left out are the tests that name the instruction set of every case themselves (kernel_sets, beam_transform), and those that repeat
-# one stage over thousands of pings to measure a figure; the stages are run by the others.
-left_out='/(kernel_sets|beam_transform|everything|statistics_oracles|specular_statistics|texture)_test$'
-mapfile -t programs < <(find "$build"/tests/core/{scene,cells,pipeline,paper} -maxdepth 1 -name '*_test' -type f | grep -vE "$left_out" | sort)
-[ ${#programs[@]} -gt 0 ] || { echo "no tests in $build/tests/core; build them first" >&2; exit 66; }
+# The programs of kind LEVELS (tests/CMakeLists.txt), less those that repeat one stage over thousands of pings to measure a figure and
+# those that name the instruction set of every case themselves.
+mapfile -t programs < <(tests/tools/run_programs.py "$build" --list LEVELS)
+[ ${#programs[@]} -gt 0 ] || exit 66
 unset SONARD_ORACLES SONARD_RELIABILITY  # figures of record are those of the processor itself
 
 started=$SECONDS
@@ -28,14 +27,7 @@ failed=0
 for level in "$@"; do
   export SONARD_SIMD=${level%%:*} SONARD_EMBREE_ISA=${level#*:}
   printf -- '-- %d programs, hot loops %s, Embree %s\n' ${#programs[@]} "$SONARD_SIMD" "$SONARD_EMBREE_ISA"
-  # One line a program that passes; the whole output of one that fails.
-  printf '%s\0' "${programs[@]}" | xargs -0 -n 1 -P "${SONARD_TEST_JOBS:-2}" bash -c '
-    if output=$(timeout 600 "$0" --gtest_brief=1 2>&1 </dev/null); then
-      printf "%s: %s\n" "${0##*/}" "$(tail -n 1 <<<"$output")"
-    else
-      printf "%s FAILED\n%s\n" "$0" "$output"
-      exit 1
-    fi' || failed=1
+  SONARD_TEST_SECONDS=600 tests/tools/run_programs.py "$build" "${programs[@]}" || failed=1
 done
 printf '\n%d programs at %d levels in %d s: %s\n' ${#programs[@]} $# $((SECONDS - started)) "$([ $failed -eq 0 ] && echo passed || echo FAILED)"
 exit $failed

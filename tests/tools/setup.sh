@@ -1,12 +1,12 @@
 # Prepares a machine and builds: sourced by run.sh, test.sh and .ci/run, from the repository root. Quick when nothing changed.
 # shellcheck shell=bash
 
-# What the build needs on Debian 12 and Ubuntu; all of it from the main archive.
-build_packages=(
+# What the programs need on Debian 12 and Ubuntu, and what the tests need besides to be built; all of it from the main archive.
+product_packages=(
   g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libtinyxml2-dev libpng-dev zlib1g-dev
-  libexpected-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libeigen3-dev libgtest-dev libgmock-dev
-  libfftw3-dev libsnappy-dev libnats-dev
+  libexpected-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libfftw3-dev libsnappy-dev libnats-dev
 )
+build_packages=("${product_packages[@]}" libeigen3-dev libgtest-dev libgmock-dev)
 
 # For the page of the live view; without them the daemon is built without it.
 page_packages=(esbuild libjs-three)
@@ -18,6 +18,16 @@ test_packages=(
 browser_packages=(chromium)
 
 say() { printf '\n== %s\n' "$*"; }
+
+# timed NAME COMMAND...: runs it; how many seconds it took goes to the file that SONARD_SECONDS names, for .ci/run.
+timed() {
+  local name=$1 from=$SECONDS status
+  shift
+  "$@"
+  status=$?
+  [ -z "${SONARD_SECONDS:-}" ] || printf '%6d s  %s\n' $((SECONDS - from)) "$name" >>"$SONARD_SECONDS"
+  return $status
+}
 
 # need_packages NAME...: installs what is missing, with apt, and says so.
 need_packages() {
@@ -88,10 +98,14 @@ build() {
   return "${PIPESTATUS[0]}"
 }
 
-# setup_and_build [targets...]: the release build; without targets everything in it, tests too.
+# setup_and_build [targets...]: the release build; without targets everything in it, tests too. With product_only set neither the
+# packages of tests are installed nor tests configured, unless they were before. What .ci/run sets differs: a plain run builds all.
 setup_and_build() {
-  need_packages "${build_packages[@]}" || return
+  local packages=("${build_packages[@]}") testing=ON
+  if [ -n "${product_only:-}" ] && [ ! -f build/release/tests/programs ]; then packages=("${product_packages[@]}") testing=OFF; fi
+  need_packages "${packages[@]}" || return
   need_packages "${page_packages[@]}" || echo "going on without: this sonard has no page for browsers"
   say "building in build/release"
-  configure release -DSONAR_WERROR="${SONAR_WERROR:-OFF}" && build release "$@"
+  configure release -DSONAR_WERROR="${SONAR_WERROR:-OFF}" -DBUILD_TESTING=$testing -DSONAR_TESTS_LEFT_OUT="${SONAR_TESTS_LEFT_OUT:-}" &&
+    build release "$@"
 }
