@@ -1,0 +1,110 @@
+"""What .ci/run leaves out, and how run_programs.py and test_times.py name what failed."""
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+TOOLS = pathlib.Path(__file__).resolve().parent
+ROOT = TOOLS.parents[1]
+HEAVY = {"package", "page", "cuda", "bench", "levels"}
+# A GoogleTest program as far as run_programs.py knows one.
+PROGRAM = """#!/bin/sh
+echo "$0 part $GTEST_SHARD_INDEX of $GTEST_TOTAL_SHARDS" >>"$RAN"
+echo "[ RUN      ] Suite.Ended"
+{ending}
+"""
+
+
+class LeftOut(unittest.TestCase):
+    def left_out(self, *files):
+        done = subprocess.run([ROOT / ".ci/run", "--left-out", *files], capture_output=True, text=True, check=True)
+        return set(done.stdout.split())
+
+    def test_is_what_the_changed_files_cannot_touch(self):
+        self.assertEqual(self.left_out("docs/faults.md"), HEAVY)
+        self.assertEqual(self.left_out("clients/sonarctl/listen.cpp", "docs/faults.md"), HEAVY)
+        self.assertEqual(self.left_out("core/pipeline/simulate.cpp"), {"package", "page"})
+        self.assertEqual(self.left_out("clients/web/main.js"), HEAVY - {"page"})
+        self.assertEqual(self.left_out("daemon/CMakeLists.txt"), HEAVY - {"package"})
+
+    def test_is_nothing_when_the_build_or_the_checks_change(self):
+        for file in ("CMakeLists.txt", "CMakePresets.json", ".ci/run", "test.sh", "tests/tools/setup.sh", "tests/CMakeLists.txt", ""):
+            with self.subTest(file=file):
+                self.assertEqual(self.left_out("docs/faults.md", file) if file else self.left_out(), set())
+
+
+class Programs(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.build = pathlib.Path(folder.name)
+        (self.build / "tests").mkdir()
+        self.failed = self.build / "failed"
+
+    def program(self, name, kinds, ending):
+        path = self.build / name
+        path.write_text(PROGRAM.format(ending=ending))
+        path.chmod(0o755)
+        with open(self.build / "tests/programs", "a", encoding="utf-8") as file:
+            file.write(f"{kinds} {path} argument\n")
+
+    def run_programs(self, *arguments, **environment):
+        environment = dict(os.environ) | {"SONARD_TEST_JOBS": "2", "SONARD_FAILED": str(self.failed), "RAN": str(self.build / "ran")} | environment
+        return subprocess.run([sys.executable, TOOLS / "run_programs.py", self.build, *arguments], capture_output=True, text=True,
+                              env=environment, check=False)
+
+    def test_are_listed_by_kind(self):
+        self.program("one", "GTEST,LEVELS", "")
+        self.program("two", "GTEST,LEVELS,FIGURES", "")
+        self.program("three", "SANITIZED", "")
+        self.assertEqual(self.run_programs("--list", "LEVELS", "SANITIZED", "--without", "FIGURES").stdout.split(), ["one", "three"])
+
+    def test_run_in_parts_and_pass(self):
+        self.program("one", "GTEST", "")
+        self.program("two", "SANITIZED", "")
+        done = self.run_programs("one", "two")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        ran = [line.partition(" ")[2] for line in (self.build / "ran").read_text().splitlines()]
+        self.assertEqual(sorted(ran), ["part  of ", "part 0 of 2", "part 1 of 2"])
+        self.assertFalse(self.failed.exists())
+
+    def test_that_fail_are_named_with_their_cases(self):
+        self.program("asserts", "GTEST", 'echo "[  FAILED  ] Suite.Asserts (3 ms)"; exit 1')
+        self.program("crashes", "GTEST", "kill -SEGV $$")
+        self.program("fuzz", "SANITIZED", "exit 3")
+        done = self.run_programs("asserts", "crashes", "fuzz", SONARD_TEST_JOBS="1")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("fuzz FAILED: it ended with 3", done.stdout)
+        self.assertEqual(sorted(self.failed.read_text().splitlines()),
+                         ["asserts: Suite.Asserts", "crashes: Suite.Ended", "fuzz: Suite.Ended"])
+
+    def test_that_hang_are_ended_and_named(self):
+        self.program("hangs", "SANITIZED", "exec sleep 600")
+        done = self.run_programs("hangs", SONARD_TEST_SECONDS="1")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("hangs FAILED: it took more than 1 s", done.stdout)
+        self.assertRegex(self.failed.read_text(), "^hangs")
+
+    def test_that_are_unknown_are_refused(self):
+        self.program("one", "GTEST", "")
+        done = self.run_programs("other")
+        self.assertEqual((done.returncode, done.stderr), (1, "no such test program: other; there are one\n"))
+
+
+class Times(unittest.TestCase):
+    def test_of_the_slowest_and_names_of_the_failed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            results = pathlib.Path(folder) / "tests.xml"
+            cases = "".join(f'<testcase name="Suite.Case{n}" time="{n}" status="{"fail" if n in (2, 7) else "run"}"/>' for n in range(1, 13))
+            results.write_text(f"<testsuite>{cases}</testsuite>")
+            tell = [sys.executable, TOOLS / "test_times.py", results]
+            slowest = subprocess.run(tell, capture_output=True, text=True, check=True).stdout.split("\n")
+            failed = subprocess.run([*tell, "--failed"], capture_output=True, text=True, check=True).stdout.split()
+        self.assertEqual((slowest[0], len(slowest) - 1), ("  12.0 s  Suite.Case12", 10))
+        self.assertEqual(failed, ["Suite.Case2", "Suite.Case7"])
+
+
+if __name__ == "__main__":
+    unittest.main()
