@@ -7,6 +7,8 @@ cd "$(dirname "$0")" || exit 70
 # shellcheck source=tests/tools/setup.sh
 . tests/tools/setup.sh
 
+# shellcheck disable=SC2034  # read by setup_and_build
+product_only=1
 case "${1:-}" in
   -h | --help)
     sed -n '2,4s/^# //p' "$0"
