@@ -99,9 +99,7 @@ class Live(PageChecks, unittest.TestCase):
         cls.browser = cls.enterClassContext(Browser())
 
     def open(self, daemon, width=1440, height=900, query="", **options):
-        page = self.browser.open(url_of(daemon) + query, width, height, **options)
-        self.addCleanup(self.leave, page)
-        return page
+        return self.opened(self.browser.open(url_of(daemon) + query, width, height, **options))
 
     def test_fan_is_true(self):
         """What the page draws of a ping is what `sonarctl view` draws of the bytes that a driver got."""

@@ -72,9 +72,7 @@ class Page(PageChecks, unittest.TestCase):
         self.mock.state("fine")
 
     def open(self, width=1440, height=900, query="", **options):
-        page = self.browser.open(self.url + query, width, height, **options)
-        self.addCleanup(self.leave, page)
-        return page
+        return self.opened(self.browser.open(self.url + query, width, height, **options))
 
     def test_fan_is_true(self):
         """What the page draws is what `sonarctl view` draws of the same ping: the usual picture, the others smaller."""

@@ -1,10 +1,12 @@
 """What the browser tests of the page hold against it, before a scripted daemon (page_test.py) and a real one (page_live_test.py)."""
 import base64
+import contextlib
 import os
 import pathlib
 import shutil
 import sys
 import time
+import unittest
 
 from browser import program
 from pictures import difference, mirrored, read_png
@@ -60,15 +62,35 @@ class PageChecks:
             time.sleep(settled_s)
             page.picture(SHOTS / f"{name}.png")
 
-    def leave(self, page):
-        """Closes it; a picture is kept of a test that failed."""
-        if not self._outcome.success:
+    open_pages = ()
+
+    def opened(self, page):
+        """For a page that the test opens: closed at its end, kept as a picture when the test or a part of it fails before."""
+        self.open_pages = (*self.open_pages, page)
+        self.addCleanup(page.close)
+        return page
+
+    @contextlib.contextmanager
+    def pictures_of_failure(self):
+        try:
+            yield
+        except unittest.SkipTest:
+            raise
+        except Exception:
             FAILED_SHOTS.mkdir(parents=True, exist_ok=True)
-            try:
-                page.picture(FAILED_SHOTS / f"failed-{self.id().rpartition('.')[2]}.png")
-            except OSError:
-                pass  # it is closed already
-        page.close()
+            for number, page in enumerate(self.open_pages):
+                with contextlib.suppress(OSError):  # it is closed already
+                    page.picture(FAILED_SHOTS / f"failed-{self.id().rpartition('.')[2]}-{number}.png")
+            raise
+
+    def _callTestMethod(self, method):  # pylint: disable=invalid-name
+        with self.pictures_of_failure():
+            super()._callTestMethod(method)
+
+    @contextlib.contextmanager
+    def subTest(self, *message, **parameters):  # pylint: disable=invalid-name
+        with super().subTest(*message, **parameters), self.pictures_of_failure():
+            yield
 
     def patiently(self, condition, patience_s=60):
         deadline = time.monotonic() + patience_s
