@@ -92,6 +92,14 @@ class Programs(unittest.TestCase):
         done = self.run_programs("other")
         self.assertEqual((done.returncode, done.stderr), (1, "no such test program: other; there are one\n"))
 
+    def test_that_are_not_built_fail(self):
+        self.program("one", "SANITIZED", "")
+        (self.build / "one").unlink()
+        done = self.run_programs("one")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("one FAILED: it did not start: ", done.stdout)
+        self.assertEqual(self.failed.read_text(), "one\n")
+
 
 class Times(unittest.TestCase):
     def test_of_the_slowest_and_names_of_the_failed(self):

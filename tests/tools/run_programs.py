@@ -38,7 +38,7 @@ def failed_cases(output):
 
 
 def run(command, part, parts):
-    """Status and output of one part; status None when it took too long."""
+    """How one part ended, nothing when it passed, and its output."""
     environment = dict(os.environ)
     if parts > 1:
         environment |= {"GTEST_TOTAL_SHARDS": str(parts), "GTEST_SHARD_INDEX": str(part)}
@@ -46,10 +46,13 @@ def run(command, part, parts):
         try:
             status = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=environment, timeout=LONGEST_S,
                                     check=False).returncode
+            ended = f"ended with {status}" if status else ""
         except subprocess.TimeoutExpired:
-            status = None
+            ended = f"took more than {LONGEST_S:.0f} s"
+        except OSError as error:
+            ended = f"did not start: {error}"
         output.seek(0)
-        return status, output.read().decode(errors="replace")
+        return ended, output.read().decode(errors="replace")
 
 
 def run_all(programs):
@@ -65,11 +68,10 @@ def run_all(programs):
     with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
         waiting = [pool.submit(one, name, part) for name in programs for part in range(parts_of[name])]
         for done in concurrent.futures.as_completed(waiting):
-            name, (status, output), took = done.result()
+            name, (ended, output), took = done.result()
             seconds[name] += took
             left[name] -= 1
-            if status != 0:
-                ended = f"took more than {LONGEST_S:.0f} s" if status is None else f"ended with {status}"
+            if ended:
                 print(f"{name} FAILED: it {ended}\n{output}")
                 failed += [f"{name}: {case}" for case in failed_cases(output)] or [name]
                 broken.add(name)
