@@ -7,10 +7,12 @@ import signal
 import socket
 import subprocess
 import tempfile
-import time
 import unittest
 
-from running_sonard import ROOT, SONARD, SONARCTL, run
+from running_sonard import ROOT, SONARD, SONARCTL, eventually, run
+
+PORT = 4222
+URL = f"nats://127.0.0.1:{PORT}"
 
 SERVER = shutil.which("nats-server") or shutil.which("nats-server", path="/usr/sbin:/usr/local/sbin")
 
@@ -26,14 +28,6 @@ sonar: {ping: {range_m: 7, beams: 32, rows: 64}}
 poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10.5], rpy_deg: [0, 10, 0]}}
 """
 TETRAHEDRON = "v 0 0 0.3\nv 0.3 0 -0.2\nv -0.2 0.3 -0.2\nv -0.2 -0.3 -0.2\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n"
-
-
-def eventually(true, patience_s=120):
-    end = time.monotonic() + patience_s
-    while not true():
-        if time.monotonic() > end:
-            raise AssertionError("has not come true")
-        time.sleep(0.05)
 
 
 def why_not():
@@ -52,10 +46,6 @@ class Farm(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.path = pathlib.Path(folder.name)
         self.out = self.path / "farm"
-        with socket.socket() as s:
-            s.bind(("127.0.0.1", 0))
-            self.port = s.getsockname()[1]
-        self.url = f"nats://127.0.0.1:{self.port}"
         self.processes = []
         self.addCleanup(self.end_all)
         self.start_server()
@@ -73,15 +63,15 @@ class Farm(unittest.TestCase):
         return process
 
     def start_server(self):
-        self.server = self.start(SERVER, "-js", "-sd", self.path / "store", "-a", "127.0.0.1", "-p", self.port)
+        self.server = self.start(SERVER, "-js", "-sd", self.path / "store", "-a", "127.0.0.1", "-p", PORT)
         eventually(self.answers)
 
     def answers(self):
         with socket.socket() as s:
-            return s.connect_ex(("127.0.0.1", self.port)) == 0
+            return s.connect_ex(("127.0.0.1", PORT)) == 0
 
     def worker(self, out=None, *more):
-        return self.start(SONARD, "worker", "--nats", self.url, "--out", out or self.out, "--threads", "1", *more)
+        return self.start(SONARD, "worker", "--nats", URL, "--out", out or self.out, "--threads", "1", *more)
 
     def farm(self, *words, code=0):
         result = run(SONARCTL, "farm", *words)
@@ -89,10 +79,10 @@ class Farm(unittest.TestCase):
         return result.stdout + result.stderr
 
     def status(self):
-        return self.farm("status", "--nats", self.url)
+        return self.farm("status", "--nats", URL)
 
     def submit(self, job, *more):
-        text = self.farm("submit", job, "--nats", self.url, "--out", self.out, "--ack-wait", "3", *more)
+        text = self.farm("submit", job, "--nats", URL, "--out", self.out, "--ack-wait", "3", *more)
         return text, self.out / text.split()[0]
 
     def logs(self):
@@ -126,7 +116,6 @@ class Farm(unittest.TestCase):
         eventually(lambda: list(made.glob("shard-*.tar.sha256")))
         self.server.kill()
         self.server.wait()
-        time.sleep(0.3)
         self.start_server()
         self.wait_for(*workers)
         self.assertIn("12 done, 0 running, 0 queued, 0 dead", self.status(), self.logs())
@@ -197,12 +186,12 @@ class Farm(unittest.TestCase):
         outside.write_text(TETRAHEDRON)
         job.write_text(SMALL.replace("meshes/ball.obj", "../outside.obj"))
         self.assertIn("../outside.obj is not below the job's folder",
-                      self.farm("submit", job, "--nats", self.url, "--out", self.out, code=78))
+                      self.farm("submit", job, "--nats", URL, "--out", self.out, code=78))
         self.assertIn("the farm has no jobs", self.status())
         self.server.kill()
         self.server.wait()
         for command in ((SONARD, "worker", "--out", self.out), (SONARCTL, "farm", "status")):
-            result = run(*command, "--nats", self.url)
+            result = run(*command, "--nats", URL)
             self.assertEqual((result.returncode, "no NATS server answers at" in result.stderr), (69, True), result.stderr)
 
 

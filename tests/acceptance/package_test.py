@@ -9,7 +9,7 @@ import sys
 import tempfile
 import unittest
 
-from running_sonard import BUILD, ROOT, free_address, run
+from running_sonard import BUILD, ROOT, run
 
 sys.path.insert(0, str(ROOT / "tests/architecture"))
 import check_links  # noqa: E402
@@ -71,10 +71,10 @@ class Installed:
         with tempfile.TemporaryDirectory() as folder:
             config = pathlib.Path(folder) / "my.yaml"
             text = "world: {scene: SCENE}\nvehicles: [{name: rov}]\nsonars: [{name: a, profile: oculus-m1200d, bind_ip: ADDRESS}]\n"
-            config.write_text(text.replace("ADDRESS", free_address()).replace("SCENE", "tank-rod.yaml"), encoding="utf-8")
+            config.write_text(text.replace("ADDRESS", "127.0.0.9").replace("SCENE", "tank-rod.yaml"), encoding="utf-8")
             found = run(self.program("sonard"), "check", config)
             self.assertEqual(found.returncode, 0, found.stderr)
-            config.write_text(text.replace("ADDRESS", free_address()).replace("SCENE", "nowhere.yaml"), encoding="utf-8")
+            config.write_text(text.replace("ADDRESS", "127.0.0.9").replace("SCENE", "nowhere.yaml"), encoding="utf-8")
             error = run(self.program("sonard"), "check", config).stderr
             looked = error.split("looked in ")[1]
             first = looked.strip().replace(" and ", ", ").split(", ")[1]

@@ -112,7 +112,7 @@ class Page(PageChecks, unittest.TestCase):
         for state, (kind, text, button) in STATES.items():
             with self.subTest(state=state):
                 self.mock.state(state)
-                page.wait(f"document.body.dataset.situation === '{kind}' && document.body.innerText.includes({text!r})", 12)
+                page.wait(f"document.body.dataset.situation === '{kind}' && document.body.innerText.includes({text!r})")
                 if button:
                     self.assertEqual(page.text("#notice-button"), button)
                 time.sleep(1.5)
@@ -127,10 +127,7 @@ class Page(PageChecks, unittest.TestCase):
                 self.mock.state(state)
                 page.wait(f"document.body.dataset.situation === '{STATES[state][0]}'")
                 page.click("#notice-button")
-                deadline = time.monotonic() + 5
-                while call not in self.mock.set_calls and time.monotonic() < deadline:
-                    time.sleep(0.1)
-                self.assertIn(call, self.mock.set_calls)
+                self.patiently(lambda: call in self.mock.set_calls)
 
     def test_looking_only_steers_nothing(self):
         self.mock.state("look only")
@@ -157,11 +154,11 @@ class Page(PageChecks, unittest.TestCase):
         page = self.open(1100, 760)
         shown(page)
         self.mock.state("lost")
-        page.wait("document.querySelector('#notice-text').innerText.includes('sonard has not answered for')", 10)
+        page.wait("document.querySelector('#notice-text').innerText.includes('sonard has not answered for')")
         time.sleep(1)
         page.picture(SHOTS / "lost.png")
         self.mock.state("fine")
-        page.wait("document.body.dataset.situation === 'fine'", 12)
+        page.wait("document.body.dataset.situation === 'fine'")
 
     def test_token(self):
         self.mock.token = "secret"

@@ -13,7 +13,7 @@ import time
 import unittest
 
 from oculus_reader import Client, Ping, fire_message
-from running_sonard import ROOT, SONARD, Sonard, free_address
+from running_sonard import ROOT, SONARD, Sonard
 
 sys.path.insert(0, str(ROOT / "tests/reliability"))
 from record import record  # noqa: E402  the folder above
@@ -84,7 +84,7 @@ class Reload(unittest.TestCase):
             near = self.look(watcher)
 
             daemon.scene.write_text(SCENE.format(x=6), encoding="utf-8")
-            second = free_address()
+            second = "127.0.0.9"
             self.config(daemon).write_text(text.replace("poses:", SECOND.format(address=second, device_id=7002) + "poses:"),
                                            encoding="utf-8")
             self.hang_up(daemon, "reloaded: front untouched, second added")
@@ -121,7 +121,7 @@ class Reload(unittest.TestCase):
 
     def test_the_demo_has_nothing_to_read(self):
         with tempfile.TemporaryFile() as log:
-            demo = subprocess.Popen([str(SONARD), "run", "--demo", "--bind", free_address()], stdin=subprocess.DEVNULL, stdout=log,
+            demo = subprocess.Popen([str(SONARD), "run", "--demo", "--bind", "127.0.0.9"], stdin=subprocess.DEVNULL, stdout=log,
                                     stderr=subprocess.STDOUT)
             try:
                 self.wait_for(log, demo, "ready in")

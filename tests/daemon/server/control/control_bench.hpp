@@ -87,7 +87,7 @@ class ControlBench {
   std::uint16_t stream_port() const { return server->stream().port; }
   std::uint16_t http_port() const { return server->http().port; }
 
-  std::string address = own_address();
+  std::string address = "127.0.0.2";
   asio::io_context io{1};
   ControlConfig config;
   LimitConfig limits;
@@ -116,7 +116,7 @@ inline v1::Event ping_event(std::uint32_t number) {
 /// A file with a token, for as long as it lives.
 struct TokenFile {
   static constexpr const char* text = "0123456789abcdef-lab";
-  std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / ("control-token-" + own_address());
+  std::filesystem::path path = own_path("control-token");
   TokenFile() {
     std::ofstream(path) << text << "\n";
     std::filesystem::permissions(path, std::filesystem::perms::owner_read);

@@ -405,7 +405,7 @@ TEST(RecordedDaemon, ASonarThatAReloadTakesAwayIsRecordedNoMore) {
   const Folder folder;
   DaemonSetup setup = recording_setup(folder);
   setup.config_file = setup.options.handle_signals = true;
-  const std::string other = own_address();
+  const std::string other = "127.0.0.3";
   const auto also = [&other](const char* name) {
     return std::string("  - {name: ") + name + ", profile: oculus-m1200d, bind_ip: " + other + ", status_to: ['" + other +
            ":9'], device_id: 9}\n";

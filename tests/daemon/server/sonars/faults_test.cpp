@@ -27,7 +27,7 @@ struct ThrowingParent final : SessionParent {
 
 TEST(Faults, EndTheSessionTheyHappenIn) {
   asio::io_context io;
-  tcp::acceptor acceptor(io, {asio::ip::make_address(own_address()), 0});
+  tcp::acceptor acceptor(io, {asio::ip::make_address("127.0.0.2"), 0});
   Client client(acceptor.local_endpoint().address().to_string(), acceptor.local_endpoint().port());
   ThrowingParent parent;
   auto session = std::make_shared<Session>(parent, acceptor.accept(), Session::Setup{});
@@ -44,7 +44,7 @@ TEST(Faults, EndTheSessionTheyHappenIn) {
 struct PoseFaults : ::testing::Test {
   PoseFaults() {
     config.protobuf.enabled = false;
-    config.json.at = {*parse_ipv4(own_address()), 0};
+    config.json.at = {{127, 0, 0, 2}, 0};
     LogOptions options;
     options.sink = [this](LogLevel, const std::string& line) { log_text += line + "\n"; };
     log = std::make_unique<Log>(options);

@@ -76,7 +76,7 @@ struct SessionShapes : ::testing::Test {
   }
 
   asio::io_context io;
-  tcp::acceptor acceptor{io, {asio::ip::make_address(own_address()), 0}};
+  tcp::acceptor acceptor{io, {asio::ip::make_address("127.0.0.2"), 0}};
   Client client{acceptor.local_endpoint().address().to_string(), acceptor.local_endpoint().port()};
   Parent parent;
   std::shared_ptr<Session> session;
