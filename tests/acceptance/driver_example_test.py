@@ -1,4 +1,4 @@
-"""The example of docs/writing-a-driver-test.md as it is, with its own little driver, on an address of its own."""
+"""The example of docs/writing-a-driver-test.md as it is, with its own little driver."""
 import os
 import subprocess
 import sys

@@ -243,7 +243,7 @@ class Reload(unittest.TestCase):
             viewer.times.clear()
             for topic in kept:
                 with self.subTest(topic):
-                    viewer.first_of(topic, patience_s=5)
+                    viewer.first_of(topic)
             self.assertTrue(viewer.times)
 
 

@@ -55,7 +55,7 @@ more=()
 if [ ${#targets[@]} -eq 0 ]; then
   mapfile -t targets < <(ninja -C "build/$preset" -t targets all | sed -n 's/: CXX_EXECUTABLE_LINKER.*//p' |
     grep -E "$wanted" | grep -vE "$left_out")
-  [ "$kind" = asan ] || more=(sonard sonarctl dump_oculus bvtsdk_programs)
+  [ "$kind" = asan ] || more=(sonard sonarctl dump_oculus bvtsdk_programs in_own_network)
 fi
 [ ${#targets[@]} -gt 0 ] || { echo "no test program matches $wanted" >&2; exit 1; }
 build "$preset" "${targets[@]}" "${more[@]}" || exit
