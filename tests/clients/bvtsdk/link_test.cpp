@@ -309,9 +309,8 @@ TEST(LinkOpen, LogsWhatFailedWhereAndWhatToDo) {
   SonarDescription sonar;
   const auto opening = [&](const std::string& endpoint) { return logged([&] { Link::open(endpoint, 4, link, sonar); }); };
   using testing::AllOf, testing::HasSubstr;
-  EXPECT_THAT(
-      opening("127.0.0.3:1"),
-      AllOf(HasSubstr("\"127.0.0.3:1\": TCP port 1: Connection refused; check that sonard runs"), HasSubstr("BVE_PORT")));
+  EXPECT_THAT(opening("127.0.0.3:1"),
+              AllOf(HasSubstr("\"127.0.0.3:1\": TCP port 1: Connection refused; check that sonard runs"), HasSubstr("BVE_PORT")));
   EXPECT_THAT(opening("not an address"), AllOf(HasSubstr("\"not an address\""), HasSubstr("check the host's name")));
   EXPECT_THAT(opening("127.0.0.1:port"), AllOf(HasSubstr("\"127.0.0.1:port\""), HasSubstr("HOST:PORT")));
   FakeSonar gone([](Peer&) {});
