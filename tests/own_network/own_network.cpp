@@ -16,6 +16,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <string>
 
 namespace sonar::testing {
@@ -65,9 +66,9 @@ bool may_isolate() {
 
 /// The lock is held until this process ends and, where it becomes another program, until that one ends.
 void wait_for_turn() {
-  const char* const path = "/tmp/sonard-tests.lock";
-  int fd = open(path, O_RDONLY);  // of another user, perhaps
-  if (fd < 0) fd = open(path, O_RDONLY | O_CREAT, 0644);
+  const std::string path = std::filesystem::temp_directory_path() / "sonard-tests.lock";
+  int fd = open(path.c_str(), O_RDONLY);  // of another user, perhaps
+  if (fd < 0) fd = open(path.c_str(), O_RDONLY | O_CREAT, 0644);
   while (fd >= 0 && flock(fd, LOCK_EX) != 0 && errno == EINTR) {
   }
 }
