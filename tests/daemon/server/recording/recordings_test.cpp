@@ -429,9 +429,11 @@ TEST(RecordedDaemon, AReloadThatFailsLeavesTheRecordingOfWhatGoesOn) {
   DaemonSetup setup = recording_setup(folder);
   setup.config_file = setup.options.handle_signals = true;
   Daemon daemon(setup);
-  const Daemon holds_the_other_address;
+  setup.address = "127.0.0.3";
+  DaemonSetup other;
+  other.address = setup.address;
+  const Daemon holds_the_other_address(other);
   EXPECT_EQ(daemon.ask(control::StartRecording{"front.mcap"}).text, "");
-  setup.address = holds_the_other_address.address();
   daemon.write_config(yaml_of(setup));
   ASSERT_EQ(kill(getpid(), SIGHUP), 0);
   ASSERT_TRUE(eventually([&] { return daemon.log_text().find("front as before") != std::string::npos; })) << daemon.log_text();
