@@ -26,7 +26,7 @@ SALINITY = 30.0  # as the water's, so that the device believes the water's sound
 RANGE_M, FIELD_DEG = 8.0, 50  # targets farther to the side are left out
 RING_M, TARGETS = 4.5, 10  # round the square's middle
 OLDEST_POSE_S, UNDER_WAY_S = 0.05, 0.02  # of a pose at a ping: its age, and the time it has had to arrive
-MOST_STALLED = 0.25  # of the echoes; what is wrong by itself is wrong in nearly all
+MOST_STALLED, MOST_STALLED_BUSY = 0.05, 0.5  # of the echoes; the second where the computer delays the vehicle as well
 ENOUGH, MOST_LAPS = 30, 10  # pings
 GOLDEN = ROOT / "tests/protocol/mavlink/golden/frames.txt"
 
@@ -111,6 +111,11 @@ class Vehicle(threading.Thread):
         self.end.set()
         self.join(10)
         self.socket.close()
+
+    def was_in_time(self):
+        """It sends every 20 ms; one in 20 may be late."""
+        late = [one for one, other in zip(self.sent, self.sent[1:]) if other[0] - one[0] > 0.03]
+        return len(late) <= 0.05 * len(self.sent)
 
     def has_fresh_pose_at(self, t):
         return any(stamp >= t - OLDEST_POSE_S for stamp, left in self.sent if left <= t - UNDER_WAY_S)
@@ -231,7 +236,8 @@ class Mavlink(unittest.TestCase):
         self.assertGreaterEqual(len(seen), 40)
         print(f"{len(judged)} of {len(pings)} pings, {len(seen)} echoes: rows off by {max(r for r, _ in seen):.2f} at most, "
               f"beams by {max(b for _, b in seen):.2f}; {len(stalled)} beyond one row and half a beam")
-        self.assertLessEqual(len(stalled), MOST_STALLED * len(seen), stalled)
+        most = MOST_STALLED if vehicle.was_in_time() else MOST_STALLED_BUSY
+        self.assertLessEqual(len(stalled), most * len(seen), stalled)
         self.assertGreaterEqual(len(judged), 20)
         self.assertEqual(headings, {0, 1, 2, 3}, "every side of the square")
 
