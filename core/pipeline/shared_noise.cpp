@@ -154,10 +154,10 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   const std::size_t beams = plan.beam_sine.size();
   double widest = 0;
   for (const double u : plan.beam_sine) widest = std::max(widest, std::abs(u));
-  const Reach reach = reach_of(plan.mode, plan.settings, widest);
+  const Reach noise_reach = reach_of(plan.mode, plan.settings, widest);
   const auto range_m = [&](int n) { return (n + plan.sample_offset) * plan.sample_spacing_m; };
   const auto leak_samples = static_cast<int>(leak.rms_upa().size());
-  while (samples_ < plan.samples && (range_m(samples_) < reach.end_m || samples_ < leak_samples)) ++samples_;
+  while (samples_ < plan.samples && (range_m(samples_) < noise_reach.end_m || samples_ < leak_samples)) ++samples_;
   // A channel's own noise, by itself, is (30) at a beam's output.
   const double own_upa = plan.column_noise_upa * std::sqrt(plan.beam_weights.weight_energy / law.channels);
   const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) : 0;
@@ -182,7 +182,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
         to[samples] = of_beam.imag();
         if (part + 1 == array.parts()) power += static_cast<double>(std::norm(of_beam));
       }
-    const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)) * reach.share(range));
+    const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)) * noise_reach.share(range));
     noise_upa_.push_back(static_cast<float>(upa * std::sqrt(1 - steady)));
     steady_upa_.push_back(static_cast<float>(upa * std::sqrt(steady)));
     // (31) at the beams' outputs, as a mean over them.

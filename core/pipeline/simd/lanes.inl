@@ -10,6 +10,18 @@ inline Lanes load(const float* at) { return *reinterpret_cast<const Lanes*>(at);
 inline void store(float* at, Lanes v) { *reinterpret_cast<Lanes*>(at) = v; }
 inline Lanes all(float x) { return Lanes{} + x; }
 
+#if defined(__clang__)  // has no shuffle by lane numbers that are not constants
+inline Lanes shuffle(Lanes a, Lanes b, LaneNumbers from) {
+  Lanes v;
+  for (int l = 0; l < lanes; ++l) v[l] = from[l] < lanes ? a[from[l]] : b[from[l] - lanes];
+  return v;
+}
+inline Lanes shuffle(Lanes a, LaneNumbers from) { return shuffle(a, a, from); }
+#else
+inline Lanes shuffle(Lanes a, LaneNumbers from) { return __builtin_shuffle(a, from); }
+inline Lanes shuffle(Lanes a, Lanes b, LaneNumbers from) { return __builtin_shuffle(a, b, from); }
+#endif
+
 #if defined(__AVX512F__)
 
 using LaneMask = __mmask16;
