@@ -34,7 +34,7 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
   framer_.append(received);
   while (const auto frame = framer_.next()) {
     // One answer a datagram: its sender may be another than it says.
-    const bool is_all = header_size + frame->payload.size() + sum_size == received.size();
+    const bool is_all = header_size + frame->header.length + sum_size == received.size();
     if (!by_datagrams_ || frame->sum_is_right || is_all) on_frame(*frame, now, reaction);
     if (by_datagrams_ && frame->sum_is_right) break;
   }
