@@ -183,7 +183,7 @@ struct Queue {
     options.sink = [this](LogLevel, const std::string& line) { lines.push_back(line); };
     log.emplace(options);
     recordings.emplace(
-        io, config, *log, 0, [] {}, most_waiting_bytes);
+        writer, config, *log, [] {}, most_waiting_bytes);
   }
   void run() {
     io.restart();
@@ -192,6 +192,7 @@ struct Queue {
   Folder folder;
   Config config;
   asio::io_context io{1};
+  WriterThread writer{io, 0};
   std::vector<std::string> lines;
   std::optional<Log> log;
   std::optional<Recordings> recordings;

@@ -143,9 +143,8 @@ TEST(PlannedFaults, BeginWithTheDaemonAndFillTheJournal) {
   std::vector<std::uint32_t> numbers;
   while (numbers.size() < 4) numbers.push_back(client.next_ping()->head.fixed.ping_id);
   EXPECT_THAT(numbers, ::testing::ElementsAre(1, 2, 4, 5));
-  std::ifstream file(journal);
   std::string line;
-  ASSERT_TRUE(std::getline(file, line));
+  ASSERT_TRUE(eventually([&] { return static_cast<bool>(std::getline(std::ifstream(journal), line)); }));
   EXPECT_THAT(line, HasSubstr(R"("event":"began","fault":"plan-1","do":"F16","kind":"F16")"));
   ASSERT_EQ(daemon.status().faults_size(), 2);
   EXPECT_EQ(daemon.status().faults(1).state(), "waiting");
