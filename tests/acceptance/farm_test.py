@@ -191,6 +191,25 @@ class Farm(unittest.TestCase):
         self.wait_for(worker)
         self.assertIn("0 running, 1 queued", self.status())
 
+    def test_numbers_that_are_no_shards_are_removed_from_the_queue(self):
+        with socket.create_connection(("127.0.0.1", self.port), timeout=60) as nats:
+            lines = nats.makefile("rb")
+            nats.sendall(b'CONNECT {"verbose":false}\r\nSUB farm.work.> 1\r\nPING\r\n')
+            while not lines.readline().startswith(b"PONG"):
+                pass
+            _, made = self.submit(self.small_job())
+            job = lines.readline().split(b".")[2]  # MSG farm.work.JOB.SHARD ...
+            for number in (b"6", b"999999999", b"18446744073709551615", b"x"):
+                nats.sendall(b"PUB farm.work." + job + b"." + number + b" 0\r\n\r\n")
+            nats.sendall(b"PING\r\n")
+            while not lines.readline().startswith(b"PONG"):
+                pass
+        self.wait_for(self.worker(None, "--until-empty"))
+        for number in ("6", "999999999", "18446744073709551615"):
+            self.assertIn(f"shard {number} is none of the 6 of", self.logs())
+        self.assertEqual(sorted(f.name for f in made.glob("shard-*.tar")), [f"shard-{n:06}.tar" for n in range(6)])
+        self.assertIn("6 done, 0 running, 0 queued, 0 dead", self.status())
+
     def test_what_is_wrong_is_said(self):
         job = self.small_job()
         outside = self.path / "outside.obj"
@@ -201,9 +220,22 @@ class Farm(unittest.TestCase):
         self.assertIn("the farm has no jobs", self.status())
         self.server.kill()
         self.server.wait()
-        for command in ((SONARD, "worker", "--out", self.out), (SONARCTL, "farm", "status")):
-            result = run(*command, "--nats", self.url)
-            self.assertEqual((result.returncode, "no NATS server answers at" in result.stderr), (69, True), result.stderr)
+        result = run(SONARCTL, "farm", "status", "--nats", self.url)
+        self.assertEqual((result.returncode, "no NATS server answers at" in result.stderr), (69, True), result.stderr)
+
+    def test_a_worker_that_is_started_before_the_server_waits_for_it(self):
+        self.submit(self.small_job())
+        self.server.kill()
+        self.server.wait()
+        worker, stopped = self.worker(None, "--until-empty"), self.worker()
+        eventually(lambda: self.logs().count("no NATS server answers at") >= 2)
+        self.assertIn("trying again", self.logs())
+        self.assertEqual((worker.poll(), stopped.poll()), (None, None), self.logs())
+        stopped.terminate()
+        self.wait_for(stopped)
+        self.start_server()
+        self.wait_for(worker)
+        self.assertIn("6 done, 0 running", self.status())
 
 
 if __name__ == "__main__":
