@@ -17,6 +17,17 @@ constexpr std::size_t deepest_request = 16;
 
 std::string in_quotes(const std::string& name) { return '"' + name.substr(0, 64) + '"'; }
 
+/// protobuf takes "range_m" and "rangeM" for the same field.
+std::string as_protobuf_reads(const std::string& name) {
+  std::string read;
+  bool behind_line = false;
+  for (const char c : name) {
+    if (c != '_') read += behind_line && c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+    behind_line = c == '_';
+  }
+  return read;
+}
+
 /// protobuf's reader also takes names without quotes, 'text' and trailing commas, and the last of two equal keys.
 class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
  public:
@@ -31,7 +42,7 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
   bool binary(binary_t&) override { return true; }
   bool start_object(std::size_t) override { return enter(); }
   bool key(string_t& name) override {
-    if (keys_.back().insert(name).second) return true;
+    if (keys_.back().insert(as_protobuf_reads(name)).second) return true;
     why = in_quotes(name) + " is given twice";
     return false;
   }

@@ -15,6 +15,11 @@ constexpr std::size_t longest_unread = 64u << 10;  // chunk headers and trailers
 
 std::string text_of(boost::beast::string_view view) { return {view.data(), view.size()}; }
 
+bool ends_with_bare_newline(std::string_view line_and_more) {
+  const std::size_t end = line_and_more.find('\n');
+  return end != std::string_view::npos && (end == 0 || line_and_more[end - 1] != '\r');
+}
+
 HttpRefusal refusal_of(const boost::beast::error_code& ec, std::size_t most_body) {
   if (ec == http::error::header_limit) return {431, "the header is longer than 8 KiB"};
   if (ec == http::error::body_limit) return {413, "the body is longer than " + std::to_string(most_body) + " bytes"};
@@ -88,6 +93,8 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
       if (buffer_.size() > longest_unread) return tl::unexpected(HttpRefusal{400, "a chunk header is too long"});
       break;
     }
+    if (ec && !beast.is_header_done() && ends_with_bare_newline(buffer_))
+      return tl::unexpected(HttpRefusal{400, "lines of a request end in CR LF, and this one ends in LF alone"});
     if (ec) return tl::unexpected(refusal_of(ec, most_body_));
     if (used == 0) break;
   }

@@ -68,6 +68,8 @@ TEST(ControlJson, RefusesWithASentence) {
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":1e999})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"mode":-1})"), HasSubstr("-1"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,"range_m":6})"), HasSubstr("\"range_m\" is given twice"));
+  EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,"rangeM":6})"), HasSubstr("\"rangeM\" is given twice"));
+  EXPECT_THAT(refusal_of("sonar", R"({"rangeM":5,"range_m":6})"), HasSubstr("\"range_m\" is given twice"));
   EXPECT_THAT(refusal_of("sonar", R"({range_m:5})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5} {"range_m":6})"), HasSubstr("not JSON"));

@@ -100,6 +100,9 @@ TEST(HttpReader, WhatIsNoHttpIsRefused) {
         "POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n", "GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n"})
     EXPECT_EQ(take(bad).refused, 400u) << bad;
   EXPECT_EQ(take("GET / HTTP/2.0\r\n\r\n").refused, 505u);
+  const Taken bare = take("GET / HTTP/1.1\nHost: a\n\n");
+  EXPECT_EQ(bare.refused, 400u);
+  EXPECT_EQ(bare.why, "lines of a request end in CR LF, and this one ends in LF alone");
 }
 
 TEST(HttpReader, EndlessChunkHeadersAndTrailersAreBounded) {
