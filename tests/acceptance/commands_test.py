@@ -143,6 +143,21 @@ class Mistakes(unittest.TestCase):
         self.expect(run(SONARCTL, "view", "--png", "x.png", "--from-raw", BUILD / "none.raw"), 66, "none.raw")
         self.expect(run(SONARCTL, "listen", free_address(), "--wait", "0.1"), 69, "Is sonard running there?")
 
+    def test_what_the_machine_lacks_is_named(self):
+        def short_of(limit):
+            return run("bash", "-c", f"{limit}; exec {SONARD} run --demo")
+
+        self.expect(short_of("ulimit -v 200000"), 69, "memory")
+        if os.geteuid() != 0:  # the superuser has no such limit
+            self.expect(short_of("ulimit -u 1"), 69, "cannot start a thread", "ulimit -u")
+
+    def test_a_token_that_never_comes_is_not_waited_for(self):
+        with tempfile.TemporaryDirectory() as folder:
+            os.mkfifo(pathlib.Path(folder) / "token")
+            for command in (["status"], ["recording", "start", "a.mcap"], ["fault", "list"]):
+                result = run(SONARCTL, *command, "--token-file", pathlib.Path(folder) / "token", patience_s=60)
+                self.expect(result, 66, "cannot read a token from")
+
     def test_an_address_of_another_machine_is_69_with_the_way_out(self):
         self.expect(run(SONARD, "run", "--demo", "--bind", "192.0.2.7"), 69, "192.0.2.7", "--bind")
 
