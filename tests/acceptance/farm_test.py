@@ -6,11 +6,15 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
 
 from running_sonard import ROOT, SONARD, SONARCTL, run
+
+sys.path.append(str(ROOT / "tests/reliability"))
+from record import record  # noqa: E402  pylint: disable=wrong-import-position
 
 SERVER = shutil.which("nats-server") or shutil.which("nats-server", path="/usr/sbin:/usr/local/sbin")
 
@@ -135,6 +139,7 @@ class Farm(unittest.TestCase):
             if file.name != "job.json":
                 self.assertEqual(file.read_bytes(), (made / file.name).read_bytes(), file.name)
         self.assertEqual(list(made.glob("*.tmp*")), [])
+        record("farm-kill", "12 of 12, of 3 workers", "all, byte for byte those of one process", True, "python3 tests/acceptance/farm_test.py")
         self.assertIn("0 submitted, 0 in the queue already, 12 finished", self.submit(job)[0])
         (made / "shard-000003.tar").unlink()
         self.assertIn("1 submitted", self.submit(job)[0])  # though its id is one that the server has just seen
