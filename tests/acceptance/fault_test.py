@@ -117,7 +117,7 @@ class Recorded(unittest.TestCase):
 
             ctl("recording", "start", "run.mcap")
             ctl("fault", "add", "F01", "--with", "bytes=3", "--at", "ping=3", "--name", "junk")
-            daemon.ctl("listen", "--seconds", "3", "--quiet")
+            daemon.ctl("listen", "--pings", "5", "--quiet")
             ctl("recording", "stop")
             checked = mcap_checker.check(pathlib.Path(folder, "run.mcap").read_bytes())
             entries = [json.loads(data) for topic, _, data in checked.messages if topic == "/faults"]
