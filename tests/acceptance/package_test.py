@@ -16,7 +16,7 @@ import check_links  # noqa: E402
 
 DOCUMENTS = "usr/share/doc/sonard/"
 WANTED = {
-    "sonard": ["usr/bin/sonard", "usr/bin/sonarctl", "usr/lib/systemd/system/sonard.service", "usr/share/man/man8/sonard.8.gz",
+    "sonard": ["usr/bin/sonard", "usr/bin/sonarctl", "usr/libexec/sonard/sonard-import-mesh", "usr/lib/systemd/system/sonard.service", "usr/share/man/man8/sonard.8.gz",
                "usr/share/man/man1/sonarctl.1.gz", "usr/share/man/man5/sonard.yaml.5.gz", "usr/share/sonard/scenes/demo.yaml",
                "usr/share/sonard/scenes/meshes/wreck.obj", "usr/share/doc/sonard/copyright", DOCUMENTS + "CHANGELOG.md",
                DOCUMENTS + "examples/sonard.yaml", DOCUMENTS + "examples/sonard-blueview.yaml",
@@ -114,7 +114,7 @@ class Package(Installed, unittest.TestCase):
         for name, wanted in WANTED.items():
             there = files_below(self.roots[name])
             self.assertEqual([w for w in wanted if w not in there], [], name)
-            allowed = ("usr/bin/", "usr/lib/systemd/", "usr/lib/sonard/", "usr/share/")
+            allowed = ("usr/bin/", "usr/libexec/sonard/", "usr/lib/systemd/", "usr/lib/sonard/", "usr/share/")
             self.assertEqual([t for t in there if not t.startswith(allowed)], [], name)
         self.assertFalse([t for t in files_below(self.root) if "bvtsdk.so" in t], "the libraries have their own package")
 
