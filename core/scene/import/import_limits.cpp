@@ -11,7 +11,7 @@
 #include "core/base/memory_left.hpp"
 
 // The shadow memory of the sanitizers takes terabytes of addresses: there their runtime keeps the limit (main.cpp).
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef SONAR_SANITIZED
 constexpr bool limits_addresses = false;
 #else
 constexpr bool limits_addresses = true;

@@ -10,7 +10,7 @@
 #include "core/scene/import/import_limits.hpp"
 #include "core/scene/import/import_mesh.hpp"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef SONAR_SANITIZED
 extern "C" const char* __asan_default_options();
 extern "C" const char* __asan_default_options() { return "hard_rss_limit_mb=2048:max_allocation_size_mb=1024"; }
 extern "C" const char* __tsan_default_options();
