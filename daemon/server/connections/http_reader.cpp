@@ -30,12 +30,19 @@ std::string joined(const http::request<http::string_body>& message, http::field 
   return all;
 }
 
+/// A body whose end another reader would see elsewhere must not be taken as a request (RFC 9112, 6.1).
+bool has_other_coding(const http::request<http::string_body>& head) {
+  return head.count(http::field::transfer_encoding) > 0 &&
+         !boost::beast::iequals(joined(head, http::field::transfer_encoding), "chunked");
+}
+
 tl::expected<std::optional<HttpRequest>, HttpRefusal> request_from(http::request<http::string_body> message) {
   HttpRequest request;
   request.method = text_of(message.method_string());
   request.target = text_of(message.target());
   request.http_1_0 = message.version() == 10;
   if (message.count(http::field::host) > 1) return tl::unexpected(HttpRefusal{400, "more than one Host"});
+  if (message.count(http::field::origin) > 1) return tl::unexpected(HttpRefusal{400, "more than one Origin"});
   request.has_host = message.count(http::field::host) == 1;
   request.has_origin = message.count(http::field::origin) > 0;
   request.host = text_of(message[http::field::host]);
@@ -84,6 +91,8 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
     boost::beast::error_code ec;
     const std::size_t used = beast.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), ec);
     buffer_.erase(0, used);
+    if (beast.is_header_done() && has_other_coding(beast.get()))
+      return tl::unexpected(HttpRefusal{501, "a Transfer-Encoding other than chunked"});
     if (ec == http::error::need_more) {
       if (buffer_.size() > longest_unread) return tl::unexpected(HttpRefusal{400, "a chunk header is too long"});
       break;
