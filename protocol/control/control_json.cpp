@@ -13,7 +13,7 @@ namespace sonar::control {
 namespace {
 
 using google::protobuf::Message;
-constexpr std::size_t deepest_request = 16;
+constexpr std::size_t deepest_request = 16, most_values = 4096;  // the longest request needs some dozen
 
 std::string in_quotes(const std::string& name) { return '"' + name.substr(0, 64) + '"'; }
 
@@ -22,13 +22,13 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
  public:
   std::string why;  // empty = it is JSON
 
-  bool null() override { return true; }
-  bool boolean(bool) override { return true; }
-  bool number_integer(number_integer_t) override { return true; }
-  bool number_unsigned(number_unsigned_t) override { return true; }
-  bool number_float(number_float_t, const string_t&) override { return true; }
-  bool string(string_t&) override { return true; }
-  bool binary(binary_t&) override { return true; }
+  bool null() override { return count(); }
+  bool boolean(bool) override { return count(); }
+  bool number_integer(number_integer_t) override { return count(); }
+  bool number_unsigned(number_unsigned_t) override { return count(); }
+  bool number_float(number_float_t, const string_t&) override { return count(); }
+  bool string(string_t&) override { return count(); }
+  bool binary(binary_t&) override { return count(); }
   bool start_object(std::size_t) override { return enter(); }
   bool key(string_t& name) override {
     if (keys_.back().insert(name).second) return true;
@@ -44,7 +44,13 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
   }
 
  private:
+  bool count() {
+    if (++values_ <= most_values) return true;
+    why = "more than " + std::to_string(most_values) + " values";
+    return false;
+  }
   bool enter() {
+    if (!count()) return false;
     keys_.emplace_back();
     if (keys_.size() <= deepest_request) return true;
     why = "nested deeper than " + std::to_string(deepest_request) + " levels";
@@ -55,6 +61,7 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
   std::vector<std::set<std::string>> keys_;  // of each open object
+  std::size_t values_ = 0;
 };
 
 /// The expected value for a protobuf type; empty where protobuf's own text is enough.
