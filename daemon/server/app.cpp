@@ -70,6 +70,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
   mavlink_server_.inject_failures_with([this](std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
     return fault_operations_.inject(unit, type, instance);
   });
+  changes_.pace_while([this] { return !clock_.stepped() && fleet_.has_clients(); });
   recordings_.use_scene(*changes_.scene());
   log_new_notes();
 }
