@@ -40,7 +40,8 @@ std::string complaint(const Vendor& vendor, const std::string& name, const std::
     return "unknown option " + quoted(name) + " of " + std::string(vendor.name()) + text::suggestion(name, names, "options");
   }
   if (option->allowed.empty()) {
-    const bool fine = value == option->default_value || is_number_of(*option, value);
+    const bool fine =
+        value == option->default_value || (!option->word.empty() && value == option->word) || is_number_of(*option, value);
     return fine ? "" : "option " + name + " must be a " + numbers_of(*option) + ", not " + quoted(value);
   }
   if (std::find(option->allowed.begin(), option->allowed.end(), value) != option->allowed.end()) return "";

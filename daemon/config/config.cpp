@@ -97,6 +97,7 @@ void read_addresses(Map& map, SonarConfig& sonar) {
   sonar.netmask = read_ip(netmask);
   for (const Node& to : map.optional("status_to").items(0, 16)) sonar.status_to.push_back(read_endpoint(to, false));
   sonar.has_own_status_to = !sonar.status_to.empty();
+  for (const Node& group : map.optional("groups").items(0, 16)) sonar.groups.push_back(read_ip(group));
   derive_addresses(sonar);
 }
 

@@ -47,7 +47,7 @@ struct AppOptions {
 class App {
  public:
   /// After stop() run() returns by then, whatever is still under way.
-  static constexpr std::chrono::milliseconds stop_limit{1800};
+  static constexpr std::chrono::milliseconds stop_limit{1500};
 
   /// `make_engine` is kept: later scenes get theirs on another thread. What it refers to must outlive the App.
   App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);

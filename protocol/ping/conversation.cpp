@@ -23,7 +23,13 @@ double number_option(const protocol::OptionValues& values, std::string_view name
 }
 
 protocol::Option silence_option() {
-  return {option_name::silence_s, {}, "never", "a host that sends nothing for so long is given up, seconds", 5, 600};
+  return {option_name::silence_s,
+          {},
+          "60",
+          "a host by UDP of which nothing is heard for so long is given up, seconds",
+          5,
+          600,
+          "never"};
 }
 protocol::Option type_option(std::string_view usual, std::string_view meaning) {
   return {option_name::device_type, {}, usual, meaning, 0, 255};
@@ -44,7 +50,7 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
 
 std::optional<std::chrono::milliseconds> Conversation::longest_silence() const {
   const double s = number_option(device_.options, option_name::silence_s);
-  return s > 0 ? std::optional(std::chrono::milliseconds(static_cast<int>(1000 * s))) : std::nullopt;
+  return by_datagrams_ && s > 0 ? std::optional(std::chrono::milliseconds(static_cast<int>(1000 * s))) : std::nullopt;
 }
 
 void Conversation::on_frame(const Frame& frame, Time now, protocol::Reaction& reaction) {

@@ -14,7 +14,8 @@ struct ThrowingParent final : SessionParent {
   std::string fault, why;
   void on_bytes(ConnectionId, protocol::BytesView) override { throw std::runtime_error("no such luck"); }
   Outbox::Message next_message(ConnectionId) override { return {}; }
-  std::vector<Endpoint> receivers(ConnectionId) const override { return {}; }
+  std::vector<Endpoint> receivers(ConnectionId) override { return {}; }
+  void look_for_host(ConnectionId) override {}
   void on_sent(ConnectionId, std::size_t) override {}
   void on_not_sent(ConnectionId) override {}
   std::optional<milliseconds> longest_silence(ConnectionId) const override { return std::nullopt; }

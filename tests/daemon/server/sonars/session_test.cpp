@@ -24,7 +24,8 @@ struct Parent final : SessionParent {
     messages.pop_front();
     return next;
   }
-  std::vector<Endpoint> receivers(ConnectionId) const override { return {}; }
+  std::vector<Endpoint> receivers(ConnectionId) override { return {}; }
+  void look_for_host(ConnectionId) override {}
   void on_sent(ConnectionId, std::size_t) override {}
   void on_not_sent(ConnectionId) override {}
   std::optional<milliseconds> longest_silence(ConnectionId) const override { return std::nullopt; }
