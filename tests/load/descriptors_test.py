@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 import unittest
+import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests/acceptance"), str(ROOT / "tests/reliability")]
@@ -102,6 +103,19 @@ class Descriptors(unittest.TestCase):
         if not QUICK:
             record("descriptors", f"0 of {pings}, {sent_away} newcomers sent away", "0", True,
                    "SONARD_BUILD=build/release python3 tests/load/descriptors_test.py")
+
+    def test_idle_strangers_keep_no_driver_out(self):
+        with Sonard(profile=PROFILE) as daemon:
+            resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (64, 64))
+            strangers = [visit((daemon.address, port)) for port in (14770, 8088, 14771) for _ in range(33)]
+            with Client(daemon.address) as driver:
+                driver.send(fire_message(range_=3.0))
+                while driver.message()[0] != 0x23:
+                    pass
+            with urllib.request.urlopen(f"http://{daemon.address}:8088/healthz", timeout=20) as answer:
+                self.assertEqual(answer.read(), b"ok\n")
+            for stranger in strangers:
+                stranger.close()
 
 
 if __name__ == "__main__":

@@ -1,5 +1,8 @@
 #include "daemon/server/poses/pose_server.hpp"
 
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <array>
 #include <vector>
@@ -12,9 +15,12 @@ namespace {
 
 constexpr std::size_t most_connections = 32;
 constexpr std::size_t most_lines_of_a_datagram = 64;
-constexpr std::size_t work_of_a_turn = 4096;  // bytes; then others have theirs
-constexpr std::size_t least_work = 64;        // bytes that cost as much as a read, or a line, does beside its own
-constexpr int most_not_json = 8;              // lines in a row that begin as JSON objects and are none
+constexpr std::size_t work_of_a_turn = 4096;            // bytes; then others have theirs
+constexpr std::size_t least_work = 64;                  // bytes that cost as much as a read, or a line, does beside its own
+constexpr int most_not_json = 8;                        // lines in a row that begin as JSON objects and are none
+constexpr int receive_buffer = 256 << 10;               // bytes; more would only be older
+constexpr std::size_t dropped_per_s = 128u << 20;       // reading away costs little, but not nothing
+constexpr std::chrono::milliseconds between_looks{10};  // at what has come meanwhile
 constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
 
 Sender sender_of(bool json, const char* transport, const asio::ip::address& ip, std::uint16_t port) {
@@ -33,8 +39,9 @@ PoseServer::PoseServer(asio::io_context& io, const PoseConfig& config, const Lim
       admission_(admission),
       intake_(intake),
       log_(log),
-      connections_(most_connections),
-      together_(limits.pose_bytes_per_s) {}
+      connections_(most_connections, std::chrono::seconds(1), [](const Connection& c) { return c.sender.source; }),
+      together_(limits.pose_bytes_per_s),
+      dropping_(dropped_per_s) {}
 
 Result<Endpoint> PoseServer::open(Port& port, Endpoint at) {
   if (port.encoding == Encoding::json) {
@@ -145,13 +152,17 @@ void PoseServer::admit(tcp::socket socket) {
   const Sender sender = sender_of(true, "tcp", peer.address(), peer.port());
   if (!is_admitted(config_.allow_from, peer.address()))
     return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
-  const bool room = connections_.make_room([this](const Connection& evicted) {
+  connections_.forget_if([](Connection& c) { return has_left(c.socket); });
+  const auto say_evicted = [this](const Connection& evicted) {
     log_limited(log_, notices_, LogLevel::info,
                 "pose connection closed: without a pose, or beyond the limits, for longest, and its place was needed",
                 {{"from", evicted.sender.id}});
-  });
+  };
+  if (admission_.is_drivers(socket)) connections_.evict(sender.source, say_evicted);
+  const bool room = connections_.make_room(sender.source, say_evicted);
   if (!room) return intake_.refuse(std::to_string(most_connections) + " connections are open and busy already", sender);
   end_when_silent(socket, limits_.dead_peer);
+  socket.set_option(asio::socket_base::receive_buffer_size(receive_buffer), ec);
   auto connection = std::make_shared<Connection>(std::move(socket), sender, limits_.input_bytes_per_s,
                                                  together_.join(limits_.pose_bytes_per_s));
   connections_.add(connection);
@@ -201,18 +212,48 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   return Turn::not_over;
 }
 
-/// The others' turns; longer when it sends more than limits allow it, or its share of all: the rest waits in the kernel.
+/// The others' turns; longer when it sends more than limits allow it, or its share of all. The rest of one that has hung up does
+/// not wait.
 asio::awaitable<void> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
-  const auto own = c.rate.pause_after(work.bytes, now), of_all = together_.pause_after(c.of_all, work.bytes, now);
-  if (own.count() > 0)
-    log_limited(log_, notices_, LogLevel::info,
-                "pose connection is read more slowly: it sends more than limits.input_bytes_per_s", {{"from", c.sender.id}});
-  const auto pause = std::max(own, of_all);
-  if (work.has_pose && pause.count() == 0) c.active_at = now;
-  error_code ec;
-  c.turn.expires_after(pause);
-  co_await c.turn.async_wait(into(ec));
+  const auto pause = std::max(c.rate.pause_after(work.bytes, now), together_.pause_after(c.of_all, work.bytes, now));
+  const bool within_limits = !drop_backlog(c) && pause.count() == 0;
+  if (!within_limits) c.proved = false;
+  if (work.has_pose && within_limits) {
+    c.proved = true;
+    c.active_at = now;
+  }
+  const auto until = now + pause;
+  do {
+    error_code ec;
+    c.turn.expires_at(std::min(until, std::chrono::steady_clock::now() + between_looks));
+    co_await c.turn.async_wait(into(ec));
+    if (!c.socket.is_open() || stopping_) co_return;
+    drop_backlog(c);
+  } while (std::chrono::steady_clock::now() < until && !has_left(c.socket));
+}
+
+/// Of what waits in the kernel, the newest stays: what limits allow now, or 0.1 s of the allowed rate. True: the rest was
+/// dropped.
+bool PoseServer::drop_backlog(Connection& c) {
+  int waiting = 0;
+  if (::ioctl(c.socket.native_handle(), FIONREAD, &waiting) != 0 || waiting <= 0) return false;
+  const auto now = std::chrono::steady_clock::now();
+  const std::size_t burst = std::min(limits_.input_bytes_per_s, together_.share()) / 10;
+  const std::size_t allowed = std::min(c.rate.left(now), together_.left(c.of_all, now));
+  const std::size_t kept = std::max({burst, allowed, 2 * control::longest_line});
+  if (static_cast<std::size_t>(waiting) <= kept || dropping_.left(now) == 0) return false;
+  // The kernel frees the bytes without copying them (tcp(7), MSG_TRUNC).
+  const ssize_t dropped =
+      ::recv(c.socket.native_handle(), nullptr, static_cast<std::size_t>(waiting) - kept, MSG_TRUNC | MSG_DONTWAIT);
+  if (dropped <= 0) return false;
+  dropping_.pause_after(static_cast<std::size_t>(dropped), now);
+  c.lines.skip_gap();
+  log_limited(log_, notices_, LogLevel::info,
+              "older poses of a connection are dropped: it sends more than limits.input_bytes_per_s, or than its share of "
+              "limits.pose_bytes_per_s",
+              {{"from", c.sender.id}});
+  return true;
 }
 
 }  // namespace sonar

@@ -21,6 +21,7 @@ class FakeOperations final : public Operations {
   void perform(const control::Operation& operation, const Sender& sender, Done done) override {
     ++asked;
     last_sender = sender;
+    if (const auto* pose = std::get_if<control::PoseSample>(&operation)) last_pose = pose->pose.position_m;
     if (std::holds_alternative<control::GetStatus>(operation)) {
       const auto status = std::make_shared<v1::DaemonStatus>();
       status->set_version("fake");
@@ -42,6 +43,7 @@ class FakeOperations final : public Operations {
   std::atomic<bool> in_trouble{false};  // likewise
   std::vector<Done> later;
   Sender last_sender;
+  Vec3d last_pose{};
 };
 
 class ControlBench {
