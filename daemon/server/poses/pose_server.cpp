@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "daemon/server/system/listen.hpp"
@@ -18,8 +19,7 @@ constexpr std::size_t most_lines_of_a_datagram = 64;
 constexpr std::size_t work_of_a_turn = 4096;            // bytes; then others have theirs
 constexpr std::size_t least_work = 64;                  // bytes that cost as much as a read, or a line, does beside its own
 constexpr int most_not_json = 8;                        // lines in a row that begin as JSON objects and are none
-constexpr int receive_buffer = 256 << 10;               // bytes; more would only be older
-constexpr std::size_t dropped_per_s = 128u << 20;       // reading away costs little, but not nothing
+constexpr std::size_t dropped_per_s = 256u << 20;       // reading away costs little, but not nothing
 constexpr std::chrono::milliseconds between_looks{10};  // at what has come meanwhile
 constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
 
@@ -162,7 +162,6 @@ void PoseServer::admit(tcp::socket socket) {
   const bool room = connections_.make_room(sender.source, say_evicted);
   if (!room) return intake_.refuse(std::to_string(most_connections) + " connections are open and busy already", sender);
   end_when_silent(socket, limits_.dead_peer);
-  socket.set_option(asio::socket_base::receive_buffer_size(receive_buffer), ec);
   auto connection = std::make_shared<Connection>(std::move(socket), sender, limits_.input_bytes_per_s,
                                                  together_.join(limits_.pose_bytes_per_s));
   connections_.add(connection);
@@ -187,8 +186,9 @@ asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
     for (Turn turn = Turn::not_over; turn == Turn::not_over; work = {}) {
       turn = take_turn(c, work);
       if (turn == Turn::end) co_return;
-      co_await rest(c, work);
+      const Rested rested = co_await rest(c, work);
       if (!c.socket.is_open() || stopping_) co_return;
+      if (rested == Rested::leaves_much) co_return take_newest(c);
     }
   }
 }
@@ -212,9 +212,8 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   return Turn::not_over;
 }
 
-/// The others' turns; longer when it sends more than limits allow it, or its share of all. The rest of one that has hung up does
-/// not wait.
-asio::awaitable<void> PoseServer::rest(Connection& c, const Work& work) {
+/// The others' turns; longer when it sends more than limits allow it, or its share of all.
+asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
   const auto pause = std::max(c.rate.pause_after(work.bytes, now), together_.pause_after(c.of_all, work.bytes, now));
   const bool within_limits = !drop_backlog(c) && pause.count() == 0;
@@ -228,9 +227,23 @@ asio::awaitable<void> PoseServer::rest(Connection& c, const Work& work) {
     error_code ec;
     c.turn.expires_at(std::min(until, std::chrono::steady_clock::now() + between_looks));
     co_await c.turn.async_wait(into(ec));
-    if (!c.socket.is_open() || stopping_) co_return;
+    if (!c.socket.is_open() || stopping_) co_return Rested::goes_on;
     drop_backlog(c);
-  } while (std::chrono::steady_clock::now() < until && !has_left(c.socket));
+    if (std::chrono::steady_clock::now() >= until) co_return Rested::goes_on;
+  } while (!has_left(c.socket));
+  co_return Rested::leaves_much;
+}
+
+/// Nothing of it acts later than now, and hanging up again and again gains nothing; but its last word counts.
+void PoseServer::take_newest(Connection& c) {
+  std::optional<control::LineParser::Line> newest;
+  std::array<std::byte, work_of_a_turn> buffer;
+  error_code ec;
+  for (std::size_t n = 0; !ec; n = c.socket.read_some(asio::buffer(buffer), ec)) {  // up to the end, which has come
+    c.lines.feed(std::span(buffer).first(n));
+    while (auto line = c.lines.next()) newest = std::move(line);
+  }
+  if (newest) on_line(*newest, c.sender);
 }
 
 /// Of what waits in the kernel, the newest stays: what limits allow now, or 0.1 s of the allowed rate. True: the rest was
@@ -249,10 +262,9 @@ bool PoseServer::drop_backlog(Connection& c) {
   if (dropped <= 0) return false;
   dropping_.pause_after(static_cast<std::size_t>(dropped), now);
   c.lines.skip_gap();
-  log_limited(log_, notices_, LogLevel::info,
-              "older poses of a connection are dropped: it sends more than limits.input_bytes_per_s, or than its share of "
-              "limits.pose_bytes_per_s",
-              {{"from", c.sender.id}});
+  intake_.refuse(
+      "older ones that waited: more than limits.input_bytes_per_s, or than a share of limits.pose_bytes_per_s, was sent",
+      c.sender);
   return true;
 }
 

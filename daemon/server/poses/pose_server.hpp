@@ -81,7 +81,9 @@ class PoseServer {
     bool has_pose = false;  // one that counts
   };
   Turn take_turn(Connection& connection, Work& work);
-  asio::awaitable<void> rest(Connection& connection, const Work& work);
+  enum class Rested { goes_on, leaves_much };  // it has hung up, and has sent more than limits allow
+  asio::awaitable<Rested> rest(Connection& connection, const Work& work);
+  void take_newest(Connection& connection);
   bool drop_backlog(Connection& connection);
   void admit(tcp::socket socket);
 

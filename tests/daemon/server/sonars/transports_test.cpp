@@ -371,7 +371,7 @@ TEST(Transports, ARequestOfHttpEndsAClientsConnection) {
     }
   EXPECT_THAT(daemon.log_text(), HasSubstr("it speaks HTTP"));
   Client driver(daemon.address(), command_port);
-  EXPECT_EQ(ask(driver, "who"), "no: unknown command\n");
+  EXPECT_EQ(ask(driver, "who"), "front 5\n") << "no range was set";
   EXPECT_EQ(ask(driver, "range 6"), "ok\n");
 }
 
