@@ -246,15 +246,13 @@ void PoseServer::take_newest(Connection& c) {
   if (newest) on_line(*newest, c.sender);
 }
 
-/// Of what waits in the kernel, the newest stays: what limits allow now, or 0.1 s of the allowed rate. True: the rest was
-/// dropped.
+/// Of what waits in the kernel, the newest stays: 0.1 s of the allowed rate, however late we are. True: the rest was dropped.
 bool PoseServer::drop_backlog(Connection& c) {
   int waiting = 0;
   if (::ioctl(c.socket.native_handle(), FIONREAD, &waiting) != 0 || waiting <= 0) return false;
   const auto now = std::chrono::steady_clock::now();
   const std::size_t burst = std::min(limits_.input_bytes_per_s, together_.share()) / 10;
-  const std::size_t allowed = std::min(c.rate.left(now), together_.left(c.of_all, now));
-  const std::size_t kept = std::max({burst, allowed, 2 * control::longest_line});
+  const std::size_t kept = std::max(burst, 2 * control::longest_line);
   if (static_cast<std::size_t>(waiting) <= kept || dropping_.left(now) == 0) return false;
   // The kernel frees the bytes without copying them (tcp(7), MSG_TRUNC).
   const ssize_t dropped =
