@@ -242,6 +242,32 @@ class Page(PageChecks, unittest.TestCase):
         page.wait("document.querySelector('[name=\"/front/range_m\"]').value === '7.5'")
         self.mock.parameters["/front/range_m"] = 10.0
 
+    def test_settings_take_keys(self):
+        page = self.open()
+        field = "document.querySelector('[name=\"/front/%s\"]')"
+        page.wait(field % "range_m" + "?.value === '10'")
+        page.run((field % "range_m") + ".focus(), document.activeElement.select()")
+        for key in ("9", "9", "Backspace", "Backspace", "7", ".", "5"):
+            page.press(key)
+        self.assertEqual(page.run((field % "range_m") + ".value"), "7.5")
+        page.press("Enter")
+        self.patiently(lambda: self.mock.parameters["/front/range_m"] == 7.5)
+        page.press("ArrowUp")
+        page.press("Tab")
+        self.assertEqual(page.run("document.activeElement.name"), "/front/rate_hz")
+        self.patiently(lambda: self.mock.parameters["/front/range_m"] == 8.5)
+        self.mock.set_calls.clear()
+        page.run("document.activeElement.select()")
+        before = page.run("document.activeElement.value")
+        page.press("3")
+        page.press("Escape")
+        self.assertEqual(page.run((field % "rate_hz") + ".value"), before, "Escape gives it up")
+        self.assertEqual(page.run("document.activeElement === document.body"), True)
+        page.press("f")
+        self.assertEqual(page.text("#freeze"), "Go on", "the page's own keys again")
+        self.assertEqual(self.mock.set_calls, [])
+        self.mock.parameters["/front/range_m"] = 10.0
+
     def test_numbers_are_true(self):
         page = self.open()
         page.wait("Math.abs(document.querySelector('#clients tr:nth-child(2) td:nth-child(2)').innerText - 7) <= 0.3", 40)
