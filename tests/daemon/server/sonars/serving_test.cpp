@@ -1,6 +1,7 @@
 // One client, one sonar, over loopback: the conversation a driver has with the device.
 #include <gmock/gmock.h>
 
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
