@@ -487,6 +487,18 @@ TEST(ReplayOfPingLogs, AFileOfNoKnownSonarIsRefused) {
   EXPECT_THAT(device.error().text, ::testing::HasSubstr("f holds no message of a sonar: f: bytes 1"));
 }
 
+TEST(Replay, SaysThatAPing360CannotBeReplayed) {
+  Bytes file;
+  const auto writer = recording::write_ping_log(recording::sink_into(file));
+  ASSERT_TRUE(
+      writer->write({{}, Origin::device, Carrier::stream, ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{})}));
+  auto opened = recording::open_recording(recording::source_from("f", file));
+  ASSERT_TRUE(opened);
+  const auto device = find_replay_device(*opened->reader, "f", 1042);
+  ASSERT_FALSE(device);
+  EXPECT_THAT(device.error().text, ::testing::HasSubstr("those of a Ping360 cannot"));
+}
+
 // ---- .sonar files
 
 Bytes sonar_file(std::uint32_t shots, milliseconds period) {
