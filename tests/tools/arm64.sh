@@ -62,14 +62,16 @@ build_all() {
   [ ${#tests[@]} -gt 0 ] || { echo "$folder has no tests to build" >&2; return 66; }
   NINJA_STATUS="[%f/%t] " cmake --build "$folder" --parallel "$(build_jobs)" --target installed "${tests[@]}" </dev/null |
     tests/tools/build_progress.py
-  [ "${PIPESTATUS[0]}" = 0 ] || return 1
+  [ "${PIPESTATUS[0]}" = 0 ] && qemu-aarch64 "$folder/daemon/sonard" --version
+}
+
+make_commands() {
   local program
   for program in daemon/sonard clients/sonarctl; do
     mkdir -p "$emulated/${program%/*}"
     printf '#!/bin/sh\nexec qemu-aarch64 "%s/%s" "$@"\n' "$PWD/$folder" "$program" >"$emulated/$program"
     chmod +x "$emulated/$program"
   done
-  qemu-aarch64 "$folder/daemon/sonard" --version
 }
 
 # One line a program that passes; the whole output of one that fails.
@@ -88,9 +90,9 @@ run_tests() {
 }
 
 # A run is the same to the byte on one, two and four threads.
-threads() { SONARD_BUILD=$PWD/$emulated SONARD_PINGS=10 python3 -B tests/acceptance/determinism_test.py; }
+threads() { make_commands && SONARD_BUILD=$PWD/$emulated SONARD_PINGS=3 python3 -B tests/acceptance/determinism_test.py; }
 
-demo() { SONARD_DEMO_SLOWNESS=30 tests/tools/check_demo.sh "$emulated" "$folder/demo.png"; }
+demo() { make_commands && SONARD_DEMO_SLOWNESS=60 tests/tools/check_demo.sh "$emulated" "$folder/demo.png"; }
 
 package() { (cd "$folder" && cpack -G DEB >/dev/null && ls -1 "$PWD"/*_arm64.deb); }
 
