@@ -37,7 +37,7 @@ done
 # Licences of all that is inside: of libraries, and of what was compiled or linked in, by the packages that it came from.
 packages() {
   local package library
-  for library in "${bundled[@]}"; do dpkg-query -S "$(readlink -f "${library#* }")"; done | sed 's/:.*//'
+  for library in "${bundled[@]}"; do dpkg-query -S "*/$(basename "$(readlink -f "${library#* }")")"; done | sed 's/:.*//'
   for package in "${build_packages[@]}" libjs-three; do
     case $package in *-dev | libjs-*) dpkg-query -W -f '${Package} ${Depends}\n' "$package" | sed 's/([^)]*)//g; s/[,|]/ /g' | tr -s ' ' '\n' ;; esac
   done | grep -E -- '-dev$|^libjs-'
